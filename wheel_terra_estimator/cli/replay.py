@@ -1,0 +1,20 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""``wheel-terra replay``."""
+
+from __future__ import annotations
+
+import argparse
+
+from wheel_terra_estimator.errors import UserError
+
+SUMMARY = 'run the estimator over a rosbag2, without ROS'
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of the command."""
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Run the command."""
+    raise UserError('this command is not in this version yet')

@@ -1,0 +1,10 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""The one error that users are meant to see."""
+
+
+class UserError(Exception):
+    """Input that cannot be used: one line that names file, key or row, and the cure.
+
+    Commands print it on standard error and exit with status 2; the node logs it and ends.
+    """

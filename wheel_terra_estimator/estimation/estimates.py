@@ -1,0 +1,64 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Estimates: what the core gives, one set for each distinct stamp of the wheel odometry."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+NO_ENTRAPMENT_IN_SIGHT = 10.0
+"""Rim travel left [m] that ``~/mobility`` states when nothing points to an entrapment."""
+
+
+class SlipClass(IntEnum):
+    """Slip class of a wheel, as published on ``~/slip_class``."""
+
+    LOW = 0
+    MODERATE = 1
+    HIGH = 2
+    STUCK = 3
+    UNKNOWN = 255
+
+
+@dataclass(frozen=True)
+class EstimateSet:
+    """All outputs that belong to one stamp; every array is (n,) in the order of ``wheels.names``.
+
+    No field is ever nan or infinite: what cannot be estimated is held (0 where there never was a
+    value), its standard deviation says how little is known.
+    """
+
+    stamp: int  # [ns]
+    slip: FloatArray  # [-]
+    slip_std: FloatArray
+    slip_velocity: FloatArray  # r w - v [m/s]
+    slip_velocity_std: FloatArray
+    drawbar_pull: FloatArray  # [N]
+    drawbar_pull_std: FloatArray
+    sinkage: FloatArray  # [m]
+    sinkage_std: FloatArray
+    sinkage_rate: FloatArray  # [m/s]
+    sinkage_rate_std: FloatArray
+    normal_load: FloatArray  # [N]
+    normal_load_std: FloatArray
+    slip_class: NDArray[np.uint8]
+    rim_travel_left: FloatArray  # [m]
+    pull_margin: FloatArray  # [N]
+    soil_names: tuple[str, ...]
+    soil: FloatArray  # (k,)
+    soil_std: FloatArray  # (k,)
+    forward_velocity: float  # body x in base_link [m/s]
+    forward_velocity_variance: float
+    yaw_rate: float  # [rad/s]
+    yaw_rate_variance: float
+    stuck: bool
+    stuck_probability: FloatArray  # (n,) [-]
+    time_to_stuck: FloatArray  # (n,) [s]
+    reasons: tuple[str, ...]  # (n,) why the wheel is called what it is called, in words
+    faults: dict[str, str] = field(default_factory=dict)  # input or state -> words, for diagnostics

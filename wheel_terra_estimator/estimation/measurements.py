@@ -1,0 +1,99 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Typed measurements: what the estimator hears, whatever brought it (a topic, a bag row, a test).
+
+All stamps are integer nanoseconds; all vectors are in ``base_link`` (REP 103: x forward, y left,
+z up) in SI units. ``nan`` marks a wheel that the message did not hold or could not measure.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Union
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class WheelOdometry:
+    """Wheel rates and drive torques, one entry per wheel in the order of ``wheels.names``.
+
+    Attributes
+    ----------
+    stamp : int
+        Time of the measurement [ns].
+    rate : numpy.ndarray
+        (n,) wheel rate, positive forward after the wheel's direction was applied [rad/s]; nan
+        where the message did not hold the wheel.
+    torque : numpy.ndarray
+        (n,) drive torque, positive when it drives the wheel forward [N m]; nan where unknown.
+    """
+
+    stamp: int
+    rate: FloatArray
+    torque: FloatArray
+
+
+@dataclass(frozen=True)
+class InertialReading:
+    """One IMU message, already turned into ``base_link``.
+
+    Attributes
+    ----------
+    stamp : int
+        Time of the measurement [ns].
+    specific_force : numpy.ndarray
+        (3,) specific force, +g on z at rest [m/s^2] (REP 145).
+    angular_rate : numpy.ndarray
+        (3,) angular rate [rad/s].
+    orientation : numpy.ndarray or None
+        (4,) unit quaternion x, y, z, w of ``base_link`` in the world; None when not reported.
+    """
+
+    stamp: int
+    specific_force: FloatArray
+    angular_rate: FloatArray
+    orientation: FloatArray | None
+
+
+@dataclass(frozen=True)
+class SinkageReading:
+    """Measured sinkage of the wheels: (n,) depth of the rim below the surface [m], nan = none."""
+
+    stamp: int
+    sinkage: FloatArray
+
+
+@dataclass(frozen=True)
+class LeavingAngleReading:
+    """Measured leaving angle of the wheels: (n,) [rad], negative behind the hub, nan = none."""
+
+    stamp: int
+    leaving_angle: FloatArray
+
+
+@dataclass(frozen=True)
+class ReferenceVelocity:
+    """Body velocity from a slip-free source (visual odometry, GNSS).
+
+    Attributes
+    ----------
+    stamp : int
+        Time of the measurement [ns].
+    forward : float
+        Velocity of ``base_link`` along its x axis [m/s].
+    variance : float
+        Variance of ``forward`` [(m/s)^2]; 0 or less = not stated.
+    """
+
+    stamp: int
+    forward: float
+    variance: float
+
+
+Measurement = Union[
+    WheelOdometry, InertialReading, SinkageReading, LeavingAngleReading, ReferenceVelocity
+]
