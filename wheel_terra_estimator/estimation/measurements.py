@@ -9,7 +9,7 @@ z up) in SI units. ``nan`` marks a wheel that the message did not hold or could 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Union
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -94,6 +94,21 @@ class ReferenceVelocity:
     variance: float
 
 
-Measurement = Union[
-    WheelOdometry, InertialReading, SinkageReading, LeavingAngleReading, ReferenceVelocity
-]
+Measurement: TypeAlias = (
+    WheelOdometry | InertialReading | SinkageReading | LeavingAngleReading | ReferenceVelocity
+)
+
+
+@dataclass(frozen=True)
+class StepInputs:
+    """All measurements of one stamp, merged: what one step of the estimator gets.
+
+    None where the stamp brought no such measurement. Within a channel the later arrival wins wheel
+    by wheel, so that messages which hold some of the wheels only complete one another.
+    """
+
+    wheel_odometry: WheelOdometry | None = None
+    inertial: InertialReading | None = None
+    sinkage: SinkageReading | None = None
+    leaving_angle: LeavingAngleReading | None = None
+    reference: ReferenceVelocity | None = None
