@@ -1,0 +1,454 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""What a diagnosis says: typed, ready for pictures, and written as ``report.json``."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wheel_terra_estimator.discrepancy.table import QUANTITIES, UNITS, SteadyTable
+
+if TYPE_CHECKING:
+    from wheel_terra_estimator.configuration.reader import Configuration
+
+FloatArray = NDArray[np.float64]
+VERDICTS = ('agrees', 'named', 'unexplained')
+
+
+@dataclass(frozen=True)
+class FittedParameter:
+    """A fitted parameter: ``value`` and ``std`` in ``unit``, with the bounds of the fit."""
+
+    value: float
+    std: float
+    unit: str
+    lower: float = -math.inf
+    upper: float = math.inf
+    meaning: str = ''
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the keys of ``report.json``."""
+        return {'value': self.value, 'std': self.std, 'unit': self.unit}
+
+
+@dataclass(frozen=True)
+class NamedEffect:
+    """An effect that was added to the model.
+
+    Attributes
+    ----------
+    name, claim, source : str
+        As in the catalogue.
+    parameters : mapping
+        Parameter name -> fitted parameter.
+    confidence : float
+        Probability that the name is right, calibrated on synthetic campaigns.
+    confidence_of_set : float
+        Probability that the name or one of ``confounded_with`` is right.
+    confounded_with : tuple of str
+        Effects that the data cannot tell from it, most probable first.
+    remainder : bool
+        True where something smooth is left that it does not explain.
+    separates : mapping
+        Confounded name -> what would separate the two, from the catalogue.
+    """
+
+    name: str
+    parameters: Mapping[str, FittedParameter]
+    confidence: float
+    confidence_of_set: float
+    confounded_with: tuple[str, ...] = ()
+    remainder: bool = False
+    claim: str = ''
+    source: str = ''
+    separates: Mapping[str, str] = field(default_factory=dict)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the keys of ``report.json``."""
+        return {
+            'name': self.name,
+            'parameters': {key: value.to_dict() for key, value in self.parameters.items()},
+            'confidence': self.confidence,
+            'confidence_of_set': self.confidence_of_set,
+            'confounded_with': list(self.confounded_with),
+            'remainder': self.remainder,
+        }
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One set of effects that was fitted, the empty one (``nothing``) included.
+
+    Attributes
+    ----------
+    names : tuple of str
+        The effects in it.
+    log_evidence : float
+        Log marginal likelihood relative to ``nothing``: above 0 the data speak for it.
+    probability : float
+        Posterior probability among all fitted sets.
+    held_out_gain : float
+        Log predictive score on groups of rows that the fit did not see, relative to the soil refit.
+    chi2, degrees_of_freedom : float
+        Of the residual after the fit, whitened by the noise.
+    parameters : mapping
+        ``effect.parameter`` -> fitted parameter.
+    size : float
+        Distance d' to the best soil refit, in noise standard deviations, at the fitted values.
+    why_not : str
+        Why it was not added; empty for the chosen one.
+    """
+
+    names: tuple[str, ...]
+    log_evidence: float
+    probability: float
+    held_out_gain: float
+    chi2: float
+    degrees_of_freedom: float
+    parameters: Mapping[str, FittedParameter]
+    size: float
+    why_not: str = ''
+
+    @property
+    def label(self) -> str:
+        """Names joined for people."""
+        return ' + '.join(self.names) if self.names else 'nothing'
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the keys of ``report.json``."""
+        return {
+            'name': self.label,
+            'log_evidence': self.log_evidence,
+            'why_not': self.why_not,
+            'probability': self.probability,
+            'held_out_gain': self.held_out_gain,
+            'chi2': self.chi2,
+            'parameters': {key: value.to_dict() for key, value in self.parameters.items()},
+        }
+
+
+@dataclass(frozen=True)
+class QuantityGap:
+    """Root-mean-square error of one quantity on rows that the fit did not see [its unit].
+
+    ``noise`` is the stated or estimated standard deviation, ``floor`` the model-error floor that
+    the data ask for; ``shrink`` = 1 - excess(after)/excess(refit), where the excess is what is left
+    when noise and floor are subtracted in squares, with a bootstrap interval over the rows.
+    """
+
+    before: float
+    refit: float
+    after: float
+    noise: float | None
+    floor: float = 0.0
+    rows: int = 0
+    shrink: float | None = None
+    shrink_low: float | None = None
+    shrink_high: float | None = None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the keys of ``report.json``."""
+        result: dict[str, Any] = {
+            'before': self.before,
+            'refit': self.refit,
+            'after': self.after,
+            'rows': self.rows,
+            'floor': self.floor,
+        }
+        for key in ('noise', 'shrink', 'shrink_low', 'shrink_high'):
+            if getattr(self, key) is not None:
+                result[key] = getattr(self, key)
+        return result
+
+
+@dataclass(frozen=True)
+class InputRange:
+    """One side of the box in which the gap is largest."""
+
+    input: str
+    low: float
+    high: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class Where:
+    """Where model (soil refitted) and measurement disagree most.
+
+    Attributes
+    ----------
+    sentence : str
+        For people.
+    quantity : str
+        The quantity with the largest share of the misfit.
+    shares : mapping
+        Quantity -> share of the squared misfit in excess of the noise, 0..1.
+    box : tuple of InputRange
+        Region with the largest gap; empty = everywhere (a constant shift).
+    rows : numpy.ndarray
+        Indices of the table rows inside the box.
+    share_of_gap, share_of_rows : float
+        Share of the misfit and of the rows inside.
+    mean : float
+        Mean of measured minus model inside, in the unit of ``quantity``.
+    mean_in_noise_std : float
+        The same in noise standard deviations.
+    p_value : float
+        Of the box, calibrated by the parametric bootstrap of the soil refit.
+    trend_input, trend_correlation : str, float
+        Input with the largest rank correlation with the residual.
+    """
+
+    sentence: str
+    quantity: str
+    shares: Mapping[str, float]
+    box: tuple[InputRange, ...]
+    rows: NDArray[np.intp]
+    share_of_gap: float
+    share_of_rows: float
+    mean: float
+    mean_in_noise_std: float
+    p_value: float
+    trend_input: str
+    trend_correlation: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the keys of ``report.json``."""
+        return {
+            'sentence': self.sentence,
+            'quantity': self.quantity,
+            'shares': dict(self.shares),
+            'box': [vars(side) for side in self.box],
+            'rows': [int(row) for row in self.rows],
+            'share_of_gap': self.share_of_gap,
+            'share_of_rows': self.share_of_rows,
+            'mean': self.mean,
+            'unit': UNITS[self.quantity],
+            'mean_in_noise_std': self.mean_in_noise_std,
+            'p_value': self.p_value,
+            'trend_input': self.trend_input,
+            'trend_correlation': self.trend_correlation,
+        }
+
+
+@dataclass(frozen=True)
+class NextMeasurement:
+    """A measurement that would settle what stays open.
+
+    Attributes
+    ----------
+    what : str
+        For people.
+    separates : tuple of str
+        The two rivals (``nothing`` may be one).
+    distance_now, distance_then : float
+        Distance between the rivals' best fits in noise standard deviations, before and with it.
+    rows : mapping or None
+        Column -> values of the proposed rows (SI); None for a zero check of an instrument.
+    predictions : mapping
+        Rival -> (n, 3) predicted sinkage, drawbar pull, torque of these rows.
+    """
+
+    what: str
+    separates: tuple[str, ...]
+    distance_now: float
+    distance_then: float
+    rows: Mapping[str, FloatArray] | None = None
+    predictions: Mapping[str, FloatArray] = field(default_factory=dict)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the keys of ``report.json``."""
+        return {
+            'what': self.what,
+            'separates': list(self.separates),
+            'distance_now': self.distance_now,
+            'distance_then': self.distance_then,
+            'rows': None
+            if self.rows is None
+            else {key: [float(x) for x in value] for key, value in self.rows.items()},
+        }
+
+
+@dataclass(frozen=True)
+class SoilShift:
+    """A soil parameter before and after the fit; ``pull`` = shift in stated deviations."""
+
+    name: str
+    before: float
+    prior_std: float
+    refit: float
+    after: float
+    after_std: float
+    pull: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class Curves:
+    """(N, 3) model values of the table's rows: sinkage, drawbar pull, torque.
+
+    ``before`` = as configured, ``refit`` = soil refitted, ``after`` = effects added; the
+    ``held_out`` pair was computed row by row from fits that did not see the row. ``band`` is one
+    standard deviation of noise plus floor; ``signature`` the part of the named (or best) effect
+    that the soil cannot imitate, ``rival_signature`` the same of the next best one.
+    """
+
+    before: FloatArray
+    refit: FloatArray
+    after: FloatArray
+    held_out_refit: FloatArray
+    held_out_after: FloatArray
+    band: FloatArray
+    signature: FloatArray | None = None
+    signature_name: str = ''
+    rival_signature: FloatArray | None = None
+    rival_name: str = ''
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Standard deviation of each cell and how it was found.
+
+    ``std`` (N, 3) [m, N, N m]; ``origin`` quantity -> ``given``, ``repeats`` or ``estimated``;
+    ``degrees_of_freedom`` quantity -> how well it is known (infinite where given).
+    """
+
+    std: FloatArray
+    origin: Mapping[str, str]
+    degrees_of_freedom: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """Everything a diagnosis found.
+
+    Attributes
+    ----------
+    verdict : str
+        ``agrees``, ``named`` or ``unexplained``.
+    sentence : str
+        The verdict for people, in one or two sentences.
+    table : SteadyTable
+    configuration : Configuration
+    effects : tuple of NamedEffect
+        Strongest first; empty unless ``named``.
+    candidates : tuple of Candidate
+        Best first, ``nothing`` among them.
+    gap : mapping
+        Quantity -> QuantityGap.
+    not_visible : mapping
+        Effect -> why these rows could not have shown it.
+    smallest_visible : mapping
+        Effect -> (parameter, smallest size that these rows would have shown, unit).
+    where : Where
+    next_measurement : tuple of NextMeasurement
+    curves : Curves
+    noise : Noise
+    soil : tuple of SoilShift
+    outliers : tuple of (int, str, float)
+        Row index, quantity, deviation in standard deviations of the cells that were set apart.
+    gap_p_value : float
+        Of the test "the soil alone explains these rows".
+    remainder_p_value, remainder_amplitude : float
+        Of what is left after the fit, and the smooth part in it as a share of the range.
+    floor : float
+        Model-error floor in use, as a share of each quantity's range.
+    notes : tuple of str
+        Warnings for people (units, duplicates, constant columns, soil pulls).
+    base_effects : tuple of str
+        Effects that the configuration had switched on already.
+    seconds : float
+        Time the diagnosis took.
+    """
+
+    verdict: str
+    sentence: str
+    table: SteadyTable
+    configuration: Configuration
+    effects: tuple[NamedEffect, ...]
+    candidates: tuple[Candidate, ...]
+    gap: Mapping[str, QuantityGap]
+    not_visible: Mapping[str, str]
+    smallest_visible: Mapping[str, tuple[str, float, str]]
+    where: Where
+    next_measurement: tuple[NextMeasurement, ...]
+    curves: Curves
+    noise: Noise
+    soil: tuple[SoilShift, ...]
+    outliers: tuple[tuple[int, str, float], ...]
+    gap_p_value: float
+    remainder_p_value: float
+    remainder_amplitude: float
+    floor: float
+    notes: tuple[str, ...] = ()
+    base_effects: tuple[str, ...] = ()
+    seconds: float = 0.0
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the content of ``report.json``: finite numbers, text and lists only."""
+        return _finite(
+            {
+                'verdict': self.verdict,
+                'sentence': self.sentence,
+                'effects': [effect.to_dict() for effect in self.effects],
+                'candidates': [candidate.to_dict() for candidate in self.candidates],
+                'gap': {key: value.to_dict() for key, value in self.gap.items()},
+                'not_visible': sorted(self.not_visible),
+                'why_not_visible': dict(self.not_visible),
+                'smallest_visible': {
+                    key: {'parameter': parameter, 'value': value, 'unit': unit}
+                    for key, (parameter, value, unit) in self.smallest_visible.items()
+                },
+                'where': self.where.to_dict(),
+                'next_measurement': [item.to_dict() for item in self.next_measurement],
+                'soil': [vars(shift) for shift in self.soil],
+                'noise': {
+                    quantity: {
+                        'std': float(np.nanmedian(self.noise.std[:, column])),
+                        'origin': self.noise.origin[quantity],
+                    }
+                    for column, quantity in enumerate(QUANTITIES)
+                    if quantity in self.noise.origin
+                },
+                'outliers': [
+                    {'line': int(self.table.lines[row]), 'quantity': quantity, 'deviation': size}
+                    for row, quantity, size in self.outliers
+                ],
+                'gap_p_value': self.gap_p_value,
+                'remainder': {
+                    'p_value': self.remainder_p_value,
+                    'amplitude': self.remainder_amplitude,
+                },
+                'floor': self.floor,
+                'base_effects': list(self.base_effects),
+                'notes': list(self.notes),
+                'rows': len(self.table.lines),
+                'table': self.table.name,
+            }
+        )
+
+    def write_json(self, path: str | Path) -> None:
+        """Write ``report.json``."""
+        text = json.dumps(self.to_dict(), indent=2, ensure_ascii=False, allow_nan=False)
+        Path(path).write_text(text + '\n', encoding='utf-8')
+
+
+def _finite(value: Any) -> Any:
+    """Turn numpy scalars into numbers and what is not finite into null: JSON has no NaN."""
+    if isinstance(value, Mapping):
+        return {key: _finite(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(item) for item in value]
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
