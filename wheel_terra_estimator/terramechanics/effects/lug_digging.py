@@ -1,0 +1,33 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Lugs dig soil out from under the wheel."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+from wheel_terra_estimator.terramechanics.contact import Contact
+from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter
+
+
+def _dig(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
+    contact.sinkage = contact.sinkage + p.kd * contact.lug_height * maths.maximum(contact.slip, 0.0)
+
+
+EFFECT = Effect(
+    name='lug_digging',
+    claim='lugs dig soil out: sinkage grows with lug height times slip, forces do not change',
+    symbol='z += kd h s',
+    parameters=(
+        EffectParameter(
+            'kd', '-', 1.0, 0.0, 4.0, 1.0, 'half_normal', 'share of the lug height dug at s = 1'
+        ),
+    ),
+    touches=frozenset({'sinkage'}),
+    needs=('slip', 'lug_height'),
+    confounded_with={'slip_sinkage_exponent': 'pull and torque; a second lug height; load'},
+    validity='s from 0 to 0.9; above, repeated digging at one place is not bounded by h',
+    source='Ding et al. 2010 eqs 9 to 12 and 20 (doi 10.1007/s11771-010-0021-7)',
+    on_outputs=_dig,
+)

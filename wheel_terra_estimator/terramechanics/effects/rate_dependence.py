@@ -1,0 +1,43 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Strength of the soil depends on the speed of the rim."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+from wheel_terra_estimator.terramechanics.contact import Contact
+from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter
+
+REFERENCE_SPEED = 0.05  # [m/s]; rover speed, below which Ding et al. 2010 saw no influence
+
+
+def _rate(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
+    known = contact.rim_speed > 1e-4
+    speed = maths.where(known, contact.rim_speed, REFERENCE_SPEED)
+    decades = maths.log(speed / REFERENCE_SPEED)
+    contact.bearing_modulus = contact.bearing_modulus * maths.exp(p.bearing * decades)
+    shear = maths.exp(p.shear * decades)
+    contact.cohesion = contact.cohesion * shear
+    contact.tan_friction = contact.tan_friction * shear
+
+
+EFFECT = Effect(
+    name='rate_dependence',
+    claim='bearing or shear strength depends on the rim speed',
+    symbol='k *= (v_rim/0.05 m/s)^bearing;  c, tan(phi) *= (v_rim/0.05 m/s)^shear',
+    parameters=(
+        EffectParameter(
+            'bearing', '-', 0.1, -0.6, 0.6, 0.15, 'normal', 'exponent of the bearing strength'
+        ),
+        EffectParameter(
+            'shear', '-', 0.0, -0.4, 0.4, 0.05, 'normal', 'exponent of the shear strength'
+        ),
+    ),
+    touches=frozenset({'sinkage', 'drawbar_pull', 'torque'}),
+    needs=('angular_velocity',),
+    validity='rim speed 1 mm/s to 1 m/s; no influence where the speed is not recorded',
+    source='power law of strain rate, own choice; Ding et al. 2010: none below 55 mm/s',
+    on_inputs=_rate,
+)

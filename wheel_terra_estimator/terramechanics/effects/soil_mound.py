@@ -1,0 +1,52 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""At high slip soil piles up behind the wheel and moves the leaving angle."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+from wheel_terra_estimator.terramechanics.contact import Contact
+from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter
+
+
+def _mound(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
+    """Raise the rear contact height: z2 = z20 + kappa z ((s - onset)+/(1 - onset))^2."""
+    excess = maths.maximum(contact.slip - p.onset, 0.0) / (1.0 - p.onset)
+    rise = p.kappa * excess * excess * (1.0 - maths.cos(contact.entrance_angle))
+    # 1 - cos is the contact height over r. The slope of a circle is steeper the higher one gets, so
+    # the height saturates below the hub (1 - exp keeps it smooth).
+    base = 1.0 - maths.cos(contact.leaving_angle)
+    height = base + (1.0 - base) * (1.0 - maths.exp(-rise / (1.0 - base)))
+    raised = -maths.arccos(maths.maximum(1.0 - height, 0.0))
+    contact.leaving_angle = maths.where(rise > 0.0, raised, contact.leaving_angle)
+
+
+EFFECT = Effect(
+    name='soil_mound',
+    claim='at high slip, soil piles up behind the wheel and moves the leaving angle back',
+    symbol='r (1 - cos t_2) += kappa z x^2, x = (s - onset)+/(1 - onset)',
+    parameters=(
+        EffectParameter(
+            'kappa',
+            '-',
+            1.0,
+            0.0,
+            8.0,
+            1.0,
+            'half_normal',
+            'height of the mound at s = 1 over the sinkage',
+        ),
+        EffectParameter(
+            'onset', '-', 0.4, 0.0, 0.9, 0.15, 'normal', 'slip at which it starts', prior_mean=0.4
+        ),
+    ),
+    touches=frozenset({'sinkage', 'drawbar_pull', 'torque'}),
+    needs=('slip',),
+    confounded_with={'stress_peak_shift': 'a rear camera: measured leaving angle'},
+    validity='slip up to 0.95; a measured leaving angle overrides it',
+    source='Guo, Ding et al., high-slip contact modelling for grouser-wheeled rovers, Mech. Mach. '
+    'Theory (a mound higher than the free surface); law reconstructed here',
+    on_contact=_mound,
+)

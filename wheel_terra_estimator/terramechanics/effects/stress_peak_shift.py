@@ -1,0 +1,31 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""The angle of greatest stress moves forward with slip."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+from wheel_terra_estimator.terramechanics.contact import Contact
+from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter
+
+
+def _shift(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
+    contact.peak_ratio = contact.peak_ratio + p.c2 * contact.slip
+
+
+EFFECT = Effect(
+    name='stress_peak_shift',
+    claim='the angle of greatest stress moves forward with slip',
+    symbol='t_m = (c1 + c2 s) t_1',
+    parameters=(EffectParameter('c2', '-', 0.2, -0.5, 0.8, 0.2, 'half_normal', 'shift at s = 1'),),
+    touches=frozenset({'sinkage', 'drawbar_pull', 'torque'}),
+    needs=('slip',),
+    confounded_with={
+        'slip_sinkage_exponent': 'high load, braking rows, slip near 0.9; pressure cells in the rim'
+    },
+    validity='c1 + c2 s between 0 and 1; clamped inside the contact',
+    source='Wong and Reece 1967; Ding et al. 2010 section 3.1.1 (doi 10.1007/s11771-010-0021-7)',
+    on_inputs=_shift,
+)

@@ -1,0 +1,93 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Slip ratio of the public contract and what follows from it for the soil under the rim."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+# A locked wheel (s = -1) has v/w without bound; this floor on 1 + s keeps it finite, with a shear
+# that is saturated long before.
+_LOCKED = 1e-6
+
+
+def slip_ratio(speed: Any, rim_speed: Any, rest_speed: float = 2e-3) -> Any:
+    """Slip ratio s of a wheel from its ground speed and its rim speed.
+
+    Driving (``|v| <= |r w|``): s = 1 - v/(r w). Braking or skidding: s = r w/v - 1. Symmetric in
+    direction. If v opposes r w and ``|r w|`` exceeds `rest_speed`, s = 1; a wheel held still while
+    the rover moves has s = -1.
+
+    Parameters
+    ----------
+    speed, rim_speed : float or array_like
+        Ground speed v and rim speed r w, any common shape [m/s].
+    rest_speed : float
+        Below it a speed counts as rest [m/s].
+
+    Returns
+    -------
+    numpy.ndarray
+        Slip ratio in [-1, 1]; nan where both speeds are below `rest_speed`.
+    """
+    v, rw = np.broadcast_arrays(np.asarray(speed, float), np.asarray(rim_speed, float))
+    turning, moving = np.abs(rw) > rest_speed, np.abs(v) > rest_speed
+    with np.errstate(divide='ignore', invalid='ignore'):
+        driving = 1.0 - v / rw
+        braking = rw / v - 1.0
+    slip = np.where(np.abs(v) <= np.abs(rw), driving, braking)
+    slip = np.where(turning & (v * rw < 0.0), 1.0, slip)
+    slip = np.where(~turning & moving, -1.0, slip)
+    return np.clip(np.where(turning | moving, slip, np.nan), -1.0, 1.0)
+
+
+def speed_ratio(slip: Any, maths: Any = np) -> Any:
+    """Return v/(r w) for a slip ratio (scalars with `maths=ScalarMaths`) [-]."""
+    driving = 1.0 - slip
+    braking = 1.0 / maths.maximum(1.0 + slip, _LOCKED)
+    return maths.where(slip >= 0.0, driving, braking)
+
+
+def slip_of_speed_ratio(ratio: Any, maths: Any = np) -> Any:
+    """Return the slip ratio for u = v/(r w); the inverse of `speed_ratio` for u >= 0 [-]."""
+    driving = 1.0 - maths.maximum(ratio, 0.0)
+    braking = 1.0 / maths.maximum(ratio, 1.0) - 1.0
+    return maths.where(ratio <= 1.0, driving, braking)
+
+
+def change_of_radius(slip: Any, from_radius: Any, to_radius: Any, maths: Any = np) -> Any:
+    """Slip ratio of the same motion for another reference radius [-]."""
+    return slip_of_speed_ratio(speed_ratio(slip, maths) * from_radius / to_radius, maths)
+
+
+def shear_displacement(
+    angle: Any, entrance_angle: Any, shear_radius: Any, velocity_ratio: Any, maths: Any = np
+) -> Any:
+    """Shear displacement j = R (t1 - t) - (v/w)(sin t1 - sin t) [m].
+
+    Seed 1 equation 14, written with v/w so that slip radius and shear radius may differ; j < 0 is
+    a rim that drags the soil along (braking).
+
+    Parameters
+    ----------
+    angle, entrance_angle : float or array_like
+        Hub angle t and entrance angle t1 [rad].
+    shear_radius, velocity_ratio : float or array_like
+        R and v/w [m].
+    """
+    return shear_radius * (entrance_angle - angle) - velocity_ratio * (
+        maths.sin(entrance_angle) - maths.sin(angle)
+    )
+
+
+def lug_passage_period(wheel: Any, angular_velocity: Any) -> Any:
+    """Time between two lugs [s], seed 1 equation 2: 2 pi/(n w) = 2 pi r (1 - s)/(n v).
+
+    Infinite for a smooth or a standing wheel.
+    """
+    rate = np.asarray(wheel.lug_count, float) * np.abs(np.asarray(angular_velocity, float))
+    with np.errstate(divide='ignore'):
+        return 2.0 * math.pi / rate

@@ -1,0 +1,77 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Steady operating points: one entry per wheel, table row or grid point."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from wheel_terra_estimator.terramechanics.checks import check_range
+from wheel_terra_estimator.terramechanics.wheel import Wheel
+
+STANDARD_GRAVITY = 9.80665  # [m/s^2]
+SLIP_RADII = ('lug_tip', 'rim', 'shear')
+
+
+@dataclass(frozen=True)
+class OperatingPoints:
+    """What is known of N steady wheel-soil contacts before the soil answers.
+
+    Attributes
+    ----------
+    slip : array_like
+        (N,) recorded slip ratio of the public contract, in [-1, 1] [-].
+    normal_load : array_like
+        (N,) load on the wheel as recorded (terrain normal, unless `slope_gravity` is on) [N].
+    wheel : Wheel
+        Floats, or arrays of shape (N,).
+    slope : array_like
+        (N,) slope, positive uphill [rad].
+    slip_radius : str
+        Radius to which `slip` refers: ``lug_tip`` (r + h), ``rim`` (r), or ``shear`` (the model's
+        shear radius: equation 14 as seed 1 prints it).
+    gravity : array_like
+        (N,) [m/s^2].
+    angular_velocity : array_like
+        (N,) wheel rate [rad/s], negative in reverse; nan = not recorded (taken as forward).
+    pass_number : array_like
+        (N,) 1 on virgin soil, 2 for the second wheel in the same rut, and so on.
+    leaving_angle : array_like
+        (N,) measured leaving angle [rad], negative behind the hub; nan = not measured.
+    """
+
+    slip: Any
+    normal_load: Any
+    wheel: Wheel
+    slope: Any = 0.0
+    slip_radius: str = 'lug_tip'
+    gravity: Any = STANDARD_GRAVITY
+    angular_velocity: Any = np.nan
+    pass_number: Any = 1
+    leaving_angle: Any = np.nan
+
+    def __post_init__(self) -> None:
+        if self.slip_radius not in SLIP_RADII:
+            raise ValueError(f'slip radius is {self.slip_radius!r}; allowed is one of {SLIP_RADII}')
+        wheel = self.wheel
+        names = ('slip', 'normal_load', 'slope', 'gravity', 'angular_velocity', 'pass_number')
+        columns = [np.asarray(getattr(self, name), float) for name in (*names, 'leaving_angle')]
+        wheel_shapes = [np.shape(v) for v in (wheel.radius, wheel.width, wheel.lug_height)]
+        shape = np.broadcast_shapes((1,), *(c.shape for c in columns), *wheel_shapes)
+        for name, column in zip((*names, 'leaving_angle'), columns, strict=True):
+            object.__setattr__(self, name, np.broadcast_to(column, shape))
+        check_range('slip', self.slip, -1.0, 1.0)
+        check_range('normal load', self.normal_load, 0.0, unit='N', open_lower=True)
+        check_range('slope', self.slope, -np.pi / 2, np.pi / 2, unit='rad')
+        check_range('gravity', self.gravity, 0.0, unit='m/s^2', open_lower=True)
+        check_range('angular velocity', self.angular_velocity, unit='rad/s', allow_nan=True)
+        check_range('pass number', self.pass_number, 1.0)
+        check_range(
+            'leaving angle', self.leaving_angle, -np.pi / 2, np.pi / 4, unit='rad', allow_nan=True
+        )
+
+    def __len__(self) -> int:
+        return int(self.slip.shape[0])

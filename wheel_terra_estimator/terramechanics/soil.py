@@ -1,0 +1,73 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Soil parameters of the wheel-soil model."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from wheel_terra_estimator.terramechanics.checks import check_range
+
+PRESSURE_LAWS = ('bekker', 'reece')
+
+
+@dataclass(frozen=True)
+class Soil:
+    """Soil parameters as the model without any effect uses them.
+
+    Every number is a float, or an array that broadcasts against the operating points.
+
+    Attributes
+    ----------
+    cohesive_modulus : float or numpy.ndarray
+        kc [N/m^(n+1)] in p = (kc/b + kphi) z^n (Bekker); kc' [-] in
+        p = (c kc' + density g b kphi') (z/b)^n (Reece).
+    frictional_modulus : float or numpy.ndarray
+        kphi [N/m^(n+2)] (Bekker) or kphi' [-] (Reece).
+    sinkage_exponent : float or numpy.ndarray
+        n0 [-].
+    cohesion : float or numpy.ndarray
+        c [Pa].
+    friction_angle : float or numpy.ndarray
+        phi [rad].
+    shear_modulus : float or numpy.ndarray
+        K, shear displacement scale of Janosi and Hanamoto [m].
+    peak_stress_ratio : float or numpy.ndarray
+        c1 = angle of greatest stress over entrance angle at zero slip [-].
+    leaving_angle_ratio : float or numpy.ndarray
+        c3 = leaving angle over entrance angle [-], zero or negative.
+    density : float or numpy.ndarray
+        Bulk density [kg/m^3].
+    pressure_law : str
+        ``bekker`` or ``reece``; says how the two moduli are read.
+    """
+
+    cohesive_modulus: Any
+    frictional_modulus: Any
+    sinkage_exponent: Any
+    cohesion: Any
+    friction_angle: Any
+    shear_modulus: Any
+    peak_stress_ratio: Any = 0.5
+    leaving_angle_ratio: Any = -0.2
+    density: Any = 1600.0
+    pressure_law: str = 'bekker'
+
+    def __post_init__(self) -> None:
+        if self.pressure_law not in PRESSURE_LAWS:
+            raise ValueError(
+                f'pressure law is {self.pressure_law!r}; allowed is one of {PRESSURE_LAWS}'
+            )
+        # kc may be slightly negative in fits to plates of two sizes; what counts is kc/b + kphi.
+        check_range('cohesive modulus', self.cohesive_modulus)
+        check_range('frictional modulus', self.frictional_modulus, 0.0)
+        check_range('sinkage exponent', self.sinkage_exponent, 0.0, 4.0, open_lower=True)
+        check_range('cohesion', self.cohesion, 0.0, unit='Pa')
+        check_range('friction angle', self.friction_angle, 0.0, np.pi / 3, unit='rad')
+        check_range('shear modulus', self.shear_modulus, 0.0, unit='m', open_lower=True)
+        check_range('peak stress ratio', self.peak_stress_ratio, 0.0, 1.0)
+        check_range('leaving angle ratio', self.leaving_angle_ratio, -1.5, 0.0)
+        check_range('density', self.density, 0.0, unit='kg/m^3')
