@@ -1,0 +1,265 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""The checked configuration: SI units and radians, arrays over wheels, nothing left to check."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wheel_terra_estimator.configuration import ros_yaml
+from wheel_terra_estimator.configuration.ros_yaml import Value
+from wheel_terra_estimator.terramechanics.soil import Soil
+from wheel_terra_estimator.terramechanics.wheel import Wheel
+
+FloatArray: TypeAlias = NDArray[np.float64]
+EffectSettings: TypeAlias = dict[str, dict[str, float]]
+
+SOIL_FIELDS = (
+    'cohesive_modulus',
+    'frictional_modulus',
+    'sinkage_exponent',
+    'cohesion',
+    'friction_angle',
+    'shear_modulus',
+    'peak_stress_ratio',
+    'leaving_angle_ratio',
+    'density',
+)
+
+
+class Section:
+    """The parameters below one prefix as attributes, read-only.
+
+    Lists of numbers are numpy arrays; keys that end in ``_deg`` lose the suffix and are radians.
+    """
+
+    def __init__(self, values: Mapping[str, Value], prefix: str) -> None:
+        attributes: dict[str, Any] = {}
+        for key, value in values.items():
+            if key.startswith(prefix):
+                name = key[len(prefix) :]
+                attributes[name.removesuffix('_deg')] = _internal(name, value)
+        self.__dict__.update(attributes)
+
+    def __setattr__(self, name: str, value: object) -> None:
+        raise AttributeError('a configuration is read-only; see Configuration.replace')
+
+    def __getattr__(self, name: str) -> Any:
+        # Reached only for names that the table does not declare.
+        raise AttributeError(f'no such parameter: {name}')
+
+    def __repr__(self) -> str:
+        return f'{type(self).__name__}({self.__dict__})'
+
+
+class Wheels(Section):
+    """Wheels of the rover; every array is (n,) in the order of ``names``."""
+
+    names: tuple[str, ...]
+    radius: FloatArray  # rim [m]
+    width: FloatArray  # [m]
+    lug_height: FloatArray  # [m]
+    lug_count: FloatArray  # [-]
+    lug_thickness: FloatArray  # [m]
+    x: FloatArray  # hub in base_link [m]
+    y: FloatArray
+    z: FloatArray
+    direction: FloatArray  # +1 or -1
+    torque_limit: FloatArray  # [N m], 0 = not known
+    passes: FloatArray  # pass number of the soil
+
+    def __init__(self, values: Mapping[str, Value]) -> None:
+        super().__init__(values, 'wheels.')
+        tip = values['slip_radius'] == 'lug_tip'
+        slip_radius = self.radius + self.lug_height if tip else self.radius.copy()
+        slip_radius.setflags(write=False)
+        self.__dict__['slip_radius'] = slip_radius
+        self.__dict__['wheel'] = Wheel(
+            radius=self.radius,
+            width=self.width,
+            lug_height=self.lug_height,
+            lug_count=self.lug_count,
+            lug_thickness=self.lug_thickness,
+        )
+
+    slip_radius: FloatArray  # radius that the slip ratio refers to [m]
+    wheel: Wheel
+
+    @property
+    def count(self) -> int:
+        """Number of wheels."""
+        return len(self.names)
+
+
+class Rover(Section):
+    """Mass, gravity and suspension."""
+
+    name: str
+    mass: float  # [kg]
+    gravity: float  # [m/s^2]
+    centre_of_gravity: FloatArray  # (3,) [m]
+    suspension: str  # rigid, rocker_bogie, shares
+    load_shares: FloatArray  # (n,)
+    rocker_pivot: FloatArray  # x, z [m]
+    bogie_pivot: FloatArray  # x, z [m]
+    bogie_wheels: str  # front, rear
+    load_std: float
+
+    def __init__(self, values: Mapping[str, Value]) -> None:
+        super().__init__(values, 'rover.')
+
+
+@dataclass(frozen=True, eq=False)
+class Configuration:
+    """Everything that files and overrides stated, checked, with defaults filled in.
+
+    Attributes
+    ----------
+    wheels, rover : Wheels, Rover
+        The vehicle.
+    soil, soil_std : Soil, dict
+        Nominal soil, and field of ``Soil`` -> standard deviation in internal units.
+    effects, effects_std : dict
+        Enabled effect -> parameter -> value or stated standard deviation.
+    sensors, filter : Section
+        ``sensors.*`` and ``filter.*`` as attributes.
+    slip_radius, wheel_odometry, reference_odom_max_rate, rest_speed, max_lag, history
+        The parameters that stand in no section.
+    stated : frozenset of str
+        Keys that a file or an override gave, as against defaults.
+    """
+
+    wheels: Wheels
+    rover: Rover
+    soil: Soil
+    soil_std: dict[str, float]
+    effects: EffectSettings
+    effects_std: EffectSettings
+    sensors: Section
+    filter: Section
+    slip_radius: str
+    wheel_odometry: str
+    reference_odom_max_rate: float  # [Hz]
+    rest_speed: float  # [m/s]
+    max_lag: float  # [s]
+    history: float  # [s]
+    provenance: str
+    stated: frozenset[str]
+    _values: Mapping[str, Value]
+
+    @classmethod
+    def from_values(cls, values: Mapping[str, Value], stated: Iterable[str]) -> Configuration:
+        """Build from checked values of all declared keys (see ``reader``)."""
+        effects, effects_std = _effects(values)
+        soil = _soil(values)
+        return cls(
+            wheels=Wheels(values),
+            rover=Rover(values),
+            soil=soil,
+            soil_std=_soil_std(values, soil),
+            effects=effects,
+            effects_std=effects_std,
+            sensors=Section(values, 'sensors.'),
+            filter=Section(values, 'filter.'),
+            slip_radius=str(values['slip_radius']),
+            wheel_odometry=str(values['wheel_odometry']),
+            reference_odom_max_rate=_number(values, 'reference_odom_max_rate'),
+            rest_speed=_number(values, 'rest_speed'),
+            max_lag=_number(values, 'max_lag'),
+            history=_number(values, 'history'),
+            provenance=str(values['provenance']),
+            stated=frozenset(stated),
+            _values=dict(values),
+        )
+
+    def flat(self) -> dict[str, Value]:
+        """Return canonical key -> value of every declared parameter, as it would be written."""
+        return dict(self._values)
+
+    def replace(self, changes: Mapping[str, Value]) -> Configuration:
+        """Return a configuration in which some keys have other values, checked like a file."""
+        from wheel_terra_estimator.configuration import reader
+
+        stated = {key: self._values[key] for key in self.stated}
+        return reader.from_parameters({**stated, **changes}, complete=False)
+
+    def write(self, path: str | Path, keys: Iterable[str] | None = None, comment: str = '') -> None:
+        """Write a parameter file that the commands and the node accept.
+
+        Parameters
+        ----------
+        path : str or pathlib.Path
+            File to be written.
+        keys : iterable of str, optional
+            Canonical keys to be written, in this order; default: all that were stated.
+        comment : str
+            Lines at the top of the file.
+        """
+        chosen = [key for key in self._values if key in self.stated] if keys is None else keys
+        ros_yaml.write(Path(path), {key: self._values[key] for key in chosen}, comment)
+
+
+def _internal(name: str, value: Value) -> Any:
+    if isinstance(value, list):
+        if isinstance(value[0], str):
+            return tuple(value)
+        array = np.array(value, dtype=float)
+        if name.endswith('_deg'):
+            array = np.radians(array)
+        array.setflags(write=False)
+        return array
+    if name.endswith('_deg') and not isinstance(value, str):
+        return math.radians(value)
+    return value
+
+
+def _number(values: Mapping[str, Value], key: str) -> float:
+    value = values[key]
+    assert isinstance(value, (int, float))
+    return float(value)
+
+
+def _soil(values: Mapping[str, Value]) -> Soil:
+    fields = {
+        field: math.radians(_number(values, 'soil.friction_angle_deg'))
+        if field == 'friction_angle'
+        else _number(values, f'soil.{field}')
+        for field in SOIL_FIELDS
+    }
+    return Soil(**fields, pressure_law=str(values['soil.pressure_law']))
+
+
+def _soil_std(values: Mapping[str, Value], soil: Soil) -> dict[str, float]:
+    section = Section(values, 'soil.')
+    return {
+        field: float(
+            getattr(section, f'{field}_std')
+            or section.relative_std * abs(float(getattr(soil, field)))
+        )
+        for field in SOIL_FIELDS
+    }
+
+
+def _effects(values: Mapping[str, Value]) -> tuple[EffectSettings, EffectSettings]:
+    enabled = [
+        key.split('.')[1]
+        for key, value in values.items()
+        if key.startswith('effects.') and key.endswith('.enabled') and value
+    ]
+    settings: EffectSettings = {}
+    deviations: EffectSettings = {}
+    for name in enabled:
+        below = Section(values, f'effects.{name}.').__dict__
+        stds = {key for key in below if key.removesuffix('_std') in below and key.endswith('_std')}
+        settings[name] = {
+            key: float(value) for key, value in below.items() if key not in stds | {'enabled'}
+        }
+        deviations[name] = {key.removesuffix('_std'): float(below[key]) for key in sorted(stds)}
+    return settings, deviations

@@ -1,0 +1,759 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""The declared parameters: one table from which checks, descriptors and documentation come.
+
+To add a parameter, add one line to ``DECLARED``, such as
+``number('filter.gate_probability', 0.999, '-', 'what it does', above=0.0, at_most=1.0)``: the reader
+then accepts and checks the key, the node declares it, ``configuration.filter.gate_probability`` has
+its value, and ``python -m wheel_terra_estimator.configuration.documentation`` writes it to
+``docs/parameters.md`` (a test says when that was forgotten). ``size='wheels'`` makes a per-wheel
+list, a number a list of that length. A key that ends in ``_deg`` is in degrees in files and in
+radians in the code, where its name has no suffix.
+
+The keys ``effects.<name>.enabled``, ``effects.<name>.<parameter>`` and
+``effects.<name>.<parameter>_std`` come from the catalogue of effects.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from math import inf
+from typing import Literal, TypeAlias
+
+from wheel_terra_estimator.configuration.ros_yaml import Value
+
+Kind: TypeAlias = Literal['number', 'integer', 'flag', 'text']
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One declared parameter.
+
+    Attributes
+    ----------
+    key : str
+        Canonical dotted key.
+    kind : str
+        ``number`` (an integer will do), ``integer``, ``flag`` or ``text``.
+    default : bool, int, float, str or list
+        Value where no file states one; a scalar default of a per-wheel key counts for each wheel.
+    unit : str
+        Unit of the value in files.
+    meaning : str
+        One sentence for the documentation and the node's descriptor.
+    size : 'wheels', int or None
+        Per-wheel list, list of that length (0: any length), or a scalar.
+    lower, upper : float
+        Allowed range of each number.
+    open_lower, open_upper : bool
+        Whether the bound itself is excluded.
+    choices : tuple of str
+        Allowed texts, if not any.
+    aliases : tuple of str
+        Other spellings that are accepted.
+    required : bool
+        Whether a complete configuration must state it.
+    """
+
+    key: str
+    kind: Kind
+    default: Value
+    unit: str
+    meaning: str
+    size: int | Literal['wheels'] | None = None
+    lower: float = -inf
+    upper: float = inf
+    open_lower: bool = False
+    open_upper: bool = False
+    choices: tuple[str, ...] = ()
+    aliases: tuple[str, ...] = ()
+    required: bool = False
+
+    @property
+    def allowed(self) -> str:
+        """What a value must be, in words, for messages and documentation."""
+        noun = {'number': 'number', 'integer': 'integer', 'flag': 'true/false', 'text': 'text'}
+        words = noun[self.kind]
+        if self.choices:
+            words = 'one of ' + ', '.join(self.choices)
+        if self.size is not None:
+            plural = words if self.kind in ('flag', 'text') else f'{words}s'
+            words = f'list of {plural}'
+            if self.size == 'wheels':
+                words += ', one per wheel'
+            elif self.size:
+                words = f'list of {self.size} {plural}'
+        limits = []
+        if self.lower > -inf:
+            limits.append(f'{"above" if self.open_lower else "at least"} {self.lower:g}')
+        if self.upper < inf:
+            limits.append(f'{"below" if self.open_upper else "at most"} {self.upper:g}')
+        if limits:
+            words += f' ({" and ".join(limits)})'
+        return words
+
+
+def number(
+    key: str,
+    default: float | list[float],
+    unit: str,
+    meaning: str,
+    *,
+    size: int | Literal['wheels'] | None = None,
+    above: float | None = None,
+    at_least: float | None = None,
+    below: float | None = None,
+    at_most: float | None = None,
+    aliases: tuple[str, ...] = (),
+    required: bool = False,
+) -> Parameter:
+    """Declare a finite number, or a list of such."""
+    return Parameter(
+        key,
+        'number',
+        default,
+        unit,
+        meaning,
+        size=size,
+        lower=above if above is not None else (-inf if at_least is None else at_least),
+        upper=below if below is not None else (inf if at_most is None else at_most),
+        open_lower=above is not None,
+        open_upper=below is not None,
+        aliases=aliases,
+        required=required,
+    )
+
+
+def integer(
+    key: str,
+    default: int | list[int],
+    unit: str,
+    meaning: str,
+    *,
+    size: int | Literal['wheels'] | None = None,
+    at_least: float = -inf,
+    at_most: float = inf,
+    aliases: tuple[str, ...] = (),
+) -> Parameter:
+    """Declare an integer, or a list of such."""
+    return Parameter(
+        key,
+        'integer',
+        default,
+        unit,
+        meaning,
+        size=size,
+        lower=at_least,
+        upper=at_most,
+        aliases=aliases,
+    )
+
+
+def flag(key: str, default: bool, meaning: str, *, aliases: tuple[str, ...] = ()) -> Parameter:
+    """Declare a switch."""
+    return Parameter(key, 'flag', default, '', meaning, aliases=aliases)
+
+
+def text(
+    key: str,
+    default: str | list[str],
+    meaning: str,
+    *,
+    size: int | Literal['wheels'] | None = None,
+    choices: tuple[str, ...] = (),
+    aliases: tuple[str, ...] = (),
+    required: bool = False,
+) -> Parameter:
+    """Declare a text, or a list of such."""
+    return Parameter(
+        key,
+        'text',
+        default,
+        '',
+        meaning,
+        size=size,
+        choices=choices,
+        aliases=aliases,
+        required=required,
+    )
+
+
+_NOT_STATED = '; 0 = soil.relative_std of the value'
+
+DECLARED: tuple[Parameter, ...] = (
+    # General
+    text('provenance', '', 'where this configuration comes from, in words'),
+    text(
+        'effect_file',
+        '',
+        'Python file that registers effects of your own (path, relative to the file that names '
+        'it); it is executed',
+    ),
+    text(
+        'slip_radius',
+        'lug_tip',
+        'radius that the slip ratio refers to: rim + lug height, or rim',
+        choices=('lug_tip', 'rim'),
+        aliases=('wheels.slip_radius',),
+    ),
+    text(
+        'wheel_odometry',
+        'joint_states',
+        'topic that carries the wheel rates',
+        choices=('joint_states', 'odom'),
+        aliases=('sensors.wheel_odometry',),
+    ),
+    number(
+        'reference_odom_max_rate',
+        0.0,
+        'Hz',
+        'thins reference_odom to this rate, by stamps; 0 = all messages',
+        at_least=0.0,
+        aliases=('sensors.reference_odom_max_rate',),
+    ),
+    number(
+        'rest_speed',
+        0.002,
+        'm/s',
+        'rim or ground speed below which a wheel counts as standing still',
+        above=0.0,
+        aliases=('filter.rest_speed',),
+    ),
+    number(
+        'max_lag',
+        0.0,
+        's',
+        'how long inputs are held back to be sorted by stamp; 0 = released at once',
+        at_least=0.0,
+        at_most=60.0,
+        aliases=('filter.max_lag',),
+    ),
+    number(
+        'history',
+        2.0,
+        's',
+        'how far back a late input is still fused at its own stamp',
+        at_least=0.0,
+        at_most=60.0,
+        aliases=('filter.history',),
+    ),
+    # Wheels
+    text(
+        'wheels.names',
+        ['wheel'],
+        'joint names, front to rear, left before right; every list and output is in this order',
+        size=0,
+        required=True,
+    ),
+    number(
+        'wheels.radius',
+        0.15,
+        'm',
+        'radius of the rim, lugs not counted',
+        size='wheels',
+        above=0.0,
+        at_most=10.0,
+        required=True,
+    ),
+    number(
+        'wheels.width',
+        0.15,
+        'm',
+        'width of the rim',
+        size='wheels',
+        above=0.0,
+        at_most=10.0,
+        required=True,
+    ),
+    number(
+        'wheels.lug_height',
+        0.0,
+        'm',
+        'height of the lugs above the rim; 0 = smooth',
+        size='wheels',
+        at_least=0.0,
+        at_most=1.0,
+    ),
+    integer(
+        'wheels.lug_count',
+        0,
+        '-',
+        'number of lugs around the wheel',
+        size='wheels',
+        at_least=0,
+        at_most=1000,
+    ),
+    number(
+        'wheels.lug_thickness',
+        0.0,
+        'm',
+        'thickness of a lug along the circumference',
+        size='wheels',
+        at_least=0.0,
+        at_most=1.0,
+    ),
+    number('wheels.x', 0.0, 'm', 'hub position in base_link, forward', size='wheels'),
+    number('wheels.y', 0.0, 'm', 'hub position in base_link, left', size='wheels'),
+    number('wheels.z', 0.0, 'm', 'hub position in base_link, up', size='wheels'),
+    integer(
+        'wheels.direction',
+        1,
+        '-',
+        '1, or -1 for a wheel whose joint counts negative when it drives forward (flips rate and '
+        'torque)',
+        size='wheels',
+        at_least=-1,
+        at_most=1,
+    ),
+    number(
+        'wheels.torque_limit',
+        0.0,
+        'N m',
+        'greatest drive torque, for the stall test; 0 = not known',
+        size='wheels',
+        at_least=0.0,
+    ),
+    integer(
+        'wheels.passes',
+        1,
+        '-',
+        'pass number of the soil that the wheel runs in when driving straight (2 = in the rut of '
+        'one wheel before it)',
+        size='wheels',
+        at_least=1,
+        at_most=100,
+    ),
+    # Rover
+    text('rover.name', '', 'name of the rover or test rig, for reports'),
+    number('rover.mass', 0.0, 'kg', 'mass carried by the wheels', above=0.0, required=True),
+    number('rover.gravity', 9.80665, 'm/s^2', 'gravity of the place', above=0.0, at_most=300.0),
+    number(
+        'rover.centre_of_gravity',
+        [0.0, 0.0, 0.0],
+        'm',
+        'centre of gravity x, y, z in base_link',
+        size=3,
+    ),
+    text(
+        'rover.suspension',
+        'rigid',
+        'how the load is shared: a rigid (or soft, symmetric) chassis, a rocker-bogie, or given '
+        'shares',
+        choices=('rigid', 'rocker_bogie', 'shares'),
+    ),
+    number(
+        'rover.load_shares',
+        0.0,
+        '-',
+        'share of the load on each wheel, sum 1, for suspension shares; 0 everywhere = equal',
+        size='wheels',
+        at_least=0.0,
+        at_most=1.0,
+    ),
+    number(
+        'rover.rocker_pivot',
+        [0.0, 0.0],
+        'm',
+        'x, z of the rocker pivots in base_link, for suspension rocker_bogie',
+        size=2,
+    ),
+    number(
+        'rover.bogie_pivot',
+        [0.0, 0.0],
+        'm',
+        'x, z of the bogie pivots in base_link, for suspension rocker_bogie',
+        size=2,
+    ),
+    text(
+        'rover.bogie_wheels',
+        'rear',
+        'which two wheels of each side hang on the bogie, for suspension rocker_bogie',
+        choices=('front', 'rear'),
+    ),
+    number(
+        'rover.load_std',
+        0.03,
+        '-',
+        'standard deviation of the load of a wheel that the load model leaves open, as a share of '
+        'the mean load',
+        at_least=0.0,
+        at_most=1.0,
+    ),
+    # Soil
+    text('soil.name', '', 'name of the soil, for reports'),
+    text(
+        'soil.pressure_law',
+        'bekker',
+        'how the two moduli are read: (kc/b + kphi) z^n, or with reece, where both are pure '
+        "numbers, (c kc' + density g b kphi') (z/b)^n",
+        choices=('bekker', 'reece'),
+    ),
+    number('soil.cohesive_modulus', 1.37e3, 'N/m^(n+1)', 'kc (may be negative in a fit)'),
+    number('soil.frictional_modulus', 814.0e3, 'N/m^(n+2)', 'kphi', at_least=0.0),
+    number('soil.sinkage_exponent', 1.0, '-', 'sinkage exponent n0', above=0.0, at_most=4.0),
+    number('soil.cohesion', 800.0, 'Pa', 'cohesion c', at_least=0.0, at_most=1.0e6),
+    number(
+        'soil.friction_angle_deg',
+        37.2,
+        'deg',
+        'angle of internal friction phi',
+        at_least=0.0,
+        at_most=60.0,
+    ),
+    number(
+        'soil.shear_modulus',
+        0.015,
+        'm',
+        'shear deformation modulus K',
+        above=0.0,
+        at_most=1.0,
+    ),
+    number(
+        'soil.peak_stress_ratio',
+        0.4,
+        '-',
+        'angle of greatest stress over entrance angle at zero slip, c1',
+        at_least=0.0,
+        at_most=1.0,
+    ),
+    number(
+        'soil.leaving_angle_ratio',
+        0.0,
+        '-',
+        'leaving angle over entrance angle, c3 (zero or negative)',
+        at_least=-1.5,
+        at_most=0.0,
+    ),
+    number('soil.density', 1600.0, 'kg/m^3', 'bulk density', above=0.0, at_most=3.0e4),
+    number(
+        'soil.relative_std',
+        0.1,
+        '-',
+        'standard deviation of a soil parameter whose own is not stated, as a share of its value',
+        at_least=0.0,
+        at_most=10.0,
+    ),
+    number(
+        'soil.cohesive_modulus_std',
+        0.0,
+        'N/m^(n+1)',
+        f'standard deviation of kc{_NOT_STATED}',
+        at_least=0.0,
+    ),
+    number(
+        'soil.frictional_modulus_std',
+        0.0,
+        'N/m^(n+2)',
+        f'standard deviation of kphi{_NOT_STATED}',
+        at_least=0.0,
+    ),
+    number(
+        'soil.sinkage_exponent_std',
+        0.0,
+        '-',
+        f'standard deviation of n0{_NOT_STATED}',
+        at_least=0.0,
+    ),
+    number('soil.cohesion_std', 0.0, 'Pa', f'standard deviation of c{_NOT_STATED}', at_least=0.0),
+    number(
+        'soil.friction_angle_std_deg',
+        0.0,
+        'deg',
+        f'standard deviation of phi{_NOT_STATED}',
+        at_least=0.0,
+        at_most=90.0,
+    ),
+    number(
+        'soil.shear_modulus_std',
+        0.0,
+        'm',
+        f'standard deviation of K{_NOT_STATED}',
+        at_least=0.0,
+    ),
+    number(
+        'soil.peak_stress_ratio_std',
+        0.0,
+        '-',
+        f'standard deviation of c1{_NOT_STATED}',
+        at_least=0.0,
+    ),
+    number(
+        'soil.leaving_angle_ratio_std',
+        0.0,
+        '-',
+        f'standard deviation of c3{_NOT_STATED}',
+        at_least=0.0,
+    ),
+    number(
+        'soil.density_std',
+        0.0,
+        'kg/m^3',
+        f'standard deviation of the density{_NOT_STATED}',
+        at_least=0.0,
+    ),
+    # Sensors: what the estimator assumes and the simulator makes
+    number('sensors.wheel_odometry_rate', 10.0, 'Hz', 'rate of the wheel odometry', above=0.0),
+    number(
+        'sensors.wheel_rate_std',
+        0.005,
+        'rad/s',
+        'noise of a wheel rate, one standard deviation',
+        at_least=0.0,
+    ),
+    number(
+        'sensors.torque_std',
+        0.2,
+        'N m',
+        'noise of a drive torque, one standard deviation',
+        at_least=0.0,
+    ),
+    number(
+        'sensors.torque_zero_std',
+        0.1,
+        'N m',
+        'constant zero error of a drive torque, one standard deviation',
+        at_least=0.0,
+    ),
+    number(
+        'sensors.torque_gain_std',
+        0.05,
+        '-',
+        'gain error of the drive torques, one standard deviation',
+        at_least=0.0,
+    ),
+    number('sensors.imu_rate', 50.0, 'Hz', 'rate of the IMU', above=0.0),
+    number(
+        'sensors.specific_force_std',
+        0.05,
+        'm/s^2',
+        'noise of the accelerometer, one standard deviation per message',
+        at_least=0.0,
+    ),
+    number(
+        'sensors.specific_force_bias_std',
+        0.03,
+        'm/s^2',
+        'constant bias of the accelerometer, one standard deviation',
+        at_least=0.0,
+    ),
+    number(
+        'sensors.angular_rate_std',
+        0.005,
+        'rad/s',
+        'noise of the gyroscope, one standard deviation per message',
+        at_least=0.0,
+    ),
+    number(
+        'sensors.angular_rate_bias_std',
+        0.001,
+        'rad/s',
+        'constant bias of the gyroscope, one standard deviation',
+        at_least=0.0,
+    ),
+    number(
+        'sensors.orientation_std_deg',
+        0.3,
+        'deg',
+        'error of the roll and pitch of the orientation, one standard deviation',
+        at_least=0.0,
+    ),
+    number(
+        'sensors.imu_mounting_roll_deg',
+        0.0,
+        'deg',
+        'roll of the IMU frame in base_link (fixed axes x, then y, then z, as in URDF)',
+        at_least=-360.0,
+        at_most=360.0,
+    ),
+    number(
+        'sensors.imu_mounting_pitch_deg',
+        0.0,
+        'deg',
+        'pitch of the IMU frame in base_link',
+        at_least=-360.0,
+        at_most=360.0,
+    ),
+    number(
+        'sensors.imu_mounting_yaw_deg',
+        0.0,
+        'deg',
+        'yaw of the IMU frame in base_link',
+        at_least=-360.0,
+        at_most=360.0,
+    ),
+    number('sensors.sinkage_rate', 10.0, 'Hz', 'rate of the sinkage sensor', above=0.0),
+    number(
+        'sensors.sinkage_std',
+        0.002,
+        'm',
+        'noise of a sinkage reading, one standard deviation',
+        at_least=0.0,
+    ),
+    number(
+        'sensors.sinkage_zero_std',
+        0.001,
+        'm',
+        'constant zero error of a sinkage sensor, one standard deviation',
+        at_least=0.0,
+    ),
+    number(
+        'sensors.leaving_angle_std_deg',
+        3.0,
+        'deg',
+        'error of a measured leaving angle, one standard deviation',
+        above=0.0,
+    ),
+    number('sensors.reference_rate', 1.0, 'Hz', 'rate of the reference velocity', above=0.0),
+    number(
+        'sensors.reference_std',
+        0.003,
+        'm/s',
+        'noise of the reference velocity where its message states no variance',
+        above=0.0,
+    ),
+    number(
+        'sensors.reference_std_floor',
+        0.0005,
+        'm/s',
+        'least standard deviation of a reference velocity that is believed',
+        above=0.0,
+    ),
+    number(
+        'sensors.reference_delay',
+        0.4,
+        's',
+        'typical age of a reference velocity when it arrives',
+        at_least=0.0,
+    ),
+    # Filter: time
+    number(
+        'filter.silence',
+        0.5,
+        's',
+        'wheel odometry silent for this long: sets go on on the stamps of the other inputs',
+        above=0.0,
+    ),
+    number('filter.heartbeat_rate', 5.0, 'Hz', 'rate of the sets during such a silence', above=0.0),
+    number(
+        'filter.clock_step',
+        1.0,
+        's',
+        'a step back of the clock by more than this ends the run',
+        above=0.0,
+    ),
+    # Filter: classes and warnings
+    number(
+        'filter.class_thresholds',
+        [0.3, 0.6, 0.9],
+        '-',
+        'upper bounds of |slip| of the classes low, moderate, high',
+        size=3,
+        above=0.0,
+        at_most=1.0,
+    ),
+    number(
+        'filter.class_hysteresis',
+        0.02,
+        '-',
+        'hysteresis of the slip classes',
+        at_least=0.0,
+        at_most=0.3,
+    ),
+    number(
+        'filter.class_dwell',
+        0.3,
+        's',
+        'how long a new class must hold before it is taken',
+        at_least=0.0,
+    ),
+    number(
+        'filter.rest_time',
+        0.5,
+        's',
+        'how long rim and ground speed must stay below rest_speed before a wheel is at rest',
+        at_least=0.0,
+    ),
+    number(
+        'filter.stuck_horizon',
+        15.0,
+        's',
+        'an entrapment expected within this time raises the stuck warning',
+        above=0.0,
+    ),
+    number(
+        'filter.stuck_travel',
+        0.3,
+        'm',
+        'an entrapment expected within this rim travel raises the stuck warning',
+        above=0.0,
+    ),
+    number(
+        'filter.stuck_clear_slip',
+        0.6,
+        '-',
+        'the stuck warning clears when the median |slip| has been below this',
+        above=0.0,
+        at_most=1.0,
+    ),
+    number(
+        'filter.stuck_clear_time',
+        3.0,
+        's',
+        'for how long, before the stuck warning clears',
+        at_least=0.0,
+    ),
+)
+
+
+def declared() -> dict[str, Parameter]:
+    """Return all parameters by canonical key, those of the effects catalogue included."""
+    from wheel_terra_estimator.terramechanics.effects import catalogue
+
+    table = {parameter.key: parameter for parameter in DECLARED}
+    for name, effect in catalogue().items():
+        prefix = f'effects.{name}'
+        table[f'{prefix}.enabled'] = flag(f'{prefix}.enabled', False, effect.claim)
+        for item in effect.parameters:
+            key = f'{prefix}.{item.name}'
+            table[key] = number(
+                key,
+                float(item.default),
+                item.unit,
+                item.meaning,
+                at_least=float(item.lower),
+                at_most=float(item.upper),
+            )
+            table[f'{key}_std'] = number(
+                f'{key}_std',
+                0.0,
+                item.unit,
+                f'standard deviation of {item.name} as fitted; 0 = not stated',
+                at_least=0.0,
+            )
+    return table
+
+
+def by_spelling(table: Mapping[str, Parameter]) -> dict[str, Parameter]:
+    """Return the parameters by every spelling that is accepted, aliases included."""
+    spellings = dict(table)
+    for parameter in table.values():
+        for alias in parameter.aliases:
+            spellings[alias] = parameter
+    return spellings
+
+
+def nearest(key: str, known: Iterable[str]) -> str | None:
+    """Return the known key that looks most like ``key``, None if none does."""
+    known = list(known)
+    found = difflib.get_close_matches(key, known, n=1, cutoff=0.6)
+    if not found:
+        # A right name in the wrong section ('rover.radius') is near too.
+        last = key.rsplit('.', 1)[-1]
+        found = [other for other in known if other.rsplit('.', 1)[-1] == last]
+    if not found:
+        tails = {other.rsplit('.', 1)[-1]: other for other in known}
+        close = difflib.get_close_matches(key.rsplit('.', 1)[-1], tails, n=1, cutoff=0.6)
+        found = [tails[name] for name in close]
+    return found[0] if found else None

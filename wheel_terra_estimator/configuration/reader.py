@@ -1,0 +1,293 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""From parameter files and overrides to a checked ``Configuration``.
+
+Every complaint is one line that names the file, the key, what is allowed and, for an unknown key,
+the nearest known one.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from wheel_terra_estimator.configuration import ros_yaml, shipped
+from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.configuration.parameters import (
+    Parameter,
+    by_spelling,
+    declared,
+    nearest,
+)
+from wheel_terra_estimator.configuration.ros_yaml import Value
+from wheel_terra_estimator.errors import UserError
+
+# Parameters that every ROS node has; they may stand in the same file.
+STANDARD_PARAMETERS = ('use_sim_time', 'start_type_description_service')
+STANDARD_PREFIXES = ('qos_overrides.',)
+
+_Sourced = dict[str, tuple[Any, str]]
+
+
+def load(
+    files: Sequence[str | Path] = (), overrides: Sequence[str] = (), *, complete: bool = True
+) -> Configuration:
+    """Read parameter files and overrides; later ones win key by key.
+
+    Parameters
+    ----------
+    files : sequence of str or pathlib.Path
+        Paths, or bare names of shipped files.
+    overrides : sequence of str
+        ``NAME:=VALUE``.
+    complete : bool
+        Whether wheels and mass must be stated (not needed where a table brings them).
+
+    Raises
+    ------
+    UserError
+        If a file or key cannot be used.
+    """
+    sourced: list[tuple[str, str, Any]] = []
+    for name in files:
+        path = shipped.find(name)
+        for key, value in ros_yaml.read(path).items():
+            if key == 'effect_file' and value:
+                value = str(path.parent / str(value))
+            sourced.append((key, str(path), value))
+    for override in overrides:
+        key, separator, text = override.partition(':=')
+        if not separator or not key.strip():
+            raise UserError(f"-p {override}: must be NAME:=VALUE, such as 'rover.mass:=120.0'")
+        key = key.strip()
+        sourced.append((key, f'-p {override}', ros_yaml.parse_value(text, f'-p {override}')))
+    return _checked(sourced, complete)
+
+
+def from_parameters(
+    parameters: Mapping[str, Any], *, source: str = 'parameters', complete: bool = True
+) -> Configuration:
+    """Check parameters that came without a file (the node's overrides, a caller's mapping).
+
+    Parameters
+    ----------
+    parameters : mapping
+        Key -> scalar or sequence; arrays of any kind will do.
+    source : str
+        What messages name in place of the file.
+    complete : bool
+        As for ``load``.
+    """
+    sourced = [
+        (key, source, value.tolist() if hasattr(value, 'tolist') else value)
+        for key, value in parameters.items()
+    ]
+    return _checked(sourced, complete)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare ``--config`` and ``-p``, the same for every command."""
+    parser.add_argument(
+        '--config',
+        action='append',
+        default=[],
+        metavar='F',
+        help='parameter file, or the bare name of a shipped one (frostyboy); may be given several '
+        'times, later files win key by key',
+    )
+    parser.add_argument(
+        '-p',
+        dest='parameters',
+        action='append',
+        default=[],
+        metavar='NAME:=VALUE',
+        help='one parameter, wins over files; may be given several times',
+    )
+
+
+def from_arguments(arguments: argparse.Namespace, *, complete: bool = True) -> Configuration:
+    """Return the configuration that the arguments of ``add_arguments`` ask for."""
+    return load(arguments.config, arguments.parameters, complete=complete)
+
+
+def _checked(sourced: Sequence[tuple[str, str, Any]], complete: bool) -> Configuration:
+    _load_effect_file(sourced)
+    table = declared()
+    spellings = by_spelling(table)
+    stated: _Sourced = {}
+    seen: dict[tuple[str, str], str] = {}
+    for key, source, value in sourced:
+        if key in STANDARD_PARAMETERS or key.startswith(STANDARD_PREFIXES):
+            continue
+        parameter = spellings.get(key)
+        if parameter is None:
+            raise UserError(_unknown(key, source, spellings))
+        before = seen.setdefault((source, parameter.key), key)
+        if before != key:
+            raise UserError(f'{source}: {before} and {key} are the same parameter; give one')
+        stated[parameter.key] = (value, source)
+    if complete:
+        _require(table, stated, [source for _, source, _ in sourced])
+    values: dict[str, Value] = {}
+    names = table['wheels.names']
+    wheels = len(_value(names, stated, 0))
+    for key, parameter in table.items():
+        values[key] = _value(parameter, stated, wheels)
+    _cross_check(values, stated)
+    return Configuration.from_values(values, stated)
+
+
+def _load_effect_file(sourced: Sequence[tuple[str, str, Any]]) -> None:
+    """Register a user's own effects before their keys are judged."""
+    for key, source, value in reversed(sourced):
+        if key == 'effect_file' and value:
+            if not Path(str(value)).is_file():
+                raise UserError(f'{source}: effect_file: there is no file {value}')
+            from wheel_terra_estimator.terramechanics import effects
+
+            try:
+                effects.load_file(str(value))
+            except ValueError as error:
+                raise UserError(f'{source}: effect_file: {error}') from None
+            return
+
+
+def _unknown(key: str, source: str, spellings: Mapping[str, Parameter]) -> str:
+    close = nearest(key, spellings)
+    if close is None:
+        sections = 'wheels, rover, soil, sensors, filter, effects'
+        return f"{source}: unknown parameter '{key}'; sections are: {sections}"
+    return (
+        f"{source}: unknown parameter '{key}'; the nearest known one is '{close}' "
+        f'({spellings[close].allowed})'
+    )
+
+
+def _require(table: Mapping[str, Parameter], stated: _Sourced, sources: Sequence[str]) -> None:
+    missing = [key for key, item in table.items() if item.required and key not in stated]
+    if missing:
+        given = ', '.join(dict.fromkeys(sources)) or 'no configuration'
+        raise UserError(
+            f'{given}: {", ".join(missing)} not stated; give a rover file '
+            '(--config or --params-file), such as the shipped generic_six_wheel'
+        )
+
+
+def _value(parameter: Parameter, stated: _Sourced, wheels: int) -> Any:
+    """Return the checked value of one parameter, its default where nothing was stated."""
+    if parameter.key not in stated:
+        if parameter.size == 'wheels':
+            return [parameter.default] * wheels
+        return parameter.default
+    value, source = stated[parameter.key]
+
+    def refuse(problem: str) -> UserError:
+        return UserError(f'{source}: {parameter.key}: {problem}; allowed: {parameter.allowed}')
+
+    if isinstance(value, (list, tuple)) or (
+        hasattr(value, '__iter__') and not isinstance(value, str)
+    ):
+        if parameter.size is None:
+            raise refuse('is a list')
+        items = [_scalar(parameter, item, refuse) for item in value]
+        wanted = wheels if parameter.size == 'wheels' else parameter.size
+        if not items or (wanted and len(items) != wanted):
+            of = ' (as many as wheels.names)' if parameter.size == 'wheels' else ''
+            raise refuse(f'has {len(items)} entries instead of {wanted or "at least 1"}{of}')
+        return items
+    if parameter.size is not None:
+        raise refuse(f'{value!r} is not a list')
+    return _scalar(parameter, value, refuse)
+
+
+def _scalar(parameter: Parameter, value: Any, refuse: Callable[[str], UserError]) -> Any:
+    kind = parameter.kind
+    if hasattr(value, 'item'):
+        value = value.item()
+    if kind == 'flag':
+        if not isinstance(value, bool):
+            raise refuse(f'{value!r} is not true or false')
+        return value
+    if kind == 'text':
+        if not isinstance(value, str):
+            raise refuse(f'{value!r} is not a text')
+        if parameter.choices and value not in parameter.choices:
+            close = nearest(value, parameter.choices)
+            raise refuse(f'{value!r} is unknown' + (f", nearest is '{close}'" if close else ''))
+        return value
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        raise refuse(f'{value!r} is not a number')
+    if not math.isfinite(value):
+        raise refuse(f'{value!r} is not finite')
+    if kind == 'integer':
+        if value != int(value):
+            raise refuse(f'{value!r} is not an integer')
+        value = int(value)
+    else:
+        value = float(value)
+    too_low = value <= parameter.lower if parameter.open_lower else value < parameter.lower
+    too_high = value >= parameter.upper if parameter.open_upper else value > parameter.upper
+    if too_low or too_high:
+        raise refuse(f'{value!r} is out of range')
+    return value
+
+
+def _cross_check(values: Mapping[str, Any], stated: _Sourced) -> None:
+    """Check what concerns more than one key, or more than a range."""
+
+    def refuse(key: str, problem: str) -> UserError:
+        source = stated[key][1] if key in stated else 'configuration'
+        return UserError(f'{source}: {key}: {problem}')
+
+    names = values['wheels.names']
+    if len(set(names)) < len(names) or not all(names):
+        raise refuse('wheels.names', f'names must be distinct and not empty: {names}')
+    if any(direction not in (-1, 1) for direction in values['wheels.direction']):
+        raise refuse('wheels.direction', 'each entry must be 1 or -1')
+    for i, name in enumerate(names):
+        room = 2.0 * math.pi * (values['wheels.radius'][i] + values['wheels.lug_height'][i])
+        if values['wheels.lug_count'][i] * values['wheels.lug_thickness'][i] > room:
+            raise refuse('wheels.lug_thickness', f'the lugs of {name} do not fit its circumference')
+    thresholds = values['filter.class_thresholds']
+    if not thresholds[0] < thresholds[1] < thresholds[2]:
+        raise refuse('filter.class_thresholds', f'must increase: {thresholds}')
+    _check_suspension(values, refuse)
+    _check_effects(values, refuse)
+
+
+def _check_suspension(values: Mapping[str, Any], refuse: Callable[[str, str], UserError]) -> None:
+    suspension = values['rover.suspension']
+    shares = values['rover.load_shares']
+    if any(shares) and abs(sum(shares) - 1.0) > 1e-3:
+        raise refuse('rover.load_shares', f'the shares add up to {sum(shares):g} instead of 1')
+    x, y = values['wheels.x'], values['wheels.y']
+    if suspension == 'rigid' and len(x) > 1 and len(set(zip(x, y, strict=True))) < len(x):
+        raise refuse(
+            'rover.suspension', 'rigid needs wheels.x and wheels.y, distinct for each wheel'
+        )
+    if suspension == 'rocker_bogie':
+        left = sum(side > 0.0 for side in y)
+        right = sum(side < 0.0 for side in y)
+        if (left, right) != (3, 3):
+            raise refuse(
+                'rover.suspension',
+                'rocker_bogie needs three wheels on each side; '
+                f'wheels.y gives {left} left and {right} right',
+            )
+
+
+def _check_effects(values: Mapping[str, Any], refuse: Callable[[str, str], UserError]) -> None:
+    """Refuse pairs of effects that the catalogue calls incompatible."""
+    from wheel_terra_estimator.terramechanics.effects import catalogue
+
+    effects = catalogue()
+    enabled = [name for name in effects if values[f'effects.{name}.enabled']]
+    for name in enabled:
+        for other in effects[name].incompatible_with:
+            if other in enabled:
+                raise refuse(
+                    f'effects.{name}.enabled', f'cannot be on together with effects.{other}'
+                )

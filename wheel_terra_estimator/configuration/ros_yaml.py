@@ -1,0 +1,271 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""ROS parameter files without ROS: the same values that ``rcl_yaml_param_parser`` would read.
+
+PyYAML follows YAML 1.1, ROS follows C: ``1.8e6`` is a number there, ``010`` is eight, ``1_000`` a
+string. The rules of ROS are applied to every plain scalar, by a loader class of our own; PyYAML's
+global loaders stay as they are.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import yaml
+
+from wheel_terra_estimator.errors import UserError
+
+NODE_NAME = 'wheel_terra_estimator'
+
+Scalar: TypeAlias = 'bool | int | float | str'
+Value: TypeAlias = 'Scalar | list[Any]'
+
+_TRUE = frozenset({'Y', 'y', 'yes', 'Yes', 'YES', 'true', 'True', 'TRUE', 'on', 'On', 'ON'})
+_FALSE = frozenset({'N', 'n', 'no', 'No', 'NO', 'false', 'False', 'FALSE', 'off', 'Off', 'OFF'})
+_NULL = frozenset({'', '~', 'null', 'Null', 'NULL'})
+_INTEGER = re.compile(r'[+-]?(0[xX][0-9a-fA-F]+|0[0-7]*|[1-9][0-9]*)')
+_DECIMAL = re.compile(r'[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?')
+_HEXADECIMAL = re.compile(r'[+-]?0[xX][0-9a-fA-F]+\.?[0-9a-fA-F]*([pP][+-]?[0-9]+)?')
+_NOT_FINITE = re.compile(r'([+-]?)\.?(inf(?:inity)?|nan)', re.IGNORECASE)
+_OUR_SECTION = re.compile(rf'/\*\*|(.*/)?{NODE_NAME}')
+
+
+class _Null:
+    """Marks a key without a value, which ROS parameter files cannot hold."""
+
+
+_NO_VALUE = _Null()
+
+
+class _RosLoader(yaml.SafeLoader):
+    """Safe loader whose plain scalars follow ROS; resolvers are its own."""
+
+    yaml_implicit_resolvers: dict[str, list[Any]] = {}  # noqa: RUF012  (PyYAML's attribute)
+
+
+def _construct_scalar(loader: _RosLoader, node: yaml.ScalarNode) -> Any:
+    return node.value if node.style else plain_scalar(node.value)
+
+
+def _construct_mapping(loader: _RosLoader, node: yaml.MappingNode) -> dict[str, Any]:
+    mapping: dict[str, Any] = {}
+    for key_node, value_node in node.value:
+        if not isinstance(key_node, yaml.ScalarNode):
+            raise yaml.MarkedYAMLError(problem='a key is not a word', problem_mark=node.start_mark)
+        if key_node.value in mapping:
+            raise yaml.MarkedYAMLError(
+                problem=f"'{key_node.value}' is given twice", problem_mark=key_node.start_mark
+            )
+        mapping[key_node.value] = loader.construct_object(value_node, deep=True)
+    return mapping
+
+
+_RosLoader.add_constructor('tag:yaml.org,2002:str', _construct_scalar)
+_RosLoader.add_constructor('tag:yaml.org,2002:map', _construct_mapping)
+
+
+def plain_scalar(text: str) -> Scalar | _Null:
+    """Return the value that ROS gives to an unquoted scalar.
+
+    Parameters
+    ----------
+    text : str
+        The scalar as it stands in the file.
+
+    Returns
+    -------
+    bool, int, float or str
+        The value; numbers as C's ``strtoll`` (base 0) and ``strtod`` read them.
+    """
+    if text in _NULL:
+        return _NO_VALUE
+    if text in _TRUE or text in _FALSE:
+        return text in _TRUE
+    if _INTEGER.fullmatch(text):
+        digits = text.lstrip('+-')
+        if digits[:2] in ('0x', '0X'):
+            value = int(digits, 16)
+        else:
+            value = int(digits, 8 if digits.startswith('0') else 10)
+        value = -value if text.startswith('-') else value
+        if -(2**63) <= value < 2**63:
+            return value
+    if _DECIMAL.fullmatch(text):
+        return float(text)
+    if _HEXADECIMAL.fullmatch(text):
+        return float.fromhex(text)
+    special = _NOT_FINITE.fullmatch(text)
+    if special:
+        return float(special[1] + special[2])
+    return text
+
+
+def parse_value(text: str, source: str) -> Value:
+    """Return the value of ``text`` as it would be read behind a key.
+
+    Parameters
+    ----------
+    text : str
+        Right-hand side of ``NAME:=VALUE``.
+    source : str
+        What the error message names.
+    """
+    try:
+        value = yaml.load(text, Loader=_RosLoader)  # noqa: S506  (a safe loader of our own)
+    except yaml.YAMLError as error:
+        raise UserError(f'{source}: {_in_words(error)}') from None
+    return _checked(value if text.strip() else _NO_VALUE, source)
+
+
+def read(path: Path) -> dict[str, Value]:
+    """Return the parameters that a file gives to the estimator, keys dotted.
+
+    Sections ``/**``, ``wheel_terra_estimator`` and ``/any/ns/wheel_terra_estimator`` count, in this
+    order (the narrower one wins, as in ROS); sections of other nodes are passed over.
+
+    Parameters
+    ----------
+    path : pathlib.Path
+        A ROS parameter file.
+
+    Raises
+    ------
+    UserError
+        If the file cannot be read, is not YAML or not a parameter file.
+    """
+    try:
+        document = yaml.load(path.read_text(encoding='utf-8'), Loader=_RosLoader)  # noqa: S506
+    except (OSError, UnicodeDecodeError) as error:
+        reason = error.strerror if isinstance(error, OSError) else 'not a UTF-8 text'
+        raise UserError(f'{path}: cannot be read: {reason}') from None
+    except yaml.YAMLError as error:
+        raise UserError(f'{path}: {_in_words(error)}') from None
+    if not isinstance(document, Mapping):
+        raise UserError(
+            f"{path}: not a ROS parameter file; it starts with '/**:' and 'ros__parameters:'"
+        )
+    sections = list(_sections(document, '', path))
+    ours = [section for section in sections if _OUR_SECTION.fullmatch(section[0])]
+    if not ours:
+        there = ', '.join(f"'{name}'" for name, _ in sections) or 'none'
+        raise UserError(
+            f"{path}: no section for this node: sections there: {there}; use '/**:' with "
+            "'ros__parameters:' below it"
+        )
+    values: dict[str, Value] = {}
+    for _, parameters in sorted(ours, key=lambda section: section[0] != '/**'):
+        values.update(flatten(parameters, str(path)))
+    return values
+
+
+def flatten(parameters: Mapping[str, Any], source: str, prefix: str = '') -> dict[str, Value]:
+    """Return nested mappings as one mapping with dotted keys, values checked for ROS's types."""
+    flat: dict[str, Value] = {}
+    for name, value in parameters.items():
+        key = f'{prefix}{name}'
+        if isinstance(value, Mapping):
+            inner = flatten(value, source, f'{key}.')
+        else:
+            inner = {key: _checked(value, f'{source}: {key}')}
+        for inner_key, inner_value in inner.items():
+            if inner_key in flat:
+                raise UserError(f'{source}: {inner_key} is given twice')
+            flat[inner_key] = inner_value
+    return flat
+
+
+def write(path: Path, values: Mapping[str, Value], comment: str = '') -> None:
+    """Write a parameter file for any node name, with a comment on top.
+
+    Parameters
+    ----------
+    path : pathlib.Path
+        The file to be written.
+    values : mapping
+        Dotted key -> scalar or flat list of one type.
+    comment : str
+        Text of the comment, any number of lines.
+    """
+    lines = [f'# {line}'.rstrip() for line in comment.splitlines()]
+    lines += ['/**:', '  ros__parameters:']
+    lines += [f'    {key}: {format_value(value)}' for key, value in values.items()]
+    path.write_text('\n'.join(lines) + '\n', encoding='utf-8')
+
+
+def format_value(value: Value) -> str:
+    """Return a value as it stands in a parameter file, read back to the same value and type."""
+    if isinstance(value, (list, tuple)):
+        return '[' + ', '.join(format_value(item) for item in value) + ']'
+    if isinstance(value, bool):
+        return 'true' if value else 'false'
+    if isinstance(value, str):
+        escaped = ''.join(_ESCAPES.get(character, character) for character in value)
+        return f'"{escaped}"'
+    if isinstance(value, int):
+        return str(value)
+    if math.isnan(value):
+        return '.nan'
+    if math.isinf(value):
+        return '.inf' if value > 0.0 else '-.inf'
+    return repr(float(value))
+
+
+_ESCAPES = {'\\': '\\\\', '"': '\\"', '\n': '\\n', '\t': '\\t', '\r': '\\r'}
+
+
+def _sections(
+    document: Mapping[str, Any], prefix: str, path: Path
+) -> Iterator[tuple[str, Mapping[str, Any]]]:
+    """Walk namespaces down to each ``ros__parameters``."""
+    for name, below in document.items():
+        section = f'{prefix}{name}'
+        if not isinstance(below, Mapping):
+            raise UserError(f"{path}: '{section}' has no 'ros__parameters:' below it")
+        if 'ros__parameters' in below:
+            parameters = below['ros__parameters']
+            if not isinstance(parameters, Mapping):
+                raise UserError(f"{path}: 'ros__parameters' of '{section}' holds no keys")
+            yield section, parameters
+        yield from _sections(
+            {key: value for key, value in below.items() if key != 'ros__parameters'},
+            f'{section.rstrip("/")}/',
+            path,
+        )
+
+
+def _checked(value: Any, source: str) -> Value:
+    """Refuse what a ROS parameter cannot be."""
+    if isinstance(value, _Null) or value is None:
+        raise UserError(f'{source} has no value; ROS parameters know no null')
+    if not isinstance(value, list):
+        if isinstance(value, (bool, int, float, str)):
+            return value
+        raise UserError(f'{source}: only scalars and flat lists are allowed')
+    if not value:
+        raise UserError(f'{source} is an empty list, which ROS parameter files cannot hold')
+    for item in value:
+        if isinstance(item, _Null) or item is None:
+            raise UserError(f'{source} holds an empty entry; ROS parameters know no null')
+        if not isinstance(item, (bool, int, float, str)):
+            raise UserError(f'{source} is a nested list; only flat lists are allowed')
+    kinds = {type(item) for item in value}
+    if kinds == {int, float}:
+        cure = ', '.join(format_value(float(item)) for item in value)
+        raise UserError(f'{source} mixes integers and numbers, which ROS refuses; write [{cure}]')
+    if len(kinds) > 1:
+        raise UserError(f'{source} mixes types in one list: {value}')
+    return value
+
+
+def _in_words(error: yaml.YAMLError) -> str:
+    """Return a YAML error in one line, with the line number."""
+    mark = getattr(error, 'problem_mark', None)
+    problem = getattr(error, 'problem', None) or 'cannot be understood'
+    context = getattr(error, 'context', None)
+    words = f'{problem} ({context})' if context else str(problem)
+    where = f'line {mark.line + 1}: ' if mark is not None else ''
+    return f'not valid YAML: {where}{words}'.replace('\n', ' ')

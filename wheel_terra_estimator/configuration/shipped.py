@@ -1,0 +1,99 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Where the shipped files are, however the package was installed, and how they are called."""
+
+from __future__ import annotations
+
+import difflib
+import importlib.metadata
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+from wheel_terra_estimator.errors import UserError
+
+PACKAGE = 'wheel_terra_estimator'
+
+
+def configuration_folder() -> Path:
+    """Return the folder that holds ``rovers``, ``soils``, ``scenarios`` and so on.
+
+    A source tree or editable install has it beside the package; pip and colcon put it below
+    ``share`` of a prefix above the package, or of another one that the installer's record or
+    ``AMENT_PREFIX_PATH`` names.
+    """
+    for folder in _candidates():
+        if folder.is_dir():
+            return folder
+    raise UserError(
+        f'the shipped files (share/{PACKAGE}/config) were not found; install {PACKAGE} with pip or '
+        'colcon, or name files by their path'
+    )
+
+
+def _candidates() -> Iterator[Path]:
+    package = Path(__file__).resolve().parents[1]
+    if (package.parent / 'package.xml').is_file():
+        yield package.parent / 'config'
+    below = Path('share') / PACKAGE / 'config'
+    for prefix in package.parents:
+        yield prefix / below
+    try:
+        recorded = importlib.metadata.files(PACKAGE) or []
+    except importlib.metadata.PackageNotFoundError:
+        recorded = []
+    marker = below.as_posix() + '/'
+    for entry in recorded:
+        if marker in entry.as_posix():
+            located = Path(str(entry.locate())).resolve()
+            yield next(p for p in located.parents if p.name == 'config')
+            break
+    for prefix_text in os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep):
+        if prefix_text:
+            yield Path(prefix_text) / below
+
+
+def files(folder: Path | None = None) -> dict[str, Path]:
+    """Return the shipped files by name relative to the folder, without suffix."""
+    folder = folder or configuration_folder()
+    found = sorted(p for p in folder.rglob('*') if p.suffix in ('.yaml', '.yml'))
+    return {p.relative_to(folder).with_suffix('').as_posix(): p for p in found}
+
+
+def find(name: str | Path, kind: str = '') -> Path:
+    """Return the file that ``name`` means: a path, or the bare name of a shipped file.
+
+    Parameters
+    ----------
+    name : str or pathlib.Path
+        A path, a bare name (``frostyboy``) or one with its folder (``soils/hit_lss1``).
+    kind : str
+        Folder to search (``scenarios``); empty: all.
+
+    Raises
+    ------
+    UserError
+        If nothing or more than one file answers to the name.
+    """
+    path = Path(name).expanduser()
+    if path.is_file():
+        return path
+    text = str(name)
+    shipped = files()
+    if kind:
+        shipped = {key: p for key, p in shipped.items() if key.startswith(f'{kind}/')}
+    wanted = text.removesuffix('.yaml').removesuffix('.yml')
+    matches = [key for key in shipped if key == wanted or key.endswith(f'/{wanted}')]
+    if len(matches) == 1:
+        return shipped[matches[0]]
+    if matches:
+        raise UserError(f"'{text}' is ambiguous: {' or '.join(matches)}")
+    if path.is_dir():
+        raise UserError(f'{text}: is a folder, not a configuration file')
+    bare = {key.rsplit('/', 1)[-1]: key for key in shipped}
+    close = difflib.get_close_matches(wanted.rsplit('/', 1)[-1], bare, n=1)
+    hint = f"did you mean '{close[0]}'? " if close else ''
+    raise UserError(
+        f'{text}: no such file, and no shipped file of this name; {hint}there are: '
+        + ', '.join(shipped)
+    )
