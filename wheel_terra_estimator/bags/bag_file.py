@@ -1,0 +1,145 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""A rosbag2 folder (MCAP, or SQLite3) that is being written, closed whatever happens."""
+
+from __future__ import annotations
+
+import shutil
+from collections import Counter
+from collections.abc import Collection, Mapping
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+from wheel_terra_estimator.bags.messages import MessageFactory
+from wheel_terra_estimator.bags.storage import STORAGE_SUFFIXES
+from wheel_terra_estimator.errors import UserError
+
+
+class BagFile:
+    """Writes messages to a new bag; a context manager.
+
+    Parameters
+    ----------
+    path : Path
+        Folder to be made.
+    topics : mapping of str to str
+        Full topic name to message type.
+    latched : collection of str
+        Topics offered as transient local with depth 1; all others are volatile with depth 10.
+    overwrite : bool
+        Whether an earlier bag at the same path is replaced.
+    storage : str
+        ``mcap`` or ``sqlite3``.
+
+    Attributes
+    ----------
+    messages : MessageFactory
+        Builds what `write` takes.
+    counts : Counter
+        Messages written, by topic.
+
+    Raises
+    ------
+    UserError
+        The path is taken or cannot be written.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        topics: Mapping[str, str],
+        latched: Collection[str] = (),
+        overwrite: bool = False,
+        storage: str = 'mcap',
+    ) -> None:
+        self.path = path
+        self.messages = MessageFactory()
+        self.counts: Counter[str] = Counter()
+        self._topics = dict(topics)
+        self._latched = latched
+        self._storage = storage
+        make_room(path, overwrite)
+
+    def __enter__(self) -> BagFile:
+        from rosbags.rosbag2 import StoragePlugin, Writer
+
+        self._writer = Writer(
+            self.path, version=9, storage_plugin=StoragePlugin[self._storage.upper()]
+        )
+        try:
+            self._writer.open()
+        except OSError as error:
+            raise UserError(f'{self.path}: cannot be written ({error.strerror})') from None
+        self._connections = {
+            topic: self._writer.add_connection(
+                topic,
+                kind,
+                typestore=self.messages.store,
+                offered_qos_profiles=[_qos(topic in self._latched)],
+            )
+            for topic, kind in self._topics.items()
+        }
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        # Not the library's own exit, which leaves a file without index after an error.
+        self._writer.close()
+
+    def write(self, topic: str, message: Any, log_time: int) -> None:
+        """Append a message at a log time [ns]."""
+        connection = self._connections[topic]
+        data = self.messages.store.serialize_cdr(message, connection.msgtype)
+        self._writer.write(connection, log_time, data)
+        self.counts[topic] += 1
+
+
+def make_room(path: Path, overwrite: bool) -> None:
+    """Make sure that a bag can be written at ``path``; remove an earlier one if allowed."""
+    if not (path.exists() or path.is_symlink()):
+        return
+    if not overwrite:
+        raise UserError(f'{path}: exists already; choose another path or give --overwrite')
+    if not path.is_dir() or path.is_symlink():
+        raise UserError(f'{path}: is not a folder; choose another path')
+    strangers = [
+        entry.name
+        for entry in path.iterdir()
+        if entry.name != 'metadata.yaml' and not entry.name.endswith(STORAGE_SUFFIXES)
+    ]
+    if strangers:
+        raise UserError(
+            f'{path}: holds more than a bag ({strangers[0]}), so it is not overwritten; '
+            'choose another path'
+        )
+    shutil.rmtree(path)
+
+
+def _qos(latched: bool) -> Any:
+    """Return the profile that the node offers on a topic."""
+    from rosbags.interfaces import (
+        Qos,
+        QosDurability,
+        QosHistory,
+        QosLiveliness,
+        QosReliability,
+        QosTime,
+    )
+
+    forever = QosTime(9223372036, 854775807)
+    return Qos(
+        history=QosHistory.KEEP_LAST,
+        depth=1 if latched else 10,
+        reliability=QosReliability.RELIABLE,
+        durability=QosDurability.TRANSIENT_LOCAL if latched else QosDurability.VOLATILE,
+        deadline=forever,
+        lifespan=forever,
+        liveliness=QosLiveliness.AUTOMATIC,
+        liveliness_lease_duration=forever,
+        avoid_ros_namespace_conventions=False,
+    )

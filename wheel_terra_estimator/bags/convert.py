@@ -1,0 +1,323 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Message fields <-> typed measurements and estimates, the same code for the node and the replay.
+
+Messages are taken by their fields alone, so those of rclpy and those of rosbags both fit; nothing
+here imports either. What the numbers are worth is judged by the estimator core, only what does not
+fit the layout of a message is refused here.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.estimation.estimates import EstimateSet
+from wheel_terra_estimator.estimation.measurements import (
+    InertialReading,
+    LeavingAngleReading,
+    Measurement,
+    ReferenceVelocity,
+    SinkageReading,
+    WheelOdometry,
+)
+
+FloatArray = NDArray[np.float64]
+
+JOINT_STATE = 'sensor_msgs/msg/JointState'
+ODOMETRY = 'nav_msgs/msg/Odometry'
+INPUT_TYPES = {
+    'joint_states': JOINT_STATE,
+    'odom': ODOMETRY,
+    'imu/data': 'sensor_msgs/msg/Imu',
+    'sinkage': JOINT_STATE,
+    'leaving_angle': JOINT_STATE,
+    'reference_odom': ODOMETRY,
+}
+"""Input topics of the estimator (relative names) and their message types."""
+
+JOINT_OUTPUTS = ('slip', 'sinkage', 'slip_stddev', 'sinkage_stddev', 'mobility', 'soil')
+OUTPUT_TYPES = {
+    **dict.fromkeys(JOINT_OUTPUTS, JOINT_STATE),
+    'slip_class': 'std_msgs/msg/UInt8MultiArray',
+    'twist': 'geometry_msgs/msg/TwistWithCovarianceStamped',
+    'stuck': 'std_msgs/msg/Bool',
+}
+"""Private output topics of the estimator and their message types."""
+
+BASE_FRAME = 'base_link'
+UNKNOWN_VARIANCE = 1e6
+"""Variance of the twist components that are not estimated (finite, so that no filter chokes)."""
+
+
+@dataclass(frozen=True)
+class InputLayout:
+    """What of the configuration is needed to read messages; arrays are (n,), one per wheel."""
+
+    names: tuple[str, ...]
+    directions: FloatArray  # +1, or -1 where the joint counts negative forward
+    lateral_positions: FloatArray  # y of the wheels in base_link [m]
+    slip_radius: FloatArray  # [m]
+    imu_mounting: FloatArray  # (4,) quaternion x, y, z, w that turns the sensor into base_link
+    wheel_odometry: str  # 'joint_states' or 'odom'
+
+    @property
+    def topics(self) -> tuple[str, ...]:
+        """Input topics that are listened to."""
+        other = 'odom' if self.wheel_odometry == 'joint_states' else 'joint_states'
+        return tuple(name for name in INPUT_TYPES if name != other)
+
+
+def input_layout(configuration: Configuration) -> InputLayout:
+    """Return what of the configuration is needed to read messages."""
+    wheels, sensors = configuration.wheels, configuration.sensors
+    return InputLayout(
+        names=wheels.names,
+        directions=wheels.direction,
+        lateral_positions=wheels.y,
+        slip_radius=wheels.slip_radius,
+        imu_mounting=quaternion_from_roll_pitch_yaw(
+            sensors.imu_mounting_roll, sensors.imu_mounting_pitch, sensors.imu_mounting_yaw
+        ),
+        wheel_odometry=configuration.wheel_odometry,
+    )
+
+
+class InputConverter:
+    """Messages to measurements.
+
+    Attributes
+    ----------
+    rejected : Counter
+        Messages that did not fit, by (topic, reason in words).
+    """
+
+    def __init__(self, layout: InputLayout) -> None:
+        self.layout = layout
+        self.rejected: Counter[tuple[str, str]] = Counter()
+        self._columns: dict[tuple[str, ...], tuple[list[int], list[int]]] = {}
+        self._index = {name: i for i, name in enumerate(layout.names)}
+        self._mounted = not np.allclose(layout.imu_mounting, (0.0, 0.0, 0.0, 1.0), atol=0.0)
+        self._rotation = rotation_matrix(layout.imu_mounting)
+        self._methods = {
+            'joint_states': self.joint_states,
+            'odom': self.odom,
+            'imu/data': self.imu,
+            'sinkage': self.sinkage,
+            'leaving_angle': self.leaving_angle,
+            'reference_odom': self.reference_odom,
+        }
+
+    def convert(self, topic: str, message: Any) -> Measurement | None:
+        """Return the measurement in a message of an input topic; None when it does not fit."""
+        return self._methods[topic](message)
+
+    def joint_states(self, message: Any) -> WheelOdometry | None:
+        """Wheel rates and torques; wheels that the message does not hold are nan."""
+        values = self._wheel_values('joint_states', message.name, message.velocity, 'velocity')
+        if values is None:
+            return None
+        torque = np.full(len(self.layout.names), math.nan)
+        if len(message.effort):
+            if len(message.effort) == len(message.name):
+                source, target = self._columns[tuple(message.name)]
+                torque[target] = np.asarray(message.effort)[source]
+            else:
+                self.rejected['joint_states', 'effort and name differ in length'] += 1
+        directions = self.layout.directions
+        return WheelOdometry(stamp_of(message), values * directions, torque * directions)
+
+    def odom(self, message: Any) -> WheelOdometry:
+        """Wheel rates of a rover that publishes no joint states, from its wheel odometry."""
+        twist = message.twist.twist
+        rim_speed = twist.linear.x - twist.angular.z * self.layout.lateral_positions
+        return WheelOdometry(
+            stamp_of(message),
+            rim_speed / self.layout.slip_radius,
+            np.full_like(rim_speed, math.nan),
+        )
+
+    def imu(self, message: Any) -> InertialReading:
+        """Specific force, angular rate and attitude, turned into ``base_link``."""
+        force = _vector(message.linear_acceleration)
+        rate = _vector(message.angular_velocity)
+        orientation = None
+        if message.orientation_covariance[0] != -1.0:  # REP 145: -1 is "no orientation"
+            orientation = self._orientation(message.orientation)
+        if self._mounted:
+            force, rate = self._rotation @ force, self._rotation @ rate
+        return InertialReading(stamp_of(message), force, rate, orientation)
+
+    def sinkage(self, message: Any) -> SinkageReading | None:
+        """Measured sinkage of the wheels."""
+        values = self._wheel_values('sinkage', message.name, message.position, 'position')
+        return None if values is None else SinkageReading(stamp_of(message), values)
+
+    def leaving_angle(self, message: Any) -> LeavingAngleReading | None:
+        """Measured leaving angle of the wheels."""
+        values = self._wheel_values('leaving_angle', message.name, message.position, 'position')
+        return None if values is None else LeavingAngleReading(stamp_of(message), values)
+
+    def reference_odom(self, message: Any) -> ReferenceVelocity:
+        """Body velocity from a slip-free source."""
+        twist = message.twist
+        return ReferenceVelocity(
+            stamp_of(message), float(twist.twist.linear.x), float(twist.covariance[0])
+        )
+
+    def _wheel_values(
+        self, topic: str, names: Sequence[str], values: Any, label: str
+    ) -> FloatArray | None:
+        """Sort the values of a JointState into the order of the wheels, nan where there is none."""
+        if len(values) != len(names):
+            self.rejected[topic, f'{label} and name differ in length'] += 1
+            return None
+        key = tuple(names)
+        columns = self._columns.get(key)
+        if columns is None:
+            source = [i for i, name in enumerate(key) if name in self._index]
+            columns = source, [self._index[key[i]] for i in source]
+            if len(self._columns) < 100:  # a publisher that invents names must not fill the memory
+                self._columns[key] = columns
+        source, target = columns
+        if not source:
+            self.rejected[topic, 'none of the configured wheels in it'] += 1
+            return None
+        result = np.full(len(self.layout.names), math.nan)
+        result[target] = np.asarray(values, dtype=np.float64)[source]
+        return result
+
+    def _orientation(self, quaternion: Any) -> FloatArray | None:
+        sensor = np.array([quaternion.x, quaternion.y, quaternion.z, quaternion.w])
+        norm = math.sqrt(float(sensor @ sensor))
+        if not 0.5 < norm < 2.0:  # all zero is what many drivers send when there is none
+            self.rejected['imu/data', 'orientation is not a unit quaternion (left out)'] += 1
+            return None
+        sensor /= norm
+        if not self._mounted:
+            return sensor
+        x, y, z, w = self.layout.imu_mounting
+        return quaternion_product(sensor, np.array([-x, -y, -z, w]))
+
+
+def stamp_of(message: Any) -> int:
+    """Return the stamp of a message with a header [ns]."""
+    stamp = message.header.stamp
+    return int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec)
+
+
+def _vector(vector: Any) -> FloatArray:
+    return np.array([vector.x, vector.y, vector.z], dtype=np.float64)
+
+
+def rotation_matrix(quaternion: FloatArray) -> FloatArray:
+    """Return the (3, 3) rotation of a unit quaternion x, y, z, w."""
+    x, y, z, w = quaternion
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def quaternion_from_roll_pitch_yaw(roll: float, pitch: float, yaw: float) -> FloatArray:
+    """Return the quaternion x, y, z, w of rotations about fixed x, then y, then z (as in URDF)."""
+    half = [(math.sin(angle / 2), math.cos(angle / 2)) for angle in (roll, pitch, yaw)]
+    about_x, about_y, about_z = (
+        np.array([*(sine * unit for unit in axis), cosine])
+        for (sine, cosine), axis in zip(half, np.eye(3), strict=True)
+    )
+    return quaternion_product(quaternion_product(about_z, about_y), about_x)
+
+
+def quaternion_product(first: FloatArray, second: FloatArray) -> FloatArray:
+    """Return the Hamilton product of two quaternions x, y, z, w: ``second`` is applied first."""
+    ax, ay, az, aw = first
+    bx, by, bz, bw = second
+    return np.array(
+        [
+            aw * bx + ax * bw + ay * bz - az * by,
+            aw * by - ax * bz + ay * bw + az * bx,
+            aw * bz + ax * by - ay * bx + az * bw,
+            aw * bw - ax * bx - ay * by - az * bz,
+        ]
+    )
+
+
+class JointFields(NamedTuple):
+    """Fields of an output JointState; an empty list is an empty field."""
+
+    name: tuple[str, ...]
+    position: list[float]
+    velocity: list[float]
+    effort: list[float]
+
+
+def joint_fields(estimates: EstimateSet, names: tuple[str, ...]) -> dict[str, JointFields]:
+    """Return the per-wheel outputs and ``soil`` by topic, in the order they are published."""
+    e = estimates
+    table = {
+        'slip': (e.slip, e.slip_velocity, e.drawbar_pull),
+        'sinkage': (e.sinkage, e.sinkage_rate, e.normal_load),
+        'slip_stddev': (e.slip_std, e.slip_velocity_std, e.drawbar_pull_std),
+        'sinkage_stddev': (e.sinkage_std, e.sinkage_rate_std, e.normal_load_std),
+    }
+    outputs = {
+        topic: JointFields(names, *(column.tolist() for column in columns))
+        for topic, columns in table.items()
+    }
+    outputs['mobility'] = JointFields(names, e.rim_travel_left.tolist(), [], e.pull_margin.tolist())
+    outputs['soil'] = JointFields(e.soil_names, e.soil.tolist(), [], e.soil_std.tolist())
+    return outputs
+
+
+def twist_covariance(estimates: EstimateSet) -> list[float]:
+    """Return the 6 x 6 covariance of ``twist``, row by row (x, y, z, then rotations; REP 103)."""
+    diagonal = [UNKNOWN_VARIANCE] * 6
+    diagonal[0] = estimates.forward_velocity_variance
+    diagonal[5] = estimates.yaw_rate_variance
+    covariance = [0.0] * 36
+    covariance[::7] = diagonal
+    return covariance
+
+
+def finite(estimates: EstimateSet) -> EstimateSet:
+    """Return the set with 0 in place of any value that is not finite, and say so in its faults.
+
+    The core keeps its own promise of finite outputs; this is the last bar before a message.
+    """
+    bad = [
+        name
+        for name, value in _numbers(estimates).items()
+        if not (math.isfinite(value) if isinstance(value, float) else np.isfinite(value).all())
+    ]
+    if not bad:
+        return estimates
+    cleaned: dict[str, Any] = {
+        name: np.nan_to_num(getattr(estimates, name), nan=0.0, posinf=0.0, neginf=0.0)
+        for name in bad
+    }
+    for name in bad:
+        if isinstance(getattr(estimates, name), float):
+            cleaned[name] = float(cleaned[name])
+    faults = {**estimates.faults, 'outputs': f'not finite, sent as 0: {", ".join(bad)}'}
+    return replace(estimates, faults=faults, **cleaned)
+
+
+def _numbers(estimates: EstimateSet) -> dict[str, float | FloatArray]:
+    """Return the numeric fields of a set by name."""
+    return {name: getattr(estimates, name) for name in _NUMERIC_FIELDS}
+
+
+_NUMERIC_FIELDS = tuple(
+    field.name for field in fields(EstimateSet) if field.type in ('FloatArray', 'float')
+)

@@ -1,0 +1,179 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""A recording as a stream of typed measurements."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from wheel_terra_estimator.bags.convert import INPUT_TYPES, InputConverter, input_layout
+from wheel_terra_estimator.bags.storage import Bag, open_bag
+from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.configuration.parameters import nearest
+from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.estimation.measurements import Measurement
+
+
+def read(
+    path: str | Path, remaps: Mapping[str, str], configuration: Configuration
+) -> Iterator[tuple[int, Measurement]]:
+    """Yield (log time [ns], measurement) of all used topics of a bag, in the order of log times.
+
+    See `MeasurementReader` for the parameters and errors.
+    """
+    with open_bag(path) as bag:
+        yield from MeasurementReader(bag, remaps, configuration).measurements()
+
+
+class MeasurementReader:
+    """Reads the input topics of the estimator out of an open bag; no other topic is unpacked.
+
+    Parameters
+    ----------
+    bag : Bag
+        The recording.
+    remaps : mapping of str to str
+        Estimator's topic to the bag's, see `parse_remaps`.
+    configuration : Configuration
+        Wheels and mounting.
+
+    Attributes
+    ----------
+    topics : dict of str to str
+        Estimator's topic to the bag's, for the topics that are there.
+    absent : list of str
+        Topics that the estimator could use and that are not in the bag.
+    rejected : Counter
+        Messages that could not be used, by (estimator's topic, reason).
+
+    Raises
+    ------
+    UserError
+        The wheel odometry, or a topic that was remapped, is not there or has another type; no
+        wheel of the configuration is in the bag.
+    """
+
+    def __init__(self, bag: Bag, remaps: Mapping[str, str], configuration: Configuration) -> None:
+        from rosbags.typesys import Stores, get_typestore
+
+        self.bag = bag
+        self.converter = InputConverter(input_layout(configuration))
+        # Standard types only, so that a bag without message definitions is read as well.
+        self._store = get_typestore(Stores.ROS2_JAZZY)
+        self.topics: dict[str, str] = {}
+        self.absent: list[str] = []
+        for name in self.converter.layout.topics:
+            self._find(name, remaps)
+        if self.converter.layout.wheel_odometry == 'joint_states':
+            self._check_wheel_names()
+
+    @property
+    def rejected(self) -> Counter[tuple[str, str]]:
+        """Messages that could not be used, by (estimator's topic, reason)."""
+        return self.converter.rejected
+
+    @property
+    def message_count(self) -> int:
+        """Number of messages on the used topics."""
+        return sum(self.bag.topics[topic].message_count for topic in self.topics.values())
+
+    def measurements(self) -> Iterator[tuple[int, Measurement]]:
+        """Yield (log time [ns], measurement) in the order of log times."""
+        for log_time, name, message in self.messages():
+            measurement = self.converter.convert(name, message)
+            if measurement is not None:
+                yield log_time, measurement
+
+    def messages(self) -> Iterator[tuple[int, str, Any]]:
+        """Yield (log time [ns], estimator's topic, message); what cannot be unpacked is counted."""
+        names: dict[str, list[str]] = {}
+        for name, topic in self.topics.items():
+            names.setdefault(topic, []).append(name)
+        for log_time, topic, data in self.bag.messages(tuple(names)):
+            for name in names[topic]:
+                message = self.unpack(data, name)
+                if message is not None:
+                    yield log_time, name, message
+
+    def unpack(self, data: bytes, name: str) -> Any | None:
+        """Return the message in CDR bytes of an input topic; None, counted, if it is damaged."""
+        try:
+            return self._store.deserialize_cdr(data, INPUT_TYPES[name])
+        except Exception:  # the library lets many kinds through on damaged bytes
+            self.rejected[name, 'damaged message'] += 1
+            return None
+
+    def _find(self, name: str, remaps: Mapping[str, str]) -> None:
+        """Find an input topic in the bag."""
+        topic = remaps.get(name, f'/{name}')
+        found = self.bag.topics.get(topic)
+        required = name == self.converter.layout.wheel_odometry
+        if found is None or not found.message_count:
+            if not required and name not in remaps:
+                self.absent.append(name)
+                return
+            state = 'is empty' if found else 'is not in the bag'
+            raise UserError(f'{self.bag.path}: topic {topic} {state}; {self._advice(name)}')
+        if found.type != INPUT_TYPES[name]:
+            raise UserError(
+                f'{self.bag.path}: topic {topic} has type {found.type}, {name} needs '
+                f'{INPUT_TYPES[name]}; {self._advice(name)}'
+            )
+        self.topics[name] = topic
+
+    def _advice(self, name: str) -> str:
+        """Say what is there and how to use it."""
+        there = self.bag.topics.values()
+        listed = ', '.join(f'{topic.name} ({topic.type})' for topic in there)
+        fitting = [t.name for t in there if t.type == INPUT_TYPES[name] and t.message_count]
+        cure = f'name the right one with --remap {name}:={fitting[0] if fitting else "/TOPIC"}'
+        if name == 'joint_states' and not fitting:
+            odometry = [t.name for t in there if t.type == INPUT_TYPES['odom'] and t.message_count]
+            if odometry:
+                cure = f'use -p wheel_odometry:=odom --remap odom:={odometry[0]}'
+        return f'there are: {listed}; {cure}'
+
+    def _check_wheel_names(self) -> None:
+        """Make sure that some joint message holds a wheel, before anything is written."""
+        heard: dict[str, None] = {}
+        wanted = self.converter.layout.names
+        for _, _, data in self.bag.messages((self.topics['joint_states'],)):
+            message = self.unpack(data, 'joint_states')
+            if message is not None:
+                if not set(wanted).isdisjoint(message.name):
+                    self.rejected.clear()  # they are counted when they are read
+                    return
+                heard.update(dict.fromkeys(message.name))
+        raise UserError(
+            f'{self.bag.path}: no wheel of wheels.names ({", ".join(wanted)}) is on '
+            f'{self.topics["joint_states"]}, which holds {", ".join(heard) or "no names"}; '
+            'set -p wheels.names:=[...] to the names in the bag, front to rear, left before right'
+        )
+
+
+def parse_remaps(texts: Iterable[str]) -> dict[str, str]:
+    """Return {estimator's topic: bag's topic} of ``FROM:=TO`` texts.
+
+    Raises
+    ------
+    UserError
+        A text of another form, or a topic that the estimator does not listen to.
+    """
+    remaps = {}
+    for text in texts:
+        name, sign, topic = text.partition(':=')
+        name, topic = name.strip().lstrip('/'), topic.strip()
+        if not sign or not topic:
+            raise UserError(f"--remap {text}: give FROM:=TO, the estimator's topic, then the bag's")
+        if name not in INPUT_TYPES:
+            near = nearest(name, INPUT_TYPES)
+            raise UserError(
+                f'--remap {text}: the estimator does not listen to {name}'
+                + (f' (nearest: {near})' if near else '')
+                + f'; its topics are {", ".join(INPUT_TYPES)}'
+            )
+        remaps[name] = topic if topic.startswith('/') else f'/{topic}'
+    return remaps

@@ -1,0 +1,106 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Estimates into a rosbag2 folder (MCAP), under the names that the node has by default."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+from wheel_terra_estimator.bags import diagnostics
+from wheel_terra_estimator.bags.bag_file import BagFile
+from wheel_terra_estimator.bags.convert import (
+    OUTPUT_TYPES,
+    finite,
+    joint_fields,
+    twist_covariance,
+)
+from wheel_terra_estimator.estimation.estimates import EstimateSet
+
+NAMESPACE = f'/{diagnostics.NODE}'
+STUCK = f'{NAMESPACE}/stuck'
+DIAGNOSTICS = '/diagnostics'
+TOPICS = {
+    **{f'{NAMESPACE}/{topic}': kind for topic, kind in OUTPUT_TYPES.items()},
+    DIAGNOSTICS: 'diagnostic_msgs/msg/DiagnosticArray',
+}
+"""Full default name of every output and its type."""
+
+
+class EstimateBagWriter:
+    """Writes estimates as the node would publish them; a context manager that always closes.
+
+    Parameters
+    ----------
+    path : Path
+        Folder to be made.
+    names : tuple of str
+        Wheel names.
+    overwrite : bool
+        Whether an earlier bag at the same path is replaced.
+
+    Raises
+    ------
+    UserError
+        The path is taken or cannot be written.
+    """
+
+    def __init__(self, path: Path, names: tuple[str, ...], overwrite: bool = False) -> None:
+        self.names = names
+        self.file = BagFile(path, TOPICS, latched=(STUCK,), overwrite=overwrite)
+        self._schedule = diagnostics.Schedule()
+        self._stuck: bool | None = None
+
+    def __enter__(self) -> EstimateBagWriter:
+        self.file.__enter__()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.file.__exit__(kind, error, trace)
+
+    def start(self, log_time: int) -> None:
+        """Write what the node sends at its start: no stuck warning."""
+        self._write_stuck(False, log_time)
+
+    def add(
+        self,
+        estimates: EstimateSet,
+        log_time: int,
+        counters: Mapping[str, Any] | None = None,
+        faults: Mapping[str, str] | None = None,
+    ) -> None:
+        """Write all messages of a set at the log time [ns] of the input that completed it.
+
+        ``counters`` and ``faults`` go to the node's diagnostics, see `diagnostics.statuses`.
+        """
+        estimates = finite(estimates)
+        make = self.file.messages
+        header = make.header(estimates.stamp)
+        for topic, fields in joint_fields(estimates, self.names).items():
+            self.file.write(f'{NAMESPACE}/{topic}', make.joint_state(header, *fields), log_time)
+            if topic == 'slip':
+                classes = make.slip_class(estimates.slip_class)
+                self.file.write(f'{NAMESPACE}/slip_class', classes, log_time)
+        twist = make.twist_stamped(
+            header,
+            estimates.forward_velocity,
+            estimates.yaw_rate,
+            twist_covariance(estimates),
+        )
+        self.file.write(f'{NAMESPACE}/twist', twist, log_time)
+        self._write_stuck(estimates.stuck, log_time)
+        found = diagnostics.statuses(estimates, self.names, counters or {}, faults)
+        if self._schedule.due(estimates.stamp, found):
+            self.file.write(DIAGNOSTICS, make.diagnostic_array(header, found), log_time)
+
+    def _write_stuck(self, stuck: bool, log_time: int) -> None:
+        if stuck != self._stuck:
+            self._stuck = stuck
+            self.file.write(STUCK, self.file.messages.bool(stuck), log_time)
