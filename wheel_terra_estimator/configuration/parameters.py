@@ -3,9 +3,8 @@
 """The declared parameters: one table from which checks, descriptors and documentation come.
 
 To add a parameter, add one line to ``DECLARED``, such as
-``number('filter.gate_probability', 0.999, '-', 'what it does', above=0.0, at_most=1.0)``: the reader
-then accepts and checks the key, the node declares it, ``configuration.filter.gate_probability`` has
-its value, and ``python -m wheel_terra_estimator.configuration.documentation`` writes it to
+``number('filter.gate', 0.999, '-', 'what it does', above=0.0, at_most=1.0)``: the reader then
+accepts and checks the key, the node declares it, ``configuration.filter.gate`` has its value, and ``python -m wheel_terra_estimator.configuration.documentation`` writes it to
 ``docs/parameters.md`` (a test says when that was forgotten). ``size='wheels'`` makes a per-wheel
 list, a number a list of that length. A key that ends in ``_deg`` is in degrees in files and in
 radians in the code, where its name has no suffix.
@@ -744,16 +743,15 @@ def by_spelling(table: Mapping[str, Parameter]) -> dict[str, Parameter]:
     return spellings
 
 
-def nearest(key: str, known: Iterable[str]) -> str | None:
-    """Return the known key that looks most like ``key``, None if none does."""
+def nearest(key: str, known: Iterable[str]) -> str:
+    """Return the known key that looks most like ``key``; a right name in a wrong section wins."""
     known = list(known)
-    found = difflib.get_close_matches(key, known, n=1, cutoff=0.6)
-    if not found:
-        # A right name in the wrong section ('rover.radius') is near too.
-        last = key.rsplit('.', 1)[-1]
-        found = [other for other in known if other.rsplit('.', 1)[-1] == last]
-    if not found:
-        tails = {other.rsplit('.', 1)[-1]: other for other in known}
-        close = difflib.get_close_matches(key.rsplit('.', 1)[-1], tails, n=1, cutoff=0.6)
-        found = [tails[name] for name in close]
-    return found[0] if found else None
+    last = key.rsplit('.', 1)[-1]
+    for candidates in (
+        difflib.get_close_matches(key, known, n=1, cutoff=0.8),
+        [other for other in known if other.rsplit('.', 1)[-1] == last],
+        difflib.get_close_matches(key, known, n=1, cutoff=0.0),
+    ):
+        if candidates:
+            return candidates[0]
+    return known[0]

@@ -157,9 +157,6 @@ def _load_effect_file(sourced: Sequence[tuple[str, str, Any]]) -> None:
 
 def _unknown(key: str, source: str, spellings: Mapping[str, Parameter]) -> str:
     close = nearest(key, spellings)
-    if close is None:
-        sections = 'wheels, rover, soil, sensors, filter, effects'
-        return f"{source}: unknown parameter '{key}'; sections are: {sections}"
     return (
         f"{source}: unknown parameter '{key}'; the nearest known one is '{close}' "
         f'({spellings[close].allowed})'
@@ -215,8 +212,7 @@ def _scalar(parameter: Parameter, value: Any, refuse: Callable[[str], UserError]
         if not isinstance(value, str):
             raise refuse(f'{value!r} is not a text')
         if parameter.choices and value not in parameter.choices:
-            close = nearest(value, parameter.choices)
-            raise refuse(f'{value!r} is unknown' + (f", nearest is '{close}'" if close else ''))
+            raise refuse(f"{value!r} is unknown, nearest is '{nearest(value, parameter.choices)}'")
         return value
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         raise refuse(f'{value!r} is not a number')

@@ -115,7 +115,7 @@ def parse_value(text: str, source: str) -> Value:
         What the error message names.
     """
     try:
-        value = yaml.load(text, Loader=_RosLoader)  # noqa: S506  (a safe loader of our own)
+        value = yaml.load(text, Loader=_RosLoader)
     except yaml.YAMLError as error:
         raise UserError(f'{source}: {_in_words(error)}') from None
     return _checked(value if text.strip() else _NO_VALUE, source)
@@ -138,7 +138,7 @@ def read(path: Path) -> dict[str, Value]:
         If the file cannot be read, is not YAML or not a parameter file.
     """
     try:
-        document = yaml.load(path.read_text(encoding='utf-8'), Loader=_RosLoader)  # noqa: S506
+        document = yaml.load(path.read_text(encoding='utf-8'), Loader=_RosLoader)
     except (OSError, UnicodeDecodeError) as error:
         reason = error.strerror if isinstance(error, OSError) else 'not a UTF-8 text'
         raise UserError(f'{path}: cannot be read: {reason}') from None
