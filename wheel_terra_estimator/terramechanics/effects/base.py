@@ -133,3 +133,15 @@ class Effect:
     def defaults(self) -> dict[str, float]:
         """Return the default value of each parameter."""
         return {p.name: p.default for p in self.parameters}
+
+    def neutral(self) -> dict[str, float]:
+        """Return values at which the effect vanishes.
+
+        Strengths at their neutral value; what only shapes the term (an onset, a depth: parameters
+        whose prior is centred away from the neutral value) at its default.
+        """
+        first = self.parameters[0]
+        return {
+            p.name: p.neutral if p is first or p.prior_mean == p.neutral else p.default
+            for p in self.parameters
+        }

@@ -1,0 +1,105 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Entrance angle at which the soil carries the load: bracketed Newton, all points at once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wheel_terra_estimator.terramechanics.contact import Contact
+
+FloatArray = NDArray[np.float64]
+
+# Sinkage equal to the radius: the stress laws end here.
+LARGEST_ANGLE = np.pi / 2
+SMALLEST_ANGLE = 1e-5
+_STEP = 1e-6
+
+
+def explicit_entrance_angle(contact: Contact) -> FloatArray:
+    """First guess from the normal stress alone, small angles, triangular stress (10 to 20 %)."""
+    n = contact.sinkage_exponent
+    rise = 0.5 * contact.radius * np.maximum(1.0 - contact.peak_ratio**2, 0.05)
+    area = 0.5 * contact.width * contact.radius * (1.0 - contact.leaving_ratio)
+    modulus = contact.bearing_modulus * (rise / contact.reference_depth) ** n
+    guess = (contact.normal_load / (area * modulus)) ** (1.0 / (2.0 * n + 1.0))
+    return np.clip(guess, 1e-3, 1.4)
+
+
+def solve_entrance_angle(
+    carried: Callable[[FloatArray], FloatArray],
+    load: FloatArray,
+    start: FloatArray,
+    tolerance: float = 1e-10,
+) -> tuple[FloatArray, NDArray[np.bool_]]:
+    """Solve carried(t1) = load for each point.
+
+    Load grows nearly like a power of the angle, so Newton runs on logarithms; a bracket catches
+    the rest. Points where it fails are scanned for their first crossing.
+
+    Parameters
+    ----------
+    carried : callable
+        (2, N) angles -> (2, N) vertical force [N].
+    load, start : numpy.ndarray
+        (N,) load [N] and first guess [rad].
+    tolerance : float
+        Relative to the load.
+
+    Returns
+    -------
+    numpy.ndarray
+        (N,) entrance angle [rad]; `LARGEST_ANGLE` where the soil cannot carry the load.
+    numpy.ndarray
+        (N,) True where it can.
+    """
+    load = np.asarray(load, float)
+    angle = np.broadcast_to(np.asarray(start, float), load.shape).copy()
+    low, high = np.full_like(angle, SMALLEST_ANGLE), np.full_like(angle, LARGEST_ANGLE)
+    pair = np.empty((2, *angle.shape))
+    done = np.zeros(angle.shape, bool)
+    for _ in range(40):
+        pair[0], pair[1] = angle, angle * (1.0 + _STEP)
+        force, next_force = carried(pair)
+        done = np.abs(force - load) <= tolerance * load
+        if done.all():
+            return angle, done
+        low = np.where(force < load, angle, low)
+        high = np.where(force >= load, angle, high)
+        with np.errstate(divide='ignore', invalid='ignore'):
+            exponent = (next_force / force - 1.0) / _STEP
+            proposal = angle * (load / force) ** (1.0 / exponent)
+        good = np.isfinite(proposal) & (proposal > low) & (proposal < high) & (exponent > 0.2)
+        step = np.where(good, proposal, np.sqrt(low * high))
+        angle = np.where(done, angle, step)
+        if np.all(done | (high - low < 1e-13)):
+            break
+    return _first_crossing(carried, load, angle, done)
+
+
+def _first_crossing(
+    carried: Callable[[FloatArray], FloatArray],
+    load: FloatArray,
+    angle: FloatArray,
+    done: NDArray[np.bool_],
+) -> tuple[FloatArray, NDArray[np.bool_]]:
+    """Scan all points coarsely, then bisect those not done; the smallest crossing counts."""
+    grid = np.geomspace(1e-3, LARGEST_ANGLE, 80)
+    force = np.concatenate(
+        [carried(np.stack([np.full_like(load, a), np.full_like(load, b)]))
+         for a, b in zip(grid[::2], grid[1::2], strict=True)]
+    )  # fmt: skip
+    above = force >= load
+    carries = above.any(axis=0)
+    first = np.argmax(above, axis=0)
+    high = grid[first]
+    low = np.where(first > 0, grid[np.maximum(first - 1, 0)], SMALLEST_ANGLE)
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        enough = carried(np.stack([middle, middle]))[0] >= load
+        high, low = np.where(enough, middle, high), np.where(enough, low, middle)
+    angle = np.where(done, angle, np.where(carries, high, LARGEST_ANGLE))
+    return angle, done | carries

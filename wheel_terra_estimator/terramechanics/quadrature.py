@@ -1,0 +1,58 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Reference forces: the stresses integrated by Gauss-Legendre on both sides of their peak."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wheel_terra_estimator.terramechanics import stresses
+from wheel_terra_estimator.terramechanics.contact import Contact
+from wheel_terra_estimator.terramechanics.terms import Terms
+
+# Nodes per side; error below 1e-4 of the load over the validation family (docs/models).
+NODES = 10
+
+
+@lru_cache(maxsize=8)
+def _rule(nodes: int, dimensions: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Nodes and weights on (0, 1), squared towards 0, where the stress starts like x^N."""
+    x, w = np.polynomial.legendre.leggauss(nodes)
+    x, w = 0.5 * (x + 1.0), 0.5 * w
+    shape = (nodes,) + (1,) * dimensions
+    return (x * x).reshape(shape), (2.0 * x * w).reshape(shape)
+
+
+def forces(contact: Contact, terms: Terms, nodes: int = NODES) -> tuple[Any, Any, Any]:
+    """Vertical force, longitudinal force and torque on the wheel, angles given.
+
+    Seed 1 equations 17 to 19 for the load, the same integrals for pull and torque:
+    W = b Int (r sigma cos + R tau sin), F = b Int (R tau cos - r sigma sin), T = b R^2 Int tau.
+
+    Returns
+    -------
+    tuple of numpy.ndarray
+        W [N], F [N] in the direction of motion, T [N m], in the common shape of the contact.
+    """
+    t1, tm, t2 = contact.entrance_angle, contact.peak_angle, contact.leaving_angle
+    front, rear = t1 - tm, tm - t2
+    x, w = _rule(nodes, max(np.ndim(front), np.ndim(rear), np.ndim(contact.slip)))
+    # The rear branch mirrors the front one (Wong and Reece), so both share the same stress.
+    entry_side = t1 - front * x
+    stress = stresses.front_stress(contact, entry_side)
+    load = pull = torque = 0.0
+    for angle, span in ((entry_side, front), (t2 + rear * x, rear)):
+        contact.angle, contact.normal_stress = angle, stress
+        terms.apply('on_normal_stress', contact)
+        normal = contact.radius * contact.normal_stress
+        shear = contact.shear_radius * stresses.shear_stress(contact, angle, contact.normal_stress)
+        cosine, sine = np.cos(angle), np.sin(angle)
+        load = load + span * np.sum(w * (normal * cosine + shear * sine), axis=0)
+        pull = pull + span * np.sum(w * (shear * cosine - normal * sine), axis=0)
+        torque = torque + span * np.sum(w * shear, axis=0)
+    width = contact.width
+    return width * load, width * pull, width * contact.shear_radius * torque

@@ -1,0 +1,65 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Stress laws under a rigid wheel: Bekker, Reece, Wong-Reece, Janosi-Hanamoto."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from wheel_terra_estimator.terramechanics.contact import Contact
+from wheel_terra_estimator.terramechanics.kinematics import shear_displacement
+
+
+def bekker_modulus(cohesive: Any, frictional: Any, width: Any) -> Any:
+    """Pressure at 1 m depth, kc/b + kphi [Pa], for p = (kc/b + kphi) (z/1 m)^n (Bekker 1969)."""
+    return cohesive / width + frictional
+
+
+def reece_modulus(
+    cohesive: Any, frictional: Any, width: Any, cohesion: Any, weight_density: Any
+) -> Any:
+    """Pressure at a depth of one width, c kc' + rho g b kphi' [Pa], for p = k (z/b)^n (Reece)."""
+    return cohesion * cohesive + weight_density * width * frictional
+
+
+def static_sinkage(load: Any, area: Any, modulus: Any, exponent: Any) -> Any:
+    """Sinkage of a plate, (p/k)^(1/n) [m] (Bekker); the limit of a wheel without curvature."""
+    return (load / (area * modulus)) ** (1.0 / exponent)
+
+
+def bekker_wheel_sinkage(load: Any, wheel: Any, modulus: Any, exponent: Any) -> Any:
+    """Static sinkage of a towed rigid wheel [m] (Bekker 1969).
+
+    z = [3 W / ((3 - n) b k sqrt(D))]^(2/(2n+1)); small sinkage, n below 1.3, stress in front only.
+    """
+    force = (3.0 - exponent) * wheel.width * modulus * np.sqrt(2.0 * wheel.radius)
+    return (3.0 * load / force) ** (2.0 / (2.0 * exponent + 1.0))
+
+
+def compaction_resistance(width: Any, modulus: Any, exponent: Any, sinkage: Any) -> Any:
+    """Work to press a rut of unit length, b k z^(n+1)/(n+1) [N] (Bekker 1969)."""
+    return width * modulus * sinkage ** (exponent + 1.0) / (exponent + 1.0)
+
+
+def front_stress(contact: Contact, angle: Any, maths: Any = np) -> Any:
+    """Normal stress ahead of its peak, k [(r/z0)(cos t - cos t1)]^N [Pa] (seed 1 equation 17)."""
+    depth = contact.radius * (maths.cos(angle) - maths.cos(contact.entrance_angle))
+    relative = maths.maximum(depth, 0.0) / contact.reference_depth
+    return contact.bearing_modulus * relative**contact.sinkage_exponent
+
+
+def mobilised_share(displacement: Any, shear_modulus: Any, maths: Any = np) -> Any:
+    """Signed share of the shear strength, sgn(j) (1 - exp(-|j|/K)) (Janosi and Hanamoto) [-]."""
+    share = -maths.expm1(-maths.abs(displacement) / shear_modulus)
+    return maths.where(displacement >= 0.0, share, -share)
+
+
+def shear_stress(contact: Contact, angle: Any, normal_stress: Any, maths: Any = np) -> Any:
+    """Shear stress (c + sigma tan phi) sgn(j) (1 - exp(-|j|/K)) [Pa] (seed 1 equation 18)."""
+    displacement = shear_displacement(
+        angle, contact.entrance_angle, contact.shear_radius, contact.velocity_ratio, maths
+    )
+    strength = contact.cohesion + normal_stress * contact.tan_friction
+    return strength * mobilised_share(displacement, contact.shear_modulus, maths)

@@ -1,0 +1,121 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""From points, soil and switched-on effects to contacts whose angles are known."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import fields
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from wheel_terra_estimator.terramechanics import stresses
+from wheel_terra_estimator.terramechanics.contact import Contact
+from wheel_terra_estimator.terramechanics.effects import catalogue
+from wheel_terra_estimator.terramechanics.effects.base import STAGES, Term
+from wheel_terra_estimator.terramechanics.kinematics import speed_ratio
+from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
+from wheel_terra_estimator.terramechanics.soil import Soil
+
+SOIL_NUMBERS = tuple(f.name for f in fields(Soil) if f.name != 'pressure_law')
+# Share of the contact length that the peak of the stress keeps from either end.
+PEAK_MARGIN = 1e-3
+
+
+class Terms:
+    """The terms of the switched-on effects, sorted by stage, with their parameter values."""
+
+    def __init__(self, settings: Mapping[str, Mapping[str, Any]]) -> None:
+        known = catalogue()
+        self.stages: dict[str, list[tuple[Term, SimpleNamespace]]] = {s: [] for s in STAGES}
+        for name, values in settings.items():
+            parameters = SimpleNamespace(**values)
+            for stage in STAGES:
+                term = getattr(known[name], stage)
+                if term is not None:
+                    self.stages[stage].append((term, parameters))
+
+    def apply(self, stage: str, contact: Contact, maths: Any = np) -> None:
+        """Run all terms of a stage on the contact."""
+        for term, parameters in self.stages[stage]:
+            term(contact, parameters, maths)
+
+
+def build_contact(
+    points: OperatingPoints, soil: Mapping[str, Any], pressure_law: str, terms: Terms
+) -> Contact:
+    """Return the contacts before the load balance, with stage ``on_inputs`` done.
+
+    Parameters
+    ----------
+    points : OperatingPoints
+        N points.
+    soil : mapping
+        Value of each of `SOIL_NUMBERS`, any shape that broadcasts against (N,).
+    """
+    wheel = points.wheel
+    rate = points.angular_velocity
+    tip, rim = wheel.tip_radius, wheel.radius
+    if pressure_law == 'reece':
+        depth = wheel.width
+        weight = soil['density'] * points.gravity
+        modulus = stresses.reece_modulus(
+            soil['cohesive_modulus'], soil['frictional_modulus'], depth, soil['cohesion'], weight
+        )
+    else:
+        depth = 1.0
+        modulus = stresses.bekker_modulus(
+            soil['cohesive_modulus'], soil['frictional_modulus'], wheel.width
+        )
+    ratio = speed_ratio(points.slip)
+    contact = Contact(
+        slip=points.slip,
+        velocity_ratio=ratio * (tip if points.slip_radius == 'lug_tip' else rim),
+        normal_load=points.normal_load,
+        stated_load=points.normal_load,
+        slope=points.slope,
+        gravity=points.gravity,
+        rim_speed=np.abs(rate) * rim,
+        direction=np.where(rate < 0.0, -1.0, 1.0),
+        pass_number=points.pass_number,
+        radius=rim,
+        width=wheel.width,
+        lug_height=wheel.lug_height,
+        lug_count=wheel.lug_count,
+        lug_thickness=wheel.lug_thickness,
+        shear_radius=rim,
+        bearing_modulus=modulus,
+        reference_depth=depth,
+        sinkage_exponent=soil['sinkage_exponent'],
+        cohesion=soil['cohesion'],
+        tan_friction=np.tan(soil['friction_angle']),
+        shear_modulus=soil['shear_modulus'],
+        peak_ratio=soil['peak_stress_ratio'],
+        leaving_ratio=soil['leaving_angle_ratio'],
+        density=soil['density'],
+    )
+    terms.apply('on_inputs', contact)
+    if points.slip_radius == 'shear':
+        contact.velocity_ratio = contact.velocity_ratio / rim * contact.shear_radius
+    return contact
+
+
+def set_angles(
+    contact: Contact, entrance_angle: Any, measured_leaving: Any, terms: Terms, maths: Any = np
+) -> None:
+    """Set entrance, leaving and peak angle; a measured leaving angle overrides the law."""
+    contact.entrance_angle = entrance_angle
+    contact.leaving_angle = contact.leaving_ratio * entrance_angle
+    contact.peak_angle = contact.peak_ratio * entrance_angle
+    terms.apply('on_contact', contact, maths)
+    if measured_leaving is not None:
+        given = maths.minimum(measured_leaving, 0.9 * entrance_angle)
+        contact.leaving_angle = maths.where(
+            maths.isnan(measured_leaving), contact.leaving_angle, given
+        )
+    margin = PEAK_MARGIN * (entrance_angle - contact.leaving_angle)
+    contact.peak_angle = maths.minimum(
+        maths.maximum(contact.peak_angle, contact.leaving_angle + margin), entrance_angle - margin
+    )
