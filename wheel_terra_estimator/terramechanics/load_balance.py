@@ -64,7 +64,8 @@ def solve_entrance_angle(
     for _ in range(40):
         pair[0], pair[1] = angle, angle * (1.0 + _STEP)
         force, next_force = carried(pair)
-        done = np.abs(force - load) <= tolerance * load
+        error = np.abs(force - load)
+        done = error <= tolerance * load
         if done.all():
             return angle, done
         low = np.where(force < load, angle, low)
@@ -75,6 +76,9 @@ def solve_entrance_angle(
         good = np.isfinite(proposal) & (proposal > low) & (proposal < high) & (exponent > 0.2)
         step = np.where(good, proposal, np.sqrt(low * high))
         angle = np.where(done, angle, step)
+        # Newton squares the error: one step from here is below the tolerance.
+        if np.all(done | (good & (error < 1e-5 * load))):
+            return angle, np.ones_like(done)
         if np.all(done | (high - low < 1e-13)):
             break
     return _first_crossing(carried, load, angle, done)

@@ -214,8 +214,11 @@ class WheelSoilModel:
         flags = np.where(carries, 0, OVERLOADED)
         flags = flags + np.where(np.abs(points.slip) > 0.95, OUTSIDE_VALIDITY, 0)
         shape = angle.shape
-        columns = [*outputs, angle, contact.peak_angle, contact.leaving_angle]
-        return SteadyState(*(np.array(np.broadcast_to(c, shape)) for c in columns), flags)
+        columns = (*outputs, angle, contact.peak_angle, contact.leaving_angle)
+        sinkage, pull, torque, entrance, peak, leaving = (
+            np.array(np.broadcast_to(column, shape)) for column in columns
+        )
+        return SteadyState(sinkage, pull, torque, entrance, peak, leaving, flags)
 
 
 class _Batch:
@@ -236,7 +239,7 @@ class _Batch:
         self.steps = np.empty((len(names), len(points)))
         self.soil = dict(soil)
         self.effects: dict[str, dict[str, Any]] = {k: dict(v) for k, v in effects.items()}
-        self.points = SimpleNamespace(
+        self.points: Any = SimpleNamespace(
             **{name: getattr(points, name) for name in points.__dataclass_fields__}
         )
         for index, name in enumerate(names):

@@ -41,18 +41,19 @@ def forces(contact: Contact, terms: Terms, nodes: int = NODES) -> tuple[Any, Any
     t1, tm, t2 = contact.entrance_angle, contact.peak_angle, contact.leaving_angle
     front, rear = t1 - tm, tm - t2
     x, w = _rule(nodes, max(np.ndim(front), np.ndim(rear), np.ndim(contact.slip)))
-    # The rear branch mirrors the front one (Wong and Reece), so both share the same stress.
     entry_side = t1 - front * x
+    # The rear branch mirrors the front one (Wong and Reece), so both share the same stress.
     stress = stresses.front_stress(contact, entry_side)
-    load = pull = torque = 0.0
-    for angle, span in ((entry_side, front), (t2 + rear * x, rear)):
-        contact.angle, contact.normal_stress = angle, stress
-        terms.apply('on_normal_stress', contact)
-        normal = contact.radius * contact.normal_stress
-        shear = contact.shear_radius * stresses.shear_stress(contact, angle, contact.normal_stress)
-        cosine, sine = np.cos(angle), np.sin(angle)
-        load = load + span * np.sum(w * (normal * cosine + shear * sine), axis=0)
-        pull = pull + span * np.sum(w * (shear * cosine - normal * sine), axis=0)
-        torque = torque + span * np.sum(w * shear, axis=0)
+    angle = np.concatenate([entry_side, np.broadcast_to(t2 + rear * x, entry_side.shape)])
+    weight = np.concatenate([front * w, np.broadcast_to(rear * w, entry_side.shape)])
+    contact.angle = angle
+    contact.normal_stress = np.concatenate([stress, stress])
+    terms.apply('on_normal_stress', contact)
+    shear = stresses.shear_stress(contact, angle, contact.normal_stress)
+    shear *= weight * contact.shear_radius
+    normal = contact.normal_stress * (weight * contact.radius)
+    cosine, sine = np.cos(angle), np.sin(angle)
     width = contact.width
-    return width * load, width * pull, width * contact.shear_radius * torque
+    load = width * np.add.reduce(normal * cosine + shear * sine)
+    pull = width * np.add.reduce(shear * cosine - normal * sine)
+    return load, pull, width * contact.shear_radius * np.add.reduce(shear)
