@@ -133,9 +133,9 @@ def _checked(sourced: Sequence[tuple[str, str, Any]], complete: bool) -> Configu
         _require(table, stated, [source for _, source, _ in sourced])
     values: dict[str, Value] = {}
     names = table['wheels.names']
-    wheels = len(_value(names, stated, 0))
+    wheels = len(checked_value(names, stated, 0))
     for key, parameter in table.items():
-        values[key] = _value(parameter, stated, wheels)
+        values[key] = checked_value(parameter, stated, wheels)
     _cross_check(values, stated)
     return Configuration.from_values(values, stated)
 
@@ -173,7 +173,7 @@ def _require(table: Mapping[str, Parameter], stated: _Sourced, sources: Sequence
         )
 
 
-def _value(parameter: Parameter, stated: _Sourced, wheels: int) -> Any:
+def checked_value(parameter: Parameter, stated: _Sourced, wheels: int) -> Any:
     """Return the checked value of one parameter, its default where nothing was stated."""
     if parameter.key not in stated:
         if parameter.size == 'wheels':
