@@ -642,6 +642,53 @@ DECLARED: tuple[Parameter, ...] = (
         'a step back of the clock by more than this ends the run',
         above=0.0,
     ),
+    # Filter: speed and soil model (docs/estimation/design.md gives the reasons)
+    number(
+        'filter.period',
+        0.1,
+        's',
+        'least time between two updates with the wheel-soil model; in between the speed goes on '
+        'with wheels and accelerometer',
+        above=0.0,
+        at_most=1.0,
+    ),
+    number(
+        'filter.ratio_walk',
+        0.25,
+        '1/sqrt(m)',
+        'random walk of ground speed over rim speed per rim travel',
+        above=0.0,
+    ),
+    number(
+        'filter.shear_error_std',
+        0.08,
+        '-',
+        'error of the shear model per wheel, as a share of the shear stress',
+        above=0.0,
+    ),
+    number(
+        'filter.shear_error_length',
+        0.3,
+        'm',
+        'travel over which that error changes',
+        above=0.0,
+    ),
+    number(
+        'filter.soil_walk',
+        1.0,
+        '-',
+        'factor on the random walk of the soil parameters per travel; more = soil that changes '
+        'more often',
+        at_least=0.0,
+    ),
+    number(
+        'filter.gate',
+        10.8,
+        '-',
+        'squared innovation over its variance beyond which a reading is an outlier (10.8: one in '
+        '1000 good readings)',
+        above=1.0,
+    ),
     # Filter: classes and warnings
     number(
         'filter.class_thresholds',

@@ -1,0 +1,118 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""filterpy's extended Kalman filter with gates, kept symmetric, positive and finite.
+
+filterpy does the algebra (covariance in Joseph form); innovation, its covariance and the gate are
+our own, before each update, so that a bad reading never touches the state. ``h`` and ``H`` come
+from one pass over the models and are handed in as they are.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from filterpy.kalman import ExtendedKalmanFilter
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+
+class _KnownPrediction(ExtendedKalmanFilter):
+    """filterpy's filter with a nonlinear prediction of the mean, worked out by the caller."""
+
+    predicted: FloatArray
+
+    def predict_x(self, u: float = 0) -> None:
+        """Take the predicted mean."""
+        self.x = self.predicted
+
+
+class GatedFilter:
+    """State, covariance, gates and counters.
+
+    Parameters
+    ----------
+    mean, covariance : numpy.ndarray
+        (n,) and (n, n) start.
+    lower, upper : numpy.ndarray
+        (n,) physical bounds of the state, enforced after each update.
+    """
+
+    def __init__(
+        self, mean: FloatArray, covariance: FloatArray, lower: FloatArray, upper: FloatArray
+    ) -> None:
+        size = len(mean)
+        self._ekf = _KnownPrediction(dim_x=size, dim_z=1)
+        self._ekf.x = mean.copy()
+        self._ekf.P = covariance.copy()
+        self._start = covariance.copy()
+        self._lower, self._upper = lower, upper
+        self.restarts = 0
+
+    @property
+    def mean(self) -> FloatArray:
+        """(n,) state."""
+        return self._ekf.x
+
+    @property
+    def covariance(self) -> FloatArray:
+        """(n, n) covariance."""
+        return self._ekf.P
+
+    def predict(self, mean: FloatArray, transition: FloatArray, noise: FloatArray) -> None:
+        """Go to a predicted mean with transition matrix F and process noise Q."""
+        self._ekf.predicted = mean
+        self._ekf.F = transition
+        self._ekf.Q = noise
+        self._ekf.predict()
+        self._keep_sound()
+
+    def innovation_variance(self, H: FloatArray, noise: FloatArray) -> FloatArray:
+        """Return the (m,) diagonal of H P H^T + R."""
+        return np.einsum('ij,jk,ik->i', H, self._ekf.P, H) + noise
+
+    def update(self, residual: FloatArray, H: FloatArray, noise: FloatArray) -> None:
+        """Fuse m readings: residual z - h(x) (m,), H (m, n), variances (m,) of independent noise."""
+        ekf = self._ekf
+        ekf.update(residual, lambda _: H, lambda _: 0.0, R=np.diag(noise))
+        self._keep_sound()
+
+    def set(self, index: int, value: float, variance: float) -> None:
+        """Give one entry a value known from elsewhere and cut its correlations."""
+        ekf = self._ekf
+        ekf.x[index] = value
+        ekf.P[index, :] = 0.0
+        ekf.P[:, index] = 0.0
+        ekf.P[index, index] = variance
+
+    def widen(self, index: int, variance: float) -> None:
+        """Add variance to one entry."""
+        self._ekf.P[index, index] += variance
+
+    def snapshot(self) -> tuple[FloatArray, FloatArray, int]:
+        """Return copies of mean and covariance and the count of restarts."""
+        return self._ekf.x.copy(), self._ekf.P.copy(), self.restarts
+
+    def restore(self, memory: tuple[FloatArray, FloatArray, int]) -> None:
+        """Go back to a snapshot."""
+        mean, covariance, self.restarts = memory
+        self._ekf.x, self._ekf.P = mean.copy(), covariance.copy()
+
+    def _keep_sound(self) -> None:
+        ekf = self._ekf
+        # One sum finds nan and inf in either.
+        if not np.isfinite(ekf.x.sum() + ekf.P.sum()):
+            ekf.x = np.where(np.isfinite(ekf.x), ekf.x, 0.0)
+            ekf.P = self._start.copy()
+            self.restarts += 1
+        np.clip(ekf.x, self._lower, self._upper, out=ekf.x)
+        P = ekf.P
+        P += P.T.copy()
+        P *= 0.5
+        diagonal = np.einsum('ii->i', P)
+        if diagonal.min() <= 0.0:
+            np.maximum(diagonal, 1e-14, out=diagonal)
+
+
+def chi_square_gate(residual: float, variance: float, gate: float) -> float:
+    """Return the variance to be added so that residual^2 / variance does not exceed the gate."""
+    return max(residual * residual / gate - variance, 0.0)

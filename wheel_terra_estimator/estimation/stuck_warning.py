@@ -1,0 +1,302 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Stuck warning: entrapment under way, or expected within a time or a rim travel.
+
+Four signs, each with a hold time of its own, any of which raises the warning:
+
+* *digging in*: the median slip is above 0.8 with a probability above one half;
+* *look ahead*: the median slip is above one half and, at the rate at which it grew over the last
+  seconds, passes 0.9 within the horizon;
+* *held wheels*: the rover makes little of what its fastest wheel offers while at least half of its
+  wheels slip heavily or stand (torque-limited wheels stall as often as they spin);
+* *stall*: without any speed, two or more wheels pull near their torque limit while they turn much
+  slower than the fastest. Pulling away from rest looks the same: a start mask keeps it out.
+
+Only driving slip counts: braking and skidding are no entrapment. A single wheel never raises it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from wheel_terra_estimator.estimation.estimates import NO_ENTRAPMENT_IN_SIGHT
+from wheel_terra_estimator.estimation.slip_classes import exceedance_probability
+from wheel_terra_estimator.estimation.speed_process import median
+
+_ENTRAPPED_SLIP = 0.9
+_DIGGING_SLIP = 0.8
+_TREND_WINDOW = 5.0  # [s]
+_LONGEST_TIME = 600.0  # [s] said where no entrapment is in sight
+
+
+@dataclass(frozen=True)
+class StuckTuning:
+    """Thresholds; defaults as tuned on simulated tuning drives (docs/estimation)."""
+
+    horizon: float = 15.0  # [s]
+    travel: float = 0.3  # [m]
+    clear_slip: float = 0.6
+    clear_time: float = 3.0
+    dig_hold: float = 1.0
+    look_ahead: float = 10.0
+    look_ahead_slip: float = 0.5
+    look_ahead_hold: float = 1.0
+    held_slip: float = 0.6
+    held_hold: float = 0.5
+    stall_ratio: float = 0.6
+    stall_torque: float = 0.7  # of the torque limit
+    stall_hold: float = 0.5
+
+
+@dataclass(frozen=True)
+class WheelMotionState:
+    """What the warning needs of one wheel."""
+
+    slip: float
+    slip_std: float
+    rim_speed: float  # [m/s], signed
+    known: bool  # a rate is known and the wheel is not at rest
+    torque_share: float  # |torque| over its limit, nan = unknown
+    sinkage: float
+    radius: float
+
+
+@dataclass(frozen=True)
+class StuckAssessment:
+    """Result of one update; lists have one entry per wheel."""
+
+    stuck: bool
+    reason: str
+    probability: list[float]
+    time_to_stuck: list[float]
+    rim_travel_left: list[float]
+    stalled: list[bool]
+
+
+@dataclass
+class _Memory:
+    raised: bool = False
+    reason: str = ''
+    clear_since: float | None = None
+    since: dict[str, float] = field(default_factory=dict)
+    rolling_since: float | None = None
+    cruise: float = 0.0
+    trend: deque[tuple[float, float, float, float]] = field(default_factory=deque)
+    rim_travel: float = 0.0
+    last_time: float | None = None
+
+
+class StuckMonitor:
+    """Stuck warning of one rover."""
+
+    def __init__(self, tuning: StuckTuning) -> None:
+        self._tuning = tuning
+        self._memory = _Memory()
+
+    def snapshot(self) -> _Memory:
+        """Return a copy of the memory."""
+        m = self._memory
+        return _Memory(
+            m.raised,
+            m.reason,
+            m.clear_since,
+            dict(m.since),
+            m.rolling_since,
+            m.cruise,
+            deque(m.trend),
+            m.rim_travel,
+            m.last_time,
+        )
+
+    def restore(self, memory: _Memory) -> None:
+        """Go back to a snapshot."""
+        self._memory = memory
+        self._memory = self.snapshot()
+
+    def update(
+        self, time: float, speed: float, speed_known: bool, wheels: Sequence[WheelMotionState]
+    ) -> StuckAssessment:
+        """Judge the state at `time` [s].
+
+        Parameters
+        ----------
+        time : float
+            Time [s].
+        speed : float
+            Body speed [m/s].
+        speed_known : bool
+            Whether the speed rests on more than a guess: the rules that compare it with single
+            wheels need it.
+        wheels : sequence of WheelMotionState
+            One per wheel.
+        """
+        memory, tuning = self._memory, self._tuning
+        dt = 0.0 if memory.last_time is None else max(time - memory.last_time, 0.0)
+        memory.last_time = time
+        moving = [w for w in wheels if w.known]
+        fastest = max((abs(w.rim_speed) for w in moving), default=0.0)
+        stalled = self._stalled(time, wheels, fastest)
+        driving = [w.slip for w in moving]
+        # A stalled wheel offers nothing: it counts as a wheel that makes no way.
+        effective = driving + [
+            1.0 for w, s in zip(wheels, stalled, strict=True) if s and not w.known
+        ]
+        typical = median(effective) if effective else 0.0
+        typical_std = median([w.slip_std for w in moving]) if moving else 1.0
+        memory.rim_travel += fastest * dt
+        slope = self._trend(time, typical, bool(moving))
+
+        probability = exceedance_probability(typical, typical_std, _DIGGING_SLIP)
+        signs: dict[str, str] = {}
+        if effective and probability > 0.5 and fastest > 0.0:
+            if self._held('dig', time, tuning.dig_hold):
+                signs['dig'] = f'median slip {typical:.2f}: digging in'
+        else:
+            memory.since.pop('dig', None)
+        ahead = typical + tuning.look_ahead * slope
+        if typical > tuning.look_ahead_slip and ahead > _ENTRAPPED_SLIP and typical_std < 0.2:
+            if self._held('ahead', time, tuning.look_ahead_hold):
+                signs['ahead'] = f'median slip {typical:.2f} grows by {slope:.3f} per second'
+        else:
+            memory.since.pop('ahead', None)
+        self._held_wheels_sign(time, speed, speed_known, moving, stalled, fastest, signs)
+        self._stall_sign(time, moving, stalled, fastest, signs)
+
+        if signs:
+            if not memory.raised:
+                memory.reason = next(iter(signs.values()))
+            memory.raised, memory.clear_since = True, None
+        elif memory.raised:
+            magnitude = median([abs(s) for s in driving]) if driving else None
+            if magnitude is not None and magnitude < tuning.clear_slip:
+                if memory.clear_since is None:
+                    memory.clear_since = time
+                elif time - memory.clear_since >= tuning.clear_time:
+                    memory.raised, memory.reason, memory.clear_since = False, '', None
+            else:
+                memory.clear_since = None
+        return self._assessment(wheels, stalled, typical, slope, fastest)
+
+    def _assessment(
+        self,
+        wheels: Sequence[WheelMotionState],
+        stalled: list[bool],
+        typical: float,
+        slope: float,
+        fastest: float,
+    ) -> StuckAssessment:
+        probability, time_left, travel_left = [], [], []
+        for wheel, stands in zip(wheels, stalled, strict=True):
+            if stands:
+                p, t = 1.0, 0.0
+            elif not wheel.known or wheel.slip <= 0.0:
+                p, t = 0.0, _LONGEST_TIME
+            else:
+                ahead = wheel.slip + max(slope, 0.0) * self._tuning.horizon
+                p = exceedance_probability(ahead, wheel.slip_std, _ENTRAPPED_SLIP)
+                if wheel.slip >= _ENTRAPPED_SLIP:
+                    t = 0.0
+                elif slope > 1e-4 and wheel.slip > 0.3:
+                    t = min((_ENTRAPPED_SLIP - wheel.slip) / slope, _LONGEST_TIME)
+                else:
+                    t = _LONGEST_TIME
+            if self._memory.raised and (p > 0.5 or wheel.slip > 0.8):
+                p = max(p, 0.9)
+            travel = min(t * max(abs(wheel.rim_speed), 0.0), NO_ENTRAPMENT_IN_SIGHT)
+            if t >= _LONGEST_TIME:
+                travel = NO_ENTRAPMENT_IN_SIGHT
+            probability.append(p)
+            time_left.append(t)
+            travel_left.append(travel)
+        return StuckAssessment(
+            self._memory.raised, self._memory.reason, probability, time_left, travel_left, stalled
+        )
+
+    def _held(self, name: str, time: float, hold: float) -> bool:
+        since = self._memory.since.setdefault(name, time)
+        return time - since >= hold - 1e-9
+
+    def _trend(self, time: float, typical: float, moving: bool) -> float:
+        """Return the growth of the typical slip [1/s] over the last seconds, 0 when unknown."""
+        trend = self._memory.trend
+        if not moving:
+            trend.clear()
+            return 0.0
+        if not trend or time - trend[-1][0] >= 0.2 - 1e-9:
+            trend.append((time, typical, 0.0, 0.0))
+        while trend and time - trend[0][0] > _TREND_WINDOW:
+            trend.popleft()
+        if len(trend) < 5 or trend[-1][0] - trend[0][0] < 1.0:
+            return 0.0
+        n = len(trend)
+        t_mean = math.fsum(e[0] for e in trend) / n
+        s_mean = math.fsum(e[1] for e in trend) / n
+        top = math.fsum((e[0] - t_mean) * (e[1] - s_mean) for e in trend)
+        return top / math.fsum((e[0] - t_mean) ** 2 for e in trend)
+
+    def _stalled(
+        self, time: float, wheels: Sequence[WheelMotionState], fastest: float
+    ) -> list[bool]:
+        """Say which wheels pull near their limit and hardly turn while another turns."""
+        memory = self._memory
+        # Start mask: the fastest wheel above half of its own cruise for a second. It rests on rim
+        # speed alone, so that no unaided body speed decides.
+        memory.cruise = max(fastest, 0.999 * memory.cruise)
+        if fastest > 0.5 * memory.cruise and fastest > 0.0:
+            if memory.rolling_since is None:
+                memory.rolling_since = time
+        elif fastest < 0.2 * memory.cruise:
+            memory.rolling_since = None
+        masked = memory.rolling_since is None or time - memory.rolling_since < 1.0
+        if masked:
+            return [False] * len(wheels)
+        return [
+            w.torque_share >= self._tuning.stall_torque
+            and abs(w.rim_speed) < self._tuning.stall_ratio * fastest
+            for w in wheels
+        ]
+
+    def _held_wheels_sign(
+        self,
+        time: float,
+        speed: float,
+        speed_known: bool,
+        moving: Sequence[WheelMotionState],
+        stalled: list[bool],
+        fastest: float,
+        signs: dict[str, str],
+    ) -> None:
+        tuning, memory = self._tuning, self._memory
+        held = False
+        if speed_known and fastest > 0.0 and memory.rolling_since is not None and moving:
+            direction = 1.0 if max(moving, key=lambda w: abs(w.rim_speed)).rim_speed > 0 else -1.0
+            lost = 1.0 - direction * speed / fastest
+            bad = sum(
+                1
+                for w in moving
+                if w.slip > tuning.held_slip or abs(w.rim_speed) < tuning.stall_ratio * fastest
+            ) + (len(stalled) - len(moving))
+            held = lost > tuning.held_slip and 2 * bad >= len(stalled) and any(stalled)
+        if held:
+            if self._held('held', time, tuning.held_hold):
+                signs['held'] = f'{lost:.0%} of the fastest rim speed lost, others held'
+        else:
+            memory.since.pop('held', None)
+
+    def _stall_sign(
+        self,
+        time: float,
+        moving: Sequence[WheelMotionState],
+        stalled: list[bool],
+        fastest: float,
+        signs: dict[str, str],
+    ) -> None:
+        count = sum(stalled)
+        if count >= 2 and 2 * count >= len(stalled):
+            if self._held('stall', time, self._tuning.stall_hold):
+                signs['stall'] = f'{count} wheels stalled near their torque limit'
+        else:
+            self._memory.since.pop('stall', None)

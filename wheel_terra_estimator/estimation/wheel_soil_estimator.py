@@ -1,0 +1,1127 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Filter, classes and warnings of one rover: one step per stamp, estimates on demand.
+
+Between two filter cycles (``filter.period``) only sums are kept and the speed is carried on, so
+that wheel odometry at 100 Hz costs little more than at 10 Hz; a cycle predicts, fuses what came
+since, and works out the outputs.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.estimation.estimates import EstimateSet, SlipClass
+from wheel_terra_estimator.estimation.filter import GatedFilter, chi_square_gate
+from wheel_terra_estimator.estimation.filter_settings import FilterSettings
+from wheel_terra_estimator.estimation.filter_state import (
+    CENTROID,
+    GRAVITY_BIAS,
+    SHEAR_MODULUS,
+    SHEAR_STRENGTH,
+    SLIP_SINKAGE,
+    SPEED,
+    StateLayout,
+)
+from wheel_terra_estimator.estimation.measurement_models import (
+    ContactModel,
+    WheelMotion,
+    driving_slip,
+)
+from wheel_terra_estimator.estimation.measurements import ReferenceVelocity, StepInputs
+from wheel_terra_estimator.estimation.slip_classes import SlipClassifier
+from wheel_terra_estimator.estimation.speed_process import (
+    Attitude,
+    InertialWindow,
+    SpeedStep,
+    median,
+    speed_step,
+    take_inertial,
+)
+from wheel_terra_estimator.estimation.stuck_warning import (
+    StuckAssessment,
+    StuckMonitor,
+    StuckTuning,
+    WheelMotionState,
+)
+
+FloatArray = NDArray[np.float64]
+_NAN = math.nan
+
+
+@dataclass
+class _Run:
+    """Everything that changes, except the filter, the classifier and the warning."""
+
+    origin: int = 0  # [ns]
+    stamp: int = 0
+    time: float = 0.0  # [s] since origin
+    cycle_time: float | None = None
+    inertial_time: float | None = None
+    odometry_time: float | None = None
+    torque_time: float | None = None
+    sinkage_time: float | None = None
+    reference_time: float | None = None
+    reference_gap: float = 10.0  # [s] between fixes, smoothed
+    still_since: float | None = None
+    sliding_until: float = -1.0
+    rim_at_cycle: float | None = None
+    rim_speed: list[float] = field(default_factory=list)  # nan = unknown
+    rate_time: list[float] = field(default_factory=list)
+    torque_sum: list[float] = field(default_factory=list)
+    torque_count: list[int] = field(default_factory=list)
+    torque_held: list[float] = field(default_factory=list)
+    sinkage_sum: list[float] = field(default_factory=list)
+    sinkage_count: list[int] = field(default_factory=list)
+    sinkage_rejected: list[int] = field(default_factory=list)
+    sinkage_seen: list[bool] = field(default_factory=list)
+    leaving_angle: list[float] = field(default_factory=list)
+    leaving_time: list[float] = field(default_factory=list)
+    rest_since: list[float] = field(default_factory=list)  # nan = not at rest
+    resting: list[bool] = field(default_factory=list)
+    slip: list[float] = field(default_factory=list)
+    slip_std: list[float] = field(default_factory=list)
+    wheel_class: list[int] = field(default_factory=list)
+    window: InertialWindow = field(default_factory=InertialWindow)
+    attitude: Attitude = field(default_factory=Attitude)
+    force: tuple[float, float, float] = (0.0, 0.0, 0.0)  # specific force of the last window
+    force_known: bool = False
+    yaw_rate: float = 0.0
+    yaw_bias: float = 0.0
+    yaw_bias_weight: float = 0.0
+    ratio: float = 0.95  # remembered v / rim speed
+    ratio_std: float = 0.3
+    drive_direction: float = 0.0
+    load: list[float] = field(default_factory=list)
+    pull: list[float] = field(default_factory=list)
+    pull_std: list[float] = field(default_factory=list)
+    sinkage_rate: list[float] = field(default_factory=list)
+    sinkage_rate_std: list[float] = field(default_factory=list)
+    pull_margin: list[float] = field(default_factory=list)
+    margin_time: float = -10.0
+    rejected: dict[str, int] = field(default_factory=dict)
+    reference_rejected: int = 0  # in a row
+    nis: dict[str, float] = field(default_factory=dict)
+    assessment: StuckAssessment | None = None
+
+    def copy(self) -> _Run:
+        """Return a copy whose lists are its own."""
+        values: dict[str, Any] = {}
+        for entry in fields(self):
+            value = getattr(self, entry.name)
+            if isinstance(value, (list, dict, InertialWindow, Attitude)):
+                value = value.copy()
+            values[entry.name] = value
+        return _Run(**values)
+
+
+class WheelSoilEstimator:
+    """Estimator of one rover; sees stamps in order and only checked numbers.
+
+    Parameters
+    ----------
+    configuration : Configuration
+        Rover, soil, sensors, tuning.
+    """
+
+    def __init__(self, configuration: Configuration) -> None:
+        self._configuration = configuration
+        self._settings = settings = FilterSettings.from_configuration(configuration)
+        self._layout = StateLayout(settings.wheel_count)
+        self._contacts = [
+            ContactModel(configuration, settings, i) for i in range(settings.wheel_count)
+        ]
+        tuning = configuration.filter
+        self._classifier = SlipClassifier(
+            settings.wheel_count,
+            [float(b) for b in tuning.class_thresholds],
+            float(tuning.class_hysteresis),
+            float(tuning.class_dwell),
+        )
+        self._stuck_tuning = StuckTuning(
+            horizon=float(tuning.stuck_horizon),
+            travel=float(tuning.stuck_travel),
+            clear_slip=float(tuning.stuck_clear_slip),
+            clear_time=float(tuning.stuck_clear_time),
+        )
+        self._monitor = StuckMonitor(self._stuck_tuning)
+        # Below this rim speed v / rim speed is not told from noise.
+        self._low_rim = max(3.0 * settings.rest_speed, 0.005)
+        rate = max(float(settings.sensors.imu_rate), 1.0)
+        sensors = settings.sensors
+        # Attitude errors change within about half a second over rough ground.
+        attitude = settings.gravity * float(sensors.orientation_std)
+        self._acceleration_noise = math.sqrt(
+            float(sensors.specific_force_std) ** 2 / rate + attitude**2 * 0.5
+        )
+        self._start()
+
+    # ------------------------------------------------------------------ runs
+
+    def begin_run(self, stamp: int, keep_soil: bool) -> None:
+        """Start anew at a stamp [ns]; with `keep_soil` soil and biases are kept, widened."""
+        if not keep_soil:
+            self._start()
+            self._run.origin = self._run.stamp = stamp
+            return
+        old, mean = self._run, self._filter.mean.copy()
+        covariance = self._filter.covariance.copy()
+        self._start()
+        self._run.origin = self._run.stamp = stamp
+        self._run.yaw_bias, self._run.yaw_bias_weight = old.yaw_bias, 0.5 * old.yaw_bias_weight
+        self._run.rejected = dict(old.rejected)
+        layout = self._layout
+        kept = [GRAVITY_BIAS, SHEAR_STRENGTH, SHEAR_MODULUS, SLIP_SINKAGE, CENTROID]
+        kept += range(layout.size)[layout.stiffness]
+        prior = self._filter.covariance
+        fresh = prior.copy()
+        block = np.ix_(kept, kept)
+        fresh[block] = 0.5 * (covariance[block] + prior[block])
+        start = self._filter.mean.copy()
+        start[kept] = mean[kept]
+        self._filter.restore((start, fresh, self._filter.restarts))
+
+    def _start(self) -> None:
+        s = self._settings
+        n = s.wheel_count
+        run = _Run(
+            rim_speed=[_NAN] * n,
+            rate_time=[-1e9] * n,
+            torque_sum=[0.0] * n,
+            torque_count=[0] * n,
+            torque_held=[_NAN] * n,
+            sinkage_sum=[0.0] * n,
+            sinkage_count=[0] * n,
+            sinkage_rejected=[0] * n,
+            sinkage_seen=[False] * n,
+            leaving_angle=[_NAN] * n,
+            leaving_time=[-1e9] * n,
+            rest_since=[_NAN] * n,
+            resting=[False] * n,
+            slip=[0.0] * n,
+            slip_std=[1.0] * n,
+            wheel_class=[int(SlipClass.UNKNOWN)] * n,
+            pull=[0.0] * n,
+            sinkage_rate=[0.0] * n,
+            sinkage_rate_std=[1.0] * n,
+            pull_margin=[0.0] * n,
+            rejected={'reference': 0, 'sinkage': 0},
+        )
+        run.force = (0.0, 0.0, s.gravity)
+        run.load = [float(w) for w in s.load.loads(run.force)]
+        run.pull_std = list(run.load)
+        self._run = run
+        self._classifier = SlipClassifier(
+            n,
+            [float(b) for b in s.filter.class_thresholds],
+            float(s.filter.class_hysteresis),
+            float(s.filter.class_dwell),
+        )
+        self._monitor = StuckMonitor(self._stuck_tuning)
+        self._filter = self._initial_filter()
+        self._jacobian_pull = np.zeros((n, self._layout.size))
+
+    def _initial_filter(self) -> GatedFilter:
+        s, layout = self._settings, self._layout
+        mean = np.zeros(layout.size)
+        P = np.zeros((layout.size, layout.size))
+        P[SPEED, SPEED] = 1.0
+        P[GRAVITY_BIAS, GRAVITY_BIAS] = (
+            float(s.sensors.specific_force_bias_std) ** 2
+            + (s.gravity * float(s.sensors.orientation_std)) ** 2
+        )
+        P[SHEAR_STRENGTH, SHEAR_STRENGTH] = s.shear_strength_std**2
+        P[SHEAR_MODULUS, SHEAR_MODULUS] = s.shear_modulus_std**2
+        P[SLIP_SINKAGE, SLIP_SINKAGE] = 0.1**2
+        P[CENTROID, CENTROID] = 0.04**2
+        n = s.wheel_count
+        # Static sinkage by the bearing law: where the law carries the load at zero slip.
+        for i, contact in enumerate(self._contacts):
+            mean[layout.sinkage.start + i] = self._static_sinkage(contact, i)
+        z = mean[layout.sinkage]
+        P[layout.sinkage, layout.sinkage] = np.diag((0.5 * z + 0.005) ** 2)
+        shared, own = s.stiffness_std, 0.5 * s.stiffness_std
+        P[layout.stiffness, layout.stiffness] = shared**2 + np.eye(n) * own**2
+        P[layout.shear_error, layout.shear_error] = np.eye(n) * s.shear_error_std**2
+        upper = np.full(layout.size, np.inf)
+        upper[SPEED], upper[GRAVITY_BIAS] = 20.0, 2.0
+        upper[SHEAR_STRENGTH], upper[SHEAR_MODULUS] = 1.0, 1.5
+        upper[SLIP_SINKAGE], upper[CENTROID] = 0.8, 0.25
+        upper[layout.stiffness], upper[layout.shear_error] = 3.0, 1.5
+        lower = -upper
+        upper[layout.sinkage] = [0.9 * r for r in s.rim_radius]
+        lower[layout.sinkage] = [-0.02 * r for r in s.rim_radius]
+        return GatedFilter(mean, P, lower, upper)
+
+    def _static_sinkage(self, contact: ContactModel, wheel: int) -> float:
+        s = self._settings
+        motion = WheelMotion(0.0, s.slip_radius[wheel], self._run.load[wheel], 0.0, _NAN)
+        low, high = 1e-4, 0.5 * s.rim_radius[wheel]
+        for _ in range(30):
+            z = math.sqrt(low * high)
+            state = contact.geometry(motion, z, 0.0, 0.0)
+            if contact.forces(state, 0.0, 0.0, 0.0).bearing_load < motion.load:
+                low = z
+            else:
+                high = z
+        return high
+
+    def snapshot(self) -> tuple[Any, ...]:
+        """Return what `restore` needs to come back to this state."""
+        return (
+            self._run.copy(),
+            self._filter.snapshot(),
+            self._classifier.snapshot(),
+            self._monitor.snapshot(),
+            self._jacobian_pull,
+        )
+
+    def restore(self, snapshot: tuple[Any, ...]) -> None:
+        """Go back to a snapshot."""
+        run, filter_memory, classes, monitor, self._jacobian_pull = snapshot
+        self._run = run.copy()
+        self._filter.restore(filter_memory)
+        self._classifier.restore(classes)
+        self._monitor.restore(monitor)
+
+    # ------------------------------------------------------------------ step
+
+    def step(self, stamp: int, inputs: StepInputs) -> None:
+        """Bring the state to a stamp [ns] with the measurements of that stamp."""
+        run = self._run
+        if run.origin == 0:
+            run.origin = stamp
+        run.stamp = stamp
+        run.time = time = (stamp - run.origin) * 1e-9
+        if inputs.inertial is not None:
+            dt = 0.0 if run.inertial_time is None else time - run.inertial_time
+            run.inertial_time = time
+            take_inertial(
+                run.window,
+                run.attitude,
+                inputs.inertial,
+                dt,
+                self._settings.gravity,
+                run.yaw_bias,
+            )
+        if inputs.sinkage is not None:
+            for i, value in enumerate(inputs.sinkage.sinkage.tolist()):
+                if value == value:
+                    run.sinkage_sum[i] += value
+                    run.sinkage_count[i] += 1
+        if inputs.leaving_angle is not None:
+            for i, value in enumerate(inputs.leaving_angle.leaving_angle.tolist()):
+                if value == value:
+                    fresh = time - run.leaving_time[i] > 1.0
+                    old = value if fresh else run.leaving_angle[i]
+                    run.leaving_angle[i] = old + 0.3 * (value - old)
+                    run.leaving_time[i] = time
+        if inputs.wheel_odometry is not None:
+            self._take_wheel_odometry(time, inputs)
+        silent = run.odometry_time is None or time - run.odometry_time > self._settings.silence
+        due = (
+            run.cycle_time is None
+            or time - run.cycle_time >= float(self._settings.filter.period) - 1e-4
+        )
+        if inputs.reference is not None or (due and (inputs.wheel_odometry is not None or silent)):
+            self._cycle(time, inputs.reference)
+        if inputs.wheel_odometry is not None or silent:
+            self._judge(time)
+
+    def _take_wheel_odometry(self, time: float, inputs: StepInputs) -> None:
+        run, s = self._run, self._settings
+        odometry = inputs.wheel_odometry
+        assert odometry is not None
+        rates, torques = odometry.rate.tolist(), odometry.torque.tolist()
+        dt = 1.0 if run.odometry_time is None else time - run.odometry_time
+        # Fast odometry is noisy or quantised: smooth it over 50 ms, less than its use anywhere.
+        keep = 0.0 if dt >= 0.06 else math.exp(-dt / 0.05)
+        for i in range(s.wheel_count):
+            rate = rates[i]
+            if rate == rate:
+                rim = rate * s.slip_radius[i]
+                old = run.rim_speed[i]
+                run.rim_speed[i] = rim if old != old else keep * old + (1.0 - keep) * rim
+                run.rate_time[i] = time
+            torque = torques[i]
+            if torque == torque:
+                run.torque_sum[i] += torque
+                run.torque_count[i] += 1
+                run.torque_time = time
+        run.odometry_time = time
+
+    def _rim(self, wheel: int) -> float:
+        """Rim speed of a wheel [m/s], nan when its rate is unknown or too old."""
+        run = self._run
+        if run.time - run.rate_time[wheel] > self._settings.silence:
+            return _NAN
+        return run.rim_speed[wheel]
+
+    def _representative_rim(self, yaw_rate: float) -> float | None:
+        """Rim speed without the turning [m/s]; the median, so that no single wheel decides."""
+        values = []
+        for i in range(self._settings.wheel_count):
+            rim = self._rim(i)
+            if rim == rim:
+                values.append(rim + yaw_rate * self._settings.lateral[i])
+        return median(values) if values else None
+
+    def _speed_step(self, time: float) -> SpeedStep:
+        run = self._run
+        dt = 0.0 if run.cycle_time is None else time - run.cycle_time
+        return speed_step(
+            dt=dt,
+            rim_before=run.rim_at_cycle,
+            rim_now=self._representative_rim(run.yaw_rate),
+            ratio=run.ratio,
+            ratio_std=run.ratio_std,
+            low_rim=self._low_rim,
+            ratio_walk=float(self._settings.filter.ratio_walk),
+            window=run.window,
+            acceleration_noise=self._acceleration_noise,
+        )
+
+    def _current_speed(self) -> tuple[float, float]:
+        """Return speed and variance at the present stamp, carried on from the last cycle."""
+        run = self._run
+        x, P = self._filter.mean, self._filter.covariance
+        if run.cycle_time is None or run.time - run.cycle_time < 1e-6:
+            return float(x[SPEED]), float(P[SPEED, SPEED])
+        step = self._speed_step(run.time)
+        a, b = step.speed_gain, step.bias_gain
+        speed = a * float(x[SPEED]) + b * float(x[GRAVITY_BIAS]) + step.constant
+        variance = (
+            a * a * float(P[SPEED, SPEED])
+            + 2.0 * a * b * float(P[SPEED, GRAVITY_BIAS])
+            + b * b * float(P[GRAVITY_BIAS, GRAVITY_BIAS])
+            + step.variance
+        )
+        return speed, variance
+
+    # ------------------------------------------------------------------ filter cycle
+
+    def _cycle(self, time: float, reference: ReferenceVelocity | None) -> None:
+        run, s = self._run, self._settings
+        dt = 0.0 if run.cycle_time is None else time - run.cycle_time
+        window = run.window
+        if window.count:
+            count = window.count
+            run.force = (window.force_x / count, window.force_y / count, window.force_z / count)
+            run.force_known = True
+            run.yaw_rate = window.yaw_rate / count
+            run.load = [float(w) for w in s.load.loads(run.force)]
+        rim = self._representative_rim(run.yaw_rate)
+        self._follow_direction(rim)
+        rims = [self._rim(i) for i in range(s.wheel_count)]
+        still = all(r != r or abs(r) < s.rest_speed for r in rims) and any(r == r for r in rims)
+        before = self._filter.mean[self._layout.sinkage].copy()
+        self._predict(time, dt, rims, still)
+        if reference is not None:
+            self._fuse_reference(time, reference, still)
+        self._fuse_rest(time, rims, rim, still)
+        self._fuse_models(dt, rims, still)
+        self._after(time, dt, rim, rims, still, before)
+
+    def _follow_direction(self, rim: float | None) -> None:
+        """Forget v / rim speed where the drive changes its direction (up becomes down)."""
+        run = self._run
+        if rim is None or abs(rim) < self._low_rim:
+            return
+        direction = 1.0 if rim > 0.0 else -1.0
+        if direction != run.drive_direction:
+            if run.drive_direction != 0.0:
+                demand = direction * run.force[0] / max(run.force[2], 0.1)
+                run.ratio = min(max(0.9 - demand, 0.2), 1.1)
+            run.ratio_std = 0.3
+            run.drive_direction = direction
+
+    def _predict(self, time: float, dt: float, rims: list[float], still: bool) -> None:
+        run, s, layout = self._run, self._settings, self._layout
+        x = self._filter.mean
+        step = self._speed_step(time)
+        size = layout.size
+        mean = x.copy()
+        F = np.eye(size)
+        Q = np.zeros((size, size))
+        mean[SPEED] = step.speed_gain * x[SPEED] + step.bias_gain * x[GRAVITY_BIAS] + step.constant
+        F[SPEED, SPEED] = step.speed_gain
+        F[SPEED, GRAVITY_BIAS] = step.bias_gain
+        Q[SPEED, SPEED] = step.variance
+        # The residual of gravity changes as the rover drives over rough ground.
+        leak = s.gravity * float(s.sensors.orientation_std)
+        Q[GRAVITY_BIAS, GRAVITY_BIAS] = (1e-3**2 + (0.3 * leak) ** 2 * 0.1) * dt
+        speed = float(x[SPEED])
+        travel = 0.0
+        if not still and dt > 0.0:
+            travel = self._predict_wheels(x, mean, F, Q, dt, rims)
+        if travel > 0.0:
+            walk = float(s.filter.soil_walk) ** 2 * travel
+            known = run.reference_time is not None and time - run.reference_time < 20.0
+            learn = walk if known else 0.1 * walk
+            forget = math.exp(-travel / 100.0)
+            for index, walk_std in (
+                (SHEAR_STRENGTH, 0.05),
+                (SHEAR_MODULUS, 0.1),
+                (SLIP_SINKAGE, 0.05),
+            ):
+                mean[index] *= forget
+                F[index, index] = forget
+                Q[index, index] = walk_std**2 * learn
+            mean[CENTROID] *= forget
+            F[CENTROID, CENTROID] = forget
+            Q[CENTROID, CENTROID] = 0.03**2 * walk
+            n = s.wheel_count
+            k = layout.stiffness
+            Q[k, k] = (0.15**2 + np.eye(n) * 0.3**2) * walk
+            hold = math.exp(-travel / float(s.filter.shear_error_length))
+            e = layout.shear_error
+            mean[e] *= hold
+            F[e, e] *= hold
+            Q[e, e] = np.eye(n) * s.shear_error_std**2 * (1.0 - hold * hold)
+        del speed
+        self._filter.predict(mean, F, Q)
+
+    def _predict_wheels(
+        self,
+        x: FloatArray,
+        mean: FloatArray,
+        F: FloatArray,
+        Q: FloatArray,
+        dt: float,
+        rims: list[float],
+    ) -> float:
+        """Let each sinkage relax towards where the bearing law carries the load; return travel."""
+        run, s, layout = self._run, self._settings, self._layout
+        travels = []
+        for i, rim in enumerate(rims):
+            zi, ki = layout.sinkage.start + i, layout.stiffness.start + i
+            if rim != rim or abs(rim) < s.rest_speed:
+                Q[zi, zi] = 1e-10 * dt
+                continue
+            direction = 1.0 if rim > 0.0 else -1.0
+            speed = direction * (float(x[SPEED]) - run.yaw_rate * s.lateral[i])
+            rim = abs(rim)
+            slip = driving_slip(speed, rim)
+            travels.append(abs(speed) + 0.1 * abs(rim - speed))
+            z = float(x[zi])
+            load = run.load[i]
+            contact_length = max(math.sqrt(2.0 * s.rim_radius[i] * max(z, 1e-3)), 0.02)
+            rate = (abs(speed) + 0.3 * abs(rim - speed)) * dt / contact_length
+            alpha = -math.expm1(-rate)
+            if load <= 0.0:
+                Q[zi, zi] = 1e-4 * dt
+                continue
+            contact = self._contacts[i]
+            strength = float(x[SHEAR_STRENGTH])
+            modulus = float(x[SHEAR_MODULUS])
+            motion = WheelMotion(
+                slip, self._velocity_ratio(i, speed, rim), load, rim, self._leaving(i)
+            )
+            state = contact.geometry(motion, z, float(x[CENTROID]), float(x[SLIP_SINKAGE]))
+            bearing = contact.forces(state, strength, modulus, float(x[ki])).bearing_load
+            power = state.contact.sinkage_exponent + 0.5
+            # One Newton step on log load over log sinkage, bounded: relaxation does the rest.
+            growth = min(max(math.log(load / bearing) / power, -0.7), 0.7)
+            z_floor = max(z, 5e-4)
+            # No steady state where the wheel stands and digs: the sensor leads.
+            trust = min(max((0.95 - slip) / 0.15, 0.0), 1.0)
+            target = z_floor * math.exp(growth)
+            mean[zi] = z + trust * alpha * (target - z)
+            if slip > 0.8:
+                mean[zi] += 0.02 * (slip - 0.8) * rim * dt
+            sensitivity = trust * alpha * target / power
+            F[zi, zi] = max(1.0 - trust * alpha * 0.9, 0.05)
+            F[zi, ki] = -sensitivity
+            log_depth = math.log(max(state.bearing_depth, 1e-5) / state.contact.reference_depth)
+            F[zi, SLIP_SINKAGE] = -sensitivity * slip * log_depth
+            # d ln(bearing) / d slip, by one difference towards smaller slip.
+            other = WheelMotion(
+                slip - 0.02,
+                self._velocity_ratio(i, speed + 0.02 * rim, rim),
+                load,
+                rim,
+                self._leaving(i),
+            )
+            changed = contact.forces(
+                contact.geometry(other, z, float(x[CENTROID]), float(x[SLIP_SINKAGE])),
+                strength,
+                modulus,
+                float(x[ki]),
+            ).bearing_load
+            by_slip = (math.log(bearing) - math.log(changed)) / 0.02
+            F[zi, SPEED] = -sensitivity * by_slip * (-direction / rim)
+            # What the law does not know: a tenth of the sinkage per contact length, and digging.
+            digging = 0.05 * max(slip, 0.0) ** 2 * rim * dt
+            Q[zi, zi] = (0.1 * z_floor) ** 2 * 2.0 * alpha + digging**2 + 1e-9 * dt
+        return dt * math.fsum(travels) / len(rims) if travels else 0.0
+
+    def _velocity_ratio(self, wheel: int, speed: float, rim: float) -> float:
+        """Return v / w [m] of a wheel seen in its direction of rolling."""
+        return self._settings.slip_radius[wheel] * speed / rim
+
+    def _leaving(self, wheel: int) -> float:
+        run = self._run
+        return run.leaving_angle[wheel] if run.time - run.leaving_time[wheel] < 1.0 else _NAN
+
+    def _fuse_reference(self, time: float, reference: ReferenceVelocity, still: bool) -> None:
+        run, s = self._run, self._settings
+        sensors = s.sensors
+        variance = (
+            reference.variance if reference.variance > 0.0 else float(sensors.reference_std) ** 2
+        )
+        variance = max(variance, float(sensors.reference_std_floor) ** 2)
+        if run.reference_time is not None:
+            gap = min(time - run.reference_time, 10.0)
+            run.reference_gap += 0.3 * (gap - run.reference_gap)
+        x, P = self._filter.mean, self._filter.covariance
+        if still:
+            # Wheels that stand: either the fix agrees with rest, or the rover slides on them.
+            moving = abs(reference.forward) > max(3.0 * math.sqrt(variance), 2.0 * s.rest_speed)
+            if moving:
+                run.sliding_until = time + max(2.0 * run.reference_gap, 1.0)
+                self._filter.widen(SPEED, reference.forward**2)
+            else:
+                run.sliding_until = time
+        residual = reference.forward - float(x[SPEED])
+        total = float(P[SPEED, SPEED]) + variance
+        nis = residual * residual / total
+        self._note_nis('reference', nis)
+        gate = float(s.filter.gate)
+        if nis > gate:
+            run.reference_rejected += 1
+            run.rejected['reference'] += 1
+            fastest = max((abs(r) for r in run.rim_speed if r == r), default=0.0)
+            beyond = abs(reference.forward) > 1.5 * fastest + 5.0 * math.sqrt(total)
+            if run.reference_rejected >= 2 and not (beyond and run.reference_rejected < 4):
+                # Fixes that keep disagreeing are right: open the state to them.
+                self._filter.widen(SPEED, residual * residual)
+                run.reference_rejected = 0
+            else:
+                variance += chi_square_gate(residual, total, 4.0 if not beyond else 0.01)
+        else:
+            run.reference_rejected = 0
+        H = np.zeros((1, self._layout.size))
+        H[0, SPEED] = 1.0
+        self._filter.update(np.array([residual]), H, np.array([variance]))
+        run.reference_time = time
+
+    def _fuse_rest(self, time: float, rims: list[float], rim: float | None, still: bool) -> None:
+        run, s = self._run, self._settings
+        if not still:
+            run.still_since = None
+            spread = [abs(r) for r in rims if r == r]
+            typical = sum(spread) / len(spread) if spread else 0.0
+            if rim is not None and typical > s.rest_speed and abs(rim) < 0.2 * typical:
+                # Spin in place: the body stays where it is, to a share of the rim speed.
+                self._fuse_speed(0.0, max(0.1 * typical, 0.002) ** 2)
+            return
+        if run.still_since is None:
+            run.still_since = time
+        if time < run.sliding_until:
+            return
+        x, P = self._filter.mean, self._filter.covariance
+        settled = time - run.still_since
+        if settled < 0.15:
+            return
+        variance = 0.0005**2
+        if settled < 2.0:
+            # A fast rover slides on for a moment: do not stop it against the accelerometer.
+            variance += chi_square_gate(float(x[SPEED]), float(P[SPEED, SPEED]) + variance, 9.0)
+        self._fuse_speed(0.0, variance)
+        if settled > 0.5 and run.window.count and abs(run.yaw_rate) < 0.05:
+            weight = min(run.yaw_bias_weight + 1.0, 200.0)
+            run.yaw_bias += run.yaw_rate / weight
+            run.yaw_bias_weight = weight
+
+    def _fuse_speed(self, value: float, variance: float) -> None:
+        H = np.zeros((1, self._layout.size))
+        H[0, SPEED] = 1.0
+        residual = np.array([value - float(self._filter.mean[SPEED])])
+        self._filter.update(residual, H, np.array([variance]))
+
+    def _note_nis(self, channel: str, nis: float) -> None:
+        nis_of = self._run.nis
+        nis_of[channel] = 0.95 * nis_of.get(channel, 1.0) + 0.05 * min(nis, 100.0)
+
+    def _fuse_models(self, dt: float, rims: list[float], still: bool) -> None:
+        """Fuse sinkage, torque and the balance of forces, h and H from one pass."""
+        run, s, layout = self._run, self._settings, self._layout
+        x, P = self._filter.mean, self._filter.covariance
+        n, size = s.wheel_count, layout.size
+        gate = float(s.filter.gate)
+        residuals: list[float] = []
+        variances: list[float] = []
+        rows: list[FloatArray] = []
+
+        for i in range(n):
+            count = run.sinkage_count[i]
+            if not count:
+                continue
+            reading = run.sinkage_sum[i] / count
+            run.sinkage_sum[i], run.sinkage_count[i] = 0.0, 0
+            zi = layout.sinkage.start + i
+            variance = float(s.sensors.sinkage_std) ** 2 / count + 1e-10
+            residual = reading - float(x[zi])
+            total = float(P[zi, zi]) + variance
+            nis = residual * residual / total
+            self._note_nis('sinkage', nis)
+            if not run.sinkage_seen[i]:
+                run.sinkage_seen[i] = True
+            elif nis > gate:
+                run.rejected['sinkage'] += 1
+                run.sinkage_rejected[i] += 1
+                if run.sinkage_rejected[i] < 8:
+                    continue
+                # So many in a row are no spikes: the wheel is somewhere else.
+                self._filter.widen(zi, residual * residual)
+            run.sinkage_rejected[i] = 0
+            run.sinkage_time = run.time
+            row = np.zeros(size)
+            row[zi] = 1.0
+            residuals.append(residual)
+            variances.append(variance)
+            rows.append(row)
+
+        torque = [
+            run.torque_sum[i] / run.torque_count[i] if run.torque_count[i] else _NAN
+            for i in range(n)
+        ]
+        for i in range(n):
+            if run.torque_count[i]:
+                run.torque_held[i] = torque[i]
+            counted = run.torque_count[i]
+            run.torque_sum[i], run.torque_count[i] = 0.0, 0
+            del counted
+        if not still and dt > 0.0:
+            self._model_rows(rims, torque, residuals, variances, rows)
+        if rows:
+            self._filter.update(np.array(residuals), np.array(rows), np.array(variances))
+        run.window = InertialWindow()
+
+    def _model_rows(
+        self,
+        rims: list[float],
+        torque: list[float],
+        residuals: list[float],
+        variances: list[float],
+        rows: list[FloatArray],
+    ) -> None:
+        run, s, layout = self._run, self._settings, self._layout
+        x, P = self._filter.mean, self._filter.covariance
+        size = layout.size
+        balance = np.zeros(size)
+        balance_sum = 0.0
+        open_variance = 0.0
+        jacobian = np.zeros((s.wheel_count, size))
+        gate = float(s.filter.gate)
+        for i, rim in enumerate(rims):
+            load = run.load[i]
+            if rim != rim or abs(rim) < 2.0 * s.rest_speed or load < 1e-3:
+                # Standing, lifted or unknown: it may carry its share of the slope, or nothing.
+                share = load * run.force[0] / max(run.force[2], 0.1)
+                balance_sum += share
+                open_variance += (0.3 * load) ** 2
+                continue
+            direction = 1.0 if rim > 0.0 else -1.0
+            pull, torque_model, row_pull, row_torque = self._wheel_rows(i, rim, direction, load)
+            jacobian[i] = row_pull
+            balance += row_pull
+            balance_sum += pull
+            reading = torque[i]
+            if reading == reading:
+                variance = (
+                    float(s.sensors.torque_std) ** 2 + (torque_model * s.load_std) ** 2 + 1e-6
+                )
+                residual = reading - torque_model
+                total = float(row_torque @ P @ row_torque) + variance
+                nis = residual * residual / total
+                self._note_nis('torque', nis)
+                # A soil change looks like an outlier: weaken it, do not lock it out.
+                variance += chi_square_gate(residual, total, gate)
+                residuals.append(residual)
+                variances.append(variance)
+                rows.append(row_torque)
+        self._jacobian_pull = jacobian
+        if run.force_known and run.window.count:
+            weight = s.mass * run.force[2]
+            tilt = 0.0
+            for i, gain in enumerate(s.rut_tilt):
+                zi = layout.sinkage.start + i
+                tilt += gain * float(x[zi])
+                # Specific force along the ground: f_x - f_z * tilt (body pitched up by the ruts).
+                balance[zi] += weight * gain
+            residual = s.mass * run.force[0] - (balance_sum + weight * tilt)
+            noise = float(s.sensors.specific_force_std) ** 2 / run.window.count
+            variance = (
+                s.mass**2 * (noise + float(s.sensors.specific_force_bias_std) ** 2)
+                + (0.01 * weight) ** 2
+                + open_variance
+            )
+            total = float(balance @ P @ balance) + variance
+            nis = residual * residual / total
+            self._note_nis('balance', nis)
+            variance += chi_square_gate(residual, total, gate)
+            residuals.append(residual)
+            variances.append(variance)
+            rows.append(balance)
+
+    def _wheel_rows(
+        self, i: int, rim: float, direction: float, load: float
+    ) -> tuple[float, float, FloatArray, FloatArray]:
+        """Return pull, torque and their rows of the Jacobian, in the body's signs."""
+        run, s, layout = self._run, self._settings, self._layout
+        x = self._filter.mean
+        contact = self._contacts[i]
+        zi, ei = layout.sinkage.start + i, layout.shear_error.start + i
+        ki = layout.stiffness.start + i
+        v = direction * (float(x[SPEED]) - run.yaw_rate * s.lateral[i])
+        rim = abs(rim)
+        z, centroid, n1 = float(x[zi]), float(x[CENTROID]), float(x[SLIP_SINKAGE])
+        strength, modulus = float(x[SHEAR_STRENGTH] + x[ei]), float(x[SHEAR_MODULUS])
+        leaving = self._leaving(i)
+        # Far beyond standing still, or skidding hard, the shear is saturated.
+        v_model = min(max(v, -0.2 * rim), 3.0 * rim)
+
+        def at(speed: float, depth: float, shift: float) -> Any:
+            motion = WheelMotion(
+                driving_slip(speed, rim),
+                self._velocity_ratio(i, speed, rim),
+                load,
+                rim,
+                leaving,
+            )
+            return contact.geometry(motion, depth, shift, n1)
+
+        base = at(v_model, z, centroid)
+        f0 = contact.forces(base, strength, modulus, float(x[ki]))
+        stronger = contact.forces(base, strength + 0.01, modulus, 0.0)
+        stiffer = contact.forces(base, strength, modulus + 0.01, 0.0)
+        dv, dz = 0.01 * rim, 0.01 * max(z, 1e-3)
+        faster = contact.forces(at(v_model + dv, z, centroid), strength, modulus, 0.0)
+        deeper = contact.forces(at(v_model, z + dz, centroid), strength, modulus, 0.0)
+        shifted = contact.forces(at(v_model, z, centroid + 0.002), strength, modulus, 0.0)
+        row_pull, row_torque = np.zeros(layout.size), np.zeros(layout.size)
+        for index, changed, step in (
+            (SHEAR_STRENGTH, stronger, 0.01),
+            (ei, stronger, 0.01),
+            (SHEAR_MODULUS, stiffer, 0.01),
+            (zi, deeper, dz),
+            (CENTROID, shifted, 0.002),
+        ):
+            row_pull[index] = direction * (changed.pull - f0.pull) / step
+            row_torque[index] = direction * (changed.torque - f0.torque) / step
+        # v enters as direction * v: the sign cancels for forces in the body's frame.
+        row_pull[SPEED] = (faster.pull - f0.pull) / dv
+        row_torque[SPEED] = (faster.torque - f0.torque) / dv
+        return direction * f0.pull, direction * f0.torque, row_pull, row_torque
+
+    def _after(
+        self,
+        time: float,
+        dt: float,
+        rim: float | None,
+        rims: list[float],
+        still: bool,
+        sinkage_before: FloatArray,
+    ) -> None:
+        """Keep what the next cycle needs, work out pulls and sinkage rates."""
+        run, s, layout = self._run, self._settings, self._layout
+        x, P = self._filter.mean, self._filter.covariance
+        run.cycle_time = time
+        run.rim_at_cycle = rim
+        if rim is not None and abs(rim) > self._low_rim:
+            run.ratio = min(max(float(x[SPEED]) / rim, -0.5), 2.0)
+            run.ratio_std = min(max(math.sqrt(float(P[SPEED, SPEED])) / abs(rim), 0.02), 0.5)
+        if dt > 0.0:
+            keep = math.exp(-dt / 0.5)
+            change = (x[layout.sinkage] - sinkage_before) / dt
+            for i in range(s.wheel_count):
+                run.sinkage_rate[i] += (1.0 - keep) * (float(change[i]) - run.sinkage_rate[i])
+                zi = layout.sinkage.start + i
+                run.sinkage_rate_std[i] = math.sqrt(2.0 * float(P[zi, zi])) / 1.0
+        self._pulls(rims)
+
+    def _pulls(self, rims: list[float]) -> None:
+        run, s, layout = self._run, self._settings, self._layout
+        x, P = self._filter.mean, self._filter.covariance
+        slope_share = run.force[0] / max(run.force[2], 0.1)
+        zero = float(s.sensors.torque_zero_std)
+        gain = float(s.sensors.torque_gain_std)
+        variances = np.einsum('ij,jk,ik->i', self._jacobian_pull, P, self._jacobian_pull)
+        for i, rim in enumerate(rims):
+            load = run.load[i]
+            if rim != rim or abs(rim) < 2.0 * s.rest_speed or load < 1e-3:
+                # Static friction carries the slope.
+                run.pull[i] = load * slope_share
+                run.pull_std[i] = (0.1 * load if run.force_known else load) + 1e-3
+                continue
+            direction = 1.0 if rim > 0.0 else -1.0
+            rim = abs(rim)
+            v = direction * (float(x[SPEED]) - run.yaw_rate * s.lateral[i])
+            v = min(max(v, -0.2 * rim), 3.0 * rim)
+            contact = self._contacts[i]
+            zi, ei = layout.sinkage.start + i, layout.shear_error.start + i
+            motion = WheelMotion(
+                driving_slip(v, rim), self._velocity_ratio(i, v, rim), load, rim, self._leaving(i)
+            )
+            state = contact.geometry(
+                motion, float(x[zi]), float(x[CENTROID]), float(x[SLIP_SINKAGE])
+            )
+            forces = contact.forces(
+                state, float(x[SHEAR_STRENGTH] + x[ei]), float(x[SHEAR_MODULUS]), 0.0
+            )
+            run.pull[i] = direction * forces.pull
+            radius = s.shear_radius[i]
+            run.pull_std[i] = math.sqrt(
+                max(float(variances[i]), 0.0)
+                + (s.load_std * forces.pull) ** 2
+                + (zero / radius) ** 2
+                + (0.5 * gain * forces.torque / radius) ** 2
+                + (0.01 * load) ** 2
+            )
+
+    # ------------------------------------------------------------------ slip, classes, warning
+
+    def _judge(self, time: float) -> None:
+        run, s = self._run, self._settings
+        speed, variance = self._current_speed()
+        speed_std = math.sqrt(max(variance, 0.0))
+        yaw = run.yaw_rate
+        if run.window.count:
+            yaw = run.window.yaw_rate / run.window.count
+        yaw_std = math.hypot(
+            float(s.sensors.angular_rate_std), float(s.sensors.angular_rate_bias_std)
+        )
+        rate_std = float(s.sensors.wheel_rate_std)
+        motion = []
+        for i in range(s.wheel_count):
+            rim = self._rim(i)
+            v = speed - yaw * s.lateral[i]
+            v_std = math.hypot(speed_std, yaw_std * s.lateral[i])
+            if rim != rim:
+                run.slip_std[i] = min(run.slip_std[i] + 0.02, 1.0)
+                run.resting[i] = False
+                run.wheel_class[i] = self._classifier.unknown(i)
+            else:
+                self._slip_of_wheel(i, time, rim, v, v_std, rate_std)
+            limit = s.torque_limit[i]
+            torque = run.torque_held[i]
+            motion.append(
+                WheelMotionState(
+                    slip=run.slip[i],
+                    slip_std=run.slip_std[i],
+                    rim_speed=rim if rim == rim else 0.0,
+                    known=rim == rim and not run.resting[i] and abs(rim) > s.rest_speed,
+                    torque_share=abs(torque) / limit if limit > 0.0 else _NAN,
+                    sinkage=float(self._filter.mean[self._layout.sinkage.start + i]),
+                    radius=s.rim_radius[i],
+                )
+            )
+        known = run.reference_time is not None and time - run.reference_time < 10.0
+        run.assessment = self._monitor.update(time, speed, known, motion)
+        if time - run.margin_time >= 1.0:
+            run.margin_time = time
+            self._margins()
+
+    def _slip_of_wheel(
+        self, i: int, time: float, rim: float, v: float, v_std: float, rate_std: float
+    ) -> None:
+        run, s = self._run, self._settings
+        rest = s.rest_speed
+        if abs(rim) < rest and abs(v) < max(rest, 1.0 * v_std):
+            if run.rest_since[i] != run.rest_since[i]:
+                run.rest_since[i] = time
+            run.resting[i] = time - run.rest_since[i] >= s.rest_time - 1e-6
+            if run.resting[i]:
+                run.wheel_class[i] = self._classifier.unknown(i)
+            # Slip holds its last value.
+            return
+        run.rest_since[i] = _NAN
+        run.resting[i] = False
+        sliding_back = False
+        if abs(rim) <= rest:
+            slip, slip_std = -1.0, v_std / max(abs(v), rest)
+        elif v * rim < 0.0:
+            slip, slip_std = 1.0, v_std / abs(rim)
+            # Told from standing still only where it is more than noise.
+            sliding_back = abs(v) > max(rest, v_std)
+        elif abs(v) <= abs(rim):
+            slip = 1.0 - v / rim
+            slip_std = math.hypot(v_std / rim, (1.0 - slip) * rate_std * s.slip_radius[i] / rim)
+        else:
+            slip = rim / v - 1.0
+            slip_std = math.hypot(v_std * rim / (v * v), rate_std * s.slip_radius[i] / v)
+        run.slip[i], run.slip_std[i] = slip, min(max(slip_std, 1e-3), 1.0)
+        run.wheel_class[i] = self._classifier.update(i, time, slip, slip_std, sliding_back)
+
+    def _margins(self) -> None:
+        """Greatest pull that the present soil gives each wheel minus what the slope asks [N]."""
+        run, s, layout = self._run, self._settings, self._layout
+        x = self._filter.mean
+        for i, contact in enumerate(self._contacts):
+            load = run.load[i]
+            if load < 1e-3:
+                run.pull_margin[i] = 0.0
+                continue
+            zi, ei = layout.sinkage.start + i, layout.shear_error.start + i
+            best = -math.inf
+            for slip in (0.2, 0.4, 0.6, 0.8, 0.95):
+                motion = WheelMotion(slip, s.slip_radius[i] * (1.0 - slip), load, 0.05, _NAN)
+                state = contact.geometry(
+                    motion, float(x[zi]), float(x[CENTROID]), float(x[SLIP_SINKAGE])
+                )
+                forces = contact.forces(
+                    state, float(x[SHEAR_STRENGTH] + x[ei]), float(x[SHEAR_MODULUS]), 0.0
+                )
+                best = max(best, forces.pull)
+            direction = run.drive_direction or 1.0
+            demand = direction * load * run.force[0] / max(run.force[2], 0.1)
+            run.pull_margin[i] = best - demand
+
+    # ------------------------------------------------------------------ outputs
+
+    def estimates(self) -> EstimateSet:
+        """Return all outputs at the present stamp; nothing changes."""
+        run, s, layout = self._run, self._settings, self._layout
+        n = s.wheel_count
+        x, P = self._filter.mean, self._filter.covariance
+        speed, variance = self._current_speed()
+        rims = [self._rim(i) for i in range(n)]
+        yaw_std = math.hypot(
+            float(s.sensors.angular_rate_std), float(s.sensors.angular_rate_bias_std)
+        )
+        slip_velocity, slip_velocity_std = [], []
+        for i in range(n):
+            rim = rims[i]
+            v = speed - run.yaw_rate * s.lateral[i]
+            known = rim == rim
+            slip_velocity.append(rim - v if known else 0.0)
+            std = math.sqrt(max(variance, 0.0) + (yaw_std * s.lateral[i]) ** 2)
+            rate = float(s.sensors.wheel_rate_std) * s.slip_radius[i]
+            slip_velocity_std.append(math.hypot(std, rate) if known else 1.0)
+        sinkage = x[layout.sinkage]
+        zero = float(s.sensors.sinkage_zero_std)
+        sinkage_std = np.sqrt(np.maximum(np.diagonal(P)[layout.sinkage], 0.0) + zero**2)
+        assessment = run.assessment or self._monitor.update(run.time, speed, False, [])
+        names, soil, soil_std = self._soil()
+        lost = [w if w > 0 else 1.0 for w in run.load]
+        return EstimateSet(
+            stamp=run.stamp,
+            slip=np.array(run.slip),
+            slip_std=np.array(run.slip_std),
+            slip_velocity=np.array(slip_velocity),
+            slip_velocity_std=np.array(slip_velocity_std),
+            drawbar_pull=np.array(run.pull),
+            drawbar_pull_std=np.minimum(np.array(run.pull_std), np.array(lost)),
+            sinkage=sinkage.copy(),
+            sinkage_std=np.minimum(sinkage_std, s.rim_radius),
+            sinkage_rate=np.array(run.sinkage_rate),
+            sinkage_rate_std=np.array(run.sinkage_rate_std),
+            normal_load=np.array(run.load),
+            normal_load_std=np.array(
+                [s.load_std * sum(run.load) / n if run.force_known else w for w in run.load]
+            ),
+            slip_class=np.array(run.wheel_class, dtype=np.uint8),
+            rim_travel_left=np.array(assessment.rim_travel_left or [10.0] * n),
+            pull_margin=np.array(run.pull_margin),
+            soil_names=names,
+            soil=soil,
+            soil_std=soil_std,
+            forward_velocity=speed,
+            forward_velocity_variance=max(variance, 1e-12),
+            yaw_rate=run.yaw_rate,
+            yaw_rate_variance=yaw_std**2 if run.force_known else 1.0,
+            stuck=assessment.stuck,
+            stuck_probability=np.array(assessment.probability or [0.0] * n),
+            time_to_stuck=np.array(assessment.time_to_stuck or [600.0] * n),
+            reasons=self._reasons(assessment),
+            faults=self._faults(),
+        )
+
+    def _soil(self) -> tuple[tuple[str, ...], FloatArray, FloatArray]:
+        x, P = self._filter.mean, self._filter.covariance
+        soil, k = self._configuration.soil, self._layout.stiffness
+        strength = math.exp(float(x[SHEAR_STRENGTH]))
+        strength_std = math.sqrt(float(P[SHEAR_STRENGTH, SHEAR_STRENGTH]))
+        tangent = math.tan(float(soil.friction_angle)) * strength
+        angle = math.degrees(math.atan(tangent))
+        angle_std = math.degrees(tangent * strength_std / (1.0 + tangent * tangent))
+        cohesion = float(soil.cohesion) * strength
+        modulus = float(soil.shear_modulus) * math.exp(float(x[SHEAR_MODULUS]))
+        stiffness = math.exp(float(x[k].mean()))
+        stiffness_std = math.sqrt(max(float(P[k, k].mean()), 0.0))
+        entries = (
+            ('soil.friction_angle_deg', angle, angle_std),
+            ('soil.cohesion', cohesion, cohesion * strength_std),
+            (
+                'soil.shear_modulus',
+                modulus,
+                modulus * math.sqrt(float(P[SHEAR_MODULUS, SHEAR_MODULUS])),
+            ),
+            (
+                'soil.frictional_modulus',
+                float(soil.frictional_modulus) * stiffness,
+                float(soil.frictional_modulus) * stiffness * stiffness_std,
+            ),
+            (
+                'soil.cohesive_modulus',
+                float(soil.cohesive_modulus) * stiffness,
+                abs(float(soil.cohesive_modulus)) * stiffness * stiffness_std,
+            ),
+        )
+        return (
+            tuple(e[0] for e in entries),
+            np.array([e[1] for e in entries]),
+            np.array([e[2] for e in entries]),
+        )
+
+    def _reasons(self, assessment: StuckAssessment) -> tuple[str, ...]:
+        run, s = self._run, self._settings
+        words = []
+        for i in range(s.wheel_count):
+            rim = self._rim(i)
+            if rim != rim:
+                text = 'no wheel rate'
+            elif assessment.stalled and assessment.stalled[i]:
+                text = 'stalled: torque near its limit, hardly turning while others turn'
+            elif run.resting[i]:
+                text = 'at rest'
+            else:
+                text = f'slip {run.slip[i]:.2f} +- {run.slip_std[i]:.2f}'
+            if assessment.stuck and assessment.reason:
+                text += f'; rover: {assessment.reason}'
+            words.append(text)
+        return tuple(words)
+
+    def _faults(self) -> dict[str, str]:
+        run, s = self._run, self._settings
+        faults: dict[str, str] = {}
+        stale = s.silence
+        if run.odometry_time is None or run.time - run.odometry_time > stale:
+            faults['wheel_odometry'] = 'no wheel odometry: slip held'
+        if run.inertial_time is None or run.time - run.inertial_time > stale:
+            faults['imu'] = 'no IMU: loads of level ground, no balance of forces'
+        elif not run.attitude.reported:
+            faults['orientation'] = 'no orientation: slope from gyro and specific force'
+        if run.torque_time is None or run.time - run.torque_time > 2.0:
+            faults['torque'] = 'no torque: pull from the balance of forces and the soil model'
+        if run.sinkage_time is None or run.time - run.sinkage_time > 2.0:
+            faults['sinkage'] = 'no sinkage: held by its model'
+        if run.reference_time is None or run.time - run.reference_time > 20.0:
+            faults['reference'] = 'no reference velocity: slip from forces and soil model'
+        return faults
+
+    def health(self) -> dict[str, Any]:
+        """Return counters and consistency figures for diagnostics."""
+        run = self._run
+        report: dict[str, Any] = {f'rejected_{k}': v for k, v in run.rejected.items()}
+        report['filter_restarts'] = self._filter.restarts
+        for channel, value in run.nis.items():
+            report[f'nis_{channel}'] = round(value, 3)
+        return report
