@@ -14,7 +14,7 @@ import numpy as np
 from .designs import random_rows, random_soil
 from .detectability import Ruler, listed_kinds, size_for
 from .hidden import LISTED, OTHER, OUTSIDE, SmoothError
-from .truth import OUTPUTS, SOIL_SD, Hidden, Rows, TrueSoil, moved_soil, solve
+from .truth import OUTPUTS, SOIL_SD, BoolArray, Hidden, Rows, TrueSoil, moved_soil, solve
 
 INPUTS = (
     'slip',
@@ -75,7 +75,8 @@ class Plan:
 class Campaign:
     """A table and the truth behind it.
 
-    ``rows`` are the inputs as recorded, ``table`` the columns of the CSV file, ``believed`` the
+    ``rows`` are the inputs as recorded, ``table`` the columns of the CSV file, ``std`` and
+    ``noise_free`` the noise and the true outputs of the same rows, ``believed`` the
     soil in the configuration, ``soil`` the true one, ``hidden`` what was hidden, ``distances`` its
     d' (each beyond the other when two), ``distance_left`` what the best listed effect leaves
     (strangers only).
@@ -146,7 +147,7 @@ class _UnusableError(Exception):
 def _attempt(seed: int, design: str, plan: Plan, rng: np.random.Generator) -> Campaign:
     believed = random_soil(rng)
     soil = _true_soil(believed, plan.soil_error, rng)
-    rows = random_rows(design, rng, believed)
+    rows = random_rows('basic16' if plan.drive else design, rng, believed)
     if plan.drive:
         rows = _drive_rows(rows, soil, rng)
     base = solve(rows, soil)
@@ -177,14 +178,14 @@ def _attempt(seed: int, design: str, plan: Plan, rng: np.random.Generator) -> Ca
         or np.min(truth['sinkage']) < 0
     ):
         raise _UnusableError
-    table = _measure(plan, rows, truth, measured, rng)
+    table, kept = _measure(plan, rows, truth, measured, rng)
     return Campaign(
         seed,
         design,
         plan,
-        {k: table[k] for k in INPUTS},
+        {key: table[key] for key in INPUTS},
         table,
-        measured,
+        {key: measured[key][kept] for key in OUTPUTS},
         believed,
         soil,
         names,
@@ -193,7 +194,7 @@ def _attempt(seed: int, design: str, plan: Plan, rng: np.random.Generator) -> Ca
         distances,
         left,
         spices,
-        truth,
+        {key: truth[key][kept] for key in OUTPUTS},
     )
 
 
@@ -283,8 +284,10 @@ def _sizes_seen(
     return distances, left
 
 
-def _measure(plan: Plan, rows: Rows, truth: Rows, std: Rows, rng: np.random.Generator) -> Rows:
-    """Add noise, outliers and gaps; return the columns of the table."""
+def _measure(
+    plan: Plan, rows: Rows, truth: Rows, std: Rows, rng: np.random.Generator
+) -> tuple[Rows, BoolArray]:
+    """Add noise, outliers and gaps; return the columns of the table and which rows stayed."""
     n = len(rows['slip'])
     table: Rows = {key: rows[key].copy() for key in INPUTS}
     if plan.drive:
@@ -307,7 +310,7 @@ def _measure(plan: Plan, rows: Rows, truth: Rows, std: Rows, rng: np.random.Gene
             table[f'{key}_std'] = np.where(np.isnan(values), np.nan, std[key])
     present = [key for key in OUTPUTS if key in table]
     empty = np.all([np.isnan(table[key]) for key in present], axis=0)
-    return {key: value[~empty] for key, value in table.items()}
+    return {key: value[~empty] for key, value in table.items()}, ~empty
 
 
 def _drive_rows(rows: Rows, soil: TrueSoil, rng: np.random.Generator) -> Rows:

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
 Rows = dict[str, FloatArray]
 
 OUTPUTS = ('sinkage', 'drawbar_pull', 'torque')
