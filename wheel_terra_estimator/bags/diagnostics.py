@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from wheel_terra_estimator.estimation.estimates import EstimateSet, SlipClass
@@ -33,32 +33,6 @@ class Status(NamedTuple):
     values: list[tuple[str, str]]
 
 
-def statuses(
-    estimates: EstimateSet,
-    names: Sequence[str],
-    counters: Mapping[str, Any],
-    faults: Mapping[str, str] | None = None,
-) -> list[Status]:
-    """Return the status of the node, then of each wheel.
-
-    Parameters
-    ----------
-    estimates : EstimateSet
-        The set that is reported.
-    names : sequence of str
-        Wheel names.
-    counters : mapping
-        Further key-values of the node (unit in the key).
-    faults : mapping of str to str
-        Faults that the set does not know of (transport, layout of messages), in words.
-    """
-    found = {**estimates.faults, **(faults or {})}
-    return [
-        _node_status(estimates, counters, found),
-        *(_wheel_status(estimates, i, name) for i, name in enumerate(names)),
-    ]
-
-
 def stale_statuses(names: Sequence[str], words: str, counters: Mapping[str, Any]) -> list[Status]:
     """Return the statuses of a node that hears nothing."""
     return [
@@ -67,45 +41,85 @@ def stale_statuses(names: Sequence[str], words: str, counters: Mapping[str, Any]
     ]
 
 
-class Schedule:
-    """Says when a message is due: every second, and at once when a level changes."""
+class Diagnostics:
+    """Decides for each estimate set whether a message is due, and what it says.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    names : sequence of str
+        Wheel names.
+    counters : callable
+        Returns further key-values of the node (unit in the key); asked only when one is due.
+    faults : callable
+        Takes a stamp [ns], returns faults that the set does not know of, in words.
+    """
+
+    def __init__(
+        self,
+        names: Sequence[str],
+        counters: Callable[[], Mapping[str, Any]] = dict,
+        faults: Callable[[int], Mapping[str, str]] = lambda stamp: {},
+    ) -> None:
+        self._names = names
+        self._counters = counters
+        self._faults = faults
         self._stamp: int | None = None
         self._levels: list[int] = []
 
-    def due(self, stamp: int, found: Sequence[Status]) -> bool:
-        """Return whether the statuses at a stamp [ns] are to be sent; they count as sent then."""
-        levels = [status.level for status in found]
+    def due(self, estimates: EstimateSet) -> list[Status]:
+        """Return the statuses if a message is due, else nothing.
+
+        It is due every second of stamps, and at once when a level changes.
+        """
+        faults = {**estimates.faults, **self._faults(estimates.stamp)}
+        levels = [_node_level(estimates, faults)]
+        levels += [_wheel_level(estimates, i) for i in range(len(self._names))]
+        stamp = estimates.stamp
         if (
-            self._stamp is None
-            or levels != self._levels
-            or not 0 <= stamp - self._stamp < PERIOD  # a step back of the clock starts anew
+            self._stamp is not None
+            and levels == self._levels
+            and 0 <= stamp - self._stamp < PERIOD  # a step back of the clock starts anew
         ):
-            self._stamp, self._levels = stamp, levels
-            return True
-        return False
+            return []
+        self._stamp, self._levels = stamp, levels
+        return self.now(estimates)
+
+    def now(self, estimates: EstimateSet) -> list[Status]:
+        """Return the status of the node, then of each wheel."""
+        faults = {**estimates.faults, **self._faults(estimates.stamp)}
+        return [
+            _node_status(estimates, self._counters(), faults),
+            *(_wheel_status(estimates, i, name) for i, name in enumerate(self._names)),
+        ]
+
+
+def _node_level(estimates: EstimateSet, faults: Mapping[str, str]) -> int:
+    return ERROR if estimates.stuck else WARN if faults else OK
+
+
+def _wheel_level(estimates: EstimateSet, i: int) -> int:
+    return _CLASS_WORDS.get(SlipClass(int(estimates.slip_class[i])), (WARN, ''))[0]
 
 
 def _node_status(
     estimates: EstimateSet, counters: Mapping[str, Any], faults: Mapping[str, str]
 ) -> Status:
-    level, message = OK, 'running'
-    if faults:
-        level = WARN
-        message = '; '.join(f'{subject}: {words}' for subject, words in faults.items())
-    if estimates.stuck:
-        level = ERROR
-        message = 'stuck, or about to be' + (f'; {message}' if faults else '')
-    values = [('stuck', str(estimates.stuck).lower()), *_values(counters)]
-    return Status(level, f'{NODE}: estimator', message, NODE, values)
+    words = ['stuck, or about to be'] if estimates.stuck else []
+    words += [f'{subject}: {fault}' for subject, fault in faults.items()]
+    return Status(
+        level=_node_level(estimates, faults),
+        name=f'{NODE}: estimator',
+        message='; '.join(words) or 'running',
+        hardware_id=NODE,
+        values=[('stuck', str(estimates.stuck).lower()), *_values(counters)],
+    )
 
 
 def _wheel_status(estimates: EstimateSet, i: int, name: str) -> Status:
     e = estimates
     reason = e.reasons[i]
     slip_class = SlipClass(int(e.slip_class[i]))
-    level, message = _CLASS_WORDS.get(slip_class, (WARN, reason or 'slip class unknown'))
+    _, message = _CLASS_WORDS.get(slip_class, (WARN, reason or 'slip class unknown'))
     numbers = {
         'slip': e.slip[i],
         'slip_stddev': e.slip_std[i],
@@ -121,7 +135,7 @@ def _wheel_status(estimates: EstimateSet, i: int, name: str) -> Status:
         'time_to_stuck_s': e.time_to_stuck[i],
     }
     values = [*_values(numbers), ('slip_class', slip_class.name.lower()), ('reason', reason)]
-    return Status(level, f'{NODE}: {name}', message, name, values)
+    return Status(_wheel_level(e, i), f'{NODE}: {name}', message, name, values)
 
 
 def _values(counters: Mapping[str, Any]) -> list[tuple[str, str]]:

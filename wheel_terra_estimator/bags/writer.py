@@ -4,16 +4,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
 from types import TracebackType
-from typing import Any
 
 from wheel_terra_estimator.bags import diagnostics
 from wheel_terra_estimator.bags.bag_file import BagFile
 from wheel_terra_estimator.bags.convert import (
     OUTPUT_TYPES,
-    finite,
     joint_fields,
     twist_covariance,
 )
@@ -40,6 +37,8 @@ class EstimateBagWriter:
         Wheel names.
     overwrite : bool
         Whether an earlier bag at the same path is replaced.
+    statuses : Diagnostics, optional
+        Knows the counters and faults behind the estimates.
 
     Raises
     ------
@@ -47,10 +46,16 @@ class EstimateBagWriter:
         The path is taken or cannot be written.
     """
 
-    def __init__(self, path: Path, names: tuple[str, ...], overwrite: bool = False) -> None:
+    def __init__(
+        self,
+        path: Path,
+        names: tuple[str, ...],
+        overwrite: bool = False,
+        statuses: diagnostics.Diagnostics | None = None,
+    ) -> None:
         self.names = names
         self.file = BagFile(path, TOPICS, latched=(STUCK,), overwrite=overwrite)
-        self._schedule = diagnostics.Schedule()
+        self._diagnostics = statuses or diagnostics.Diagnostics(names)
         self._stuck: bool | None = None
 
     def __enter__(self) -> EstimateBagWriter:
@@ -69,18 +74,8 @@ class EstimateBagWriter:
         """Write what the node sends at its start: no stuck warning."""
         self._write_stuck(False, log_time)
 
-    def add(
-        self,
-        estimates: EstimateSet,
-        log_time: int,
-        counters: Mapping[str, Any] | None = None,
-        faults: Mapping[str, str] | None = None,
-    ) -> None:
-        """Write all messages of a set at the log time [ns] of the input that completed it.
-
-        ``counters`` and ``faults`` go to the node's diagnostics, see `diagnostics.statuses`.
-        """
-        estimates = finite(estimates)
+    def add(self, estimates: EstimateSet, log_time: int) -> None:
+        """Write all messages of a set at the log time [ns] of the input that completed it."""
         make = self.file.messages
         header = make.header(estimates.stamp)
         for topic, fields in joint_fields(estimates, self.names).items():
@@ -96,8 +91,7 @@ class EstimateBagWriter:
         )
         self.file.write(f'{NAMESPACE}/twist', twist, log_time)
         self._write_stuck(estimates.stuck, log_time)
-        found = diagnostics.statuses(estimates, self.names, counters or {}, faults)
-        if self._schedule.due(estimates.stamp, found):
+        if found := self._diagnostics.due(estimates):
             self.file.write(DIAGNOSTICS, make.diagnostic_array(header, found), log_time)
 
     def _write_stuck(self, stuck: bool, log_time: int) -> None:

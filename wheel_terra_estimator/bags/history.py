@@ -1,0 +1,233 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Estimates of a whole drive as arrays, for summaries and pictures.
+
+They come from the sets of a replay, or from a bag of the live node's outputs; the arrays are the
+same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wheel_terra_estimator.bags.convert import JOINT_STATE, OUTPUT_TYPES, stamp_of
+from wheel_terra_estimator.bags.diagnostics import NODE
+from wheel_terra_estimator.bags.storage import Bag
+from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.estimation.estimates import EstimateSet, SlipClass
+
+FloatArray = NDArray[np.float64]
+
+WHEEL_FIELDS = (
+    'slip',
+    'slip_std',
+    'slip_velocity',
+    'drawbar_pull',
+    'drawbar_pull_std',
+    'sinkage',
+    'sinkage_std',
+    'normal_load',
+    'rim_travel_left',
+    'pull_margin',
+)
+_TOPIC_FIELDS = {
+    'slip': ('slip', 'slip_velocity', 'drawbar_pull'),
+    'slip_stddev': ('slip_std', None, 'drawbar_pull_std'),
+    'sinkage': ('sinkage', None, 'normal_load'),
+    'sinkage_stddev': ('sinkage_std', None, None),
+    'mobility': ('rim_travel_left', None, 'pull_margin'),
+}
+
+
+@dataclass(frozen=True)
+class StuckWarning:
+    """One stuck warning: from, to [ns] (None: until the end), and why, in words."""
+
+    start: int
+    end: int | None
+    reason: str
+
+
+@dataclass(frozen=True)
+class EstimateHistory:
+    """Estimates of a drive; per-wheel arrays are (k, n), the others (k,).
+
+    ``values`` holds the arrays of ``WHEEL_FIELDS`` by name, units as in `EstimateSet`.
+    """
+
+    names: tuple[str, ...]
+    stamp: NDArray[np.int64]  # [ns]
+    values: dict[str, FloatArray]
+    slip_class: NDArray[np.uint8]
+    forward_velocity: FloatArray  # [m/s]
+    forward_velocity_std: FloatArray
+    warnings: tuple[StuckWarning, ...]
+
+    @property
+    def seconds(self) -> FloatArray:
+        """Time since the first set [s]."""
+        return (self.stamp - self.stamp[0]) * 1e-9 if self.stamp.size else np.empty(0)
+
+    def time_in_class(self) -> dict[SlipClass, FloatArray]:
+        """Return how long each wheel was in each class, (n,) [s]."""
+        step = np.diff(self.stamp, append=self.stamp[-1:]) * 1e-9
+        # A pause or a step back of the clock is no time in any class.
+        step = np.where((step < 0.0) | (step > 1.0), 0.0, step)
+        return {c: ((self.slip_class == c) * step[:, None]).sum(axis=0) for c in SlipClass}
+
+
+class HistoryRecorder:
+    """Collects estimate sets into an `EstimateHistory`."""
+
+    def __init__(self, names: Sequence[str]) -> None:
+        self._names = tuple(names)
+        self._rows: list[tuple[Any, ...]] = []
+        self._warnings: list[StuckWarning] = []
+
+    def add(self, estimates: EstimateSet) -> None:
+        """Append a set."""
+        e = estimates
+        self._rows.append(
+            (
+                e.stamp,
+                e.forward_velocity,
+                e.forward_velocity_variance,
+                e.slip_class,
+                *(getattr(e, name) for name in WHEEL_FIELDS),
+            )
+        )
+        running = bool(self._warnings) and self._warnings[-1].end is None
+        if e.stuck and not running:
+            self._warnings.append(StuckWarning(e.stamp, None, stuck_reason(e.reasons)))
+        elif running and not e.stuck:
+            last = self._warnings[-1]
+            self._warnings[-1] = StuckWarning(last.start, e.stamp, last.reason)
+
+    def history(self) -> EstimateHistory:
+        """Return what was collected."""
+        count, wheels = len(self._rows), len(self._names)
+        columns = list(zip(*self._rows, strict=True)) or [()] * (4 + len(WHEEL_FIELDS))
+
+        def per_wheel(column: tuple[Any, ...]) -> FloatArray:
+            return np.array(column, dtype=np.float64).reshape(count, wheels)
+
+        return EstimateHistory(
+            names=self._names,
+            stamp=np.array(columns[0], dtype=np.int64),
+            forward_velocity=np.array(columns[1], dtype=np.float64),
+            forward_velocity_std=np.sqrt(np.array(columns[2], dtype=np.float64)),
+            slip_class=np.array(columns[3], dtype=np.uint8).reshape(count, wheels),
+            values={n: per_wheel(columns[4 + i]) for i, n in enumerate(WHEEL_FIELDS)},
+            warnings=tuple(self._warnings),
+        )
+
+
+def stuck_reason(reasons: Sequence[str]) -> str:
+    """Return the reasons of the wheels as one text, each said once."""
+    return '; '.join(dict.fromkeys(reason for reason in reasons if reason))
+
+
+def read_estimates(bag: Bag, namespace: str = f'/{NODE}') -> EstimateHistory:
+    """Read the estimates out of a bag of the node's outputs.
+
+    Parameters
+    ----------
+    bag : Bag
+        Open recording.
+    namespace : str
+        Where the private topics lie.
+
+    Raises
+    ------
+    UserError
+        The bag holds no estimates.
+    """
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.ROS2_JAZZY)
+    types = {f'{namespace}/{topic}': kind for topic, kind in OUTPUT_TYPES.items()}
+    types['/diagnostics'] = 'diagnostic_msgs/msg/DiagnosticArray'
+    if f'{namespace}/slip' not in bag.topics:
+        raise UserError(
+            f'{bag.path}: no {namespace}/slip in it, so no estimates; there are: '
+            + ', '.join(bag.topics)
+        )
+    sets: dict[int, dict[str, Any]] = {}
+    names: tuple[str, ...] = ()
+    latest: dict[str, Any] = {}
+    warnings: list[StuckWarning] = []
+    reasons: dict[str, str] = {}
+    for log_time, topic, data in bag.messages(tuple(types)):
+        message: Any = store.deserialize_cdr(data, types[topic])
+        short = topic.removeprefix(f'{namespace}/')
+        if short in _TOPIC_FIELDS and types[topic] == JOINT_STATE:
+            row = sets.setdefault(stamp_of(message), {})
+            columns = (message.position, message.velocity, message.effort)
+            row.update(
+                (name, values)
+                for name, values in zip(_TOPIC_FIELDS[short], columns, strict=True)
+                if name
+            )
+            if short == 'slip':
+                names, latest = tuple(message.name), row
+                row['log_time'] = log_time
+        elif short == 'slip_class' and latest:
+            latest['slip_class'] = message.data
+        elif short == 'twist':
+            row = sets.setdefault(stamp_of(message), {})
+            row['forward_velocity'] = message.twist.twist.linear.x
+            row['forward_velocity_std'] = np.sqrt(message.twist.covariance[0])
+        elif short == 'stuck':
+            _follow(warnings, bool(message.data), log_time)
+        elif topic == '/diagnostics':
+            for status in message.status:
+                texts = [pair.value for pair in status.values if pair.key == 'reason']
+                reasons.update((status.name, text) for text in texts)
+            if warnings and not warnings[-1].reason:
+                words = stuck_reason(tuple(reasons.values()))
+                warnings[-1] = StuckWarning(warnings[-1].start, warnings[-1].end, words)
+    wanted = {*WHEEL_FIELDS, 'slip_class', 'forward_velocity'}
+    whole = {stamp: row for stamp, row in sets.items() if wanted <= row.keys()}
+    return EstimateHistory(
+        names=names,
+        stamp=np.array(list(whole), dtype=np.int64),
+        forward_velocity=np.array([row['forward_velocity'] for row in whole.values()]),
+        forward_velocity_std=np.array([row['forward_velocity_std'] for row in whole.values()]),
+        slip_class=np.array([row['slip_class'] for row in whole.values()], dtype=np.uint8).reshape(
+            len(whole), len(names)
+        ),
+        values={
+            name: np.array([row[name] for row in whole.values()]).reshape(len(whole), len(names))
+            for name in WHEEL_FIELDS
+        },
+        warnings=tuple(_in_stamps(warnings, whole)),
+    )
+
+
+def _follow(warnings: list[StuckWarning], stuck: bool, log_time: int) -> None:
+    """Open or close a warning, in log time for now."""
+    running = bool(warnings) and warnings[-1].end is None
+    if stuck and not running:
+        warnings.append(StuckWarning(log_time, None, ''))
+    elif running and not stuck:
+        warnings[-1] = StuckWarning(warnings[-1].start, log_time, warnings[-1].reason)
+
+
+def _in_stamps(warnings: list[StuckWarning], sets: dict[int, dict[str, Any]]) -> list[StuckWarning]:
+    """``~/stuck`` has no stamp: take that of the set it was sent with."""
+    stamps = list(sets)
+    logged = np.array([row['log_time'] for row in sets.values()])
+
+    def stamp(log_time: int) -> int:
+        return stamps[max(int(np.searchsorted(logged, log_time, side='right')) - 1, 0)]
+
+    return [
+        StuckWarning(stamp(w.start), None if w.end is None else stamp(w.end), w.reason)
+        for w in warnings
+        if stamps
+    ]

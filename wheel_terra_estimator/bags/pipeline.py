@@ -1,0 +1,93 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Messages in, estimate sets out: what the node and the replay both are.
+
+They differ in nothing but who brings the messages and where the sets go.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import Any
+
+from wheel_terra_estimator.bags.convert import InputConverter, finite, input_layout
+from wheel_terra_estimator.bags.diagnostics import Diagnostics
+from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.estimation.core import EstimatorCore
+from wheel_terra_estimator.estimation.estimates import EstimateSet
+
+FAULT_MEMORY = 5_000_000_000
+"""How long a refused message is shown as a fault [ns of stamps]."""
+
+
+class Pipeline:
+    """The estimator core with a converter before it.
+
+    Parameters
+    ----------
+    configuration : Configuration
+        Rover, soil, sensors, filter.
+
+    Attributes
+    ----------
+    received : Counter
+        Messages heard, by input topic.
+    diagnostics : Diagnostics
+        Says what ``/diagnostics`` is to say, and when.
+    """
+
+    def __init__(self, configuration: Configuration) -> None:
+        self.configuration = configuration
+        self.names = configuration.wheels.names
+        self.converter = InputConverter(input_layout(configuration))
+        self.core = EstimatorCore(configuration)
+        self.received: Counter[str] = Counter()
+        self.diagnostics = Diagnostics(self.names, self.counters, self._faults)
+        self._published = 0
+        self._refused: dict[tuple[str, str], tuple[int, int]] = {}  # -> count, stamp
+
+    def hear(self, topic: str, message: Any) -> list[EstimateSet]:
+        """Take a message of an input topic and return the sets that it completed."""
+        self.received[topic] += 1
+        measurement = self.converter.convert(topic, message)
+        if measurement is None:
+            return []
+        return self._out(self.core.add(measurement))
+
+    def flush(self) -> list[EstimateSet]:
+        """Return the sets that were held back for late inputs; the recording is over."""
+        return self._out(self.core.flush())
+
+    def reset(self) -> None:
+        """Forget the state, keep the parameters."""
+        self.core.reset()
+
+    @property
+    def rejected(self) -> Counter[tuple[str, str]]:
+        """Messages that could not be used, by (input topic, reason in words)."""
+        return self.converter.rejected
+
+    def counters(self) -> dict[str, Any]:
+        """Return what happened so far, for diagnostics and summaries."""
+        result: dict[str, Any] = {'sets_published': self._published}
+        result.update((f'{topic}_received', count) for topic, count in self.received.items())
+        for (topic, reason), count in self.converter.rejected.items():
+            result[f'{topic}_rejected: {reason}'] = count
+        result.update(self.core.health())
+        return result
+
+    def _out(self, sets: list[EstimateSet]) -> list[EstimateSet]:
+        sets = [finite(estimates) for estimates in sets]
+        self._published += len(sets)
+        return sets
+
+    def _faults(self, stamp: int) -> dict[str, str]:
+        """Return the messages that were refused of late, in words."""
+        for key, count in self.converter.rejected.items():
+            if count != self._refused.get(key, (0, 0))[0]:
+                self._refused[key] = count, stamp
+        return {
+            topic: f'{reason} ({count} messages)'
+            for (topic, reason), (count, since) in self._refused.items()
+            if 0 <= stamp - since < FAULT_MEMORY
+        }

@@ -1,0 +1,190 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""The estimator over a recording: as fast as it goes, no ROS, no wall clock."""
+
+from __future__ import annotations
+
+import signal
+import sys
+import threading
+from collections import Counter, defaultdict, deque
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from types import FrameType
+from typing import Any
+
+from wheel_terra_estimator.bags.convert import stamp_of
+from wheel_terra_estimator.bags.history import EstimateHistory, HistoryRecorder
+from wheel_terra_estimator.bags.pipeline import Pipeline
+from wheel_terra_estimator.bags.reader import MeasurementReader
+from wheel_terra_estimator.bags.storage import Bag
+from wheel_terra_estimator.bags.writer import EstimateBagWriter
+from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.errors import UserError
+
+LONG_DRIVE = 20_000
+"""Number of messages from which a progress bar is shown."""
+
+RESET = 'reset'
+"""Line of an arrival log for a call of ``~/reset``."""
+
+
+@dataclass(frozen=True)
+class Replay:
+    """What a replay gave: estimates, what was heard and refused, and what should be known."""
+
+    history: EstimateHistory
+    topics: dict[str, str]  # input topic of the estimator -> topic in the bag
+    heard: Counter[str]
+    rejected: Counter[tuple[str, str]]  # (input topic, reason)
+    counters: dict[str, Any]
+    notes: tuple[str, ...]
+    interrupted: bool
+
+
+def replay(
+    bag: Bag,
+    configuration: Configuration,
+    remaps: Mapping[str, str],
+    output: Path | None = None,
+    *,
+    overwrite: bool = False,
+    arrival: Path | None = None,
+) -> Replay:
+    """Run the estimator over an open bag.
+
+    Parameters
+    ----------
+    bag : Bag
+        The recording.
+    configuration : Configuration
+        Rover, soil, sensors, filter.
+    remaps : mapping of str to str
+        Estimator's topic to the bag's.
+    output : Path, optional
+        Folder of the bag that gets the estimates; closed and readable whatever happens.
+    overwrite : bool
+        Whether an earlier output is replaced.
+    arrival : Path, optional
+        Log of a live node (parameter ``record_arrival``): hear the messages in that order.
+
+    Raises
+    ------
+    UserError
+        Input that cannot be used, an output path that is taken.
+    """
+    reader = MeasurementReader(bag, remaps, configuration)
+    pipeline = Pipeline(configuration)
+    recorder = HistoryRecorder(pipeline.names)
+    messages = _in_order_of(arrival, reader) if arrival else reader.messages()
+    with ExitStack() as stack:
+        writer = None
+        if output is not None:
+            _keep_apart(bag.path, output)
+            writer = stack.enter_context(
+                EstimateBagWriter(output, pipeline.names, overwrite, pipeline.diagnostics)
+            )
+        interrupted = stack.enter_context(_until_interrupted())
+        log_time = 0
+        for count, (log_time, name, message) in enumerate(_progress(messages, reader)):
+            if writer is not None and count == 0:
+                writer.start(log_time)
+            if name == RESET:
+                pipeline.reset()
+                continue
+            for estimates in pipeline.hear(name, message):
+                recorder.add(estimates)
+                if writer is not None:
+                    writer.add(estimates, log_time)
+            if interrupted.is_set():
+                break
+        else:
+            for estimates in pipeline.flush():
+                recorder.add(estimates)
+                if writer is not None:
+                    writer.add(estimates, log_time)
+    return Replay(
+        history=recorder.history(),
+        topics=reader.topics,
+        heard=pipeline.received,
+        rejected=reader.rejected + pipeline.rejected,
+        counters=pipeline.counters(),
+        notes=tuple(_notes(bag, reader, interrupted.is_set())),
+        interrupted=interrupted.is_set(),
+    )
+
+
+def _notes(bag: Bag, reader: MeasurementReader, interrupted: bool) -> Iterator[str]:
+    if interrupted:
+        yield 'interrupted: this is the drive up to there'
+    yield from bag.notes
+    if reader.absent:
+        yield f'not in the bag: {", ".join(reader.absent)}'
+    used = set(reader.topics.values())
+    unknown = [t for t in bag.topics.values() if t.name not in used]
+    if unknown:
+        count = sum(topic.message_count for topic in unknown)
+        yield f'{count} messages not used, on {", ".join(topic.name for topic in unknown)}'
+
+
+def _in_order_of(arrival: Path, reader: MeasurementReader) -> Iterator[tuple[int, str, Any]]:
+    """Yield the messages of a bag in the order in which a live node heard them."""
+    try:
+        lines = arrival.read_text(encoding='utf-8').splitlines()
+    except OSError as error:
+        raise UserError(f'{arrival}: cannot be read ({error.strerror})') from None
+    stored: dict[tuple[str, int], deque[tuple[int, Any]]] = defaultdict(deque)
+    for log_time, name, message in reader.messages():
+        stored[name, stamp_of(message)].append((log_time, message))
+    log_time = 0
+    for number, line in enumerate(lines, start=1):
+        if line == RESET:
+            yield log_time, RESET, None
+            continue
+        name, _, stamp = line.rpartition(' ')
+        if not stamp.lstrip('-').isdigit() or not stored[name, int(stamp)]:
+            raise UserError(
+                f'{arrival}: line {number}: no message "{line}" in {reader.bag.path}; '
+                'the log belongs to another bag'
+            )
+        log_time, message = stored[name, int(stamp)].popleft()
+        yield log_time, name, message
+
+
+def _keep_apart(bag: Path, output: Path) -> None:
+    """Never write into, or delete, what is being read."""
+    source, target = bag.resolve(), output.resolve()
+    if source == target or target in source.parents or (bag.is_dir() and source in target.parents):
+        raise UserError(f'{output}: is, or lies in, or holds the bag that is read; choose another')
+
+
+def _progress(messages: Iterator[Any], reader: MeasurementReader) -> Iterator[Any]:
+    if reader.message_count < LONG_DRIVE or not sys.stderr.isatty():
+        yield from messages
+        return
+    from tqdm import tqdm
+
+    yield from tqdm(messages, total=reader.message_count, unit=' messages', unit_scale=True)
+
+
+@contextmanager
+def _until_interrupted() -> Iterator[threading.Event]:
+    """Turn the first Ctrl-C or SIGTERM into a flag, so that no message is written by half."""
+    flag = threading.Event()
+    if threading.current_thread() is not threading.main_thread():
+        yield flag
+        return
+
+    def on_signal(number: int, frame: FrameType | None) -> None:
+        if flag.is_set():
+            raise KeyboardInterrupt
+        flag.set()
+
+    kept = {number: signal.signal(number, on_signal) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield flag
+    finally:
+        for number, handler in kept.items():
+            signal.signal(number, handler)

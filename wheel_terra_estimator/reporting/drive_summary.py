@@ -1,0 +1,191 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""What happened on a drive, in the words and numbers that an operator asks for first."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from wheel_terra_estimator.bags.history import EstimateHistory
+from wheel_terra_estimator.estimation.estimates import SlipClass
+
+
+@dataclass(frozen=True)
+class WarningSpan:
+    """A stuck warning in seconds since the first set; ``end`` None: until the end."""
+
+    start: float
+    end: float | None
+    reason: str
+
+
+@dataclass(frozen=True)
+class WheelSummary:
+    """Figures of one wheel; ``seconds`` and ``shares`` by name of the slip class."""
+
+    name: str
+    seconds: dict[str, float]
+    shares: dict[str, float]
+    max_slip: float
+    max_sinkage: float
+    max_sinkage_std: float
+    mean_pull: float
+    least_margin: float
+
+
+@dataclass(frozen=True)
+class MessageRow:
+    """An input: how many messages were used, and what was rejected, in words."""
+
+    name: str
+    topic: str
+    count: int
+    rejected: str
+
+
+@dataclass(frozen=True)
+class DriveSummary:
+    """Everything that the terminal and the report say about a drive."""
+
+    title: str
+    duration: float  # [s]
+    sets: int
+    wheels: tuple[WheelSummary, ...]
+    warnings: tuple[WarningSpan, ...]
+    messages: tuple[MessageRow, ...]
+    notes: tuple[str, ...]
+
+    @property
+    def verdict(self) -> str:
+        """The drive in a sentence."""
+        if not self.sets:
+            return 'No estimate: no usable wheel odometry was heard.'
+        if self.warnings:
+            times = ', '.join(f'{w.start:.1f} s' for w in self.warnings[:5])
+            more = f' and {len(self.warnings) - 5} more' if len(self.warnings) > 5 else ''
+            kind = 'Stuck warning' if len(self.warnings) == 1 else 'Stuck warnings'
+            return f'{kind} at {times}{more}: {self.warnings[0].reason or "no reason given"}.'
+        worst = max(self.wheels, key=lambda wheel: wheel.seconds['stuck'] + wheel.seconds['high'])
+        high = worst.seconds['high'] + worst.seconds['stuck']
+        if high > 0.0:
+            return (
+                f'No stuck warning. {worst.name} slipped most: {high:.1f} s in the classes high '
+                f'and stuck, at most |slip| {worst.max_slip:.2f}.'
+            )
+        return 'No stuck warning, no wheel in the classes high or stuck.'
+
+
+def summarise(
+    title: str,
+    history: EstimateHistory,
+    topics: Mapping[str, str],
+    counts: Mapping[str, int],
+    rejected: Mapping[tuple[str, str], int],
+    notes: Sequence[str],
+) -> DriveSummary:
+    """Sum a drive up.
+
+    Parameters
+    ----------
+    title : str
+        Name of the recording.
+    history : EstimateHistory
+        The estimates.
+    topics, counts : mapping
+        Input topic of the estimator -> topic in the bag, number of messages used.
+    rejected : mapping
+        (input topic, reason) -> number of rejections.
+    notes : sequence of str
+        What else the reader should know.
+    """
+    seconds = history.seconds
+    begin = int(history.stamp[0]) if history.stamp.size else 0
+    return DriveSummary(
+        title=title,
+        duration=float(seconds.max()) if seconds.size else 0.0,
+        sets=int(seconds.size),
+        wheels=_wheels(history) if seconds.size else (),
+        warnings=tuple(
+            WarningSpan(
+                (w.start - begin) * 1e-9,
+                None if w.end is None else (w.end - begin) * 1e-9,
+                w.reason,
+            )
+            for w in history.warnings
+        ),
+        messages=tuple(
+            MessageRow(name, topic, counts.get(name, 0), _rejections(name, rejected))
+            for name, topic in topics.items()
+        ),
+        notes=tuple(notes),
+    )
+
+
+def _wheels(history: EstimateHistory) -> tuple[WheelSummary, ...]:
+    times = history.time_in_class()
+    total = np.maximum(sum(times.values()), 1e-9)
+    values = history.values
+    known = history.slip_class != SlipClass.UNKNOWN
+    result = []
+    for i, name in enumerate(history.names):
+        seconds = {c.name.lower(): float(times[c][i]) for c in SlipClass}
+        deepest = int(np.argmax(values['sinkage'][:, i]))
+        slips = np.abs(values['slip'][known[:, i], i])
+        pulls = values['drawbar_pull'][known[:, i], i]
+        result.append(
+            WheelSummary(
+                name=name,
+                seconds=seconds,
+                shares={key: value / float(total[i]) for key, value in seconds.items()},
+                max_slip=float(slips.max(initial=0.0)),
+                max_sinkage=float(values['sinkage'][deepest, i]),
+                max_sinkage_std=float(values['sinkage_std'][deepest, i]),
+                mean_pull=float(pulls.mean()) if pulls.size else 0.0,
+                least_margin=float(values['pull_margin'][:, i].min()),
+            )
+        )
+    return tuple(result)
+
+
+def _rejections(name: str, rejected: Mapping[tuple[str, str], int]) -> str:
+    of_topic = Counter({reason: n for (topic, reason), n in rejected.items() if topic == name})
+    return ', '.join(f'{count} x {reason}' for reason, count in of_topic.most_common())
+
+
+def as_text(summary: DriveSummary) -> str:
+    """Return the summary for a terminal."""
+    lines = [
+        f'{summary.title}: {summary.duration:.1f} s, {len(summary.wheels)} wheels, '
+        f'{summary.sets} estimate sets',
+        '',
+        f'  {summary.verdict}',
+    ]
+    for warning in summary.warnings:
+        end = 'the end' if warning.end is None else f'{warning.end:.1f} s'
+        lines.append(f'  STUCK from {warning.start:.1f} s to {end}: {warning.reason or "-"}')
+    if summary.wheels:
+        width = max(len(wheel.name) for wheel in summary.wheels)
+        classes = [c.name.lower() for c in SlipClass]
+        lines += [
+            '',
+            f'  {"time in class [s]":{width}}'
+            + ''.join(f'{c:>10}' for c in classes)
+            + '   max |slip|   max sinkage [mm]',
+        ]
+        for wheel in summary.wheels:
+            lines.append(
+                f'  {wheel.name:{width}}'
+                + ''.join(f'{wheel.seconds[c]:10.1f}' for c in classes)
+                + f'{wheel.max_slip:13.2f}'
+                + f'{1000 * wheel.max_sinkage:12.0f} +- {1000 * wheel.max_sinkage_std:.0f}'
+            )
+    lines += ['', f'  {"messages":24}{"used":>8}   rejected']
+    for row in summary.messages:
+        heard = f'{row.name} ({row.topic})' if row.topic != f'/{row.name}' else row.name
+        lines.append(f'  {heard:24}{row.count:8}   {row.rejected or "none"}')
+    lines += [f'  note: {note}' for note in summary.notes]
+    return '\n'.join(lines)

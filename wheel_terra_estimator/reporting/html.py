@@ -1,0 +1,62 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Self-contained HTML pages: pictures and style lie in the file, nothing is loaded from elsewhere.
+
+A report has a template that extends ``base.html`` and fills its blocks ``title``, ``headline`` and
+``content``; own templates may lie in any folder, ``base.html`` is found from there.
+"""
+
+from __future__ import annotations
+
+import base64
+from io import BytesIO
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from wheel_terra_estimator import __version__
+from wheel_terra_estimator.errors import UserError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+TEMPLATES = Path(__file__).parent / 'templates'
+
+
+def render(template: str, folder: Path = TEMPLATES, **context: Any) -> str:
+    """Return the page that a template makes of a context.
+
+    Parameters
+    ----------
+    template : str
+        File name of the template.
+    folder : Path
+        Where it lies; templates of this package are found as well.
+    **context
+        Values for the template; ``version`` is added.
+    """
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+    environment = Environment(
+        loader=FileSystemLoader([folder, TEMPLATES]),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    return environment.get_template(template).render(version=__version__, **context)
+
+
+def write_page(path: Path, page: str) -> None:
+    """Write a page; the folder is made if it is missing."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(page, encoding='utf-8')
+    except OSError as error:
+        raise UserError(f'{path}: cannot be written ({error.strerror})') from None
+
+
+def picture(figure: Figure) -> str:
+    """Return a figure as the address of an image that lies in the page itself (SVG)."""
+    buffer = BytesIO()
+    figure.savefig(buffer, format='svg', metadata={'Date': None})
+    return 'data:image/svg+xml;base64,' + base64.b64encode(buffer.getvalue()).decode()

@@ -1,0 +1,128 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""The report of a drive: one HTML file with pictures."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from wheel_terra_estimator.bags.history import EstimateHistory
+from wheel_terra_estimator.bags.truth import Truth
+from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.estimation.estimates import SlipClass
+from wheel_terra_estimator.reporting import drive_pictures
+from wheel_terra_estimator.reporting.drive_summary import DriveSummary
+from wheel_terra_estimator.reporting.html import picture, render, write_page
+from wheel_terra_estimator.reporting.style import CLASS_COLOURS
+
+
+def write_replay_report(
+    path: Path,
+    summary: DriveSummary,
+    history: EstimateHistory,
+    truth: Truth | None,
+    configuration: Configuration,
+) -> None:
+    """Write the report of a drive.
+
+    Parameters
+    ----------
+    path : Path
+        HTML file to be written; an earlier one is replaced (see `refuse_existing`).
+    summary, history : DriveSummary, EstimateHistory
+        What happened.
+    truth : Truth or None
+        Drawn beside the estimates where it is known.
+    configuration : Configuration
+        Listed at the end, with the sources of the effects in it.
+    """
+    from wheel_terra_estimator.terramechanics.effects import catalogue
+
+    effects = catalogue()
+    values = configuration.flat()
+    page = render(
+        'replay.html',
+        summary=summary,
+        rover=configuration.rover.name or 'rover',
+        tone='bad' if summary.warnings or not summary.sets else _tone(summary),
+        cards=_cards(summary),
+        classes=[
+            {'key': c.name.lower(), 'name': c.name.lower(), 'colour': colour}
+            for c, colour in CLASS_COLOURS.items()
+        ],
+        pictures=_pictures(history, truth) if summary.sets else [],
+        provenance=configuration.provenance,
+        parameters=[(key, values[key]) for key in values if key in configuration.stated],
+        sources=[(name, effects[name].source) for name in configuration.effects],
+    )
+    write_page(path, page)
+
+
+def refuse_existing(path: Path, overwrite: bool) -> None:
+    """Make sure that a report can be written at ``path``."""
+    if path.exists() and not (overwrite and path.is_file()):
+        cure = 'choose another path' + ('' if path.is_dir() else ' or give --overwrite')
+        raise UserError(f'{path}: exists already; {cure}')
+
+
+def _tone(summary: DriveSummary) -> str:
+    high = any(wheel.seconds['high'] + wheel.seconds['stuck'] > 0.0 for wheel in summary.wheels)
+    return 'warn' if high else 'good'
+
+
+def _cards(summary: DriveSummary) -> list[dict[str, str]]:
+    if not summary.wheels:
+        return []
+    deepest = max(summary.wheels, key=lambda wheel: wheel.max_sinkage)
+    slipping = max(wheel.max_slip for wheel in summary.wheels)
+    stuck = max(wheel.seconds['stuck'] for wheel in summary.wheels)
+    unknown = sum(wheel.shares[SlipClass.UNKNOWN.name.lower()] for wheel in summary.wheels)
+    return [
+        {'value': str(len(summary.warnings)), 'label': 'stuck warnings'},
+        {'value': f'{slipping:.2f}', 'label': 'greatest |slip|'},
+        {'value': f'{stuck:.1f} s', 'label': 'longest time of a wheel in class stuck'},
+        {
+            'value': f'{1000 * deepest.max_sinkage:.0f} ± {1000 * deepest.max_sinkage_std:.0f} mm',
+            'label': f'greatest sinkage ({deepest.name})',
+        },
+        {
+            'value': f'{100 * unknown / len(summary.wheels):.0f} %',
+            'label': 'of the time at rest or unknown',
+        },
+    ]
+
+
+def _pictures(history: EstimateHistory, truth: Truth | None) -> list[dict[str, str]]:
+    beside = f' The truth ({truth.source}) is dashed.' if truth else ''
+    band = f'Bands are ± {drive_pictures.BAND:g} standard deviations.'
+    red = ' Red: stuck warning.' if history.warnings else ''
+    drawn = (
+        (
+            'The drive at a glance',
+            drive_pictures.overview(history, truth),
+            'Body velocity against the mean rim speed, then slip, class, sinkage and drawbar pull '
+            f'of each wheel.{beside}{red}',
+        ),
+        (
+            'Slip, wheel by wheel',
+            drive_pictures.slip_by_wheel(history, truth),
+            f'{band} The strip below each line has the colour of the slip class; grey lines are '
+            f'the thresholds 0.3, 0.6 and 0.9.{beside if truth and truth.slip else ""}{red}',
+        ),
+        (
+            'Sinkage, wheel by wheel',
+            drive_pictures.sinkage_by_wheel(history, truth),
+            f'{band}{beside if truth and truth.sinkage else ""}{red}',
+        ),
+        (
+            'Drawbar pull, wheel by wheel',
+            drive_pictures.pull_by_wheel(history, truth),
+            'Net longitudinal force of the soil on the wheel, along the slope. '
+            f'{band}{beside if truth and truth.drawbar_pull else ""}{red}',
+        ),
+    )
+    return [
+        {'title': title, 'source': picture(figure), 'caption': caption}
+        for title, figure, caption in drawn
+    ]
