@@ -1,0 +1,131 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""The result folder of one run: summary, time series, rows for diagnose, pictures, film."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+import os
+import shutil
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from wheel_terra_estimator.soilbin.bookkeeping import SERIES
+from wheel_terra_estimator.soilbin.case import Case, to_dict
+
+# INTERFACE: tables of steady measurements.
+ROW_COLUMNS = (
+    'slip',
+    'normal_load',
+    'slope',
+    'sinkage',
+    'drawbar_pull',
+    'torque',
+    'wheel_radius',
+    'wheel_width',
+    'lug_height',
+    'lug_count',
+    'gravity',
+    'angular_velocity',
+    'leaving_angle',
+)
+
+
+def measurement_row(case: Case, summary: Mapping[str, object]) -> dict[str, float]:
+    """Return the run as one row of a table of steady measurements.
+
+    `normal_load` is W cos(slope), `drawbar_pull` H - R_r along the slope, `sinkage` the depth of
+    the rim below the undisturbed surface, `torque` the true moment on the body (the paper's
+    H r_w is in the summary).
+    """
+
+    def number(name: str) -> float:
+        return float(str(summary[name]))
+
+    return {
+        'slip': number('slip'),
+        'normal_load': case.operation.vertical_load * math.cos(case.operation.slope),
+        'slope': case.operation.slope,
+        'sinkage': number('sinkage'),
+        'drawbar_pull': number('net_traction'),
+        'torque': number('torque_body'),
+        'wheel_radius': case.wheel.rim_radius,
+        'wheel_width': case.wheel.width,
+        'lug_height': case.wheel.lug_height,
+        'lug_count': case.wheel.lug_count,
+        'gravity': case.operation.gravity,
+        'angular_velocity': case.rim_rate,
+        'leaving_angle': number('leaving_angle'),
+    }
+
+
+def write_rows(path: Path, rows: list[dict[str, float]]) -> None:
+    """Write a table of steady measurements."""
+    part = path.with_suffix('.part')
+    with part.open('w', newline='', encoding='utf-8') as file:
+        writer = csv.DictWriter(file, ROW_COLUMNS)
+        writer.writeheader()
+        for row in rows:
+            writer.writerow({name: f'{row[name]:.6g}' for name in ROW_COLUMNS})
+    os.replace(part, path)
+
+
+def write_folder(
+    folder: Path, work: Path, case: Case, summary: Mapping[str, object], film: bool
+) -> None:
+    """Write the results of a finished run into its folder; `summary.json` comes last."""
+    series = np.load(work / 'series.npy')
+    with (folder / 'time_series.csv').open('w', encoding='utf-8') as file:
+        file.write(','.join(SERIES) + '\n')
+        np.savetxt(file, series, delimiter=',', fmt='%.7g')
+    write_rows(folder / 'rows.csv', [measurement_row(case, summary)])
+    frames = sorted((work / 'frames').glob('*.npz'))
+    if frames:
+        from wheel_terra_estimator.soilbin import pictures
+
+        pictures.draw(frames[-1], frames[0], case, summary, folder / 'bed.png')
+        pictures.draw_series(series, case, folder / 'time_series.png')
+        if film:
+            pictures.film(frames, case, summary, folder / 'film.gif')
+    part = folder / 'summary.part'
+    finite = {
+        key: None if isinstance(value, float) and not math.isfinite(value) else value
+        for key, value in summary.items()
+    }
+    case_data = to_dict(case)
+    if math.isnan(case.operation.imposed_slip):
+        case_data['operation']['imposed_slip'] = None
+    part.write_text(json.dumps({'summary': finite, 'case': case_data}, indent=2) + '\n')
+    os.replace(part, folder / 'summary.json')
+    shutil.rmtree(work / 'checkpoint', ignore_errors=True)
+
+
+def clean(work: Path) -> None:
+    """Remove the working folder of a finished run."""
+    shutil.rmtree(work, ignore_errors=True)
+
+
+def as_text(summary: Mapping[str, object]) -> str:
+    """Return the main figures in a few lines."""
+
+    def number(name: str) -> float:
+        return float(str(summary[name]))
+
+    lines = [
+        f'slip {100 * number("slip"):.1f} % '
+        f'(second half {100 * number("slip_second_half"):.1f} %)',
+        f'H {number("gross_traction"):.2f} N, R_r {number("motion_resistance"):.2f} N, '
+        f'P_d {number("net_traction"):.2f} N (demanded {number("demanded_pull"):.2f} N)',
+        f'torque H r_w {number("torque_gross"):.3f} N m, on the body '
+        f'{number("torque_body"):.3f} N m',
+        f'sinkage {1000 * number("sinkage"):.1f} mm below the undisturbed surface '
+        f'(static {1000 * number("sinkage_static"):.1f} mm, z_a '
+        f'{1000 * number("sinkage_average"):.1f} mm)',
+        f'power number {number("power_number"):.3f}, pull coefficient '
+        f'{number("pull_coefficient"):.3f}',
+    ]
+    return '\n'.join(lines)
