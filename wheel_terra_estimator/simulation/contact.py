@@ -1,0 +1,232 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Forces of the soil on wheels whose sinkage is given: the reference quadrature off its balance.
+
+The stress distribution, the shear and all effects are those of the reference model. What differs
+is what is known: there the load balance finds the sinkage, here the sinkage is a state and the
+load balance finds by which factor the normal stress exceeds the bearing strength of the soil at
+that sinkage (``support_ratio``). At 1 the two agree; above 1 the wheel is sinking.
+
+Lateral motion shears the soil too: the shear displacement is a vector, the shear stress of Janosi
+and Hanamoto acts along it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wheel_terra_estimator.terramechanics import effects as effect_catalogue
+from wheel_terra_estimator.terramechanics.contact import Contact
+from wheel_terra_estimator.terramechanics.kinematics import shear_displacement, speed_ratio
+from wheel_terra_estimator.terramechanics.soil import Soil
+from wheel_terra_estimator.terramechanics.stresses import front_stress
+from wheel_terra_estimator.terramechanics.terms import Terms, set_angles
+from wheel_terra_estimator.terramechanics.wheel import Wheel
+
+FloatArray = NDArray[np.float64]
+
+NODES = 6
+"""Gauss-Legendre nodes on each side of the angle of greatest stress."""
+LEAST_SUPPORT = 0.05
+"""Floor of the support ratio: cohesion alone never carries the whole wheel."""
+LEAST_ANGLE = 0.01
+"""Least entrance angle [rad]; the balance is singular at 0."""
+
+
+@dataclass(frozen=True)
+class SoilForces:
+    """What the soil does to the wheels; shape of the points, in the direction of travel.
+
+    Attributes
+    ----------
+    pull, side_force : numpy.ndarray
+        Net longitudinal and lateral force on the wheel [N].
+    torque : numpy.ndarray
+        Drive torque that holds the wheel against the soil [N m].
+    support_ratio : numpy.ndarray
+        Normal stress over the bearing strength at this sinkage [-].
+    sinkage_exponent : numpy.ndarray
+        N after the effects [-].
+    contact_angle : numpy.ndarray
+        Entrance minus leaving angle [rad].
+    leaving_angle : numpy.ndarray
+        Leaving angle, negative behind the hub [rad].
+    lug_sinkage : numpy.ndarray
+        Sinkage beyond the depth of the stressed contact, from digging and support of lugs [m].
+    """
+
+    pull: FloatArray
+    side_force: FloatArray
+    torque: FloatArray
+    support_ratio: FloatArray
+    sinkage_exponent: FloatArray
+    contact_angle: FloatArray
+    leaving_angle: FloatArray
+    lug_sinkage: FloatArray
+
+    def first(self) -> SoilForces:
+        """Return the entry 0 of the first axis of every field."""
+        return SoilForces(*(getattr(self, name)[0] for name in self.__dataclass_fields__))
+
+
+class ContactModel:
+    """Soil forces of n wheels with given depths.
+
+    Parameters
+    ----------
+    wheel : Wheel
+        (n,) geometry.
+    soil : Soil
+        Base soil; what is below each wheel differs by factors.
+    slip_radius : numpy.ndarray
+        (n,) radius that slip refers to [m].
+    effects : mapping
+        Effect name -> parameter -> value, of the enabled effects.
+    gravity : float
+        [m/s^2].
+    """
+
+    def __init__(
+        self,
+        wheel: Wheel,
+        soil: Soil,
+        slip_radius: FloatArray,
+        effects: Mapping[str, Mapping[str, float]],
+        gravity: float,
+    ) -> None:
+        self._wheel = wheel
+        self._soil = soil
+        self._tan_friction = float(np.tan(soil.friction_angle))
+        self._bekker = soil.pressure_law == 'bekker'
+        if self._bekker:
+            self._modulus = soil.cohesive_modulus / wheel.width + soil.frictional_modulus
+        else:
+            self._modulus = (
+                soil.cohesion * soil.cohesive_modulus
+                + soil.density * gravity * wheel.width * soil.frictional_modulus
+            )
+        self._slip_radius = slip_radius
+        self._gravity = gravity
+        self._terms = Terms(effect_catalogue.check_settings(effects))
+        # Squared towards the ends of the contact, where the stress starts like a root.
+        nodes, weights = np.polynomial.legendre.leggauss(NODES)
+        nodes, weights = 0.5 * (nodes + 1.0), 0.5 * weights
+        self._nodes, self._weights = nodes * nodes, 2.0 * nodes * weights
+
+    def forces(
+        self,
+        factors: Mapping[str, FloatArray],
+        depth: FloatArray,
+        slip: FloatArray,
+        side_slip: FloatArray,
+        load: FloatArray,
+        rim_speed: FloatArray,
+        slope: FloatArray,
+        pass_number: FloatArray,
+    ) -> SoilForces:
+        """Return the forces, seen in the direction of travel.
+
+        Parameters
+        ----------
+        factors : mapping
+            Name of ``terrain.SOIL_QUANTITIES`` -> (n,) factor on the base soil below the wheels.
+        depth : numpy.ndarray
+            (n,) depth of the stressed contact r (1 - cos t1) [m].
+        slip : numpy.ndarray
+            (..., n) slip ratio, positive when driving in the direction of travel [-].
+        side_slip : numpy.ndarray
+            (..., n) lateral slip velocity over the larger of rim and ground speed [-].
+        load, rim_speed, slope, pass_number : numpy.ndarray
+            (n,) load [N], rim speed [m/s], slope in the direction of travel [rad], 1 on virgin
+            soil and more where other wheels ran before.
+        """
+        wheel, soil = self._wheel, self._soil
+        ratio = speed_ratio(np.maximum(slip, -0.999))
+        contact = Contact(
+            slip=slip,
+            velocity_ratio=ratio * self._slip_radius,
+            normal_load=load,
+            stated_load=load,
+            slope=slope,
+            gravity=self._gravity,
+            rim_speed=rim_speed,
+            direction=1.0,
+            pass_number=pass_number,
+            radius=wheel.radius,
+            width=wheel.width,
+            lug_height=wheel.lug_height,
+            lug_count=wheel.lug_count,
+            lug_thickness=wheel.lug_thickness,
+            shear_radius=wheel.radius,
+            bearing_modulus=self._modulus * factors['stiffness'],
+            reference_depth=1.0 if self._bekker else wheel.width,
+            sinkage_exponent=soil.sinkage_exponent,
+            cohesion=soil.cohesion * factors['cohesion'],
+            tan_friction=self._tan_friction * factors['friction'],
+            shear_modulus=soil.shear_modulus * factors['shear_modulus'],
+            peak_ratio=soil.peak_stress_ratio,
+            leaving_ratio=soil.leaving_angle_ratio,
+            density=soil.density,
+        )
+        self._terms.apply('on_inputs', contact)
+        contact.sinkage_exponent = soil.sinkage_exponent + factors['slip_sinkage'] * (
+            contact.sinkage_exponent - soil.sinkage_exponent
+        )
+        entrance = np.arccos(np.clip(1.0 - depth / wheel.radius, -0.5, np.cos(LEAST_ANGLE)))
+        set_angles(contact, entrance, None, self._terms)
+        t1, tm, t2 = contact.entrance_angle, contact.peak_angle, contact.leaving_angle
+        shape = np.broadcast_shapes(np.shape(t1), np.shape(tm), np.shape(t2), np.shape(slip))
+        front, rear = np.broadcast_to(t1 - tm, shape), np.broadcast_to(tm - t2, shape)
+        node = self._nodes.reshape(-1, *(1,) * len(shape))
+        weight = self._weights.reshape(node.shape)
+        entry_side = t1 - front * node
+        # The rear branch mirrors the front one (Wong and Reece), so both share the same stress.
+        stress = front_stress(contact, entry_side)
+        contact.angle = angle = np.concatenate([entry_side, t2 + rear * node])
+        contact.normal_stress = np.concatenate([stress, stress])
+        self._terms.apply('on_normal_stress', contact)
+        weights = np.concatenate([front * weight, rear * weight])
+
+        shear_radius = contact.shear_radius
+        along = shear_displacement(angle, t1, shear_radius, contact.velocity_ratio)
+        # The rim turns by (t1 - t) while the hub moves sideways.
+        across = side_slip * np.maximum(ratio, 1.0) * self._slip_radius * (t1 - angle)
+        sheared = np.sqrt(along * along + across * across) + 1e-12
+        mobilised = weights * -np.expm1(-sheared / contact.shear_modulus) / sheared
+        mobilised_along = mobilised * along
+        sine, cosine = np.sin(angle), np.cos(angle)
+        normal = contact.normal_stress
+        frictional = contact.tan_friction * normal
+
+        # Load balance, linear in the factor on the normal stress.
+        radius, width, cohesion = wheel.radius, wheel.width, contact.cohesion
+        from_cohesion = shear_radius * cohesion * (mobilised_along * sine).sum(0)
+        from_stress = radius * (weights * normal * cosine).sum(0) + shear_radius * (
+            mobilised_along * frictional * sine
+        ).sum(0)
+        support = (contact.normal_load / width - from_cohesion) / np.maximum(from_stress, 1e-9)
+        support = np.maximum(support, LEAST_SUPPORT)
+        strength = cohesion + support * frictional
+        shear = mobilised_along * strength
+        contact.drawbar_pull = width * (
+            shear_radius * (shear * cosine).sum(0)
+            - radius * support * (weights * normal * sine).sum(0)
+        )
+        contact.torque = width * shear_radius**2 * shear.sum(0)
+        side_force = width * shear_radius * (mobilised * across * strength).sum(0)
+        contact.sinkage = depth
+        self._terms.apply('on_outputs', contact)
+        return SoilForces(
+            pull=contact.drawbar_pull,
+            side_force=side_force,
+            torque=contact.torque,
+            support_ratio=support,
+            sinkage_exponent=np.broadcast_to(contact.sinkage_exponent, shape),
+            contact_angle=front + rear,
+            leaving_angle=np.broadcast_to(t2, shape),
+            lug_sinkage=np.broadcast_to(contact.sinkage - depth, shape),
+        )

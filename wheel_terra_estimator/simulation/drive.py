@@ -1,0 +1,232 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""A whole simulated drive in memory, and its parts for a closed loop."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.simulation.commands import Command
+from wheel_terra_estimator.simulation.drives import Drives
+from wheel_terra_estimator.simulation.plant import RoverPlant
+from wheel_terra_estimator.simulation.scenario import SENSOR_FAULTS, Fault, Scenario
+from wheel_terra_estimator.simulation.sensors import START, Arrival, SensorSuite
+from wheel_terra_estimator.simulation.terrain import SOIL_QUANTITIES, Patch, Terrain
+from wheel_terra_estimator.simulation.truth import Truth, TruthTable
+
+LONGEST_STEP = 0.05
+"""Longest step of a drive [s]; it divides the period of the wheel odometry."""
+DEFAULT_TORQUE_RATIO = 1.5
+"""Torque limit over mean load times radius, where neither rover nor scenario states one."""
+
+
+@dataclass(frozen=True)
+class SimulatedDrive:
+    """What a drive gave.
+
+    Attributes
+    ----------
+    scenario : Scenario
+        The scenario; ``scenario.configuration`` is what an estimator may know.
+    seed : int
+        The seed.
+    arrivals : list of Arrival
+        Measurements in the order of their arrival.
+    truth : TruthTable
+        One row per stamp of the wheel odometry.
+    """
+
+    scenario: Scenario
+    seed: int
+    arrivals: list[Arrival]
+    truth: TruthTable
+
+    @property
+    def configuration(self) -> Configuration:
+        """What the estimator is told."""
+        return self.scenario.configuration
+
+
+class Drive:
+    """A seeded rover with its sensors, one step at a time.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario; its command profile is used by ``run`` only.
+    seed : int
+        Decides all random quantities.
+
+    Attributes
+    ----------
+    plant : RoverPlant
+        The rover.
+    sensors : SensorSuite
+        Its sensors.
+    configuration : Configuration
+        What is true of rover and base soil in this drive.
+    step_length : float
+        Duration of a step [s].
+    last_truth : Truth
+        Truth at the end of the last step.
+    """
+
+    def __init__(self, scenario: Scenario, seed: int = 0) -> None:
+        # Apart, so that one more draw of one kind does not change the others.
+        variation, ground, noise = (
+            np.random.default_rng(s) for s in np.random.SeedSequence(seed).spawn(3)
+        )
+        self.scenario = scenario
+        self.seed = seed
+        draw = scenario.variation
+        truth = scenario.truth
+
+        def factor(deviation: float) -> float:
+            return float(np.exp(deviation * np.clip(variation.standard_normal(), -2.5, 2.5)))
+
+        soil = {name: factor(getattr(draw, name)) for name in SOIL_QUANTITIES}
+        patches = [
+            Patch(
+                p.start,
+                p.end,
+                p.right,
+                p.left,
+                {**p.factors, 'stiffness': p.factors['stiffness'] * factor(draw.patch)},
+            )
+            for p in scenario.patches
+        ]
+        slope_shift = draw.slope * variation.standard_normal()
+        self._speed_factor = factor(draw.speed)
+        changes = {'rover.mass': truth.rover.mass * factor(draw.mass)}
+        radius_factor = factor(draw.radius)
+        if radius_factor != 1.0:
+            changes['wheels.radius'] = (truth.wheels.radius * radius_factor).tolist()
+        self.configuration = truth.replace(changes)
+        profile = scenario.profile
+        fastest = self._speed_factor * float(
+            np.max(
+                np.abs(profile.forward)
+                + np.abs(profile.turn_rate) * np.abs(truth.wheels.y).max(initial=0.0)
+            )
+        )
+        reach = fastest * scenario.duration + 2.0 * float(np.abs(truth.wheels.x).max()) + 1.0
+        slope = scenario.slope
+        terrain = Terrain(
+            slope.position,
+            slope.angle + np.where(slope.angle != 0.0, slope_shift, 0.0),
+            slope.side,
+            patches,
+            scenario.border,
+            soil,
+            slope.undulation,
+            slope.undulation_length,
+            scenario.patchiness,
+            scenario.patchiness_length,
+            (-reach, reach),
+            ground,
+        )
+        self.plant = RoverPlant(
+            self.configuration,
+            terrain,
+            self._drives(max(fastest, 0.01)),
+            scenario.dig_efficiency,
+        )
+        self.faults = (*scenario.faults, *_random_faults(scenario, noise))
+        self.sensors = SensorSuite(scenario, noise, self.faults)
+        period = self.sensors.odometry_period
+        self.step_length = period / np.ceil(period / LONGEST_STEP - 1e-9)
+        self.last_truth: Truth = self.plant.truth()
+
+    def step(self, command: Command) -> list[Arrival]:
+        """Drive under a command for ``step_length`` and return what the sensors say."""
+        self._set_wheel_faults()
+        self.last_truth = self.plant.step(command, self.step_length)
+        return self.sensors.measure(self.last_truth)
+
+    def run(self, duration: float | None = None) -> SimulatedDrive:
+        """Drive the scenario's profile and return everything."""
+        duration = self.scenario.duration if duration is None else duration
+        profile = self.scenario.profile
+        arrivals: list[Arrival] = []
+        stamps: list[int] = []
+        rows: list[Truth] = []
+        period = self.sensors.odometry_period
+        due = period
+        factor = self._speed_factor
+        for _ in range(round(duration / self.step_length)):
+            command = profile.at(self.plant.time)
+            arrivals += self.step(Command(factor * command.forward, factor * command.turn_rate))
+            while due <= self.plant.time + 1e-9:
+                stamps.append(START + round(due * 1e9))
+                rows.append(self.last_truth)
+                due += period
+        arrivals.sort(key=lambda a: a.arrival)
+        thresholds = self.configuration.filter.class_thresholds
+        table = TruthTable.from_rows(stamps, rows, thresholds)
+        return SimulatedDrive(self.scenario, self.seed, arrivals, table)
+
+    def _drives(self, fastest: float) -> Drives:
+        truth, drive = self.configuration, self.scenario.drive
+        wheels = truth.wheels
+        by_load = truth.rover.mass * truth.rover.gravity / wheels.count * wheels.radius
+        if drive.torque_ratio:
+            limit = drive.torque_ratio * by_load
+        else:
+            known = wheels.torque_limit
+            limit = np.where(known > 0.0, known, DEFAULT_TORQUE_RATIO * by_load)
+        return Drives(limit, fastest / wheels.slip_radius, drive.acceleration / wheels.slip_radius)
+
+    def _set_wheel_faults(self) -> None:
+        faults = self.plant.faults
+        for array in (faults.rate_factor, faults.torque_factor, faults.load_factor):
+            array[:] = 1.0
+        for fault in self.faults:
+            if not fault.active(self.plant.time):
+                continue
+            wheel = slice(None) if fault.wheel is None else fault.wheel
+            if fault.kind == 'overspeed':
+                faults.rate_factor[wheel] = 4.0
+            elif fault.kind == 'locked':
+                faults.rate_factor[wheel] = 0.0
+            elif fault.kind == 'coasting':
+                faults.torque_factor[wheel] = 0.0
+            elif fault.kind == 'weak':
+                faults.torque_factor[wheel] = 0.25
+            elif fault.kind == 'lifted':
+                faults.load_factor[wheel] = 0.02
+
+
+def simulate(scenario: Scenario, seed: int = 0, duration: float | None = None) -> SimulatedDrive:
+    """Run a scenario.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        See ``scenario.load``.
+    seed : int
+        Decides all random quantities.
+    duration : float, optional
+        In place of the scenario's [s].
+    """
+    return Drive(scenario, seed).run(duration)
+
+
+def _random_faults(scenario: Scenario, random: np.random.Generator) -> list[Fault]:
+    """Draw sensor faults: when, which, which wheel, for 2 to 20 s."""
+    count = random.poisson(scenario.random_fault_rate * scenario.duration / 3600.0)
+    faults = []
+    for _ in range(count):
+        start = random.uniform(0.0, scenario.duration)
+        wheel = int(random.integers(-1, scenario.configuration.wheels.count))
+        faults.append(
+            Fault(
+                str(random.choice(SENSOR_FAULTS)),
+                None if wheel < 0 else wheel,
+                start,
+                start + random.uniform(2.0, 20.0),
+            )
+        )
+    return faults

@@ -1,0 +1,60 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Drives of the wheels: speed control whose torque is limited, so that a wheel can stall."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+CONTROL_BAND = 0.2
+"""Rate error, as a share of the working rate, at which the full torque is applied."""
+INTEGRAL_TIME = 0.3  # [s]
+SETTLING_TIME = 0.003
+"""Inertia of rotor and wheel over the gain of the control [s]."""
+
+
+class Drives:
+    """Speed control of n wheels: proportional and integral, limited torque, limited acceleration.
+
+    Parameters
+    ----------
+    torque_limit : numpy.ndarray
+        (n,) greatest torque at the wheel [N m].
+    working_rate : numpy.ndarray
+        (n,) wheel rate for which the control is made [rad/s].
+    acceleration : float
+        Greatest change of the commanded rate [rad/s^2].
+    """
+
+    def __init__(
+        self, torque_limit: FloatArray, working_rate: FloatArray, acceleration: FloatArray
+    ) -> None:
+        self._limit = torque_limit
+        self._gain = torque_limit / (CONTROL_BAND * working_rate)
+        self._acceleration = acceleration
+        self._integral = np.zeros_like(torque_limit)
+        self._target = np.zeros_like(torque_limit)
+        self._strength = np.ones_like(torque_limit)
+        self.inertia = SETTLING_TIME * self._gain  # [kg m^2]
+
+    def command(self, rate: FloatArray, strength: FloatArray, dt: float) -> None:
+        """Move the target towards a commanded rate [rad/s]; ``strength`` scales the limit."""
+        change = self._acceleration * dt
+        self._target = self._target + np.clip(rate - self._target, -change, change)
+        self._strength = strength
+
+    def torque(self, rate: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return torque [N m] and its derivative by the rate, at a wheel rate [rad/s]."""
+        limit = self._limit * self._strength
+        wanted = self._gain * (self._target - rate) + self._integral
+        torque = np.clip(wanted, -limit, limit)
+        return torque, np.where(np.abs(wanted) < limit, -self._gain, 0.0)
+
+    def finish(self, rate: FloatArray, dt: float) -> None:
+        """Take the integral part over a step that ended at ``rate``; it stops at the limit."""
+        limit = self._limit * self._strength
+        step = self._gain * (self._target - rate) * dt / INTEGRAL_TIME
+        self._integral = np.clip(self._integral + step, -limit, limit)

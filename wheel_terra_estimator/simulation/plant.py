@@ -1,0 +1,362 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""The simulated rover: body, drives and suspension on wheel-soil contacts with memory.
+
+Unknowns of a step are the body's forward, lateral and turning speed and the wheel rates. The soil
+is stiff in them (a rover stops within milliseconds of its drives), so the step is implicit Euler,
+solved by Newton's method with the wheel rates eliminated.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.simulation.commands import Command
+from wheel_terra_estimator.simulation.contact import ContactModel, SoilForces
+from wheel_terra_estimator.simulation.contact_memory import ContactMemory, Shear
+from wheel_terra_estimator.simulation.drives import Drives
+from wheel_terra_estimator.simulation.suspension import Suspension, suspension_of
+from wheel_terra_estimator.simulation.terrain import Terrain
+from wheel_terra_estimator.simulation.truth import Truth, wheel_slip
+
+FloatArray = NDArray[np.float64]
+
+LONGEST_STEP = 0.05  # [s]
+LOAD_TIME = 0.1  # [s]; the suspension settles
+TINY = 1e-6  # [m/s]; step of the numerical derivatives
+TOLERANCE = 1e-4  # [m/s]; a smaller step of Newton's method is the last: the model is linear there
+MOST_ITERATIONS = 6
+
+
+@dataclass
+class WheelFaults:
+    """What is wrong with single wheels; may be changed between steps.
+
+    Attributes
+    ----------
+    rate_factor : numpy.ndarray
+        (n,) factor on the commanded rate: above 1 a drive that runs away, 0 a locked one.
+    torque_factor : numpy.ndarray
+        (n,) factor on the torque limit: 0 a wheel that coasts.
+    load_factor : numpy.ndarray
+        (n,) factor on the load: near 0 a wheel that is lifted off.
+    """
+
+    rate_factor: FloatArray
+    torque_factor: FloatArray
+    load_factor: FloatArray
+
+    @classmethod
+    def none(cls, count: int) -> WheelFaults:
+        """Return a set without faults."""
+        return cls(np.ones(count), np.ones(count), np.ones(count))
+
+
+class WheelForces(NamedTuple):
+    """Forces and torques at hub speeds, shape (..., n), body frame."""
+
+    pull: FloatArray
+    side_force: FloatArray
+    torque: FloatArray
+    soil: SoilForces
+
+
+class RoverPlant:
+    """A rover on a terrain, driven by velocity commands.
+
+    Parameters
+    ----------
+    configuration : Configuration
+        True rover, true base soil and true effects.
+    terrain : Terrain
+        The ground.
+    drives : Drives
+        The wheel drives.
+    dig_efficiency : float
+        Share of the soil between passing lugs that a spinning wheel throws out [-].
+
+    Attributes
+    ----------
+    faults : WheelFaults
+        Faults of single wheels.
+    """
+
+    def __init__(
+        self,
+        configuration: Configuration,
+        terrain: Terrain,
+        drives: Drives,
+        dig_efficiency: float = 0.05,
+    ) -> None:
+        wheels, rover = configuration.wheels, configuration.rover
+        self._wheels = wheels
+        self._terrain = terrain
+        self._drives = drives
+        self._gravity, self._mass = rover.gravity, rover.mass
+        self._rest_speed = configuration.rest_speed
+        self._contact = ContactModel(
+            wheels.wheel,
+            configuration.soil,
+            wheels.slip_radius,
+            configuration.effects,
+            rover.gravity,
+        )
+        self._memory = ContactMemory(wheels.wheel, wheels.slip_radius, dig_efficiency)
+        self._suspension: Suspension = suspension_of(configuration)
+        length = float(np.ptp(wheels.x)) + 2.0 * float(wheels.radius.max())
+        breadth = float(np.ptp(wheels.y)) + float(wheels.width.max())
+        yaw_inertia = rover.mass * (length**2 + breadth**2) / 12.0
+        self._inertias = np.array([rover.mass, rover.mass, yaw_inertia])
+        n = wheels.count
+        one, zero = np.ones(n), np.zeros(n)
+        # Hub speed (forward, lateral) by body speed (forward, lateral, turning): (2, 3, n).
+        self._lever = np.array([[one, zero, -wheels.y], [zero, one, wheels.x]])
+        # A plane through the wheels gives the attitude of ground and chassis.
+        self._plane = np.linalg.pinv(np.stack([wheels.x, wheels.y, one], axis=1))[:2]
+
+        self.faults = WheelFaults.none(n)
+        self._time = 0.0
+        self._speeds = np.zeros(3)
+        self._rate = np.zeros(n)
+        self._angle = np.zeros(n)
+        self._position = np.zeros(3)
+        self._load = np.full(n, rover.mass * rover.gravity / n)
+        self._attitude = np.zeros(2)  # pitch (nose up) and roll (left up) of the chassis
+        self._set_down()
+
+    @property
+    def time(self) -> float:
+        """Time since the start [s]."""
+        return self._time
+
+    def step(self, command: Command, duration: float) -> Truth:
+        """Drive for ``duration`` [s] under a command and return the truth at its end."""
+        steps = max(int(np.ceil(duration / LONGEST_STEP - 1e-9)), 1)
+        for _ in range(steps):
+            self._advance(command, duration / steps)
+        return self.truth()
+
+    def truth(self) -> Truth:
+        """Return what is true now."""
+        wheels, memory, forces = self._wheels, self._memory, self._forces
+        forward, lateral, turning = (float(speed) for speed in self._speeds)
+        rim = self._rate * wheels.slip_radius
+        return Truth(
+            time=self._time,
+            slip=wheel_slip(forward, turning, wheels.y, rim, self._rest_speed),
+            slip_velocity=rim - (forward - turning * wheels.y),
+            drawbar_pull=forces.pull,
+            side_force=forces.side_force,
+            normal_load=self._carried,
+            sinkage=memory.sinkage,
+            sinkage_rate=memory.sinkage_rate,
+            torque=forces.torque,
+            wheel_rate=self._rate,
+            wheel_angle=self._angle,
+            leaving_angle=forces.soil.leaving_angle,
+            forward_velocity=forward,
+            lateral_velocity=lateral,
+            yaw_rate=turning,
+            position=self._position,
+            slope=float(np.arcsin(self._sine[0])),
+            roll=float(self._attitude[1]),
+            pitch=float(self._attitude[0]),
+            specific_force=self._specific_force,
+            angular_rate=self._angular_rate,
+        )
+
+    # Ground and soil ----------------------------------------------------------------------------
+
+    def _look_at_ground(self) -> None:
+        """Find height, slope and soil below the wheels."""
+        x, y, heading = self._position
+        cosine, sine = np.cos(heading), np.sin(heading)
+        wheels, terrain = self._wheels, self._terrain
+        wheel_x = x + cosine * wheels.x - sine * wheels.y
+        wheel_y = y + sine * wheels.x + cosine * wheels.y
+        self._surface = terrain.height(wheel_x, wheel_y)
+        self._sine = self._plane @ self._surface  # of slope along and across the body
+        along = terrain.sine_of_slope(wheel_x) * cosine + terrain.sine_of_side_slope * sine
+        self._local_slope = along
+        self._tilt = along - self._sine[0]  # small angle between ground at the wheel and body
+        self._factors = terrain.soil_factors(wheel_x, wheel_y)
+        forward, _, turning = self._speeds
+        passes = wheels.passes
+        if abs(turning) * np.ptp(wheels.x) > 0.5 * abs(forward) * np.ptp(wheels.y) + 1e-4:
+            passes = np.ones_like(passes)  # wheels leave the ruts of those before them
+        elif forward < 0.0:
+            passes = passes.max() + 1 - passes
+        self._passes = passes
+
+    def _wheel_forces(self, hub_speed: FloatArray, rate: FloatArray, dt: float) -> WheelForces:
+        """Return the forces at trial speeds of the hubs (2, ..., n) and wheel rates (..., n)."""
+        shear = self._memory.trial_shear(hub_speed[0], hub_speed[1], rate, dt)
+        sense = self._memory.sense
+        if (np.abs(sense) > 0.99).all():
+            sign = np.sign(sense)
+            soil = self._soil_forces(shear, sign)
+            return WheelForces(sign * soil.pull, soil.side_force, sign * soil.torque, soil)
+        # Between two directions of travel: a mixture of both contacts.
+        front = self._soil_forces(shear, np.ones_like(sense))
+        back = self._soil_forces(shear, -np.ones_like(sense))
+        ahead = 0.5 * (1.0 + sense)
+        mixed = SoilForces(
+            *(
+                ahead * getattr(front, name) + (1.0 - ahead) * getattr(back, name)
+                for name in SoilForces.__dataclass_fields__
+            )
+        )
+        return WheelForces(
+            ahead * front.pull - (1.0 - ahead) * back.pull,
+            mixed.side_force,
+            ahead * front.torque - (1.0 - ahead) * back.torque,
+            mixed,
+        )
+
+    def _soil_forces(self, shear: Shear, sense: FloatArray) -> SoilForces:
+        """Return the soil's answer in the frame of a wheel that travels with ``sense``."""
+        return self._contact.forces(
+            self._factors,
+            self._memory.depth,
+            shear.slip * sense,
+            shear.side_slip,
+            self._load,
+            np.abs(self._rate * self._wheels.radius),
+            self._local_slope * sense,
+            self._passes,
+        )
+
+    # One step -----------------------------------------------------------------------------------
+
+    def _advance(self, command: Command, dt: float) -> None:
+        wheels = self._wheels
+        self._look_at_ground()
+        commanded = (command.forward - command.turn_rate * wheels.y) / wheels.slip_radius
+        self._drives.command(commanded * self.faults.rate_factor, self.faults.torque_factor, dt)
+        speeds, rate = self._speeds, self._rate
+        for _ in range(MOST_ITERATIONS):
+            speeds, rate, forces, change = self._newton_step(speeds, rate, dt)
+            if change < TOLERANCE:
+                break
+        self._forces = forces
+        hub_speed = np.einsum('ijn,j->in', self._lever, speeds)
+        shear = self._memory.trial_shear(*hub_speed, rate, dt)
+        self._drives.finish(rate, dt)
+        self._memory.advance(*hub_speed, rate, shear, forces.soil, dt)
+        self._speeds, self._rate = speeds, rate
+        self._move(dt)
+        self._balance(dt)
+        self._time += dt
+
+    def _newton_step(
+        self, speeds: FloatArray, rate: FloatArray, dt: float
+    ) -> tuple[FloatArray, FloatArray, WheelForces, float]:
+        """Return better speeds and rates for the end of the step, forces there, largest change."""
+        radius = self._wheels.slip_radius
+        hub_speed = np.einsum('ijn,j->in', self._lever, speeds)
+        # The forces here, and with one more step in hub speed along, across, and wheel rate.
+        hubs = np.repeat(hub_speed[:, None], 4, axis=1)
+        hubs[0, 1] += TINY
+        hubs[1, 2] += TINY
+        rates = np.repeat(rate[None], 4, axis=0)
+        rates[3] += TINY / radius
+        forces = self._wheel_forces(hubs, rates, dt)
+        force = np.stack([forces.pull, forces.side_force])  # (2, 4, n)
+        by_hub = (force[:, 1:3] - force[:, :1]) / TINY
+        by_rate = (force[:, 3] - force[:, 0]) * radius / TINY
+        torque = forces.torque[0]
+        torque_by_hub = (forces.torque[1:3] - torque) / TINY
+        torque_by_rate = (forces.torque[3] - torque) * radius / TINY
+
+        # Wheel rates: inertia and drive against the soil; then rate = free + follow . hub change.
+        drive, drive_by_rate = self._drives.torque(rate)
+        inertia = self._drives.inertia / dt
+        stiffness = np.maximum(inertia - drive_by_rate + torque_by_rate, 0.1 * inertia)
+        free = (drive - torque - inertia * (rate - self._rate)) / stiffness
+        follow = -torque_by_hub / stiffness
+
+        now = force[:, 0] + by_rate * free
+        now[0] -= self._load * self._tilt
+        weight = self._mass * self._gravity
+        body = np.einsum('ijn,in->j', self._lever, now)
+        body[:2] -= weight * self._sine
+        forward, lateral, turning = speeds
+        body[:2] -= self._mass * turning * np.array([-lateral, forward])
+        slopes = by_hub + by_rate[:, None] * follow  # (2 forces, 2 hub speeds, n)
+        by_speed = np.einsum('ijn,ikn,kln->jl', self._lever, slopes, self._lever)
+        residual = self._inertias * (speeds - self._speeds) / dt - body
+        change = np.linalg.solve(np.diag(self._inertias / dt) - by_speed, -residual)
+        hub_change = np.einsum('ijn,j->in', self._lever, change)
+        rate_change = free + (follow * hub_change).sum(axis=0)
+        largest = max(float(np.abs(hub_change).max()), float(np.abs(rate_change * radius).max()))
+        # Far from the solution the linear model is poor: bound the move.
+        part = min(1.0, 0.1 * max(1.0, abs(float(forward))) / max(largest, 1e-12))
+        moved = part * np.concatenate([hub_change, rate_change[None]])
+        end = WheelForces(
+            pull=force[0, 0] + (by_hub[0] * moved[:2]).sum(axis=0) + by_rate[0] * moved[2],
+            side_force=force[1, 0] + (by_hub[1] * moved[:2]).sum(axis=0) + by_rate[1] * moved[2],
+            torque=torque + (torque_by_hub * moved[:2]).sum(axis=0) + torque_by_rate * moved[2],
+            soil=forces.soil.first(),
+        )
+        return speeds + part * change, rate + part * rate_change, end, largest
+
+    def _move(self, dt: float) -> None:
+        forward, lateral, turning = self._speeds
+        heading = self._position[2] + 0.5 * turning * dt
+        cosine, sine = np.cos(heading), np.sin(heading)
+        self._position = self._position + dt * np.array(
+            [forward * cosine - lateral * sine, forward * sine + lateral * cosine, turning]
+        )
+        self._angle = self._angle + self._rate * dt
+
+    def _balance(self, dt: float) -> None:
+        """Bring specific force, attitude and wheel loads up to the forces of this step."""
+        self._carried = self._load
+        force = self._contact_force()
+        loads = self._static_loads(force)
+        self._load = self._load + (loads - self._load) * -np.expm1(-dt / LOAD_TIME)
+        chassis = self._plane @ (self._surface - self._memory.sinkage)
+        attitude = np.arcsin(np.clip(chassis, -0.9, 0.9))
+        rates = (attitude - self._attitude) / dt
+        self._angular_rate = np.array([rates[1], -rates[0], self._speeds[2]])
+        self._attitude = attitude
+        # Ruts of unequal depth tilt the chassis against the ground.
+        pitch, roll = attitude - np.arcsin(self._sine)
+        self._specific_force = force + np.array(
+            [force[2] * pitch, force[2] * roll, -force[0] * pitch - force[1] * roll]
+        )
+
+    def _contact_force(self) -> FloatArray:
+        """Return the sum of all soil forces over the mass, along the ground below the rover."""
+        up = self._gravity * np.sqrt(max(1.0 - float(self._sine @ self._sine), 0.01))
+        push = self._forces.pull - self._load * self._tilt
+        return np.array([push.sum() / self._mass, self._forces.side_force.sum() / self._mass, up])
+
+    def _static_loads(self, force: FloatArray) -> FloatArray:
+        moment = self._forces.torque - self._forces.pull * self._wheels.radius
+        loads = self._suspension.normal_loads(self._mass, force, self._forces.pull, moment)
+        loads = loads * self.faults.load_factor
+        return loads * self._mass * force[2] / loads.sum()
+
+    def _set_down(self) -> None:
+        """Put the rover down at rest, wheels sunk until they carry it, slope held by shear."""
+        zero = np.zeros(self._wheels.count)
+        self._look_at_ground()
+        up = self._gravity * np.sqrt(1.0 - self._sine @ self._sine)
+        force = np.array([*(self._gravity * self._sine), up])
+        pull = np.full_like(zero, self._mass * force[0] / zero.size)
+        self._load = self._suspension.normal_loads(self._mass, force, pull, zero)
+        still = Shear(zero, zero)
+        for _ in range(100):
+            if self._memory.settle(self._soil_forces(still, zero + 1.0)) < 1e-7:
+                break
+        for _ in range(80):
+            self._advance(Command(0.0), LONGEST_STEP)
+        self._time = 0.0
+        self._position = np.zeros(3)
+        self._angle = np.zeros_like(zero)

@@ -1,0 +1,266 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Sensors of the simulated rover: truth in, typed measurements with arrival times out.
+
+Noise, zero errors and rates are those of the rover file (``sensors.*``): each seed draws its own
+zeros, gains and biases with these standard deviations.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.estimation.measurements import (
+    InertialReading,
+    LeavingAngleReading,
+    Measurement,
+    ReferenceVelocity,
+    SinkageReading,
+    WheelOdometry,
+)
+from wheel_terra_estimator.simulation.scenario import Fault, Scenario
+from wheel_terra_estimator.simulation.truth import Truth
+
+FloatArray = NDArray[np.float64]
+
+START = 1_000_000_000_000
+"""Stamp of the start of a drive [ns]; not 0, which is no stamp."""
+
+
+class Arrival(NamedTuple):
+    """A measurement and when it arrives [ns]."""
+
+    arrival: int
+    measurement: Measurement
+
+
+class SensorSuite:
+    """All sensors of a rover.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        Which sensors there are and how they fail.
+    random : numpy.random.Generator
+        Source of all errors.
+    faults : sequence of Fault
+        Planned and drawn faults.
+    """
+
+    def __init__(
+        self, scenario: Scenario, random: np.random.Generator, faults: Sequence[Fault] = ()
+    ) -> None:
+        configuration = scenario.configuration
+        self._configuration: Configuration = configuration
+        self._there = scenario.sensors
+        self._figures = figures = configuration.sensors
+        self._random = random
+        self._faults = faults
+        n = configuration.wheels.count
+        self._scale = scale = scenario.sensors.noise
+        self._torque_zero = scale * figures.torque_zero_std * random.standard_normal(n)
+        # One current sensor type, one motor constant: most of the gain error is common.
+        gain = 0.8 * random.standard_normal() + 0.6 * random.standard_normal(n)
+        self._torque_gain = 1.0 + scale * figures.torque_gain_std * gain
+        self._sinkage_zero = scale * figures.sinkage_zero_std * random.standard_normal(n)
+        self._force_bias = scale * figures.specific_force_bias_std * random.standard_normal(3)
+        self._rate_bias = scale * figures.angular_rate_bias_std * random.standard_normal(3)
+        self._attitude_error = scale * figures.orientation_std * random.standard_normal(2)
+        self._delay = (
+            scenario.sensors.reference_delay
+            if scenario.sensors.reference_delay >= 0.0
+            else figures.reference_delay
+        )
+        reference_rate = scenario.sensors.reference_rate or figures.reference_rate
+        self._periods = {
+            'odometry': 1.0 / figures.wheel_odometry_rate,
+            'imu': 1.0 / figures.imu_rate,
+            'sinkage': 1.0 / figures.sinkage_rate,
+            'reference': 1.0 / reference_rate,
+        }
+        # Sensors are not in step with each other.
+        self._next = {
+            name: period * (1.0 if name == 'odometry' else random.uniform())
+            for name, period in self._periods.items()
+        }
+        self._before: Truth | None = None
+        self._counted: FloatArray | None = None
+        self._held_sinkage = np.zeros(n)
+        self._last_stamp = {name: START for name in self._periods}
+
+    @property
+    def odometry_period(self) -> float:
+        """Time between two messages of the wheel odometry [s]."""
+        return self._periods['odometry']
+
+    def measure(self, truth: Truth) -> list[Arrival]:
+        """Return what was measured since the last call, in the order of stamps.
+
+        Call it for each step of the plant; the truth between two calls is taken as linear.
+        """
+        before = self._before or truth
+        found: list[tuple[float, str]] = []
+        for name, period in self._periods.items():
+            while self._next[name] <= truth.time + 1e-9:
+                found.append((self._next[name], name))
+                self._next[name] += period
+        self._before = truth
+        span = max(truth.time - before.time, 1e-9)
+        arrivals: list[Arrival] = []
+        for time, name in sorted(found):
+            part = min(max((time - before.time) / span, 0.0), 1.0)
+            for measurement in getattr(self, f'_{name}')(before, truth, part, time):
+                arrivals.append(self._sent(measurement, name, time))
+        return arrivals
+
+    # One sensor each; part: position between two truths ------------------------------------------
+
+    def _odometry(
+        self, before: Truth, truth: Truth, part: float, time: float
+    ) -> Iterator[Measurement]:
+        angle = _between(before.wheel_angle, truth.wheel_angle, part)
+        counts = self._there.encoder_counts
+        if counts:
+            step = 2.0 * math.pi / counts
+            angle = np.floor(angle / step) * step
+        counted, self._counted = self._counted, angle
+        if counted is None or self._failed('no_wheel_odometry', time) is not None:
+            return
+        n = angle.size
+        noise = self._random.standard_normal((2, n))
+        rate = (angle - counted) / self._periods['odometry']
+        # The mean rate of the period is that of its middle; drives report a filtered value too.
+        rate = rate + self._scale * self._figures.wheel_rate_std * noise[0]
+        torque = _between(before.torque, truth.torque, part)
+        torque = self._torque_gain * torque + self._torque_zero
+        torque += self._scale * self._figures.torque_std * noise[1]
+        if (wheels := self._failed('torque_spikes', time)) is not None:
+            spikes = wheels & (self._random.uniform(size=n) < 0.1)
+            torque = np.where(spikes, torque + 50.0 * self._figures.torque_std, torque)
+        missing = self._failed('no_torque', time)
+        if not self._there.torque:
+            torque = np.full(n, np.nan)
+        elif missing is not None:
+            torque = np.where(missing, np.nan, torque)
+        if (wheels := self._failed('nan_values', time)) is not None:
+            rate = np.where(wheels & (self._random.uniform(size=n) < 0.2), np.nan, rate)
+        yield WheelOdometry(self._stamp(time), rate, torque)
+
+    def _imu(self, before: Truth, truth: Truth, part: float, time: float) -> Iterator[Measurement]:
+        if not self._there.imu or self._failed('no_imu', time) is not None:
+            return
+        figures, scale = self._figures, self._scale
+        noise = self._random.standard_normal((2, 3))
+        force = _between(before.specific_force, truth.specific_force, part) + self._force_bias
+        force = force + scale * figures.specific_force_std * noise[0]
+        if self._failed('imu_bias', time) is not None:
+            force = force + np.array([0.3, 0.0, 0.0])
+        rate = _between(before.angular_rate, truth.angular_rate, part) + self._rate_bias
+        rate = rate + scale * figures.angular_rate_std * noise[1]
+        orientation = None
+        if self._there.orientation and self._failed('no_orientation', time) is None:
+            small = 0.2 * scale * figures.orientation_std * self._random.standard_normal(2)
+            error = self._attitude_error + small
+            roll = before.roll + part * (truth.roll - before.roll) + error[0]
+            pitch = before.pitch + part * (truth.pitch - before.pitch) + error[1]
+            heading = _between(before.position, truth.position, part)[2]
+            orientation = quaternion(roll, -pitch, float(heading))
+        yield InertialReading(self._stamp(time), force, rate, orientation)
+
+    def _sinkage(
+        self, before: Truth, truth: Truth, part: float, time: float
+    ) -> Iterator[Measurement]:
+        sinkage = _between(before.sinkage, truth.sinkage, part)
+        leaving = _between(before.leaving_angle, truth.leaving_angle, part)
+        n = sinkage.size
+        if self._there.leaving_angle:
+            error = self._scale * self._figures.leaving_angle_std * self._random.standard_normal(n)
+            yield LeavingAngleReading(self._stamp(time), leaving + error)
+        if not self._there.sinkage:
+            return
+        reading = sinkage + self._sinkage_zero
+        reading += self._scale * self._figures.sinkage_std * self._random.standard_normal(n)
+        chance = self._random.uniform(size=(2, n))
+        wild = self._random.uniform(-0.5, 1.0, size=n) * self._configuration.wheels.radius
+        reading = np.where(chance[0] < self._there.sinkage_outliers, wild, reading)
+        reading = np.where(chance[1] < self._there.sinkage_dropouts, np.nan, reading)
+        missing = self._failed('no_sinkage', time)
+        if missing is not None:
+            reading = np.where(missing, np.nan, reading)
+        held = self._failed('sinkage_stuck', time)
+        if held is not None:
+            reading = np.where(held, self._held_sinkage, reading)
+        self._held_sinkage = reading
+        yield SinkageReading(self._stamp(time), reading)
+
+    def _reference(
+        self, before: Truth, truth: Truth, part: float, time: float
+    ) -> Iterator[Measurement]:
+        chance = self._random.uniform(size=2)
+        std = self._figures.reference_std
+        error = self._scale * std * self._random.standard_normal()
+        if not self._there.reference or self._failed('no_reference', time) is not None:
+            return
+        if chance[0] < self._there.reference_dropouts:
+            return
+        forward = before.forward_velocity + part * (
+            truth.forward_velocity - before.forward_velocity
+        )
+        wild = chance[1] < self._there.reference_outliers
+        if wild or (self._failed('reference_wild', time) is not None and chance[1] < 0.3):
+            error += 10.0 * std * (1.0 if self._random.uniform() < 0.5 else -1.0)
+        yield ReferenceVelocity(self._stamp(time), forward + error, std**2)
+
+    # Faults and transport -----------------------------------------------------------------------
+
+    def _failed(self, kind: str, time: float) -> NDArray[np.bool_] | None:
+        """Return the (n,) wheels that a fault of this kind concerns now; None if there is none."""
+        wheels = None
+        for fault in self._faults:
+            if fault.kind == kind and fault.active(time):
+                if wheels is None:
+                    wheels = np.zeros(self._configuration.wheels.count, dtype=bool)
+                wheels[slice(None) if fault.wheel is None else fault.wheel] = True
+        return wheels
+
+    def _stamp(self, time: float) -> int:
+        return START + round(time * 1e9)
+
+    def _sent(self, measurement: Measurement, name: str, time: float) -> Arrival:
+        delay = self._random.exponential(self._there.jitter) if self._there.jitter else 0.0
+        if name == 'reference':
+            delay += self._delay
+        arrival = measurement.stamp + round(delay * 1e9)
+        if name != 'reference' and self._failed('zero_stamps', time) is not None:
+            measurement = replace(measurement, stamp=0)
+        elif name != 'reference' and self._failed('repeated_stamps', time) is not None:
+            measurement = replace(measurement, stamp=self._last_stamp[name])
+        else:
+            self._last_stamp[name] = measurement.stamp
+        return Arrival(arrival, measurement)
+
+
+def quaternion(roll: float, pitch: float, yaw: float) -> FloatArray:
+    """Return x, y, z, w of rotations about fixed x, then y, then z."""
+    (sr, sp, sy), (cr, cp, cy) = (
+        [f(0.5 * angle) for angle in (roll, pitch, yaw)] for f in (math.sin, math.cos)
+    )
+    return np.array(
+        [
+            sr * cp * cy - cr * sp * sy,
+            cr * sp * cy + sr * cp * sy,
+            cr * cp * sy - sr * sp * cy,
+            cr * cp * cy + sr * sp * sy,
+        ]
+    )
+
+
+def _between(before: FloatArray, after: FloatArray, part: float) -> FloatArray:
+    return before + part * (after - before)

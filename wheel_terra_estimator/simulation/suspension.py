@@ -1,0 +1,148 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Wheel loads of the simulated rover: statics of chassis, rockers and bogies with wheel forces.
+
+Unlike the estimator's load law this one knows the true wheel forces: pull acts below the pivots,
+the contact stress acts ahead of the hub, and the body accelerates.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wheel_terra_estimator.configuration.configuration import Configuration
+
+FloatArray = NDArray[np.float64]
+
+LEAST_LOAD_SHARE = 0.02
+"""Least load of a wheel as a share of the mean: a lifted wheel still touches the ground."""
+
+
+@dataclass(frozen=True)
+class Suspension:
+    """Geometry that decides the wheel loads; frame: ``base_link`` shifted down to the ground.
+
+    Attributes
+    ----------
+    x, y : numpy.ndarray
+        (n,) wheel hubs [m].
+    centre_of_gravity : numpy.ndarray
+        (3,) x, y and height above the ground [m].
+    rocker_pivot : tuple of float or None
+        x and height above the ground [m] of the pivots to which chassis and differential are fixed.
+    bogie_pivot : tuple of float or None
+        x and height above the ground [m] of the pivots between rocker and bogie.
+    bogie_wheels : numpy.ndarray
+        (n,) bool: wheels on a bogie.
+    shares : numpy.ndarray or None
+        (n,) given shares of the total load, in place of statics.
+    """
+
+    x: FloatArray
+    y: FloatArray
+    centre_of_gravity: FloatArray
+    rocker_pivot: tuple[float, float] | None = None
+    bogie_pivot: tuple[float, float] | None = None
+    bogie_wheels: NDArray[np.bool_] | None = None
+    shares: FloatArray | None = None
+
+    @cached_property
+    def _sides(self) -> tuple[FloatArray, FloatArray]:
+        return (self.y > 0).astype(float), (self.y <= 0).astype(float)
+
+    @cached_property
+    def _rows(self) -> FloatArray:
+        """Coefficients of the loads in the balances, one row each."""
+        left, right = self._sides
+        rows = [np.ones_like(self.x), self.x, self.y]
+        if self.rocker_pivot is not None:
+            # The differential gives both rockers the same moment about their pivots.
+            rows.append((left - right) * (self.x - self.rocker_pivot[0]))
+        if self.bogie_pivot is not None and self.bogie_wheels is not None:
+            on_bogie = self.bogie_wheels * (self.x - self.bogie_pivot[0])
+            rows += [left * on_bogie, right * on_bogie]
+        return np.array(rows)
+
+    @cached_property
+    def _solution(self) -> FloatArray:
+        return np.linalg.pinv(self._rows)
+
+    def normal_loads(
+        self, mass: float, specific_force: FloatArray, pull: FloatArray, load_moment: FloatArray
+    ) -> FloatArray:
+        """Return the loads perpendicular to the ground.
+
+        With fewer balances than wheels (no pivots named) the loads are those of least norm: a
+        rigid frame on ground that yields evenly.
+
+        Parameters
+        ----------
+        mass : float
+            Mass of the rover [kg].
+        specific_force : numpy.ndarray
+            (3,) forward, left, up in the frame of the ground below the rover [m/s^2].
+        pull : numpy.ndarray
+            (n,) longitudinal force of the soil [N].
+        load_moment : numpy.ndarray
+            (n,) moment of the load about the hub, positive where it acts ahead of it [N m].
+
+        Returns
+        -------
+        numpy.ndarray
+            (n,) loads [N], none below ``LEAST_LOAD_SHARE`` of their mean.
+        """
+        forward, left, up = specific_force
+        total = mass * up
+        if self.shares is not None:
+            return self.shares * total
+        cg_x, cg_y, cg_z = self.centre_of_gravity
+        balance = [
+            total,
+            total * cg_x - mass * forward * cg_z - load_moment.sum(),
+            total * cg_y - mass * left * cg_z,
+        ]
+        on_left, on_right = self._sides
+        if self.rocker_pivot is not None:
+            height = self.rocker_pivot[1]
+            balance.append(-((on_left - on_right) * (pull * height + load_moment)).sum())
+        if self.bogie_pivot is not None and self.bogie_wheels is not None:
+            moment = self.bogie_wheels * (pull * self.bogie_pivot[1] + load_moment)
+            balance += [-(on_left * moment).sum(), -(on_right * moment).sum()]
+        loads = self._solution @ np.array(balance)
+        least = LEAST_LOAD_SHARE * total / loads.size
+        if (loads < least).any():
+            loads = np.maximum(loads, least)
+            loads *= total / loads.sum()
+        return loads
+
+
+def suspension_of(configuration: Configuration) -> Suspension:
+    """Return the suspension that a configuration describes, heights taken from the wheel rims."""
+    wheels, rover = configuration.wheels, configuration.rover
+    ground = float(np.mean(wheels.z - wheels.radius))
+    cg_x, cg_y, cg_z = rover.centre_of_gravity
+    rocker = bogie = on_bogie = shares = None
+    if rover.suspension == 'rocker_bogie':
+        rocker = (float(rover.rocker_pivot[0]), float(rover.rocker_pivot[1]) - ground)
+        bogie = (float(rover.bogie_pivot[0]), float(rover.bogie_pivot[1]) - ground)
+        order = -1.0 if rover.bogie_wheels == 'front' else 1.0
+        on_bogie = np.zeros(wheels.count, dtype=bool)
+        for side in (wheels.y > 0.0, wheels.y <= 0.0):
+            members = np.flatnonzero(side)
+            on_bogie[members[np.argsort(order * wheels.x[members])[:2]]] = True
+    elif rover.suspension == 'shares':
+        shares = rover.load_shares
+        shares = shares / shares.sum() if shares.any() else np.full(wheels.count, 1 / wheels.count)
+    return Suspension(
+        x=wheels.x,
+        y=wheels.y,
+        centre_of_gravity=np.array([cg_x, cg_y, cg_z - ground]),
+        rocker_pivot=rocker,
+        bogie_pivot=bogie,
+        bogie_wheels=on_bogie,
+        shares=shares,
+    )

@@ -1,0 +1,149 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Ground of the simulated drive: slope along x, side slope along y, soil that changes in both.
+
+Coordinates lie in the surface: x is the distance along the main direction, y to its left [m].
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+GRID = 0.02
+"""Distance of the kept points of slope, height and soil variation [m]."""
+
+
+@dataclass(frozen=True)
+class Patch:
+    """A rectangle of ground whose soil differs from the base soil by factors.
+
+    Attributes
+    ----------
+    start, end : float
+        Extent along x [m].
+    right, left : float
+        Extent along y [m].
+    factors : dict of str to float
+        Factor for each soil quantity named in ``SOIL_QUANTITIES``.
+    """
+
+    start: float
+    end: float
+    right: float
+    left: float
+    factors: dict[str, float]
+
+
+SOIL_QUANTITIES = ('stiffness', 'cohesion', 'friction', 'shear_modulus', 'slip_sinkage')
+"""What a patch or a variation scales; ``friction`` scales the tangent of the friction angle."""
+
+
+def smooth_noise(random: np.random.Generator, count: int, correlation_length: float) -> FloatArray:
+    """Return ``count`` grid values of a unit normal process with the given correlation length."""
+    width = max(correlation_length / GRID, 1.0)
+    reach = int(4 * width)
+    kernel = np.exp(-0.5 * (np.arange(-reach, reach + 1) / width) ** 2)
+    kernel /= np.sqrt((kernel**2).sum())
+    return np.convolve(random.standard_normal(count + 2 * reach), kernel, mode='valid')
+
+
+class Terrain:
+    """Slope, height and soil factors at any point.
+
+    Parameters
+    ----------
+    slope_position, slope_angle : numpy.ndarray
+        (k,) knots of the slope along x [m], [rad], positive uphill; linear between.
+    side_slope : float
+        Slope along y [rad], positive when the left side is higher.
+    patches : list of Patch
+        Later ones lie over earlier ones.
+    border : float
+        Length over which the soil changes at the border of a patch [m].
+    base_factors : dict of str to float
+        Factors of the whole ground (the error of the nominal soil).
+    undulation, undulation_length : float
+        Standard deviation [rad] and correlation length [m] of the slope's unevenness.
+    patchiness, patchiness_length : float
+        Standard deviation of the logarithm and correlation length [m] of the stiffness, drawn for
+        the left and the right half of the ground.
+    extent : tuple of float
+        Least and greatest x [m]; beyond, the values of the ends hold.
+    random : numpy.random.Generator
+        Source of the unevenness.
+    """
+
+    def __init__(
+        self,
+        slope_position: FloatArray,
+        slope_angle: FloatArray,
+        side_slope: float,
+        patches: list[Patch],
+        border: float,
+        base_factors: dict[str, float],
+        undulation: float,
+        undulation_length: float,
+        patchiness: float,
+        patchiness_length: float,
+        extent: tuple[float, float],
+        random: np.random.Generator,
+    ) -> None:
+        self._x = np.arange(extent[0], extent[1] + GRID, GRID)
+        slope = np.interp(self._x, slope_position, slope_angle)
+        slope += undulation * smooth_noise(random, slope.size, undulation_length)
+        self._sin_slope = np.sin(slope)
+        height = np.cumsum(self._sin_slope) * GRID
+        self._height = height - np.interp(0.0, self._x, height)
+        self._patchiness = patchiness * np.stack(
+            [smooth_noise(random, slope.size, patchiness_length) for _ in range(2)]
+        )
+        self._sin_side = float(np.sin(side_slope))
+        self._patches = patches
+        self._border = border
+        self._base = np.array([base_factors.get(name, 1.0) for name in SOIL_QUANTITIES])
+
+    def sine_of_slope(self, x: FloatArray) -> FloatArray:
+        """Return the sine of the slope along x at ``x``."""
+        return np.interp(x, self._x, self._sin_slope)
+
+    @property
+    def sine_of_side_slope(self) -> float:
+        """The sine of the slope along y."""
+        return self._sin_side
+
+    def height(self, x: FloatArray, y: FloatArray) -> FloatArray:
+        """Return the height of the surface [m]."""
+        beyond = np.where(
+            x < self._x[0],
+            (x - self._x[0]) * self._sin_slope[0],
+            np.where(x > self._x[-1], (x - self._x[-1]) * self._sin_slope[-1], 0.0),
+        )
+        return np.interp(x, self._x, self._height) + beyond + self._sin_side * y
+
+    def soil_factors(self, x: FloatArray, y: FloatArray) -> dict[str, FloatArray]:
+        """Return the factor of each of ``SOIL_QUANTITIES`` at the points, shape of ``x``."""
+        logarithms = np.zeros((len(SOIL_QUANTITIES), x.size))
+        for patch in self._patches:
+            inside = (
+                self._step(x - patch.start)
+                * self._step(patch.end - x)
+                * self._step(y - patch.right)
+                * self._step(patch.left - y)
+            )
+            there = np.log([patch.factors.get(name, 1.0) for name in SOIL_QUANTITIES])
+            logarithms += inside * (there[:, None] - logarithms)
+        left = np.interp(x, self._x, self._patchiness[0])
+        right = np.interp(x, self._x, self._patchiness[1])
+        logarithms[0] += np.where(y > 0.0, left, right)
+        factors = self._base[:, None] * np.exp(logarithms)
+        return dict(zip(SOIL_QUANTITIES, factors, strict=True))
+
+    def _step(self, distance: FloatArray) -> FloatArray:
+        """Rise smoothly from 0 to 1 over the width of a border around ``distance`` = 0."""
+        part = np.clip(0.5 + distance / self._border, 0.0, 1.0)
+        return part * part * (3.0 - 2.0 * part)

@@ -1,0 +1,160 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""What is true of the simulated rover at one time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wheel_terra_estimator.terramechanics.kinematics import slip_ratio
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Truth:
+    """State of rover and soil; arrays are (n,), in the order of ``wheels.names``, in SI units.
+
+    ``slip`` is nan for a wheel at rest (``rest_speed`` of the contract).
+    """
+
+    time: float  # since the start of the drive [s]
+    slip: FloatArray
+    slip_velocity: FloatArray  # r w - v
+    drawbar_pull: FloatArray
+    side_force: FloatArray
+    normal_load: FloatArray
+    sinkage: FloatArray
+    sinkage_rate: FloatArray
+    torque: FloatArray
+    wheel_rate: FloatArray
+    wheel_angle: FloatArray
+    leaving_angle: FloatArray
+    forward_velocity: float
+    lateral_velocity: float
+    yaw_rate: float
+    position: FloatArray  # (3,) x, y, heading
+    slope: float  # of the ground in the direction of the heading, positive uphill
+    pitch: float  # of the chassis, positive nose up
+    roll: float  # of the chassis, positive left side up
+    specific_force: FloatArray  # (3,) in the chassis frame
+    angular_rate: FloatArray  # (3,) in the chassis frame
+
+
+@dataclass(frozen=True)
+class TruthTable:
+    """Truth of a whole drive, one row per stamp of the wheel odometry.
+
+    Attributes
+    ----------
+    stamp : numpy.ndarray
+        (k,) [ns].
+    slip, slip_velocity, drawbar_pull, normal_load, sinkage, sinkage_rate, torque, wheel_rate
+        (k, n), as in ``Truth``; ``slip`` is nan at rest.
+    slip_class : numpy.ndarray
+        (k, n) class of the contract without hysteresis, 255 at rest.
+    stuck : numpy.ndarray
+        (k,) bool: median abs(slip) of the turning wheels above 0.9 for 1 s; clears after 3 s below
+        0.6.
+    forward_velocity, yaw_rate, slope : numpy.ndarray
+        (k,).
+    position : numpy.ndarray
+        (k, 3) x, y, heading.
+    """
+
+    stamp: NDArray[np.int64]
+    slip: FloatArray
+    slip_velocity: FloatArray
+    drawbar_pull: FloatArray
+    normal_load: FloatArray
+    sinkage: FloatArray
+    sinkage_rate: FloatArray
+    torque: FloatArray
+    wheel_rate: FloatArray
+    slip_class: NDArray[np.uint8]
+    stuck: NDArray[np.bool_]
+    forward_velocity: FloatArray
+    yaw_rate: FloatArray
+    slope: FloatArray
+    position: FloatArray
+
+    @classmethod
+    def from_rows(
+        cls,
+        stamps: Sequence[int],
+        rows: Sequence[Truth],
+        thresholds: FloatArray,
+    ) -> TruthTable:
+        """Collect rows and add class and stuck."""
+        own = {f.name for f in fields(Truth)}
+        columns = {
+            f.name: np.array([getattr(row, f.name) for row in rows])
+            for f in fields(cls)
+            if f.name in own
+        }
+        stamp = np.array(stamps, dtype=np.int64)
+        return cls(
+            stamp=stamp,
+            slip_class=slip_classes(columns['slip'], thresholds),
+            stuck=entrapped(stamp, columns['slip']),
+            **columns,
+        )
+
+
+def wheel_slip(
+    forward: float, yaw_rate: float, wheel_y: FloatArray, rim_speed: FloatArray, rest_speed: float
+) -> FloatArray:
+    """Return the slip ratio of each wheel from its own ground speed, nan at rest."""
+    return np.asarray(slip_ratio(forward - yaw_rate * wheel_y, rim_speed, rest_speed))
+
+
+def slip_classes(slip: FloatArray, thresholds: FloatArray) -> NDArray[np.uint8]:
+    """Return the class of each slip ratio, upper bounds included, 255 where slip is nan."""
+    classes = np.searchsorted(thresholds, np.abs(np.nan_to_num(slip)), side='left')
+    return np.where(np.isnan(slip), 255, classes).astype(np.uint8)
+
+
+def entrapped(
+    stamp: NDArray[np.int64],
+    slip: FloatArray,
+    above: float = 0.9,
+    hold: float = 1.0,
+    below: float = 0.6,
+    clear: float = 3.0,
+) -> NDArray[np.bool_]:
+    """Return where the rover is entrapped: the scoring rule of the estimator's warnings.
+
+    Parameters
+    ----------
+    stamp : numpy.ndarray
+        (k,) [ns].
+    slip : numpy.ndarray
+        (k, n) slip ratio, nan at rest.
+    above, hold : float
+        Entrapped once the median abs(slip) has been above ``above`` for ``hold`` [s].
+    below, clear : float
+        Free once it has been below ``below`` for ``clear`` [s].
+    """
+    turning = ~np.isnan(slip).all(axis=1)
+    median = np.zeros(len(stamp))
+    median[turning] = np.nanmedian(np.abs(slip[turning]), axis=1)
+    # Skidding with locked wheels is no entrapment.
+    driving = np.zeros(len(stamp))
+    driving[turning] = np.nanmedian(slip[turning], axis=1)
+    result = np.zeros(len(stamp), dtype=bool)
+    since_high = since_low = None
+    stuck = False
+    for i, now in enumerate(stamp * 1e-9):
+        high, low = turning[i] and driving[i] > above, median[i] < below
+        since_high = (since_high if since_high is not None else now) if high else None
+        since_low = (since_low if since_low is not None else now) if low else None
+        if since_high is not None and now - since_high >= hold:
+            stuck = True
+        elif since_low is not None and now - since_low >= clear:
+            stuck = False
+        result[i] = stuck
+    return result
