@@ -28,6 +28,7 @@ INPUTS = (
     'angular_velocity',
     'pass_number',
 )
+SLIP_STD = 0.02  # of a window of a drive
 
 
 @dataclass(frozen=True)
@@ -97,10 +98,22 @@ class Campaign:
     distance_left: float
     spice: tuple[float, ...] = ()
     noise_free: Rows = field(default_factory=dict)
+    soil_deviations_stated: bool = True
 
     def settings(self) -> dict[str, object]:
         """Return the engineer's configuration of a one-wheel rig, key by key."""
         soil = self.believed
+        slope = np.sin(soil.friction_angle) * np.cos(soil.friction_angle)  # d(phi)/d(ln tan phi)
+        deviations: dict[str, object] = {
+            'soil.frictional_modulus_std': 0.10 * soil.frictional_modulus,
+            'soil.cohesive_modulus_std': 0.10 * soil.cohesive_modulus,
+            'soil.sinkage_exponent_std': 0.05,
+            'soil.friction_angle_std_deg': float(np.degrees(0.05 * slope)),
+            'soil.shear_modulus_std': 0.10 * soil.shear_modulus,
+            'soil.cohesion_std': 0.20 * soil.cohesion,
+            'soil.peak_stress_ratio_std': 0.03,
+            'soil.leaving_angle_ratio_std': 0.03,
+        }
         return {
             'rover.mass': float(np.median(self.rows['normal_load'])) / 9.81,
             'wheels.names': ['wheel'],
@@ -116,6 +129,7 @@ class Campaign:
             'soil.peak_stress_ratio': soil.peak_stress_ratio,
             'soil.leaving_angle_ratio': soil.leaving_angle_ratio,
             'soil.density': soil.density,
+            **(deviations if self.soil_deviations_stated else {}),
         }
 
     def write_csv(self, path: str | Path) -> None:
@@ -146,7 +160,7 @@ class _UnusableError(Exception):
 
 def _attempt(seed: int, design: str, plan: Plan, rng: np.random.Generator) -> Campaign:
     believed = random_soil(rng)
-    soil = _true_soil(believed, plan.soil_error, rng)
+    soil, stated = _true_soil(believed, plan.soil_error, rng)
     rows = random_rows('basic16' if plan.drive else design, rng, believed)
     if plan.drive:
         rows = _drive_rows(rows, soil, rng)
@@ -161,7 +175,7 @@ def _attempt(seed: int, design: str, plan: Plan, rng: np.random.Generator) -> Ca
         measured['drawbar_pull'][rows['_whole_rover'] == 0] = np.nan
         for key in ('sinkage', 'torque'):
             measured[key][rows['_whole_rover'] == 1] = np.nan
-    ruler = Ruler(rows, soil, measured)
+    ruler = Ruler(rows, soil, _with_slip_error(rows, soil, measured) if plan.drive else measured)
     names, sizes, effects, spices = _hide(plan, rows, soil, ruler, measured, rng)
     distances, left = _sizes_seen(plan, rows, ruler, names, effects)
     if any(not np.isfinite(d) for d in distances):
@@ -195,6 +209,7 @@ def _attempt(seed: int, design: str, plan: Plan, rng: np.random.Generator) -> Ca
         left,
         spices,
         {key: truth[key][kept] for key in OUTPUTS},
+        stated,
     )
 
 
@@ -209,16 +224,28 @@ def _outputs(rows: Rows, soil: TrueSoil, effects: tuple[Hidden, ...], plan: Plan
     return out
 
 
-def _true_soil(believed: TrueSoil, error: float, rng: np.random.Generator) -> TrueSoil:
-    """Soil in the field: off by the stated deviations, or (half of the cases) by 5 to 10 %."""
+def _true_soil(believed: TrueSoil, error: float, rng: np.random.Generator) -> tuple[TrueSoil, bool]:
+    """Soil in the field: off by the stated deviations, or (half of the cases) by 5 to 10 %.
+
+    In the second case the configuration states no deviations.
+    """
     n = len(SOIL_SD)
     if error <= 1 and rng.random() < 0.5:
         off = 1 + rng.choice([-1.0, 1.0], n) * rng.uniform(0.05, 0.10, n)
         changed = {key: getattr(believed, key) * f for key, f in zip(SOIL_SD, off, strict=True)}
         changed['friction_angle'] = believed.friction_angle * (1 + (off[2] - 1) / 2)
         changed['sinkage_exponent'] = believed.sinkage_exponent * (1 + (off[1] - 1) / 2)
-        return replace(believed, **changed)
-    return moved_soil(believed, error * np.clip(rng.standard_normal(n), -2, 2))
+        return replace(believed, **changed), False
+    return moved_soil(believed, error * np.clip(rng.standard_normal(n), -2, 2)), True
+
+
+def _with_slip_error(rows: Rows, soil: TrueSoil, std: Rows) -> Rows:
+    """Noise of each output with what an uncertain slip adds to it, for an honest d'."""
+    moved = {**rows, 'slip': rows['slip'] + 0.01}
+    low, high = solve(rows, soil), solve(moved, soil)
+    return {
+        key: np.hypot(std[key], SLIP_STD / 0.01 * np.abs(high[key] - low[key])) for key in OUTPUTS
+    }
 
 
 def _noise_level(rows: Rows, rng: np.random.Generator) -> Rows:
@@ -291,8 +318,8 @@ def _measure(
     n = len(rows['slip'])
     table: Rows = {key: rows[key].copy() for key in INPUTS}
     if plan.drive:
-        slip_std = np.full(n, 0.02)
-        slip_error = 0.02 * rng.standard_normal(int(rows['_window'].max()) + 1)
+        slip_std = np.full(n, SLIP_STD)
+        slip_error = SLIP_STD * rng.standard_normal(int(rows['_window'].max()) + 1)
         table['slip'] = np.clip(table['slip'] + slip_error[rows['_window'].astype(int)], -0.9, 0.98)
         table['slip_std'] = slip_std
     kind = plan.noise if plan.noise != 'mixed' else str(rng.choice(['gauss', 't']))
