@@ -1,232 +1,220 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Wheel-soil contact as the filter sees it: torque and pull conditioned on load and sinkage.
+"""Wheel-soil models as the filter uses them, in scalar floats, seen in the direction of rolling.
 
-With the sinkage known, the contact geometry is known, and the load balance fixes the normal
-stress. Writing A, B, C for the integrals of the linearised stresses, E = 1 - exp(-j/K)::
-
-    W = b (r A sigma + R B tau),  tau = E (c + sigma tan(phi))
-    =>  tau = E (c + tan(phi) W / (b r A)) / (1 + E tan(phi) R B / (r A))
-    T = b R^2 C tau,  F = b (R A tau - r B sigma)
-
-So torque and pull depend on slip, sinkage, load and shear strength, and on no bearing parameter:
-they hold in soil of unknown stiffness and while the wheel is still sinking. The bearing law says
-only where the sinkage tends to; its load ratio is returned beside them.
-
-Scalar floats throughout: for a rover's wheels a loop over ``math`` is several times faster than
-numpy. The terms of the effects are those of the catalogue, the same as in the quadrature.
+* Torque and pull: ``terramechanics.conditioned``. With the sinkage measured, the load balance fixes
+  the stresses; slip, load and shear strength are enough, and no bearing parameter enters. It holds
+  in soil of unknown stiffness and while the wheel is still sinking.
+* Sinkage: the bearing law says which load the soil would carry at the present sinkage; where that
+  is less than the wheel's load, it sinks on.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from types import SimpleNamespace
-from typing import Any
+from dataclasses import MISSING, dataclass, fields
+from typing import NamedTuple
 
 from wheel_terra_estimator.configuration.configuration import Configuration
-from wheel_terra_estimator.estimation.filter_settings import FilterSettings
+from wheel_terra_estimator.terramechanics.conditioned import SMALLEST_ANGLE, ConditionedForces
 from wheel_terra_estimator.terramechanics.contact import Contact
-from wheel_terra_estimator.terramechanics.effects import catalogue
 from wheel_terra_estimator.terramechanics.maths import ScalarMaths
+from wheel_terra_estimator.terramechanics.terms import Terms, set_angles
 
-# Effects of a table or of an instrument that the filter does not read: loads are terrain-normal
+# Effects of a table or of an instrument that the filter must not apply: loads are terrain-normal
 # already, and the pull comes from specific force, not from an attitude.
 _NOT_IN_FILTER = frozenset({'slope_gravity', 'pitch_bias'})
-_LEAST_SINKAGE = 3e-4  # [m]; a wheel on soil is never at exactly 0, and derivatives need a contact
-_LEAST_GAP = 1e-3  # [rad] between the angles of the linearised stresses
+_CONTACT_INPUTS = tuple(f.name for f in fields(Contact) if f.default is MISSING)
+_LEAST_BEARING = 0.05  # of the normal stress's part: cohesion alone carries no wheel
+
+
+def speed_ratio_of_slip(slip: float) -> float:
+    """Return v / (r w) of a driving or braking slip [-]."""
+    return 1.0 - slip if slip >= 0.0 else 1.0 / max(1.0 + slip, 1e-3)
+
+
+def slip_of_speed_ratio(ratio: float) -> float:
+    """Return the contract's slip for v / (r w), rim speed not at rest [-]."""
+    if ratio <= 0.0:
+        return 1.0
+    return 1.0 - ratio if ratio <= 1.0 else 1.0 / ratio - 1.0
+
+
+class WheelForces(NamedTuple):
+    """Torque and pull of one wheel with their derivatives by the filter's quantities."""
+
+    torque: float  # [N m]
+    pull: float  # [N]
+    d_torque: tuple[float, float, float, float, float]
+    d_pull: tuple[float, float, float, float, float]
+    """By v/(r w), sinkage, ln shear strength, ln K, centroid shift."""
 
 
 @dataclass(frozen=True)
-class WheelMotion:
-    """Motion and load of one wheel, seen in its direction of rolling (rim speed positive)."""
+class Bearing:
+    """What the bearing law says at a sinkage."""
 
-    slip: float
-    velocity_ratio: float  # v / w [m]
-    load: float  # [N]
-    rim_speed: float  # |r w| [m/s]
-    leaving_angle: float  # measured [rad], nan = not
+    load: float  # that it carries [N]
+    exponent: float  # N
+    log_depth: float  # ln of the depth at the peak stress over the reference depth
 
 
-@dataclass(slots=True)
-class ContactState:
-    """Geometry of a contact and what the soil gives at it, before the shear is known."""
-
-    contact: Contact
-    a: float
-    b: float
-    c: float
-    displacement: float  # j at the angle of greatest stress [m]
-    bearing_stress: float  # sigma by the bearing law [Pa]
-    bearing_depth: float  # depth of the angle of greatest stress [m]
-
-
-@dataclass(frozen=True)
-class ContactForces:
-    """Forces in the direction of rolling."""
-
-    pull: float  # F [N]
-    torque: float  # T as the sensor reads it [N m]
-    bearing_load: float  # load that the bearing law carries at this sinkage [N]
-
-
-class ContactModel:
-    """Scalar contact model of one wheel.
+class WheelModels:
+    """Contact models of all wheels of a rover.
 
     Parameters
     ----------
     configuration : Configuration
         Soil, wheels, effects.
-    settings : FilterSettings
-        Constants of the rover.
-    wheel : int
-        Index of the wheel.
     """
 
-    def __init__(self, configuration: Configuration, settings: FilterSettings, wheel: int) -> None:
+    def __init__(self, configuration: Configuration) -> None:
         soil, wheels = configuration.soil, configuration.wheels
-        self._radius = settings.rim_radius[wheel]
-        self._width = float(wheels.width[wheel])
-        self._lug = (
-            float(wheels.lug_height[wheel]),
-            float(wheels.lug_count[wheel]),
-            float(wheels.lug_thickness[wheel]),
+        effects = {k: v for k, v in configuration.effects.items() if k not in _NOT_IN_FILTER}
+        gravity = float(configuration.rover.gravity)
+        self._forces = ConditionedForces(
+            wheels.wheel, soil, effects, configuration.slip_radius, gravity
         )
-        self._pass = settings.passes[wheel]
-        self._gravity = settings.gravity
-        self._bearing_modulus = float(soil.cohesive_modulus / self._width + soil.frictional_modulus)
-        self._exponent = float(soil.sinkage_exponent)
+        self._terms = Terms(effects)
         self._cohesion = float(soil.cohesion)
         self._tan_friction = math.tan(float(soil.friction_angle))
         self._shear_modulus = float(soil.shear_modulus)
+        self._exponent = float(soil.sinkage_exponent)
         self._peak_ratio = float(soil.peak_stress_ratio)
         self._leaving_ratio = float(soil.leaving_angle_ratio)
-        self._density = float(soil.density)
-        known = catalogue()
-        self._terms: dict[str, list[tuple[Any, SimpleNamespace]]] = {
-            'on_inputs': [],
-            'on_contact': [],
-            'on_normal_stress': [],
-            'on_outputs': [],
-        }
-        for name, values in configuration.effects.items():
-            if name in _NOT_IN_FILTER:
-                continue
-            for stage, terms in self._terms.items():
-                term = getattr(known[name], stage)
-                if term is not None:
-                    terms.append((term, SimpleNamespace(**values)))
-
-    def geometry(
-        self, motion: WheelMotion, sinkage: float, centroid: float, slip_sinkage: float
-    ) -> ContactState:
-        """Return the contact for a sinkage [m], a centroid shift [rad] and a change of n1."""
-        m = ScalarMaths
-        height, count, thickness = self._lug
-        c = Contact(
-            motion.slip,
-            motion.velocity_ratio,
-            motion.load,
-            motion.load,
-            0.0,
-            self._gravity,
-            motion.rim_speed,
-            1.0,
-            self._pass,
-            self._radius,
-            self._width,
-            height,
-            count,
-            thickness,
-            self._radius,
-            self._bearing_modulus,
-            1.0,
-            self._exponent + slip_sinkage * motion.slip,
-            self._cohesion,
-            self._tan_friction,
-            self._shear_modulus,
-            self._peak_ratio,
-            self._leaving_ratio,
-            self._density,
-        )
-        for term, values in self._terms['on_inputs']:
-            term(c, values, m)
-        r = c.radius
-        offset = 0.0
-        if self._terms['on_outputs']:
-            # What lugs or a zero error add to the sinkage is no contact depth.
-            for term, values in self._terms['on_outputs']:
-                term(c, values, m)
-            offset, c.sinkage, c.drawbar_pull, c.torque = c.sinkage, 0.0, 0.0, 0.0
-        depth = min(max(sinkage - offset, _LEAST_SINKAGE), 0.95 * r)
-        entrance = math.acos(1.0 - depth / r)
-        c.entrance_angle = entrance
-        c.peak_angle = c.peak_ratio * entrance
-        if motion.leaving_angle == motion.leaving_angle:
-            c.leaving_angle = motion.leaving_angle
-            for term, values in self._terms['on_contact']:
-                term(c, values, m)
-            c.leaving_angle = motion.leaving_angle
-        else:
-            c.leaving_angle = c.leaving_ratio * entrance
-            for term, values in self._terms['on_contact']:
-                term(c, values, m)
-        # The centroid is a third of the sum of the three angles: the peak takes the shift.
-        leaving = min(c.leaving_angle, entrance - 3.0 * _LEAST_GAP)
-        span = entrance - leaving
-        peak = min(
-            max(c.peak_angle + 3.0 * centroid, leaving + 0.02 * span), entrance - 0.02 * span
-        )
-        c.leaving_angle, c.peak_angle = leaving, peak
-        cos_1, cos_m, cos_2 = math.cos(entrance), math.cos(peak), math.cos(leaving)
-        sin_1, sin_m, sin_2 = math.sin(entrance), math.sin(peak), math.sin(leaving)
-        rear, front = peak - leaving, entrance - peak
-        a = (cos_m - cos_2) / rear + (cos_m - cos_1) / front
-        b = (sin_m - sin_2) / rear + (sin_m - sin_1) / front
-        displacement = c.shear_radius * front - c.velocity_ratio * (sin_1 - sin_m)
-        # Where the peak lies behind the hub, the deepest soil is at the bottom.
-        bearing_depth = max(r * ((cos_m if peak > 0.0 else 1.0) - cos_1), 1e-5)
-        stress = c.bearing_modulus * (bearing_depth / c.reference_depth) ** c.sinkage_exponent
-        if self._terms['on_normal_stress']:
-            c.angle, c.normal_stress = peak, stress
-            for term, values in self._terms['on_normal_stress']:
-                term(c, values, m)
-            stress = c.normal_stress
-        return ContactState(c, a, b, 0.5 * span, displacement, stress, bearing_depth)
+        self._passes = [float(p) for p in wheels.passes]
+        self._slip_radius = [float(r) for r in wheels.slip_radius]
+        self._modulus = []
+        self._contacts = []
+        for i in range(wheels.count):
+            width = float(wheels.width[i])
+            if soil.pressure_law == 'reece':
+                weight = float(soil.density) * gravity
+                modulus = self._cohesion * float(soil.cohesive_modulus) + weight * width * float(
+                    soil.frictional_modulus
+                )
+                depth = width
+            else:
+                modulus = float(soil.cohesive_modulus) / width + float(soil.frictional_modulus)
+                depth = 1.0
+            contact = Contact(**dict.fromkeys(_CONTACT_INPUTS, 0.0))
+            contact.gravity = gravity
+            contact.radius, contact.width = float(wheels.radius[i]), width
+            contact.lug_height = float(wheels.lug_height[i])
+            contact.lug_count = float(wheels.lug_count[i])
+            contact.density = float(soil.density)
+            contact.reference_depth = depth
+            contact.pass_number = self._passes[i]
+            contact.direction = 1.0
+            self._contacts.append(contact)
+            self._modulus.append(max(modulus, 1.0))
 
     def forces(
-        self, state: ContactState, strength: float, modulus: float, stiffness: float
-    ) -> ContactForces:
-        """Return the forces for log factors on shear strength, K and stiffness."""
-        c = state.contact
-        ratio = state.displacement / (c.shear_modulus * math.exp(modulus))
-        mobilised = -math.expm1(-abs(ratio)) * math.exp(strength)
-        if ratio < 0.0:
-            mobilised = -mobilised
-        r, shear_radius, width = c.radius, c.shear_radius, c.width
-        normal = r * state.a
-        lever = shear_radius * state.b
-        mobilised_friction = mobilised * c.tan_friction
-        mobilised_cohesion = mobilised * c.cohesion
-        denominator = max(normal + lever * mobilised_friction, 0.2 * normal)
-        sigma = max((c.normal_load / width - lever * mobilised_cohesion) / denominator, 0.0)
-        tau = mobilised_cohesion + sigma * mobilised_friction
-        c.drawbar_pull = width * (shear_radius * state.a * tau - r * state.b * sigma)
-        c.torque = width * shear_radius * shear_radius * state.c * tau
-        c.sinkage = 0.0
-        for term, values in self._terms['on_outputs']:
-            term(c, values, ScalarMaths)
-        bearing = state.bearing_stress * math.exp(stiffness)
-        bearing_tau = mobilised_cohesion + bearing * mobilised_friction
-        return ContactForces(
-            c.drawbar_pull,
-            c.torque,
-            max(width * (normal * bearing + lever * bearing_tau), 0.05 * width * normal * bearing),
+        self,
+        wheel: int,
+        ratio: float,
+        sinkage: float,
+        load: float,
+        strength: float,
+        modulus: float,
+        centroid: float,
+        rim_speed: float,
+        leaving_angle: float,
+    ) -> WheelForces:
+        """Return torque and pull.
+
+        Parameters
+        ----------
+        wheel : int
+            Index.
+        ratio : float
+            v/(r w) in the direction of rolling [-].
+        sinkage, load : float
+            [m], [N].
+        strength, modulus : float
+            Logarithms of the factors on c and tan(phi), and on K.
+        centroid : float
+            Shift of the stress centroid [rad].
+        rim_speed, leaving_angle : float
+            |r w| [m/s]; measured leaving angle [rad], nan = not.
+        """
+        factor = math.exp(strength)
+        cohesion, friction = self._cohesion * factor, self._tan_friction * factor
+        shear_modulus = self._shear_modulus * math.exp(modulus)
+        # Beyond three times the rim speed the shear is saturated long since.
+        torque, pull, d_torque, d_pull, _ = self._forces.forces(
+            wheel,
+            min(max(ratio, 0.0), 3.0),
+            sinkage,
+            load,
+            cohesion,
+            friction,
+            shear_modulus,
+            centroid,
+            leaving_angle=leaving_angle,
+            rim_speed=rim_speed,
+            pass_number=self._passes[wheel],
+        )
+        t, f = d_torque, d_pull
+        return WheelForces(
+            torque,
+            pull,
+            (t[0], t[1], t[3] * cohesion + t[4] * friction, t[5] * shear_modulus, t[6]),
+            (f[0], f[1], f[3] * cohesion + f[4] * friction, f[5] * shear_modulus, f[6]),
         )
 
+    def bearing(
+        self,
+        wheel: int,
+        ratio: float,
+        sinkage: float,
+        load: float,
+        strength: float,
+        modulus: float,
+        stiffness: float,
+        slip_sinkage: float,
+        leaving_angle: float,
+    ) -> Bearing:
+        """Return the load that the bearing law carries at a sinkage.
 
-def driving_slip(speed: float, rim_speed: float) -> float:
-    """Return the contract's slip ratio for a rim speed that is positive and not at rest."""
-    if speed <= rim_speed:
-        return min(1.0 - speed / rim_speed, 1.0)
-    return rim_speed / speed - 1.0
+        Parameters are those of `forces`; `stiffness` is the logarithm of the factor on the bearing
+        modulus, `slip_sinkage` is added to n1.
+        """
+        c, m = self._contacts[wheel], ScalarMaths
+        factor = math.exp(strength)
+        slip = slip_of_speed_ratio(ratio)
+        c.slip, c.velocity_ratio = slip, min(max(ratio, 0.0), 3.0) * self._slip_radius[wheel]
+        c.normal_load = c.stated_load = load
+        c.rim_speed = math.nan
+        c.shear_radius = c.radius
+        c.bearing_modulus = self._modulus[wheel] * math.exp(stiffness)
+        c.sinkage_exponent = self._exponent + slip_sinkage * slip
+        c.cohesion, c.tan_friction = self._cohesion * factor, self._tan_friction * factor
+        c.shear_modulus = self._shear_modulus * math.exp(modulus)
+        c.peak_ratio, c.leaving_ratio = self._peak_ratio, self._leaving_ratio
+        stages = self._terms.stages
+        for term, values in stages['on_inputs']:
+            term(c, values, m)
+        c.sinkage = c.drawbar_pull = c.torque = c.entrance_angle = 0.0
+        for term, values in stages['on_outputs']:
+            term(c, values, m)
+        depth = min(max(sinkage - c.sinkage, 0.0), 0.95 * c.radius)
+        entrance = max(math.acos(1.0 - depth / c.radius), 10.0 * SMALLEST_ANGLE)
+        set_angles(c, entrance, leaving_angle, self._terms, m)
+        t1, tm, t2 = c.entrance_angle, c.peak_angle, c.leaving_angle
+        cos_1, cos_m, cos_2 = math.cos(t1), math.cos(tm), math.cos(t2)
+        sin_1, sin_m, sin_2 = math.sin(t1), math.sin(tm), math.sin(t2)
+        a = (cos_m - cos_2) / (tm - t2) + (cos_m - cos_1) / (t1 - tm)
+        b = (sin_m - sin_2) / (tm - t2) + (sin_m - sin_1) / (t1 - tm)
+        peak_depth = max(c.radius * (cos_m - cos_1), 1e-6)
+        log_depth = math.log(peak_depth / c.reference_depth)
+        c.angle = tm
+        c.normal_stress = c.bearing_modulus * math.exp(c.sinkage_exponent * log_depth)
+        for term, values in stages['on_normal_stress']:
+            term(c, values, m)
+        shear = (c.shear_radius * (t1 - tm) - c.velocity_ratio * (sin_1 - sin_m)) / c.shear_modulus
+        mobilised = math.copysign(-math.expm1(-abs(shear)), shear)
+        tau = mobilised * (c.cohesion + c.normal_stress * c.tan_friction)
+        normal = c.width * c.radius * a * c.normal_stress
+        carried = normal + c.width * c.shear_radius * b * tau
+        return Bearing(max(carried, _LEAST_BEARING * normal), c.sinkage_exponent, log_depth)

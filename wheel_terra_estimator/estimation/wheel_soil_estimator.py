@@ -30,9 +30,9 @@ from wheel_terra_estimator.estimation.filter_state import (
     StateLayout,
 )
 from wheel_terra_estimator.estimation.measurement_models import (
-    ContactModel,
-    WheelMotion,
-    driving_slip,
+    WheelForces,
+    WheelModels,
+    slip_of_speed_ratio,
 )
 from wheel_terra_estimator.estimation.measurements import ReferenceVelocity, StepInputs
 from wheel_terra_estimator.estimation.slip_classes import SlipClassifier
@@ -134,9 +134,7 @@ class WheelSoilEstimator:
         self._configuration = configuration
         self._settings = settings = FilterSettings.from_configuration(configuration)
         self._layout = StateLayout(settings.wheel_count)
-        self._contacts = [
-            ContactModel(configuration, settings, i) for i in range(settings.wheel_count)
-        ]
+        self._models = WheelModels(configuration)
         tuning = configuration.filter
         self._classifier = SlipClassifier(
             settings.wheel_count,
@@ -242,8 +240,8 @@ class WheelSoilEstimator:
         P[CENTROID, CENTROID] = 0.04**2
         n = s.wheel_count
         # Static sinkage by the bearing law: where the law carries the load at zero slip.
-        for i, contact in enumerate(self._contacts):
-            mean[layout.sinkage.start + i] = self._static_sinkage(contact, i)
+        for i in range(n):
+            mean[layout.sinkage.start + i] = self._static_sinkage(i)
         z = mean[layout.sinkage]
         P[layout.sinkage, layout.sinkage] = np.diag((0.5 * z + 0.005) ** 2)
         shared, own = s.stiffness_std, 0.5 * s.stiffness_std
@@ -259,14 +257,13 @@ class WheelSoilEstimator:
         lower[layout.sinkage] = [-0.02 * r for r in s.rim_radius]
         return GatedFilter(mean, P, lower, upper)
 
-    def _static_sinkage(self, contact: ContactModel, wheel: int) -> float:
-        s = self._settings
-        motion = WheelMotion(0.0, s.slip_radius[wheel], self._run.load[wheel], 0.0, _NAN)
-        low, high = 1e-4, 0.5 * s.rim_radius[wheel]
+    def _static_sinkage(self, wheel: int) -> float:
+        low, high = 1e-4, 0.5 * self._settings.rim_radius[wheel]
+        load = self._run.load[wheel]
         for _ in range(30):
             z = math.sqrt(low * high)
-            state = contact.geometry(motion, z, 0.0, 0.0)
-            if contact.forces(state, 0.0, 0.0, 0.0).bearing_load < motion.load:
+            bearing = self._models.bearing(wheel, 1.0, z, load, 0.0, 0.0, 0.0, 0.0, _NAN)
+            if bearing.load < load:
                 low = z
             else:
                 high = z
@@ -456,7 +453,6 @@ class WheelSoilEstimator:
         # The residual of gravity changes as the rover drives over rough ground.
         leak = s.gravity * float(s.sensors.orientation_std)
         Q[GRAVITY_BIAS, GRAVITY_BIAS] = (1e-3**2 + (0.3 * leak) ** 2 * 0.1) * dt
-        speed = float(x[SPEED])
         travel = 0.0
         if not still and dt > 0.0:
             travel = self._predict_wheels(x, mean, F, Q, dt, rims)
@@ -484,7 +480,6 @@ class WheelSoilEstimator:
             mean[e] *= hold
             F[e, e] *= hold
             Q[e, e] = np.eye(n) * s.shear_error_std**2 * (1.0 - hold * hold)
-        del speed
         self._filter.predict(mean, F, Q)
 
     def _predict_wheels(
@@ -507,27 +502,27 @@ class WheelSoilEstimator:
             direction = 1.0 if rim > 0.0 else -1.0
             speed = direction * (float(x[SPEED]) - run.yaw_rate * s.lateral[i])
             rim = abs(rim)
-            slip = driving_slip(speed, rim)
+            ratio = speed / rim
+            slip = slip_of_speed_ratio(ratio)
             travels.append(abs(speed) + 0.1 * abs(rim - speed))
-            z = float(x[zi])
-            load = run.load[i]
-            contact_length = max(math.sqrt(2.0 * s.rim_radius[i] * max(z, 1e-3)), 0.02)
-            rate = (abs(speed) + 0.3 * abs(rim - speed)) * dt / contact_length
-            alpha = -math.expm1(-rate)
-            if load <= 0.0:
+            z, load = float(x[zi]), run.load[i]
+            if load <= 1e-3:
                 Q[zi, zi] = 1e-4 * dt
                 continue
-            contact = self._contacts[i]
-            strength = float(x[SHEAR_STRENGTH])
-            modulus = float(x[SHEAR_MODULUS])
-            motion = WheelMotion(
-                slip, self._velocity_ratio(i, speed, rim), load, rim, self._leaving(i)
+            contact_length = max(math.sqrt(2.0 * s.rim_radius[i] * max(z, 1e-3)), 0.02)
+            alpha = -math.expm1(-(abs(speed) + 0.3 * abs(rim - speed)) * dt / contact_length)
+            soil = (
+                float(x[SHEAR_STRENGTH]),
+                float(x[SHEAR_MODULUS]),
+                float(x[ki]),
+                float(x[SLIP_SINKAGE]),
+                self._leaving(i),
             )
-            state = contact.geometry(motion, z, float(x[CENTROID]), float(x[SLIP_SINKAGE]))
-            bearing = contact.forces(state, strength, modulus, float(x[ki])).bearing_load
-            power = state.contact.sinkage_exponent + 0.5
+            bearing = self._models.bearing(i, ratio, z, load, *soil)
+            slower = self._models.bearing(i, ratio - 0.02, z, load, *soil)
             # One Newton step on log load over log sinkage, bounded: relaxation does the rest.
-            growth = min(max(math.log(load / bearing) / power, -0.7), 0.7)
+            power = bearing.exponent + 0.5
+            growth = min(max(math.log(load / bearing.load) / power, -0.7), 0.7)
             z_floor = max(z, 5e-4)
             # No steady state where the wheel stands and digs: the sensor leads.
             trust = min(max((0.95 - slip) / 0.15, 0.0), 1.0)
@@ -538,32 +533,13 @@ class WheelSoilEstimator:
             sensitivity = trust * alpha * target / power
             F[zi, zi] = max(1.0 - trust * alpha * 0.9, 0.05)
             F[zi, ki] = -sensitivity
-            log_depth = math.log(max(state.bearing_depth, 1e-5) / state.contact.reference_depth)
-            F[zi, SLIP_SINKAGE] = -sensitivity * slip * log_depth
-            # d ln(bearing) / d slip, by one difference towards smaller slip.
-            other = WheelMotion(
-                slip - 0.02,
-                self._velocity_ratio(i, speed + 0.02 * rim, rim),
-                load,
-                rim,
-                self._leaving(i),
-            )
-            changed = contact.forces(
-                contact.geometry(other, z, float(x[CENTROID]), float(x[SLIP_SINKAGE])),
-                strength,
-                modulus,
-                float(x[ki]),
-            ).bearing_load
-            by_slip = (math.log(bearing) - math.log(changed)) / 0.02
-            F[zi, SPEED] = -sensitivity * by_slip * (-direction / rim)
+            F[zi, SLIP_SINKAGE] = -sensitivity * slip * bearing.log_depth
+            by_ratio = math.log(bearing.load / slower.load) / 0.02
+            F[zi, SPEED] = -sensitivity * by_ratio * direction / rim
             # What the law does not know: a tenth of the sinkage per contact length, and digging.
             digging = 0.05 * max(slip, 0.0) ** 2 * rim * dt
             Q[zi, zi] = (0.1 * z_floor) ** 2 * 2.0 * alpha + digging**2 + 1e-9 * dt
         return dt * math.fsum(travels) / len(rims) if travels else 0.0
-
-    def _velocity_ratio(self, wheel: int, speed: float, rim: float) -> float:
-        """Return v / w [m] of a wheel seen in its direction of rolling."""
-        return self._settings.slip_radius[wheel] * speed / rim
 
     def _leaving(self, wheel: int) -> float:
         run = self._run
@@ -695,9 +671,7 @@ class WheelSoilEstimator:
         for i in range(n):
             if run.torque_count[i]:
                 run.torque_held[i] = torque[i]
-            counted = run.torque_count[i]
             run.torque_sum[i], run.torque_count[i] = 0.0, 0
-            del counted
         if not still and dt > 0.0:
             self._model_rows(rims, torque, residuals, variances, rows)
         if rows:
@@ -729,7 +703,7 @@ class WheelSoilEstimator:
                 open_variance += (0.3 * load) ** 2
                 continue
             direction = 1.0 if rim > 0.0 else -1.0
-            pull, torque_model, row_pull, row_torque = self._wheel_rows(i, rim, direction, load)
+            pull, torque_model, row_pull, row_torque = self._wheel_rows(i, rim, direction)
             jacobian[i] = row_pull
             balance += row_pull
             balance_sum += pull
@@ -772,54 +746,39 @@ class WheelSoilEstimator:
             rows.append(balance)
 
     def _wheel_rows(
-        self, i: int, rim: float, direction: float, load: float
+        self, i: int, rim: float, direction: float
     ) -> tuple[float, float, FloatArray, FloatArray]:
         """Return pull, torque and their rows of the Jacobian, in the body's signs."""
+        layout = self._layout
+        zi, ei = layout.sinkage.start + i, layout.shear_error.start + i
+        forces = self._forces(i, rim, direction)
+        row_pull, row_torque = np.zeros(layout.size), np.zeros(layout.size)
+        for row, derivatives in ((row_pull, forces.d_pull), (row_torque, forces.d_torque)):
+            by_ratio, by_sinkage, by_strength, by_modulus, by_centroid = derivatives
+            # The ratio is that of the direction of rolling: the two signs cancel.
+            row[SPEED] = by_ratio / abs(rim)
+            row[zi] = direction * by_sinkage
+            row[SHEAR_STRENGTH] = row[ei] = direction * by_strength
+            row[SHEAR_MODULUS] = direction * by_modulus
+            row[CENTROID] = direction * by_centroid
+        return direction * forces.pull, direction * forces.torque, row_pull, row_torque
+
+    def _forces(self, i: int, rim: float, direction: float) -> WheelForces:
+        """Return the forces of a turning wheel at the present state, in its own direction."""
         run, s, layout = self._run, self._settings, self._layout
         x = self._filter.mean
-        contact = self._contacts[i]
-        zi, ei = layout.sinkage.start + i, layout.shear_error.start + i
-        ki = layout.stiffness.start + i
         v = direction * (float(x[SPEED]) - run.yaw_rate * s.lateral[i])
-        rim = abs(rim)
-        z, centroid, n1 = float(x[zi]), float(x[CENTROID]), float(x[SLIP_SINKAGE])
-        strength, modulus = float(x[SHEAR_STRENGTH] + x[ei]), float(x[SHEAR_MODULUS])
-        leaving = self._leaving(i)
-        # Far beyond standing still, or skidding hard, the shear is saturated.
-        v_model = min(max(v, -0.2 * rim), 3.0 * rim)
-
-        def at(speed: float, depth: float, shift: float) -> Any:
-            motion = WheelMotion(
-                driving_slip(speed, rim),
-                self._velocity_ratio(i, speed, rim),
-                load,
-                rim,
-                leaving,
-            )
-            return contact.geometry(motion, depth, shift, n1)
-
-        base = at(v_model, z, centroid)
-        f0 = contact.forces(base, strength, modulus, float(x[ki]))
-        stronger = contact.forces(base, strength + 0.01, modulus, 0.0)
-        stiffer = contact.forces(base, strength, modulus + 0.01, 0.0)
-        dv, dz = 0.01 * rim, 0.01 * max(z, 1e-3)
-        faster = contact.forces(at(v_model + dv, z, centroid), strength, modulus, 0.0)
-        deeper = contact.forces(at(v_model, z + dz, centroid), strength, modulus, 0.0)
-        shifted = contact.forces(at(v_model, z, centroid + 0.002), strength, modulus, 0.0)
-        row_pull, row_torque = np.zeros(layout.size), np.zeros(layout.size)
-        for index, changed, step in (
-            (SHEAR_STRENGTH, stronger, 0.01),
-            (ei, stronger, 0.01),
-            (SHEAR_MODULUS, stiffer, 0.01),
-            (zi, deeper, dz),
-            (CENTROID, shifted, 0.002),
-        ):
-            row_pull[index] = direction * (changed.pull - f0.pull) / step
-            row_torque[index] = direction * (changed.torque - f0.torque) / step
-        # v enters as direction * v: the sign cancels for forces in the body's frame.
-        row_pull[SPEED] = (faster.pull - f0.pull) / dv
-        row_torque[SPEED] = (faster.torque - f0.torque) / dv
-        return direction * f0.pull, direction * f0.torque, row_pull, row_torque
+        return self._models.forces(
+            i,
+            v / abs(rim),
+            float(x[layout.sinkage.start + i]),
+            run.load[i],
+            float(x[SHEAR_STRENGTH] + x[layout.shear_error.start + i]),
+            float(x[SHEAR_MODULUS]),
+            float(x[CENTROID]),
+            abs(rim),
+            self._leaving(i),
+        )
 
     def _after(
         self,
@@ -849,7 +808,7 @@ class WheelSoilEstimator:
 
     def _pulls(self, rims: list[float]) -> None:
         run, s, layout = self._run, self._settings, self._layout
-        x, P = self._filter.mean, self._filter.covariance
+        P = self._filter.covariance
         slope_share = run.force[0] / max(run.force[2], 0.1)
         zero = float(s.sensors.torque_zero_std)
         gain = float(s.sensors.torque_gain_std)
@@ -862,20 +821,7 @@ class WheelSoilEstimator:
                 run.pull_std[i] = (0.1 * load if run.force_known else load) + 1e-3
                 continue
             direction = 1.0 if rim > 0.0 else -1.0
-            rim = abs(rim)
-            v = direction * (float(x[SPEED]) - run.yaw_rate * s.lateral[i])
-            v = min(max(v, -0.2 * rim), 3.0 * rim)
-            contact = self._contacts[i]
-            zi, ei = layout.sinkage.start + i, layout.shear_error.start + i
-            motion = WheelMotion(
-                driving_slip(v, rim), self._velocity_ratio(i, v, rim), load, rim, self._leaving(i)
-            )
-            state = contact.geometry(
-                motion, float(x[zi]), float(x[CENTROID]), float(x[SLIP_SINKAGE])
-            )
-            forces = contact.forces(
-                state, float(x[SHEAR_STRENGTH] + x[ei]), float(x[SHEAR_MODULUS]), 0.0
-            )
+            forces = self._forces(i, rim, direction)
             run.pull[i] = direction * forces.pull
             radius = s.shear_radius[i]
             run.pull_std[i] = math.sqrt(
@@ -964,22 +910,26 @@ class WheelSoilEstimator:
         """Greatest pull that the present soil gives each wheel minus what the slope asks [N]."""
         run, s, layout = self._run, self._settings, self._layout
         x = self._filter.mean
-        for i, contact in enumerate(self._contacts):
+        for i in range(s.wheel_count):
             load = run.load[i]
             if load < 1e-3:
                 run.pull_margin[i] = 0.0
                 continue
-            zi, ei = layout.sinkage.start + i, layout.shear_error.start + i
-            best = -math.inf
-            for slip in (0.2, 0.4, 0.6, 0.8, 0.95):
-                motion = WheelMotion(slip, s.slip_radius[i] * (1.0 - slip), load, 0.05, _NAN)
-                state = contact.geometry(
-                    motion, float(x[zi]), float(x[CENTROID]), float(x[SLIP_SINKAGE])
-                )
-                forces = contact.forces(
-                    state, float(x[SHEAR_STRENGTH] + x[ei]), float(x[SHEAR_MODULUS]), 0.0
-                )
-                best = max(best, forces.pull)
+            strength = float(x[SHEAR_STRENGTH] + x[layout.shear_error.start + i])
+            best = max(
+                self._models.forces(
+                    i,
+                    1.0 - slip,
+                    float(x[layout.sinkage.start + i]),
+                    load,
+                    strength,
+                    float(x[SHEAR_MODULUS]),
+                    float(x[CENTROID]),
+                    _NAN,
+                    _NAN,
+                ).pull
+                for slip in (0.2, 0.4, 0.6, 0.8, 0.95)
+            )
             direction = run.drive_direction or 1.0
             demand = direction * load * run.force[0] / max(run.force[2], 0.1)
             run.pull_margin[i] = best - demand
