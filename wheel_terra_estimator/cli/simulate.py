@@ -5,16 +5,80 @@
 from __future__ import annotations
 
 import argparse
+import sys
+from pathlib import Path
 
+from wheel_terra_estimator.configuration import reader as configuration_reader
 from wheel_terra_estimator.errors import UserError
 
 SUMMARY = 'drive a simulated rover and write a rosbag2 with ground truth'
+LONGEST = 86400.0  # [s]
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
+    from wheel_terra_estimator.simulation.scenario import DEFAULT
+
+    parser.add_argument(
+        '--scenario',
+        default=DEFAULT,
+        metavar='F',
+        help=f'scenario file, or the bare name of a shipped one (default: {DEFAULT})',
+    )
+    parser.add_argument('--list', action='store_true', help='list the shipped scenarios and stop')
+    parser.add_argument('--seed', type=int, default=0, help='decides all random quantities')
+    parser.add_argument(
+        '--duration', type=float, metavar='S', help="length of the drive in place of the scenario's"
+    )
+    parser.add_argument('-o', dest='output', type=Path, metavar='DIR', help='rosbag2 folder (MCAP)')
+    configuration_reader.add_arguments(parser)
+    parser.add_argument(
+        '--overwrite', action='store_true', help='replace an earlier bag of the same name'
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the command."""
-    raise UserError('this command is not in this version yet')
+    from wheel_terra_estimator.simulation import scenario as scenarios
+
+    if arguments.list:
+        for name, description in scenarios.shipped_scenarios().items():
+            print(f'{name:24s} {description}')
+        return 0
+    if arguments.output is None:
+        raise UserError('-o DIR is missing: say where the bag goes')
+    if arguments.seed < 0:
+        raise UserError(f'--seed {arguments.seed}: must not be negative')
+    scenario = scenarios.load(
+        arguments.scenario, files=arguments.config, parameters=arguments.parameters
+    )
+    duration = scenario.duration if arguments.duration is None else arguments.duration
+    if not 0.0 < duration <= LONGEST:
+        raise UserError(f'--duration {duration:g}: must be above 0 and at most {LONGEST:g} s')
+
+    from tqdm import tqdm
+
+    from wheel_terra_estimator.bags.bag_file import make_room
+    from wheel_terra_estimator.bags.simulated_drive import write_simulated_drive
+    from wheel_terra_estimator.simulation.drive import Drive
+
+    make_room(arguments.output, arguments.overwrite)
+    quiet = not sys.stderr.isatty() or duration < 60.0
+    with tqdm(total=round(duration), unit='s', disable=quiet, leave=False) as bar:
+        drive = Drive(scenario, arguments.seed).run(duration, bar.update)
+    bag = write_simulated_drive(drive, arguments.output, arguments.overwrite)
+
+    truth = drive.truth
+    distance = abs(float(truth.position[-1, 0] - truth.position[0, 0]))
+    print(
+        f'{scenario.name}, seed {arguments.seed}: {duration:g} s, {distance:.2f} m along the path'
+    )
+    for name, share in truth.time_in_class().items():
+        print(f'  {name:8s} {100.0 * share:5.1f} % of the wheel time')
+    stuck = truth.first_stuck()
+    print('  not entrapped' if stuck is None else f'  entrapped after {stuck:.1f} s')
+    print(f'bag: {arguments.output} ({sum(bag.counts.values())} messages)')
+    words = [f'--config {name}' for name in scenario.files]
+    words += [f"-p '{parameter}'" for parameter in scenario.parameters]
+    print(f'estimates: wheel-terra replay {arguments.output} {" ".join(words)}')
+    return 0

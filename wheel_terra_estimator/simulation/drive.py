@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -146,8 +147,18 @@ class Drive:
         self.last_truth = self.plant.step(command, self.step_length)
         return self.sensors.measure(self.last_truth)
 
-    def run(self, duration: float | None = None) -> SimulatedDrive:
-        """Drive the scenario's profile and return everything."""
+    def run(
+        self, duration: float | None = None, progress: Callable[[int], object] | None = None
+    ) -> SimulatedDrive:
+        """Drive the scenario's profile and return everything.
+
+        Parameters
+        ----------
+        duration : float, optional
+            In place of the scenario's [s].
+        progress : callable, optional
+            Called with 1 for each second driven.
+        """
         duration = self.scenario.duration if duration is None else duration
         profile = self.scenario.profile
         arrivals: list[Arrival] = []
@@ -163,6 +174,8 @@ class Drive:
                 stamps.append(START + round(due * 1e9))
                 rows.append(self.last_truth)
                 due += period
+            if progress and self.plant.time // 1.0 > (self.plant.time - self.step_length) // 1.0:
+                progress(1)
         arrivals.sort(key=lambda a: a.arrival)
         thresholds = self.configuration.filter.class_thresholds
         table = TruthTable.from_rows(stamps, rows, thresholds)

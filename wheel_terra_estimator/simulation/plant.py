@@ -245,9 +245,10 @@ class RoverPlant:
                 break
         self._forces = forces
         hub_speed = np.einsum('ijn,j->in', self._lever, speeds)
-        shear = self._memory.trial_shear(*hub_speed, rate, dt)
+        forward, lateral = hub_speed
+        shear = self._memory.trial_shear(forward, lateral, rate, dt)
         self._drives.finish(rate, dt)
-        self._memory.advance(*hub_speed, rate, shear, forces.soil, dt)
+        self._memory.advance(forward, lateral, rate, shear, forces.soil, dt)
         self._speeds, self._rate = speeds, rate
         self._move(dt)
         self._balance(dt)

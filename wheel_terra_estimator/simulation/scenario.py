@@ -58,11 +58,30 @@ _FACTORS = {
     'slip_sinkage': 'growth of the sinkage exponent with slip',
 }
 
+TRUE_EFFECTS = {
+    'slip_sinkage_exponent.enabled': 'true',
+    'slip_sinkage_exponent.n1': '0.35',
+    'stress_peak_shift.enabled': 'true',
+    'stress_peak_shift.c2': '0.15',
+    'lug_shear_radius.enabled': 'true',
+    'lug_digging.enabled': 'true',
+    'soil_mound.enabled': 'true',
+    'multipass.enabled': 'true',
+    'bulldozing.enabled': 'true',
+    'bulldozing.kb': '0.3',
+}
+"""Effects that are at work in the simulated soil where a scenario does not say otherwise."""
+
 DECLARED: tuple[Parameter, ...] = (
     text('description', '', 'what happens in the drive'),
     text('configuration', ['generic_six_wheel'], 'rover and soil files', size=0),
     text('parameters', [], 'NAME:=VALUE on top of these files, known to the estimator', size=0),
-    text('truth', [], 'NAME:=VALUE that hold in the simulation but not for the estimator', size=0),
+    text(
+        'truth',
+        [f'effects.{name}:={value}' for name, value in TRUE_EFFECTS.items()],
+        'NAME:=VALUE that hold in the simulation, whatever the estimator is told',
+        size=0,
+    ),
     number('duration', 120.0, 's', 'length of the drive', above=0.0, at_most=1e6),
     # What the rover is told
     number('drive.time', [0.0], 's', 'knots of the command, linear between', size=0),
@@ -172,8 +191,10 @@ class Scenario:
     ----------
     name : str
         Where it came from.
+    files, parameters : tuple of str
+        Configuration files and NAME:=VALUE that an estimator of this drive is to be given.
     configuration : Configuration
-        What the estimator is told: rover, nominal soil, sensors.
+        What these say: rover, nominal soil, sensors.
     truth : Configuration
         What holds in the simulation before the variations of a seed.
     drive, slope, variation, sensors : Section
@@ -188,6 +209,8 @@ class Scenario:
 
     name: str
     description: str
+    files: tuple[str, ...]
+    parameters: tuple[str, ...]
     configuration: Configuration
     truth: Configuration
     duration: float
@@ -241,6 +264,8 @@ def load(
     return Scenario(
         name=name,
         description=checked['description'],
+        files=tuple(str(file) for file in base),
+        parameters=tuple(known),
         configuration=configuration,
         truth=reader.load(base, [*known, *checked['truth']]),
         duration=checked['duration'],
@@ -257,6 +282,15 @@ def load(
         dig_efficiency=checked['dig_efficiency'],
         random_fault_rate=checked['faults.random_rate'],
     )
+
+
+def shipped_scenarios() -> dict[str, str]:
+    """Return name -> description of the scenarios that come with the package."""
+    return {
+        key.removeprefix('scenarios/'): str(ros_yaml.read(path).get('description', ''))
+        for key, path in shipped.files().items()
+        if key.startswith('scenarios/')
+    }
 
 
 def _checked(name: str, values: Mapping[str, Any]) -> dict[str, Any]:

@@ -93,7 +93,7 @@ class SensorSuite:
         self._before: Truth | None = None
         self._counted: FloatArray | None = None
         self._held_sinkage = np.zeros(n)
-        self._last_stamp = {name: START for name in self._periods}
+        self._last_stamp = dict.fromkeys(self._periods, START)
 
     @property
     def odometry_period(self) -> float:

@@ -69,7 +69,7 @@ class Suspension:
 
     @cached_property
     def _solution(self) -> FloatArray:
-        return np.linalg.pinv(self._rows)
+        return np.asarray(np.linalg.pinv(self._rows), dtype=np.float64)
 
     def normal_loads(
         self, mass: float, specific_force: FloatArray, pull: FloatArray, load_moment: FloatArray

@@ -104,6 +104,16 @@ class TruthTable:
             **columns,
         )
 
+    def time_in_class(self) -> dict[str, float]:
+        """Return the share of the wheel time in each class [-]."""
+        names = {0: 'low', 1: 'moderate', 2: 'high', 3: 'stuck', 255: 'at rest'}
+        return {name: float((self.slip_class == c).mean()) for c, name in names.items()}
+
+    def first_stuck(self) -> float | None:
+        """Return when the rover was first entrapped, from the first row on [s]."""
+        rows = np.flatnonzero(self.stuck)
+        return None if rows.size == 0 else float(self.stamp[rows[0]] - self.stamp[0]) * 1e-9
+
 
 def wheel_slip(
     forward: float, yaw_rate: float, wheel_y: FloatArray, rim_speed: FloatArray, rest_speed: float
@@ -139,7 +149,7 @@ def entrapped(
     below, clear : float
         Free once it has been below ``below`` for ``clear`` [s].
     """
-    turning = ~np.isnan(slip).all(axis=1)
+    turning: NDArray[np.bool_] = np.asarray(~np.isnan(slip).all(axis=1))
     median = np.zeros(len(stamp))
     median[turning] = np.nanmedian(np.abs(slip[turning]), axis=1)
     # Skidding with locked wheels is no entrapment.

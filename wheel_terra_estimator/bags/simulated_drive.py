@@ -1,0 +1,185 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""A simulated drive as a rosbag2 folder: what the sensors sent, and the ground truth."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from wheel_terra_estimator.bags.bag_file import BagFile
+from wheel_terra_estimator.bags.convert import (
+    BASE_FRAME,
+    INPUT_TYPES,
+    OUTPUT_TYPES,
+    input_layout,
+    quaternion_product,
+    rotation_matrix,
+)
+from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.estimation.measurements import (
+    InertialReading,
+    LeavingAngleReading,
+    Measurement,
+    ReferenceVelocity,
+    SinkageReading,
+    WheelOdometry,
+)
+from wheel_terra_estimator.simulation.drive import SimulatedDrive
+
+TRUTH = '/ground_truth'
+TRUTH_TOPICS = {
+    f'{TRUTH}/{name}': OUTPUT_TYPES[name]
+    for name in ('slip', 'sinkage', 'slip_class', 'stuck', 'twist')
+}
+
+
+def write_simulated_drive(drive: SimulatedDrive, path: Path, overwrite: bool = False) -> BagFile:
+    """Write a drive; messages are logged when they arrive, the truth at its own stamps.
+
+    Returns
+    -------
+    BagFile
+        The closed bag, for its counts.
+
+    Raises
+    ------
+    UserError
+        The path is taken or cannot be written.
+    """
+    inputs = {f'/{name}': kind for name, kind in INPUT_TYPES.items()}
+    if not drive.scenario.sensors.leaving_angle:
+        del inputs['/leaving_angle']
+    topics = {**inputs, **TRUTH_TOPICS}
+    with BagFile(path, topics, latched=(f'{TRUTH}/stuck',), overwrite=overwrite) as bag:
+        sender = _Sender(bag, drive.configuration)
+        truth = _TruthSender(bag, drive)
+        for arrival, measurement in drive.arrivals:
+            truth.write_until(arrival)
+            sender.write(measurement, arrival)
+        truth.write_until(None)
+    return bag
+
+
+class _Sender:
+    """Measurements as messages, in the frames and signs of the rover's own sensors."""
+
+    def __init__(self, bag: BagFile, configuration: Configuration) -> None:
+        self._bag = bag
+        self._make = bag.messages
+        self._wheels = configuration.wheels
+        self._figures = configuration.sensors
+        mounting = input_layout(configuration).imu_mounting
+        self._mounting = mounting
+        self._into_sensor = rotation_matrix(mounting).T
+        self._mounted = not np.allclose(mounting, (0.0, 0.0, 0.0, 1.0))
+
+    def write(self, measurement: Measurement, log_time: int) -> None:
+        if isinstance(measurement, WheelOdometry):
+            self._wheel_odometry(measurement, log_time)
+        elif isinstance(measurement, InertialReading):
+            self._bag.write('/imu/data', self._imu(measurement), log_time)
+        elif isinstance(measurement, SinkageReading):
+            self._bag.write(
+                '/sinkage', self._joints(measurement.stamp, measurement.sinkage), log_time
+            )
+        elif isinstance(measurement, LeavingAngleReading):
+            message = self._joints(measurement.stamp, measurement.leaving_angle)
+            self._bag.write('/leaving_angle', message, log_time)
+        elif isinstance(measurement, ReferenceVelocity):
+            self._reference(measurement, log_time)
+
+    def _joints(self, stamp: int, values: Any) -> Any:
+        return self._make.joint_state(self._make.header(stamp), self._wheels.names, values)
+
+    def _wheel_odometry(self, odometry: WheelOdometry, log_time: int) -> None:
+        wheels, header = self._wheels, self._make.header(odometry.stamp)
+        message = self._make.joint_state(
+            header,
+            wheels.names,
+            velocity=odometry.rate * wheels.direction,
+            effort=odometry.torque * wheels.direction,
+        )
+        self._bag.write('/joint_states', message, log_time)
+        rim = odometry.rate * wheels.slip_radius
+        known = ~np.isnan(rim)
+        if known.any():
+            # Body motion that rolling wheels would give: v - turn y = rim speed.
+            layout = np.stack([np.ones(wheels.count), -wheels.y], axis=1)[known]
+            forward, turn = np.linalg.lstsq(layout, rim[known], rcond=None)[0]
+            twist = self._make.twist_with_covariance(forward, turn, 1e-4 * np.eye(6))
+            header = self._make.header(odometry.stamp, 'odom')
+            self._bag.write('/odom', self._make.odometry(header, twist), log_time)
+
+    def _imu(self, reading: InertialReading) -> Any:
+        figures = self._figures
+        force, rate = reading.specific_force, reading.angular_rate
+        orientation = reading.orientation
+        if self._mounted:
+            force, rate = self._into_sensor @ force, self._into_sensor @ rate
+            if orientation is not None:
+                orientation = quaternion_product(orientation, self._mounting)
+        return self._make.imu(
+            self._make.header(reading.stamp, 'imu_link' if self._mounted else BASE_FRAME),
+            force.tolist(),
+            rate.tolist(),
+            None if orientation is None else orientation.tolist(),
+            (
+                figures.orientation_std**2,
+                figures.angular_rate_std**2,
+                figures.specific_force_std**2,
+            ),
+        )
+
+    def _reference(self, reference: ReferenceVelocity, log_time: int) -> None:
+        covariance = reference.variance * np.eye(6)
+        twist = self._make.twist_with_covariance(reference.forward, 0.0, covariance)
+        header = self._make.header(reference.stamp, 'odom')
+        self._bag.write('/reference_odom', self._make.odometry(header, twist), log_time)
+
+
+class _TruthSender:
+    """The truth as messages; slip at rest holds its last value, as the outputs do."""
+
+    def __init__(self, bag: BagFile, drive: SimulatedDrive) -> None:
+        self._bag = bag
+        self._truth = drive.truth
+        self._names = drive.configuration.wheels.names
+        self._row = 0
+        self._slip = np.zeros(len(self._names))
+        self._stuck: bool | None = None
+
+    def write_until(self, time: int | None) -> None:
+        """Write the rows before ``time`` [ns]; None: all that are left."""
+        stamps = self._truth.stamp
+        while self._row < len(stamps) and (time is None or stamps[self._row] <= time):
+            self._write(self._row)
+            self._row += 1
+
+    def _write(self, row: int) -> None:
+        truth, make = self._truth, self._bag.messages
+        stamp = int(truth.stamp[row])
+        header = make.header(stamp)
+        self._slip = np.where(np.isnan(truth.slip[row]), self._slip, truth.slip[row])
+        columns = {
+            'slip': (self._slip, truth.slip_velocity[row], truth.drawbar_pull[row]),
+            'sinkage': (truth.sinkage[row], truth.sinkage_rate[row], truth.normal_load[row]),
+        }
+        for name, fields in columns.items():
+            self._bag.write(
+                f'{TRUTH}/{name}', make.joint_state(header, self._names, *fields), stamp
+            )
+        self._bag.write(f'{TRUTH}/slip_class', make.slip_class(truth.slip_class[row]), stamp)
+        twist = make.twist_stamped(
+            header,
+            float(truth.forward_velocity[row]),
+            float(truth.yaw_rate[row]),
+            np.zeros((6, 6)),
+        )
+        self._bag.write(f'{TRUTH}/twist', twist, stamp)
+        stuck = bool(truth.stuck[row])
+        if stuck != self._stuck:
+            self._stuck = stuck
+            self._bag.write(f'{TRUTH}/stuck', make.bool(stuck), stamp)
