@@ -93,9 +93,12 @@ class BagFile:
 
     def write(self, topic: str, message: Any, log_time: int) -> None:
         """Append a message at a log time [ns]."""
-        connection = self._connections[topic]
-        data = self.messages.store.serialize_cdr(message, connection.msgtype)
-        self._writer.write(connection, log_time, data)
+        data = self.messages.store.serialize_cdr(message, self._topics[topic])
+        self.write_raw(topic, data, log_time)
+
+    def write_raw(self, topic: str, data: bytes | memoryview, log_time: int) -> None:
+        """Append a message that is serialised already (CDR)."""
+        self._writer.write(self._connections[topic], log_time, data)
         self.counts[topic] += 1
 
 

@@ -15,6 +15,8 @@ NODE = 'wheel_terra_estimator'
 PERIOD = 1_000_000_000
 """Time between two messages when no level changes [ns]."""
 
+_NEEDED = frozenset({'wheel_odometry', 'imu', 'outputs'})  # that no rover does without
+
 _CLASS_WORDS = {
     SlipClass.LOW: (OK, 'low slip'),
     SlipClass.MODERATE: (OK, 'moderate slip'),
@@ -65,14 +67,16 @@ class Diagnostics:
         self._faults = faults
         self._stamp: int | None = None
         self._levels: list[int] = []
+        self._lacking: set[str] | None = None  # subjects with a fault in every set so far
 
     def due(self, estimates: EstimateSet) -> list[Status]:
         """Return the statuses if a message is due, else nothing.
 
         It is due every second of stamps, and at once when a level changes.
         """
-        faults = {**estimates.faults, **self._faults(estimates.stamp)}
-        levels = [_node_level(estimates, faults)]
+        found = estimates.faults.keys()
+        self._lacking = found - _NEEDED if self._lacking is None else self._lacking & found
+        levels = [self._node_level(estimates)]
         levels += [_wheel_level(estimates, i) for i in range(len(self._names))]
         stamp = estimates.stamp
         if (
@@ -86,40 +90,45 @@ class Diagnostics:
 
     def now(self, estimates: EstimateSet) -> list[Status]:
         """Return the status of the node, then of each wheel."""
-        faults = {**estimates.faults, **self._faults(estimates.stamp)}
         return [
-            _node_status(estimates, self._counters(), faults),
+            self._node_status(estimates),
             *(_wheel_status(estimates, i, name) for i, name in enumerate(self._names)),
         ]
 
+    def _node_level(self, estimates: EstimateSet) -> int:
+        """A rover without a sensor is not at fault; a sensor that fell silent is."""
+        if estimates.stuck:
+            return ERROR
+        lost = estimates.faults.keys() - (self._lacking or set())
+        return WARN if lost or self._faults(estimates.stamp) else OK
 
-def _node_level(estimates: EstimateSet, faults: Mapping[str, str]) -> int:
-    return ERROR if estimates.stuck else WARN if faults else OK
+    def _node_status(self, estimates: EstimateSet) -> Status:
+        faults = {**estimates.faults, **self._faults(estimates.stamp)}
+        words = ['stuck, or about to be'] if estimates.stuck else []
+        words += [f'{subject}: {fault}' for subject, fault in faults.items()]
+        return Status(
+            level=self._node_level(estimates),
+            name=f'{NODE}: estimator',
+            message='; '.join(words) or 'running',
+            hardware_id=NODE,
+            values=[('stuck', str(estimates.stuck).lower()), *_values(self._counters())],
+        )
 
 
 def _wheel_level(estimates: EstimateSet, i: int) -> int:
-    return _CLASS_WORDS.get(SlipClass(int(estimates.slip_class[i])), (WARN, ''))[0]
-
-
-def _node_status(
-    estimates: EstimateSet, counters: Mapping[str, Any], faults: Mapping[str, str]
-) -> Status:
-    words = ['stuck, or about to be'] if estimates.stuck else []
-    words += [f'{subject}: {fault}' for subject, fault in faults.items()]
-    return Status(
-        level=_node_level(estimates, faults),
-        name=f'{NODE}: estimator',
-        message='; '.join(words) or 'running',
-        hardware_id=NODE,
-        values=[('stuck', str(estimates.stuck).lower()), *_values(counters)],
-    )
+    slip_class = SlipClass(int(estimates.slip_class[i]))
+    if slip_class in _CLASS_WORDS:
+        return _CLASS_WORDS[slip_class][0]
+    if 'wheel_odometry' in estimates.faults:
+        return STALE
+    return OK if estimates.reasons[i].startswith('at rest') else WARN
 
 
 def _wheel_status(estimates: EstimateSet, i: int, name: str) -> Status:
     e = estimates
     reason = e.reasons[i]
     slip_class = SlipClass(int(e.slip_class[i]))
-    _, message = _CLASS_WORDS.get(slip_class, (WARN, reason or 'slip class unknown'))
+    message = _CLASS_WORDS[slip_class][1] if slip_class in _CLASS_WORDS else reason
     numbers = {
         'slip': e.slip[i],
         'slip_stddev': e.slip_std[i],

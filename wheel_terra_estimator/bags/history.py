@@ -128,8 +128,12 @@ class HistoryRecorder:
 
 
 def stuck_reason(reasons: Sequence[str]) -> str:
-    """Return the reasons of the wheels as one text, each said once."""
-    return '; '.join(dict.fromkeys(reason for reason in reasons if reason))
+    """Return why the rover is called stuck, out of the reasons of its wheels.
+
+    They state it after ``rover:``, each the same; without that each reason is said once.
+    """
+    parts = [reason.rpartition('rover: ')[2] for reason in reasons]
+    return '; '.join(dict.fromkeys(part for part in parts if part))
 
 
 def read_estimates(bag: Bag, namespace: str = f'/{NODE}') -> EstimateHistory:

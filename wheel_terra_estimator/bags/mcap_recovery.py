@@ -124,7 +124,7 @@ def _decompress(compression: str, packed: bytes) -> bytes:
         if compression == 'zstd':
             return decompress_zstd(packed)
         if compression == 'lz4':
-            from lz4.frame import LZ4FrameDecompressor  # type: ignore[import-untyped]
+            from lz4.frame import LZ4FrameDecompressor
 
             return bytes(LZ4FrameDecompressor().decompress(packed))
     except Exception as error:  # each library has an error class of its own

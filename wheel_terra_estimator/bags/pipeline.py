@@ -32,6 +32,8 @@ class Pipeline:
     ----------
     received : Counter
         Messages heard, by input topic.
+    transport_faults, transport_counters : dict, Counter
+        What whoever brings the messages has to say for itself in diagnostics.
     diagnostics : Diagnostics
         Says what ``/diagnostics`` is to say, and when.
     """
@@ -43,6 +45,8 @@ class Pipeline:
         self.core = EstimatorCore(configuration)
         self.received: Counter[str] = Counter()
         self.diagnostics = Diagnostics(self.names, self.counters, self._faults)
+        self.transport_faults: dict[str, str] = {}
+        self.transport_counters: Counter[str] = Counter()
         self._published = 0
         self._refused: dict[tuple[str, str], tuple[int, int]] = {}  # -> count, stamp
 
@@ -73,6 +77,7 @@ class Pipeline:
         result.update((f'{topic}_received', count) for topic, count in self.received.items())
         for (topic, reason), count in self.converter.rejected.items():
             result[f'{topic}_rejected: {reason}'] = count
+        result.update(self.transport_counters)
         result.update(self.core.health())
         return result
 
@@ -86,8 +91,9 @@ class Pipeline:
         for key, count in self.converter.rejected.items():
             if count != self._refused.get(key, (0, 0))[0]:
                 self._refused[key] = count, stamp
-        return {
+        refused = {
             topic: f'{reason} ({count} messages)'
             for (topic, reason), (count, since) in self._refused.items()
             if 0 <= stamp - since < FAULT_MEMORY
         }
+        return {**refused, **self.transport_faults}

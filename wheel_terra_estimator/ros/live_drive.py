@@ -1,0 +1,303 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Plays a recording to the real node over DDS, records what it publishes, writes the report.
+
+The live counterpart of ``wheel-terra replay``, for demonstrations and for the test that both give
+the same numbers::
+
+    python -m wheel_terra_estimator.ros.live_drive BAG -o OUT --report report.html --config ROVER
+
+The node runs in a process of its own, with reliable inputs and deep queues, so that the recording
+is heard in full however loaded the machine is.
+"""
+
+from __future__ import annotations
+
+import argparse
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import NamedTuple
+
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import TwistWithCovarianceStamped
+from rclpy.duration import Duration
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+from rclpy.serialization import deserialize_message
+from rclpy.utilities import try_shutdown
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Bool, UInt8MultiArray
+
+from wheel_terra_estimator.bags.bag_file import BagFile
+from wheel_terra_estimator.bags.convert import JOINT_OUTPUTS, stamp_of
+from wheel_terra_estimator.bags.history import read_estimates
+from wheel_terra_estimator.bags.reader import MeasurementReader, parse_remaps
+from wheel_terra_estimator.bags.storage import Bag, RawMessage, open_bag
+from wheel_terra_estimator.bags.truth import read_truth
+from wheel_terra_estimator.bags.writer import DIAGNOSTICS, NAMESPACE, STUCK, TOPICS
+from wheel_terra_estimator.configuration import reader as configuration_reader
+from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.reporting.drive_summary import as_text, summarise
+from wheel_terra_estimator.reporting.replay_report import refuse_existing, write_replay_report
+from wheel_terra_estimator.ros.estimator_node import MESSAGE_TYPES
+
+QUEUE = 5000
+DISCOVERY_TIMEOUT = 60.0  # [s]
+QUIET = 3.0  # [s] without an output after the last input: the node is done
+
+OUTPUT_MESSAGES = {
+    **{f'{NAMESPACE}/{topic}': JointState for topic in JOINT_OUTPUTS},
+    f'{NAMESPACE}/slip_class': UInt8MultiArray,
+    f'{NAMESPACE}/twist': TwistWithCovarianceStamped,
+    STUCK: Bool,
+    DIAGNOSTICS: DiagnosticArray,
+}
+
+
+class Heard(NamedTuple):
+    """An output of the node: topic and CDR bytes, in the order of arrival."""
+
+    topic: str
+    data: bytes
+
+
+def drive(
+    bag: Bag,
+    configuration: Configuration,
+    remaps: Mapping[str, str],
+    rate: float = 0.0,
+    arrival: Path | None = None,
+) -> list[Heard]:
+    """Play a bag to a node and return what it published.
+
+    Parameters
+    ----------
+    bag : Bag
+        The recording.
+    configuration : Configuration
+        What the node is to be started with.
+    remaps : mapping of str to str
+        Estimator's topic to the bag's.
+    rate : float
+        Speed, 1 = as recorded, 0 = as fast as the node takes it.
+    arrival : Path, optional
+        Where the node logs its order of arrival.
+
+    Raises
+    ------
+    UserError
+        The node did not come up, or ended on its own.
+    """
+    topics = MeasurementReader(bag, remaps, configuration).topics
+    with TemporaryDirectory() as folder, _context():
+        parameters = Path(folder) / 'parameters.yaml'
+        configuration.write(parameters)
+        with _running_node(_node_arguments(parameters, topics, arrival)) as process:
+            player = _Player(topics)
+            try:
+                player.wait_for_partners(process)
+                names = {topic: name for name, topic in topics.items()}
+                player.play(bag.messages(tuple(names)), names, rate)
+                player.wait_for_end()
+            finally:
+                player.destroy_node()
+        return player.heard
+
+
+def _node_arguments(parameters: Path, topics: Mapping[str, str], arrival: Path | None) -> list[str]:
+    settings = {
+        f'qos_overrides./{name}.subscription.{policy}': value
+        for name in topics
+        for policy, value in (('reliability', 'reliable'), ('depth', QUEUE))
+    }
+    settings.update(
+        (f'qos_overrides.{topic}.publisher.depth', QUEUE)
+        for topic in OUTPUT_MESSAGES
+        if topic != STUCK
+    )
+    if arrival is not None:
+        settings['record_arrival'] = str(arrival)
+    arguments = ['--ros-args', '--params-file', str(parameters)]
+    for name, value in settings.items():
+        arguments += ['-p', f'{name}:={value}']
+    return arguments
+
+
+@contextmanager
+def _context() -> Iterator[None]:
+    rclpy.init()
+    try:
+        yield
+    finally:
+        try_shutdown()
+
+
+@contextmanager
+def _running_node(arguments: Sequence[str]) -> Iterator[subprocess.Popen[bytes]]:
+    """Run the node; it is stopped as by Ctrl-C."""
+    process = subprocess.Popen(
+        [sys.executable, '-m', 'wheel_terra_estimator.ros.estimator_node', *arguments]
+    )
+    try:
+        yield process
+    finally:
+        if process.poll() is None:
+            process.send_signal(signal.SIGINT)
+        try:
+            process.wait(10.0)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
+
+
+class _Player(Node):
+    """Publishes the inputs as they lie in the bag and keeps the outputs."""
+
+    def __init__(self, topics: Mapping[str, str]) -> None:
+        super().__init__('wheel_terra_drive_player')
+        self.heard: list[Heard] = []
+        self._last_stamp = 0
+        self._inputs = {
+            name: self.create_publisher(MESSAGE_TYPES[name], name, QoSProfile(depth=QUEUE))
+            for name in topics
+        }
+        for topic, kind in OUTPUT_MESSAGES.items():
+            profile = QoSProfile(depth=QUEUE)
+            if topic == STUCK:
+                profile.durability = profile.durability.TRANSIENT_LOCAL
+            self.create_subscription(kind, topic, partial(self._keep, topic), profile, raw=True)
+
+    def wait_for_partners(self, process: subprocess.Popen[bytes]) -> None:
+        """Wait until every topic has its partner, by counting endpoints."""
+
+        def ready() -> bool:
+            if process.poll() is not None:
+                raise UserError('the node ended by itself; its message stands above')
+            return all(p.get_subscription_count() for p in self._inputs.values()) and all(
+                self.count_publishers(topic) for topic in OUTPUT_MESSAGES
+            )
+
+        if not self._spin_until(ready, DISCOVERY_TIMEOUT):
+            raise UserError(f'the node was not found within {DISCOVERY_TIMEOUT:.0f} s')
+
+    def play(self, messages: Iterator[RawMessage], names: Mapping[str, str], rate: float) -> None:
+        """Publish messages at their pace; in between take what the node publishes."""
+        begin = None
+        for count, message in enumerate(messages):
+            if begin is None:
+                begin = message.log_time, time.monotonic()
+            if rate > 0.0:
+                due = begin[1] + (message.log_time - begin[0]) * 1e-9 / rate
+                self._spin_until(partial(_past, due), max(due - time.monotonic(), 0.0))
+            publisher = self._inputs[names[message.topic]]
+            publisher.publish(message.data)
+            if rate <= 0.0 and count % 20 == 19:
+                publisher.wait_for_all_acked(Duration(seconds=5))
+                self._spin_until(lambda: False, 0.02)
+
+    def wait_for_end(self) -> None:
+        """Wait until the node says nothing new."""
+        count = -1
+        while count != len(self.heard):
+            count = len(self.heard)
+            self._spin_until(lambda: False, QUIET)
+            # Diagnostics go on for ever.
+            if all(heard.topic == DIAGNOSTICS for heard in self.heard[count:]):
+                return
+
+    def _keep(self, topic: str, data: bytes) -> None:
+        self.heard.append(Heard(topic, bytes(data)))
+
+    def _spin_until(self, condition: Callable[[], bool], seconds: float) -> bool:
+        end = time.monotonic() + seconds
+        while not condition():
+            left = end - time.monotonic()
+            if left <= 0.0:
+                return False
+            rclpy.spin_once(self, timeout_sec=min(left, 0.05))
+        return True
+
+
+def _past(due: float) -> bool:
+    return time.monotonic() >= due
+
+
+def record(heard: Sequence[Heard], path: Path, start: int, overwrite: bool = False) -> None:
+    """Write outputs of the node to a bag; log times are the stamps of the sets.
+
+    Parameters
+    ----------
+    heard : sequence of Heard
+        Outputs in the order of arrival.
+    path : Path
+        Folder to be made.
+    start : int
+        Log time of what came before the first set [ns].
+    overwrite : bool
+        Whether an earlier bag is replaced.
+    """
+    log_time = start
+    with BagFile(path, TOPICS, latched=(STUCK,), overwrite=overwrite) as file:
+        for topic, data in heard:
+            if topic == f'{NAMESPACE}/slip':
+                log_time = max(log_time, stamp_of(deserialize_message(data, JointState)))
+            file.write_raw(topic, data, log_time)
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the program."""
+    parser = argparse.ArgumentParser(description='Play a recording to the real node.')
+    parser.add_argument('bag', type=Path, metavar='BAG')
+    parser.add_argument('-o', dest='output', type=Path, required=True, metavar='DIR')
+    parser.add_argument('--report', type=Path, metavar='F.html')
+    parser.add_argument('--remap', action='append', default=[], metavar='FROM:=TO')
+    parser.add_argument(
+        '--rate', type=float, default=0.0, help='1 = as recorded; 0 = as fast as it goes (default)'
+    )
+    parser.add_argument('--arrival', type=Path, metavar='F', help='log of the order of arrival')
+    parser.add_argument('--overwrite', action='store_true')
+    configuration_reader.add_arguments(parser)
+    arguments = parser.parse_args(argv)
+    try:
+        _run(arguments)
+    except UserError as error:
+        print(f'live_drive: {error}', file=sys.stderr)
+        return 2
+    return 0
+
+
+def _run(arguments: argparse.Namespace) -> None:
+    configuration = configuration_reader.from_arguments(arguments)
+    remaps = parse_remaps(arguments.remap)
+    if arguments.report:
+        refuse_existing(arguments.report, arguments.overwrite)
+    with open_bag(arguments.bag) as bag:
+        reader = MeasurementReader(bag, remaps, configuration)
+        heard = drive(bag, configuration, remaps, arguments.rate, arguments.arrival)
+        start = next(bag.messages(tuple(reader.topics.values()))).log_time
+        record(heard, arguments.output, start, arguments.overwrite)
+        truth = read_truth(bag, remaps, configuration)
+        counts = {name: bag.topics[topic].message_count for name, topic in reader.topics.items()}
+    with open_bag(arguments.output) as estimates:
+        history = read_estimates(estimates)
+    title = f'{arguments.bag.resolve().name}, live'
+    notes = [f'not in the bag: {", ".join(reader.absent)}'] if reader.absent else []
+    summary = summarise(title, history, reader.topics, counts, {}, notes)
+    print(as_text(summary))
+    print(f'estimates: {arguments.output}')
+    if arguments.report:
+        write_replay_report(arguments.report, summary, history, truth, configuration)
+        print(f'report: {arguments.report}')
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,111 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Publishers of the estimator and the messages they send."""
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Sequence
+
+from builtin_interfaces.msg import Time
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from geometry_msgs.msg import TwistWithCovarianceStamped
+from rclpy.node import Node
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Bool, MultiArrayDimension, UInt8MultiArray
+
+from wheel_terra_estimator.bags.convert import (
+    BASE_FRAME,
+    JOINT_OUTPUTS,
+    joint_fields,
+    twist_covariance,
+)
+from wheel_terra_estimator.bags.diagnostics import Status
+from wheel_terra_estimator.estimation.estimates import EstimateSet
+from wheel_terra_estimator.ros.qos import OVERRIDABLE, output_profile
+
+
+class EstimatePublisher:
+    """Publishes estimate sets on the private topics of a node, and its diagnostics.
+
+    Parameters
+    ----------
+    node : Node
+        Owner of the publishers.
+    names : tuple of str
+        Wheel names.
+    """
+
+    def __init__(self, node: Node, names: tuple[str, ...]) -> None:
+        self._names = names
+        self._stuck: bool | None = None
+
+        def publisher(kind: type, topic: str, latched: bool = False):  # type: ignore[no-untyped-def]
+            return node.create_publisher(
+                kind, topic, output_profile(latched), qos_overriding_options=OVERRIDABLE
+            )
+
+        self._joint_publishers = {t: publisher(JointState, f'~/{t}') for t in JOINT_OUTPUTS}
+        self._class_publisher = publisher(UInt8MultiArray, '~/slip_class')
+        self._twist_publisher = publisher(TwistWithCovarianceStamped, '~/twist')
+        self._stuck_publisher = publisher(Bool, '~/stuck', latched=True)
+        self._diagnostics_publisher = publisher(DiagnosticArray, '/diagnostics')
+        # Messages are made once and filled anew: publishing copies them.
+        self._joint_messages = {topic: JointState() for topic in JOINT_OUTPUTS}
+        self._twist = TwistWithCovarianceStamped()
+        for message in (*self._joint_messages.values(), self._twist):
+            message.header.frame_id = BASE_FRAME
+        self._classes = UInt8MultiArray()
+        size = len(names)
+        self._classes.layout.dim = [MultiArrayDimension(label='wheel', size=size, stride=size)]
+
+    def publish(self, estimates: EstimateSet) -> None:
+        """Publish all messages of a set."""
+        stamp = time_message(estimates.stamp)
+        for topic, fields in joint_fields(estimates, self._names).items():
+            message = self._joint_messages[topic]
+            message.header.stamp = stamp
+            if len(message.name) != len(fields.name):
+                message.name = list(fields.name)
+            message.position = fields.position
+            message.velocity = fields.velocity
+            message.effort = fields.effort
+            self._joint_publishers[topic].publish(message)
+            if topic == 'slip':
+                self._classes.data = array('B', estimates.slip_class.tolist())
+                self._class_publisher.publish(self._classes)
+        self._twist.header.stamp = stamp
+        self._twist.twist.twist.linear.x = estimates.forward_velocity
+        self._twist.twist.twist.angular.z = estimates.yaw_rate
+        self._twist.twist.covariance = twist_covariance(estimates)
+        self._twist_publisher.publish(self._twist)
+        self.publish_stuck(estimates.stuck)
+
+    def publish_stuck(self, stuck: bool) -> None:
+        """Publish the stuck warning if it is new."""
+        if stuck != self._stuck:
+            self._stuck = stuck
+            self._stuck_publisher.publish(Bool(data=stuck))
+
+    def publish_diagnostics(self, stamp: Time, statuses: Sequence[Status]) -> None:
+        """Publish statuses on ``/diagnostics``."""
+        message = DiagnosticArray()
+        message.header.stamp = stamp
+        message.header.frame_id = BASE_FRAME
+        message.status = [
+            DiagnosticStatus(
+                level=bytes([status.level]),
+                name=status.name,
+                message=status.message,
+                hardware_id=status.hardware_id,
+                values=[KeyValue(key=key, value=value) for key, value in status.values],
+            )
+            for status in statuses
+        ]
+        self._diagnostics_publisher.publish(message)
+
+
+def time_message(stamp: int) -> Time:
+    """Return a stamp [ns] as a message."""
+    seconds, nanoseconds = divmod(stamp, 1_000_000_000)
+    return Time(sec=seconds, nanosec=nanoseconds)

@@ -1,0 +1,83 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""The declared table of parameters as ROS parameters, checked by the one reader."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
+from rclpy.node import Node
+
+from wheel_terra_estimator.configuration import reader
+from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.configuration.parameters import Parameter, declared
+
+OWN_PARAMETERS = {
+    'record_arrival': (
+        '',
+        'file that gets one line (topic, stamp in ns) for each input in the order of arrival, for '
+        '`wheel-terra replay --arrival`; empty = none',
+    ),
+    'executor': (
+        'single_threaded',
+        "single_threaded, or events: rclpy's experimental executor, less CPU",
+    ),
+}
+"""Parameters of the process rather than of the estimator: default and meaning."""
+
+
+def take_overrides(node: Node) -> dict[str, Any]:
+    """Return what the user gave a node, and clear the way to declare it properly.
+
+    The node must have been made with ``automatically_declare_parameters_from_overrides``: only so
+    are parameters seen that nobody declares, misspelt ones above all.
+    """
+    given = {}
+    for name in node.get_parameters_by_prefix(''):
+        if name in reader.STANDARD_PARAMETERS or name.startswith(reader.STANDARD_PREFIXES):
+            continue
+        given[name] = node.get_parameter(name).value
+        node.undeclare_parameter(name)
+    return given
+
+
+def declare_parameters(node: Node) -> Configuration:
+    """Check and declare all parameters; they are read once, so all are read-only.
+
+    Raises
+    ------
+    UserError
+        If a parameter is unknown or its value cannot be used.
+    """
+    given = take_overrides(node)
+    for name, (default, meaning) in OWN_PARAMETERS.items():
+        value = str(given.pop(name, default))
+        descriptor = ParameterDescriptor(description=meaning, read_only=True)
+        node.declare_parameter(name, value, descriptor, ignore_override=True)
+    configuration = reader.from_parameters(given, source='parameters')
+    values = configuration.flat()
+    for key, parameter in declared().items():
+        node.declare_parameter(key, values[key], _descriptor(parameter), ignore_override=True)
+    return configuration
+
+
+def _descriptor(parameter: Parameter) -> ParameterDescriptor:
+    unit = f' [{parameter.unit}]' if parameter.unit else ''
+    descriptor = ParameterDescriptor(
+        description=f'{parameter.meaning}{unit}',
+        additional_constraints=parameter.allowed,
+        read_only=True,
+    )
+    finite = parameter.lower > float('-inf') and parameter.upper < float('inf')
+    if finite and parameter.kind == 'number':
+        descriptor.floating_point_range = [
+            FloatingPointRange(
+                from_value=float(parameter.lower), to_value=float(parameter.upper), step=0.0
+            )
+        ]
+    elif finite and parameter.kind == 'integer':
+        descriptor.integer_range = [
+            IntegerRange(from_value=int(parameter.lower), to_value=int(parameter.upper), step=1)
+        ]
+    return descriptor
