@@ -1,9 +1,18 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Closed form: the stresses replaced by triangles with their peak at the peak angle.
+"""Closed forms of load, pull and torque at given contact angles.
 
-Form of Iagnemma, Shibly and Ding/Yoshida/Nagatani, derived again here by parts. With
-``maths = ScalarMaths`` everything runs on floats.
+Two of them:
+
+* ``triangle_forces``: the field's linearised stresses. Both stresses are triangles with their
+  peak at the peak angle, which gives the coefficients A, B, C, and from them the drawbar pull
+  without soil parameters (``decoupled_pull``).
+* ``forces``: one representative angle per side of the peak, placed and weighted by the exact
+  moments of the pressure-sinkage curve, so that the shape of the normal stress (its exponent)
+  and the growth of shear along the contact are kept. Nothing in it is fitted; over the
+  validation family its error is some ten times smaller than that of the triangles.
+
+With ``maths = ScalarMaths`` everything runs on floats.
 """
 
 from __future__ import annotations
@@ -14,7 +23,14 @@ import numpy as np
 
 from wheel_terra_estimator.terramechanics import stresses
 from wheel_terra_estimator.terramechanics.contact import Contact
+from wheel_terra_estimator.terramechanics.kinematics import shear_displacement
 from wheel_terra_estimator.terramechanics.terms import Terms
+
+# Stress that effects add (a hard layer) is integrated with Gauss's four points per side.
+_POINTS, _WEIGHTS = (
+    (0.5 * (nodes + 1.0)).tolist() if k == 0 else (0.5 * nodes).tolist()
+    for k, nodes in enumerate(np.polynomial.legendre.leggauss(4))
+)
 
 
 def coefficients(
@@ -23,32 +39,13 @@ def coefficients(
     """Integrals A, B, C of a unit triangle times cos t, sin t and 1 over the contact.
 
     A = (cos tm - cos t2)/(tm - t2) + (cos tm - cos t1)/(t1 - tm), B the same with sines,
-    C = (t1 - t2)/2.
+    C = (t1 - t2)/2; by parts, exact.
     """
     front, rear = entrance_angle - peak_angle, peak_angle - leaving_angle
     cos_m, sin_m = maths.cos(peak_angle), maths.sin(peak_angle)
     a = (cos_m - maths.cos(leaving_angle)) / rear + (cos_m - maths.cos(entrance_angle)) / front
     b = (sin_m - maths.sin(leaving_angle)) / rear + (sin_m - maths.sin(entrance_angle)) / front
     return a, b, 0.5 * (entrance_angle - leaving_angle)
-
-
-def forces(contact: Contact, terms: Terms, maths: Any = np) -> tuple[Any, Any, Any]:
-    """Vertical force [N], longitudinal force [N] and torque [N m], angles given.
-
-    W = b (r A sigma_m + R B tau_m), F = b (R A tau_m - r B sigma_m), T = b R^2 C tau_m.
-    """
-    a, b, c = coefficients(
-        contact.entrance_angle, contact.peak_angle, contact.leaving_angle, maths
-    )
-    contact.angle = contact.peak_angle
-    contact.normal_stress = stresses.front_stress(contact, contact.peak_angle, maths)
-    terms.apply('on_normal_stress', contact, maths)
-    sigma = contact.normal_stress
-    tau = stresses.shear_stress(contact, contact.peak_angle, sigma, maths)
-    r, R, width = contact.radius, contact.shear_radius, contact.width
-    load = width * (r * a * sigma + R * b * tau)
-    pull = width * (R * a * tau - r * b * sigma)
-    return load, pull, width * R * R * c * tau
 
 
 def decoupled_pull(
@@ -62,7 +59,134 @@ def decoupled_pull(
 ) -> Any:
     """Drawbar pull from torque, load and contact angles: no soil parameter, no width [N].
 
-    F = (A^2 + B^2)/(A C) T/R - (B/A) W: eliminate both peak stresses from the three balances.
+    F = (A^2 + B^2)/(A C) T/R - (B/A) W: both peak stresses eliminated from the three balances.
     """
     a, b, c = coefficients(entrance_angle, peak_angle, leaving_angle, maths)
     return (a * a + b * b) / (a * c) * torque / shear_radius - b / a * normal_load
+
+
+def triangle_forces(contact: Contact, terms: Terms, maths: Any = np) -> tuple[Any, Any, Any]:
+    """Load [N], pull [N] and torque [N m] of triangular stresses, angles given.
+
+    W = b (r A sigma_m + R B tau_m), F = b (R A tau_m - r B sigma_m), T = b R^2 C tau_m.
+    """
+    peak = contact.peak_angle
+    a, b, c = coefficients(contact.entrance_angle, peak, contact.leaving_angle, maths)
+    contact.angle = peak
+    contact.normal_stress = stresses.front_stress(contact, peak, maths)
+    terms.apply('on_normal_stress', contact, maths)
+    sigma = contact.normal_stress
+    tau = stresses.shear_stress(contact, peak, sigma, maths)
+    r, R, width = contact.radius, contact.shear_radius, contact.width
+    load = width * (r * a * sigma + R * b * tau)
+    pull = width * (R * a * tau - r * b * sigma)
+    return load, pull, width * R * R * c * tau
+
+
+def branch_moments(exponent: Any, skew: Any) -> tuple[Any, Any]:
+    """Area and centroid of the stress on one side of its peak, both as shares.
+
+    For small angles the stress is [v (1 + q (1 - v))]^N of its peak, with v = 0 at the edge of
+    the contact, 1 at the peak, and q = (t1 - tm)/(t1 + tm); its moments, as a series in q
+    (exact for N = 1).
+
+    Parameters
+    ----------
+    exponent, skew : float or array_like
+        N and q.
+
+    Returns
+    -------
+    area : float or numpy.ndarray
+        Integral over v.
+    centroid : float or numpy.ndarray
+        Mean v; 2/3 for a triangle.
+    """
+    n, q = exponent, skew
+    area = (1.0 + n * q / (n + 2.0) * (1.0 + (n - 1.0) * q / (n + 3.0))) / (n + 1.0)
+    first = (1.0 + n * q / (n + 3.0) * (1.0 + (n - 1.0) * q / (n + 4.0))) / (n + 2.0)
+    return area, first / area
+
+
+def moment_spread(exponent: Any) -> Any:
+    """Variance of v under the stress v^N: (N + 1)/((N + 2)^2 (N + 3))."""
+    return (exponent + 1.0) / ((exponent + 2.0) ** 2 * (exponent + 3.0))
+
+
+def mean_share_front(displacement: Any, maths: Any = np) -> Any:
+    """Mobilised share of shear strength in front of the peak; argument j/K at its centroid.
+
+    The mean of exp(-j/K) over the branch, where j spreads from 0: (1 + x/8)^-8 (the mean over a
+    gamma distribution whose variance is that of the stress-weighted j) instead of exp(-x).
+    """
+    base = 1.0 / (1.0 + 0.125 * maths.abs(displacement))
+    base = base * base
+    base = base * base
+    share = 1.0 - base * base
+    return maths.where(displacement >= 0.0, share, -share)
+
+
+def mean_share_rear(displacement: Any, maths: Any = np) -> Any:
+    """Return the same behind the peak, where j spreads less around its mean: (1 + x/16)^-16."""
+    base = 1.0 / (1.0 + 0.0625 * maths.abs(displacement))
+    base = base * base
+    base = base * base
+    base = base * base
+    share = 1.0 - base * base
+    return maths.where(displacement >= 0.0, share, -share)
+
+
+def forces(contact: Contact, terms: Terms, maths: Any = np) -> tuple[Any, Any, Any]:
+    """Load [N], pull [N] and torque [N m] from branch moments, angles given."""
+    t1, tm, t2 = contact.entrance_angle, contact.peak_angle, contact.leaving_angle
+    front, rear = t1 - tm, tm - t2
+    exponent, R, ratio = contact.sinkage_exponent, contact.shear_radius, contact.velocity_ratio
+    area, centroid = branch_moments(exponent, front / (t1 + tm))
+    spread = 0.5 * moment_spread(exponent)
+    peak = stresses.front_stress(contact, tm, maths) * area
+    load = pull = torque = 0.0
+    for span, angle, middle, mean_share in (
+        (front, t1 - front * centroid, t1 - 0.5 * front, mean_share_front),
+        (rear, t2 + rear * centroid, tm - 0.5 * rear, mean_share_rear),
+    ):
+        displacement = shear_displacement(angle, t1, R, ratio, maths)
+        share = mean_share(displacement / contact.shear_modulus, maths)
+        normal = peak * span * (1.0 - spread * span * span) * contact.radius
+        friction = normal / contact.radius * contact.tan_friction * share * R
+        cohesion = contact.cohesion * span * share * R
+        cosine, sine = maths.cos(angle), maths.sin(angle)
+        cos_middle, sin_middle = maths.cos(middle), maths.sin(middle)
+        load = load + normal * cosine + friction * sine + cohesion * sin_middle
+        pull = pull + friction * cosine + cohesion * cos_middle - normal * sine
+        torque = torque + friction + cohesion
+    width = contact.width
+    result = width * load, width * pull, width * R * torque
+    if terms.stages['on_normal_stress']:
+        added = _added_stress_forces(contact, terms, maths)
+        result = tuple(a + b for a, b in zip(result, added, strict=True))
+    return result
+
+
+def _added_stress_forces(contact: Contact, terms: Terms, maths: Any) -> tuple[Any, Any, Any]:
+    """Forces of what the effects add to the normal stress, and of its friction."""
+    t1, tm, t2 = contact.entrance_angle, contact.peak_angle, contact.leaving_angle
+    R, ratio = contact.shear_radius, contact.velocity_ratio
+    load = pull = torque = 0.0
+    for low, high, behind in ((tm, t1, False), (t2, tm, True)):
+        for point, weight in zip(_POINTS, _WEIGHTS, strict=True):
+            angle = low + (high - low) * point
+            mirror = t1 - (t1 - tm) * (point if behind else 1.0 - point)
+            stress = stresses.front_stress(contact, mirror, maths)
+            contact.angle, contact.normal_stress = angle, stress
+            terms.apply('on_normal_stress', contact, maths)
+            normal = (contact.normal_stress - stress) * weight * (high - low)
+            displacement = shear_displacement(angle, t1, R, ratio, maths)
+            share = stresses.mobilised_share(displacement, contact.shear_modulus, maths)
+            shear = normal * contact.tan_friction * share * R
+            normal = normal * contact.radius
+            cosine, sine = maths.cos(angle), maths.sin(angle)
+            load = load + normal * cosine + shear * sine
+            pull = pull + shear * cosine - normal * sine
+            torque = torque + shear
+    width = contact.width
+    return width * load, width * pull, width * R * torque

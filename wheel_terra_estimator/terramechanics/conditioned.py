@@ -14,13 +14,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from wheel_terra_estimator.terramechanics.branch_integrals import Direction, branch_integrals
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects import (
     EffectSettings,
     catalogue,
     check_settings,
 )
-from wheel_terra_estimator.terramechanics.kinematics import slip_of_speed_ratio
 from wheel_terra_estimator.terramechanics.maths import ScalarMaths
 from wheel_terra_estimator.terramechanics.operating_points import STANDARD_GRAVITY
 from wheel_terra_estimator.terramechanics.soil import Soil
@@ -39,6 +39,9 @@ INPUTS = (
 )
 SMALLEST_ANGLE = 2e-3  # [rad]; below, the wheel hardly touches and angles lose their meaning
 _STEP = 1e-6
+# Smallest size of speed ratio, load, c, tan(phi), K for the finite steps through the effects.
+_FLOORS = (1.0, 1.0, 100.0, 0.1, 0.01)
+_LARGEST_COSINE = math.cos(SMALLEST_ANGLE)
 
 
 class Forces(NamedTuple):
@@ -87,10 +90,12 @@ class ConditionedForces:
         slip_radius: str = 'lug_tip',
         gravity: float = STANDARD_GRAVITY,
     ) -> None:
+        if slip_radius not in ('lug_tip', 'rim'):
+            raise ValueError(f"slip radius is {slip_radius!r}; allowed: 'lug_tip', 'rim'")
         settings = check_settings(effects or {})
         known = catalogue()
-        self._inputs = Terms(settings).stages['on_inputs']
         self._terms = Terms(settings)
+        self._on_inputs = self._terms.stages['on_inputs']
         outputs = {name: values for name, values in settings.items() if known[name].on_outputs}
         self._on_sinkage = Terms(
             {n: v for n, v in outputs.items() if 'sinkage' in known[n].touches}
@@ -98,16 +103,24 @@ class ConditionedForces:
         self._on_forces = Terms(
             {n: v for n, v in outputs.items() if known[n].touches - {'sinkage'}}
         ).stages['on_outputs']
-        self._soil = soil
-        self._gravity = gravity
+        self._plain = not (self._on_inputs or self._on_sinkage or self._terms.stages['on_contact'])
+        self._exponent = float(soil.sinkage_exponent)
+        self._peak_ratio = float(soil.peak_stress_ratio)
+        self._leaving_ratio = float(soil.leaving_angle_ratio)
         columns = np.broadcast_arrays(
             *(
-                np.atleast_1d(np.asarray(v, float))
-                for v in (wheel.radius, wheel.width, wheel.lug_height, wheel.lug_count)
+                np.atleast_1d(np.asarray(value, float))
+                for value in (wheel.radius, wheel.width, wheel.lug_height, wheel.lug_count)
             )
         )
-        self._wheels = list(zip(*(c.tolist() for c in columns), strict=True))
-        self._tip = slip_radius == 'lug_tip'
+        self._wheels = []
+        for radius, width, height, count in zip(*(c.tolist() for c in columns), strict=True):
+            contact = Contact(
+                *(0.0,) * 5, gravity, *(0.0,) * 3, radius, width, height, count, *(0.0,) * 11
+            )
+            contact.density = float(soil.density)
+            contact.reference_depth = 1.0
+            self._wheels.append((contact, radius + height if slip_radius == 'lug_tip' else radius))
 
     def __len__(self) -> int:
         return len(self._wheels)
@@ -129,7 +142,7 @@ class ConditionedForces:
         slope: float = 0.0,
         direction: float = 1.0,
     ) -> Forces:
-        """Torque and pull of wheel `index`, in the direction of travel times `direction`.
+        """Torque and pull of wheel `index`, positive forward; travel along `direction`.
 
         Parameters
         ----------
@@ -143,5 +156,224 @@ class ConditionedForces:
             c [Pa], tan(phi) [-], K [m].
         centroid_shift : float
             Rotation of the stress centroid, positive towards the front [rad].
+        leaving_angle, rim_speed, pass_number, slope, direction
+            As in ``OperatingPoints``; nan = not known; direction is +1 or -1.
         """
-        raise NotImplementedError
+        contact, slip_radius = self._wheels[index]
+        contact.rim_speed, contact.pass_number = rim_speed, pass_number
+        contact.slope, contact.direction = slope, direction
+        given = (
+            max(speed_ratio, 0.0),
+            max(normal_load, 1e-3),
+            max(cohesion, 0.0),
+            max(tan_friction, 0.0),
+            max(shear_modulus, 1e-6),
+        )
+        scale, angle_rate, leaving = self._rates(
+            contact, given, slip_radius, sinkage, leaving_angle
+        )
+        t1, clamped = self._inputs(contact, given, slip_radius, sinkage)
+        set_angles(contact, t1, leaving, self._terms, ScalarMaths)
+        sink_rate = 0.0 if clamped else 1.0 / (contact.radius * math.sin(t1))
+        by_ratio, by_load, by_cohesion, by_friction, by_modulus, by_angle, exponent = scale
+        result = _respond(
+            contact,
+            centroid_shift,
+            (
+                (*by_angle, by_ratio, exponent, 0.0),
+                (sink_rate, sink_rate * angle_rate[0], sink_rate * angle_rate[1], 0.0, 0.0, 0.0),
+                (0.0, 0.0, 0.0, 0.0, 0.0, by_modulus / contact.shear_modulus),
+            ),
+            (by_load, by_cohesion, by_friction),
+        )
+        torque, pull, d_torque, d_pull = result
+        if direction < 0.0:
+            torque, pull = -torque, -pull
+            d_torque, d_pull = tuple(-d for d in d_torque), tuple(-d for d in d_pull)
+        if self._on_forces:
+            return self._with_force_terms(
+                contact, torque, pull, (d_torque, d_pull), given, slip_radius, sinkage, clamped
+            )
+        return Forces(torque, pull, d_torque, d_pull, clamped)
+
+    def _rates(
+        self,
+        contact: Contact,
+        given: tuple[float, ...],
+        slip_radius: float,
+        sinkage: float,
+        leaving_angle: float,
+    ) -> tuple[tuple, tuple[float, float], float | None]:
+        """Derivatives through the effects' terms, by one small step in all inputs at once.
+
+        Load, c, tan(phi) and K each depend on themselves alone, the angles and the exponent on
+        speed ratio and sinkage.
+        """
+        leaving = None if math.isnan(leaving_angle) else leaving_angle
+        if self._plain and leaving is None:
+            rates = (slip_radius, 1.0, 1.0, 1.0, 1.0, (0.0, 0.0, 0.0), 0.0)
+            return rates, (self._peak_ratio, self._leaving_ratio), None
+        moved = tuple(
+            value + _STEP * max(value, floor) for value, floor in zip(given, _FLOORS, strict=True)
+        )
+        before: list[float] = []
+        after: list[float] = []
+        for inputs, into in ((moved, after), (given, before)):
+            t1, _ = self._inputs(contact, inputs, slip_radius, sinkage)
+            set_angles(contact, t1, leaving, self._terms, ScalarMaths)
+            into.extend(
+                (
+                    contact.velocity_ratio,
+                    contact.normal_load,
+                    contact.cohesion,
+                    contact.tan_friction,
+                    contact.shear_modulus,
+                    contact.entrance_angle,
+                    contact.peak_angle,
+                    contact.leaving_angle,
+                    contact.sinkage_exponent,
+                )
+            )
+        steps = [m - g for m, g in zip(moved, given, strict=True)]
+        steps += [steps[0]] * 4
+        rate = [(a - b) / s for a, b, s in zip(after, before, steps, strict=True)]
+        peak, left = contact.peak_angle, contact.leaving_angle
+        set_angles(contact, contact.entrance_angle + _STEP, leaving, self._terms, ScalarMaths)
+        angle_rate = (
+            (contact.peak_angle - peak) / _STEP,
+            (contact.leaving_angle - left) / _STEP,
+        )
+        return (*rate[:5], tuple(rate[5:8]), rate[8]), angle_rate, leaving
+
+    def _inputs(
+        self, contact: Contact, given: tuple[float, ...], slip_radius: float, sinkage: float
+    ) -> tuple[float, bool]:
+        """Set the contact to the inputs, effects done; return entrance angle and clamp flag."""
+        ratio = given[0]
+        contact.slip = 1.0 - ratio if ratio <= 1.0 else 1.0 / ratio - 1.0
+        contact.velocity_ratio = ratio * slip_radius
+        contact.normal_load = contact.stated_load = given[1]
+        contact.cohesion, contact.tan_friction, contact.shear_modulus = given[2:]
+        contact.shear_radius, contact.sinkage_exponent = contact.radius, self._exponent
+        contact.peak_ratio, contact.leaving_ratio = self._peak_ratio, self._leaving_ratio
+        for term, parameters in self._on_inputs:
+            term(contact, parameters, ScalarMaths)
+        contact.sinkage = 0.0
+        for term, parameters in self._on_sinkage:
+            term(contact, parameters, ScalarMaths)
+        cosine = 1.0 - (sinkage - contact.sinkage) / contact.radius
+        if cosine > _LARGEST_COSINE:
+            return SMALLEST_ANGLE, True
+        if cosine < 0.0:
+            return 0.5 * math.pi, True
+        return math.acos(cosine), False
+
+    def _with_force_terms(
+        self,
+        contact: Contact,
+        torque: float,
+        pull: float,
+        derivatives: tuple[tuple[float, ...], tuple[float, ...]],
+        given: tuple[float, ...],
+        slip_radius: float,
+        sinkage: float,
+        clamped: bool,
+    ) -> Forces:
+        """Add the terms that act on torque and pull, and their derivatives (finite steps)."""
+
+        def added(inputs: tuple[float, ...], depth: float) -> tuple[float, float]:
+            contact.entrance_angle, _ = self._inputs(contact, inputs, slip_radius, depth)
+            contact.torque = contact.drawbar_pull = 0.0
+            for term, parameters in self._on_forces:
+                term(contact, parameters, ScalarMaths)
+            return contact.torque, contact.drawbar_pull
+
+        base = added(given, sinkage)
+        rows: list[list[float]] = [list(row) for row in derivatives]
+        # Positions of the five inputs and of the sinkage among INPUTS.
+        for column, position in ((0, 0), (2, 1), (3, 2), (4, 3), (5, 4), (1, None)):
+            inputs, depth = list(given), sinkage
+            if position is None:
+                step = _STEP * contact.radius
+                depth += step
+            else:
+                step = _STEP * (abs(given[position]) + _STEP)
+                inputs[position] += step
+            moved = added(tuple(inputs), depth)
+            for k in (0, 1):
+                rows[k][column] += (moved[k] - base[k]) / step
+        return Forces(torque + base[0], pull + base[1], tuple(rows[0]), tuple(rows[1]), clamped)
+
+
+def _respond(
+    contact: Contact,
+    shift: float,
+    directions: tuple[Direction, Direction, Direction],
+    rates: tuple[float, float, float],
+) -> tuple[float, float, tuple[float, ...], tuple[float, ...]]:
+    """Torque and pull from the load balance, and their derivatives in the order of ``INPUTS``.
+
+    The balance W/b = sigma (r Nx + R mu Fy) + R c Cy gives the peak stress sigma; then
+    T = b R^2 (mu sigma Fs + c Cs) and F = b [R (mu sigma Fx + c Cx) - r sigma Ny], with N, F, C
+    the normal, friction and cohesion integrals.
+    """
+    r, R, width = contact.radius, contact.shear_radius, contact.width
+    c, mu = contact.cohesion, contact.tan_friction
+    value, moved = branch_integrals(
+        contact.entrance_angle,
+        contact.peak_angle,
+        contact.leaving_angle,
+        R,
+        contact.velocity_ratio,
+        contact.sinkage_exponent,
+        contact.shear_modulus,
+        shift,
+        directions,
+    )
+    nx, ny, fx, fy, fs, cx, cy, cs = value
+    inverse = 1.0 / (r * nx + R * mu * fy)
+    sigma = (contact.normal_load / width - R * c * cy) * inverse
+    rubbed = mu * sigma
+    arm = width * R * R
+    torque = arm * (rubbed * fs + c * cs)
+    pull = width * (R * (rubbed * fx + c * cx) - r * sigma * ny)
+
+    d_torque, d_pull = [], []
+    for d_nx, d_ny, d_fx, d_fy, d_fs, d_cx, d_cy, d_cs in (*moved, value.turned()):
+        d_sigma = -(R * c * d_cy + sigma * (r * d_nx + R * mu * d_fy)) * inverse
+        d_torque.append(arm * (mu * d_sigma * fs + rubbed * d_fs + c * d_cs))
+        d_pull.append(
+            width
+            * (
+                R * (mu * d_sigma * fx + rubbed * d_fx + c * d_cx)
+                - r * (d_sigma * ny + sigma * d_ny)
+            )
+        )
+    # Load, cohesion, tan(phi): the integrals stay, sigma and the explicit factors move.
+    by_sigma_torque, by_sigma_pull = arm * mu * fs, width * (R * mu * fx - r * ny)
+    by_load, by_cohesion, by_friction = rates
+    s_load = by_load * inverse / width
+    s_cohesion = -by_cohesion * R * cy * inverse
+    s_friction = -by_friction * sigma * R * fy * inverse
+    return (
+        torque,
+        pull,
+        (
+            d_torque[0],
+            d_torque[1],
+            by_sigma_torque * s_load,
+            by_sigma_torque * s_cohesion + by_cohesion * arm * cs,
+            by_sigma_torque * s_friction + by_friction * arm * sigma * fs,
+            d_torque[2],
+            d_torque[3],
+        ),
+        (
+            d_pull[0],
+            d_pull[1],
+            by_sigma_pull * s_load,
+            by_sigma_pull * s_cohesion + by_cohesion * width * R * cx,
+            by_sigma_pull * s_friction + by_friction * width * R * sigma * fx,
+            d_pull[2],
+            d_pull[3],
+        ),
+    )

@@ -29,7 +29,7 @@ from wheel_terra_estimator.terramechanics.terms import (
 )
 
 FloatArray = NDArray[np.float64]
-METHODS = ('quadrature', 'closed_form')
+METHODS = ('quadrature', 'closed_form', 'triangles')
 
 # Scale of finite steps for soil parameters that may be zero.
 _SMALLEST_SCALE = {'cohesion': 100.0, 'cohesive_modulus': 1e3, 'friction_angle': 0.1}
@@ -76,7 +76,8 @@ class WheelSoilModel:
         Effect name -> parameter -> value; only switched-on effects; missing parameters take their
         defaults.
     method : str
-        ``quadrature`` (reference) or ``closed_form`` (linearised stresses, for on-board use).
+        ``quadrature`` (reference), ``closed_form`` (branch moments, for on-board use) or
+        ``triangles`` (the linearised stresses of the literature, for comparison).
     strict : bool
         True: a soil that cannot carry the load raises ``ValueError``; False: the point is clamped
         at a sinkage of one radius and flagged.
@@ -188,7 +189,9 @@ class WheelSoilModel:
     def _forces(self, contact: Contact, terms: Terms) -> tuple[Any, Any, Any]:
         if self.method == 'quadrature':
             return quadrature.forces(contact, terms, self.nodes)
-        return closed_form.forces(contact, terms)
+        if self.method == 'closed_form':
+            return closed_form.forces(contact, terms)
+        return closed_form.triangle_forces(contact, terms)
 
     def _response(
         self, contact: Contact, angle: FloatArray, points: OperatingPoints, terms: Terms

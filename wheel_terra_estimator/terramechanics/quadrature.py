@@ -15,7 +15,7 @@ from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.terms import Terms
 
 # Nodes per side; error below 1e-4 of the load over the validation family (docs/models).
-NODES = 10
+NODES = 8
 
 
 @lru_cache(maxsize=8)
