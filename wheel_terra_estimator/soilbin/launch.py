@@ -37,12 +37,14 @@ def run_case(
     folder: Path,
     cache: Path | None,
     progress: Progress | None = None,
+    stop: Callable[[], bool] = lambda: False,
     checkpoint_every: float = 120.0,
 ) -> dict[str, object]:
     """Run (or go on with) a case in a working folder; return its summary.
 
     The folder keeps ``series.npy``, ``outcome.json`` and the frames; an interrupted run leaves
-    ``checkpoint/`` and goes on from it when called again with the same case.
+    ``checkpoint/`` and goes on from it when called again with the same case. ``progress`` takes
+    (stage, fraction); ``stop`` is asked now and then whether to interrupt.
     """
     check(case)
     time_step(case)
@@ -55,7 +57,7 @@ def run_case(
         (folder / 'outcome.json').unlink(missing_ok=True)
     if not (folder / 'outcome.json').exists():
         _write(job_file, json.dumps(job | {'checkpoint_every': checkpoint_every}))
-        _engine(folder, case.name, progress)
+        _engine(folder, case.name, progress, stop)
     outcome = json.loads((folder / 'outcome.json').read_text())
     series = np.load(folder / 'series.npy')
     if len(series) < 4:
@@ -70,10 +72,10 @@ def _plain(data: object) -> object:
 def _write(path: Path, text: str) -> None:
     part = path.with_suffix('.part')
     part.write_text(text)
-    os.replace(part, path)
+    part.replace(path)
 
 
-def _engine(folder: Path, name: str, progress: Progress | None) -> None:
+def _engine(folder: Path, name: str, progress: Progress | None, stop: Callable[[], bool]) -> None:
     environment = dict(os.environ, OMP_NUM_THREADS='1')
     with (folder / 'engine.err').open('w') as errors:
         process = subprocess.Popen(
@@ -97,6 +99,9 @@ def _engine(folder: Path, name: str, progress: Progress | None) -> None:
                         words, kind = message['error'], message.get('kind', '')
                     elif progress:
                         progress(message['stage'], message['fraction'])
+                    if stop() and not interrupted:
+                        interrupted = True
+                        process.send_signal(signal.SIGTERM)
                 break
             except KeyboardInterrupt:
                 interrupted = True

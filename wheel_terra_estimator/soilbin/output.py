@@ -7,7 +7,6 @@ from __future__ import annotations
 import csv
 import json
 import math
-import os
 import shutil
 from collections.abc import Mapping
 from pathlib import Path
@@ -71,7 +70,7 @@ def write_rows(path: Path, rows: list[dict[str, float]]) -> None:
         writer.writeheader()
         for row in rows:
             writer.writerow({name: f'{row[name]:.6g}' for name in ROW_COLUMNS})
-    os.replace(part, path)
+    part.replace(path)
 
 
 def write_folder(
@@ -100,7 +99,7 @@ def write_folder(
     if math.isnan(case.operation.imposed_slip):
         case_data['operation']['imposed_slip'] = None
     part.write_text(json.dumps({'summary': finite, 'case': case_data}, indent=2) + '\n')
-    os.replace(part, folder / 'summary.json')
+    part.replace(folder / 'summary.json')
     shutil.rmtree(work / 'checkpoint', ignore_errors=True)
 
 
@@ -116,8 +115,7 @@ def as_text(summary: Mapping[str, object]) -> str:
         return float(str(summary[name]))
 
     lines = [
-        f'slip {100 * number("slip"):.1f} % '
-        f'(second half {100 * number("slip_second_half"):.1f} %)',
+        f'slip {100 * number("slip"):.1f} % (second half {100 * number("slip_second_half"):.1f} %)',
         f'H {number("gross_traction"):.2f} N, R_r {number("motion_resistance"):.2f} N, '
         f'P_d {number("net_traction"):.2f} N (demanded {number("demanded_pull"):.2f} N)',
         f'torque H r_w {number("torque_gross"):.3f} N m, on the body '

@@ -28,32 +28,36 @@ def _figure(width: float, height: float) -> tuple[Any, Any]:
     return figure, figure.add_subplot()
 
 
+def _discs(axes: Any, centres: np.ndarray, diameters: np.ndarray, **style: Any) -> Any:
+    from matplotlib.collections import EllipseCollection
+
+    discs = EllipseCollection(
+        diameters,
+        diameters,
+        np.zeros_like(diameters),
+        units='xy',
+        offsets=centres,
+        transOffset=axes.transData,
+        cmap='YlOrRd',
+        linewidths=0,
+        **style,
+    )
+    axes.add_collection(discs)
+    return discs
+
+
 def _bed(axes: Any, frame: Mapping[str, np.ndarray], colours: np.ndarray, case: Case) -> Any:
     """Draw grains and wheel, turned so that gravity points down the picture."""
-    from matplotlib.collections import EllipseCollection
     from matplotlib.patches import Circle
 
     slope = case.operation.slope
     turn = np.array([[math.cos(slope), -math.sin(slope)], [math.sin(slope), math.cos(slope)]])
-    sizes = 2 * frame['radii']
-    grains = EllipseCollection(
-        sizes, sizes, np.zeros_like(sizes), units='xy', offsets=frame['centres'] @ turn.T,
-        transOffset=axes.transData, array=colours, cmap='YlOrRd', linewidths=0,
-    )  # fmt: skip
-    axes.add_collection(grains)
+    grains = _discs(axes, frame['centres'] @ turn.T, 2 * frame['radii'], array=colours)
     axle = turn @ frame['axle']
     wheel = case.wheel
     axes.add_patch(Circle(tuple(axle), wheel.rim_radius, facecolor='#c8d5f0', edgecolor='#41598a'))
-    # The wheel turns clockwise; where its lugs started does not matter to the picture.
-    angle = -case.rim_rate * float(frame['time']) + slope
-    lugs = geometry.lug_discs(wheel, angle)
-    diameter = np.full(len(lugs), geometry.LUG_DISC)
-    axes.add_collection(
-        EllipseCollection(
-            diameter, diameter, 0 * diameter, units='xy', offsets=lugs + axle,
-            transOffset=axes.transData, facecolors='#41598a', linewidths=0,
-        )  # fmt: skip
-    )
+    lugs = frame['lugs'] @ turn.T
+    _discs(axes, lugs, np.full(len(lugs), geometry.LUG_DISC), facecolors='#41598a')
     walls, _ = geometry.wall_discs(case)
     walls = walls[walls[:, 1] < 0.15] @ turn.T
     axes.plot(walls[:, 0], walls[:, 1], ',', color='0.3')
@@ -74,7 +78,7 @@ def _load(path: Path) -> dict[str, np.ndarray]:
 def draw(
     frame_file: Path, first_file: Path, case: Case, summary: Mapping[str, object], target: Path
 ) -> None:
-    """Draw the end of the run, grains coloured by their displacement in the travel (figs 19, 20)."""
+    """Draw the end of the run, grains coloured by their displacement (figures 19, 20)."""
     frame, first = _load(frame_file), _load(first_file)
     moved = 1000 * np.linalg.norm(frame['centres'] - first['centres'], axis=1)
     figure, axes = _figure(10, 5)
@@ -85,9 +89,7 @@ def draw(
     figure.savefig(target, dpi=130)
 
 
-def film(
-    files: Sequence[Path], case: Case, summary: Mapping[str, object], target: Path
-) -> None:
+def film(files: Sequence[Path], case: Case, summary: Mapping[str, object], target: Path) -> None:
     """Write a GIF, grains coloured by displacement in 0.1 s, red from 1 mm on (fig. 10)."""
     import imageio.v3 as imageio
 
@@ -101,7 +103,9 @@ def film(
         grains = _bed(axes, frame, moved, case)
         grains.set_clim(0, 1000 * MOVED)
         figure.colorbar(grains, ax=axes, label='displacement in 0.1 s [mm]', shrink=0.7)
-        axes.set_title(f'{_title(case, summary)}, {case.operation.speed_factor * float(frame["time"]):.1f} s')
+        axes.set_title(
+            f'{_title(case, summary)}, {case.operation.speed_factor * float(frame["time"]):.1f} s'
+        )
         figure.set_dpi(80)
         figure.canvas.draw()
         pictures.append(np.asarray(figure.canvas.buffer_rgba())[..., :3].copy())

@@ -54,6 +54,6 @@ def store(target: Path | None, write: Callable[[Path], None]) -> None:
         target.parent.mkdir(parents=True, exist_ok=True)
         write(part)
         if part.exists() and part.stat().st_size > 0:
-            os.replace(part, target)
+            part.replace(target)
     except OSError:
         part.unlink(missing_ok=True)

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import json
 import math
-import os
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -22,11 +21,11 @@ Report = Callable[[str, float], None]
 CHUNK = 400  # steps between two looks at the interrupt flag
 
 
-class Interrupted(Exception):
+class InterruptedRunError(Exception):
     """The user wants to stop; the state has been saved."""
 
 
-class NotSettled(Exception):
+class NotSettledError(Exception):
     """The bed does not come to rest."""
 
 
@@ -66,7 +65,7 @@ class Run:
             done += chunk
             self.report(stage, done / total)
             if self.stop_asked():
-                raise Interrupted
+                raise InterruptedRunError
 
     # -- bed ------------------------------------------------------------------------------------
 
@@ -99,7 +98,7 @@ class Run:
             self.advance('consolidation', self.steps(duration))
             if self.engine.rms_speed() <= bed.settled_speed:
                 return
-        raise NotSettled(
+        raise NotSettledError(
             f'the level bed still moves at {1000 * self.engine.rms_speed():.1f} mm/s (rms) after '
             f'{3 * duration:.1f} s: raise soilbin.bed.settling_time, '
             'soilbin.bed.settled_speed or soilbin.grains.damping_ratio'
@@ -121,7 +120,7 @@ class Run:
         self.advance('turning', self.steps(0.5 * self._slowness()))
         speed = self.engine.rms_speed()
         if speed > self.case.bed.settled_speed:
-            raise NotSettled(
+            raise NotSettledError(
                 f'the bed itself slides on a slope of {math.degrees(operation.slope):g} deg: '
                 f'{1000 * speed:.1f} mm/s (rms) with no wheel on it. These grains are too weak '
                 'for this slope: raise soilbin.grains.rolling_friction, or flatten the slope'
@@ -197,7 +196,7 @@ class Run:
                 self.checkpoint(series)
                 saved = self.clock()
             if asked:
-                raise Interrupted
+                raise InterruptedRunError
         return ''
 
     def _sample(self, time: float) -> list[float]:
@@ -208,7 +207,7 @@ class Run:
         return [values[name] for name in SERIES]
 
     def _frame(self, number: int, time: float) -> None:
-        ids, centres, radii, velocity = self.engine.grains()
+        _, centres, radii, velocity = self.engine.grains()
         x, y = self.engine.axle()
         frames = self.folder / 'frames'
         frames.mkdir(exist_ok=True)
@@ -218,6 +217,7 @@ class Run:
             velocity=velocity.astype(np.float32),
             radii=radii.astype(np.float32),
             axle=np.array([x, y]),
+            lugs=self.engine.lug_positions().astype(np.float32),
             time=time,
         )
 
@@ -248,7 +248,7 @@ class Run:
         np.save(new / 'series.npy', np.asarray(series))
         (new / 'facts.json').write_text(json.dumps({'facts': self.facts}))
         shutil.rmtree(old, ignore_errors=True)
-        os.replace(new, old)
+        new.replace(old)
 
     def restart(self) -> tuple[dict, list[list[float]]] | None:
         """Load the checkpoint, if there is a whole one."""

@@ -7,8 +7,8 @@ from __future__ import annotations
 import csv
 import hashlib
 import json
-import os
 import shutil
+import threading
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
@@ -33,11 +33,13 @@ class Job:
         return hashlib.sha256(json.dumps(data, sort_keys=True).encode()).hexdigest()[:12]
 
 
-def run_job(job: Job, work: str, cache: str) -> dict[str, object]:
+def run_job(
+    job: Job, work: str, cache: str, stop: Callable[[], bool] = lambda: False
+) -> dict[str, object]:
     """Run one job; a case that cannot give a result gives a row that says why."""
     folder = Path(work) / job.key
     try:
-        row = run_case(job.case, folder, Path(cache) if cache else None)
+        row = run_case(job.case, folder, Path(cache) if cache else None, stop=stop)
     except CaseFailedError as error:
         row = {'stopped': str(error)}
     shutil.rmtree(folder, ignore_errors=True)
@@ -86,12 +88,17 @@ def run_study(
 def _on_this_machine(
     jobs: Sequence[Job], work: str, cache: str, workers: int, _: str
 ) -> Iterable[dict[str, object]]:
+    stop = threading.Event()
     with ThreadPoolExecutor(workers) as pool:
-        running: list[Future] = [pool.submit(run_job, job, work, cache) for job in jobs]
+        running: list[Future] = [
+            pool.submit(run_job, job, work, cache, stop.is_set) for job in jobs
+        ]
         try:
             for future in as_completed(running):
                 yield future.result()
         finally:
+            # Interrupted or failed: the running cases keep their state, the others do not start.
+            stop.set()
             for future in running:
                 future.cancel()
 
@@ -126,7 +133,7 @@ def _append(table: Path, row: Mapping[str, object]) -> None:
         writer = csv.DictWriter(file, names, restval='')
         writer.writeheader()
         writer.writerows([*rows, {k: _text(v) for k, v in row.items()}])
-    os.replace(part, table)
+    part.replace(table)
 
 
 def _text(value: object) -> object:

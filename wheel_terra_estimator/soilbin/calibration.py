@@ -1,0 +1,157 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Calibration on wheel 2 alone: what the paper does not state, and what each of it decides.
+
+Wheel 2 under 19.6 N on four slopes gives the five numbers of the fit; the other eight wheels judge
+(``wheel-terra soilbin reproduce``). Coarse grains, so that one setting takes two minutes.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+from wheel_terra_estimator.soilbin import files, metrics
+from wheel_terra_estimator.soilbin.case import Case
+from wheel_terra_estimator.soilbin.metrics import Row
+from wheel_terra_estimator.soilbin.study import Job
+
+TABLE = 'calibration.csv'
+SLOPES = (0.0, 7.1, 15.0, 25.0)
+CENTRE = {'grains__rolling_friction': 0.8, 'grains__rolling_stiffness': 2000.0}
+# One assumption changed at a time about the centre, and the grid of the two fitted ones.
+SETTINGS: dict[str, dict[str, object]] = {
+    'centre': {},
+    'published list alone': {'grains__rolling_friction': 0.0},
+    'rolling friction 0.4': {'grains__rolling_friction': 0.4},
+    'rolling friction 0.6': {'grains__rolling_friction': 0.6},
+    'rolling friction 1.0': {'grains__rolling_friction': 1.0},
+    'rolling friction 0.6, k_r 5000': {
+        'grains__rolling_friction': 0.6,
+        'grains__rolling_stiffness': 5000.0,
+    },
+    'rolling friction 1.0, k_r 10000': {
+        'grains__rolling_friction': 1.0,
+        'grains__rolling_stiffness': 10_000.0,
+    },
+    'grains that do not turn': {'grains__rotation': 'locked', 'grains__rolling_friction': 0.0},
+    'tangential stiffness x10': {'grains__tangential_stiffness': 5000.0},
+    'critical damping': {'grains__damping_ratio': 1.0},
+    'random bed': {'bed__arrangement': 'random'},
+    'dense bed (settled with friction 0.05)': {'bed__preparation_friction': 0.05},
+    'load dropped at once': {'operation__loading_time': 0.02},
+    'half the speed': {'operation__speed_factor': 2.0},
+    'twice the speed': {'operation__speed_factor': 8.0},
+}
+TARGETS = {  # figure: (published, tolerance of the fit)
+    'slope_at_20_percent_deg': (7.10, 2.0),
+    'slip_25_deg': (0.734, 0.08),
+    'power_number_self_propelled': (0.280, 0.25 * 0.280),
+    'power_number_15_deg': (0.790, 0.25 * 0.790),
+    'power_number_20_percent': (0.414, 0.25 * 0.414),
+}
+
+
+def base_case(grain_scale: float) -> Case:
+    """Return wheel 2 on the coarse bed with the setting at the centre of the screen."""
+    case = files.load(['published', 'wheel_2'])
+    return case.replace(
+        grains__damping_ratio=0.15,
+        bed__grain_scale=grain_scale,
+        bed__length=0.9,
+        operation__speed_factor=4.0,
+        operation__duration=30.0,
+        numerics__samples=400,
+        numerics__frames=1,
+        **CENTRE,
+    )
+
+
+def jobs(arguments: argparse.Namespace) -> list[Job]:
+    """Return settings x slopes over one bed, or the three best settings over several."""
+    base = base_case(arguments.grain_scale or 2.0)
+    seeds = arguments.seeds or 3
+    found = []
+    if arguments.stage != 'seeds':
+        found += [_job(base, setting, slope, 1) for setting in SETTINGS for slope in SLOPES]
+    if arguments.stage != 'screen':
+        fitted = [name for name in SETTINGS if name == 'centre' or name.startswith('rolling')]
+        found += [
+            _job(base, setting, slope, seed)
+            for seed in range(1, seeds + 1)
+            for setting in fitted
+            for slope in SLOPES
+        ]
+    return found
+
+
+def _job(base: Case, setting: str, slope_deg: float, seed: int) -> Job:
+    name = f'{setting}, {slope_deg:g} deg, bed {seed}'
+    case = base.replace(
+        name=name,
+        operation__slope=math.radians(slope_deg),
+        bed__seed=seed,
+        **SETTINGS[setting],
+    )
+    return Job(case, {'name': name, 'setting': setting, 'slope_deg': slope_deg, 'seed': seed})
+
+
+def figures(rows: Sequence[Row]) -> dict[str, float]:
+    """Return the five numbers of the fit from the rows of one setting."""
+    found = metrics.table6_metrics(rows)
+    slopes, slip = metrics.by_slope(rows, 'slip')
+    found['slip_25_deg'] = float(slip[slopes == 25.0][0]) if 25.0 in slopes else math.nan
+    return {name: found[name] for name in TARGETS}
+
+
+def misfit(found: dict[str, float]) -> float:
+    """Return the root mean square of the five deviations in units of their tolerances."""
+    parts = [((found[name] - wanted) / width) ** 2 for name, (wanted, width) in TARGETS.items()]
+    return math.sqrt(sum(parts) / len(parts))
+
+
+def report(arguments: argparse.Namespace, rows: Sequence[Row], folder: Path) -> None:
+    """Write the sensitivity table and name the best setting."""
+    from wheel_terra_estimator.soilbin.tables import page, table, value
+
+    names = ('slope at 20 % [deg]', 'slip at 25 deg [%]', 'PN level', 'PN 15 deg', 'PN 20 %')
+    head = ['setting', 'beds', *names, 'H, R_r at 25 deg [N]', 'z_a [cm]', 'misfit']
+    paper = [f'{wanted * (100 if key == "slip_25_deg" else 1):.3g}'
+             for key, (wanted, _) in TARGETS.items()]  # fmt: skip
+    body = [['**paper**', '', *paper, '11.25, 2.94', '1.71', '']]
+    scored: list[tuple[float, str]] = []
+    for setting in SETTINGS:
+        part = [row for row in rows if row['setting'] == setting]
+        if not part:
+            continue
+        beds = metrics.per_seed(part)
+        found = figures(part)
+        single = [figures(group) for group in beds.values()]
+        cells = []
+        for key in TARGETS:
+            unit = 100 if key == 'slip_25_deg' else 1
+            deviation = metrics.spread(one[key] for one in single)[1]
+            cells.append(value(unit * found[key], unit * deviation))
+        steep = [row for row in part if row['slope_deg'] in ('25', '25.0')]
+
+        def mean(name: str, steep: list[Row] = steep) -> float:
+            return metrics.spread(metrics.number(row, name) for row in steep)[0]
+
+        score = misfit(found)
+        if math.isfinite(score):
+            scored.append((score, setting))
+        said = next((row['stopped'] for row in steep if row.get('stopped')), '')
+        forces = f'{mean("gross_traction"):.3g}, {mean("motion_resistance"):.3g}'
+        body.append([setting, str(len(beds)), *cells, said or forces,
+                     value(100 * mean('sinkage_average')), value(score)])  # fmt: skip
+    lines = ['# Calibration on wheel 2', '', *table(head, body), '']
+    lines.append(
+        'Misfit: root mean square of the five deviations in units of 2 deg, 8 points and 25 %. '
+        'The centre has rolling friction 0.8 and rolling stiffness 2000 N/m; every other line '
+        'changes what it names. Written by `wheel-terra soilbin calibrate`.'
+    )
+    if scored:
+        lines += ['', f'Best: {min(scored)[1]} (misfit {min(scored)[0]:.2f}).']
+    page(folder / 'calibration_table.md', lines)

@@ -1,0 +1,305 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Reproduction of Nakashima et al. 2010: tables 6 and 7, figures 11 to 16, section 6."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+from pathlib import Path
+
+from wheel_terra_estimator.soilbin import files, metrics
+from wheel_terra_estimator.soilbin.case import EARTH_GRAVITY, Case
+from wheel_terra_estimator.soilbin.metrics import Row
+from wheel_terra_estimator.soilbin.study import Job
+
+TABLE = 'reproduction.csv'
+PARTS = ('table7', 'table6', 'loads', 'moon')
+WHEELS = range(1, 10)
+SLOPES_TABLE6 = (0.0, 5.0, 10.0, 15.0)
+MOON = EARTH_GRAVITY / 6
+MOON_PULLS = (0.0, 0.1, 0.2, 0.3)  # P/W on the level
+MOON_SLOPES = (10.0, 15.0, 21.0, 25.0)
+EARTH_SLOPES = (0.0, 15.0, 25.0)
+FIGURES_TABLE7 = {
+    'slip': 'slip',
+    'H': 'gross_traction',
+    'R_r': 'motion_resistance',
+    'z_a': 'sinkage_average',
+}
+# The wheels that each figure compares, and how its power number should order them.
+FIGURES = {
+    'figure 11, diameter: 250 < 200 < 150 mm at 25 deg': (5, 2, 4),
+    'figure 13, width: 150 < 100 < 50 mm at 25 deg': (3, 2, 1),
+    'figure 14, lug height: 20 < 10 < 5 mm at 25 deg': (8, 2, 6),
+    'figure 15, number of lugs: 18 < 36 at 25 deg': (2, 7),
+    'figure 16, lug thickness: 5 < 10 mm at 25 deg': (2, 9),
+}
+
+
+def wheel_case(wheel: int, slope_deg: float, seed: int, grain_scale: float) -> Case:
+    """Return the calibrated case of one of the paper's wheels under 19.6 N."""
+    case = files.load(['calibrated', f'wheel_{wheel}'])
+    name = f'wheel {wheel}, {slope_deg:g} deg, bed {seed}'
+    return case.replace(
+        name=name,
+        operation__slope=math.radians(slope_deg),
+        bed__seed=seed,
+        bed__grain_scale=grain_scale or case.bed.grain_scale,
+        numerics__samples=400,
+        numerics__frames=0,
+    )
+
+
+def _job(case: Case, part: str, wheel: int, slope_deg: float, **labels: object) -> Job:
+    base: dict[str, object] = {
+        'name': case.name,
+        'part': part,
+        'wheel': wheel,
+        'slope_deg': slope_deg,
+        'load': case.operation.vertical_load,
+        'gravity': round(case.operation.gravity, 4),
+        'pull_ratio': 0.0,
+        'grain_scale': case.bed.grain_scale,
+        'seed': case.bed.seed,
+    }
+    return Job(case, base | labels)
+
+
+def jobs(arguments: argparse.Namespace) -> list[Job]:
+    """Return the cases, the most telling ones first: every part over one bed, then the next."""
+    parts = tuple(arguments.part or PARTS)
+    scale = arguments.grain_scale or 1.0
+    found: list[Job] = []
+    for seed in range(1, 1 + (arguments.seeds or 3)):
+        if 'table7' in parts:
+            found += [_job(wheel_case(w, 25.0, seed, scale), 'table7', w, 25.0) for w in WHEELS]
+        if 'table6' in parts:
+            found += [
+                _job(wheel_case(w, slope, seed, scale), 'table6', w, slope)
+                for slope in SLOPES_TABLE6
+                for w in WHEELS
+            ]
+            found.append(_job(wheel_case(2, 20.0, seed, scale), 'table6', 2, 20.0))
+        if 'loads' in parts:
+            for load in (9.8, 14.7):
+                for slope in (0.0, 15.0, 25.0):
+                    case = wheel_case(2, slope, seed, scale).replace(
+                        name=f'wheel 2, {load:g} N, {slope:g} deg, bed {seed}',
+                        operation__vertical_load=load,
+                    )
+                    found.append(_job(case, 'loads', 2, slope))
+        if 'moon' in parts:
+            found += _moon(seed, scale)
+    return found
+
+
+def _moon(seed: int, scale: float) -> list[Job]:
+    """Section 6: wheel 5 under 14.7 N on a bed of 15 cm; slopes in the bin of 1.6 m."""
+    found = []
+    for gravity, place in ((MOON, 'Moon'), (EARTH_GRAVITY, 'Earth')):
+        flat = wheel_case(5, 0.0, seed, scale).replace(
+            operation__gravity=gravity, operation__vertical_load=14.7, bed__rows=40
+        )
+        for ratio in MOON_PULLS:
+            case = flat.replace(
+                name=f'{place}, level, P/W {ratio:g}, bed {seed}',
+                operation__hitch_pull=ratio * 14.7,
+            )
+            found.append(_job(case, 'moon', 5, 0.0, pull_ratio=ratio))
+        slopes = MOON_SLOPES if place == 'Moon' else EARTH_SLOPES[1:]
+        for slope in slopes:
+            case = flat.replace(
+                name=f'{place}, {slope:g} deg, bed {seed}',
+                operation__slope=math.radians(slope),
+                operation__start=0.7,
+                bed__length=1.6,
+            )
+            found.append(_job(case, 'moon', 5, slope))
+    return found
+
+
+# -- page -----------------------------------------------------------------------------------------
+
+
+def report(arguments: argparse.Namespace, rows: Sequence[Row], folder: Path) -> None:
+    """Write the comparison with the paper as a page, misses included."""
+    from wheel_terra_estimator.soilbin.tables import page
+
+    scales = sorted({row['grain_scale'] for row in rows})
+    parts = ['# Paper and virtual soil bin side by side', '']
+    parts.append(
+        f'{len(rows)} runs, grain scale {", ".join(scales) or "-"}; mean (deviation between beds). '
+        'Written by `wheel-terra soilbin reproduce`.'
+    )
+    parts += ['', *table7_lines(rows), '', *table6_lines(rows), '', *figure_lines(rows)]
+    parts += ['', *load_lines(rows), '', *moon_lines(rows)]
+    failed = [row for row in rows if row.get('stopped')]
+    if failed:
+        parts += ['', '## Runs that stopped early', '']
+        parts += [f'- {row["name"]}: {row["stopped"]}' for row in failed]
+    page(folder / 'comparison.md', parts)
+
+
+def of(rows: Sequence[Row], part: str, wheel: int | None = None) -> list[Row]:
+    """Return the rows of a part (and a wheel) that gave a result."""
+    return [
+        row
+        for row in rows
+        if row['part'] == part and (wheel is None or row['wheel'] == str(wheel)) and row.get('slip')
+    ]
+
+
+def table7_comparison(rows: Sequence[Row]) -> dict[int, dict[str, tuple[float, float]]]:
+    """Return slip, H, R_r, z_a with deviation of the wheels that have rows at 25 deg."""
+    found = {w: metrics.table7_spread(of(rows, 'table7', w)) for w in WHEELS}
+    return {w: values for w, values in found.items() if math.isfinite(values['slip'][0])}
+
+
+def table7_lines(rows: Sequence[Row]) -> list[str]:
+    """Return table 7 side by side with the errors and rank correlations."""
+    from wheel_terra_estimator.soilbin.tables import table, value
+
+    paper, ours = metrics.published('table7'), table7_comparison(rows)
+    units = {'slip': 100.0, 'gross_traction': 1.0, 'motion_resistance': 1.0, 'sinkage_average': 100}
+    names = ('slip [%]', 'H [N]', 'R_r [N]', 'z_a [cm]')
+    head = ['wheel', 'beds', *(f'{name} {who}' for name in names for who in ('paper', 'ours'))]
+    body = []
+    for wheel, values in ours.items():
+        cells = [str(wheel), str(len(of(rows, 'table7', wheel)))]
+        for key, unit in units.items():
+            mean, deviation = values[key]
+            cells += [f'{unit * paper[wheel][key]:.3g}', value(unit * mean, unit * deviation)]
+        body.append(cells)
+    lines = ['## Table 7: 25 deg, W 19.6 N', '', *table(head, body), '']
+    others = [wheel for wheel in ours if wheel != 2]
+    if len(others) > 2:
+        lines.append('Median error over the wheels other than 2 (which the fit used): '
+                     + ', '.join(median_errors(ours, others)) + '.')  # fmt: skip
+        lines.append('')
+        agreement = (
+            f'{name} {metrics.rank_correlation(*zip(*pairs, strict=True)):.2f}'
+            for name, key in FIGURES_TABLE7.items()
+            if (pairs := [(ours[w][key][0], paper[w][key]) for w in ours])
+        )
+        lines.append(f'Rank correlation with the paper over all wheels: {", ".join(agreement)}.')
+    return lines
+
+
+def median_errors(
+    ours: dict[int, dict[str, tuple[float, float]]], wheels: Sequence[int]
+) -> list[str]:
+    """Return the median error of each figure of table 7 in words."""
+    import numpy as np
+
+    paper = metrics.published('table7')
+    words = []
+    for name, key in FIGURES_TABLE7.items():
+        errors = [abs(ours[w][key][0] - paper[w][key]) for w in wheels]
+        if key == 'slip':
+            words.append(f'slip {100 * np.median(errors):.1f} points')
+        else:
+            ratio = np.median([e / paper[w][key] for e, w in zip(errors, wheels, strict=True)])
+            words.append(f'{name} {100 * ratio:.0f} %')
+    return words
+
+
+def table6_rows(rows: Sequence[Row], wheel: int) -> list[Row]:
+    """Return the rows over the slopes of one wheel."""
+    return of(rows, 'table6', wheel) + of(rows, 'table7', wheel)
+
+
+def table6_lines(rows: Sequence[Row]) -> list[str]:
+    """Return table 6 side by side with the sums of ranks."""
+    from wheel_terra_estimator.soilbin.tables import table, value
+
+    paper = metrics.published('table6')
+    ours = {w: metrics.table6_spread(table6_rows(rows, w)) for w in WHEELS if of(rows, 'table6', w)}
+    if not ours:
+        return ['## Table 6', '', 'Not computed yet.']
+    sums = metrics.rank_sums({w: {k: v[0] for k, v in ours[w].items()} for w in ours})
+    names = ('slope at 20 % [deg]', 'PN level', 'PN 15 deg', 'PN 20 %')
+    head = ['wheel', *(f'{name} {who}' for name in names for who in ('paper', 'ours'))]
+    head += ['ranks paper', 'ranks ours']
+    body = []
+    for wheel, values in ours.items():
+        cells = [str(wheel)]
+        for key in metrics.TABLE6:
+            cells += [f'{paper[wheel][key]:.3g}', value(*values[key])]
+        body.append([*cells, f'{paper[wheel]["sum_of_ranks"]:.0f}', str(sums[wheel])])
+    best = min(sums, key=lambda w: sums[w])
+    lines = ['## Table 6: W 19.6 N', '', *table(head, body), '']
+    if len(sums) > 2:
+        agreement = metrics.rank_correlation(
+            [sums[w] for w in sums], [paper[w]['sum_of_ranks'] for w in sums]
+        )
+        lines.append(
+            f'Smallest sum of ranks: wheel {best} (paper: wheel 5); rank correlation of the sums '
+            f'{agreement:.2f}.'
+        )
+    return lines
+
+
+def figure_lines(rows: Sequence[Row]) -> list[str]:
+    """Say which trends of figures 11 to 16 are there at 25 deg."""
+    lines = ['## Figures 11 to 16 as trends', '']
+    ours = {w: metrics.spread(metrics.number(r, 'power_number') for r in of(rows, 'table7', w))[0]
+            for w in WHEELS}  # fmt: skip
+    for title, wheels in FIGURES.items():
+        values = [ours[w] for w in wheels]
+        if any(math.isnan(v) for v in values):
+            continue
+        seen = all(a < b for a, b in pairwise(values))
+        numbers = ', '.join(f'{v:.2f}' for v in values)
+        lines.append(f'- {title}: {"seen" if seen else "NOT seen"} (ours: {numbers})')
+    return lines
+
+
+def load_lines(rows: Sequence[Row]) -> list[str]:
+    """Return figure 12 and the text's numbers on the wheel load."""
+    from wheel_terra_estimator.soilbin.tables import table, value
+
+    paper = {9.8: (1.46, 1.18), 14.7: (2.18, 1.59), 19.6: (2.94, 1.71)}
+    body = []
+    for load, (resistance, sinkage) in paper.items():
+        part = of(rows, 'loads') + of(rows, 'table7', 2)
+        part = [r for r in part if r['slope_deg'] == '25' and float(r['load']) == load]
+        if part:
+            mean = {k: metrics.spread(metrics.number(r, k) for r in part)
+                    for k in ('motion_resistance', 'sinkage_average', 'torque_coefficient',
+                              'power_number')}  # fmt: skip
+            za = mean['sinkage_average']
+            body.append([f'{load:g}', f'{resistance:g}', value(*mean['motion_resistance']),
+                         f'{sinkage:g}', value(100 * za[0], 100 * za[1]),
+                         '0.572-0.574', value(*mean['torque_coefficient']),
+                         value(*mean['power_number'])])  # fmt: skip
+    head = ['W [N]', 'R_r paper', 'R_r ours', 'z_a [cm] paper', 'z_a ours', 'H/W paper',
+            'H/W ours', 'PN ours']  # fmt: skip
+    return ['## Figure 12: wheel 2 at 25 deg under three loads', '', *table(head, body)]
+
+
+def moon_lines(rows: Sequence[Row]) -> list[str]:
+    """Return section 6: level pull and slopes in 1/6 g."""
+    from wheel_terra_estimator.soilbin.tables import table, value
+
+    groups: dict[tuple[str, float, float], list[Row]] = {}
+    for row in (r for r in rows if r['part'] == 'moon'):
+        key = (
+            'Moon' if float(row['gravity']) < 5 else 'Earth',
+            float(row['slope_deg']),
+            float(row['pull_ratio']),
+        )
+        groups.setdefault(key, []).append(row)
+    told = {('Moon', 0.0, 0.0): '26.3', ('Moon', 21.0, 0.0): '94.4 (z_a 3.01)',
+            ('Moon', 25.0, 0.0): 'cannot climb', ('Earth', 25.0, 0.0): '68.3'}  # fmt: skip
+    body = []
+    for key, part in sorted(groups.items()):
+        slip = metrics.spread(100 * metrics.number(r, 'slip') for r in part)
+        sinkage = metrics.spread(100 * metrics.number(r, 'sinkage_average') for r in part)
+        why = next((r['stopped'] for r in part if r.get('stopped')), '')
+        body.append([key[0], f'{key[1]:g}', f'{key[2]:g}', told.get(key, ''), value(*slip),
+                     value(*sinkage), why])  # fmt: skip
+    head = ['gravity', 'slope [deg]', 'P/W', 'slip paper [%]', 'slip ours [%]', 'z_a ours [cm]', '']
+    return ['## Section 6: wheel 5, W 14.7 N, bed of 15 cm', '', *table(head, body)]
