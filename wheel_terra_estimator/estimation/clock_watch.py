@@ -1,0 +1,157 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Tells a stray stamp from a step of the clock, by stamps and their order of arrival alone.
+
+A slow topic is late, a message is resent, a driver stamps one message wrongly: none of these may
+end a run, or every loop over a late camera would. A step of the clock (a looped bag, a simulation
+that was reset, a corrected system clock) takes all topics with it. So a message far off its time
+line is held until a second one bears it out, or the old line goes on.
+"""
+
+from __future__ import annotations
+
+from enum import Enum
+from typing import NamedTuple
+
+from wheel_terra_estimator.estimation.input_checks import WHEEL_ODOMETRY
+from wheel_terra_estimator.estimation.measurements import Measurement
+
+WITNESSES = 5
+"""Messages of one topic that prove a step without those of another."""
+
+
+class Suspicion(Enum):
+    """How a stamp does not fit."""
+
+    BEHIND = 'behind'
+    AHEAD = 'ahead'
+
+
+class Arrival(NamedTuple):
+    """A measurement and its channel."""
+
+    channel: int
+    measurement: Measurement
+
+
+class Judgement(NamedTuple):
+    """What to do after a message came.
+
+    Attributes
+    ----------
+    accepted : list of Arrival
+        To be used, in this order.
+    stepped_back : bool
+        The run has ended; `accepted` belongs to the new one.
+    strays : list of (Suspicion, Arrival)
+        Held before and now known not to fit; those behind may still be late inputs.
+    """
+
+    accepted: list[Arrival]
+    stepped_back: bool = False
+    strays: tuple[tuple[Suspicion, Arrival], ...] = ()
+
+
+class ClockWatch:
+    """Watches the stamps of one run.
+
+    Parameters
+    ----------
+    channels : int
+        Number of channels.
+    clock_step : int
+        A stamp further than this before the newest of its own channel does not fit [ns].
+    max_lag : int
+        Disorder that is expected [ns]; never taken for a step.
+    history : int
+        How far back late inputs are used [ns]; further ahead than this a message would push the
+        others out of use, so it does not fit either.
+    """
+
+    def __init__(self, channels: int, clock_step: int, max_lag: int, history: int) -> None:
+        self._clock_step = max(clock_step, max_lag)
+        self._reach = max(history + max_lag, clock_step)
+        self._newest_of: list[int | None] = [None] * channels
+        self._held: list[Arrival] = []
+        self._suspicion = Suspicion.BEHIND
+        self._odometry_behind = 0
+        self.newest: int | None = None
+
+    def judge(self, channel: int, measurement: Measurement) -> Judgement:
+        """Return what to do with a message, and with those held before it."""
+        stamp = measurement.stamp
+        arrival = Arrival(channel, measurement)
+        suspicion = self._suspect(channel, stamp)
+        if suspicion is None:
+            strays = self._drop_held()
+            self._accept(arrival)
+            return Judgement([arrival], strays=strays)
+        strays = ()
+        held = self._held
+        if held and (
+            suspicion is not self._suspicion or stamp < held[-1].measurement.stamp - self._reach
+        ):
+            strays = self._drop_held()
+        self._held.append(arrival)
+        self._suspicion = suspicion
+        if channel == WHEEL_ODOMETRY and suspicion is Suspicion.BEHIND:
+            self._odometry_behind += 1
+        if not self._borne_out():
+            return Judgement([], strays=strays)
+        accepted = self.release()
+        return Judgement(accepted, suspicion is Suspicion.BEHIND, strays)
+
+    def release(self) -> list[Arrival]:
+        """Return the messages that are held and take them as the time line from here on."""
+        accepted, self._held = self._held, []
+        if accepted and self._suspicion is Suspicion.BEHIND:
+            self._newest_of = [None] * len(self._newest_of)
+            self.newest = None
+        for arrival in accepted:
+            self._accept(arrival)
+        return accepted
+
+    def finish(self) -> Judgement:
+        """Return what to do at the end of the data with what is still held."""
+        if self._suspicion is Suspicion.AHEAD:
+            return Judgement(self.release())
+        return Judgement([], strays=self._drop_held())
+
+    def _suspect(self, channel: int, stamp: int) -> Suspicion | None:
+        if self.newest is None:
+            return None
+        own = self._newest_of[channel]
+        if own is None:
+            if stamp < self.newest - self._reach:
+                return Suspicion.BEHIND
+        elif stamp < own - self._clock_step:
+            return Suspicion.BEHIND
+        if stamp > self.newest + self._reach and any(
+            other is not None for i, other in enumerate(self._newest_of) if i != channel
+        ):
+            return Suspicion.AHEAD
+        return None
+
+    def _borne_out(self) -> bool:
+        channels = [arrival.channel for arrival in self._held]
+        return (
+            len(set(channels)) > 1
+            or channels.count(WHEEL_ODOMETRY) > 1
+            or len(channels) >= WITNESSES
+            # Wheel odometry keeps the time: where it and another topic have different clocks
+            # for good, the other one gives way.
+            or self._odometry_behind >= WITNESSES
+        )
+
+    def _accept(self, arrival: Arrival) -> None:
+        channel, stamp = arrival.channel, arrival.measurement.stamp
+        if channel == WHEEL_ODOMETRY:
+            self._odometry_behind = 0
+        own = self._newest_of[channel]
+        self._newest_of[channel] = stamp if own is None else max(own, stamp)
+        self.newest = stamp if self.newest is None else max(self.newest, stamp)
+
+    def _drop_held(self) -> tuple[tuple[Suspicion, Arrival], ...]:
+        strays = tuple((self._suspicion, arrival) for arrival in self._held)
+        self._held = []
+        return strays

@@ -1,0 +1,176 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""The estimator core: typed measurements in, sets of estimates out; no ROS, no file format.
+
+A measurement passes the checks of its values, then the watch over the clock, then the timeline,
+which runs the filter in the order of stamps; sets pass the guard. The node and the replay differ
+in nothing but who calls ``add``, and the same calls give the same numbers.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from wheel_terra_estimator.configuration import Configuration
+from wheel_terra_estimator.estimation.clock_watch import Arrival, ClockWatch, Judgement, Suspicion
+from wheel_terra_estimator.estimation.estimates import EstimateSet, SlipClass
+from wheel_terra_estimator.estimation.input_checks import CHANNELS, InputChecks
+from wheel_terra_estimator.estimation.measurements import Measurement
+from wheel_terra_estimator.estimation.output_guard import OutputGuard
+from wheel_terra_estimator.estimation.timeline import Estimator, Fate, Timeline, TimeSettings
+
+FAULT_MEMORY = 5_000_000_000
+"""How long a rejected input is told of in the sets [ns of stamps]."""
+
+_SECOND = 1_000_000_000
+
+
+class EstimatorCore:
+    """Estimates of one rover from its measurements.
+
+    Parameters
+    ----------
+    configuration : Configuration
+        Rover, soil, sensors, filter.
+    estimator : Estimator, optional
+        What runs through the inputs; default: ``WheelSoilEstimator``.
+    """
+
+    def __init__(self, configuration: Configuration, estimator: Estimator | None = None) -> None:
+        if estimator is None:
+            from wheel_terra_estimator.estimation.wheel_soil_estimator import WheelSoilEstimator
+
+            estimator = WheelSoilEstimator(configuration)
+        rate = configuration.reference_odom_max_rate
+        tuning = configuration.filter
+        self._settings = TimeSettings(
+            max_lag=_nanoseconds(configuration.max_lag),
+            history=_nanoseconds(configuration.history),
+            silence=_nanoseconds(tuning.silence),
+            heartbeat=max(_nanoseconds(1.0 / tuning.heartbeat_rate), 1),
+            reference_period=_nanoseconds(1.0 / rate) if rate else 0,
+        )
+        self._clock_step = _nanoseconds(tuning.clock_step)
+        self._estimator = estimator
+        self._checks = InputChecks(configuration)
+        self._guard = OutputGuard(configuration)
+        self._timeline = Timeline(estimator, self._settings, self._finish)
+        self._watch = self._new_watch()
+        self._received = [0] * len(CHANNELS)
+        self._late = [0] * len(CHANNELS)
+        self._told: list[tuple[str, int] | None] = [None] * len(CHANNELS)  # words, stamp of set
+        self._clock_steps = 0
+        self._resets = 0
+
+    def add(self, measurement: Measurement) -> list[EstimateSet]:
+        """Take a measurement and return the sets that it completed, oldest first.
+
+        Parameters
+        ----------
+        measurement : WheelOdometry, InertialReading, SinkageReading, LeavingAngleReading or \
+ReferenceVelocity
+            What came, in the order of arrival.
+        """
+        channel = CHANNELS[type(measurement)]
+        self._received[channel] += 1
+        checked = self._checks.check(channel, measurement)
+        if checked is None:
+            return []
+        return self._follow(self._watch.judge(channel, checked))
+
+    def flush(self) -> list[EstimateSet]:
+        """Return the sets that were held back for late inputs: no more will come."""
+        sets = self._follow(self._watch.finish())
+        return sets + self._timeline.flush()
+
+    def reset(self) -> None:
+        """Forget the state, keep the parameters; the next measurement begins a new run."""
+        self._resets += 1
+        self._watch = self._new_watch()
+        self._timeline.end_run(keep_soil=False)
+
+    def health(self) -> dict[str, Any]:
+        """Return counters and words for diagnostics: key (with unit where it has one) -> value."""
+        result: dict[str, Any] = {}
+        checks, timeline = self._checks, self._timeline
+        for channel, name in enumerate(checks.names):
+            result[f'{name}_used'] = self._received[channel] - checks.refused[channel]
+            if self._late[channel]:
+                result[f'{name}_late'] = self._late[channel]
+            if timeline.repeated[channel]:
+                result[f'{name}_stamp_repeated'] = timeline.repeated[channel]
+            for reason, count in checks.rejected[channel].items():
+                result[f'{name}_rejected: {reason}'] = count
+        result.update(timeline.counts)
+        result['clock_steps_back'] = self._clock_steps
+        result['resets'] = self._resets
+        estimator_health = getattr(self._estimator, 'health', dict)
+        result.update(estimator_health())
+        return result
+
+    def _new_watch(self) -> ClockWatch:
+        settings = self._settings
+        return ClockWatch(len(CHANNELS), self._clock_step, settings.max_lag, settings.history)
+
+    def _follow(self, judgement: Judgement) -> list[EstimateSet]:
+        sets: list[EstimateSet] = []
+        for suspicion, arrival in judgement.strays:
+            if suspicion is Suspicion.BEHIND:
+                sets += self._insert(arrival)
+            else:
+                self._checks.refuse(arrival.channel, 'stamp far ahead of all others')
+        if judgement.stepped_back:
+            self._clock_steps += 1
+            self._timeline.end_run(keep_soil=True)
+        for arrival in judgement.accepted:
+            sets += self._insert(arrival)
+        newest = self._watch.newest
+        if judgement.accepted and newest is not None:
+            sets += self._timeline.advance(newest)
+        return sets
+
+    def _insert(self, arrival: Arrival) -> list[EstimateSet]:
+        channel, measurement = arrival
+        fate, sets = self._timeline.insert(channel, measurement)
+        if fate is Fate.LATE:
+            self._late[channel] += 1
+        elif fate is Fate.TOO_OLD:
+            self._checks.refuse(channel, 'stamp older than the history')
+        elif fate is Fate.FULL:
+            self._checks.refuse(channel, 'more inputs than can be sorted')
+        return sets
+
+    def _finish(
+        self, stamp: int, outcome: EstimateSet | Exception, silent: bool
+    ) -> tuple[EstimateSet, bool]:
+        estimates, failed = self._guard.repaired(stamp, outcome)
+        faults = self._faults(stamp, silent)
+        if faults:
+            estimates = replace(estimates, faults={**estimates.faults, **faults})
+        if silent:
+            unknown = np.full(len(estimates.slip_class), SlipClass.UNKNOWN, dtype=np.uint8)
+            estimates = replace(estimates, slip_class=unknown)
+        return estimates, failed
+
+    def _faults(self, stamp: int, silent: bool) -> dict[str, str]:
+        """Return what was left out of late, and silence, in words."""
+        faults = {}
+        checks = self._checks
+        for channel, reason in enumerate(checks.latest):
+            if reason:
+                count = checks.rejected[channel][reason]
+                self._told[channel] = f'{reason} ({count} so far)', stamp
+                checks.latest[channel] = ''
+            told = self._told[channel]
+            if told is not None and abs(stamp - told[1]) < FAULT_MEMORY:
+                faults[checks.names[channel]] = told[0]
+        if silent:
+            faults[checks.names[0]] = 'silent: wheel rates unknown'
+        return faults
+
+
+def _nanoseconds(seconds: float) -> int:
+    return round(seconds * _SECOND)

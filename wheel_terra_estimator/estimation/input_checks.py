@@ -1,0 +1,199 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Checks of single measurements: what cannot be true is left out and counted, the rest is used.
+
+After these checks a number is finite, or nan where the measurement types allow it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from wheel_terra_estimator.configuration import Configuration
+from wheel_terra_estimator.estimation.measurements import (
+    FloatArray,
+    InertialReading,
+    LeavingAngleReading,
+    Measurement,
+    ReferenceVelocity,
+    SinkageReading,
+    WheelOdometry,
+)
+
+GREATEST_SPEED = 50.0  # rim or body [m/s]; far above any rover
+GREATEST_TORQUE = 1.0e5  # [N m]
+GREATEST_FORCE = 500.0  # specific force [m/s^2], 50 g
+GREATEST_RATE = 50.0  # angular rate [rad/s]
+GREATEST_VARIANCE = GREATEST_SPEED**2  # says that nothing is known
+LATEST_STAMP = 2**31 * 1_000_000_000  # builtin_interfaces/Time ends in 2038 [ns]
+
+CHANNELS: dict[type, int] = {
+    WheelOdometry: 0,
+    InertialReading: 1,
+    SinkageReading: 2,
+    LeavingAngleReading: 3,
+    ReferenceVelocity: 4,
+}
+"""Kind of measurement -> its place in ``StepInputs``."""
+
+WHEEL_ODOMETRY, INERTIAL, SINKAGE, LEAVING_ANGLE, REFERENCE = range(5)
+
+
+class InputChecks:
+    """Judges measurements of one rover.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Topic of each channel, for messages.
+    rejected : list of collections.Counter
+        Per channel: reason in words -> how often something was left out for it.
+    refused : list of int
+        Per channel: messages of which nothing was left to use.
+    latest : list of str
+        Per channel: reason of the latest rejection since this was last emptied.
+    """
+
+    def __init__(self, configuration: Configuration) -> None:
+        wheels = configuration.wheels
+        self.names = (
+            configuration.wheel_odometry,
+            'imu/data',
+            'sinkage',
+            'leaving_angle',
+            'reference_odom',
+        )
+        self.rejected: list[Counter[str]] = [Counter() for _ in self.names]
+        self.refused = [0] * len(self.names)
+        self.latest = [''] * len(self.names)
+        self._count = wheels.count
+        self._radius = wheels.radius.tolist()
+        self._greatest_rate = (GREATEST_SPEED / wheels.slip_radius).tolist()
+        self._checks: tuple[Callable[[Any], Any], ...] = (
+            self._wheel_odometry,
+            self._inertial,
+            self._sinkage,
+            self._leaving_angle,
+            self._reference,
+        )
+
+    def check(self, channel: int, measurement: Measurement) -> Measurement | None:
+        """Return the measurement without what cannot be true; None where nothing is left."""
+        stamp = measurement.stamp
+        if stamp <= 0:
+            self.refuse(channel, 'stamp is zero or negative')
+            return None
+        if stamp > LATEST_STAMP:
+            self.refuse(channel, 'stamp is beyond the range of ROS time')
+            return None
+        checked: Measurement | None = self._checks[channel](measurement)
+        return checked
+
+    def reject(self, channel: int, reason: str) -> None:
+        """Count a part of a message that was left out."""
+        self.rejected[channel][reason] += 1
+        self.latest[channel] = reason
+
+    def refuse(self, channel: int, reason: str) -> None:
+        """Count a message that was left out."""
+        self.refused[channel] += 1
+        self.reject(channel, reason)
+
+    def _wheel_odometry(self, m: WheelOdometry) -> WheelOdometry | None:
+        if len(m.rate) != self._count or len(m.torque) != self._count:
+            self.refuse(WHEEL_ODOMETRY, 'wrong number of wheels')
+            return None
+        rates, torques = m.rate.tolist(), m.torque.tolist()
+        bad_rates = [i for i, rate in enumerate(rates) if abs(rate) > self._greatest_rate[i]]
+        bad_torques = [i for i, torque in enumerate(torques) if abs(torque) > GREATEST_TORQUE]
+        if bad_rates or bad_torques:
+            # Infinite values fail these bounds too; nan passes, it marks an unknown.
+            if bad_rates:
+                self.reject(WHEEL_ODOMETRY, 'wheel rate infinite or absurd')
+            if bad_torques:
+                self.reject(WHEEL_ODOMETRY, 'torque infinite or absurd')
+            m = replace(m, rate=_without(m.rate, bad_rates), torque=_without(m.torque, bad_torques))
+        return m
+
+    def _inertial(self, m: InertialReading) -> InertialReading | None:
+        x, y, z = m.specific_force.tolist()
+        force = math.sqrt(x * x + y * y + z * z)
+        if not force <= GREATEST_FORCE:
+            self.refuse(INERTIAL, 'specific force not finite or absurd')
+            return None
+        if force == 0.0:
+            self.refuse(INERTIAL, 'specific force exactly zero (sensor not running)')
+            return None
+        x, y, z = m.angular_rate.tolist()
+        if not math.sqrt(x * x + y * y + z * z) <= GREATEST_RATE:
+            self.refuse(INERTIAL, 'angular rate not finite or absurd')
+            return None
+        if m.orientation is None:
+            return m
+        x, y, z, w = m.orientation.tolist()
+        norm = math.sqrt(x * x + y * y + z * z + w * w)
+        if abs(norm - 1.0) < 1e-6:
+            return m
+        if not 0.9 < norm < 1.1:
+            self.reject(INERTIAL, 'orientation is no unit quaternion (left out)')
+            return replace(m, orientation=None)
+        return replace(m, orientation=m.orientation / norm)
+
+    def _sinkage(self, m: SinkageReading) -> SinkageReading | None:
+        values = self._wheel_values(SINKAGE, m.sinkage)
+        if values is None:
+            return None
+        radius = self._radius
+        deep = [i for i, z in enumerate(values) if z > radius[i]]
+        high = [i for i, z in enumerate(values) if z < -0.5 * radius[i]]
+        if not deep and not high:
+            return m
+        if deep:
+            self.reject(SINKAGE, 'sinkage infinite or larger than the wheel radius')
+        if high:
+            self.reject(SINKAGE, 'sinkage far above the surface')
+        return SinkageReading(m.stamp, _without(m.sinkage, deep + high))
+
+    def _leaving_angle(self, m: LeavingAngleReading) -> LeavingAngleReading | None:
+        values = self._wheel_values(LEAVING_ANGLE, m.leaving_angle)
+        if values is None:
+            return None
+        bad = [i for i, angle in enumerate(values) if abs(angle) > 0.5 * math.pi]
+        if not bad:
+            return m
+        self.reject(LEAVING_ANGLE, 'leaving angle not within a quarter turn')
+        return LeavingAngleReading(m.stamp, _without(m.leaving_angle, bad))
+
+    def _reference(self, m: ReferenceVelocity) -> ReferenceVelocity | None:
+        if not abs(m.forward) <= GREATEST_SPEED:
+            self.refuse(REFERENCE, 'velocity not finite or absurd')
+            return None
+        if m.variance > GREATEST_VARIANCE:
+            self.refuse(REFERENCE, 'variance says that nothing is known')
+            return None
+        if not m.variance >= 0.0:
+            self.reject(REFERENCE, 'variance negative or nan (taken as not stated)')
+            return replace(m, variance=0.0)
+        return m
+
+    def _wheel_values(self, channel: int, values: FloatArray) -> list[float] | None:
+        if len(values) != self._count:
+            self.refuse(channel, 'wrong number of wheels')
+            return None
+        listed: list[float] = values.tolist()
+        return listed
+
+
+def _without(values: FloatArray, indices: list[int]) -> FloatArray:
+    """Return the values with some of them marked as unknown."""
+    if not indices:
+        return values
+    cleaned = np.array(values, dtype=float)
+    cleaned[indices] = math.nan
+    return cleaned

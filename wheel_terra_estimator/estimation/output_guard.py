@@ -1,0 +1,135 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""The last look at a set before it leaves: no field is ever nan or infinite."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import fields, replace
+from typing import Any
+
+import numpy as np
+
+from wheel_terra_estimator.configuration import Configuration
+from wheel_terra_estimator.estimation.estimates import (
+    NO_ENTRAPMENT_IN_SIGHT,
+    EstimateSet,
+    SlipClass,
+)
+
+_WHEEL_FIELDS = tuple(
+    f.name
+    for f in fields(EstimateSet)
+    if f.type == 'FloatArray' and f.name not in ('soil', 'soil_std')
+)
+_SCALAR_FIELDS = tuple(f.name for f in fields(EstimateSet) if f.type == 'float')
+
+
+class OutputGuard:
+    """Holds values that became nan or infinite, and says how little is known of them.
+
+    Parameters
+    ----------
+    configuration : Configuration
+        Says what an unknown quantity can be at most.
+    """
+
+    def __init__(self, configuration: Configuration) -> None:
+        self._blank = blank_estimates(configuration)
+        self._good = self._blank
+
+    def repaired(self, stamp: int, outcome: EstimateSet | Exception) -> tuple[EstimateSet, bool]:
+        """Return a set that can be published, and whether something had to be held.
+
+        Parameters
+        ----------
+        stamp : int
+            Stamp of the set [ns].
+        outcome : EstimateSet or Exception
+            What the estimator gave.
+        """
+        if isinstance(outcome, Exception):
+            return self._held(stamp, self._good, f'{type(outcome).__name__}: {outcome}'), True
+        if _is_finite(outcome):
+            if outcome.stamp != stamp:
+                outcome = replace(outcome, stamp=stamp)
+            self._good = outcome
+            return outcome, False
+        return self._held(stamp, self._mended(outcome), 'an estimate was not a number'), True
+
+    def _mended(self, estimates: EstimateSet) -> EstimateSet:
+        changes: dict[str, Any] = {}
+        for name in _WHEEL_FIELDS:
+            values = getattr(estimates, name)
+            changes[name] = np.where(np.isfinite(values), values, getattr(self._good, name))
+        for name in _SCALAR_FIELDS:
+            value = getattr(estimates, name)
+            changes[name] = value if math.isfinite(value) else getattr(self._good, name)
+        known = np.isfinite(estimates.soil) & np.isfinite(estimates.soil_std)
+        changes['soil_names'] = tuple(
+            name for name, good in zip(estimates.soil_names, known, strict=True) if good
+        )
+        changes['soil'] = estimates.soil[known]
+        changes['soil_std'] = estimates.soil_std[known]
+        return replace(estimates, **changes)
+
+    def _held(self, stamp: int, estimates: EstimateSet, words: str) -> EstimateSet:
+        """Return a set whose values stand still and whose deviations say that nothing is known."""
+        blank = self._blank
+        held = replace(
+            estimates,
+            stamp=stamp,
+            slip_class=blank.slip_class,
+            faults={**estimates.faults, 'filter': f'started anew: {words}'},
+            reasons=blank.reasons,
+            forward_velocity_variance=blank.forward_velocity_variance,
+            yaw_rate_variance=blank.yaw_rate_variance,
+            **{name: getattr(blank, name) for name in _WHEEL_FIELDS if name.endswith('_std')},
+        )
+        self._good = held
+        return held
+
+
+def blank_estimates(configuration: Configuration) -> EstimateSet:
+    """Return the set of a rover of which nothing is known yet."""
+    wheels, rover = configuration.wheels, configuration.rover
+    n = wheels.count
+    zeros, ones = np.zeros(n), np.ones(n)
+    load = np.full(n, rover.mass * rover.gravity / n)
+    return EstimateSet(
+        stamp=0,
+        slip=zeros,
+        slip_std=ones,
+        slip_velocity=zeros,
+        slip_velocity_std=ones,
+        drawbar_pull=zeros,
+        drawbar_pull_std=load,
+        sinkage=zeros,
+        sinkage_std=wheels.radius,
+        sinkage_rate=zeros,
+        sinkage_rate_std=wheels.radius,
+        normal_load=load,
+        normal_load_std=load,
+        slip_class=np.full(n, SlipClass.UNKNOWN, dtype=np.uint8),
+        rim_travel_left=np.full(n, NO_ENTRAPMENT_IN_SIGHT),
+        pull_margin=zeros,
+        soil_names=(),
+        soil=np.zeros(0),
+        soil_std=np.zeros(0),
+        forward_velocity=0.0,
+        forward_velocity_variance=1.0,
+        yaw_rate=0.0,
+        yaw_rate_variance=1.0,
+        stuck=False,
+        stuck_probability=zeros,
+        time_to_stuck=zeros,
+        reasons=('nothing known',) * n,
+    )
+
+
+def _is_finite(estimates: EstimateSet) -> bool:
+    arrays = [getattr(estimates, name) for name in _WHEEL_FIELDS]
+    everything = np.concatenate((*arrays, estimates.soil, estimates.soil_std))
+    return bool(np.isfinite(everything).all()) and all(
+        math.isfinite(getattr(estimates, name)) for name in _SCALAR_FIELDS
+    )
