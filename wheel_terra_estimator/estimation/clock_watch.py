@@ -17,7 +17,10 @@ from wheel_terra_estimator.estimation.input_checks import WHEEL_ODOMETRY
 from wheel_terra_estimator.estimation.measurements import Measurement
 
 WITNESSES = 5
-"""Messages of one topic that prove a step without those of another."""
+"""Messages of wheel odometry that prove a step though other topics stay on the old time line."""
+
+MOST_HELD = 1000
+"""Messages that are held at most; a stamp that stands still must not fill the memory."""
 
 
 class Suspicion(Enum):
@@ -74,7 +77,7 @@ class ClockWatch:
         self._newest_of: list[int | None] = [None] * channels
         self._held: list[Arrival] = []
         self._suspicion = Suspicion.BEHIND
-        self._odometry_behind = 0
+        self._odometry_astray = 0
         self.newest: int | None = None
 
     def judge(self, channel: int, measurement: Measurement) -> Judgement:
@@ -92,10 +95,11 @@ class ClockWatch:
             suspicion is not self._suspicion or stamp < held[-1].measurement.stamp - self._reach
         ):
             strays = self._drop_held()
+        if suspicion is not self._suspicion:
+            self._odometry_astray = 0
         self._held.append(arrival)
         self._suspicion = suspicion
-        if channel == WHEEL_ODOMETRY and suspicion is Suspicion.BEHIND:
-            self._odometry_behind += 1
+        self._odometry_astray += channel == WHEEL_ODOMETRY
         if not self._borne_out():
             return Judgement([], strays=strays)
         accepted = self.release()
@@ -134,19 +138,22 @@ class ClockWatch:
 
     def _borne_out(self) -> bool:
         channels = [arrival.channel for arrival in self._held]
+        stamps = [arrival.measurement.stamp for arrival in self._held]
         return (
             len(set(channels)) > 1
             or channels.count(WHEEL_ODOMETRY) > 1
-            or len(channels) >= WITNESSES
+            # One topic alone for so long that the others would have been heard.
+            or max(stamps) - min(stamps) > self._clock_step
+            or len(stamps) >= MOST_HELD
             # Wheel odometry keeps the time: where it and another topic have different clocks
             # for good, the other one gives way.
-            or self._odometry_behind >= WITNESSES
+            or self._odometry_astray >= WITNESSES
         )
 
     def _accept(self, arrival: Arrival) -> None:
         channel, stamp = arrival.channel, arrival.measurement.stamp
         if channel == WHEEL_ODOMETRY:
-            self._odometry_behind = 0
+            self._odometry_astray = 0
         own = self._newest_of[channel]
         self._newest_of[channel] = stamp if own is None else max(own, stamp)
         self.newest = stamp if self.newest is None else max(self.newest, stamp)

@@ -147,6 +147,7 @@ class Timeline:
         self._odometry: int | None  # newest released stamp of wheel odometry
         self._heartbeats: int  # sets of the present silence
         self._next_reference: int  # a reference velocity is used again from here on
+        self._disorder: bool  # inputs of this run came after a set that would have used them
         self._last_kept = 0  # stamp of the newest kept state
         self._clear(self._pristine, keep_soil=False)
 
@@ -185,6 +186,7 @@ class Timeline:
                 changed = True
             if changed and index < self._ran:
                 self._ran = index
+                self._disorder = True
         else:
             entries.append(_Entry(stamp, channel, measurement))
             stamps.append(stamp)
@@ -218,6 +220,7 @@ class Timeline:
         self._odometry = None
         self._heartbeats = 0
         self._next_reference = 0
+        self._disorder = False
 
     def _insert_at(self, index: int, entry: _Entry) -> None:
         self._entries.insert(index, entry)
@@ -343,6 +346,7 @@ class Timeline:
             stamp = entry.stamp
             if (
                 index == last
+                or (index == last - 1 and self._disorder)
                 or stamp - self._last_kept >= KEPT_STATE_SPACING
                 or (stamp >= dense and entry.parts[WHEEL_ODOMETRY] is not None)
             ):

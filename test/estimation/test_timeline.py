@@ -1,0 +1,388 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""The contract's rules of time, on an estimator that notices every lapse."""
+
+import math
+
+import numpy as np
+from fake_estimator import (
+    SECOND,
+    essence,
+    imu,
+    make_core,
+    odometry,
+    play,
+    reference,
+    sinkage,
+    stamp_at,
+)
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from wheel_terra_estimator.estimation.estimates import SlipClass
+from wheel_terra_estimator.estimation.measurements import WheelOdometry
+
+
+def times(sets):
+    return [round((s.stamp - stamp_at(0.0)) / SECOND, 6) for s in sets]
+
+
+def drive(duration=2.0):
+    """Odometry at 10 Hz, IMU at 50 Hz (some stamps shared), sinkage and reference at 5 and 2 Hz."""
+    stream = [odometry(0.1 * i, rate=1.0 + 0.01 * i) for i in range(round(10 * duration))]
+    stream += [imu(0.02 * i + 0.0, force=0.1 * i) for i in range(round(50 * duration))]
+    stream += [sinkage(0.2 * i + 0.013, depth=0.001 * i) for i in range(round(5 * duration))]
+    stream += [reference(0.5 * i + 0.007, forward=0.01 * i) for i in range(round(2 * duration))]
+    return sorted(stream, key=lambda m: m.stamp)
+
+
+# -- Sets ---------------------------------------------------------------------------------------
+
+
+def test_one_set_for_each_stamp_of_the_wheel_odometry():
+    core, _ = make_core()
+    sets = play(core, drive(2.0))
+    assert times(sets) == [round(0.1 * i, 6) for i in range(20)]
+
+
+def test_a_set_comes_at_once_and_holds_all_inputs_up_to_its_stamp():
+    core, fake = make_core()
+    assert core.add(imu(0.0, force=2.0)) == []
+    assert core.add(imu(0.05, force=3.0)) == []
+    (estimates,) = core.add(odometry(0.1, rate=1.0))
+    expected = (2.0 * 1.3 * math.exp(-0.05) + 3.0 * 1.3) * math.exp(-0.05) + 2.2
+    assert math.isclose(estimates.forward_velocity, expected, rel_tol=1e-12)
+
+
+def test_equal_stamps_are_merged_whatever_came_first():
+    first, _ = make_core(max_lag=0.5)
+    second, _ = make_core(max_lag=0.5)
+    one = play(first, [odometry(0.0), imu(0.0, 5.0), sinkage(0.0), odometry(0.1)])
+    other = play(second, [sinkage(0.0), imu(0.0, 5.0), odometry(0.0), odometry(0.1)])
+    assert essence(one) == essence(other)
+
+
+def test_an_input_of_the_stamp_of_the_last_set_makes_no_second_set_but_counts_from_then_on():
+    core, _ = make_core()
+    assert len(core.add(odometry(0.0))) == 1
+    assert core.add(imu(0.0, 5.0)) == []
+    (estimates,) = core.add(odometry(0.1))
+    merged, _ = make_core()
+    assert essence([estimates]) == essence(play(merged, [imu(0.0, 5.0), odometry(0.0), odometry(0.1)]))[
+        1:
+    ]
+
+
+def test_odometry_a_little_later_than_the_imu_still_gets_its_set():
+    core, _ = make_core()
+    core.add(imu(0.0))
+    core.add(odometry(0.0))
+    core.add(imu(0.12, force=7.0))
+    (estimates,) = core.add(odometry(0.1))
+    assert times([estimates]) == [0.1]
+    in_order, _ = make_core()
+    expected = play(in_order, [imu(0.0), odometry(0.0), odometry(0.1)])
+    assert essence([estimates]) == essence(expected[1:])  # without the younger input
+
+
+def test_messages_that_hold_some_of_the_wheels_complete_one_another():
+    core, _ = make_core(max_lag=0.2)
+    nan = math.nan
+    left = WheelOdometry(stamp_at(0.0), np.array([3.0, nan]), np.array([nan, nan]))
+    right = WheelOdometry(stamp_at(0.0), np.array([nan, 5.0]), np.array([nan, 2.0]))
+    sets = play(core, [left, right])
+    assert len(sets) == 1
+    assert math.isclose(sets[0].forward_velocity, 8.0 * 1.1)
+    assert 'joint_states_stamp_repeated' not in core.health()
+
+
+def test_max_lag_holds_back_until_the_newest_stamp_passes():
+    core, _ = make_core(max_lag=0.2)
+    assert core.add(odometry(0.0)) == []
+    assert core.add(odometry(0.1)) == []
+    assert times(core.add(imu(0.2))) == [0.0]
+    assert times(core.add(odometry(0.35))) == [0.1]
+    assert times(core.flush()) == [0.35]
+
+
+# -- Order of arrival -----------------------------------------------------------------------------
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.data())
+def test_with_a_large_max_lag_the_order_of_arrival_is_nothing(data):
+    stream = drive(1.0)
+    core, _ = make_core(max_lag=1.0, history=1.0)
+    expected = essence(play(core, stream))
+    delays = data.draw(
+        st.lists(st.floats(0.0, 0.99), min_size=len(stream), max_size=len(stream))
+    )
+    shuffled = [
+        m for _, m in sorted(zip(delays, stream, strict=True), key=lambda p: p[1].stamp + p[0] * SECOND)
+    ]
+    core, _ = make_core(max_lag=1.0, history=1.0)
+    assert essence(play(core, shuffled)) == expected
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.data())
+def test_late_inputs_within_the_history_end_in_the_same_state(data):
+    stream = drive(2.0)
+    last = odometry(4.2)
+    core, _ = make_core()
+    expected = essence(play(core, [*stream, imu(4.19), last]))[-1]
+    delays = [
+        data.draw(st.floats(0.0, 0.99)) if data.draw(st.booleans()) else 0.0 for _ in stream
+    ]
+    arrivals = sorted(zip(delays, stream, strict=True), key=lambda p: p[1].stamp + p[0] * SECOND)
+    core, _ = make_core()
+    sets = play(core, [m for _, m in arrivals] + [imu(4.19), last])
+    assert essence(sets)[-1] == expected
+    stamps = [s.stamp for s in sets]
+    assert all(a < b for a, b in zip(stamps, stamps[1:], strict=False))
+    assert not any('older' in key for key in core.health())
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.data())
+def test_each_set_is_what_a_run_in_order_through_the_inputs_so_far_gives(data):
+    """The definition itself: laziness, kept states and forgetting must not show."""
+    stream = drive(1.5)
+    delays = [data.draw(st.sampled_from([0.0, 0.0, 0.004, 0.03, 0.25, 0.7])) for _ in stream]
+    arrivals = [
+        m
+        for _, m in sorted(
+            zip(delays, stream, strict=True), key=lambda p: p[1].stamp + p[0] * SECOND
+        )
+    ]
+    core, _ = make_core()
+    arrived = []
+    for measurement in arrivals:
+        arrived.append(measurement)
+        for estimates in core.add(measurement):
+            used = [m for m in arrived if m.stamp <= estimates.stamp]
+            plain, _ = make_core(max_lag=30.0)
+            expected = play(plain, sorted(used, key=lambda m: m.stamp))[-1]
+            assert estimates.forward_velocity == expected.forward_velocity
+
+
+def test_an_input_older_than_the_history_is_dropped_and_counted():
+    core, _ = make_core(history=2.0)
+    play(core, [odometry(0.1 * i) for i in range(40)], flush=False)
+    before, _ = make_core(history=2.0)
+    play(before, [odometry(0.1 * i) for i in range(40)], flush=False)
+    core.add(sinkage(1.89))  # the state is at 3.9
+    core.add(sinkage(1.91))
+    before.add(sinkage(1.91))
+    assert essence(core.add(odometry(4.0))) == essence(before.add(odometry(4.0)))
+    health = core.health()
+    assert health['sinkage_rejected: stamp older than the history'] == 1
+    assert health['sinkage_late'] == 1
+
+
+def test_the_first_input_of_a_run_may_come_late():
+    core, _ = make_core()
+    late = play(core, [odometry(0.1), imu(0.02, 4.0), odometry(0.2)])
+    core, _ = make_core()
+    assert essence(late)[-1] == essence(play(core, [imu(0.02, 4.0), odometry(0.1), odometry(0.2)]))[-1]
+
+
+# -- Economy --------------------------------------------------------------------------------------
+
+
+def test_slightly_late_imu_messages_cost_little():
+    """250 Hz, each 6 ms later than the odometry of its time: batched, not one run each."""
+    core, fake = make_core()
+    stream = [(0.01 * i, odometry(0.01 * i)) for i in range(1000)]
+    stream += [(0.004 * i + 0.006, imu(0.004 * i)) for i in range(2500)]
+    for _, measurement in sorted(stream, key=lambda pair: pair[0]):
+        core.add(measurement)
+    distinct = len({m.stamp for _, m in stream})
+    assert fake.steps < 3.5 * distinct
+
+
+def test_a_late_reference_costs_one_run_of_its_lateness():
+    core, fake = make_core()
+    stream = [(0.1 * i, odometry(0.1 * i)) for i in range(300)]
+    stream += [(0.02 * i + 0.001, imu(0.02 * i)) for i in range(1500)]
+    stream += [(1.0 * i + 0.75, reference(1.0 * i + 0.25)) for i in range(29)]  # 0.5 s late
+    for _, measurement in sorted(stream, key=lambda pair: pair[0]):
+        core.add(measurement)
+    health = core.health()
+    assert health['reference_odom_late'] == 29
+    # Half a second at 50 Hz from a kept state at most 0.1 s before, and one step for each IMU
+    # message that has the stamp of the set just given.
+    assert health['steps_repeated'] < 29 * 36 + 300 * 1.1
+
+
+def test_the_log_stays_short_over_a_long_drive():
+    core, _ = make_core()
+    for i in range(20_000):
+        core.add(imu(0.004 * i))
+        if i % 25 == 0:
+            core.add(odometry(0.004 * i))
+    assert len(core._timeline._entries) < 2.0 / 0.004 + 200
+
+
+def test_a_driver_whose_stamp_stands_still_fills_nothing():
+    core, _ = make_core()
+    for i in range(1000):
+        core.add(odometry(0.0, rate=0.1 * i))
+    assert len(core._timeline._entries) == 1
+    assert core.health()['joint_states_stamp_repeated'] == 999
+
+
+# -- Silence --------------------------------------------------------------------------------------
+
+
+def test_sets_go_on_at_five_hertz_while_the_wheel_odometry_is_silent():
+    core, _ = make_core()
+    stream = [imu(0.02 * i) for i in range(200)]
+    stream += [odometry(0.1 * i) for i in range(11)] + [odometry(3.0 + 0.1 * i) for i in range(10)]
+    sets = play(core, sorted(stream, key=lambda m: m.stamp))
+    silent = [s for s in sets if stamp_at(1.0) < s.stamp < stamp_at(3.0)]
+    assert times(silent) == [1.5, 1.7, 1.9, 2.1, 2.3, 2.5, 2.7, 2.9]
+    for estimates in silent:
+        assert (estimates.slip_class == SlipClass.UNKNOWN).all()
+        assert 'silent' in estimates.faults['joint_states']
+    returned = [s for s in sets if s.stamp >= stamp_at(3.0)]
+    assert times(returned) == [round(3.0 + 0.1 * i, 6) for i in range(10)]
+    assert all((s.slip_class == 0).all() for s in returned)
+
+
+def test_sets_begin_without_any_wheel_odometry():
+    core, _ = make_core()
+    assert times(play(core, [imu(0.02 * i) for i in range(60)])) == [0.5, 0.7, 0.9, 1.1]
+
+
+def test_odd_rates_keep_the_five_hertz():
+    core, _ = make_core()
+    sets = play(core, [odometry(0.0)] + [imu(0.013 * i) for i in range(1, 800)])
+    assert len(sets) == 1 + math.floor((0.013 * 799 - 0.5) / 0.2) + 1
+
+
+# -- Clock ----------------------------------------------------------------------------------------
+
+
+def test_a_looped_bag_begins_a_new_run_that_keeps_the_soil():
+    core, fake = make_core()
+    once = drive(2.0)
+    sets = play(core, once + once + once)
+    assert times(sets) == [round(0.1 * i, 6) for i in range(20)] * 3
+    assert core.health()['clock_steps_back'] == 2
+    assert core.health()['runs'] == 3
+    kept = [keep for _, keep in fake.begun]
+    assert kept[0] is False and kept == sorted(kept) and kept.count(True) >= 2
+
+
+def test_odometry_alone_can_step_back():
+    core, _ = make_core()
+    stream = [odometry(0.1 * i) for i in range(30)] + [odometry(0.1 * i) for i in range(5)]
+    assert times(play(core, stream)) == times(play(make_core()[0], stream[:30])) + [
+        0.0,
+        0.1,
+        0.2,
+        0.3,
+        0.4,
+    ]
+
+
+def test_a_step_back_of_less_than_a_second_goes_on_in_the_same_run():
+    core, _ = make_core()
+    stream = [odometry(0.1 * i) for i in range(30)] + [odometry(2.1 + 0.1 * i) for i in range(12)]
+    sets = play(core, stream)
+    assert core.health()['clock_steps_back'] == 0
+    assert times(sets) == [round(0.1 * i, 6) for i in range(33)]
+
+
+def test_one_stale_message_ends_no_run():
+    core, _ = make_core()
+    for i in range(300):
+        core.add(imu(0.02 * i))
+        if i % 5 == 0:
+            core.add(odometry(0.02 * i))
+            core.add(sinkage(0.02 * i))
+        if i in (200, 250):
+            core.add(sinkage(0.02 * i - 3.0))
+            core.add(imu(0.02 * i + 0.01))
+            core.add(odometry(0.02 * i - 4.0))
+            core.add(imu(0.02 * i + 0.015))
+    health = core.health()
+    assert health['clock_steps_back'] == 0
+    assert health['sinkage_rejected: stamp older than the history'] == 2
+    assert health['joint_states_rejected: stamp older than the history'] == 2
+
+
+def test_a_reference_that_is_always_late_ends_no_run():
+    core, _ = make_core()
+    stream = [(0.1 * i, odometry(0.1 * i)) for i in range(100)]
+    stream += [(0.5 * i + 1.5, reference(0.5 * i)) for i in range(15)]
+    for _, measurement in sorted(stream, key=lambda pair: pair[0]):
+        core.add(measurement)
+    assert core.health()['clock_steps_back'] == 0
+    assert core.health()['reference_odom_late'] == 15
+
+
+def test_one_stamp_from_the_future_does_no_harm():
+    core, _ = make_core()
+    stream = drive(2.0)
+    spoilt = stream[:60] + [imu(5000.0)] + stream[60:]
+    assert essence(play(core, spoilt)) == essence(play(make_core()[0], stream))
+    assert core.health()['imu/data_rejected: stamp far ahead of all others'] == 1
+
+
+def test_a_pause_of_all_topics_is_no_new_run():
+    core, _ = make_core()
+    later = [odometry(60.0), imu(60.01), odometry(60.1)]
+    sets = play(core, [imu(0.0), odometry(0.0), *later])
+    assert times(sets) == [0.0, 60.0, 60.1]
+    assert core.health()['runs'] == 1
+
+
+def test_a_slow_lone_odometry_gets_its_sets_at_once():
+    core, _ = make_core()
+    assert [times(core.add(odometry(30.0 * i))) for i in range(4)] == [[0.0], [30.0], [60.0], [90.0]]
+
+
+def test_wheel_odometry_keeps_the_time_where_clocks_differ_for_good():
+    """An IMU whose clock is an hour ahead is left out; the sets follow the wheels."""
+    core, _ = make_core()
+    sets = []
+    for i in range(200):
+        sets += core.add(imu(3600.0 + 0.02 * i))
+        if i % 5 == 0:
+            sets += core.add(odometry(0.02 * i))
+    assert times(sets)[-10:] == [round(0.1 * i, 6) for i in range(30, 40)]
+    assert core.health()['imu/data_rejected: stamp far ahead of all others'] > 100
+
+
+def test_reset_begins_a_new_run_and_forgets_the_soil():
+    core, fake = make_core()
+    play(core, drive(2.0), flush=False)
+    core.reset()
+    again = play(core, drive(2.0))
+    assert essence(again) == essence(play(make_core()[0], drive(2.0)))
+    assert fake.begun[-1][1] is False
+
+
+# -- Reference ------------------------------------------------------------------------------------
+
+
+def test_the_reference_is_thinned_by_stamps():
+    core, _ = make_core(reference_odom_max_rate=1.0)
+    stream = [odometry(0.1 * i) for i in range(100)]
+    stream += [reference(0.1 * i + 0.001 * (-1) ** i + 0.05) for i in range(100)]
+    sets = play(core, sorted(stream, key=lambda m: m.stamp))
+    assert sets[-1].yaw_rate == 10.0  # the fake counts the references that it was given
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.permutations(range(20)))
+def test_thinning_does_not_depend_on_the_order_of_arrival(order):
+    stream = [reference(0.05 * i + 0.003, forward=0.01 * i) for i in order]
+    core, _ = make_core(reference_odom_max_rate=3.0)
+    sets = play(core, [odometry(0.0), *stream, odometry(1.1)])
+    ordered, _ = make_core(reference_odom_max_rate=3.0)
+    stream.sort(key=lambda m: m.stamp)
+    expected = play(ordered, [odometry(0.0), *stream, odometry(1.1)])
+    assert essence(sets)[-1] == essence(expected)[-1]
