@@ -12,9 +12,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numpy as np
-
-from wheel_terra_estimator.terramechanics.branch_integrals import Direction, branch_integrals
+from wheel_terra_estimator.terramechanics.balanced_branches import balanced_forces
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects import (
     EffectSettings,
@@ -23,6 +21,7 @@ from wheel_terra_estimator.terramechanics.effects import (
 )
 from wheel_terra_estimator.terramechanics.maths import ScalarMaths
 from wheel_terra_estimator.terramechanics.operating_points import STANDARD_GRAVITY
+from wheel_terra_estimator.terramechanics.scalar_wheels import scalar_contacts
 from wheel_terra_estimator.terramechanics.soil import Soil
 from wheel_terra_estimator.terramechanics.terms import Terms, set_angles
 from wheel_terra_estimator.terramechanics.wheel import Wheel
@@ -90,8 +89,6 @@ class ConditionedForces:
         slip_radius: str = 'lug_tip',
         gravity: float = STANDARD_GRAVITY,
     ) -> None:
-        if slip_radius not in ('lug_tip', 'rim'):
-            raise ValueError(f"slip radius is {slip_radius!r}; allowed: 'lug_tip', 'rim'")
         settings = check_settings(effects or {})
         known = catalogue()
         self._terms = Terms(settings)
@@ -107,20 +104,7 @@ class ConditionedForces:
         self._exponent = float(soil.sinkage_exponent)
         self._peak_ratio = float(soil.peak_stress_ratio)
         self._leaving_ratio = float(soil.leaving_angle_ratio)
-        columns = np.broadcast_arrays(
-            *(
-                np.atleast_1d(np.asarray(value, float))
-                for value in (wheel.radius, wheel.width, wheel.lug_height, wheel.lug_count)
-            )
-        )
-        self._wheels = []
-        for radius, width, height, count in zip(*(c.tolist() for c in columns), strict=True):
-            contact = Contact(
-                *(0.0,) * 5, gravity, *(0.0,) * 3, radius, width, height, count, *(0.0,) * 11
-            )
-            contact.density = float(soil.density)
-            contact.reference_depth = 1.0
-            self._wheels.append((contact, radius + height if slip_radius == 'lug_tip' else radius))
+        self._wheels = scalar_contacts(wheel, soil, slip_radius, gravity)
 
     def __len__(self) -> int:
         return len(self._wheels)
@@ -169,24 +153,24 @@ class ConditionedForces:
             max(tan_friction, 0.0),
             max(shear_modulus, 1e-6),
         )
-        scale, angle_rate, leaving = self._rates(
+        rates, angle_rate, leaving = self._rates(
             contact, given, slip_radius, sinkage, leaving_angle
         )
         t1, clamped = self._inputs(contact, given, slip_radius, sinkage)
         set_angles(contact, t1, leaving, self._terms, ScalarMaths)
         sink_rate = 0.0 if clamped else 1.0 / (contact.radius * math.sin(t1))
-        by_ratio, by_load, by_cohesion, by_friction, by_modulus, by_angle, exponent = scale
-        result = _respond(
+        by_ratio, by_load, by_cohesion, by_friction, by_modulus, by_angle, by_exponent = rates
+        (torque, pull), rows = balanced_forces(
             contact,
             centroid_shift,
             (
-                (*by_angle, by_ratio, exponent, 0.0),
-                (sink_rate, sink_rate * angle_rate[0], sink_rate * angle_rate[1], 0.0, 0.0, 0.0),
-                (0.0, 0.0, 0.0, 0.0, 0.0, by_modulus / contact.shear_modulus),
+                (*by_angle, by_ratio, by_exponent),
+                (sink_rate, sink_rate * angle_rate[0], sink_rate * angle_rate[1], 0.0, 0.0),
             ),
-            (by_load, by_cohesion, by_friction),
         )
-        torque, pull, d_torque, d_pull = result
+        scales = (1.0, 1.0, by_load, by_cohesion, by_friction, by_modulus, 1.0)
+        d_torque = tuple([row[0] * scale for row, scale in zip(rows, scales, strict=True)])
+        d_pull = tuple([row[1] * scale for row, scale in zip(rows, scales, strict=True)])
         if direction < 0.0:
             torque, pull = -torque, -pull
             d_torque, d_pull = tuple(-d for d in d_torque), tuple(-d for d in d_pull)
@@ -303,77 +287,3 @@ class ConditionedForces:
             for k in (0, 1):
                 rows[k][column] += (moved[k] - base[k]) / step
         return Forces(torque + base[0], pull + base[1], tuple(rows[0]), tuple(rows[1]), clamped)
-
-
-def _respond(
-    contact: Contact,
-    shift: float,
-    directions: tuple[Direction, Direction, Direction],
-    rates: tuple[float, float, float],
-) -> tuple[float, float, tuple[float, ...], tuple[float, ...]]:
-    """Torque and pull from the load balance, and their derivatives in the order of ``INPUTS``.
-
-    The balance W/b = sigma (r Nx + R mu Fy) + R c Cy gives the peak stress sigma; then
-    T = b R^2 (mu sigma Fs + c Cs) and F = b [R (mu sigma Fx + c Cx) - r sigma Ny], with N, F, C
-    the normal, friction and cohesion integrals.
-    """
-    r, R, width = contact.radius, contact.shear_radius, contact.width
-    c, mu = contact.cohesion, contact.tan_friction
-    value, moved = branch_integrals(
-        contact.entrance_angle,
-        contact.peak_angle,
-        contact.leaving_angle,
-        R,
-        contact.velocity_ratio,
-        contact.sinkage_exponent,
-        contact.shear_modulus,
-        shift,
-        directions,
-    )
-    nx, ny, fx, fy, fs, cx, cy, cs = value
-    inverse = 1.0 / (r * nx + R * mu * fy)
-    sigma = (contact.normal_load / width - R * c * cy) * inverse
-    rubbed = mu * sigma
-    arm = width * R * R
-    torque = arm * (rubbed * fs + c * cs)
-    pull = width * (R * (rubbed * fx + c * cx) - r * sigma * ny)
-
-    d_torque, d_pull = [], []
-    for d_nx, d_ny, d_fx, d_fy, d_fs, d_cx, d_cy, d_cs in (*moved, value.turned()):
-        d_sigma = -(R * c * d_cy + sigma * (r * d_nx + R * mu * d_fy)) * inverse
-        d_torque.append(arm * (mu * d_sigma * fs + rubbed * d_fs + c * d_cs))
-        d_pull.append(
-            width
-            * (
-                R * (mu * d_sigma * fx + rubbed * d_fx + c * d_cx)
-                - r * (d_sigma * ny + sigma * d_ny)
-            )
-        )
-    # Load, cohesion, tan(phi): the integrals stay, sigma and the explicit factors move.
-    by_sigma_torque, by_sigma_pull = arm * mu * fs, width * (R * mu * fx - r * ny)
-    by_load, by_cohesion, by_friction = rates
-    s_load = by_load * inverse / width
-    s_cohesion = -by_cohesion * R * cy * inverse
-    s_friction = -by_friction * sigma * R * fy * inverse
-    return (
-        torque,
-        pull,
-        (
-            d_torque[0],
-            d_torque[1],
-            by_sigma_torque * s_load,
-            by_sigma_torque * s_cohesion + by_cohesion * arm * cs,
-            by_sigma_torque * s_friction + by_friction * arm * sigma * fs,
-            d_torque[2],
-            d_torque[3],
-        ),
-        (
-            d_pull[0],
-            d_pull[1],
-            by_sigma_pull * s_load,
-            by_sigma_pull * s_cohesion + by_cohesion * width * R * cx,
-            by_sigma_pull * s_friction + by_friction * width * R * sigma * fx,
-            d_pull[2],
-            d_pull[3],
-        ),
-    )
