@@ -134,6 +134,6 @@ def size_for(
             factor = new
         else:
             factor /= 3
-    if result is None:
-        raise ValueError('the wheel sinks in')
+    if result is None or result[2] < 0.5:
+        raise ValueError('the wheel sinks in, or nothing at all can be seen')
     return result

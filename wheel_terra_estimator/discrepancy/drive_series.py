@@ -1,0 +1,143 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""A drive as time series: the measurements of all sensors, sorted by stamp."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.estimation.measurements import (
+    InertialReading,
+    Measurement,
+    ReferenceVelocity,
+    SinkageReading,
+    WheelOdometry,
+)
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Channel:
+    """Samples of one sensor: ``time`` (k,) [s], strictly increasing, and ``values`` (k, m)."""
+
+    time: FloatArray
+    values: FloatArray
+
+    def within(self, start: float, end: float) -> FloatArray:
+        """Return the samples (j, m) with start <= time < end."""
+        first, last = np.searchsorted(self.time, [start, end])
+        return self.values[first:last]
+
+    def times_within(self, start: float, end: float) -> FloatArray:
+        """Return the stamps (j,) [s] with start <= time < end."""
+        first, last = np.searchsorted(self.time, [start, end])
+        return self.time[first:last]
+
+    def longest_gap(self, start: float, end: float) -> float:
+        """Return the longest silence [s] within a stretch, its ends included."""
+        times = self.times_within(start, end)
+        return float(np.max(np.diff(np.concatenate([[start], times, [end]]))))
+
+
+@dataclass(frozen=True)
+class DriveSeries:
+    """Everything that a drive measured; stamps count from the first wheel odometry.
+
+    Attributes
+    ----------
+    rate, torque : Channel
+        (k, n) wheel rates [rad/s] and drive torques [N m] at the same stamps, nan = not in the
+        message.
+    specific_force : Channel
+        (k, 3) [m/s^2].
+    yaw_rate : Channel
+        (k, 1) [rad/s].
+    sinkage : Channel
+        (k, n) [m], nan = no reading.
+    reference : Channel
+        (k, 2) forward velocity of the body [m/s] and its stated variance [(m/s)^2].
+    """
+
+    rate: Channel
+    torque: Channel
+    specific_force: Channel
+    yaw_rate: Channel
+    sinkage: Channel
+    reference: Channel
+
+
+def collect(measurements: Iterable[Measurement], wheels: int, name: str) -> DriveSeries:
+    """Sort the measurements of a drive into series.
+
+    Parameters
+    ----------
+    measurements : iterable of Measurement
+        In any order.
+    wheels : int
+        Number of wheels n.
+    name : str
+        Where they came from, for messages.
+
+    Raises
+    ------
+    UserError
+        If a sensor is missing without which no steady row can be had.
+    """
+    rate: dict[int, FloatArray] = {}
+    torque: dict[int, FloatArray] = {}
+    force: dict[int, FloatArray] = {}
+    yaw: dict[int, FloatArray] = {}
+    sinkage: dict[int, FloatArray] = {}
+    reference: dict[int, FloatArray] = {}
+    for item in measurements:
+        if isinstance(item, WheelOdometry):
+            # A message may hold some of the wheels only: equal stamps complete one another.
+            for series, values in ((rate, item.rate), (torque, item.torque)):
+                before = series.get(item.stamp)
+                series[item.stamp] = (
+                    values if before is None else np.where(np.isnan(values), before, values)
+                )
+        elif isinstance(item, InertialReading):
+            force[item.stamp] = item.specific_force
+            yaw[item.stamp] = item.angular_rate[2:]
+        elif isinstance(item, SinkageReading):
+            sinkage[item.stamp] = item.sinkage
+        elif isinstance(item, ReferenceVelocity):
+            reference[item.stamp] = np.array([item.forward, item.variance])
+    for series, topic, why in (
+        (rate, 'wheel odometry', 'wheel rates'),
+        (force, 'imu/data', 'loads and pull come from the specific force'),
+        (reference, 'reference_odom', 'the slip of a drive comes from it'),
+    ):
+        if len(series) < 2:
+            raise UserError(
+                f'{name}: no {topic} ({why}); if it has another name in the bag, give '
+                f'--remap {"joint_states" if series is rate else topic}:=/ITS/NAME'
+            )
+    origin = min(rate)
+    return DriveSeries(
+        *(
+            _channel(series, origin, width)
+            for series, width in (
+                (rate, wheels),
+                (torque, wheels),
+                (force, 3),
+                (yaw, 1),
+                (sinkage, wheels),
+                (reference, 2),
+            )
+        )
+    )
+
+
+def _channel(series: dict[int, FloatArray], origin: int, width: int) -> Channel:
+    stamps = sorted(series)
+    time = np.array([(stamp - origin) * 1e-9 for stamp in stamps])
+    values = np.array([series[stamp] for stamp in stamps], dtype=float).reshape(-1, width)
+    return Channel(time, values)

@@ -1,0 +1,592 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Steady rows out of a drive: windows over whole lug periods, with honest deviations.
+
+On a drive nobody sets the slip: it follows from the slope, and is known only as well as the
+reference velocity. Nor is the pull of a wheel measured: the accelerometer gives the sum over the
+wheels. So each window yields
+
+- one row per wheel with slip, normal load (from the specific force and the load model), torque and
+  sinkage, no pull;
+- one row for the mean wheel (mean slip, mean load) with the pull per wheel, m f_x / n, and nothing
+  else. It is left out where the wheels differ in size or in slip so much that the mean of their
+  pulls is not the pull of the mean wheel.
+
+No cell is used twice and no pull is made up. Pull is taken along the chassis and turned to the
+local slope by the tilt that the measured sinkages give (wheels that sink deeper behind tip the
+chassis nose-up).
+
+Deviations of a window's means come from the scatter of the means over single lug passages, with
+their lag-one correlation pooled over all windows of the run: a window of its own is too short to
+know it (naive standard errors cover 28 % instead of 95 %). Errors that a whole drive shares (zero
+and gain of torque and sinkage sensors, bias of the accelerometer, as ``sensors.*`` state them) are
+added at sqrt(number of windows) times their size: the rows together then know a common shift
+exactly as well as the instrument does, and a zero error within its stated size is not taken for an
+effect.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.discrepancy.drive_series import Channel, DriveSeries, collect
+from wheel_terra_estimator.discrepancy.table import SteadyTable, check_table
+from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.estimation.filter_settings import FilterSettings
+from wheel_terra_estimator.estimation.measurements import Measurement
+from wheel_terra_estimator.terramechanics.kinematics import slip_ratio
+
+FloatArray = NDArray[np.float64]
+
+LEAST_PASSAGES = 10  # lug passages in a window
+LEAST_DURATION = 4.0  # [s]
+LEAST_SEGMENTS = 8  # into which a window is cut to judge drift and scatter
+MAXIMUM_ROWS = 120  # more windows are merged with their likes
+TURNING = 0.03  # mean yaw rate [rad/s] beyond which a window counts as a turn
+SLIP_SPREAD = 0.15  # between wheels, beyond which there is no mean wheel
+SETTLING_TRAVEL = 0.5  # rim travel after standing, in wheel radii, that is not used
+
+# Greatest drift over a window: share of the mean, and an absolute amount that is always allowed.
+_DRIFT = {'wheel rate': (0.10, 0.01), 'slip': (0.10, 0.02), 'slope': (0.0, 0.0035)}
+_CREEP = (0.10, 0.5e-3)  # of the sinkage [m]
+
+GOOD = 'steady'
+QUALITIES = (
+    GOOD,
+    'standing',
+    'settling',
+    'turning',
+    'digging in',
+    'wheel rate changes',
+    'slip changes',
+    'slope changes',
+    'no reference',
+    'no data',
+)
+
+
+@dataclass(frozen=True)
+class Window:
+    """Means of a steady window and what their scatter says.
+
+    Attributes
+    ----------
+    start, end : float
+        [s] from the first wheel odometry.
+    passages : int
+        Lug passages in it (0 for a smooth wheel).
+    slip, normal_load, torque, sinkage, rate : numpy.ndarray
+        (n,) means; nan = not measured.
+    pull : float
+        Mean pull per wheel [N], along the local slope.
+    slope : float
+        Slope of the ground, positive uphill in the direction of travel [rad].
+    scatter : mapping
+        ``slip``, ``torque``, ``sinkage`` -> (n,), ``pull`` -> (1,): variance between segments.
+    segments : int
+        Number of segments.
+    series : mapping
+        As ``scatter``: (segments, n) means, from which the correlation is pooled.
+    reference_std : float
+        Standard deviation of the mean reference velocity as its messages state it [m/s].
+    """
+
+    start: float
+    end: float
+    passages: int
+    slip: FloatArray
+    normal_load: FloatArray
+    torque: FloatArray
+    sinkage: FloatArray
+    rate: FloatArray
+    pull: float
+    slope: float
+    segments: int
+    series: Mapping[str, FloatArray]
+    reference_std: float
+    std: Mapping[str, FloatArray] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class DriveRows:
+    """Rows of a drive as columns of the table format, and what was found on the way.
+
+    Attributes
+    ----------
+    name : str
+        Where the drive came from.
+    columns : mapping
+        Column -> (N,) values [SI], nan = not measured.
+    windows : tuple of Window
+        The steady ones.
+    stretches, seconds : mapping
+        Quality -> number of stretches and how long they were; ``steady`` are the windows.
+    notes : tuple of str
+        For people.
+    """
+
+    name: str
+    columns: Mapping[str, FloatArray]
+    windows: tuple[Window, ...]
+    stretches: Mapping[str, int]
+    seconds: Mapping[str, float]
+    notes: tuple[str, ...]
+
+    def table(self) -> SteadyTable:
+        """Return the rows as a checked table."""
+        return check_table(self.name, self.columns, notes=self.notes)
+
+
+def rows_from_bag(
+    path: str | Path, configuration: Configuration, remaps: Mapping[str, str] | None = None
+) -> DriveRows:
+    """Return the steady rows of a rosbag2.
+
+    Parameters
+    ----------
+    path : str or pathlib.Path
+        Folder, or a single ``.mcap`` or ``.db3``.
+    configuration : Configuration
+        Wheels, mass and load model.
+    remaps : mapping, optional
+        Estimator's topic -> the bag's.
+
+    Raises
+    ------
+    UserError
+        If the bag cannot be read, lacks a sensor, or holds no steady window.
+    """
+    from wheel_terra_estimator.bags import reader
+
+    measurements = (item for _, item in reader.read(path, remaps or {}, configuration))
+    return rows_from_measurements(measurements, configuration, str(path))
+
+
+def rows_from_measurements(
+    measurements: Iterable[Measurement], configuration: Configuration, name: str = 'drive'
+) -> DriveRows:
+    """Return the steady rows of a drive; see `rows_from_bag`."""
+    wheels = configuration.wheels
+    series = collect(measurements, wheels.count, name)
+    finder = _WindowFinder(series, configuration)
+    windows = _with_deviations(finder.search(), configuration)
+    if not windows:
+        seen = ', '.join(f'{key} {finder.seconds[key]:.1f} s' for key in finder.seconds)
+        raise UserError(
+            f'{name}: no steady window of {LEAST_DURATION:g} s and {LEAST_PASSAGES} lug passages '
+            f'({seen or "nothing"}); drive straight at constant wheel rate, a few seconds per slope'
+        )
+    merged = _merge(windows, max(MAXIMUM_ROWS // (wheels.count + 1), 6))
+    columns, left_out = _columns(merged, configuration)
+    _add_shared_errors(columns, configuration, len(merged))
+    return DriveRows(
+        name,
+        columns,
+        tuple(windows),
+        dict(finder.stretches),
+        dict(finder.seconds),
+        _notes(finder, windows, merged, left_out),
+    )
+
+
+class _WindowFinder:
+    """Walks along a drive and cuts out the steady windows."""
+
+    def __init__(self, series: DriveSeries, configuration: Configuration) -> None:
+        self.series = series
+        self.configuration = configuration
+        self.settings = FilterSettings.from_configuration(configuration)
+        self.stretches: Counter[str] = Counter()
+        self.seconds: Counter[str] = Counter()
+        self._last = ''
+
+    def search(self) -> list[Window]:
+        """Return the windows in order of time."""
+        wheels = self.configuration.wheels
+        time = self.series.rate.time
+        now, end = float(time[0]), float(time[-1])
+        settle = SETTLING_TRAVEL * float(np.mean(wheels.radius))
+        unsettled = settle
+        windows: list[Window] = []
+        while now < end:
+            ahead = self.series.rate.within(now, now + 0.5)
+            rate = float(np.nanmean(np.abs(ahead))) if np.isfinite(ahead).any() else np.nan
+            rim = rate * float(np.mean(wheels.slip_radius))
+            if not rim > 3 * self.configuration.rest_speed:
+                now = self._pass(now, 0.5, 'standing' if rim >= 0 else 'no data')
+                unsettled = settle
+                continue
+            if unsettled > 0:
+                step = min(0.5, unsettled / rim)
+                unsettled -= step * rim
+                now = self._pass(now, step, 'settling')
+                continue
+            duration, passages = self._duration(rate)
+            if now + duration > end:
+                self._pass(now, end - now, 'no data')
+                break
+            quality, window = self._judge(now, now + duration, passages)
+            if window is not None:
+                windows.append(window)
+                now = self._pass(now, duration, GOOD, one=True)
+            else:
+                now = self._pass(now, max(0.25 * duration, 0.5), quality)
+                if quality == 'slope changes':  # until the last wheel has followed
+                    unsettled = float(np.ptp(wheels.x))
+        return windows
+
+    def _pass(self, now: float, step: float, quality: str, one: bool = False) -> float:
+        """Book a stretch and return its end."""
+        if one or quality != self._last:
+            self.stretches[quality] += 1
+        self._last = quality
+        self.seconds[quality] += step
+        return now + step
+
+    def _duration(self, rate: float) -> tuple[float, int]:
+        """Return the length [s] of a window at this wheel rate, and its lug passages."""
+        lugs = int(np.max(self.configuration.wheels.lug_count))
+        if not lugs or not np.any(self.configuration.wheels.lug_height > 0):
+            return LEAST_DURATION, 0
+        period = 2 * np.pi / (lugs * rate)
+        passages = max(LEAST_PASSAGES, int(np.ceil(LEAST_DURATION / period)))
+        return passages * period, passages
+
+    def _judge(self, start: float, end: float, passages: int) -> tuple[str, Window | None]:
+        """Return the quality of a stretch and, where it is steady, its window."""
+        s = self.series
+        samples = len(s.rate.times_within(start, end))
+        count = min(passages or LEAST_SEGMENTS, samples // 3)
+        if count < LEAST_SEGMENTS or s.rate.longest_gap(start, end) > 1.0:
+            return 'no data', None
+        if s.reference.longest_gap(start, end) > max(3.0, 0.5 * (end - start)):
+            return 'no reference', None
+        force = _segments(s.specific_force, start, end, count)
+        yaw = _segments(s.yaw_rate, start, end, count)
+        if np.isnan(force).any() or np.isnan(yaw).any():
+            return 'no data', None
+        if abs(yaw.mean()) > TURNING:
+            return 'turning', None
+        rate = _segments(s.rate, start, end, count)
+        torque = _segments(s.torque, start, end, count)
+        sinkage = _segments(s.sinkage, start, end, count)
+        slip = self._slip(start, end, count, rate)
+        if np.isnan(rate).any() or np.isnan(slip).any():
+            return 'no data', None
+        direction = np.sign(np.mean(rate))
+        tilt = np.nan_to_num(sinkage) @ np.asarray(self.settings.rut_tilt)
+        pitch = np.arctan2(force[:, 0], force[:, 2])
+        slope = direction * (pitch - tilt)
+        for what, values in (
+            ('wheel rate', rate.mean(1)),
+            ('slip', slip.mean(1)),
+            ('slope', slope),
+        ):
+            share, always = _DRIFT[what]
+            if _drifts(values, max(share * abs(values.mean()), always)):
+                return f'{what} changes', None
+        depth = sinkage.mean(1) if np.isfinite(sinkage).all() else np.zeros(count)
+        if _drifts(depth, max(_CREEP[0] * depth.mean(), _CREEP[1])):
+            return 'digging in', None
+        mass, wheels = self.settings.mass, self.settings.wheel_count
+        along = force[:, 0] * np.cos(tilt) - force[:, 2] * np.sin(tilt)
+        pull = direction * mass / wheels * along
+        mean = force.mean(0)
+        references = s.reference.within(start, end)
+        stated = references[references[:, 1] > 0, 1]
+        return GOOD, Window(
+            start,
+            end,
+            passages,
+            slip.mean(0),
+            self.settings.load.loads([float(f) for f in mean]),
+            direction * _mean(torque),
+            _mean(sinkage),
+            rate.mean(0),
+            float(pull.mean()),
+            float(slope.mean()),
+            count,
+            {'slip': slip, 'torque': torque, 'sinkage': sinkage, 'pull': pull[:, None]},
+            float(np.sqrt(stated.mean() / len(stated))) if stated.size else 0.0,
+        )
+
+    def _slip(self, start: float, end: float, count: int, rate: FloatArray) -> FloatArray:
+        """Return the slip of each wheel in each segment, (count, n)."""
+        s = self.series
+        edges = np.linspace(start, end, count + 1)
+        middle = 0.5 * (edges[1:] + edges[:-1])
+        forward = np.interp(middle, s.reference.time, s.reference.values[:, 0])
+        yaw = np.interp(middle, s.yaw_rate.time, s.yaw_rate.values[:, 0])
+        lateral = np.asarray(self.settings.lateral)
+        ground = forward[:, None] - yaw[:, None] * lateral
+        # Ratio of means, not mean of ratios: where the reference is noisy only the first is right.
+        rim = rate * np.asarray(self.settings.slip_radius)
+        slip = slip_ratio(ground.mean(0), rim.mean(0), self.configuration.rest_speed)
+        single = slip_ratio(ground, rim, self.configuration.rest_speed)
+        return single - np.nanmean(single, axis=0) + slip
+
+
+def _segments(channel: Channel, start: float, end: float, count: int) -> FloatArray:
+    """Return the means of equal parts of a stretch, (count, m); nan where a part has no sample."""
+    times = channel.times_within(start, end)
+    values = channel.within(start, end)
+    index = np.minimum(((times - start) / (end - start) * count).astype(int), count - 1)
+    result = np.full((count, values.shape[1]), np.nan)
+    for part in range(count):
+        inside = values[index == part]
+        good = np.isfinite(inside).any(axis=0)
+        if good.any():
+            result[part, good] = np.nanmean(inside[:, good], axis=0)
+    return result
+
+
+def _mean(values: FloatArray) -> FloatArray:
+    """Column means; nan where less than half of the segments have a value."""
+    good = np.isfinite(values)
+    total = np.where(good, values, 0.0).sum(0)
+    enough = 2 * good.sum(0) > len(values)
+    return np.where(enough, total / np.maximum(good.sum(0), 1), np.nan)
+
+
+def _drifts(values: FloatArray, allowed: float) -> bool:
+    """Return whether the segments drift by more than ``allowed``, and significantly so."""
+    n = len(values)
+    x = (np.arange(n) - (n - 1) / 2) / n
+    slope = float(x @ values / (x @ x))
+    residual = values - values.mean() - slope * x
+    error = float(np.sqrt(residual @ residual / max(n - 2, 1) / (x @ x)))
+    return abs(slope) > allowed and abs(slope) > 2 * error
+
+
+def _correlation(blocks: Iterable[FloatArray]) -> float:
+    """Return the lag-one correlation within blocks (k, n), pooled, corrected for shortness."""
+    above = below = weight = 0.0
+    for block in blocks:
+        d = block - block.mean(0)
+        d = d[:, np.isfinite(d).all(0)]
+        if d.size:
+            above += float((d[1:] * d[:-1]).sum())
+            below += float((d * d).sum())
+            weight += d.shape[1]
+            length = len(d)
+    if below <= 0.0:
+        return 0.0
+    raw = above / below
+    # Expectation of the estimate in blocks of length k: r - (1 + 4 r)/k (Marriott, Pope 1954).
+    return float(np.clip((raw * length + 1) / max(length - 4, 1), 0.0, 0.95))
+
+
+def _with_deviations(windows: list[Window], configuration: Configuration) -> list[Window]:
+    """Return the windows with the standard deviations of their means."""
+    if not windows:
+        return []
+    settings, sensors = FilterSettings.from_configuration(configuration), configuration.sensors
+    names = ('slip', 'torque', 'sinkage', 'pull')
+    correlation = {name: _correlation(w.series[name] for w in windows) for name in names}
+    pooled = {name: _mean(np.array([_variance(w.series[name]) for w in windows])) for name in names}
+    # What white noise of the sensors leaves at best: the scatter must not promise more.
+    duration = np.mean([w.end - w.start for w in windows])
+    imu = max(duration * float(sensors.imu_rate), 1.0)
+    least = {
+        'torque': 1e-3
+        * settings.mass
+        * settings.gravity
+        / settings.wheel_count
+        * np.mean(settings.rim_radius),
+        'sinkage': 5e-5,
+        'pull': settings.mass / settings.wheel_count * float(sensors.specific_force_std) / imu**0.5,
+    }
+    result = []
+    for window in windows:
+        std: dict[str, FloatArray] = {}
+        for name in names:
+            k = window.segments
+            # A window's own scatter counts as much as ten degrees of freedom of all windows.
+            variance = (_variance(window.series[name]) * (k - 1) + 10 * pooled[name]) / (k + 9)
+            r = correlation[name]
+            std[name] = np.sqrt(variance / k * (1 + r) / (1 - r))
+        rim = np.abs(window.rate) * np.asarray(settings.slip_radius)
+        std['slip'] = np.maximum(np.maximum(std['slip'], window.reference_std / rim), 2e-3)
+        for name, floor in least.items():
+            std[name] = np.maximum(std[name], floor)
+        result.append(replace(window, std=std))
+    return result
+
+
+def _variance(values: FloatArray) -> FloatArray:
+    good = np.isfinite(values).all(0)
+    return np.where(good, np.var(np.where(good, values, 0.0), axis=0, ddof=1), np.nan)
+
+
+def _merge(windows: list[Window], most: int) -> list[Window]:
+    """Merge windows of like slip, slope, rate and direction until at most ``most`` are left."""
+    groups = [[w] for w in windows]
+    cell = 0.01
+    while len(groups) > most and cell < 0.2:
+        cells: dict[tuple[int, ...], list[Window]] = {}
+        for w in windows:
+            rate = float(np.mean(w.rate))
+            key = (
+                round(float(np.mean(w.slip)) / cell),
+                round(w.slope / cell),
+                round(np.log(abs(rate)) / (4 * cell)),
+                int(np.sign(rate)),
+            )
+            cells.setdefault(key, []).append(w)
+        groups = list(cells.values())
+        cell *= 1.25
+    return [_mean_window(group) for group in groups]
+
+
+def _mean_window(group: list[Window]) -> Window:
+    if len(group) == 1:
+        return group[0]
+    count = len(group)
+
+    def mean(name: str) -> FloatArray:
+        return np.mean([getattr(w, name) for w in group], axis=0)
+
+    return replace(
+        group[0],
+        slip=mean('slip'),
+        normal_load=mean('normal_load'),
+        torque=mean('torque'),
+        sinkage=mean('sinkage'),
+        rate=mean('rate'),
+        pull=float(mean('pull')),
+        slope=float(mean('slope')),
+        passages=sum(w.passages for w in group),
+        std={
+            name: np.sqrt(np.mean([w.std[name] ** 2 for w in group], axis=0) / count)
+            for name in group[0].std
+        },
+    )
+
+
+def _columns(
+    windows: list[Window], configuration: Configuration
+) -> tuple[dict[str, FloatArray], int]:
+    """Return the columns, and in how many windows there was no mean wheel."""
+    wheels = configuration.wheels
+    alike = all(
+        np.ptp(values) <= 1e-6 * np.max(np.abs(values))
+        for values in (wheels.radius, wheels.width, wheels.lug_height + 1.0)
+    )
+    rows: list[dict[str, float]] = []
+    left_out = 0
+    for window in windows:
+        constant = {'slope': window.slope, 'gravity': float(configuration.rover.gravity)}
+        for i in range(wheels.count):
+            if np.isnan([window.torque[i], window.sinkage[i]]).all() or window.normal_load[i] <= 0:
+                continue
+            rows.append(
+                {
+                    **constant,
+                    **_wheel(wheels, i),
+                    'slip': window.slip[i],
+                    'slip_std': window.std['slip'][i],
+                    'normal_load': window.normal_load[i],
+                    'angular_velocity': window.rate[i],
+                    'torque': window.torque[i],
+                    'torque_std': window.std['torque'][i],
+                    'sinkage': window.sinkage[i],
+                    'sinkage_std': window.std['sinkage'][i],
+                }
+            )
+        if not alike or np.ptp(window.slip) > SLIP_SPREAD:
+            left_out += 1
+            continue
+        rows.append(
+            {
+                **constant,
+                **_wheel(wheels, 0),
+                'pass_number': float(np.mean(wheels.passes)),
+                'slip': float(np.mean(window.slip)),
+                'slip_std': float(np.mean(window.std['slip'])),
+                'normal_load': float(np.mean(window.normal_load)),
+                'angular_velocity': float(np.mean(window.rate)),
+                'drawbar_pull': window.pull,
+                'drawbar_pull_std': float(window.std['pull'][0]),
+            }
+        )
+    names = dict.fromkeys(key for row in rows for key in row)
+    columns = {name: np.array([row.get(name, np.nan) for row in rows]) for name in names}
+    for quantity in ('torque', 'sinkage', 'drawbar_pull'):
+        if quantity in columns:
+            columns[f'{quantity}_std'][np.isnan(columns[quantity])] = np.nan
+            if np.isnan(columns[quantity]).all():
+                del columns[quantity], columns[f'{quantity}_std']
+    return columns, left_out
+
+
+def _add_shared_errors(
+    columns: dict[str, FloatArray], configuration: Configuration, windows: int
+) -> None:
+    """Widen deviations by what all rows of a sensor share, see the module's text."""
+    sensors, rover = configuration.sensors, configuration.rover
+    bias = float(sensors.specific_force_bias_std) * float(rover.mass) / configuration.wheels.count
+    shared = {
+        'torque': lambda values: np.hypot(
+            float(sensors.torque_zero_std), float(sensors.torque_gain_std) * np.abs(values)
+        ),
+        'sinkage': lambda values: np.full(len(values), float(sensors.sinkage_zero_std)),
+        'drawbar_pull': lambda values: np.full(len(values), bias),
+    }
+    for quantity, error in shared.items():
+        if quantity in columns:
+            std = columns[f'{quantity}_std']
+            columns[f'{quantity}_std'] = np.hypot(std, windows**0.5 * error(columns[quantity]))
+
+
+def _wheel(wheels: object, i: int) -> dict[str, float]:
+    return {
+        column: float(getattr(wheels, name)[i])
+        for column, name in (
+            ('wheel_radius', 'radius'),
+            ('wheel_width', 'width'),
+            ('lug_height', 'lug_height'),
+            ('lug_count', 'lug_count'),
+            ('pass_number', 'passes'),
+        )
+    }
+
+
+def _notes(
+    finder: _WindowFinder, windows: list[Window], merged: list[Window], left_out: int
+) -> tuple[str, ...]:
+    used = finder.seconds[GOOD]
+    total = sum(finder.seconds.values())
+    passages = [w.passages for w in windows]
+    kind = 'smooth wheels'
+    if max(passages):
+        kind = f'{min(passages)} to {max(passages)} lug passages each'
+    slips = [float(np.mean(w.slip)) for w in windows]
+    notes = [
+        f'{len(windows)} steady windows ({kind}), {used:.0f} of {total:.0f} s used, mean slip '
+        f'{min(slips):.2f} to {max(slips):.2f} with a standard deviation of '
+        f'{np.median([np.median(w.std["slip"]) for w in windows]):.3f}'
+    ]
+    rest = [
+        f'{key} {finder.seconds[key]:.0f} s'
+        for key in QUALITIES
+        if key != GOOD and finder.seconds[key] >= 0.5
+    ]
+    if rest:
+        notes.append('not used: ' + ', '.join(rest))
+    if len(merged) < len(windows):
+        notes.append(f'windows of like slip, slope and rate merged into {len(merged)}')
+    notes.append(
+        'pull: mean over the wheels (the accelerometer gives no more), in rows of their own'
+    )
+    if left_out:
+        notes.append(
+            f'{left_out} windows give no pull: the wheels differ too much for a mean wheel'
+        )
+    return tuple(notes)
