@@ -1,20 +1,150 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""``wheel-terra diagnose``."""
+"""``wheel-terra diagnose``: table or drive in, verdict, corrected model and report out."""
 
 from __future__ import annotations
 
 import argparse
+import shutil
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 from wheel_terra_estimator.errors import UserError
+
+if TYPE_CHECKING:
+    from wheel_terra_estimator.configuration.configuration import Configuration
+    from wheel_terra_estimator.discrepancy.result import Diagnosis
+    from wheel_terra_estimator.discrepancy.table import SteadyTable
 
 SUMMARY = 'find where model and measurement disagree and name the missing effect'
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
+    from wheel_terra_estimator.configuration import reader
+
+    parser.add_argument('data', metavar='DATA', help='CSV table of steady rows, or a rosbag2')
+    parser.add_argument('-o', '--output', required=True, metavar='DIR', help='folder to be written')
+    parser.add_argument(
+        '--reference',
+        metavar='A.csv',
+        help='table in which the effect in question is absent; fitted first, so that structural '
+        'error common to both cancels',
+    )
+    parser.add_argument(
+        '--effects',
+        action='append',
+        default=[],
+        metavar='FILE.py',
+        help='Python file with effects of your own, which then compete like the others',
+    )
+    parser.add_argument(
+        '--only',
+        action='append',
+        default=[],
+        metavar='NAME',
+        help='effect that may be named; may be given several times (default: all)',
+    )
+    parser.add_argument(
+        '--floor',
+        type=float,
+        metavar='SHARE',
+        help="greatest model-error floor, share of each quantity's range (default: as the data "
+        'ask, up to 0.04; 0: the model is exact)',
+    )
+    parser.add_argument(
+        '--remap',
+        action='append',
+        default=[],
+        metavar='FROM:=TO',
+        help="for a bag: FROM is the estimator's topic, TO the bag's; may be given several times",
+    )
+    parser.add_argument(
+        '--no-pictures', action='store_true', help='write report.json and model.yaml only'
+    )
+    parser.add_argument('--overwrite', action='store_true', help='replace DIR if it exists')
+    reader.add_arguments(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the command."""
-    raise UserError('this command is not in this version yet')
+    from wheel_terra_estimator.configuration import reader
+    from wheel_terra_estimator.discrepancy.workflow import Options, diagnose
+
+    output = Path(arguments.output)
+    if output.exists() and not arguments.overwrite:
+        raise UserError(f'{output}: exists already; choose another folder or add --overwrite')
+    if arguments.floor is not None and not 0.0 <= arguments.floor <= 0.2:
+        raise UserError(f'--floor {arguments.floor:g}: must be a share between 0 and 0.2')
+    _load_effects(arguments.effects)
+    configuration = reader.from_arguments(arguments, complete=False)
+    table = _read(arguments.data, arguments.remap, configuration)
+    reference = None
+    if arguments.reference:
+        reference = _read(arguments.reference, arguments.remap, configuration)
+    options = Options(tuple(arguments.only) or None, arguments.floor)
+    diagnosis = diagnose(table, configuration, reference, options)
+    _write(diagnosis, output, pictures=not arguments.no_pictures)
+    print(diagnosis.sentence)
+    for quantity, gap in diagnosis.gap.items():
+        noise = '' if gap.noise is None else f', noise {gap.noise:.3g}'
+        print(
+            f'  {quantity}: held-out error {gap.before:.3g} as configured, {gap.refit:.3g} soil '
+            f'refitted, {gap.after:.3g} in the end{noise}'
+        )
+    for note in diagnosis.notes:
+        print(f'  note: {note}')
+    print(f'  written: {output}')
+    return 0
+
+
+def _load_effects(files: list[str]) -> None:
+    from wheel_terra_estimator.terramechanics.effects import load_file
+
+    for file in files:
+        try:
+            load_file(file)
+        except ValueError as error:
+            raise UserError(f'--effects {error}') from None
+
+
+def _read(data: str, remaps: list[str], configuration: Configuration) -> SteadyTable:
+    """Read a table, or extract the steady windows of a drive."""
+    path = Path(data)
+    if path.is_dir() or path.suffix in ('.mcap', '.db3'):
+        from wheel_terra_estimator.discrepancy.drive_windows import rows_from_bag
+
+        return rows_from_bag(path, configuration, _remap(remaps)).table()
+    from wheel_terra_estimator.discrepancy.table import read_table
+
+    return read_table(path)
+
+
+def _remap(remaps: list[str]) -> dict[str, str]:
+    pairs = {}
+    for text in remaps:
+        name, separator, topic = text.partition(':=')
+        if not separator or not name or not topic:
+            raise UserError(f'--remap {text}: must be FROM:=TO')
+        pairs[name] = topic
+    return pairs
+
+
+def _write(diagnosis: Diagnosis, output: Path, *, pictures: bool) -> None:
+    """Write all files beside the place first, so that an error leaves nothing half-written."""
+    from wheel_terra_estimator.discrepancy.model_file import write_model
+
+    output.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=output.parent, prefix='.diagnose-') as folder:
+        fresh = Path(folder) / 'out'
+        fresh.mkdir()
+        diagnosis.write_json(fresh / 'report.json')
+        write_model(diagnosis, fresh / 'model.yaml')
+        if pictures:
+            from wheel_terra_estimator.discrepancy.report import write_report
+
+            write_report(diagnosis, fresh)
+        if output.exists():
+            shutil.rmtree(output) if output.is_dir() else output.unlink()
+        fresh.rename(output)

@@ -1,0 +1,172 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Candidate explanations: every visible effect, fitted inside the forward model with the soil free.
+
+Sensor and radius errors are candidates like any other: they enter through the same terms.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wheel_terra_estimator.discrepancy.evidence import Floor, Posterior, evidence, marginal
+from wheel_terra_estimator.discrepancy.fitting import Fit, fit
+from wheel_terra_estimator.discrepancy.forward import Forward
+from wheel_terra_estimator.discrepancy.parameters import Coordinate, effect_coordinates
+from wheel_terra_estimator.discrepancy.problem import Problem
+from wheel_terra_estimator.discrepancy.signatures import shapes
+from wheel_terra_estimator.terramechanics.effects.base import Effect
+
+FloatArray = NDArray[np.float64]
+
+# Floor during the fits [share of the range]; the evidence then weighs all floors.
+FIT_FLOOR = 0.01
+_STRONGEST_START, _WEAKEST_START = 2.5, 0.15
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """A fitted set of effects with its evidence."""
+
+    fitted: Fit
+    posterior: Posterior
+    log_evidence: float
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The effects in it."""
+        return self.fitted.names
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What all fits of one table share.
+
+    Attributes
+    ----------
+    observed : numpy.ndarray
+        (m,) measured cells (moved along the slip where slip is latent).
+    nuisance : tuple of Coordinate
+        Soil and stated base effects.
+    effects : mapping
+        The visible effects.
+    deepest : float
+        Greatest rim sinkage of the baseline [m].
+    """
+
+    forward: Forward
+    problem: Problem
+    observed: FloatArray
+    nuisance: tuple[Coordinate, ...]
+    effects: Mapping[str, Effect]
+    floors: tuple[Floor, ...]
+    noise_freedom: FloatArray
+    deepest: float = 0.02
+
+    def coordinates(self, names: Iterable[str]) -> tuple[Coordinate, ...]:
+        """Return nuisance coordinates followed by those of the effects."""
+        own = [c for name in names for c in effect_coordinates(self.effects[name])]
+        return (*self.nuisance, *own)
+
+    def fit(
+        self,
+        sets: Sequence[tuple[str, ...]],
+        starts: Sequence[FloatArray],
+        angle: FloatArray | None = None,
+        variance: FloatArray | None = None,
+        iterations: int = 8,
+    ) -> list[Fit]:
+        """Fit sets of effects; all rows start at the entrance angles `angle` (N,)."""
+        if not sets:
+            return []
+        weights = self.problem.variance(FIT_FLOOR) if variance is None else variance
+        angles = None if angle is None else np.broadcast_to(angle, (len(sets), len(angle)))
+        return fit(
+            self.forward,
+            self.problem,
+            self.observed,
+            [(names, self.coordinates(names)) for names in sets],
+            starts,
+            [weights] * len(sets),
+            angles,
+            iterations,
+        )
+
+    def explain(self, fitted: Fit) -> Explanation:
+        """Weigh a fit."""
+        posterior = evidence(self.problem, fitted, self.floors, self.noise_freedom)
+        return Explanation(fitted, posterior, marginal(posterior, self.floors))
+
+
+def linear_starts(
+    setting: Setting, base: Fit, names: Sequence[str]
+) -> list[tuple[float, tuple[str, ...], FloatArray]]:
+    """Return (promised fall of the objective, names, start) for ``base`` plus each effect.
+
+    The promise comes from the signatures at the base fit. An effect's second parameter (an onset, a
+    depth) has no gradient while its strength is nil, so a few values of it compete.
+    """
+    trials: list[tuple[str, tuple[Coordinate, ...], FloatArray]] = []
+    for name in names:
+        own = effect_coordinates(setting.effects[name])
+        for shape in shapes(own, setting.deepest, 0.0):
+            trials.append((name, own, shape))
+    if not trials:
+        return []
+    coordinates = [(*base.coordinates, *own) for _, own, _ in trials]
+    state = setting.forward.solve(
+        coordinates,
+        [np.concatenate([base.u, shape]) for _, _, shape in trials],
+        np.broadcast_to(base.angle, (len(trials), len(base.angle))),
+    )
+    problem, fixed = setting.problem, len(base.u)
+    best: dict[str, tuple[float, tuple[str, ...], FloatArray]] = {}
+    for index, (name, own, shape) in enumerate(trials):
+        outputs = state.outputs[index]
+        sensitivity = problem.flat(state.jacobian[index])
+        residual = problem.rotate(setting.observed - problem.flat(outputs))
+        keep = [*range(fixed), fixed]  # the strength only: the shape has no gradient here
+        reduced = Fit(
+            (name,),
+            tuple(coordinates[index][k] for k in keep),
+            np.concatenate([base.u, shape])[keep],
+            outputs,
+            state.angle[index],
+            sensitivity[:, keep],
+            residual,
+            problem.rotate(sensitivity[:, keep]),
+            base.variance,
+            0.0,
+        )
+        weights = reduced.jacobian / base.variance[:, None]
+        precision = reduced.jacobian.T @ weights + np.eye(len(keep))
+        mean = np.linalg.solve(
+            precision, weights.T @ (reduced.residual + reduced.jacobian @ reduced.u)
+        )
+        strength = np.clip(mean[-1], own[0].lower, own[0].upper)
+        score = _linear_gain(precision, mean, strength, reduced)
+        neutral = own[0].coordinate(own[0].neutral)
+        away = strength - neutral
+        size = np.clip(abs(away), _WEAKEST_START, _STRONGEST_START)
+        side = np.sign(away) if away else 1.0
+        if not own[0].lower <= neutral + side * size <= own[0].upper:
+            side = -side
+        start = shape.copy()
+        # Terms whose prior sits away from neutral (a full tilt of the weight) start at the prior.
+        start[0] = neutral + side * size if neutral == 0.0 else 0.0
+        full = np.concatenate([np.clip(mean[:fixed], base.u - 1.5, base.u + 1.5), start])
+        if name not in best or score > best[name][0]:
+            best[name] = (score, (*base.names, name), full)
+    return list(best.values())
+
+
+def _linear_gain(precision: FloatArray, mean: FloatArray, strength: float, reduced: Fit) -> float:
+    """Fall of the objective that the linear signature promises at a strength inside its bounds."""
+    covariance = np.linalg.inv(precision)
+    start = reduced.u[-1]
+    spread = covariance[-1, -1]
+    return 0.5 * ((mean[-1] - start) ** 2 - (mean[-1] - strength) ** 2) / spread

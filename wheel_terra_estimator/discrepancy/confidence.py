@@ -1,0 +1,91 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""How sure the name is: a map from posterior weights to frequencies, fitted on campaigns.
+
+The posterior of a model family that is never quite right is too sure of itself. A logistic map of
+few features, fitted on synthetic campaigns that include other formulas, structural error, outliers,
+unknown noise and strangers, brings it to the frequency with which such names are right.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from functools import lru_cache
+from importlib.resources import files
+
+import numpy as np
+from scipy.special import expit, logsumexp
+
+from wheel_terra_estimator.discrepancy.remainder import Remainder
+from wheel_terra_estimator.discrepancy.selection import Selection
+from wheel_terra_estimator.discrepancy.verdict import Verdict
+
+FEATURES = (
+    'one',
+    'margin',
+    'margin_of_set',
+    'gain',
+    'remainder',
+    'two',
+    'open',
+    'noise_unknown',
+)
+
+
+@dataclass(frozen=True)
+class Confidence:
+    """Probability that a name is right, and that it or one of its rivals is."""
+
+    of_name: float
+    of_set: float
+
+
+def features(
+    selection: Selection, verdict: Verdict, place: int, left: Remainder, noise_known: bool
+) -> dict[str, float]:
+    """Return the features of the name at ``place`` in the named set."""
+    total = np.array([logsumexp(row) for row in selection.log_joint])
+    name = selection.explanations[verdict.index].names[place]
+    has = np.array([name in e.names for e in selection.explanations])
+    inside = {name, *verdict.open_sets[place]}
+    covered = np.array([bool(inside & set(e.names)) for e in selection.explanations])
+
+    def margin(mine: np.ndarray) -> float:
+        against = total[~mine]
+        if not against.size:
+            return 20.0
+        return float(logsumexp(total[mine]) - logsumexp(against))
+
+    nothing = next(h for h, e in enumerate(selection.explanations) if not e.names)
+    return {
+        'one': 1.0,
+        'margin': _squash(margin(has)),
+        'margin_of_set': _squash(margin(covered)),
+        'gain': float(np.log1p(max(total[verdict.index] - total[nothing], 0.0))),
+        'remainder': float(left.significant),
+        'two': float(len(selection.explanations[verdict.index].names) - 1),
+        'open': float(len(verdict.open_sets[place])),
+        'noise_unknown': float(not noise_known),
+    }
+
+
+def _squash(value: float) -> float:
+    """Compress large log odds: beyond some ten nats only the model family's own error counts."""
+    return float(4.0 * np.tanh(value / 8.0))
+
+
+def confidence(values: dict[str, float]) -> Confidence:
+    """Map features to probabilities."""
+    weights = _weights()
+    vector = np.array([values[name] for name in FEATURES])
+    of_name = float(expit(vector @ np.array(weights['name'])))
+    of_set = float(expit(vector @ np.array(weights['set'])))
+    return Confidence(of_name, max(of_name, of_set))
+
+
+@lru_cache(maxsize=1)
+def _weights() -> dict[str, list[float]]:
+    text = files('wheel_terra_estimator.discrepancy').joinpath('confidence_map.json').read_text()
+    loaded: dict[str, list[float]] = json.loads(text)
+    return loaded

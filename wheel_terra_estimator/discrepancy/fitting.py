@@ -1,0 +1,185 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Maximum a posteriori fits of many hypotheses in lockstep (Gauss-Newton with bounds)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wheel_terra_estimator.discrepancy.forward import Forward
+from wheel_terra_estimator.discrepancy.parameters import Coordinate, bounds
+from wheel_terra_estimator.discrepancy.problem import Problem
+
+FloatArray = NDArray[np.float64]
+
+_LONGEST_STEP = 2.0  # prior standard deviations
+_CLOSE_ENOUGH = 0.02  # in the objective
+
+
+@dataclass
+class Fit:
+    """A fitted hypothesis, with its linearisation in rotated coordinates.
+
+    Attributes
+    ----------
+    names : tuple of str
+        The effects in it.
+    coordinates : tuple of Coordinate
+    u : numpy.ndarray
+        (P,) fitted coordinates.
+    outputs : numpy.ndarray
+        (N, 3) fitted values.
+    angle : numpy.ndarray
+        (N,) entrance angles [rad].
+    sensitivity : numpy.ndarray
+        (m, P) derivative of the cells by u.
+    residual, jacobian : numpy.ndarray
+        (m,) and (m, P), whitened and rotated, at u.
+    variance : numpy.ndarray
+        (m,) of the fit.
+    objective : float
+        Half of chi-square plus prior.
+    """
+
+    names: tuple[str, ...]
+    coordinates: tuple[Coordinate, ...]
+    u: FloatArray
+    outputs: FloatArray
+    angle: FloatArray
+    sensitivity: FloatArray
+    residual: FloatArray
+    jacobian: FloatArray
+    variance: FloatArray
+    objective: float
+
+    def precision(self) -> FloatArray:
+        """Posterior precision of u."""
+        weighted = self.jacobian / self.variance[:, None]
+        return self.jacobian.T @ weighted + np.eye(len(self.u))
+
+    def within(self, problem: Problem, observed: FloatArray) -> Fit:
+        """Return the same fit seen through other noise: same cells, another rotation."""
+        return replace(
+            self,
+            residual=problem.rotate(observed - problem.flat(self.outputs)),
+            jacobian=problem.rotate(self.sensitivity),
+        )
+
+    def values(self) -> dict[str, float]:
+        """Return key -> value of every coordinate."""
+        return {c.key: float(c.value(x)) for c, x in zip(self.coordinates, self.u, strict=True)}
+
+
+def fit(
+    forward: Forward,
+    problem: Problem,
+    observed: FloatArray,
+    hypotheses: Sequence[tuple[tuple[str, ...], tuple[Coordinate, ...]]],
+    starts: Sequence[FloatArray],
+    variances: Sequence[FloatArray],
+    angles: FloatArray | None = None,
+    iterations: int = 8,
+) -> list[Fit]:
+    """Fit all hypotheses; each has its own start and its own variance of the rotated axes.
+
+    Parameters
+    ----------
+    observed : numpy.ndarray
+        (m,) cells to be matched.
+    hypotheses : sequence of (names, coordinates)
+    starts : sequence of numpy.ndarray
+        (P,) start of each.
+    variances : sequence of numpy.ndarray
+        (m,) variance of the rotated axes for each.
+    angles : numpy.ndarray, optional
+        (B, N) entrance angles near the solution.
+    """
+    count = len(hypotheses)
+    limits = [bounds(coordinates) for _, coordinates in hypotheses]
+    trial = [
+        np.clip(np.asarray(s, dtype=float), *limit) for s, limit in zip(starts, limits, strict=True)
+    ]
+    best: list[Fit | None] = [None] * count
+    damping = np.full(count, 1e-6)
+    angle = None if angles is None else np.array(angles, dtype=float)
+    active = list(range(count))
+    for _ in range(iterations):
+        state = forward.solve(
+            [hypotheses[b][1] for b in active],
+            [trial[b] for b in active],
+            None if angle is None else angle[active],
+        )
+        if angle is None:
+            angle = np.empty((count, state.angle.shape[1]))
+        going = []
+        for index, b in enumerate(active):
+            u = trial[b]
+            residual = problem.rotate(observed - problem.flat(state.outputs[index]))
+            objective = 0.5 * float(residual @ (residual / variances[b]) + u @ u)
+            previous = best[b]
+            angle[b] = state.angle[index]
+            improved = previous is None or objective <= previous.objective
+            gain = np.inf if previous is None else previous.objective - objective
+            if improved:
+                sensitivity = problem.flat(state.jacobian[index])
+                best[b] = Fit(
+                    *hypotheses[b],
+                    u,
+                    state.outputs[index],
+                    state.angle[index],
+                    sensitivity,
+                    residual,
+                    problem.rotate(sensitivity),
+                    variances[b],
+                    objective,
+                )
+                damping[b] = max(0.1 * damping[b], 1e-6)
+            else:
+                damping[b] = max(30.0 * damping[b], 1.0)
+            current = best[b]
+            assert current is not None
+            step, expected = _step(current, limits[b], damping[b])
+            if expected < _CLOSE_ENOUGH or (improved and gain < _CLOSE_ENOUGH):
+                continue
+            trial[b] = current.u + step
+            if improved:
+                slope = state.angle_slope[index] @ step
+                angle[b] = np.clip(state.angle[index] + slope, 2e-3, 1.5)
+            going.append(b)
+        active = going
+        if not active:
+            break
+    return [f for f in best if f is not None]
+
+
+def _step(
+    current: Fit, limit: tuple[FloatArray, FloatArray], damping: float
+) -> tuple[FloatArray, float]:
+    """Return a bounded Gauss-Newton step and the fall of the objective that it should bring."""
+    lower, upper = limit
+    precision = current.precision()
+    gradient = current.jacobian.T @ (current.residual / current.variance) - current.u
+    damped = precision + damping * np.diag(np.diag(precision))
+    free = np.ones(len(current.u), dtype=bool)
+    step = np.zeros(len(current.u))
+    # Few passes suffice: a coordinate that would leave its range stays at the bound.
+    for _ in range(3):
+        fixed = ~free
+        right = gradient[free] - damped[np.ix_(free, fixed)] @ step[fixed]
+        step[free] = np.linalg.solve(damped[np.ix_(free, free)], right)
+        longest = np.abs(step).max(initial=0.0)
+        if longest > _LONGEST_STEP:
+            step *= _LONGEST_STEP / longest
+        new = current.u + step
+        outside = free & ((new < lower) | (new > upper))
+        if not outside.any():
+            break
+        step[outside] = np.clip(new, lower, upper)[outside] - current.u[outside]
+        free &= ~outside
+    step = np.clip(current.u + step, lower, upper) - current.u
+    expected = float(gradient @ step - 0.5 * step @ precision @ step)
+    return step, expected

@@ -1,0 +1,177 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Which measurement would separate what is left: a menu of row blocks, ranked by expected d'."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wheel_terra_estimator.discrepancy.candidates import Setting
+from wheel_terra_estimator.discrepancy.fitting import Fit
+from wheel_terra_estimator.discrepancy.result import NextMeasurement
+from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
+from wheel_terra_estimator.terramechanics.wheel import Wheel
+
+FloatArray = NDArray[np.float64]
+
+_SLIPS = np.array([0.05, 0.1, 0.2, 0.3, 0.45, 0.6, 0.7, 0.8])
+_KEPT = 3
+_DEEPEST = 0.6  # of the radius: blocks in which a rival sinks deeper are not proposed
+# A zero check costs minutes and settles an instrument's error for good.
+ZERO_CHECKS = {
+    'sinkage_offset': 'read the sinkage sensor with the wheel on a hard, level floor (should be 0)',
+    'drivetrain_friction': 'read the torque with the wheel turning in the air',
+    'wheel_radius_bias': 'roll the wheel out on a hard floor: distance over 10 turns',
+    'pitch_bias': 'read attitude and pull of the standing rig, then turned by 180 degrees',
+}
+
+
+def propose(
+    setting: Setting, chosen: Fit, rivals: Sequence[Fit], std: FloatArray
+) -> tuple[NextMeasurement, ...]:
+    """Rank measurements by how far they would part the chosen explanation from its rivals.
+
+    Parameters
+    ----------
+    chosen, rivals : Fit
+        The best explanation, and those that the rows cannot exclude, most probable first.
+    std : numpy.ndarray
+        (3,) noise of a new row.
+    """
+    found: list[NextMeasurement] = []
+    for rival in rivals[:2]:
+        names = (_label(chosen), _label(rival))
+        now = _distance(setting, chosen, rival, None, std)
+        for name in {*chosen.names, *rival.names}:
+            if name in ZERO_CHECKS and (name in chosen.names) != (name in rival.names):
+                found.append(NextMeasurement(ZERO_CHECKS[name], names, now, np.inf))
+        blocks = []
+        for what, points in _menu(setting):
+            then, outputs = _with_rows(setting, chosen, rival, points, std)
+            depth = outputs[..., 0].max()
+            if np.isfinite(then) and depth < _DEEPEST * np.min(points.wheel.radius):
+                blocks.append(
+                    NextMeasurement(
+                        what,
+                        names,
+                        now,
+                        then,
+                        _columns(points),
+                        dict(zip(names, outputs, strict=True)),
+                    )
+                )
+        blocks.sort(key=lambda block: -block.distance_then)
+        found.extend(blocks[:_KEPT])
+    return tuple(found)
+
+
+def _label(fitted: Fit) -> str:
+    return ' + '.join(fitted.names) or 'nothing'
+
+
+def _menu(setting: Setting) -> list[tuple[str, OperatingPoints]]:
+    """Return the blocks of rows that a laboratory could add."""
+    old = setting.forward.points
+    wheel = Wheel(
+        *(
+            float(np.median(np.broadcast_to(values, (len(old),))))
+            for values in (old.wheel.radius, old.wheel.width)
+        ),
+        lug_height=float(np.max(old.wheel.lug_height)),
+        lug_count=float(np.median(old.wheel.lug_count)),
+        lug_thickness=float(np.median(old.wheel.lug_thickness)),
+    )
+    rate = np.asarray(old.angular_velocity, dtype=float)
+    speed = float(np.nanmedian(rate)) if np.isfinite(rate).any() else np.nan
+    base = OperatingPoints(
+        _SLIPS,
+        float(np.median(old.normal_load)),
+        wheel,
+        0.0,
+        old.slip_radius,
+        float(np.median(old.gravity)),
+        speed,
+        float(np.min(old.pass_number)),
+    )
+    load, radius = base.normal_load, wheel.radius
+    high = np.linspace(0.82, 0.94, 8)
+    menu = [
+        ('braking rows, slip -0.3 to -0.02', replace(base, slip=-np.linspace(0.02, 0.3, 8))),
+        ('slip 0.82 to 0.94', replace(base, slip=high)),
+        ('three times the load', replace(base, normal_load=3.0 * load)),
+        ('a third of the load', replace(base, normal_load=load / 3.0)),
+        (
+            'a wheel of 0.6 times the radius',
+            replace(base, wheel=replace(wheel, radius=0.6 * radius)),
+        ),
+        (
+            'a wheel of twice the width',
+            replace(base, wheel=replace(wheel, width=2.0 * wheel.width)),
+        ),
+        ('a slope of 12 degrees', replace(base, slope=np.radians(12.0))),
+        ('the same rows again', base),
+    ]
+    if wheel.lug_height > 0.0:
+        taller = replace(wheel, lug_height=1.6 * wheel.lug_height)
+        menu.append(('the wheel without lugs', replace(base, wheel=replace(wheel, lug_height=0.0))))
+        menu.append(('lugs 1.6 times as high', replace(base, wheel=taller)))
+    if np.isfinite(speed):
+        menu.append(('five times the speed', replace(base, angular_velocity=5.0 * speed)))
+    menu.append(('a second pass in the same rut', replace(base, pass_number=base.pass_number + 1)))
+    return menu
+
+
+def _with_rows(
+    setting: Setting, chosen: Fit, rival: Fit, points: OperatingPoints, std: FloatArray
+) -> tuple[float, FloatArray]:
+    state = setting.forward.at(points).solve(
+        [chosen.coordinates, rival.coordinates], [chosen.u, rival.u]
+    )
+    difference = ((state.outputs[0] - state.outputs[1]) / std).reshape(-1)
+    jacobian = (state.jacobian[1] / std[None, :, None]).reshape(len(difference), -1)
+    keep = np.isfinite(difference)
+    new = (difference[keep], jacobian[keep])
+    return _distance(setting, chosen, rival, new, std), state.outputs
+
+
+def _distance(
+    setting: Setting,
+    chosen: Fit,
+    rival: Fit,
+    new: tuple[FloatArray, FloatArray] | None,
+    std: FloatArray,
+) -> float:
+    """Distance d' of the chosen prediction from the rival's best refit to it (linear)."""
+    problem = setting.problem
+    scale = 1.0 / np.sqrt(rival.variance)
+    difference = problem.rotate(problem.flat(chosen.outputs - rival.outputs)) * scale
+    jacobian = rival.jacobian * scale[:, None]
+    if new is not None:
+        difference = np.concatenate([difference, new[0]])
+        jacobian = np.concatenate([jacobian, new[1]])
+    precision = jacobian.T @ jacobian + np.eye(jacobian.shape[1])
+    step = np.linalg.solve(precision, jacobian.T @ difference)
+    return float(np.linalg.norm(difference - jacobian @ step))
+
+
+def _columns(points: OperatingPoints) -> dict[str, FloatArray]:
+    count = len(points)
+    values = {
+        'slip': points.slip,
+        'normal_load': points.normal_load,
+        'slope': points.slope,
+        'wheel_radius': points.wheel.radius,
+        'wheel_width': points.wheel.width,
+        'lug_height': points.wheel.lug_height,
+        'angular_velocity': points.angular_velocity,
+        'pass_number': points.pass_number,
+    }
+    return {
+        key: np.array(np.broadcast_to(np.asarray(value, dtype=float), (count,)))
+        for key, value in values.items()
+        if np.isfinite(np.asarray(value, dtype=float)).all()
+    }

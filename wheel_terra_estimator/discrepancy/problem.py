@@ -1,0 +1,189 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""The measured cells, their noise and the model-error floor in coordinates where both are diagonal.
+
+Cell i: y_i = f_i(u) + d_i + e_i with noise e_i ~ N(0, std_i^2) and a smooth structural error d,
+a Gaussian process over the inputs of the table whose standard deviation is a share `a` of the range
+of the quantity. In the eigenbasis of std^-1 K std^-1 the covariance for every `a` is diagonal, so
+that all amplitudes cost one decomposition.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+IndexArray = NDArray[np.intp]
+
+# Structural errors are smooth over about a third of the range of an input, with slower parts.
+_LENGTHS = (0.35, 1.0)
+# A cell set apart as an outlier is taken to have this many times its noise.
+OUTLIER_FACTOR = 12.0
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Cells of a table in whitened, rotated coordinates.
+
+    Attributes
+    ----------
+    observed : numpy.ndarray
+        (m,) measured values.
+    row, quantity : numpy.ndarray
+        (m,) indices of each cell.
+    std : numpy.ndarray
+        (m,) noise standard deviation, inflated for outliers.
+    outlier : numpy.ndarray
+        (m,) bool.
+    scale : numpy.ndarray
+        (3,) range of each quantity: the unit of the floor.
+    rotation : numpy.ndarray
+        (m, m) whitening and rotation.
+    roughness : numpy.ndarray
+        (m,) variance of the floor along each rotated axis at amplitude 1, in noise variances.
+    block : numpy.ndarray
+        (m,) quantity to which each rotated axis belongs; -1 where slip errors mix them.
+    log_std : float
+        Sum of the logarithms of the noise (half the log determinant at amplitude 0).
+    """
+
+    observed: FloatArray
+    row: IndexArray
+    quantity: IndexArray
+    std: FloatArray
+    outlier: NDArray[np.bool_]
+    scale: FloatArray
+    rotation: FloatArray
+    roughness: FloatArray
+    block: IndexArray
+    log_std: float
+
+    @property
+    def size(self) -> int:
+        """Number of cells."""
+        return len(self.observed)
+
+    def flat(self, values: FloatArray) -> FloatArray:
+        """Take the measured cells of an (N, 3, ...) array: (m, ...)."""
+        return values[self.row, self.quantity]
+
+    def rotate(self, cells: FloatArray) -> FloatArray:
+        """Whiten and rotate (m,) or (m, P) cells."""
+        return self.rotation @ cells
+
+    def variance(
+        self, amplitude: FloatArray | float, noise: FloatArray | float = 1.0
+    ) -> FloatArray:
+        """Return (m,) variances of the rotated axes.
+
+        Parameters
+        ----------
+        amplitude : float or numpy.ndarray
+            Share of the range; (3,) per quantity.
+        noise : float or numpy.ndarray
+            Factor on the noise standard deviation; (3,) per quantity.
+        """
+        a = np.broadcast_to(np.asarray(amplitude, dtype=float), (3,))
+        k = np.broadcast_to(np.asarray(noise, dtype=float), (3,))
+        if (self.block < 0).any():
+            return k.mean() ** 2 + a.max() ** 2 * self.roughness
+        return k[self.block] ** 2 + a[self.block] ** 2 * self.roughness
+
+
+def kernel(inputs: FloatArray) -> FloatArray:
+    """(N, N) correlation of a structural error between rows.
+
+    Parameters
+    ----------
+    inputs : numpy.ndarray
+        (N, d) inputs, each scaled to a range of 1; d may be 0.
+    """
+    if inputs.shape[1] == 0:
+        return np.ones((len(inputs), len(inputs)))
+    square = ((inputs[:, None, :] - inputs[None, :, :]) ** 2).sum(axis=-1)
+    return np.mean([np.exp(-0.5 * square / length**2) for length in _LENGTHS], axis=0)
+
+
+def build_problem(
+    measured: FloatArray,
+    std: FloatArray,
+    inputs: FloatArray,
+    scale: FloatArray,
+    outliers: Sequence[tuple[int, int]] = (),
+    by_slip: FloatArray | None = None,
+    slip_std: FloatArray | None = None,
+) -> Problem:
+    """Return the problem of an (N, 3) table.
+
+    Parameters
+    ----------
+    measured, std : numpy.ndarray
+        (N, 3); nan = not measured.
+    inputs : numpy.ndarray
+        (N, d) inputs for the floor, scaled to a range of 1.
+    scale : numpy.ndarray
+        (3,) range of each quantity.
+    outliers : sequence of (row, quantity)
+        Cells set apart.
+    by_slip, slip_std : numpy.ndarray, optional
+        (N, 3) derivative by the recorded slip and (N,) its standard deviation: an error common to
+        the quantities of a row.
+    """
+    row, quantity = np.nonzero(np.isfinite(measured))
+    deviation = std[row, quantity].copy()
+    apart = np.zeros(len(row), dtype=bool)
+    for r, q in outliers:
+        apart |= (row == r) & (quantity == q)
+    deviation[apart] *= OUTLIER_FACTOR
+    correlation = kernel(inputs)
+    m = len(row)
+    if by_slip is None or slip_std is None or not (slip_std > 0.0).any():
+        rotation, roughness = np.zeros((m, m)), np.empty(m)
+        block = np.empty(m, dtype=np.intp)
+        at = 0
+        for q in range(3):
+            mine = np.flatnonzero(quantity == q)
+            if not mine.size:
+                continue
+            part = slice(at, at + mine.size)
+            relative = scale[q] / deviation[mine]
+            smooth = correlation[np.ix_(row[mine], row[mine])] * np.outer(relative, relative)
+            values, vectors = np.linalg.eigh(smooth)
+            rotation[part, mine] = vectors.T / deviation[mine]
+            roughness[part] = np.maximum(values, 0.0)
+            block[part] = q
+            at += mine.size
+        log_std = float(np.log(deviation).sum())
+    else:
+        common = by_slip[row, quantity]
+        noise = np.diag(deviation**2)
+        noise += np.where(
+            row[:, None] == row[None, :], np.outer(common, common) * slip_std[row] ** 2, 0.0
+        )
+        lower = np.linalg.cholesky(noise)
+        smooth = np.where(
+            quantity[:, None] == quantity[None, :],
+            correlation[np.ix_(row, row)] * np.outer(scale[quantity], scale[quantity]),
+            0.0,
+        )
+        whitening = np.linalg.inv(lower)
+        values, vectors = np.linalg.eigh(whitening @ smooth @ whitening.T)
+        rotation, roughness = vectors.T @ whitening, np.maximum(values, 0.0)
+        block = np.full(m, -1, dtype=np.intp)
+        log_std = float(np.log(np.diag(lower)).sum())
+    return Problem(
+        measured[row, quantity],
+        row,
+        quantity,
+        deviation,
+        apart,
+        scale,
+        rotation,
+        roughness,
+        block,
+        log_std,
+    )

@@ -1,0 +1,68 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""What is left after the best explanation: an absolute test, not a comparison."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import logsumexp
+
+from wheel_terra_estimator.discrepancy.gap_test import chi_square_p_value
+from wheel_terra_estimator.discrepancy.selection import Selection
+
+Variance: TypeAlias = Callable[
+    [tuple[float, float, float], NDArray[np.float64]], NDArray[np.float64]
+]
+
+# Misfit that even the best floor leaves improbable.
+IMPROBABLE = 1e-3
+
+
+@dataclass(frozen=True)
+class Remainder:
+    """What one explanation leaves.
+
+    Attributes
+    ----------
+    probability : float
+        That a smooth misfit beyond the model-error floor is left.
+    amplitude : float
+        Most probable amplitude of the structural error, share of the range.
+    p_value : float
+        Of the whole misfit under the best floor (chi-square).
+    """
+
+    probability: float
+    amplitude: float
+    p_value: float
+
+    @property
+    def significant(self) -> bool:
+        """True where something is left that wants a name."""
+        return self.probability > 0.5 or self.p_value < IMPROBABLE
+
+
+def remainder(selection: Selection, index: int, variance_of: Variance) -> Remainder:
+    """Test what explanation number ``index`` leaves.
+
+    Parameters
+    ----------
+    variance_of : callable
+        (amplitude, noise factor) -> (m,) variances of the rotated axes.
+    """
+    explanation = selection.explanations[index]
+    joint = selection.log_joint[index]
+    share = float(np.exp(logsumexp(joint[selection.unexplained]) - logsumexp(joint)))
+    top = int(np.argmax(joint))
+    quiet = [k for k, floor in enumerate(selection.floors) if not floor.unexplained]
+    best = quiet[int(np.argmax(joint[quiet]))]
+    floor = selection.floors[best]
+    variance = variance_of(floor.amplitude, explanation.posterior.noise_factor[best])
+    return Remainder(
+        share, selection.floors[top].largest, chi_square_p_value(explanation.fitted, variance)
+    )

@@ -1,0 +1,238 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""The search: noise, robust pass, candidates and their weights, until they agree."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wheel_terra_estimator.discrepancy import noise as noises
+from wheel_terra_estimator.discrepancy.candidates import FIT_FLOOR, Explanation, Setting
+from wheel_terra_estimator.discrepancy.evidence import Floor
+from wheel_terra_estimator.discrepancy.fitting import Fit, fit
+from wheel_terra_estimator.discrepancy.forward import Forward
+from wheel_terra_estimator.discrepancy.outliers import find_outliers
+from wheel_terra_estimator.discrepancy.parameters import Coordinate
+from wheel_terra_estimator.discrepancy.problem import Problem, build_problem
+from wheel_terra_estimator.discrepancy.result import Noise
+from wheel_terra_estimator.discrepancy.selection import (
+    Selection,
+    explain_pairs,
+    explain_singles,
+    weigh,
+)
+from wheel_terra_estimator.discrepancy.signatures import SEEN, Signature, signatures, unavailable
+from wheel_terra_estimator.discrepancy.table import QUANTITIES, SteadyTable
+from wheel_terra_estimator.terramechanics.effects.base import Effect
+
+FloatArray = NDArray[np.float64]
+
+_FLEXIBLE = 0.25  # floor of the first robust pass: wide enough for any effect [share of range]
+_ROBUST_FLOOR = 0.02  # floor of the later ones
+_PASSES = 3
+
+
+@dataclass(frozen=True)
+class Findings:
+    """Outcome of the search on one table.
+
+    Attributes
+    ----------
+    setting : Setting
+        Model, cells, noise as used in the end.
+    nothing : Fit
+        Soil refitted only.
+    selection : Selection
+    signatures : mapping
+        Of all effects that the columns can show.
+    not_visible : mapping
+        Effect -> reason.
+    noise : Noise
+    outliers : tuple of (row, quantity, deviation)
+    """
+
+    setting: Setting
+    nothing: Fit
+    selection: Selection
+    signatures: Mapping[str, Signature]
+    not_visible: Mapping[str, str]
+    noise: Noise
+    outliers: tuple[tuple[int, int, float], ...]
+
+
+def search(
+    table: SteadyTable,
+    forward: Forward,
+    nuisance: tuple[Coordinate, ...],
+    effects: Mapping[str, Effect],
+    floors: tuple[Floor, ...],
+) -> Findings:
+    """Find noise, outliers and the weights of all explanations of a table.
+
+    Parameters
+    ----------
+    effects : mapping
+        Effects that may be named.
+    """
+    scale = _ranges(table)
+    noise = noises.stated_noise(table, scale)
+    builder = _Builder(table, forward, scale)
+    problem, observed = builder.build(noise.std, ())
+    nothing = _fit_nothing(forward, problem, observed, nuisance, None)
+    if builder.latent:
+        builder.linearise(nothing)
+        problem, observed = builder.build(noise.std, ())
+        nothing = _fit_nothing(builder.forward, problem, observed, nuisance, nothing)
+    noise = builder.estimate(noise, nothing, ())
+    # A smooth misfit of any size is allowed here, so that an effect does not look like outliers.
+    problem, observed = builder.build(noise.std, ())
+    nothing = _fit_nothing(builder.forward, problem, observed, nuisance, nothing)
+    outliers = find_outliers(problem, nothing, problem.variance(_FLEXIBLE), observed)
+    if outliers:
+        noise = builder.estimate(noise, nothing, outliers)
+    lug_height = np.broadcast_to(forward.points.wheel.lug_height, (len(table),))
+    reasons = {name: unavailable(effect, table, lug_height) for name, effect in effects.items()}
+    possible = {name: effect for name, effect in effects.items() if not reasons[name]}
+    findings = None
+    for turn in range(_PASSES):
+        problem, observed = builder.build(noise.std, outliers)
+        nothing = _fit_nothing(builder.forward, problem, observed, nuisance, nothing)
+        rim = forward.points.wheel.radius * (1.0 - np.cos(nothing.angle))
+        deepest = float(np.max(rim))
+        found = signatures(builder.forward, problem, nothing, possible, deepest)
+        visible = {name: possible[name] for name, s in found.items() if s.distance >= SEEN}
+        freedom = np.array([noise.degrees_of_freedom.get(q, np.inf) for q in QUANTITIES])
+        setting = Setting(
+            builder.forward,
+            problem,
+            observed,
+            nuisance,
+            visible,
+            floors,
+            freedom,
+            deepest,
+        )
+        selection = _select(setting, nothing)
+        findings = Findings(
+            setting,
+            nothing,
+            selection,
+            found,
+            {
+                **{name: why for name, why in reasons.items() if why},
+                **{
+                    name: 'even a large one would stay below the noise on these rows'
+                    for name in possible
+                    if name not in visible
+                },
+            },
+            noise,
+            tuple(outliers),
+        )
+        if turn == _PASSES - 1:
+            break
+        again = _outliers_of_best(builder, noise, selection)
+        if {cell[:2] for cell in again} == {cell[:2] for cell in outliers}:
+            break
+        outliers = again
+        noise = builder.estimate(noise, selection.explanations[0].fitted, outliers)
+    assert findings is not None
+    return findings
+
+
+def _ranges(table: SteadyTable) -> FloatArray:
+    """(3,) range of each measured quantity, the unit of the floor; robust to single outliers."""
+    scale = np.ones(3)
+    for q in range(3):
+        values = np.sort(table.measured[np.isfinite(table.measured[:, q]), q])
+        if values.size:
+            cut = max(1, values.size // 20) if values.size > 8 else 0
+            span = values[-1 - cut] - values[cut]
+            scale[q] = max(span, 1e-3 * np.abs(values).max(), 1e-9)
+    return scale
+
+
+def _inputs(table: SteadyTable) -> FloatArray:
+    """(N, d) varying inputs, each scaled to a range of 1."""
+    columns = []
+    for name in table.varying():
+        values = np.nan_to_num(table.columns[name], nan=float(np.nanmean(table.columns[name])))
+        columns.append((values - values.min()) / np.ptp(values))
+    return np.column_stack(columns) if columns else np.zeros((len(table), 0))
+
+
+def _fit_nothing(
+    forward: Forward,
+    problem: Problem,
+    observed: FloatArray,
+    nuisance: tuple[Coordinate, ...],
+    previous: Fit | None,
+) -> Fit:
+    start = np.zeros(len(nuisance)) if previous is None else previous.u
+    angles = None if previous is None else previous.angle[None]
+    variance = problem.variance(FIT_FLOOR)
+    return fit(forward, problem, observed, [((), nuisance)], [start], [variance], angles, 12)[0]
+
+
+def _select(setting: Setting, nothing: Fit) -> Selection:
+    singles = explain_singles(setting, nothing)
+    incompatible = {name: e.incompatible_with for name, e in setting.effects.items()}
+    explanations: list[Explanation] = list(singles)
+    explanations += explain_pairs(setting, singles, incompatible)
+    return weigh(explanations, setting.floors, len(setting.effects))
+
+
+def _outliers_of_best(
+    builder: _Builder, noise: Noise, selection: Selection
+) -> list[tuple[int, int, float]]:
+    """Look for outliers anew, from scratch, under the best explanation."""
+    problem, observed = builder.build(noise.std, ())
+    best = selection.explanations[0]
+    floor = selection.floors[int(np.argmax(selection.probability[0]))]
+    amplitude = np.maximum(np.array(floor.amplitude), _ROBUST_FLOOR)
+    return find_outliers(problem, best.fitted, problem.variance(amplitude), observed)
+
+
+class _Builder:
+    """Makes problems of one table, with the recorded slip as a latent variable where needed."""
+
+    def __init__(self, table: SteadyTable, forward: Forward, scale: FloatArray) -> None:
+        self.table = table
+        self.forward = forward
+        self.scale = scale
+        self.inputs = _inputs(table)
+        self.latent = bool((table.slip_std > 0.0).any())
+        self._by_slip: FloatArray | None = None
+        self._moved = np.zeros(len(table))
+
+    def linearise(self, nothing: Fit) -> None:
+        """Linearise the slip errors around the most probable slips."""
+        self._by_slip = self.forward.by_slip(nothing.coordinates, nothing.u, nothing.angle)
+
+    def build(
+        self, std: FloatArray, outliers: list[tuple[int, int, float]] | tuple[()]
+    ) -> tuple[Problem, FloatArray]:
+        """Return the problem and the cells that the model has to match."""
+        self.last = build_problem(
+            self.table.measured,
+            std,
+            self.inputs,
+            self.scale,
+            [(row, quantity) for row, quantity, _ in outliers],
+            self._by_slip,
+            self.table.slip_std,
+        )
+        return self.last, self.last.observed
+
+    def estimate(
+        self, noise: Noise, fitted: Fit, outliers: list[tuple[int, int, float]] | tuple[()]
+    ) -> Noise:
+        """Estimate the noise that was not stated."""
+        if 'estimated' not in noise.origin.values():
+            return noise
+        problem, observed = self.build(noise.std, outliers)
+        return noises.estimate_noise(noise, fitted, problem, observed)

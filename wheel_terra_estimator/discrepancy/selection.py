@@ -1,0 +1,176 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Which set of effects: nothing, one, two; with the structural error left over weighed along.
+
+Every hypothesis is a set of effects together with an assumption on the structural error: none, a
+model-error floor of a few per cent, or a smooth misfit beyond it that no listed effect explains.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import logsumexp
+
+from wheel_terra_estimator.discrepancy.candidates import Explanation, Setting, linear_starts
+from wheel_terra_estimator.discrepancy.evidence import Floor
+from wheel_terra_estimator.discrepancy.fitting import Fit, fit
+
+FloatArray = NDArray[np.float64]
+
+# Prior probabilities: nothing missing, one effect, two effects.
+PRIOR_NOTHING, PRIOR_ONE, PRIOR_TWO = 0.50, 0.45, 0.05
+# Prior of the structural error: floors that a good model may have ...
+_FLOORS = ((0.0, 0.60), (0.007, 0.10), (0.015, 0.12), (0.025, 0.10), (0.04, 0.04))
+# ... and smooth misfits that ask for a name, in all quantities or in one of them.
+_UNEXPLAINED_PRIOR = 0.04
+_UNEXPLAINED = (0.08, 0.16, 0.35)
+_UNEXPLAINED_SINGLE = (0.04, 0.12, 0.35)
+
+_PAIR_SEEDS = 4  # best single effects to which a second one is added
+_PAIRS = 8  # pairs that are fitted
+
+
+def default_floors(greatest: float | None = None) -> tuple[Floor, ...]:
+    """Return the assumptions on the structural error with their priors.
+
+    Parameters
+    ----------
+    greatest : float, optional
+        Amplitude up to which an error counts as floor; given by the user or by a reference table.
+    """
+    floors = [Floor((a, a, a), math.log(p), False) for a, p in _FLOORS]
+    if greatest is not None:
+        kept = [(a, p) for a, p in _FLOORS if a <= greatest] or [_FLOORS[0]]
+        total = sum(p for _, p in kept)
+        share = (1.0 - _UNEXPLAINED_PRIOR) / total
+        floors = [Floor((a, a, a), math.log(p * share), False) for a, p in kept]
+    patterns = [(a, a, a) for a in _UNEXPLAINED]
+    for q, a in itertools.product(range(3), _UNEXPLAINED_SINGLE):
+        single = [0.0, 0.0, 0.0]
+        single[q] = a
+        patterns.append((single[0], single[1], single[2]))
+    each = math.log(_UNEXPLAINED_PRIOR / len(patterns))
+    floors.extend(Floor(pattern, each, True) for pattern in patterns)
+    return tuple(floors)
+
+
+@dataclass(frozen=True)
+class Selection:
+    """All hypotheses with their posterior probabilities.
+
+    Attributes
+    ----------
+    explanations : tuple of Explanation
+        Best first.
+    log_joint : numpy.ndarray
+        (H, F) log of prior times evidence per explanation and floor.
+    probability : numpy.ndarray
+        (H, F), normalised.
+    floors : tuple of Floor
+    """
+
+    explanations: tuple[Explanation, ...]
+    log_joint: FloatArray
+    probability: FloatArray
+    floors: tuple[Floor, ...]
+
+    @property
+    def unexplained(self) -> NDArray[np.bool_]:
+        """(F,) True for floors that ask for a name."""
+        return np.array([floor.unexplained for floor in self.floors])
+
+    def of(self, names: Sequence[str]) -> float:
+        """Posterior probability of a set of effects, structural error integrated out."""
+        for h, explanation in enumerate(self.explanations):
+            if set(explanation.names) == set(names):
+                return float(self.probability[h].sum())
+        return 0.0
+
+    def find(self, names: Sequence[str]) -> Explanation:
+        """Return the explanation with exactly these effects."""
+        for explanation in self.explanations:
+            if set(explanation.names) == set(names):
+                return explanation
+        raise KeyError(names)
+
+    def single_weights(self, temperature: float = 1.0) -> dict[str, float]:
+        """Return effect -> share of the tempered probability among the single effects."""
+        singles = [
+            (e.names[0], float(logsumexp(self.log_joint[h])))
+            for h, e in enumerate(self.explanations)
+            if len(e.names) == 1
+        ]
+        if not singles:
+            return {}
+        logs = np.array([value for _, value in singles]) / temperature
+        shares = np.exp(logs - logsumexp(logs))
+        return {name: float(s) for (name, _), s in zip(singles, shares, strict=True)}
+
+
+def weigh(
+    explanations: Sequence[Explanation], floors: tuple[Floor, ...], visible: int
+) -> Selection:
+    """Return posterior probabilities of all explanations and floors."""
+    priors = {
+        0: math.log(PRIOR_NOTHING),
+        1: math.log(PRIOR_ONE / max(visible, 1)),
+        2: math.log(PRIOR_TWO / max(visible * (visible - 1) / 2, 1)),
+    }
+    floor_prior = np.array([floor.log_prior for floor in floors])
+    joint = np.array(
+        [e.posterior.log_evidence + floor_prior + priors[len(e.names)] for e in explanations]
+    )
+    order = np.argsort(-logsumexp(joint, axis=1))
+    joint = joint[order]
+    return Selection(
+        tuple(explanations[k] for k in order), joint, np.exp(joint - logsumexp(joint)), floors
+    )
+
+
+def explain_singles(setting: Setting, nothing: Fit) -> list[Explanation]:
+    """Fit nothing and every visible effect; return their explanations."""
+    starts = linear_starts(setting, nothing, tuple(setting.effects))
+    fits = setting.fit([n for _, n, _ in starts], [u for _, _, u in starts], nothing.angle)
+    return [setting.explain(f) for f in (nothing, *fits)]
+
+
+def explain_pairs(
+    setting: Setting, singles: Sequence[Explanation], incompatible: Mapping[str, frozenset[str]]
+) -> list[Explanation]:
+    """Add a second effect to the best single ones, where the linear evidence promises most."""
+    ranked = sorted((e for e in singles if e.names), key=lambda e: -e.log_evidence)
+    proposals: dict[frozenset[str], tuple[float, tuple[str, ...], FloatArray, FloatArray]] = {}
+    for seed in ranked[:_PAIR_SEEDS]:
+        first = seed.names[0]
+        others = [
+            name
+            for name in setting.effects
+            if name != first
+            and name not in incompatible.get(first, frozenset())
+            and first not in incompatible.get(name, frozenset())
+        ]
+        for score, names, start in linear_starts(setting, seed.fitted, others):
+            key = frozenset(names)
+            total = score - seed.fitted.objective
+            if key not in proposals or proposals[key][0] < total:
+                proposals[key] = (total, names, start, seed.fitted.angle)
+    best = sorted(proposals.values(), key=lambda proposal: -proposal[0])[:_PAIRS]
+    if not best:
+        return []
+    variance = ranked[0].fitted.variance
+    fits = fit(
+        setting.forward,
+        setting.problem,
+        setting.observed,
+        [(names, setting.coordinates(names)) for _, names, _, _ in best],
+        [start for _, _, start, _ in best],
+        [variance] * len(best),
+        np.array([angle for _, _, _, angle in best]),
+    )
+    return [setting.explain(f) for f in fits]

@@ -1,0 +1,154 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Numbers and words of the report that follow from the search: gaps, reasons, notes, verdict."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wheel_terra_estimator.discrepancy.fitting import Fit
+from wheel_terra_estimator.discrepancy.remainder import Remainder
+from wheel_terra_estimator.discrepancy.result import Curves, NamedEffect, QuantityGap
+from wheel_terra_estimator.discrepancy.search import Findings
+from wheel_terra_estimator.discrepancy.table import QUANTITIES, SteadyTable
+from wheel_terra_estimator.discrepancy.verdict import Verdict
+
+FloatArray = NDArray[np.float64]
+
+_DRAWS = 1000
+_SEED = 5
+_STRONG_PULL = 2.0  # prior deviations
+
+
+def gaps(
+    table: SteadyTable, findings: Findings, curves: Curves, floor: float
+) -> dict[str, QuantityGap]:
+    """Return the held-out errors of each quantity; cells set apart as outliers do not count."""
+    measured = table.measured.copy()
+    for row, quantity, _ in findings.outliers:
+        measured[row, quantity] = np.nan
+    rng = np.random.default_rng(_SEED)
+    found = {}
+    for q, quantity in enumerate(QUANTITIES):
+        mine = np.isfinite(measured[:, q])
+        if not mine.any():
+            continue
+        count = int(mine.sum())
+        errors = {
+            'before': (curves.before - measured)[mine, q] ** 2,
+            'refit': (curves.held_out_refit - measured)[mine, q] ** 2,
+            'after': (curves.held_out_after - measured)[mine, q] ** 2,
+        }
+        noise = float(np.sqrt(np.mean(findings.noise.std[mine, q] ** 2)))
+        least = floor * findings.setting.problem.scale[q]
+        shrink = low = high = None
+        if findings.selection is not None and not np.array_equal(errors['refit'], errors['after']):
+            known = noise**2 + least**2
+            shrink = _shrink(errors['refit'].mean(), errors['after'].mean(), known)
+            rows = rng.integers(0, count, (_DRAWS, count))
+            refit, after = errors['refit'][rows].mean(axis=1), errors['after'][rows].mean(axis=1)
+            draws = [_shrink(a, b, known) for a, b in zip(refit, after, strict=True)]
+            values = np.array([d for d in draws if d is not None])
+            if shrink is not None and len(values) > _DRAWS // 2:
+                low, high = (float(v) for v in np.quantile(values, (0.05, 0.95)))
+        found[quantity] = QuantityGap(
+            *(float(np.sqrt(errors[key].mean())) for key in ('before', 'refit', 'after')),
+            noise,
+            float(least),
+            count,
+            shrink,
+            low,
+            high,
+        )
+    return found
+
+
+def _shrink(refit: float, after: float, known: float) -> float | None:
+    """Share of the excess error that went away; None where the refit left no excess."""
+    excess = refit - known
+    if excess <= 0.25 * known:
+        return None
+    return float(1.0 - np.sqrt(max(after - known, 0.0) / excess))
+
+
+def why_not(
+    findings: Findings, verdict: Verdict, index: int, totals: FloatArray, chosen: set[str]
+) -> str:
+    """Return why an explanation was not the one."""
+    selection = findings.selection
+    names = selection.explanations[index].names
+    behind = float(totals[verdict.index] - totals[index])
+    if not names:
+        return f'leaves a gap: {behind:.1f} nats behind {_label(chosen)}'
+    open_names = {name for rivals in verdict.open_sets for name in rivals}
+    if len(names) == len(chosen) and set(names) - chosen <= open_names:
+        return f'cannot be told apart on these rows ({behind:.1f} nats behind)'
+    if verdict.word == 'agrees':
+        return f'no gap that needs it ({behind:.1f} nats behind nothing)'
+    if verdict.word == 'unexplained':
+        return 'leaves a smooth misfit that it does not explain'
+    if chosen < set(names):
+        extra = ' + '.join(sorted(set(names) - chosen))
+        return f'{extra} adds nothing that the data ask for ({behind:.1f} nats behind)'
+    if set(names) < chosen:
+        return f'leaves what {" + ".join(sorted(chosen - set(names)))} explains ({behind:.1f} nats)'
+    return f'fits worse: {behind:.1f} nats behind {_label(chosen)}'
+
+
+def _label(names: set[str]) -> str:
+    return ' + '.join(sorted(names)) or 'nothing'
+
+
+def notes(table: SteadyTable, findings: Findings, after: Fit) -> tuple[str, ...]:
+    """Return remarks for people: the reader's, noise, outliers, soil far off, effects at bounds."""
+    found = list(table.notes)
+    guessed = [q for q, origin in findings.noise.origin.items() if origin == 'estimated']
+    if guessed:
+        found.append(
+            f'noise of {", ".join(guessed)} was not stated and was estimated from the scatter; '
+            'repeats or *_std columns make every figure sharper'
+        )
+    if findings.outliers:
+        found.append(f'{len(findings.outliers)} cells were set apart as outliers')
+    for c, u in zip(after.coordinates, after.u, strict=True):
+        if c.owner == 'soil' and abs(u) > _STRONG_PULL:
+            found.append(
+                f'soil.{c.name} was pulled {u:+.1f} of its deviations to '
+                f'{float(c.value(u)):.3g} {c.unit}: look at this number before any effect'
+            )
+        if c.owner != 'soil' and (u - c.lower < 1e-3 or c.upper - u < 1e-3):
+            found.append(f'{c.key} stands at the end of its range ({float(c.value(u)):.3g})')
+    return tuple(found)
+
+
+def sentence(
+    verdict: Verdict,
+    effects: tuple[NamedEffect, ...],
+    gap_p_value: float,
+    left: Remainder,
+    floor: float,
+) -> str:
+    """Return the verdict in words."""
+    within = f', within a model-error floor of {100 * floor:.1f} % of the range' if floor else ''
+    if verdict.word == 'agrees':
+        return f'Model and measurement agree once the soil is refitted{within} (p = {gap_p_value:.2g}).'
+    if verdict.word == 'unexplained':
+        return (
+            'Model and measurement disagree, and none of the known effects explains it '
+            f'(a misfit of about {100 * left.amplitude:.0f} % of the range is left).'
+        )
+    parts = []
+    for effect in effects:
+        values = ', '.join(
+            f'{name} = {p.value:.3g} +- {p.std:.2g}{"" if p.unit == "-" else " " + p.unit}'
+            for name, p in effect.parameters.items()
+        )
+        text = f'{effect.name} ({values}; confidence {effect.confidence:.2f}'
+        if effect.confounded_with:
+            text += f'; these rows cannot tell it from {", ".join(effect.confounded_with)}'
+        parts.append(text + ')')
+    result = 'Missing in the model: ' + ' and '.join(parts)
+    if any(effect.remainder for effect in effects):
+        result += '; something is left that this does not explain'
+    return result + '.'

@@ -1,0 +1,178 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Where model and measurement disagree: a scan over boxes of the inputs, calibrated by simulation."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wheel_terra_estimator.discrepancy.fitting import Fit
+from wheel_terra_estimator.discrepancy.problem import Problem
+from wheel_terra_estimator.discrepancy.result import InputRange, Where
+from wheel_terra_estimator.discrepancy.table import INPUT_UNITS, QUANTITIES, UNITS, SteadyTable
+
+FloatArray = NDArray[np.float64]
+
+_LEVELS = 7  # steps into which an input is cut
+_LARGEST_SHARE = 0.7  # of the rows in a box; more is "everywhere"
+_DRAWS = 400
+_SEED = 7
+_SURE = 0.05
+_LABELS = {'sinkage': 'sinkage', 'drawbar_pull': 'drawbar pull', 'torque': 'torque'}
+
+
+def locate(table: SteadyTable, problem: Problem, nothing: Fit, observed: FloatArray) -> Where:
+    """Return the region of the inputs in which the soil-refitted model is worst.
+
+    The residuals after a refit are neither independent nor equal in size; the p-value therefore
+    comes from noise drawn and refitted on the same rows (linear), under the same scan.
+    """
+    cells = (observed - problem.flat(nothing.outputs)) / problem.std
+    cells = np.where(problem.outlier, 0.0, cells)
+    residual = np.full((len(table), 3), np.nan)
+    residual[problem.row, problem.quantity] = cells
+    present = [q for q in range(3) if (problem.quantity == q).any()]
+    excess = {q: max(float((cells[problem.quantity == q] ** 2 - 1.0).sum()), 1e-9) for q in present}
+    total = sum(excess.values())
+    shares = {QUANTITIES[q]: excess[q] / total for q in present}
+    worst = max(present, key=lambda q: excess[q])
+    mine = np.isfinite(residual[:, worst])
+    names = [name for name in table.varying() if np.isfinite(table.columns[name]).all()]
+    boxes, sides = _boxes(table, names)
+    values = np.where(mine, residual[:, worst], 0.0)
+    share_inside = float('nan')
+    p_value, box, inside = 1.0, (), mine
+    if len(boxes):
+        counts = np.maximum(boxes @ mine, 1.0)
+        score = _score(boxes @ values**2, counts)
+        best = int(np.argmax(score))
+        null = _simulated(problem, nothing, worst, len(table))
+        strongest = _score(boxes @ (null.T**2), counts[:, None]).max(axis=0)
+        p_value = float((1 + (strongest >= score[best]).sum()) / (1 + len(strongest)))
+        chosen = (boxes[best] > 0) & mine
+        square = float((values**2).sum())
+        share_inside = float((values[chosen] ** 2).sum()) / max(square, 1e-12)
+        # A box that holds no more than its rows' share of the gap is no region.
+        if p_value < _SURE and share_inside > 1.3 * chosen.sum() / mine.sum():
+            box, inside = sides[best], chosen
+    if not box:
+        share_inside = 1.0
+    physical = values[inside] * _std_of_rows(problem, worst, len(table))[inside]
+    mean, in_std = float(np.mean(physical)), float(np.mean(values[inside]))
+    trend, correlation = _trend(table, names, residual[:, worst], mine)
+    where = ' and '.join(_text(side) for side in box) if box else 'everywhere alike'
+    quantity = QUANTITIES[worst]
+    if p_value < _SURE or excess[worst] > 3.0 * np.sqrt(2.0 * mine.sum()):
+        sentence = (
+            f'{_LABELS[quantity]} is worst, {where}: measured minus model is on average '
+            f'{_amount(mean, quantity)} there ({in_std:+.1f} noise standard deviations)'
+        )
+    else:
+        sentence = 'no region stands out from the noise'
+    return Where(
+        sentence,
+        quantity,
+        shares,
+        box,
+        np.flatnonzero(inside),
+        share_inside,
+        float(inside.sum() / mine.sum()),
+        mean,
+        in_std,
+        p_value,
+        trend,
+        correlation,
+    )
+
+
+def _boxes(table: SteadyTable, names: list[str]) -> tuple[FloatArray, list[tuple[InputRange, ...]]]:
+    """Return (boxes, N) membership and the sides of each box: one input, or slip and another."""
+    intervals: dict[str, list[tuple[NDArray[np.bool_], InputRange]]] = {}
+    for name in names:
+        values = table.columns[name]
+        levels = np.unique(values)
+        if len(levels) > _LEVELS:
+            levels = np.unique(np.quantile(values, np.linspace(0.0, 1.0, _LEVELS + 1)))
+            edges = list(itertools.combinations(levels, 2))
+        else:
+            edges = list(itertools.combinations_with_replacement(levels, 2))
+        found = []
+        for low, high in edges:
+            member = (values >= low - 1e-12) & (values <= high + 1e-12)
+            if 2 <= member.sum() <= _LARGEST_SHARE * len(values):
+                found.append((member, InputRange(name, float(low), float(high), INPUT_UNITS[name])))
+        intervals[name] = found
+    boxes: list[NDArray[np.bool_]] = []
+    sides: list[tuple[InputRange, ...]] = []
+    for name in names:
+        for member, side in intervals[name]:
+            boxes.append(member)
+            sides.append((side,))
+    for first, second in itertools.combinations(names, 2):
+        if 'slip' not in (first, second):
+            continue
+        for (a, side_a), (b, side_b) in itertools.product(intervals[first], intervals[second]):
+            both = a & b
+            if both.sum() >= 3:
+                boxes.append(both)
+                sides.append((side_a, side_b))
+    return np.array(boxes, dtype=float).reshape(len(boxes), len(table)), sides
+
+
+def _score(square: FloatArray, count: FloatArray) -> FloatArray:
+    """Return how far a box's squared misfit exceeds the noise: log likelihood ratio of a scale."""
+    ratio = np.maximum(square / count, 1.0)
+    return 0.5 * count * (ratio - 1.0 - np.log(ratio))
+
+
+def _simulated(problem: Problem, nothing: Fit, quantity: int, rows: int) -> FloatArray:
+    """(draws, N) whitened residuals of a refit where nothing is missing."""
+    rng = np.random.default_rng(_SEED)
+    jacobian = nothing.sensitivity / problem.std[:, None]
+    noise = rng.standard_normal((problem.size, _DRAWS))
+    precision = jacobian.T @ jacobian + np.eye(jacobian.shape[1])
+    draws = noise - jacobian @ np.linalg.solve(precision, jacobian.T @ noise)
+    mine = problem.quantity == quantity
+    full = np.zeros((_DRAWS, rows))
+    full[:, problem.row[mine]] = draws[mine].T
+    return full
+
+
+def _std_of_rows(problem: Problem, quantity: int, rows: int) -> FloatArray:
+    std = np.zeros(rows)
+    mine = problem.quantity == quantity
+    std[problem.row[mine]] = problem.std[mine]
+    return std
+
+
+def _trend(
+    table: SteadyTable, names: list[str], residual: FloatArray, mine: NDArray[np.bool_]
+) -> tuple[str, float]:
+    from scipy.stats import rankdata
+
+    best, value = '', 0.0
+    ranks = rankdata(residual[mine])
+    for name in names:
+        column = table.columns[name][mine]
+        if np.ptp(column) == 0.0 or len(column) < 4:
+            continue
+        correlation = float(np.corrcoef(rankdata(column), ranks)[0, 1])
+        if abs(correlation) > abs(value):
+            best, value = name, correlation
+    return best, value
+
+
+def _text(side: InputRange) -> str:
+    unit = '' if side.unit == '-' else f' {side.unit}'
+    if side.low == side.high:
+        return f'at {side.input} {side.low:.3g}{unit}'
+    return f'at {side.input} {side.low:.3g} to {side.high:.3g}{unit}'
+
+
+def _amount(value: float, quantity: str) -> str:
+    if quantity == 'sinkage':
+        return f'{1e3 * value:+.2f} mm'
+    return f'{value:+.3g} {UNITS[quantity]}'

@@ -1,0 +1,516 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""The discrepancy workflow: a table and a model in, a diagnosis out."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.discrepancy import confidence as confidences
+from wheel_terra_estimator.discrepancy import gap_test, next_measurement, summary
+from wheel_terra_estimator.discrepancy.fitting import Fit
+from wheel_terra_estimator.discrepancy.forward import Forward
+from wheel_terra_estimator.discrepancy.held_out import HeldOut, hold_out, slip_groups
+from wheel_terra_estimator.discrepancy.parameters import (
+    Coordinate,
+    base_coordinates,
+    soil_coordinates,
+)
+from wheel_terra_estimator.discrepancy.remainder import Remainder, remainder
+from wheel_terra_estimator.discrepancy.result import (
+    Candidate,
+    Curves,
+    Diagnosis,
+    FittedParameter,
+    NamedEffect,
+    NextMeasurement,
+    SoilShift,
+)
+from wheel_terra_estimator.discrepancy.search import Findings, search
+from wheel_terra_estimator.discrepancy.selection import default_floors
+from wheel_terra_estimator.discrepancy.signatures import CLEAR, distance
+from wheel_terra_estimator.discrepancy.table import (
+    QUANTITIES,
+    SteadyTable,
+    check_against_wheel,
+)
+from wheel_terra_estimator.discrepancy.verdict import Verdict, decide
+from wheel_terra_estimator.discrepancy.where import locate
+from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.terramechanics.effects import catalogue
+from wheel_terra_estimator.terramechanics.effects.base import Effect
+from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
+from wheel_terra_estimator.terramechanics.wheel import Wheel
+
+FloatArray = NDArray[np.float64]
+
+_CANDIDATES_SHOWN = 12
+
+
+@dataclass(frozen=True)
+class Options:
+    """Choices of a diagnosis.
+
+    Attributes
+    ----------
+    effects : tuple of str or None
+        Effects that may be named; None = all candidates of the catalogue.
+    floor : float or None
+        Greatest model-error floor, share of each quantity's range; None = up to 4 %, as the data ask.
+    """
+
+    effects: tuple[str, ...] | None = None
+    floor: float | None = None
+
+
+def diagnose(
+    table: SteadyTable,
+    configuration: Configuration,
+    reference: SteadyTable | None = None,
+    options: Options | None = None,
+) -> Diagnosis:
+    """Find where a model and a table disagree, and name the missing effect.
+
+    Parameters
+    ----------
+    table : SteadyTable
+        Checked rows (``table.read_table``).
+    configuration : Configuration
+        The model believed in: soil, effects that are on, the wheel where the table has none.
+    reference : SteadyTable, optional
+        Rows in which the effect in question is absent; fitted first, so that the structural error
+        common to both tables cancels.
+    options : Options, optional
+
+    Raises
+    ------
+    UserError
+        If the table does not fit the wheel or the soil of the configuration.
+    """
+    started = time.perf_counter()
+    chosen = options or Options()
+    points = operating_points(table, configuration)
+    check_against_wheel(
+        table,
+        np.broadcast_to(points.wheel.radius, (len(table),)),
+        np.broadcast_to(points.wheel.width, (len(table),)),
+    )
+    known = catalogue()
+    effects = _effects_to_try(configuration, chosen, known)
+    forward = Forward(points, configuration.soil, configuration.effects, known)
+    _check_soil_carries(table, forward, configuration)
+    nuisance = nuisance_coordinates(configuration, known)
+    findings = search(table, forward, nuisance, effects, default_floors(chosen.floor))
+    return _report(table, configuration, findings, known, started)
+
+
+def operating_points(table: SteadyTable, configuration: Configuration) -> OperatingPoints:
+    """Return the table's rows as operating points; what it does not state comes from the model.
+
+    Raises
+    ------
+    UserError
+        If neither the table nor the configuration states the wheel.
+    """
+    wheels, columns = configuration.wheels, table.columns
+    stated = configuration.stated
+    values = {}
+    for column, field in (
+        ('wheel_radius', 'radius'),
+        ('wheel_width', 'width'),
+        ('lug_height', 'lug_height'),
+        ('lug_count', 'lug_count'),
+    ):
+        first = getattr(wheels, field)
+        default = float(first[0]) if len(first) else float('nan')
+        if column in columns:
+            values[field] = np.where(np.isfinite(columns[column]), columns[column], default)
+        else:
+            if field in ('radius', 'width') and f'wheels.{field}' not in stated:
+                raise UserError(
+                    f'{table.name}: no column {column}, and no wheel in the configuration; '
+                    f'add the column, or --config with wheels.{field}'
+                )
+            values[field] = np.full(len(table), default)
+    thickness = float(wheels.lug_thickness[0]) if len(wheels.lug_thickness) else 0.0
+
+    def column(name: str, default: float) -> FloatArray:
+        if name not in columns:
+            return np.full(len(table), default)
+        return np.where(np.isnan(columns[name]), default, columns[name])
+
+    wheel = Wheel(**values, lug_thickness=thickness)
+    try:
+        return OperatingPoints(
+            columns['slip'],
+            columns['normal_load'],
+            wheel,
+            column('slope', 0.0),
+            configuration.slip_radius,
+            column('gravity', float(configuration.rover.gravity)),
+            column('angular_velocity', np.nan),
+            column('pass_number', 1.0),
+            column('leaving_angle', np.nan),
+        )
+    except ValueError as error:
+        raise UserError(f'{table.name}: {error}') from None
+
+
+def nuisance_coordinates(
+    configuration: Configuration, known: Mapping[str, Effect]
+) -> tuple[Coordinate, ...]:
+    """Return the soil parameters and the stated uncertain parameters of effects that are on."""
+    stated = {
+        field: value
+        for field, value in configuration.soil_std.items()
+        if configuration.stated & {f'soil.{field}_std', f'soil.{field}_std_deg'}
+    }
+    return (
+        *soil_coordinates(configuration.soil, stated),
+        *base_coordinates(configuration.effects, configuration.effects_std, known),
+    )
+
+
+def _effects_to_try(
+    configuration: Configuration, options: Options, known: Mapping[str, Effect]
+) -> dict[str, Effect]:
+    if options.effects is not None:
+        for name in options.effects:
+            if name not in known:
+                raise UserError(f'effect {name} is not in the catalogue: {", ".join(known)}')
+        names = list(options.effects)
+    else:
+        names = [name for name, effect in known.items() if effect.candidate]
+    on = configuration.effects
+    return {
+        name: known[name]
+        for name in names
+        if name not in on and not (known[name].incompatible_with & on.keys())
+    }
+
+
+def _check_soil_carries(table: SteadyTable, forward: Forward, configuration: Configuration) -> None:
+    """Raise where the configured soil lets the wheel sink in to its hub."""
+    nothing = soil_coordinates(configuration.soil, {})
+    state = forward.solve([nothing], [np.zeros(len(nothing))], jacobian=False)
+    sunk = state.angle[0] > 1.45
+    if sunk.any():
+        row = int(np.flatnonzero(sunk)[0])
+        load = table.columns['normal_load'][row]
+        raise UserError(
+            f'{table.name}, line {table.lines[row]}: the configured soil cannot carry '
+            f'{load:g} N on this wheel; check the soil of --config and the units of normal_load'
+        )
+
+
+def _report(
+    table: SteadyTable,
+    configuration: Configuration,
+    findings: Findings,
+    known: Mapping[str, Effect],
+    started: float,
+) -> Diagnosis:
+    setting, selection, nothing = findings.setting, findings.selection, findings.nothing
+    problem = setting.problem
+    verdict = decide(selection)
+    left = remainder(selection, verdict.index, problem.variance)
+    explanation = selection.explanations[verdict.index]
+    if verdict.word == 'named' and left.significant and not _explains_most(findings, verdict):
+        verdict = Verdict(
+            'unexplained', _index_of_nothing(findings), (), verdict.probability_something
+        )
+        left = remainder(selection, verdict.index, problem.variance)
+        explanation = selection.explanations[verdict.index]
+    after = explanation.fitted
+    quiet = [k for k, floor in enumerate(selection.floors) if not floor.unexplained]
+    floor_index = quiet[int(np.argmax(selection.log_joint[verdict.index][quiet]))]
+    floor = selection.floors[floor_index].largest
+    variance = problem.variance(floor)
+    shown = _shown(findings, verdict.index)
+    groups = slip_groups(table)
+    kept = [nothing, *(selection.explanations[h].fitted for h in shown)]
+    outs = hold_out(setting, kept, [variance] * len(kept), groups)
+    gains = dict(zip(shown, (o.log_score - outs[0].log_score for o in outs[1:]), strict=True))
+    held_after = outs[1 + shown.index(verdict.index)] if after.names else outs[0]
+    curves = _curves(table, configuration, findings, after, outs[0], held_after, floor)
+    names = {name: s for name, s in findings.signatures.items() if name in setting.effects}
+    one_sided = {
+        name for name in names if all(p.prior == 'half_normal' for p in known[name].parameters[:1])
+    }
+    gap_p_value = min(
+        1.0,
+        2.0
+        * min(
+            gap_test.scan_p_value(nothing, variance, names, one_sided),
+            gap_test.chi_square_p_value(nothing, variance),
+        ),
+    )
+    effects = _named(findings, verdict, left, known, floor_index) if after.names else ()
+    candidates = _candidates(findings, verdict, shown, gains, floor_index)
+    return Diagnosis(
+        verdict=verdict.word,
+        sentence=summary.sentence(verdict, effects, gap_p_value, left, floor),
+        table=table,
+        configuration=configuration,
+        effects=effects,
+        candidates=candidates,
+        gap=summary.gaps(table, findings, curves, floor),
+        not_visible=dict(findings.not_visible),
+        smallest_visible=_smallest_visible(findings, known),
+        where=locate(table, problem, nothing, setting.observed),
+        next_measurement=_next(findings, verdict, after),
+        curves=curves,
+        noise=findings.noise,
+        soil=_soil_shifts(findings, after, variance),
+        outliers=tuple((r, QUANTITIES[q], size) for r, q, size in findings.outliers),
+        gap_p_value=gap_p_value,
+        remainder_p_value=left.p_value,
+        remainder_amplitude=left.amplitude,
+        floor=floor,
+        notes=summary.notes(table, findings, after),
+        base_effects=tuple(configuration.effects),
+        seconds=time.perf_counter() - started,
+    )
+
+
+def _index_of_nothing(findings: Findings) -> int:
+    return next(h for h, e in enumerate(findings.selection.explanations) if not e.names)
+
+
+def _explains_most(findings: Findings, verdict: Verdict) -> bool:
+    """Whether the named set removes nearly all of the misfit in excess of the noise."""
+    m = findings.setting.problem.size
+    nothing = float((findings.nothing.residual**2).sum())
+    after = findings.selection.explanations[verdict.index].fitted
+    rest = float((after.residual**2).sum())
+    return nothing - rest >= 0.9 * (nothing - m)
+
+
+def _shown(findings: Findings, chosen: int) -> list[int]:
+    """Return the explanations that are listed: the best, and the chosen one among them."""
+    with_names = [h for h, e in enumerate(findings.selection.explanations) if e.names]
+    shown = with_names[:_CANDIDATES_SHOWN]
+    if findings.selection.explanations[chosen].names and chosen not in shown:
+        shown.append(chosen)
+    return shown
+
+
+def _parameters(
+    fitted: Fit, covariance: FloatArray, inflate: float = 1.0
+) -> dict[str, FittedParameter]:
+    found = {}
+    for index, c in enumerate(fitted.coordinates):
+        if c.owner in fitted.names:
+            u, std = float(fitted.u[index]), inflate * float(np.sqrt(covariance[index, index]))
+            found[c.key] = FittedParameter(
+                float(c.value(u)),
+                c.deviation(u, std),
+                c.unit,
+                float(c.value(c.lower)),
+                float(c.value(c.upper)),
+                c.meaning,
+            )
+    return found
+
+
+def _named(
+    findings: Findings,
+    verdict: Verdict,
+    left: Remainder,
+    known: Mapping[str, Effect],
+    floor_index: int,
+) -> tuple[NamedEffect, ...]:
+    """Return the named effects, strongest first."""
+    explanation = findings.selection.explanations[verdict.index]
+    fitted = explanation.fitted
+    covariance = explanation.posterior.covariance[floor_index]
+    parameters = _parameters(fitted, covariance)
+    noise_known = all(np.isfinite(f) for f in findings.noise.degrees_of_freedom.values())
+    found = []
+    for place, name in enumerate(fitted.names):
+        values = confidences.features(findings.selection, verdict, place, left, noise_known)
+        sure = confidences.confidence(values)
+        rivals = verdict.open_sets[place]
+        own = {
+            key.split('.', 1)[1]: value
+            for key, value in parameters.items()
+            if key.split('.', 1)[0] == name
+        }
+        found.append(
+            (
+                _strength(findings, fitted, name),
+                NamedEffect(
+                    name,
+                    own,
+                    sure.of_name,
+                    sure.of_set,
+                    rivals,
+                    left.significant,
+                    known[name].claim,
+                    known[name].source,
+                    {
+                        rival: known[name].confounded_with.get(rival)
+                        or known[rival].confounded_with.get(name, '')
+                        for rival in rivals
+                    },
+                ),
+            )
+        )
+    found.sort(key=lambda item: -item[0])
+    return tuple(effect for _, effect in found)
+
+
+def _strength(findings: Findings, fitted: Fit, name: str) -> float:
+    """D' of one effect in a fitted set, beyond soil (linear)."""
+    mine = [i for i, c in enumerate(fitted.coordinates) if c.owner == name]
+    away = np.array(
+        [
+            fitted.u[i] - fitted.coordinates[i].coordinate(fitted.coordinates[i].neutral)
+            for i in mine
+        ]
+    )
+    change = fitted.jacobian[:, mine[:1]] @ away[:1]
+    return distance(fitted, fitted.variance, change)
+
+
+def _distance_to_nothing(findings: Findings, fitted: Fit) -> float:
+    change = findings.setting.problem.rotate(
+        findings.setting.problem.flat(fitted.outputs - findings.nothing.outputs)
+    )
+    return float(np.sqrt((change**2 / fitted.variance).sum()))
+
+
+def _candidates(
+    findings: Findings,
+    verdict: Verdict,
+    shown: list[int],
+    gains: Mapping[int, float],
+    floor_index: int,
+) -> tuple[Candidate, ...]:
+    selection = findings.selection
+    nothing = _index_of_nothing(findings)
+    totals = np.logaddexp.reduce(selection.log_joint, axis=1)
+    evidence = {h: selection.explanations[h].log_evidence for h in (*shown, nothing)}
+    chosen = set(selection.explanations[verdict.index].names)
+    found = []
+    for h in sorted({*shown, nothing}, key=lambda h: -totals[h]):
+        explanation = selection.explanations[h]
+        fitted = explanation.fitted
+        found.append(
+            Candidate(
+                explanation.names,
+                evidence[h] - evidence[nothing],
+                float(selection.probability[h].sum()),
+                gains.get(h, 0.0),
+                float((fitted.residual**2).sum()),
+                float(findings.setting.problem.size - len(fitted.u)),
+                _parameters(fitted, explanation.posterior.covariance[floor_index]),
+                _distance_to_nothing(findings, fitted) if explanation.names else 0.0,
+                '' if h == verdict.index else summary.why_not(findings, verdict, h, totals, chosen),
+            )
+        )
+    return tuple(found)
+
+
+def _curves(
+    table: SteadyTable,
+    configuration: Configuration,
+    findings: Findings,
+    after: Fit,
+    held_refit: HeldOut,
+    held_after: HeldOut,
+    floor: float,
+) -> Curves:
+    setting = findings.setting
+    nuisance = setting.nuisance
+    configured = setting.forward.solve([nuisance], [np.zeros(len(nuisance))], jacobian=False)
+    band = np.sqrt(findings.noise.std**2 + (floor * setting.problem.scale) ** 2)
+    singles = [e.fitted for e in findings.selection.explanations if len(e.names) == 1]
+    ordered = ([after] if after.names else []) + [f for f in singles if f.names != after.names]
+    shapes = [_signature_shape(findings, f) for f in ordered[:2]]
+    labels = [' + '.join(f.names) for f in ordered[:2]]
+    return Curves(
+        configured.outputs[0],
+        findings.nothing.outputs,
+        after.outputs,
+        held_refit.outputs,
+        held_after.outputs,
+        band,
+        shapes[0] if shapes else None,
+        labels[0] if labels else '',
+        shapes[1] if len(shapes) > 1 else None,
+        labels[1] if len(labels) > 1 else '',
+    )
+
+
+def _signature_shape(findings: Findings, fitted: Fit) -> FloatArray:
+    """(N, 3) change of the model from soil refit to fitted effect: comparable with the residual."""
+    return fitted.outputs - findings.nothing.outputs
+
+
+def _smallest_visible(
+    findings: Findings, known: Mapping[str, Effect]
+) -> dict[str, tuple[str, float, str]]:
+    """Size of each effect that these rows would have shown clearly (signature scaled linearly)."""
+    found = {}
+    for name, s in findings.signatures.items():
+        if name in findings.setting.effects and s.distance > 0.0:
+            parameter = known[name].parameters[0]
+            found[name] = (parameter.name, abs(s.size) * CLEAR / s.distance, parameter.unit)
+    return found
+
+
+def _next(findings: Findings, verdict: Verdict, after: Fit) -> tuple[NextMeasurement, ...]:
+    selection = findings.selection
+    rivals: list[Fit] = []
+    if verdict.word == 'named':
+        for place, names in enumerate(verdict.open_sets):
+            others = set(after.names) - {after.names[place]}
+            for rival in names:
+                try:
+                    rivals.append(selection.find((*others, rival)).fitted)
+                except KeyError:
+                    continue
+    if not rivals:
+        wanted = [e.fitted for e in selection.explanations if e.names != after.names]
+        wanted = [f for f in wanted if f.names or verdict.word == 'named']
+        rivals = [f for f in wanted if not set(after.names) < set(f.names)][:1]
+    noise = np.array(
+        [
+            float(np.nanmedian(findings.noise.std[:, q]))
+            if np.isfinite(findings.noise.std[:, q]).any()
+            else np.inf
+            for q in range(3)
+        ]
+    )
+    return next_measurement.propose(findings.setting, after, rivals, noise)
+
+
+def _soil_shifts(findings: Findings, after: Fit, variance: FloatArray) -> tuple[SoilShift, ...]:
+    weighted = after.jacobian / variance[:, None]
+    covariance = np.linalg.inv(weighted.T @ after.jacobian + np.eye(len(after.u)))
+    refit = findings.nothing.values()
+    found = []
+    for index, c in enumerate(after.coordinates):
+        if c.owner != 'soil':
+            continue
+        u = float(after.u[index])
+        found.append(
+            SoilShift(
+                c.name,
+                float(c.value(0.0)),
+                c.deviation(0.0, 1.0),
+                refit[c.key],
+                float(c.value(u)),
+                c.deviation(u, float(np.sqrt(covariance[index, index]))),
+                u,
+                c.unit,
+            )
+        )
+    return tuple(found)
