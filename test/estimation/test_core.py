@@ -1,0 +1,136 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""The core around the timeline: guard of the outputs, counters, words."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from fake_estimator import (
+    FakeEstimator,
+    configuration,
+    essence,
+    imu,
+    make_core,
+    odometry,
+    play,
+    reference,
+    sinkage,
+    stamp_at,
+)
+
+from wheel_terra_estimator.estimation.core import EstimatorCore
+from wheel_terra_estimator.estimation.estimates import SlipClass
+from wheel_terra_estimator.estimation.measurements import WheelOdometry
+
+
+class Failing(FakeEstimator):
+    """Fails in the way of `how` when the wheel rate is 9."""
+
+    def __init__(self, config, how):
+        super().__init__(config)
+        self.how = how
+        self.poisoned = False
+
+    def step(self, stamp, inputs):
+        super().step(stamp, inputs)
+        if inputs.wheel_odometry is not None and inputs.wheel_odometry.rate[0] == 9.0:
+            if self.how == 'raise':
+                raise np.linalg.LinAlgError('singular matrix')
+            self.poisoned = True
+
+    def begin_run(self, stamp, keep_soil):
+        super().begin_run(stamp, keep_soil)
+        self.poisoned = False
+
+    def estimates(self):
+        estimates = replace(super().estimates(), slip=np.full(2, 0.25), slip_std=np.full(2, 0.1))
+        if self.poisoned and self.how == 'nan':
+            estimates = replace(estimates, slip=np.array([math.nan, 0.5]), forward_velocity=math.nan)
+        if self.poisoned and self.how == 'inf':
+            estimates = replace(
+                estimates,
+                time_to_stuck=np.array([math.inf, 1.0]),
+                soil_names=('soil.cohesion', 'soil.density'),
+                soil=np.array([1.0, math.inf]),
+                soil_std=np.array([1.0, 1.0]),
+            )
+        return estimates
+
+    def snapshot(self):
+        return super().snapshot(), self.poisoned
+
+    def restore(self, snapshot):
+        super().restore(snapshot[0])
+        self.poisoned = snapshot[1]
+
+
+@pytest.mark.parametrize('how', ['raise', 'nan', 'inf'])
+def test_a_failing_filter_is_held_said_and_started_anew(how):
+    config = configuration()
+    core = EstimatorCore(config, Failing(config, how))
+    good = core.add(odometry(0.0)) + core.add(odometry(0.1))
+    (held,) = core.add(odometry(0.2, rate=9.0))
+    assert held.stamp == stamp_at(0.2)
+    assert (held.slip_class == SlipClass.UNKNOWN).all()
+    assert 'started anew' in held.faults['filter']
+    np.testing.assert_array_equal(held.slip_std, 1.0)
+    np.testing.assert_array_equal(held.sinkage_std, config.wheels.radius)
+    assert held.slip[0] == good[-1].slip[0] == 0.25
+    for name in vars(held):
+        value = getattr(held, name)
+        if isinstance(value, (np.ndarray, float)):
+            assert np.isfinite(value).all(), name
+    if how == 'nan':
+        assert held.slip[1] == 0.5  # what was a number is passed on
+        assert held.forward_velocity == good[-1].forward_velocity
+    if how == 'inf':
+        assert held.soil_names == ('soil.cohesion',)
+    # It goes on, from a fresh state.
+    again = core.add(odometry(0.3)) + core.add(odometry(0.4))
+    fresh = play(make_core()[0], [odometry(0.3), odometry(0.4)])
+    assert essence(again) == essence(fresh)
+    assert core.health()['filter_restarts'] == 1
+
+
+def test_a_filter_that_fails_at_once_gives_the_blank_set():
+    config = configuration()
+    core = EstimatorCore(config, Failing(config, 'raise'))
+    (held,) = core.add(odometry(0.0, rate=9.0))
+    assert (held.slip == 0.0).all() and (held.slip_std == 1.0).all()
+    np.testing.assert_allclose(held.normal_load, 10.0 * 9.80665 / 2)
+
+
+def test_nothing_that_can_be_said_in_a_measurement_ends_in_an_exception():
+    core, _ = make_core()
+    values = (math.nan, math.inf, -math.inf, 0.0, 1e308, -1e308, 1.0)
+    sets = []
+    for i, value in enumerate(values):
+        t = 0.1 * i
+        sets += core.add(WheelOdometry(stamp_at(t), np.full(2, value), np.full(2, value)))
+        sets += core.add(imu(t, force=value))
+        sets += core.add(sinkage(t, depth=value))
+        for variance in values:
+            sets += core.add(reference(t, forward=value, variance=variance))
+    assert len(sets) == len(values)
+    assert all(math.isfinite(s.forward_velocity) for s in sets)
+
+
+def test_health_names_topic_and_reason():
+    core, _ = make_core(wheel_odometry='odom')
+    play(core, [odometry(0.0), imu(0.05, force=math.nan), odometry(0.1), sinkage(0.15, 0.5)])
+    health = core.health()
+    assert health['odom_used'] == 2
+    assert health['imu/data_used'] == 0
+    assert health['imu/data_rejected: specific force not finite or absurd'] == 1
+    assert health['sinkage_rejected: sinkage infinite or larger than the wheel radius'] == 1
+    assert health['fake_steps'] >= 2
+
+
+def test_a_rejection_is_a_fault_of_the_sets_for_some_time():
+    core, _ = make_core()
+    core.add(imu(0.0, force=math.inf))
+    said = [s.faults.get('imu/data') for i in range(100) for s in core.add(odometry(0.1 * i))]
+    assert said[0] == 'specific force not finite or absurd (1 so far)'
+    assert said[49] is not None and said[51] is None

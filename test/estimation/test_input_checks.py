@@ -1,0 +1,146 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""What cannot be true is left out and counted, the rest of the message is used."""
+
+import math
+
+import numpy as np
+import pytest
+from fake_estimator import configuration, imu, odometry, reference, sinkage, stamp_at
+
+from wheel_terra_estimator.estimation.input_checks import CHANNELS, InputChecks
+from wheel_terra_estimator.estimation.measurements import (
+    InertialReading,
+    LeavingAngleReading,
+    SinkageReading,
+    WheelOdometry,
+)
+
+NAN, INF = math.nan, math.inf
+
+
+@pytest.fixture
+def checks():
+    return InputChecks(configuration())
+
+
+def check(checks, measurement):
+    return checks.check(CHANNELS[type(measurement)], measurement)
+
+
+def reasons(checks):
+    return [reason for counter in checks.rejected for reason in counter]
+
+
+@pytest.mark.parametrize(
+    'measurement',
+    [odometry(0.0), imu(0.0), sinkage(0.0), reference(0.0), odometry(0.0, torque=2.0)],
+    ids=lambda m: type(m).__name__,
+)
+def test_a_good_measurement_passes_as_it_is(checks, measurement):
+    assert check(checks, measurement) is measurement
+    assert reasons(checks) == []
+
+
+@pytest.mark.parametrize('stamp', [0, -5, 2**63])
+@pytest.mark.parametrize('kind', [odometry, imu, sinkage, reference])
+def test_impossible_stamps(checks, stamp, kind):
+    measurement = kind(0.0)
+    object.__setattr__(measurement, 'stamp', stamp)
+    assert check(checks, measurement) is None
+    assert len(reasons(checks)) == 1 and 'stamp' in reasons(checks)[0]
+    assert sum(checks.refused) == 1
+
+
+@pytest.mark.parametrize('bad', [INF, -INF, 1e9])
+def test_one_bad_wheel_leaves_the_other(checks, bad):
+    m = check(checks, WheelOdometry(stamp_at(0.0), np.array([bad, 2.0]), np.array([1.0, bad])))
+    np.testing.assert_array_equal(m.rate, [NAN, 2.0])
+    np.testing.assert_array_equal(m.torque, [1.0, NAN])
+    assert reasons(checks) == ['wheel rate infinite or absurd', 'torque infinite or absurd']
+    assert sum(checks.refused) == 0
+
+
+def test_nan_marks_an_unknown_and_is_no_fault(checks):
+    m = WheelOdometry(stamp_at(0.0), np.array([NAN, 2.0]), np.array([NAN, NAN]))
+    assert check(checks, m) is m
+    assert check(checks, SinkageReading(stamp_at(0.0), np.array([NAN, 0.01]))) is not None
+    assert reasons(checks) == []
+
+
+def test_wrong_number_of_wheels(checks):
+    assert check(checks, WheelOdometry(stamp_at(0.0), np.zeros(3), np.zeros(3))) is None
+    assert check(checks, SinkageReading(stamp_at(0.0), np.zeros(1))) is None
+    assert reasons(checks) == ['wrong number of wheels'] * 2
+
+
+@pytest.mark.parametrize(
+    ('depth', 'passes'),
+    [(0.1, True), (0.1001, False), (INF, False), (-0.01, True), (-0.06, False), (-INF, False)],
+)
+def test_sinkage_larger_than_the_wheel(checks, depth, passes):
+    m = check(checks, SinkageReading(stamp_at(0.0), np.array([depth, 0.02])))
+    assert m.sinkage[1] == 0.02
+    assert np.isnan(m.sinkage[0]) != passes
+    assert bool(reasons(checks)) != passes
+
+
+def test_leaving_angle(checks):
+    m = check(checks, LeavingAngleReading(stamp_at(0.0), np.array([-0.4, 2.0])))
+    np.testing.assert_array_equal(m.leaving_angle, [-0.4, NAN])
+    assert len(reasons(checks)) == 1
+
+
+@pytest.mark.parametrize('bad', [NAN, INF, -INF, 1e4])
+@pytest.mark.parametrize('axis', [0, 1, 2])
+def test_imu_that_is_not_a_number(checks, bad, axis):
+    force, rate = np.array([0.0, 0.0, 9.8]), np.zeros(3)
+    force[axis] = bad
+    assert check(checks, InertialReading(stamp_at(0.0), force, np.zeros(3), None)) is None
+    rate[axis] = bad
+    good = np.array([0.0, 0.0, 9.8])
+    assert check(checks, InertialReading(stamp_at(0.0), good, rate, None)) is None
+    assert len(reasons(checks)) == 2
+
+
+def test_imu_that_does_not_run(checks):
+    assert check(checks, InertialReading(stamp_at(0.0), np.zeros(3), np.zeros(3), None)) is None
+
+
+@pytest.mark.parametrize(
+    ('quaternion', 'kept'),
+    [
+        ([0.0, 0.0, 0.0, 1.0], True),
+        ([0.0, 0.0, 0.0, 1.05], True),
+        ([0.0, 0.0, 0.0, 0.0], False),
+        ([0.0, 0.0, 0.0, 2.0], False),
+        ([NAN, 0.0, 0.0, 1.0], False),
+        ([INF, 0.0, 0.0, 1.0], False),
+    ],
+)
+def test_orientation(checks, quaternion, kept):
+    m = InertialReading(stamp_at(0.0), np.array([0.0, 0.0, 9.8]), np.zeros(3), np.array(quaternion))
+    result = check(checks, m)
+    assert result is not None  # specific force and angular rate are used all the same
+    assert (result.orientation is not None) == kept
+    if kept:
+        np.testing.assert_allclose(np.linalg.norm(result.orientation), 1.0, rtol=1e-12)
+    assert bool(reasons(checks)) != kept
+
+
+@pytest.mark.parametrize(
+    ('variance', 'used'), [(-1.0, 0.0), (NAN, 0.0), (0.0, 0.0), (1e-4, 1e-4)]
+)
+def test_variance_that_is_none(checks, variance, used):
+    assert check(checks, reference(0.0, variance=variance)).variance == used
+
+
+@pytest.mark.parametrize('variance', [INF, 1e308, 1e6])
+def test_variance_that_says_nothing_is_known(checks, variance):
+    assert check(checks, reference(0.0, variance=variance)) is None
+
+
+@pytest.mark.parametrize('forward', [NAN, INF, -INF, 1e3])
+def test_velocity_that_is_none(checks, forward):
+    assert check(checks, reference(0.0, forward=forward)) is None
+    assert reasons(checks) == ['velocity not finite or absurd']
