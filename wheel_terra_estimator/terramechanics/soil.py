@@ -51,8 +51,8 @@ class Soil:
     cohesion: Any
     friction_angle: Any
     shear_modulus: Any
-    peak_stress_ratio: Any = 0.5
-    leaving_angle_ratio: Any = -0.2
+    peak_stress_ratio: Any = 0.4
+    leaving_angle_ratio: Any = 0.0
     density: Any = 1600.0
     pressure_law: str = 'bekker'
 
