@@ -28,7 +28,7 @@ from typing import NamedTuple
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import TwistWithCovarianceStamped
-from rclpy.duration import Duration
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.serialization import deserialize_message
@@ -51,6 +51,7 @@ from wheel_terra_estimator.reporting.replay_report import refuse_existing, write
 from wheel_terra_estimator.ros.estimator_node import MESSAGE_TYPES
 
 QUEUE = 5000
+AHEAD = 20  # wheel odometry messages that the player may be ahead of the node
 DISCOVERY_TIMEOUT = 60.0  # [s]
 QUIET = 3.0  # [s] without an output after the last input: the node is done
 
@@ -64,8 +65,9 @@ OUTPUT_MESSAGES = {
 
 
 class Heard(NamedTuple):
-    """An output of the node: topic and CDR bytes, in the order of arrival."""
+    """An output of the node: when it was published [ns], topic, CDR bytes."""
 
+    published: int
     topic: str
     data: bytes
 
@@ -110,7 +112,8 @@ def drive(
                 player.wait_for_end()
             finally:
                 player.destroy_node()
-        return player.heard
+        # The executor goes by topics; the order of publication is that of the node.
+        return sorted(player.heard, key=lambda heard: heard.published)
 
 
 def _node_arguments(parameters: Path, topics: Mapping[str, str], arrival: Path | None) -> list[str]:
@@ -134,7 +137,7 @@ def _node_arguments(parameters: Path, topics: Mapping[str, str], arrival: Path |
 
 @contextmanager
 def _context() -> Iterator[None]:
-    rclpy.init()
+    rclpy.init(args=[])  # the arguments are our own, not those of ROS
     try:
         yield
     finally:
@@ -165,7 +168,9 @@ class _Player(Node):
     def __init__(self, topics: Mapping[str, str]) -> None:
         super().__init__('wheel_terra_drive_player')
         self.heard: list[Heard] = []
-        self._last_stamp = 0
+        self._sent = self._sets = 0
+        self._executor = SingleThreadedExecutor()
+        self._executor.add_node(self)
         self._inputs = {
             name: self.create_publisher(MESSAGE_TYPES[name], name, QoSProfile(depth=QUEUE))
             for name in topics
@@ -174,7 +179,7 @@ class _Player(Node):
             profile = QoSProfile(depth=QUEUE)
             if topic == STUCK:
                 profile.durability = profile.durability.TRANSIENT_LOCAL
-            self.create_subscription(kind, topic, partial(self._keep, topic), profile, raw=True)
+            self.create_subscription(kind, topic, self._keeper(topic), profile, raw=True)
 
     def wait_for_partners(self, process: subprocess.Popen[bytes]) -> None:
         """Wait until every topic has its partner, by counting endpoints."""
@@ -192,17 +197,18 @@ class _Player(Node):
     def play(self, messages: Iterator[RawMessage], names: Mapping[str, str], rate: float) -> None:
         """Publish messages at their pace; in between take what the node publishes."""
         begin = None
-        for count, message in enumerate(messages):
+        for message in messages:
             if begin is None:
                 begin = message.log_time, time.monotonic()
             if rate > 0.0:
                 due = begin[1] + (message.log_time - begin[0]) * 1e-9 / rate
                 self._spin_until(partial(_past, due), max(due - time.monotonic(), 0.0))
-            publisher = self._inputs[names[message.topic]]
-            publisher.publish(message.data)
-            if rate <= 0.0 and count % 20 == 19:
-                publisher.wait_for_all_acked(Duration(seconds=5))
-                self._spin_until(lambda: False, 0.02)
+            name = names[message.topic]
+            self._inputs[name].publish(message.data)
+            if name in ('joint_states', 'odom'):
+                self._sent += 1
+                # As many sets as wheel odometry is the rule; where it is not, go on after a while.
+                self._spin_until(lambda: self._sent - self._sets < AHEAD, 0.5)
 
     def wait_for_end(self) -> None:
         """Wait until the node says nothing new."""
@@ -214,8 +220,12 @@ class _Player(Node):
             if all(heard.topic == DIAGNOSTICS for heard in self.heard[count:]):
                 return
 
-    def _keep(self, topic: str, data: bytes) -> None:
-        self.heard.append(Heard(topic, bytes(data)))
+    def _keeper(self, topic: str) -> Callable[[bytes, Mapping[str, int]], None]:
+        def keep(data: bytes, info: Mapping[str, int]) -> None:
+            self.heard.append(Heard(info['source_timestamp'], topic, bytes(data)))
+            self._sets += topic == f'{NAMESPACE}/slip'
+
+        return keep
 
     def _spin_until(self, condition: Callable[[], bool], seconds: float) -> bool:
         end = time.monotonic() + seconds
@@ -223,7 +233,7 @@ class _Player(Node):
             left = end - time.monotonic()
             if left <= 0.0:
                 return False
-            rclpy.spin_once(self, timeout_sec=min(left, 0.05))
+            self._executor.spin_once(timeout_sec=min(left, 0.05))
         return True
 
 
@@ -237,7 +247,7 @@ def record(heard: Sequence[Heard], path: Path, start: int, overwrite: bool = Fal
     Parameters
     ----------
     heard : sequence of Heard
-        Outputs in the order of arrival.
+        Outputs in the order of publication.
     path : Path
         Folder to be made.
     start : int
@@ -247,7 +257,7 @@ def record(heard: Sequence[Heard], path: Path, start: int, overwrite: bool = Fal
     """
     log_time = start
     with BagFile(path, TOPICS, latched=(STUCK,), overwrite=overwrite) as file:
-        for topic, data in heard:
+        for _, topic, data in heard:
             if topic == f'{NAMESPACE}/slip':
                 log_time = max(log_time, stamp_of(deserialize_message(data, JointState)))
             file.write_raw(topic, data, log_time)
