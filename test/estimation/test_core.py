@@ -47,7 +47,9 @@ class Failing(FakeEstimator):
     def estimates(self):
         estimates = replace(super().estimates(), slip=np.full(2, 0.25), slip_std=np.full(2, 0.1))
         if self.poisoned and self.how == 'nan':
-            estimates = replace(estimates, slip=np.array([math.nan, 0.5]), forward_velocity=math.nan)
+            estimates = replace(
+                estimates, slip=np.array([math.nan, 0.5]), forward_velocity=math.nan
+            )
         if self.poisoned and self.how == 'inf':
             estimates = replace(
                 estimates,

@@ -128,9 +128,7 @@ def test_orientation(checks, quaternion, kept):
     assert bool(reasons(checks)) != kept
 
 
-@pytest.mark.parametrize(
-    ('variance', 'used'), [(-1.0, 0.0), (NAN, 0.0), (0.0, 0.0), (1e-4, 1e-4)]
-)
+@pytest.mark.parametrize(('variance', 'used'), [(-1.0, 0.0), (NAN, 0.0), (0.0, 0.0), (1e-4, 1e-4)])
 def test_variance_that_is_none(checks, variance, used):
     assert check(checks, reference(0.0, variance=variance)).variance == used
 

@@ -68,9 +68,10 @@ def test_an_input_of_the_stamp_of_the_last_set_makes_no_second_set_but_counts_fr
     assert core.add(imu(0.0, 5.0)) == []
     (estimates,) = core.add(odometry(0.1))
     merged, _ = make_core()
-    assert essence([estimates]) == essence(play(merged, [imu(0.0, 5.0), odometry(0.0), odometry(0.1)]))[
-        1:
-    ]
+    assert (
+        essence([estimates])
+        == essence(play(merged, [imu(0.0, 5.0), odometry(0.0), odometry(0.1)]))[1:]
+    )
 
 
 def test_odometry_a_little_later_than_the_imu_still_gets_its_set():
@@ -114,11 +115,12 @@ def test_with_a_large_max_lag_the_order_of_arrival_is_nothing(data):
     stream = drive(1.0)
     core, _ = make_core(max_lag=1.0, history=1.0)
     expected = essence(play(core, stream))
-    delays = data.draw(
-        st.lists(st.floats(0.0, 0.99), min_size=len(stream), max_size=len(stream))
-    )
+    delays = data.draw(st.lists(st.floats(0.0, 0.99), min_size=len(stream), max_size=len(stream)))
     shuffled = [
-        m for _, m in sorted(zip(delays, stream, strict=True), key=lambda p: p[1].stamp + p[0] * SECOND)
+        m
+        for _, m in sorted(
+            zip(delays, stream, strict=True), key=lambda p: p[1].stamp + p[0] * SECOND
+        )
     ]
     core, _ = make_core(max_lag=1.0, history=1.0)
     assert essence(play(core, shuffled)) == expected
@@ -131,9 +133,7 @@ def test_late_inputs_within_the_history_end_in_the_same_state(data):
     last = odometry(4.2)
     core, _ = make_core()
     expected = essence(play(core, [*stream, imu(4.19), last]))[-1]
-    delays = [
-        data.draw(st.floats(0.0, 0.99)) if data.draw(st.booleans()) else 0.0 for _ in stream
-    ]
+    delays = [data.draw(st.floats(0.0, 0.99)) if data.draw(st.booleans()) else 0.0 for _ in stream]
     arrivals = sorted(zip(delays, stream, strict=True), key=lambda p: p[1].stamp + p[0] * SECOND)
     core, _ = make_core()
     sets = play(core, [m for _, m in arrivals] + [imu(4.19), last])
@@ -184,7 +184,9 @@ def test_the_first_input_of_a_run_may_come_late():
     core, _ = make_core()
     late = play(core, [odometry(0.1), imu(0.02, 4.0), odometry(0.2)])
     core, _ = make_core()
-    assert essence(late)[-1] == essence(play(core, [imu(0.02, 4.0), odometry(0.1), odometry(0.2)]))[-1]
+    assert (
+        essence(late)[-1] == essence(play(core, [imu(0.02, 4.0), odometry(0.1), odometry(0.2)]))[-1]
+    )
 
 
 # -- Economy --------------------------------------------------------------------------------------
@@ -341,7 +343,12 @@ def test_a_pause_of_all_topics_is_no_new_run():
 
 def test_a_slow_lone_odometry_gets_its_sets_at_once():
     core, _ = make_core()
-    assert [times(core.add(odometry(30.0 * i))) for i in range(4)] == [[0.0], [30.0], [60.0], [90.0]]
+    assert [times(core.add(odometry(30.0 * i))) for i in range(4)] == [
+        [0.0],
+        [30.0],
+        [60.0],
+        [90.0],
+    ]
 
 
 def test_wheel_odometry_keeps_the_time_where_clocks_differ_for_good():

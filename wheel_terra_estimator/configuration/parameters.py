@@ -4,10 +4,11 @@
 
 To add a parameter, add one line to ``DECLARED``, such as
 ``number('filter.gate', 0.999, '-', 'what it does', above=0.0, at_most=1.0)``: the reader then
-accepts and checks the key, the node declares it, ``configuration.filter.gate`` has its value, and ``python -m wheel_terra_estimator.configuration.documentation`` writes it to
-``docs/parameters.md`` (a test says when that was forgotten). ``size='wheels'`` makes a per-wheel
-list, a number a list of that length. A key that ends in ``_deg`` is in degrees in files and in
-radians in the code, where its name has no suffix.
+accepts and checks the key, the node declares it, ``configuration.filter.gate`` has its value, and
+``python -m wheel_terra_estimator.configuration.documentation`` writes it to ``docs/parameters.md``
+(a test says when that was forgotten). ``size='wheels'`` makes a per-wheel list, a number a list of
+that length. A key that ends in ``_deg`` is in degrees in files and in radians in the code, where
+its name has no suffix.
 
 The keys ``effects.<name>.enabled``, ``effects.<name>.<parameter>`` and
 ``effects.<name>.<parameter>_std`` come from the catalogue of effects.

@@ -129,14 +129,15 @@ def _checked(sourced: Sequence[tuple[str, str, Any]], complete: bool) -> Configu
         if before != key:
             raise UserError(f'{source}: {before} and {key} are the same parameter; give one')
         stated[parameter.key] = (value, source)
+    sources = ', '.join(dict.fromkeys(source for _, source, _ in sourced)) or 'no configuration'
     if complete:
-        _require(table, stated, [source for _, source, _ in sourced])
+        _require(table, stated, sources)
     values: dict[str, Value] = {}
     names = table['wheels.names']
     wheels = len(checked_value(names, stated, 0))
     for key, parameter in table.items():
         values[key] = checked_value(parameter, stated, wheels)
-    _cross_check(values, stated)
+    _cross_check(values, stated, sources)
     return Configuration.from_values(values, stated)
 
 
@@ -163,12 +164,11 @@ def _unknown(key: str, source: str, spellings: Mapping[str, Parameter]) -> str:
     )
 
 
-def _require(table: Mapping[str, Parameter], stated: _Sourced, sources: Sequence[str]) -> None:
+def _require(table: Mapping[str, Parameter], stated: _Sourced, sources: str) -> None:
     missing = [key for key, item in table.items() if item.required and key not in stated]
     if missing:
-        given = ', '.join(dict.fromkeys(sources)) or 'no configuration'
         raise UserError(
-            f'{given}: {", ".join(missing)} not stated; give a rover file '
+            f'{sources}: {", ".join(missing)} not stated; give a rover file '
             '(--config or --params-file), such as the shipped generic_six_wheel'
         )
 
@@ -231,11 +231,11 @@ def _scalar(parameter: Parameter, value: Any, refuse: Callable[[str], UserError]
     return value
 
 
-def _cross_check(values: Mapping[str, Any], stated: _Sourced) -> None:
+def _cross_check(values: Mapping[str, Any], stated: _Sourced, sources: str) -> None:
     """Check what concerns more than one key, or more than a range."""
 
     def refuse(key: str, problem: str) -> UserError:
-        source = stated[key][1] if key in stated else 'configuration'
+        source = stated[key][1] if key in stated else sources
         return UserError(f'{source}: {key}: {problem}')
 
     names = values['wheels.names']

@@ -1,0 +1,174 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Parameter files are read as ROS reads them."""
+
+import math
+
+import pytest
+import yaml
+from hypothesis import given
+from hypothesis import strategies as st
+
+from wheel_terra_estimator.configuration import ros_yaml
+from wheel_terra_estimator.errors import UserError
+
+# What rcl_yaml_param_parser of Jazzy gives (taken from rclpy 7.1.6; the test below asks it again).
+AS_ROS_READS = {
+    '1.8e6': 1.8e6,
+    '1e5': 1e5,
+    '010': 8,
+    '08': 8.0,
+    '0x10': 16,
+    '0x1p3': 8.0,
+    '1_000': '1_000',
+    'yes': True,
+    'Off': False,
+    'n': False,
+    '.5': 0.5,
+    '1.': 1.0,
+    '+1': 1,
+    '-3': -3,
+    '+.5e-3': 0.0005,
+    'inf': math.inf,
+    '-.inf': -math.inf,
+    '"1"': '1',
+    "'1.0'": '1.0',
+    '"yes"': 'yes',
+    '1:30': '1:30',
+    '2020-01-01': '2020-01-01',
+    '9223372036854775808': 9.223372036854775808e18,
+    '=': '=',
+    '[1.0, 2e0]': [1.0, 2.0],
+    '[1, 2]': [1, 2],
+    '[a, b]': ['a', 'b'],
+}
+
+
+@pytest.mark.parametrize(('text', 'value'), AS_ROS_READS.items())
+def test_values(text, value):
+    read = ros_yaml.parse_value(text, 'test')
+    assert read == value
+    assert type(read) is type(value)
+
+
+def test_not_a_number():
+    assert math.isnan(ros_yaml.parse_value('.nan', 'test'))
+
+
+@pytest.mark.ros
+def test_values_against_ros_itself(tmp_path):
+    rclpy = pytest.importorskip('rclpy')
+    lines = [f'    k{i}: {text}' for i, text in enumerate(AS_ROS_READS)]
+    file = tmp_path / 'p.yaml'
+    file.write_text('\n'.join(['/**:', '  ros__parameters:', *lines]) + '\n')
+    context = rclpy.Context()
+    rclpy.init(args=['--ros-args', '--params-file', str(file)], context=context)
+    try:
+        node = rclpy.create_node(
+            'wheel_terra_estimator',
+            context=context,
+            automatically_declare_parameters_from_overrides=True,
+        )
+        for i, (text, value) in enumerate(AS_ROS_READS.items()):
+            read = node.get_parameter(f'k{i}').value
+            read = list(read) if isinstance(value, list) else read
+            assert read == value and type(read) is type(value), text
+        node.destroy_node()
+    finally:
+        rclpy.shutdown(context=context)
+
+
+def test_the_global_loader_is_left_alone():
+    assert yaml.safe_load('a: 1.8e6') == {'a': '1.8e6'}
+    assert yaml.safe_load('a: yes') == {'a': True}
+
+
+def write(tmp_path, text):
+    file = tmp_path / 'some.yaml'
+    file.write_text(text)
+    return file
+
+
+def test_nested_and_dotted_keys_and_sections(tmp_path):
+    file = write(
+        tmp_path,
+        """
+other_node:
+  ros__parameters: {x: 1}
+/rover1/wheel_terra_estimator:
+  ros__parameters:
+    c: 3
+ns:
+  wheel_terra_estimator:
+    ros__parameters:
+      d: 4
+wheel_terra_estimator:
+  ros__parameters:
+    a.b: 2
+/**:
+  ros__parameters:
+    a: {b: 1, e: {f: 5}}
+    a.g: 6
+""",
+    )
+    assert ros_yaml.read(file) == {'a.b': 2, 'a.e.f': 5, 'a.g': 6, 'c': 3, 'd': 4}
+
+
+@pytest.mark.parametrize(
+    ('text', 'words'),
+    [
+        ('', 'not a ROS parameter file'),
+        ('- 1', 'not a ROS parameter file'),
+        ('a: [1, 2', 'not valid YAML: line'),
+        ('wheels: {radius: 1}', "no 'ros__parameters:'"),
+        ('/**:\n  ros__parameters: 5', 'holds no keys'),
+        ('other:\n  ros__parameters: {a: 1}', "sections there: 'other'"),
+        ('/**:\n  ros__parameters:\n    a:', 'a has no value'),
+        ('/**:\n  ros__parameters: {a: ~}', 'a has no value'),
+        ('/**:\n  ros__parameters: {a: null}', 'a has no value'),
+        ('/**:\n  ros__parameters: {a: []}', 'a is an empty list'),
+        ('/**:\n  ros__parameters: {a: [[1], [2]]}', 'a is a nested list'),
+        ('/**:\n  ros__parameters: {a: [{b: 1}]}', 'a is a nested list'),
+        ('/**:\n  ros__parameters: {a: [1, ~]}', 'empty entry'),
+        ('/**:\n  ros__parameters: {a: [1, x]}', 'mixes types'),
+        ('/**:\n  ros__parameters: {a: [0, 0.5]}', 'write [0.0, 0.5]'),
+        ('/**:\n  ros__parameters: {a: 1, a: 2}', "'a' is given twice"),
+        ('/**:\n  ros__parameters: {a.b: 1, a: {b: 2}}', 'a.b is given twice'),
+        ('/**:\n  ros__parameters: {a: !!python/name:os.system x}', 'not valid YAML'),
+    ],
+)
+def test_complaints_are_one_line_that_names_the_file(tmp_path, text, words):
+    file = write(tmp_path, text)
+    with pytest.raises(UserError) as caught:
+        ros_yaml.read(file)
+    message = str(caught.value)
+    assert message.startswith(str(file)) and words in message and '\n' not in message
+
+
+def test_files_that_cannot_be_read(tmp_path):
+    with pytest.raises(UserError, match='cannot be read: No such file'):
+        ros_yaml.read(tmp_path / 'none.yaml')
+    binary = tmp_path / 'binary.yaml'
+    binary.write_bytes(b'\xff\xfe\x00')
+    with pytest.raises(UserError, match='not a UTF-8 text'):
+        ros_yaml.read(binary)
+
+
+scalars = st.one_of(
+    st.booleans(),
+    st.integers(-(2**63), 2**63 - 1),
+    st.floats(allow_nan=False),
+    st.text(st.characters(codec='utf-8', exclude_categories=['Cc', 'Cs']), max_size=20),
+)
+lists = st.one_of(
+    st.lists(st.booleans(), min_size=1, max_size=4),
+    st.lists(st.floats(allow_nan=False), min_size=1, max_size=4),
+    st.lists(st.text('abc: #"\\\'-~[]{}01.e', max_size=6), min_size=1, max_size=4),
+)
+
+
+@given(st.one_of(scalars, lists))
+def test_what_is_written_is_read_back(value):
+    read = ros_yaml.parse_value(ros_yaml.format_value(value), 'test')
+    assert read == value
+    assert type(read) is type(value)

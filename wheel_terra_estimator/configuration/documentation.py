@@ -1,0 +1,83 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Writes ``docs/parameters.md`` from the declared table: ``python -m`` this module."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from wheel_terra_estimator.configuration.parameters import Parameter, declared
+from wheel_terra_estimator.configuration.ros_yaml import format_value
+
+_INTRODUCTION = """# Parameters
+
+Written by `python -m wheel_terra_estimator.configuration.documentation` from the declared table;
+do not edit.
+
+Every file is a ROS parameter file, the same for the node (`--params-file F`) and the commands
+(`--config F`, a path or the bare name of a shipped file, several times; later files win key by
+key; `-p NAME:=VALUE` wins over files):
+
+    /**:
+      ros__parameters:
+        wheels:
+          names: [left_wheel, right_wheel]
+          radius: [0.12, 0.12]
+        rover.mass: 20.0
+
+Keys may be nested or dotted. Only scalars and flat lists of one type; no null, no empty list. An
+integer will do where a number is wanted, though not inside a list of numbers (`[0.0, 0.5]`, not
+`[0, 0.5]`: ROS refuses mixed lists). Unknown keys are errors. A per-wheel list has one entry for
+each of `wheels.names`, in that order.
+"""
+
+_SECTIONS = {
+    '': 'General',
+    'wheels': 'Wheels',
+    'rover': 'Rover',
+    'soil': 'Soil',
+    'sensors': 'Sensors',
+    'filter': 'Filter',
+    'effects': 'Effects',
+}
+_EFFECTS = """
+For each effect of the catalogue (`wheel-terra effects`); all are off by default. The default of a
+parameter is its value where the effect is switched on and no other is given. Each parameter has a
+companion `..._std`, the standard deviation that a fit found (0 = not stated).
+"""
+
+
+def page() -> str:
+    """Return the page as Markdown."""
+    lines = [_INTRODUCTION]
+    table = list(declared().values())
+    for section, title in _SECTIONS.items():
+        lines += [f'## {title}', _EFFECTS if section == 'effects' else '']
+        lines += ['| key | default | unit | allowed | meaning |', '|---|---|---|---|---|']
+        for parameter in table:
+            head = parameter.key.split('.')[0] if '.' in parameter.key else ''
+            if head == section and not (section == 'effects' and parameter.key.endswith('_std')):
+                lines.append(_row(parameter))
+        lines.append('')
+    return '\n'.join(lines).rstrip() + '\n'
+
+
+def _row(parameter: Parameter) -> str:
+    default = '*required*' if parameter.required else f'`{format_value(parameter.default)}`'
+    if parameter.size == 'wheels' and not parameter.required:
+        default += ' each'
+    meaning = parameter.meaning.replace('|', '\\|')
+    if parameter.aliases:
+        meaning += ' (also ' + ', '.join(f'`{alias}`' for alias in parameter.aliases) + ')'
+    unit = parameter.unit if parameter.unit not in ('', '-') else ''
+    return f'| `{parameter.key}` | {default} | {unit} | {parameter.allowed} | {meaning} |'
+
+
+def path() -> Path:
+    """Return where the page stands in a source tree."""
+    return Path(__file__).resolve().parents[2] / 'docs' / 'parameters.md'
+
+
+if __name__ == '__main__':
+    path().write_text(page(), encoding='utf-8')
+    print(path())
