@@ -5,16 +5,178 @@
 from __future__ import annotations
 
 import argparse
+import difflib
+import json
+import sys
+import textwrap
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
 
 from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.terramechanics.effects import OUTPUTS, Effect, catalogue, load_file
 
 SUMMARY = 'list the physical and instrument effects that can be named'
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
+    parser.add_argument('names', nargs='*', metavar='NAME', help='only these, in full')
+    parser.add_argument(
+        '--format',
+        choices=('text', 'json', 'markdown'),
+        default='text',
+        help='text (default), json for programs, markdown for the documentation',
+    )
+    parser.add_argument(
+        '--load',
+        type=Path,
+        action='append',
+        default=[],
+        metavar='F.py',
+        help='a file with effects of your own, listed with the others',
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the command."""
-    raise UserError('this command is not in this version yet')
+    for path in arguments.load:
+        try:
+            load_file(path)
+        except ValueError as error:
+            raise UserError(str(error)) from None
+    known = catalogue()
+    for name in arguments.names:
+        if name not in known:
+            close = difflib.get_close_matches(name, known, n=1)
+            hint = f"did you mean '{close[0]}'? " if close else ''
+            raise UserError(f'no effect {name}; {hint}there are: {", ".join(known)}')
+    chosen = {name: known[name] for name in arguments.names or known}
+    write = {'text': as_text, 'json': as_json, 'markdown': as_markdown}[arguments.format]
+    sys.stdout.write(write(chosen))
+    return 0
+
+
+def as_text(effects: Mapping[str, Effect]) -> str:
+    """Return the catalogue for a terminal."""
+    blocks = []
+    for effect in effects.values():
+        lines = [effect.name, *_wrapped('', effect.claim), *_wrapped('term: ', effect.symbol)]
+        for p in effect.parameters:
+            note = '' if p.free else '; not fitted'
+            lines += _wrapped(
+                f'{p.name} [{p.unit}]: ',
+                f'{p.meaning}; default {p.default:g}, range {p.lower:g} to {p.upper:g}, '
+                f'prior {_prior(p)}{note}',
+            )
+        kind = 'instrument' if effect.instrument else 'soil'
+        lines += _wrapped('touches: ', f'{_touched(effect)} ({kind})')
+        if effect.needs:
+            lines += _wrapped('needs: ', ', '.join(effect.needs))
+        for other, separates in effect.confounded_with.items():
+            lines += _wrapped('like ', f'{other}; what separates them: {separates}')
+        if effect.incompatible_with:
+            lines += _wrapped('not with: ', ', '.join(sorted(effect.incompatible_with)))
+        if not effect.candidate:
+            lines += _wrapped('', 'tried by the discrepancy workflow only when asked for by name')
+        lines += _wrapped('valid: ', effect.validity)
+        lines += _wrapped('source: ', effect.source)
+        blocks.append('\n'.join(lines) + '\n')
+    return '\n'.join(blocks)
+
+
+def as_json(effects: Mapping[str, Effect]) -> str:
+    """Return the catalogue for programs."""
+    return json.dumps([_record(effect) for effect in effects.values()], indent=2) + '\n'
+
+
+def as_markdown(effects: Mapping[str, Effect]) -> str:
+    """Return the catalogue as a page of the documentation."""
+    lines = [
+        '# Effects',
+        '',
+        '<!-- Written by `python tools/document_effects.py`; do not edit. -->',
+        '',
+        'Every physical or instrument effect that the models know. Each is off unless a model file '
+        'switches it on (`effects.<name>.enabled: true`); the same terms then run in the reference '
+        'quadrature, in the closed form and in the filter. A figure shows what the first parameter '
+        'does to a wheel of 157 mm radius with 10 mm lugs under 80 N in HIT-LSS1 sand.',
+        '',
+        '| effect | stands for | touches |',
+        '|---|---|---|',
+    ]
+    for effect in effects.values():
+        lines.append(f'| [`{effect.name}`](#{effect.name}) | {effect.claim} | {_touched(effect)} |')
+    for effect in effects.values():
+        lines += ['', f'## {effect.name}', '', f'{effect.claim[0].upper()}{effect.claim[1:]}.', '']
+        lines += [f'    {effect.symbol}', '']
+        lines += [
+            '| parameter | unit | meaning | default | range | prior |',
+            '|---|---|---|---|---|---|',
+        ]
+        for p in effect.parameters:
+            note = '' if p.free else ' (not fitted)'
+            lines.append(
+                f'| `{p.name}` | {p.unit} | {p.meaning}{note} | {p.default:g} '
+                f'| {p.lower:g} to {p.upper:g} | {_prior(p)} |'
+            )
+        lines += ['', f'- Touches: {_touched(effect)}.']
+        if effect.needs:
+            lines.append(f'- Needs to vary in a table: {", ".join(effect.needs)}.')
+        for other, separates in effect.confounded_with.items():
+            lines.append(f'- Nearly the same as `{other}`; what separates them: {separates}.')
+        if effect.incompatible_with:
+            lines.append(f'- Not together with: {", ".join(sorted(effect.incompatible_with))}.')
+        if not effect.candidate:
+            lines.append('- Tried by the discrepancy workflow only when asked for by name.')
+        lines += [f'- Valid: {effect.validity}.', f'- Source: {effect.source}.', '']
+        lines.append(f'![{effect.name}](models/effects/{effect.name}.svg)')
+    return '\n'.join(lines) + '\n'
+
+
+def _record(effect: Effect) -> dict[str, Any]:
+    return {
+        'name': effect.name,
+        'claim': effect.claim,
+        'symbol': effect.symbol,
+        'parameters': [
+            {
+                'name': p.name,
+                'unit': p.unit,
+                'meaning': p.meaning,
+                'default': p.default,
+                'lower': p.lower,
+                'upper': p.upper,
+                'neutral': p.neutral,
+                'prior': p.prior,
+                'prior_mean': p.prior_mean,
+                'prior_scale': p.prior_scale,
+                'fitted': p.free,
+            }
+            for p in effect.parameters
+        ],
+        'touches': [name for name in OUTPUTS if name in effect.touches],
+        'instrument': effect.instrument,
+        'needs': list(effect.needs),
+        'confounded_with': dict(effect.confounded_with),
+        'incompatible_with': sorted(effect.incompatible_with),
+        'candidate': effect.candidate,
+        'validity': effect.validity,
+        'source': effect.source,
+    }
+
+
+def _touched(effect: Effect) -> str:
+    return ', '.join(name.replace('_', ' ') for name in OUTPUTS if name in effect.touches)
+
+
+def _prior(p: Any) -> str:
+    if p.prior == 'half_normal':
+        return f'half-normal, scale {p.prior_scale:g}'
+    return f'normal, {p.prior_mean:g} ± {p.prior_scale:g}'
+
+
+def _wrapped(head: str, text: str) -> list[str]:
+    return textwrap.wrap(
+        head + text, 92, initial_indent='    ', subsequent_indent='    ' + ' ' * len(head)
+    )

@@ -5,16 +5,317 @@
 from __future__ import annotations
 
 import argparse
+import csv
+import math
+import re
+import sys
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import product
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
+import numpy as np
+from numpy.typing import NDArray
+
+from wheel_terra_estimator.configuration import reader as configuration_reader
 from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.terramechanics.model import METHODS, OVERLOADED, WheelSoilModel
+from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
+from wheel_terra_estimator.terramechanics.wheel import Wheel
+
+if TYPE_CHECKING:
+    from wheel_terra_estimator.configuration.configuration import Configuration
+
+FloatArray = NDArray[np.float64]
 
 SUMMARY = 'print or draw the curves of the wheel-soil model'
+DEFAULT_SLIP = '0:0.9:19'
+
+# Columns of the result, in the layout of the tables of steady measurements.
+INPUTS = (
+    'slip',
+    'normal_load',
+    'slope',
+    'wheel_radius',
+    'wheel_width',
+    'lug_height',
+    'lug_count',
+    'gravity',
+    'angular_velocity',
+    'pass_number',
+    'leaving_angle',
+)
+OUTPUTS = ('sinkage', 'drawbar_pull', 'torque')
+ANGLES = ('entrance_angle', 'peak_stress_angle', 'leaving_angle')
+PICTURES = ('.png', '.svg', '.pdf')
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
+    # Lets `--slip -0.5:0.9:15` through: argparse takes only plain negative numbers for values.
+    parser._negative_number_matcher = re.compile(r'^-\.?\d')
+    parser.add_argument(
+        '--slip',
+        metavar='A:B:N',
+        help=f'N slip ratios from A to B, or a list A,B,C (default {DEFAULT_SLIP})',
+    )
+    parser.add_argument(
+        '--load',
+        metavar='W[,W]',
+        help='loads on the wheel [N] (default: the weight of the rover over the number of wheels)',
+    )
+    parser.add_argument(
+        '--slope', metavar='A[,A]', help='slopes, positive uphill [rad] (default 0)'
+    )
+    parser.add_argument('--wheel', metavar='NAME', help='which of wheels.names (default the first)')
+    parser.add_argument(
+        '--angular-velocity', type=float, metavar='W', help='wheel rate [rad/s], for speed effects'
+    )
+    parser.add_argument(
+        '--points',
+        type=Path,
+        metavar='F.csv',
+        help='operating points from a table of steady measurements instead of --slip and --load',
+    )
+    parser.add_argument(
+        '--method', choices=METHODS, default='quadrature', help='how the contact is integrated'
+    )
+    parser.add_argument(
+        '--table',
+        choices=('csv', 'text'),
+        default='csv',
+        help='layout on standard output (default csv, as diagnose reads it)',
+    )
+    parser.add_argument('--angles', action='store_true', help='add the contact angles [rad]')
+    parser.add_argument(
+        '-o',
+        dest='output',
+        type=Path,
+        metavar='FILE',
+        help='write a picture (.png, .svg, .pdf) or a table (.csv) instead',
+    )
+    parser.add_argument('--overwrite', action='store_true', help='replace an existing FILE')
+    configuration_reader.add_arguments(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the command."""
-    raise UserError('this command is not in this version yet')
+    output: Path | None = arguments.output
+    if output is not None:
+        _check_output(output, arguments.overwrite)
+    configuration = configuration_reader.from_arguments(arguments)
+    columns = _points(arguments, configuration)
+    try:
+        model = WheelSoilModel(
+            configuration.soil, configuration.effects, arguments.method, strict=False
+        )
+        points = OperatingPoints(
+            slip=columns['slip'],
+            normal_load=columns['normal_load'],
+            wheel=Wheel(
+                columns['wheel_radius'],
+                columns['wheel_width'],
+                columns['lug_height'],
+                columns['lug_count'],
+            ),
+            slope=columns['slope'],
+            slip_radius=configuration.slip_radius,
+            gravity=columns['gravity'],
+            angular_velocity=columns['angular_velocity'],
+            pass_number=columns['pass_number'],
+            leaving_angle=columns['leaving_angle'],
+        )
+        state = model.steady_state(points)
+    except ValueError as error:
+        raise UserError(str(error)) from None
+    overloaded = (state.flags & OVERLOADED) != 0
+    if overloaded.all():
+        raise UserError(
+            f'this soil cannot carry {columns["normal_load"][0]:g} N on this wheel at any sinkage '
+            'up to the radius; choose a smaller --load, a larger wheel or another soil'
+        )
+    if overloaded.any():
+        print(
+            f'wheel-terra predict: {int(overloaded.sum())} of {overloaded.size} points left empty: '
+            'the soil cannot carry the load there',
+            file=sys.stderr,
+        )
+    result: dict[str, FloatArray] = {
+        name: values
+        for name, values in columns.items()
+        if name in INPUTS[:3] or (arguments.points and np.isfinite(values).any())
+    }
+    if arguments.angles:
+        result.pop('leaving_angle', None)
+    for name in (*OUTPUTS, *(ANGLES if arguments.angles else ())):
+        result[name] = np.where(overloaded, np.nan, getattr(state, name))
+    if output is None:
+        (_write_csv if arguments.table == 'csv' else _write_text)(result, sys.stdout)
+    elif output.suffix.lower() == '.csv':
+        with output.open('w', encoding='utf-8', newline='') as stream:
+            _write_csv(result, stream)
+    else:
+        _draw(result, output, _title(arguments, configuration))
+    return 0
+
+
+def _check_output(output: Path, overwrite: bool) -> None:
+    if output.suffix.lower() not in (*PICTURES, '.csv'):
+        raise UserError(
+            f'{output}: what is wanted cannot be told from the name; end it in '
+            f'{", ".join(PICTURES)} or .csv'
+        )
+    if output.is_dir():
+        raise UserError(f'{output}: is a folder; name a file')
+    if output.exists() and not overwrite:
+        raise UserError(f'{output}: exists already; choose another name or add --overwrite')
+    if not output.parent.is_dir():
+        raise UserError(f'{output}: there is no folder {output.parent}; make it first')
+
+
+def _points(arguments: argparse.Namespace, configuration: Configuration) -> dict[str, FloatArray]:
+    """Return all input columns, (N,) each, from the arguments, the table and the configuration."""
+    wheels = configuration.wheels
+    wheel = 0
+    if arguments.wheel is not None:
+        if arguments.wheel not in wheels.names:
+            raise UserError(f'--wheel {arguments.wheel}: there are {", ".join(wheels.names)}')
+        wheel = wheels.names.index(arguments.wheel)
+    rover = configuration.rover
+    defaults = {
+        'slope': 0.0,
+        'wheel_radius': float(wheels.radius[wheel]),
+        'wheel_width': float(wheels.width[wheel]),
+        'lug_height': float(wheels.lug_height[wheel]),
+        'lug_count': float(wheels.lug_count[wheel]),
+        'gravity': float(rover.gravity),
+        'angular_velocity': math.nan,
+        'pass_number': float(wheels.passes[wheel]),
+        'leaving_angle': math.nan,
+    }
+    if arguments.angular_velocity is not None:
+        defaults['angular_velocity'] = arguments.angular_velocity
+    if arguments.points is not None:
+        if arguments.slip or arguments.load or arguments.slope:
+            raise UserError('--points brings slip, load and slope; leave --slip, --load, --slope')
+        columns = _read_points(arguments.points)
+        count = columns['slip'].size
+    else:
+        load = rover.mass * rover.gravity / wheels.count
+        slips = _numbers('--slip', arguments.slip or DEFAULT_SLIP)
+        loads = _numbers('--load', arguments.load) if arguments.load else np.array([load])
+        slopes = _numbers('--slope', arguments.slope) if arguments.slope else np.array([0.0])
+        rows = np.array(list(product(loads, slopes, slips)))
+        columns = {'normal_load': rows[:, 0], 'slope': rows[:, 1], 'slip': rows[:, 2]}
+        count = len(rows)
+    full = {name: np.full(count, value) for name, value in defaults.items()}
+    for name, values in columns.items():
+        default = full.get(name)
+        full[name] = values if default is None else np.where(np.isnan(values), default, values)
+    return {name: full[name] for name in INPUTS}
+
+
+def _numbers(option: str, text: str) -> FloatArray:
+    """Read A:B:N or A,B,C."""
+    try:
+        if ':' in text:
+            first, last, count = text.split(':')
+            if int(count) < 1:
+                raise ValueError
+            return np.linspace(float(first), float(last), int(count))
+        return np.array([float(part) for part in text.split(',')])
+    except ValueError:
+        raise UserError(
+            f'{option} {text}: must be A:B:N (N values from A to B) or a list A,B,C of numbers'
+        ) from None
+
+
+def _read_points(path: Path) -> dict[str, FloatArray]:
+    """Read the input columns of a table; others are left alone."""
+    try:
+        with path.open(encoding='utf-8-sig', newline='') as stream:
+            rows = list(csv.DictReader(stream))
+    except OSError as error:
+        raise UserError(f'{path}: {error.strerror}; give the path of a CSV table') from None
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise UserError(f'{path}: not a CSV text in UTF-8 ({error})') from None
+    header = [name for name in (rows[0] if rows else {}) if name is not None]
+    for needed in ('slip', 'normal_load'):
+        if needed not in header:
+            raise UserError(f'{path}: row 1: no column {needed}; the columns are {header}')
+    columns = {name: np.full(len(rows), np.nan) for name in INPUTS if name in header}
+    for index, row in enumerate(rows):
+        for name, values in columns.items():
+            cell = (row[name] or '').strip()
+            try:
+                values[index] = float(cell) if cell else np.nan
+            except ValueError:
+                raise UserError(
+                    f'{path}: row {index + 2}: {name} is {cell!r}; it must be a number'
+                ) from None
+        for needed in ('slip', 'normal_load'):
+            if not np.isfinite(columns[needed][index]):
+                raise UserError(f'{path}: row {index + 2}: {needed} is missing; fill the cell')
+    return columns
+
+
+def _cells(columns: Mapping[str, FloatArray]) -> Iterable[list[str]]:
+    for row in zip(*columns.values(), strict=True):
+        yield [f'{value:.9g}' if np.isfinite(value) else '' for value in row]
+
+
+def _write_csv(columns: Mapping[str, FloatArray], stream: Any) -> None:
+    writer = csv.writer(stream, lineterminator='\n')
+    writer.writerow(columns)
+    writer.writerows(_cells(columns))
+
+
+def _write_text(columns: Mapping[str, FloatArray], stream: Any) -> None:
+    units = {'slip': '-', 'normal_load': 'N', 'drawbar_pull': 'N', 'torque': 'N m'}
+    units |= dict.fromkeys(('sinkage', 'wheel_radius', 'wheel_width', 'lug_height'), 'm')
+    units |= dict.fromkeys(('slope', *ANGLES), 'rad')
+    heads = [f'{name} [{units[name]}]' if name in units else name for name in columns]
+    stream.write('  '.join(heads) + '\n')
+    for row in zip(*columns.values(), strict=True):
+        cells = (f'{value:.5g}'.rjust(len(head)) for value, head in zip(row, heads, strict=True))
+        stream.write('  '.join(cells) + '\n')
+
+
+def _title(arguments: argparse.Namespace, configuration: Configuration) -> str:
+    name = str(configuration.flat().get('soil.name') or 'soil as configured')
+    effects = ', '.join(configuration.effects) or 'none'
+    return f'{name}; effects: {effects}; {arguments.method}'
+
+
+def _draw(columns: Mapping[str, FloatArray], path: Path, title: str) -> None:
+    from matplotlib.figure import Figure
+
+    from wheel_terra_estimator.reporting.style import LINE_COLOURS, picture_style
+
+    labels = (('sinkage [mm]', 1e3), ('drawbar pull [N]', 1.0), ('torque [N m]', 1.0))
+    with picture_style():
+        figure = Figure(figsize=(9.5, 3.4))
+        axes = figure.subplots(1, 3)
+        for index, (label, rows) in enumerate(_groups(columns)):
+            order = np.argsort(rows['slip'], kind='stable')
+            colour = LINE_COLOURS[index % len(LINE_COLOURS)]
+            for axis, name, (_, scale) in zip(axes, OUTPUTS, labels, strict=True):
+                axis.plot(rows['slip'][order], scale * rows[name][order], color=colour, label=label)
+        for axis, (text, _) in zip(axes, labels, strict=True):
+            axis.set_xlabel('slip [-]')
+            axis.set_ylabel(text)
+        axes[0].invert_yaxis()
+        axes[0].legend()
+        figure.suptitle(title, fontsize=9)
+        figure.savefig(path, dpi=110)
+
+
+def _groups(columns: Mapping[str, FloatArray]) -> Sequence[tuple[str, Mapping[str, FloatArray]]]:
+    """Split the rows into one curve per combination of load and slope."""
+    keys = np.stack([columns['normal_load'], columns['slope']], axis=1)
+    found = []
+    for load, slope in np.unique(keys, axis=0):
+        rows = (keys[:, 0] == load) & (keys[:, 1] == slope)
+        label = f'{load:g} N' + (f', slope {slope:g} rad' if np.ptp(keys[:, 1]) else '')
+        found.append((label, {name: values[rows] for name, values in columns.items()}))
+    return found
