@@ -24,7 +24,7 @@ def row_counts(bed: Bed) -> list[int]:
     in a bin of 1.6 m its 15980 (inferred from the counts, not stated there).
     """
     rows = max(1, round(bed.rows / bed.grain_scale))
-    full = round(bed.length / (bed.pitch * bed.grain_scale))
+    full = int(bed.length / (bed.pitch * bed.grain_scale) + 1e-6)
     return [full - row % 2 for row in range(rows)]
 
 

