@@ -119,6 +119,12 @@ class RoverPlant:
         # A plane through the wheels gives the attitude of ground and chassis.
         self._plane = np.linalg.pinv(np.stack([wheels.x, wheels.y, one], axis=1))[:2]
 
+        # How far each other wheel of the same track is ahead (n, n) [m].
+        ahead = wheels.x[None, :] - wheels.x[:, None]
+        apart = np.abs(wheels.y[None, :] - wheels.y[:, None])
+        self._ahead = np.where(apart < wheels.width, ahead, 0.0)
+        self._straight = 0.0  # way since the last turn [m]
+
         self.faults = WheelFaults.none(n)
         self._time = 0.0
         self._speeds = np.zeros(3)
@@ -159,6 +165,7 @@ class RoverPlant:
             wheel_rate=self._rate,
             wheel_angle=self._angle,
             leaving_angle=forces.soil.leaving_angle,
+            pass_number=self._passes,
             forward_velocity=forward,
             lateral_velocity=lateral,
             yaw_rate=turning,
@@ -185,13 +192,11 @@ class RoverPlant:
         self._local_slope = along
         self._tilt = along - self._sine[0]  # small angle between ground at the wheel and body
         self._factors = terrain.soil_factors(wheel_x, wheel_y)
-        forward, _, turning = self._speeds
-        passes = wheels.passes
-        if abs(turning) * np.ptp(wheels.x) > 0.5 * abs(forward) * np.ptp(wheels.y) + 1e-4:
-            passes = np.ones_like(passes)  # wheels leave the ruts of those before them
-        elif forward < 0.0:
-            passes = passes.max() + 1 - passes
-        self._passes = passes
+        if abs(self._speeds[2]) * np.ptp(wheels.x) > 0.5 * abs(self._speeds[0]) * np.ptp(wheels.y):
+            self._straight = 0.0  # wheels leave the ruts of those before them
+        before = self._ahead if self._speeds[0] >= 0.0 else -self._ahead
+        passes = 1.0 + ((before > 0.0) & (before <= self._straight)).sum(axis=1)
+        self._passes = np.minimum(passes, wheels.passes.max())
 
     def _wheel_forces(self, hub_speed: FloatArray, rate: FloatArray, dt: float) -> WheelForces:
         """Return the forces at trial speeds of the hubs (2, ..., n) and wheel rates (..., n)."""
@@ -314,6 +319,7 @@ class RoverPlant:
             [forward * cosine - lateral * sine, forward * sine + lateral * cosine, turning]
         )
         self._angle = self._angle + self._rate * dt
+        self._straight += abs(float(forward)) * dt
 
     def _balance(self, dt: float) -> None:
         """Bring specific force, attitude and wheel loads up to the forces of this step."""
@@ -360,4 +366,5 @@ class RoverPlant:
             self._advance(Command(0.0), LONGEST_STEP)
         self._time = 0.0
         self._position = np.zeros(3)
+        self._straight = 0.0
         self._angle = np.zeros_like(zero)

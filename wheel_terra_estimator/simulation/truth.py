@@ -34,6 +34,7 @@ class Truth:
     wheel_rate: FloatArray
     wheel_angle: FloatArray
     leaving_angle: FloatArray
+    pass_number: FloatArray  # 1 on virgin soil
     forward_velocity: float
     lateral_velocity: float
     yaw_rate: float

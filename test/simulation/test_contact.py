@@ -1,0 +1,136 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Forces at a given depth against the reference model, which solves for the depth."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from wheel_terra_estimator.simulation.contact import ContactModel, SoilForces
+from wheel_terra_estimator.simulation.terrain import SOIL_QUANTITIES
+from wheel_terra_estimator.terramechanics.model import WheelSoilModel
+from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
+from wheel_terra_estimator.terramechanics.soil import Soil
+from wheel_terra_estimator.terramechanics.wheel import Wheel
+
+SOIL = Soil(15.6e3, 2407.4e3, 1.1, 250.0, np.radians(31.9), 0.0114, 0.4, -0.2)
+EFFECTS = {
+    name: {}
+    for name in (
+        'slip_sinkage_exponent',
+        'lug_shear_radius',
+        'lug_digging',
+        'soil_mound',
+        'multipass',
+        'bulldozing',
+    )
+}
+
+
+def wheels(random: np.random.Generator, count: int) -> Wheel:
+    radius = random.uniform(0.08, 0.25, count)
+    return Wheel(
+        radius=radius,
+        width=radius * random.uniform(0.6, 1.4, count),
+        lug_height=radius * random.uniform(0.0, 0.1, count),
+        lug_count=np.full(count, 20),
+    )
+
+
+def answer(
+    model: ContactModel,
+    depth: np.ndarray,
+    slip: np.ndarray,
+    load: np.ndarray,
+    side_slip: np.ndarray | float = 0.0,
+    passes: np.ndarray | float = 1.0,
+    **factors: float,
+) -> SoilForces:
+    one = np.ones_like(depth)
+    given = {name: one * factors.get(name, 1.0) for name in SOIL_QUANTITIES}
+    return model.forces(
+        given, depth, slip, side_slip + 0.0 * one, load, 0.05 * one, 0.0 * one, passes + 0.0 * one
+    )
+
+
+@pytest.mark.parametrize('effects', [{}, EFFECTS], ids=['plain', 'effects'])
+def test_at_the_steady_depth_it_is_the_reference_model(effects: dict[str, dict]) -> None:
+    random = np.random.default_rng(3)
+    count = 200
+    wheel = wheels(random, count)
+    slip = random.uniform(-0.4, 0.9, count)
+    load = 8e3 * wheel.radius * wheel.width * random.uniform(0.5, 1.5, count)
+    passes = random.integers(1, 4, count)
+    steady = WheelSoilModel(SOIL, effects).steady_state(
+        OperatingPoints(slip, load, wheel, pass_number=passes, angular_velocity=0.3)
+    )
+    depth = wheel.radius * (1.0 - np.cos(steady.entrance_angle))
+    model = ContactModel(wheel, SOIL, wheel.tip_radius, effects, 9.80665)
+    forces = answer(model, depth, slip, load, passes=passes)
+    np.testing.assert_allclose(forces.support_ratio, 1.0, atol=2e-3)
+    np.testing.assert_allclose(forces.pull / load, steady.drawbar_pull / load, atol=2e-3)
+    arm = load * wheel.radius
+    np.testing.assert_allclose(forces.torque / arm, steady.torque / arm, atol=2e-3)
+    np.testing.assert_allclose(depth + forces.lug_sinkage, steady.sinkage, atol=1e-9)
+
+
+def test_a_wheel_above_its_depth_of_balance_is_sinking() -> None:
+    wheel = wheels(np.random.default_rng(4), 20)
+    load, slip = 5e3 * wheel.radius * wheel.width, np.full(20, 0.2)
+    model = ContactModel(wheel, SOIL, wheel.tip_radius, {}, 9.80665)
+    ratios = [
+        answer(model, share * wheel.radius, slip, load).support_ratio
+        for share in (0.01, 0.05, 0.2, 0.5)
+    ]
+    assert (np.diff(ratios, axis=0) < 0.0).all()
+    assert (ratios[0] > 1.0).all()
+    assert (ratios[-1] < 1.0).all()
+
+
+def test_stiffness_changes_the_support_and_nothing_else() -> None:
+    wheel = wheels(np.random.default_rng(5), 20)
+    load, slip = 5e3 * wheel.radius * wheel.width, np.full(20, 0.3)
+    model = ContactModel(wheel, SOIL, wheel.tip_radius, {}, 9.80665)
+    depth = 0.1 * wheel.radius
+    soft = answer(model, depth, slip, load, stiffness=0.3)
+    firm = answer(model, depth, slip, load)
+    np.testing.assert_allclose(0.3 * soft.support_ratio, firm.support_ratio, rtol=1e-9)
+    np.testing.assert_allclose(soft.pull, firm.pull, rtol=1e-9)
+
+
+def test_side_slip_acts_against_the_motion_and_costs_pull() -> None:
+    wheel = wheels(np.random.default_rng(6), 20)
+    load, slip = 5e3 * wheel.radius * wheel.width, np.full(20, 0.4)
+    model = ContactModel(wheel, SOIL, wheel.tip_radius, {}, 9.80665)
+    depth = 0.1 * wheel.radius
+    straight = answer(model, depth, slip, load)
+    left, right = (answer(model, depth, slip, load, side_slip=side) for side in (0.5, -0.5))
+    np.testing.assert_allclose(straight.side_force, 0.0, atol=1e-9)
+    np.testing.assert_allclose(left.side_force, -right.side_force)
+    np.testing.assert_allclose(left.pull, right.pull)
+    assert (left.side_force > 0.1 * load).all()
+    assert (left.pull < straight.pull).all()
+    # No direction of slip gives more than the strength of the soil.
+    shear = np.hypot(left.torque / wheel.radius, left.side_force)
+    cohesion = 250.0 * wheel.radius * wheel.width * left.contact_angle
+    assert (shear < 1.2 * (np.tan(np.radians(31.9)) * load + cohesion)).all()
+
+
+def test_without_friction_and_cohesion_pull_is_the_compaction_resistance() -> None:
+    # F = -b k z^(n+1)/(n+1) when the stress starts at the bottom of the wheel (Bekker).
+    slick = Soil(0.0, 1e6, 1.0, 0.0, 1e-9, 0.01, 1e-6, 0.0)
+    wheel = Wheel(np.array([0.2]), np.array([0.1]))
+    depth = np.array([0.02])
+    steady = WheelSoilModel(slick, {}).steady_state(OperatingPoints([0.3], [40.0], wheel))
+    depth = steady.sinkage
+    model = ContactModel(wheel, slick, wheel.radius, {}, 9.80665)
+    forces = answer(model, depth, np.array([0.3]), np.array([40.0]))
+    assert forces.pull == pytest.approx(-0.1 * 1e6 * depth**2 / 2.0, rel=2e-3)
+    assert forces.torque == pytest.approx(0.0, abs=1e-6)
+
+
+def test_bad_geometry_and_effects_are_refused() -> None:
+    wheel = Wheel(np.array([0.2]), np.array([0.1]))
+    with pytest.raises(ValueError, match='not in the catalogue'):
+        ContactModel(wheel, SOIL, wheel.radius, {'magic': {}}, 9.81)

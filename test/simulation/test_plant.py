@@ -1,0 +1,202 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""The rover obeys mechanics: balances, limits, symmetry, and the steady state of the reference."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from conftest import drives, ground, rover
+
+from wheel_terra_estimator.simulation import plant as plant_module
+from wheel_terra_estimator.simulation.commands import Command
+from wheel_terra_estimator.simulation.plant import RoverPlant
+from wheel_terra_estimator.simulation.truth import Truth
+from wheel_terra_estimator.terramechanics.model import WheelSoilModel
+from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
+
+G = 9.80665
+MakePlant = Callable[..., RoverPlant]
+
+
+def drive(plant: RoverPlant, seconds: float, forward: float = 0.05, turn: float = 0.0) -> Truth:
+    for _ in range(round(seconds / 0.1)):
+        truth = plant.step(Command(forward, turn), 0.1)
+    return truth
+
+
+@pytest.mark.parametrize('slope', [-8.0, 0.0, 7.0, 13.0])
+def test_steady_climb_is_the_steady_state_of_the_reference(plant: MakePlant, slope: float) -> None:
+    configuration = rover()
+    truth = drive(plant(configuration, slope_deg=slope), 35.0)
+    wheels, mass = configuration.wheels, configuration.rover.mass
+    steady = WheelSoilModel(configuration.soil, configuration.effects).steady_state(
+        OperatingPoints(
+            truth.slip,
+            truth.normal_load,
+            wheels.wheel,
+            pass_number=truth.pass_number,
+            angular_velocity=truth.wheel_rate,
+        )
+    )
+    np.testing.assert_allclose(truth.sinkage, steady.sinkage, atol=3e-4)
+    load = truth.normal_load
+    np.testing.assert_allclose(truth.drawbar_pull / load, steady.drawbar_pull / load, atol=3e-3)
+    arm = load * wheels.radius
+    np.testing.assert_allclose(truth.torque / arm, steady.torque / arm, atol=3e-3)
+    weight = mass * G
+    assert truth.drawbar_pull.sum() == pytest.approx(weight * np.sin(np.radians(slope)), abs=1.0)
+    assert load.sum() == pytest.approx(weight * np.cos(np.radians(slope)), rel=1e-6)
+
+
+def test_energy_balance_over_a_climb(plant: MakePlant) -> None:
+    rover_plant = plant(slope_deg=9.0)
+    mass = rover().rover.mass
+    pulled = driven = dissipated = 0.0
+    height = speed = 0.0
+    for _ in range(600):
+        truth = rover_plant.step(Command(0.05), 0.05)
+        rim = truth.wheel_rate * 0.12
+        pulled += float(truth.drawbar_pull.sum() * truth.forward_velocity) * 0.05
+        driven += float((truth.torque * truth.wheel_rate).sum()) * 0.05
+        loss = truth.torque * truth.wheel_rate - truth.drawbar_pull * truth.forward_velocity
+        assert (loss > -1e-3 - 0.02 * np.abs(truth.torque * rim)).all()
+        dissipated += float(loss.sum()) * 0.05
+        speed = truth.forward_velocity
+        height = truth.position[0] * np.sin(np.radians(9.0))
+    assert pulled == pytest.approx(mass * (G * height + 0.5 * speed**2), rel=0.01)
+    assert driven == pytest.approx(pulled + dissipated, rel=1e-9)
+    assert dissipated > 0.3 * pulled
+
+
+def test_a_parked_rover_stays_where_it_is(plant: MakePlant) -> None:
+    truth = drive(plant(slope_deg=12.0, side_deg=5.0), 60.0, forward=0.0)
+    assert np.abs(truth.position[:2]).max() < 1e-4
+    assert np.isnan(truth.slip).all()
+    expected = rover().rover.mass * G * np.sin(np.radians(12.0))
+    assert truth.drawbar_pull.sum() == pytest.approx(expected, rel=2e-3)
+
+
+def test_accelerometer_at_rest_shows_the_attitude_of_the_chassis(plant: MakePlant) -> None:
+    truth = drive(plant(slope_deg=10.0, side_deg=6.0), 5.0, forward=0.0)
+    assert np.linalg.norm(truth.specific_force) == pytest.approx(G, rel=1e-3)
+    assert truth.specific_force[0] == pytest.approx(G * np.sin(truth.pitch), abs=5e-3)
+    assert truth.specific_force[1] == pytest.approx(G * np.sin(truth.roll), abs=5e-3)
+    # The lower wheels carry more and are deeper: the chassis leans further than the ground.
+    assert truth.pitch > np.radians(10.0)
+    assert truth.roll > np.radians(6.0)
+
+
+def test_specific_force_times_mass_is_the_sum_of_pulls_while_accelerating(
+    plant: MakePlant,
+) -> None:
+    rover_plant = plant(slope_deg=5.0)
+    for _ in range(40):
+        truth = rover_plant.step(Command(0.08), 0.05)
+        tilt = truth.pitch - np.radians(5.0)
+        expected = truth.drawbar_pull.sum() / rover().rover.mass + G * tilt
+        assert truth.specific_force[0] == pytest.approx(expected, abs=0.01)
+
+
+def test_too_steep_a_slope_entraps(plant: MakePlant) -> None:
+    truth = drive(plant(slope_deg=24.0), 40.0)
+    assert truth.forward_velocity < 0.002
+    assert np.nanmin(truth.slip) > 0.9
+    deeper = drive(plant(slope_deg=24.0), 60.0)
+    assert (deeper.sinkage > truth.sinkage).all()
+
+
+def test_weak_drives_stall(plant: MakePlant) -> None:
+    configuration = rover(f'wheels.torque_limit:={[6.0] * 6}')
+    truth = drive(plant(configuration, slope_deg=10.0), 30.0)
+    np.testing.assert_allclose(np.abs(truth.torque).max(), 6.0, rtol=0.05)
+    assert np.abs(truth.forward_velocity) < 0.005 or truth.forward_velocity < 0.0
+
+
+def test_descent_skids_and_a_locked_wheel_is_dragged(plant: MakePlant) -> None:
+    rover_plant = plant(slope_deg=-16.0)
+    truth = drive(rover_plant, 30.0)
+    assert (truth.slip < -0.03).all()
+    assert (truth.drawbar_pull < 0.0).all()
+    rover_plant.faults.rate_factor[0] = 0.0
+    truth = drive(rover_plant, 20.0)
+    assert truth.slip[0] == -1.0
+    assert truth.torque[0] < 0.0
+    assert truth.drawbar_pull[0] < truth.drawbar_pull[1:].min()
+
+
+def test_reverse_mirrors_forward(plant: MakePlant) -> None:
+    # A rover that looks the same from both ends.
+    ends = [
+        'rover.suspension:=rigid',
+        'rover.centre_of_gravity:=[0.0, 0.0, 0.2]',
+        'wheels.passes:=[1, 1, 2, 2, 3, 3]',
+    ]
+    ahead = drive(plant(rover(*ends)), 30.0, forward=0.05)
+    back = drive(plant(rover(*ends)), 30.0, forward=-0.05)
+    mirror = [4, 5, 2, 3, 0, 1]
+    np.testing.assert_allclose(back.forward_velocity, -ahead.forward_velocity, rtol=1e-6)
+    np.testing.assert_allclose(back.slip[mirror], ahead.slip, atol=1e-6)
+    np.testing.assert_allclose(back.torque[mirror], -ahead.torque, rtol=1e-4)
+    np.testing.assert_allclose(back.sinkage[mirror], ahead.sinkage, rtol=1e-4)
+
+
+def test_left_mirrors_right_and_scrub_slows_the_turn(plant: MakePlant) -> None:
+    left = drive(plant(), 20.0, turn=0.05)
+    right = drive(plant(), 20.0, turn=-0.05)
+    mirror = [1, 0, 3, 2, 5, 4]
+    np.testing.assert_allclose(left.slip[mirror], right.slip, atol=1e-5)
+    np.testing.assert_allclose(left.side_force[mirror], -right.side_force, atol=1e-2)
+    assert 0.0 < left.yaw_rate < 0.05
+    # The outer wheels pull, the inner ones hold back: that turns against the scrub.
+    assert left.drawbar_pull[1] > left.drawbar_pull[0]
+
+
+def test_the_path_closes_on_a_turn_in_place(plant: MakePlant) -> None:
+    truth = drive(plant(), 30.0, forward=0.0, turn=0.1)
+    assert truth.yaw_rate > 0.01
+    assert np.abs(truth.position[:2]).max() < 0.1
+    outward = np.sign(truth.slip_velocity)
+    assert (outward[[1, 3, 5]] > 0).all()
+    assert (outward[[0, 2, 4]] < 0).all()
+
+
+def test_less_gravity_less_sinkage(plant: MakePlant) -> None:
+    earth = drive(plant(), 20.0)
+    moon = drive(plant(rover('rover.gravity:=1.62')), 20.0)
+    assert (moon.sinkage < 0.5 * earth.sinkage).all()
+    assert moon.normal_load.sum() == pytest.approx(180.0 * 1.62, rel=1e-6)
+
+
+def test_a_shorter_step_gives_the_same_drive(monkeypatch: pytest.MonkeyPatch) -> None:
+    configuration = rover()
+    ends = []
+    for step in (0.05, 0.0125):
+        monkeypatch.setattr(plant_module, 'LONGEST_STEP', step)
+        hill = ground(
+            slope_position=np.array([0.0, 0.4, 0.8]), slope_angle=np.radians([0.0, 0.0, 12.0])
+        )
+        ends.append(drive(RoverPlant(configuration, hill, drives(configuration)), 30.0))
+    np.testing.assert_allclose(ends[0].slip, ends[1].slip, atol=3e-3)
+    np.testing.assert_allclose(ends[0].sinkage, ends[1].sinkage, atol=3e-4)
+    np.testing.assert_allclose(ends[0].position, ends[1].position, atol=5e-3)
+
+
+def test_wheels_sink_one_after_the_other_in_a_patch(plant: MakePlant) -> None:
+    from wheel_terra_estimator.simulation.terrain import Patch
+
+    patch = Patch(1.0, 9.0, -9.0, 9.0, {'stiffness': 0.3})
+    rover_plant = plant(patches=[patch])
+    before = drive(rover_plant, 2.0).sinkage
+    entered = np.full(6, np.nan)
+    for _ in range(1000):
+        truth = rover_plant.step(Command(0.05), 0.05)
+        new = np.isnan(entered) & (truth.sinkage > before + 5e-3)
+        entered[new] = truth.position[0]
+        if not np.isnan(entered).any():
+            break
+    # Hubs at 0.61, 0 and -0.61 m: the border at 1 m comes after 0.39, 1.0, 1.61 m.
+    np.testing.assert_allclose(entered[[0, 2, 4]], [0.39, 1.0, 1.61], atol=0.25)
+    assert entered[0] < entered[2] < entered[4]
