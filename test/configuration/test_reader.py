@@ -178,7 +178,10 @@ def test_a_configuration_is_read_only_and_can_be_copied():
 @pytest.mark.parametrize(
     ('changes', 'words'),
     [
-        ({'wheels.raduis': [0.1, 0.1]}, "unknown parameter 'wheels.raduis'; the nearest known one is 'wheels.radius'"),
+        (
+            {'wheels.raduis': [0.1, 0.1]},
+            "unknown parameter 'wheels.raduis'; the nearest known one is 'wheels.radius'",
+        ),
         ({'rover.radius': 0.1}, "'wheels.radius'"),
         ({'soil.friction_angle': 0.5}, "'soil.friction_angle_deg'"),
         ({'effects.lug_diging.enabled': True}, "'effects.lug_digging.enabled'"),
@@ -200,7 +203,10 @@ def test_a_configuration_is_read_only_and_can_be_copied():
         ({'wheels.names': ['a', 'a']}, 'names must be distinct'),
         ({'wheels.names': [1, 2]}, '1 is not a text'),
         ({'soil.leaving_angle_ratio': 0.1}, 'at most 0'),
-        ({'slip_radius': 'tip'}, "'tip' is unknown, nearest is 'lug_tip'; allowed: one of lug_tip, rim"),
+        (
+            {'slip_radius': 'tip'},
+            "'tip' is unknown, nearest is 'lug_tip'; allowed: one of lug_tip, rim",
+        ),
         ({'rover.suspension': 'rocker-bogie'}, "nearest is 'rocker_bogie'"),
         ({'rover.suspension': 'rocker_bogie'}, 'three wheels on each side'),
         ({'wheels.y': [0.0, 0.0]}, 'rigid needs wheels.x and wheels.y'),
@@ -338,13 +344,8 @@ def test_rovers_of_the_shipped_files_against_the_sources():
 
 def test_a_written_model_is_read_back(tmp_path):
     c = reader.load(['frostyboy'], ['effects.lug_digging.enabled:=true'])
-    c = c.replace(
-        {
-            'soil.cohesion': 321.5,
-            'effects.lug_digging.kd': 1.25,
-            'provenance': 'a "fit"\nof mine: 1',
-        }
-    )
+    words = 'a "fit"\nof mine: 1'
+    c = c.replace({'soil.cohesion': 321.5, 'effects.lug_digging.kd': 1.25, 'provenance': words})
     file = tmp_path / 'model.yaml'
     c.write(file, comment='Made by a test.\nSecond line.')
     assert file.read_text().startswith('# Made by a test.\n# Second line.\n/**:\n')
@@ -354,7 +355,7 @@ def test_a_written_model_is_read_back(tmp_path):
     keys = ['soil.cohesion', 'effects.lug_digging.enabled', 'provenance']
     c.write(file, keys)
     part = reader.load([file], complete=False)
-    assert part.stated == set(keys) and part.provenance == 'a "fit"\nof mine: 1'
+    assert part.stated == set(keys) and part.provenance == words
 
 
 @pytest.mark.ros
@@ -386,7 +387,8 @@ def test_an_effect_of_ones_own(tmp_path):
         'from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter\n'
         'def term(contact, p, maths):\n'
         '    contact.drawbar_pull = contact.drawbar_pull + p.extra\n'
-        "MINE = Effect(name='my_effect', claim='mine', symbol='F += x', touches=frozenset({'drawbar_pull'}),\n"
+        "MINE = Effect(name='my_effect', claim='mine', symbol='F += x',\n"
+        "    touches=frozenset({'drawbar_pull'}),\n"
         "    parameters=(EffectParameter('extra', 'N', 1.0, 0.0, 9.0, 1.0, 'normal', 'more'),),\n"
         "    validity='', source='', on_outputs=term)\n"
     )

@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""An estimator whose state depends on every input, its stamp and its order: a detector of lapses."""
+"""An estimator whose state depends on every input, its stamp and its order, to detect lapses."""
 
 import math
 from dataclasses import replace
