@@ -89,8 +89,8 @@ MAY_USE = {
     'configuration': {'configuration', 'terramechanics'},
     'estimation': {'estimation', 'configuration', 'terramechanics'},
     'simulation': {'simulation', 'configuration', 'terramechanics', 'estimation'},
-    # Drives give it rows: the loads of the wheels are those of the estimator.
-    'discrepancy': {'discrepancy', 'configuration', 'terramechanics', 'estimation'},
+    # It has a report of its own, and the wheel loads of its drives are those of the estimator.
+    'discrepancy': {'discrepancy', 'configuration', 'terramechanics', 'estimation', 'reporting'},
 }
 
 
