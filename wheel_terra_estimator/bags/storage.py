@@ -3,7 +3,8 @@
 """Raw messages of a recording, whatever its shape and state.
 
 A rosbag2 folder, a folder without ``metadata.yaml``, a single ``.mcap`` or ``.db3``, compressed or
-cut off: `open_bag` gives the messages that are whole and says in words what was wrong.
+cut off: `open_bag` gives the messages that are whole and says in words what was wrong. On damaged
+files the libraries raise almost anything, hence the wide handlers here.
 """
 
 from __future__ import annotations
@@ -116,7 +117,7 @@ def _open_sources(path: Path, notes: list[str], stack: ExitStack) -> list[_Sourc
     if (path / 'metadata.yaml').exists():
         try:
             return [_Indexed(path, notes, stack)]
-        except _damage_errors() as error:
+        except Exception as error:
             if not files:
                 raise UserError(f'{path}: cannot be read ({error})') from None
             if len(files) > 1 or 'etadata' in str(error):
@@ -143,24 +144,12 @@ def _open_file(path: Path, notes: list[str], stack: ExitStack) -> _Source:
         path = unpacked
     try:
         return _Indexed(path, notes, stack)
-    except _damage_errors() as error:
+    except Exception as error:
         if path.suffix != '.mcap':
             raise UserError(
                 f'{path}: cannot be read ({error}); try `sqlite3 {path.name} .recover`'
             ) from None
         return _Recovered(path, notes, str(error))
-
-
-def _damage_errors() -> tuple[type[Exception], ...]:
-    """Return what the readers raise on damaged files."""
-    import struct
-
-    import apsw
-    from rosbags.rosbag2 import ReaderError
-
-    # TypeError: ord() of nothing at the end of a cut file.
-    others = (struct.error, EOFError, OSError, TypeError, ValueError, KeyError)
-    return ReaderError, apsw.Error, *others
 
 
 class _Indexed:
@@ -182,7 +171,7 @@ class _Indexed:
         try:
             for connection, last, data in self.reader.messages(connections):
                 yield RawMessage(last, connection.topic, bytes(data))
-        except _damage_errors() as error:
+        except Exception as error:
             # The index was fine, the content is not: go on behind the damage where possible.
             files = sorted(self.path.glob('*.mcap')) if self.path.is_dir() else [self.path]
             if any(file.suffix != '.mcap' for file in files) or not files:

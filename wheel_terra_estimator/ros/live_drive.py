@@ -23,7 +23,7 @@ from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
@@ -220,7 +220,7 @@ class _Player(Node):
             if all(heard.topic == DIAGNOSTICS for heard in self.heard[count:]):
                 return
 
-    def _keeper(self, topic: str) -> Callable[[bytes, Mapping[str, int]], None]:
+    def _keeper(self, topic: str) -> Any:
         def keep(data: bytes, info: Mapping[str, int]) -> None:
             self.heard.append(Heard(info['source_timestamp'], topic, bytes(data)))
             self._sets += topic == f'{NAMESPACE}/slip'

@@ -1,0 +1,135 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Recordings as measurements: topics, remaps, names, damaged and unknown messages."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import Any
+
+import pytest
+
+from wheel_terra_estimator.bags.reader import MeasurementReader, parse_remaps, read
+from wheel_terra_estimator.bags.storage import open_bag
+from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.estimation.measurements import WheelOdometry
+
+
+def kinds(measurements: Any) -> Counter[str]:
+    return Counter(type(measurement).__name__ for _, measurement in measurements)
+
+
+def test_drive_is_read_in_the_order_of_log_times(make_bag: Any, rover: Any) -> None:
+    rows = list(read(make_bag(), {}, rover))
+    assert kinds(rows) == {'WheelOdometry': 40, 'InertialReading': 40, 'ReferenceVelocity': 4}
+    times = [log_time for log_time, _ in rows]
+    assert times == sorted(times)
+    first = rows[0][1]
+    assert isinstance(first, WheelOdometry)
+    assert first.rate.tolist() == [2.0, 2.0]
+
+
+def test_remapped_topics(make_bag: Any, rover: Any, drive: Any) -> None:
+    moved = [
+        (topic.replace('/reference_odom', '/truth/odometry'), message, time)
+        for topic, message, time in drive
+    ]
+    topics = {'/joint_states': 'sensor_msgs/msg/JointState', '/imu/data': 'sensor_msgs/msg/Imu'}
+    bag = make_bag(messages=moved, topics={**topics, '/truth/odometry': 'nav_msgs/msg/Odometry'})
+    assert 'ReferenceVelocity' not in kinds(read(bag, {}, rover))
+    remaps = parse_remaps(['reference_odom:=/truth/odometry'])
+    assert kinds(read(bag, remaps, rover))['ReferenceVelocity'] == 4
+
+
+def test_missing_wheel_odometry_says_which_and_what_is_there(
+    make_bag: Any, rover: Any, drive: Any
+) -> None:
+    bag = make_bag(
+        messages=[row for row in drive if row[0] != '/joint_states'],
+        topics={'/imu/data': 'sensor_msgs/msg/Imu', '/reference_odom': 'nav_msgs/msg/Odometry'},
+    )
+    with pytest.raises(UserError) as error:
+        list(read(bag, {}, rover))
+    text = str(error.value)
+    assert str(bag) in text
+    assert '/joint_states is not in the bag' in text
+    assert '/imu/data (sensor_msgs/msg/Imu)' in text
+    assert '-p wheel_odometry:=odom --remap odom:=/reference_odom' in text
+
+
+def test_remap_to_a_topic_that_is_not_there_or_of_another_type(make_bag: Any, rover: Any) -> None:
+    bag = make_bag()
+    with pytest.raises(UserError, match=r'/vo is not in the bag.*--remap reference_odom:='):
+        list(read(bag, {'reference_odom': '/vo'}, rover))
+    with pytest.raises(UserError, match=r'/imu/data has type sensor_msgs/msg/Imu, sinkage needs'):
+        list(read(bag, {'sinkage': '/imu/data'}, rover))
+
+
+def test_wheel_names_that_do_not_match_are_told_with_both_lists(make_bag: Any, rover: Any) -> None:
+    other = rover.replace({'wheels.names': ['front_left', 'front_right']})
+    with pytest.raises(UserError) as error:
+        list(read(make_bag(), {}, other))
+    assert 'front_left, front_right' in str(error.value)
+    assert 'arm, left, right' in str(error.value)
+
+
+def test_odometry_in_place_of_joint_states(make_bag: Any, rover: Any) -> None:
+    by_odometry = rover.replace({'wheel_odometry': 'odom'})
+    found = kinds(read(make_bag(), {'odom': '/reference_odom'}, by_odometry))
+    assert found['WheelOdometry'] == 4
+
+
+def test_damaged_and_unknown_messages_are_counted_and_the_rest_is_used(
+    make_bag: Any, rover: Any, drive: Any, tmp_path: Any
+) -> None:
+    """Types that nobody knows are never unpacked; a damaged message costs itself alone."""
+    from rosbags.interfaces import ConnectionExtRosbag2
+    from rosbags.rosbag2 import StoragePlugin, Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.ROS2_JAZZY)
+    path = tmp_path / 'odd'
+    with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        joints = writer.add_connection(
+            '/joint_states', 'sensor_msgs/msg/JointState', typestore=store
+        )
+        strange = writer.add_connection(
+            '/strange', 'my_msgs/msg/Strange', msgdef='int32 number', rihs01='RIHS01_00'
+        )
+        assert isinstance(strange.ext, ConnectionExtRosbag2)
+        for topic, message, time in drive:
+            if topic == '/joint_states':
+                data = bytes(store.serialize_cdr(message, 'sensor_msgs/msg/JointState'))
+                writer.write(joints, time, data)
+                writer.write(joints, time + 1, data[:40])
+                writer.write(strange, time, b'\x00\x01\x00\x00\x01\x00\x00\x00')
+    with open_bag(path) as bag:
+        reader = MeasurementReader(bag, {}, rover)
+        assert kinds(reader.measurements()) == {'WheelOdometry': 40}
+        assert reader.rejected == {('joint_states', 'damaged message'): 40}
+        assert reader.absent == ['imu/data', 'sinkage', 'leaving_angle', 'reference_odom']
+
+
+def test_bag_without_message_definitions(make_bag: Any, rover: Any) -> None:
+    """SQLite recordings of Foxy and Humble have none: Jazzy's own are used."""
+    import sqlite3
+
+    bag = make_bag(storage='sqlite3')
+    (file,) = bag.glob('*.db3')
+    with sqlite3.connect(file) as connection:
+        connection.execute('DELETE FROM message_definitions')
+    assert kinds(read(bag, {}, rover))['WheelOdometry'] == 40
+
+
+@pytest.mark.parametrize(
+    ('text', 'words'),
+    [
+        ('reference_odom', 'give FROM:=TO'),
+        ('joint_state:=/x', 'nearest: joint_states'),
+        ('slip:=/x', 'does not listen to slip'),
+    ],
+)
+def test_remaps_are_checked(text: str, words: str) -> None:
+    with pytest.raises(UserError, match=words):
+        parse_remaps([text])
+    assert parse_remaps(['/imu/data:=imu', 'odom:=/a']) == {'imu/data': '/imu', 'odom': '/a'}

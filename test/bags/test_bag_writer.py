@@ -1,0 +1,168 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Output bags: names, types, quality of service, log times, and that they are always readable."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+from estimate_sets import STAMP, some_estimates
+
+from wheel_terra_estimator.bags.history import HistoryRecorder, read_estimates
+from wheel_terra_estimator.bags.storage import open_bag
+from wheel_terra_estimator.bags.writer import EstimateBagWriter
+from wheel_terra_estimator.errors import UserError
+
+NAMES = ('left', 'right')
+SECOND = 1_000_000_000
+
+
+def sets(count: int = 25) -> list[Any]:
+    return [
+        some_estimates(
+            stamp=STAMP + i * SECOND // 10,
+            stuck=8 <= i < 15,
+            slip=np.array([0.01 * i, -0.02 * i]),
+            slip_class=np.array([i % 4, 255], dtype=np.uint8),
+            reasons=('slip; rover: digging in', 'at rest; rover: digging in'),
+        )
+        for i in range(count)
+    ]
+
+
+@pytest.fixture
+def bag(tmp_path: Path) -> Path:
+    path = tmp_path / 'estimates'
+    with EstimateBagWriter(path, NAMES) as writer:
+        writer.start(STAMP)
+        for i, estimates in enumerate(sets()):
+            writer.add(estimates, STAMP + i * SECOND // 10 + 7)
+    return path
+
+
+def messages(path: Path) -> list[tuple[int, str, Any]]:
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.ROS2_JAZZY)
+    with open_bag(path) as bag:
+        return [
+            (m.log_time, m.topic, store.deserialize_cdr(m.data, bag.topics[m.topic].type))
+            for m in bag.messages(tuple(bag.topics))
+        ]
+
+
+def test_topics_have_full_names_and_the_types_of_the_contract(bag: Path) -> None:
+    joint_state = 'sensor_msgs/msg/JointState'
+    with open_bag(bag) as opened:
+        found = {name: (topic.type, topic.message_count) for name, topic in opened.topics.items()}
+    own = '/wheel_terra_estimator'
+    assert found == {
+        f'{own}/slip': (joint_state, 25),
+        f'{own}/sinkage': (joint_state, 25),
+        f'{own}/slip_stddev': (joint_state, 25),
+        f'{own}/sinkage_stddev': (joint_state, 25),
+        f'{own}/mobility': (joint_state, 25),
+        f'{own}/soil': (joint_state, 25),
+        f'{own}/slip_class': ('std_msgs/msg/UInt8MultiArray', 25),
+        f'{own}/twist': ('geometry_msgs/msg/TwistWithCovarianceStamped', 25),
+        f'{own}/stuck': ('std_msgs/msg/Bool', 3),
+        # By the second (0, 1, 2), and whenever a class changed its level.
+        '/diagnostics': ('diagnostic_msgs/msg/DiagnosticArray', found['/diagnostics'][1]),
+    }
+    assert 3 < found['/diagnostics'][1] <= 25
+
+
+def test_messages_of_a_set_share_stamp_and_log_time(bag: Path) -> None:
+    by_time: dict[int, list[tuple[str, Any]]] = {}
+    for log_time, topic, message in messages(bag):
+        by_time.setdefault(log_time, []).append((topic, message))
+    for i in range(25):
+        row = by_time.pop(STAMP + i * SECOND // 10 + 7)
+        topics = [topic.rpartition('/')[2] for topic, _ in row]
+        assert topics[:2] == ['slip', 'slip_class']  # right after each slip
+        for _, message in row:
+            if hasattr(message, 'header'):
+                stamp = message.header.stamp
+                assert stamp.sec * SECOND + stamp.nanosec == STAMP + i * SECOND // 10
+                assert message.header.frame_id == 'base_link'
+    assert [topic for topic, _ in by_time.pop(STAMP)] == ['/wheel_terra_estimator/stuck']
+    assert not by_time
+
+
+def test_slip_class_layout(bag: Path) -> None:
+    found = [m for _, topic, m in messages(bag) if topic.endswith('slip_class')]
+    (dimension,) = found[2].layout.dim
+    assert (dimension.label, dimension.size, dimension.stride) == ('wheel', 2, 2)
+    assert found[2].layout.data_offset == 0
+    assert found[2].data.tolist() == [2, 255]
+
+
+def test_stuck_is_sent_at_start_and_on_change(bag: Path) -> None:
+    found = [(t, m.data) for t, topic, m in messages(bag) if topic.endswith('/stuck')]
+    assert found == [
+        (STAMP, False),
+        (STAMP + 8 * SECOND // 10 + 7, True),
+        (STAMP + 15 * SECOND // 10 + 7, False),
+    ]
+
+
+def test_quality_of_service_in_the_metadata(bag: Path) -> None:
+    metadata = yaml.safe_load((bag / 'metadata.yaml').read_text())['rosbag2_bagfile_information']
+    assert metadata['storage_identifier'] == 'mcap'
+    for topic in metadata['topics_with_message_count']:
+        (profile,) = topic['topic_metadata']['offered_qos_profiles']
+        latched = topic['topic_metadata']['name'].endswith('/stuck')
+        assert profile['reliability'] == 'reliable'
+        assert profile['durability'] == ('transient_local' if latched else 'volatile')
+        assert (profile['history'], profile['depth']) == ('keep_last', 1 if latched else 10)
+
+
+def test_estimates_come_back_as_they_went(bag: Path) -> None:
+    recorder = HistoryRecorder(NAMES)
+    for estimates in sets():
+        recorder.add(estimates)
+    direct = recorder.history()
+    with open_bag(bag) as opened:
+        stored = read_estimates(opened)
+    assert stored.names == direct.names
+    assert stored.warnings == direct.warnings
+    assert direct.warnings[0].reason == 'digging in'
+    np.testing.assert_array_equal(stored.stamp, direct.stamp)
+    np.testing.assert_array_equal(stored.slip_class, direct.slip_class)
+    np.testing.assert_array_equal(stored.forward_velocity, direct.forward_velocity)
+    for name, values in direct.values.items():
+        np.testing.assert_array_equal(stored.values[name], values, err_msg=name)
+
+
+def test_bag_is_closed_and_readable_after_a_failure(tmp_path: Path) -> None:
+    path = tmp_path / 'broken_off'
+    with pytest.raises(KeyboardInterrupt), EstimateBagWriter(path, NAMES) as writer:
+        writer.start(STAMP)
+        writer.add(sets()[0], STAMP)
+        raise KeyboardInterrupt
+    assert (path / 'metadata.yaml').exists()
+    assert sum(topic.endswith('/slip') for _, topic, _ in messages(path)) == 1
+
+
+def test_existing_path_is_refused_unless_overwrite(bag: Path, tmp_path: Path) -> None:
+    with pytest.raises(UserError, match='--overwrite'):
+        EstimateBagWriter(bag, NAMES)
+    assert len(messages(bag)) > 100
+    with EstimateBagWriter(bag, NAMES, overwrite=True) as writer:
+        writer.start(STAMP)
+    assert len(messages(bag)) == 1
+
+
+def test_overwrite_never_deletes_what_is_no_bag(tmp_path: Path) -> None:
+    home = tmp_path / 'home'
+    home.mkdir()
+    (home / 'thesis.tex').write_text('years of work')
+    with pytest.raises(UserError, match=r'holds more than a bag \(thesis.tex\)'):
+        EstimateBagWriter(home, NAMES, overwrite=True)
+    with pytest.raises(UserError, match='is not a folder'):
+        EstimateBagWriter(home / 'thesis.tex', NAMES, overwrite=True)
+    assert (home / 'thesis.tex').read_text() == 'years of work'

@@ -1,0 +1,230 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Messages to measurements, estimates to message fields."""
+
+from __future__ import annotations
+
+import importlib
+import math
+from dataclasses import fields, replace
+from typing import Any
+
+import numpy as np
+import pytest
+from estimate_sets import STAMP, some_estimates
+
+from wheel_terra_estimator.bags.convert import (
+    InputConverter,
+    finite,
+    input_layout,
+    joint_fields,
+    quaternion_from_roll_pitch_yaw,
+    rotation_matrix,
+    stamp_of,
+    twist_covariance,
+)
+from wheel_terra_estimator.estimation.estimates import EstimateSet
+
+@pytest.fixture
+def converter(rover: Any) -> InputConverter:
+    return InputConverter(input_layout(rover))
+
+
+def test_stamp_is_exact(factory: Any) -> None:
+    assert stamp_of(factory.joint_state(factory.header(STAMP), [])) == STAMP
+
+
+def test_joint_state_is_sorted_into_the_order_of_the_wheels(
+    converter: InputConverter, factory: Any
+) -> None:
+    message = factory.joint_state(
+        factory.header(STAMP),
+        ('right', 'mast', 'left'),
+        velocity=(-3.0, 99.0, 2.0),
+        effort=(-5.0, 99.0, 4.0),
+    )
+    measured = converter.convert('joint_states', message)
+    assert measured.stamp == STAMP
+    # The right joint counts negative forward: rate and torque are flipped.
+    assert measured.rate.tolist() == [2.0, 3.0]
+    assert measured.torque.tolist() == [4.0, 5.0]
+
+
+def test_wheels_that_a_message_does_not_hold_are_unknown(
+    converter: InputConverter, factory: Any
+) -> None:
+    message = factory.joint_state(factory.header(STAMP), ('right',), velocity=(-3.0,))
+    measured = converter.convert('joint_states', message)
+    assert math.isnan(measured.rate[0])
+    assert measured.rate[1] == 3.0
+    assert np.isnan(measured.torque).all()
+
+
+@pytest.mark.parametrize(
+    ('names', 'velocity', 'effort', 'reason'),
+    [
+        (('mast',), (1.0,), (), 'none of the configured wheels in it'),
+        ((), (), (), 'none of the configured wheels in it'),
+        (('left', 'right'), (), (), 'velocity and name differ in length'),
+        (('left', 'right'), (1.0,), (), 'velocity and name differ in length'),
+    ],
+)
+def test_joint_state_that_does_not_fit_is_counted(
+    converter: InputConverter, factory: Any, names: Any, velocity: Any, effort: Any, reason: str
+) -> None:
+    message = factory.joint_state(factory.header(STAMP), names, velocity=velocity, effort=effort)
+    assert converter.convert('joint_states', message) is None
+    assert converter.rejected == {('joint_states', reason): 1}
+
+
+def test_effort_of_another_length_costs_the_torque_only(
+    converter: InputConverter, factory: Any
+) -> None:
+    message = factory.joint_state(
+        factory.header(STAMP), ('left', 'right'), velocity=(1.0, -1.0), effort=(1.0,)
+    )
+    measured = converter.convert('joint_states', message)
+    assert measured.rate.tolist() == [1.0, 1.0]
+    assert np.isnan(measured.torque).all()
+    assert converter.rejected == {('joint_states', 'effort and name differ in length'): 1}
+
+
+def test_odometry_gives_each_wheel_its_own_rim_speed(rover: Any, factory: Any) -> None:
+    converter = InputConverter(input_layout(rover.replace({'wheel_odometry': 'odom'})))
+    twist = factory.twist_with_covariance(1.0, 0.5, np.zeros(36))
+    measured = converter.convert('odom', factory.odometry(factory.header(STAMP), twist))
+    # Left (y = 0.4): 1.0 - 0.5 * 0.4 = 0.8 m/s, right 1.2 m/s, at the lug tips (0.21 m).
+    np.testing.assert_allclose(measured.rate * 0.21, [0.8, 1.2], rtol=1e-14)
+    assert np.isnan(measured.torque).all()
+
+
+def test_imu_without_orientation(converter: InputConverter, factory: Any) -> None:
+    message = factory.imu(factory.header(STAMP), (0.1, 0.2, 9.8), (0.01, 0.02, 0.03), None)
+    measured = converter.convert('imu/data', message)
+    assert measured.orientation is None
+    assert measured.specific_force.tolist() == [0.1, 0.2, 9.8]
+    assert measured.angular_rate.tolist() == [0.01, 0.02, 0.03]
+    zero = factory.imu(factory.header(STAMP), (0, 0, 9.8), (0, 0, 0), (0.0, 0.0, 0.0, 0.0))
+    assert converter.convert('imu/data', zero).orientation is None
+    assert sum(converter.rejected.values()) == 1
+
+
+def test_mounting_turns_the_imu_into_base_link(rover: Any, factory: Any) -> None:
+    """A sensor turned by 90 deg to the left and tilted sees the same rover."""
+    turned = rover.replace(
+        {'sensors.imu_mounting_yaw_deg': 90.0, 'sensors.imu_mounting_roll_deg': 180.0}
+    )
+    converter = InputConverter(input_layout(turned))
+    # Upside down, its x to the left of the rover: its y then points forward, its z down.
+    message = factory.imu(
+        factory.header(STAMP), (0.2, 0.1, -9.8), (0.02, 0.01, -0.03), (0.0, 0.0, 0.0, 1.0)
+    )
+    measured = converter.convert('imu/data', message)
+    np.testing.assert_allclose(measured.specific_force, [0.1, 0.2, 9.8], atol=1e-12)
+    np.testing.assert_allclose(measured.angular_rate, [0.01, 0.02, 0.03], atol=1e-12)
+
+
+def test_orientation_of_base_link_agrees_with_the_turned_vectors(rover: Any, factory: Any) -> None:
+    """World vectors do not depend on how the sensor is mounted: R_base f_base = R_imu f_imu."""
+    turned = rover.replace(
+        {
+            'sensors.imu_mounting_roll_deg': 20.0,
+            'sensors.imu_mounting_pitch_deg': -35.0,
+            'sensors.imu_mounting_yaw_deg': 110.0,
+        }
+    )
+    converter = InputConverter(input_layout(turned))
+    sensor = np.array([0.1, -0.3, 0.2, 0.9])
+    sensor /= np.linalg.norm(sensor)
+    force = np.array([0.5, -1.0, 9.0])
+    message = factory.imu(factory.header(STAMP), force, (0, 0, 0), tuple(sensor))
+    measured = converter.convert('imu/data', message)
+    np.testing.assert_allclose(
+        rotation_matrix(measured.orientation) @ measured.specific_force,
+        rotation_matrix(sensor) @ force,
+        atol=1e-12,
+    )
+
+
+def test_roll_pitch_yaw_are_about_fixed_axes() -> None:
+    roll, pitch, yaw = 0.3, -0.5, 1.1
+    x = np.array([[1, 0, 0], [0, np.cos(roll), -np.sin(roll)], [0, np.sin(roll), np.cos(roll)]])
+    y = np.array([[np.cos(pitch), 0, np.sin(pitch)], [0, 1, 0], [-np.sin(pitch), 0, np.cos(pitch)]])
+    z = np.array([[np.cos(yaw), -np.sin(yaw), 0], [np.sin(yaw), np.cos(yaw), 0], [0, 0, 1]])
+    found = rotation_matrix(quaternion_from_roll_pitch_yaw(roll, pitch, yaw))
+    np.testing.assert_allclose(found, z @ y @ x, atol=1e-15)
+
+
+def test_sinkage_leaving_angle_and_reference(converter: InputConverter, factory: Any) -> None:
+    header = factory.header(STAMP)
+    message = factory.joint_state(header, ('right', 'left'), position=(0.03, math.nan))
+    sinkage = converter.convert('sinkage', message)
+    assert math.isnan(sinkage.sinkage[0])
+    assert sinkage.sinkage[1] == 0.03
+    assert converter.convert('leaving_angle', message).leaving_angle[1] == 0.03
+    twist = factory.twist_with_covariance(0.7, 0.1, [4e-4] + [0.0] * 35)
+    reference = converter.convert('reference_odom', factory.odometry(header, twist))
+    assert (reference.forward, reference.variance) == (0.7, 4e-4)
+
+
+@pytest.mark.ros
+def test_messages_of_rclpy_and_of_rosbags_are_the_same_measurements(
+    converter: InputConverter, drive: Any
+) -> None:
+    serialization = pytest.importorskip('rclpy.serialization')
+    from wheel_terra_estimator.bags.convert import INPUT_TYPES
+    from wheel_terra_estimator.bags.messages import MessageFactory
+
+    store = MessageFactory().store
+    for topic, message, _ in drive[:6]:
+        kind = INPUT_TYPES[topic[1:]]
+        package, _, name = kind.split('/')
+        cls = getattr(importlib.import_module(f'{package}.msg'), name)
+        live = serialization.deserialize_message(bytes(store.serialize_cdr(message, kind)), cls)
+        assert repr(converter.convert(topic[1:], live)) == repr(
+            converter.convert(topic[1:], message)
+        )
+
+
+def test_every_output_field_is_where_the_contract_wants_it() -> None:
+    e = some_estimates()
+    names = ('left', 'right')
+    found = joint_fields(e, names)
+    table = {
+        'slip': (e.slip, e.slip_velocity, e.drawbar_pull),
+        'sinkage': (e.sinkage, e.sinkage_rate, e.normal_load),
+        'slip_stddev': (e.slip_std, e.slip_velocity_std, e.drawbar_pull_std),
+        'sinkage_stddev': (e.sinkage_std, e.sinkage_rate_std, e.normal_load_std),
+        'mobility': (e.rim_travel_left, [], e.pull_margin),
+        'soil': (e.soil, [], e.soil_std),
+    }
+    assert list(found) == list(table)
+    for topic, columns in table.items():
+        assert found[topic].name == (names if topic != 'soil' else e.soil_names)
+        assert [list(column) for column in found[topic][1:]] == [list(c) for c in columns]
+
+
+def test_twist_covariance_is_row_major_and_positive() -> None:
+    e = some_estimates()
+    matrix = np.array(twist_covariance(e)).reshape(6, 6)
+    assert matrix[0, 0] == e.forward_velocity_variance
+    assert matrix[5, 5] == e.yaw_rate_variance
+    assert (np.diag(matrix) > 0.0).all()
+    assert np.count_nonzero(matrix - np.diag(np.diag(matrix))) == 0
+
+
+def test_no_value_that_is_not_finite_passes() -> None:
+    good = some_estimates()
+    assert finite(good) is good
+    for field in fields(EstimateSet):
+        for bad in (math.nan, math.inf, -math.inf):
+            if field.type == 'FloatArray':
+                spoilt = getattr(good, field.name).copy()
+                spoilt[0] = bad
+            elif field.type == 'float':
+                spoilt = bad
+            else:
+                continue
+            cleaned = finite(replace(good, **{field.name: spoilt}))
+            assert np.isfinite(getattr(cleaned, field.name)).all()
+            assert field.name in cleaned.faults['outputs']

@@ -1,0 +1,93 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Figures of a whole drive, and the truth beside it."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from estimate_sets import STAMP, some_estimates
+
+from wheel_terra_estimator.bags.history import HistoryRecorder, read_estimates
+from wheel_terra_estimator.bags.storage import open_bag
+from wheel_terra_estimator.bags.truth import read_truth
+from wheel_terra_estimator.configuration import reader
+from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.estimation.estimates import SlipClass
+
+SECOND = 1_000_000_000
+
+
+def test_time_in_class_counts_no_pauses() -> None:
+    recorder = HistoryRecorder(('left', 'right'))
+    stamps = [0.0, 0.5, 1.0, 1.5, 60.0, 60.5, 20.0]  # a pause of a minute, a step back
+    classes = [0, 0, 3, 3, 2, 2, 2]
+    for time, value in zip(stamps, classes, strict=True):
+        recorder.add(
+            some_estimates(
+                stamp=STAMP + round(time * SECOND),
+                slip_class=np.array([value, 255], dtype=np.uint8),
+            )
+        )
+    times = recorder.history().time_in_class()
+    assert [times[c][0] for c in SlipClass] == pytest.approx([1.0, 0.0, 0.5, 0.5, 0.0])
+    assert times[SlipClass.UNKNOWN][1] == pytest.approx(2.0)
+
+
+def test_history_of_nothing() -> None:
+    history = HistoryRecorder(('left',)).history()
+    assert history.seconds.size == 0
+    assert history.values['slip'].shape == (0, 1)
+
+
+def test_bag_without_estimates_is_refused(make_bag: Any) -> None:
+    with open_bag(make_bag()) as bag, pytest.raises(UserError, match='no estimates'):
+        read_estimates(bag)
+
+
+def test_true_slip_from_a_true_velocity(make_bag: Any, rover: Any, drive: Any) -> None:
+    """Rim speed 2 rad/s x 0.21 m = 0.42 m/s, velocity 0.36 m/s: slip 1/7."""
+    moved = [(t.replace('/reference_odom', '/truth/odometry'), m, time) for t, m, time in drive]
+    bag = make_bag(
+        messages=moved,
+        topics={
+            '/joint_states': 'sensor_msgs/msg/JointState',
+            '/imu/data': 'sensor_msgs/msg/Imu',
+            '/truth/odometry': 'nav_msgs/msg/Odometry',
+        },
+    )
+    with open_bag(bag) as opened:
+        truth = read_truth(opened, {}, rover)
+    assert truth is not None and truth.slip is not None
+    assert truth.velocity.value.shape == (4, 1)
+    np.testing.assert_allclose(truth.slip.value, np.full((40, 2), 1 / 7), atol=1e-12)
+
+
+def test_no_truth_in_a_bag_without(make_bag: Any, rover: Any) -> None:
+    with open_bag(make_bag()) as bag:
+        assert read_truth(bag, {}, rover) is None
+
+
+@pytest.mark.shared
+def test_true_slip_of_a_measured_drive_is_that_of_its_table(shared: Path) -> None:
+    """The table has wheel speeds and the speed of each side, of the author's own making."""
+    configuration = reader.load(['frostyboy'])
+    with open_bag(shared / 'bags' / 'frostyboy_event_1_6_mcap') as bag:
+        truth = read_truth(bag, {}, configuration)
+    assert truth is not None and truth.slip is not None
+    with (shared / 'frostyboy_snow' / 'event_1_6.csv').open() as file:
+        rows = list(csv.DictReader(file))
+    speed = np.array([[float(r['v_X'])] for r in rows])
+    yaw = -np.array([[float(r['angAccel_Z'])] for r in rows])  # z counts clockwise
+    rim = 0.265 * np.array([[float(r[f'w{w}']) for w in ('fl', 'fr', 'rl', 'rr')] for r in rows])
+    ground = speed - yaw * np.array([0.571, -0.571, 0.571, -0.571])
+    driving = (rim > 0.3) & (ground > 0.0) & (ground < rim)
+    assert driving.sum() > 1000
+    expected = 1.0 - ground / np.where(driving, rim, 1.0)
+    found = truth.slip.value
+    assert found.shape == expected.shape
+    np.testing.assert_allclose(found[driving], expected[driving], atol=2e-6)

@@ -1,0 +1,186 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Recordings in every shape and state give the messages that are whole."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from wheel_terra_estimator.bags.mcap_recovery import recover
+from wheel_terra_estimator.bags.storage import RawMessage, open_bag
+from wheel_terra_estimator.errors import UserError
+
+
+def contents(path: Path) -> list[RawMessage]:
+    with open_bag(path) as bag:
+        return list(bag.messages(tuple(bag.topics)))
+
+
+@pytest.fixture
+def whole(make_bag: Any) -> list[RawMessage]:
+    return contents(make_bag(name='whole'))
+
+
+@pytest.mark.parametrize('storage', ['mcap', 'sqlite3'])
+def test_folder_single_file_and_folder_without_metadata_are_the_same(
+    make_bag: Any, whole: list[RawMessage], storage: str
+) -> None:
+    folder = make_bag(storage=storage)
+    (file,) = (p for p in folder.iterdir() if p.suffix in ('.mcap', '.db3'))
+    assert len(whole) == 84
+    assert contents(folder) == whole
+    assert contents(file) == whole
+    (folder / 'metadata.yaml').unlink()
+    with open_bag(folder) as bag:
+        assert list(bag.messages(tuple(bag.topics))) == whole
+        assert 'metadata.yaml is missing' in bag.notes[0]
+
+
+def test_unreadable_metadata_is_set_aside(make_bag: Any, whole: list[RawMessage]) -> None:
+    folder = make_bag()
+    (folder / 'metadata.yaml').write_text('rosbag2_bagfile_information: {version: 9}\n')
+    assert contents(folder) == whole
+
+
+@pytest.mark.parametrize('mode', ['FILE', 'MESSAGE', 'STORAGE'])
+def test_compressed_bags(tmp_path: Path, drive: Any, whole: list[RawMessage], mode: str) -> None:
+    from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.ROS2_JAZZY)
+    writer = Writer(tmp_path / 'bag', version=9, storage_plugin=StoragePlugin.MCAP)
+    writer.set_compression(CompressionMode[mode], CompressionFormat.ZSTD)
+    with writer:
+        connections: dict[str, Any] = {}
+        for topic, message, log_time in drive:
+            kind = message.__msgtype__
+            if topic not in connections:
+                connections[topic] = writer.add_connection(topic, kind, typestore=store)
+            writer.write(connections[topic], log_time, store.serialize_cdr(message, kind))
+    assert contents(tmp_path / 'bag') == whole
+    (tmp_path / 'bag' / 'metadata.yaml').unlink()
+    assert contents(tmp_path / 'bag') == whole
+
+
+def test_truncated_mcap_gives_the_messages_before_the_cut(
+    make_bag: Any, whole: list[RawMessage], tmp_path: Path
+) -> None:
+    (file,) = make_bag().glob('*.mcap')
+    content = file.read_bytes()
+    cut = tmp_path / 'cut.mcap'
+    counts = []
+    for size in range(len(content) // 3, len(content), len(content) // 40):
+        cut.write_bytes(content[:size])
+        messages, damage = recover(cut)
+        found = [(m.log_time, m.topic, m.data) for m in messages]
+        assert found == [tuple(m) for m in whole[: len(found)]]
+        assert damage or len(found) == len(whole)
+        counts.append(len(found))
+    assert counts == sorted(counts)
+    assert counts[0] > 0
+    with open_bag(cut) as bag:
+        assert 'whole messages recovered' in bag.notes[0]
+
+
+def test_truncated_mcap_in_its_folder(make_bag: Any, whole: list[RawMessage]) -> None:
+    folder = make_bag()
+    (file,) = folder.glob('*.mcap')
+    file.write_bytes(file.read_bytes()[: file.stat().st_size // 2])
+    found = contents(folder)
+    assert 0 < len(found) < len(whole)
+    assert found == whole[: len(found)]
+
+
+def test_damaged_chunk_is_left_out_and_said(
+    tmp_path: Path, drive: Any, whole: list[RawMessage]
+) -> None:
+    """A compressed bag of several chunks with rubbish in one: the others are read."""
+    from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.ROS2_JAZZY)
+    writer = Writer(tmp_path / 'bag', version=9, storage_plugin=StoragePlugin.MCAP)
+    writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
+    with writer:
+        kind = 'sensor_msgs/msg/JointState'
+        connection = writer.add_connection('/joint_states', kind, typestore=store)
+        joints = [(m, t) for topic, m, t in drive if topic == '/joint_states']
+        for number in range(9000):  # about 3 MB, a chunk is closed at 1 MB
+            message, _ = joints[number % len(joints)]
+            writer.write(connection, 1000 + number, store.serialize_cdr(message, kind))
+    (file,) = (tmp_path / 'bag').glob('*.mcap')
+    content = bytearray(file.read_bytes())
+    magic = [i for i in range(len(content)) if content[i : i + 4] == b'\x28\xb5\x2f\xfd']
+    assert len(magic) >= 2
+    for offset in range(20, 60):
+        content[magic[1] + offset] ^= 0xFF
+    file.write_bytes(content)
+    with open_bag(file) as bag:
+        times = [m.log_time for m in bag.messages(('/joint_states',))]
+        assert bag.notes
+    assert times == sorted(set(times))
+    assert 3000 < len(times) < 9000
+    assert times[0] == 1000
+
+
+def test_recording_without_index_is_read(make_bag: Any, whole: list[RawMessage]) -> None:
+    """What a recorder that was killed leaves: all chunks, no summary, no metadata."""
+    folder = make_bag()
+    (file,) = folder.glob('*.mcap')
+    (folder / 'metadata.yaml').unlink()
+    content = file.read_bytes()
+    file.write_bytes(content[: content.rindex(b'serialized_metadata') - 40])
+    assert contents(folder) == whole
+
+
+@pytest.mark.parametrize(
+    ('name', 'content', 'words'),
+    [
+        ('gone', None, 'no such bag'),
+        ('notes.txt', b'hello', 'not a bag'),
+        ('empty.mcap', b'', 'holds no messages'),
+        ('rubbish.mcap', b'rubbish' * 100, 'does not begin as an MCAP file'),
+        ('rubbish.db3', b'rubbish' * 100, 'cannot be read'),
+    ],
+)
+def test_what_is_no_recording_is_refused_by_name(
+    tmp_path: Path, name: str, content: bytes | None, words: str
+) -> None:
+    path = tmp_path / name
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(UserError) as error, open_bag(path):
+        pass
+    assert str(path) in str(error.value)
+    assert words in str(error.value)
+    assert '\n' not in str(error.value)
+
+
+def test_empty_bag_and_empty_folder(make_bag: Any, tmp_path: Path) -> None:
+    with pytest.raises(UserError, match='holds no messages'), open_bag(make_bag(messages=[])):
+        pass
+    empty = tmp_path / 'empty'
+    empty.mkdir()
+    with pytest.raises(UserError, match='not a bag'), open_bag(empty):
+        pass
+
+
+def test_split_bag_is_read_as_one(make_bag: Any, drive: Any, whole: list[RawMessage]) -> None:
+    first = make_bag(messages=drive[:40], name='first')
+    second = make_bag(messages=drive[40:], name='second')
+    for file in second.glob('*.mcap'):
+        shutil.copy(file, first)
+    (first / 'metadata.yaml').unlink()
+    assert contents(first) == whole
+
+
+@pytest.mark.shared
+def test_measured_bag_in_both_storages_is_the_same(shared: Path) -> None:
+    mcap = contents(shared / 'bags' / 'frostyboy_event_1_6_mcap')
+    sqlite = contents(shared / 'bags' / 'frostyboy_event_1_6_db3')
+    assert len(mcap) == 2570
+    assert sorted(mcap) == sorted(sqlite)
