@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import fields, replace
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,8 @@ _WHEEL_FIELDS = tuple(
     if f.type == 'FloatArray' and f.name not in ('soil', 'soil_std')
 )
 _SCALAR_FIELDS = tuple(f.name for f in fields(EstimateSet) if f.type == 'float')
+_ARRAYS = attrgetter(*_WHEEL_FIELDS, 'soil', 'soil_std')
+_SCALARS = attrgetter(*_SCALAR_FIELDS)
 
 
 class OutputGuard:
@@ -128,8 +131,7 @@ def blank_estimates(configuration: Configuration) -> EstimateSet:
 
 
 def _is_finite(estimates: EstimateSet) -> bool:
-    arrays = [getattr(estimates, name) for name in _WHEEL_FIELDS]
-    everything = np.concatenate((*arrays, estimates.soil, estimates.soil_std))
-    return bool(np.isfinite(everything).all()) and all(
-        math.isfinite(getattr(estimates, name)) for name in _SCALAR_FIELDS
-    )
+    numbers = np.concatenate(_ARRAYS(estimates))
+    # A sum is cheap and never hides a nan; where it overflows, the long way decides.
+    finite = math.isfinite(np.add.reduce(numbers)) or bool(np.isfinite(numbers).all())
+    return finite and all(map(math.isfinite, _SCALARS(estimates)))

@@ -33,10 +33,10 @@ from wheel_terra_estimator.estimation.measurements import (
     WheelOdometry,
 )
 
-KEPT_STATE_SPACING = 100_000_000
-"""Greatest distance of kept states, the price of a late input [ns]."""
+KEPT_STATE_SPACING = 50_000_000
+"""Distance of kept states [ns]: what a late input costs, against what keeping costs."""
 DENSE_SPAN = 50_000_000
-"""Before the newest set states are kept at each wheel odometry, for slightly late inputs [ns]."""
+"""Inputs that come so little [ns] after a set that would have used them make kept states denser."""
 GREATEST_LENGTH = 100_000
 """Inputs that the log holds at most, so that no publisher can fill the memory."""
 TRIM_LENGTH = 64
@@ -147,7 +147,7 @@ class Timeline:
         self._odometry: int | None  # newest released stamp of wheel odometry
         self._heartbeats: int  # sets of the present silence
         self._next_reference: int  # a reference velocity is used again from here on
-        self._disorder: bool  # inputs of this run came after a set that would have used them
+        self._disorder: bool  # inputs come a little after sets that would have used them
         self._last_kept = 0  # stamp of the newest kept state
         self._clear(self._pristine, keep_soil=False)
 
@@ -185,8 +185,9 @@ class Timeline:
                 self._insert_at(index, _Entry(stamp, channel, measurement))
                 changed = True
             if changed and index < self._ran:
+                if stamp > stamps[self._ran - 1] - DENSE_SPAN:
+                    self._disorder = True
                 self._ran = index
-                self._disorder = True
         else:
             entries.append(_Entry(stamp, channel, measurement))
             stamps.append(stamp)
@@ -338,23 +339,26 @@ class Timeline:
         """Run the log up to and with the entry `last`."""
         if self._position != self._ran or self._position < 0:
             self._go_back()
+        elif self._position:
+            self._keep(self._position - 1, self._disorder)
         entries = self._entries
         dense = entries[last].stamp - DENSE_SPAN
         for index in range(self._position, last + 1):
             entry = entries[index]
             self._step(entry, must=index == last)
-            stamp = entry.stamp
-            if (
-                index == last
-                or (index == last - 1 and self._disorder)
-                or stamp - self._last_kept >= KEPT_STATE_SPACING
-                or (stamp >= dense and entry.parts[WHEEL_ODOMETRY] is not None)
-            ):
-                entry.kept = self.estimator.snapshot(), self._next_reference
-                self._last_kept = stamp
-            else:
-                entry.kept = None
+            entry.kept = None
+            # The state at the end is kept by the next run, if nothing has changed before.
+            if index < last:
+                odometry = entry.parts[WHEEL_ODOMETRY] is not None and entry.stamp >= dense
+                self._keep(index, self._disorder and (odometry or index == last - 1))
         self._ran = self._position = last + 1
+
+    def _keep(self, index: int, must: bool) -> None:
+        """Keep the estimator's state, which is that after entry `index`, if it is worth it."""
+        entry = self._entries[index]
+        if entry.kept is None and (must or entry.stamp - self._last_kept >= KEPT_STATE_SPACING):
+            entry.kept = self.estimator.snapshot(), self._next_reference
+            self._last_kept = entry.stamp
 
     def _go_back(self) -> None:
         """Return to the last kept state before the first entry that has changed."""
