@@ -71,7 +71,7 @@ class GatedFilter:
         return np.einsum('ij,jk,ik->i', H, self._ekf.P, H) + noise
 
     def update(self, residual: FloatArray, H: FloatArray, noise: FloatArray) -> None:
-        """Fuse m readings: residual z - h(x) (m,), H (m, n), variances (m,) of independent noise."""
+        """Fuse m readings: residual z - h(x) (m,), H (m, n), variances (m,)."""
         ekf = self._ekf
         ekf.update(residual, lambda _: H, lambda _: 0.0, R=np.diag(noise))
         self._keep_sound()

@@ -14,9 +14,11 @@ shear_strength   ln     Common factor on cohesion and tan(phi); the two are not 
                         wheels of nearly equal load.
 shear_modulus    ln     Common factor on K; seen at low slip, as shear_strength is at high slip.
 slip_sinkage     -      Added to n1 in N = n0 + n1 s.
-centroid         rad    Common shift of the centroid of the contact stress: takes up errors of c1,
-                        c2, c3, of the mound and of the line arm at once. Seen by torque against
-                        the balance of forces.
+centroid         -      Common shift of the centroid of the contact stress, as a share of the
+                        entrance angle: takes up errors of c1, c2, c3 and of resistances that the
+                        torque does not see (bulldozing). Seen by torque against the balance.
+mound            -      The part of that shift that comes with slip, (s - 0.4)+^2: soil piles up
+                        behind the wheel and pushes it (seed 3). Seen where slip changes.
 sinkage (n)      m      Rim below the surface.
 stiffness (n)    ln     Factor on the bearing modulus, per wheel: wheels enter a patch one by one.
 shear_error (n)  ln     Error of the shear model, per wheel, first-order Gauss-Markov over travel.
@@ -37,8 +39,8 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 
-SPEED, GRAVITY_BIAS, SHEAR_STRENGTH, SHEAR_MODULUS, SLIP_SINKAGE, CENTROID = range(6)
-_COMMON = 6
+SPEED, GRAVITY_BIAS, SHEAR_STRENGTH, SHEAR_MODULUS, SLIP_SINKAGE, CENTROID, MOUND = range(7)
+_COMMON = 7
 
 
 @dataclass(frozen=True)

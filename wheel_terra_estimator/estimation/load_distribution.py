@@ -3,12 +3,13 @@
 """Quasi-static normal load of each wheel from specific force, centre of gravity and suspension.
 
 The soil's forces on the wheels must equal mass times specific force (that is what an accelerometer
-measures), whatever the slope and the acceleration, so no attitude is needed. With contact points a
-height h below the centre of gravity, the moment about it gives (x, y relative to it)::
+measures), whatever the slope and the acceleration, so no attitude is needed. A wheel's load acts
+ahead of its hub; the moment about the hub, M = T - F r, follows from torque and pull. With the
+centre of gravity a height h above the contact points (x, y relative to it)::
 
-    sum W_i     = m f_z
-    sum W_i x_i = -h m f_x      (uphill: f_x > 0, the rear wheels carry more)
-    sum W_i y_i = -h m f_y
+    sum W_i       = m f_z
+    sum W_i x_i   = -h m f_x - sum M_i      (uphill: f_x > 0, the rear wheels carry more)
+    sum W_i y_i   = -h m f_y
 
 Three equations leave n - 3 loads open; the suspension closes them.
 """
@@ -27,23 +28,45 @@ Vector = Sequence[float] | FloatArray
 
 @dataclass(frozen=True)
 class LoadDistribution:
-    """Linear map from specific force to wheel loads, made once per rover.
+    """Linear map from forces to wheel loads, made once per rover.
 
     Attributes
     ----------
-    matrix : numpy.ndarray
+    by_force : numpy.ndarray
         (n, 3): loads [N] per specific force x, y, z [m/s^2].
+    by_pull, by_moment : numpy.ndarray
+        (n, n): loads per drawbar pull of each wheel [-] (beyond what the specific force says) and
+        per moment of the load about its hub [1/m].
     """
 
-    matrix: FloatArray
+    by_force: FloatArray
+    by_pull: FloatArray
+    by_moment: FloatArray
 
-    def loads(self, specific_force: Vector) -> FloatArray:
+    def loads(
+        self,
+        specific_force: Vector,
+        pull: Vector | None = None,
+        moment: Vector | None = None,
+    ) -> FloatArray:
         """Return the (n,) normal loads [N]; no wheel pulls on the ground.
 
         Where the linear map asks a wheel for a negative load, the wheel has lifted off: it gets 0
         and the others are scaled so that the sum stays ``m f_z``.
+
+        Parameters
+        ----------
+        specific_force : sequence of float
+            x, y, z [m/s^2].
+        pull, moment : sequence of float, optional
+            Per wheel [N], T - F r [N m]; default: pull shared evenly, load below the hub.
         """
-        loads = self.matrix @ np.asarray(specific_force, dtype=float)
+        force = np.asarray(specific_force, dtype=float)
+        loads = self.by_force @ force
+        if pull is not None:
+            loads = loads + self.by_pull @ np.asarray(pull, dtype=float)
+        if moment is not None:
+            loads = loads + self.by_moment @ np.asarray(moment, dtype=float)
         if loads.min() < 0.0:
             total = loads.sum()
             loads = np.maximum(loads, 0.0)
@@ -101,71 +124,100 @@ def load_distribution(
         share = np.asarray(shares, dtype=float)
         if share.shape != (n,) or share.min() < 0.0 or share.sum() <= 0.0:
             raise ValueError(f'shares must be {n} numbers that are not negative, got {shares}')
-        matrix = np.zeros((n, 3))
-        matrix[:, 2] = mass * share / share.sum()
-        return LoadDistribution(matrix)
+        by_force = np.zeros((n, 3))
+        by_force[:, 2] = mass * share / share.sum()
+        return LoadDistribution(by_force, np.zeros((n, n)), np.zeros((n, n)))
 
     cg = np.asarray(centre_of_gravity, dtype=float)
-    x, y = position[:, 0] - cg[0], position[:, 1] - cg[1]
     height = cg[2] - contact_height
-    rows = [np.ones(n), x, y]
-    sides = [
-        mass * np.array([0.0, 0.0, 1.0]),
-        mass * np.array([-height, 0.0, 0.0]),
-        mass * np.array([0.0, -height, 0.0]),
-    ]
+    balances = _Balances(n)
+    balances.add(np.ones(n), force=(0.0, 0.0, mass))
+    balances.add(position[:, 0] - cg[0], force=(-mass * height, 0.0, 0.0), moment=np.full(n, -1.0))
+    balances.add(position[:, 1] - cg[1], force=(0.0, -mass * height, 0.0))
     if suspension == 'rocker_bogie':
         if rocker_pivot is None or bogie_pivot is None:
             raise ValueError('rocker_bogie needs the positions of its rocker and bogie pivots')
         _close_rocker_bogie(
-            rows,
-            sides,
+            balances,
             position,
-            contact_height,
-            np.asarray(rocker_pivot, dtype=float),
-            np.asarray(bogie_pivot, dtype=float),
+            mass,
+            (float(rocker_pivot[0]), float(rocker_pivot[1]) - contact_height),
+            (float(bogie_pivot[0]), float(bogie_pivot[1]) - contact_height),
             bogie_wheels,
         )
-    # Fewer equations than wheels: the least-norm solution is that of equal springs.
-    return LoadDistribution(np.linalg.pinv(np.array(rows)) @ np.array(sides))
+    return balances.solve()
+
+
+class _Balances:
+    """Rows of the balances: coefficients of the loads, and of what stands on the right."""
+
+    def __init__(self, count: int) -> None:
+        self._count = count
+        self._rows: list[FloatArray] = []
+        self._force: list[FloatArray] = []
+        self._pull: list[FloatArray] = []
+        self._moment: list[FloatArray] = []
+
+    def add(
+        self,
+        row: FloatArray,
+        force: Vector = (0.0, 0.0, 0.0),
+        pull: FloatArray | None = None,
+        moment: FloatArray | None = None,
+    ) -> None:
+        zero = np.zeros(self._count)
+        self._rows.append(row)
+        self._force.append(np.asarray(force, dtype=float))
+        self._pull.append(zero if pull is None else pull)
+        self._moment.append(zero if moment is None else moment)
+
+    def solve(self) -> LoadDistribution:
+        # Fewer equations than wheels: the least-norm solution is that of equal springs.
+        solution = np.linalg.pinv(np.array(self._rows))
+        return LoadDistribution(
+            solution @ np.array(self._force),
+            solution @ np.array(self._pull),
+            solution @ np.array(self._moment),
+        )
 
 
 def _close_rocker_bogie(
-    rows: list[FloatArray],
-    sides: list[FloatArray],
+    balances: _Balances,
     position: FloatArray,
-    contact_height: float,
-    rocker: FloatArray,
-    bogie: FloatArray,
+    mass: float,
+    rocker: tuple[float, float],
+    bogie: tuple[float, float],
     bogie_wheels: str,
 ) -> None:
     """Add: no moment about each bogie pivot, equal moments of left and right rocker.
 
-    The pulls act below the pivots and turn the bogie; they enter as load times ``f_x / f_z``, which
-    is bilinear. To stay linear the arm is taken at equal loads: the bogie carries the share of its
-    wheels, so its pull is that share of ``m f_x``.
+    Pivots are x and height above the contact points. Pulls act below them; they are taken as the
+    even share of ``m f_x`` plus what `pull` says beyond it.
     """
     n = len(position)
-    arm_x = position[:, 0]
-    left = position[:, 1] > 0.0
-    mass = sides[0][2]
-    difference = np.zeros(n)
-    for side in (left, ~left):
+    x = position[:, 0]
+    difference, pull_difference, moment_difference = np.zeros(n), np.zeros(n), np.zeros(n)
+    even = np.eye(n) - 1.0 / n  # pull of each wheel beyond the even share
+    for sign, side in ((1.0, position[:, 1] > 0.0), (-1.0, position[:, 1] <= 0.0)):
         index = np.flatnonzero(side)
         if len(index) != 3:
             raise ValueError(f'rocker_bogie needs three wheels on each side, got {len(index)}')
-        rear_first = index[np.argsort(arm_x[index])]
+        rear_first = index[np.argsort(x[index])]
         pair = rear_first[:2] if bogie_wheels == 'rear' else rear_first[1:]
-        if not arm_x[pair].min() < bogie[0] < arm_x[pair].max():
+        if not x[pair].min() < bogie[0] < x[pair].max():
             raise ValueError('rocker_bogie: the bogie pivot must lie between the bogie wheels')
-        row = np.zeros(n)
-        row[pair] = arm_x[pair] - bogie[0]
-        rows.append(row)
-        pull_share = len(pair) / n
-        sides.append(mass * np.array([-(bogie[1] - contact_height) * pull_share, 0.0, 0.0]))
-        sign = 1.0 if side is left else -1.0
-        # Rocker: its single wheel at its own arm, the bogie's wheels at the bogie pivot.
-        difference[index] = sign * (arm_x[index] - rocker[0])
-        difference[pair] = sign * (bogie[0] - rocker[0])
-    rows.append(difference)
-    sides.append(np.zeros(3))
+        row, on_pair = np.zeros(n), np.zeros(n)
+        row[pair] = x[pair] - bogie[0]
+        on_pair[pair] = 1.0
+        balances.add(
+            row,
+            force=(-bogie[1] * mass * len(pair) / n, 0.0, 0.0),
+            pull=-bogie[1] * on_pair @ even,
+            moment=-on_pair,
+        )
+        # About the rocker pivot all wheels of the side act through their positions: the bogie's
+        # own balance has moved its pair to the bogie pivot.
+        difference[index] = sign * (x[index] - rocker[0])
+        pull_difference[index] = -sign * rocker[1]
+        moment_difference[index] = -sign
+    balances.add(difference, pull=pull_difference @ even, moment=moment_difference)

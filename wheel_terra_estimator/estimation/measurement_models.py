@@ -45,9 +45,9 @@ class WheelForces(NamedTuple):
 
     torque: float  # [N m]
     pull: float  # [N]
-    d_torque: tuple[float, float, float, float, float]
-    d_pull: tuple[float, float, float, float, float]
-    """By v/(r w), sinkage, ln shear strength, ln K, centroid shift."""
+    d_torque: tuple[float, float, float, float, float, float]
+    d_pull: tuple[float, float, float, float, float, float]
+    """By v/(r w), sinkage, ln shear strength, ln K, centroid, mound."""
 
 
 @dataclass(frozen=True)
@@ -84,6 +84,7 @@ class WheelModels:
         self._leaving_ratio = float(soil.leaving_angle_ratio)
         self._passes = [float(p) for p in wheels.passes]
         self._slip_radius = [float(r) for r in wheels.slip_radius]
+        self._radius = [float(r) for r in wheels.radius]
         self._modulus = []
         self._contacts = []
         for i in range(wheels.count):
@@ -118,6 +119,7 @@ class WheelModels:
         strength: float,
         modulus: float,
         centroid: float,
+        mound: float,
         rim_speed: float,
         leaving_angle: float,
     ) -> WheelForces:
@@ -133,14 +135,18 @@ class WheelModels:
             [m], [N].
         strength, modulus : float
             Logarithms of the factors on c and tan(phi), and on K.
-        centroid : float
-            Shift of the stress centroid [rad].
+        centroid, mound : float
+            Shift of the stress centroid over the entrance angle: at all slips, and for each
+            (s - 0.4)+^2 / 0.36, to the rear [-].
         rim_speed, leaving_angle : float
             |r w| [m/s]; measured leaving angle [rad], nan = not.
         """
         factor = math.exp(strength)
         cohesion, friction = self._cohesion * factor, self._tan_friction * factor
         shear_modulus = self._shear_modulus * math.exp(modulus)
+        high = max(0.6 - ratio, 0.0) / 0.6
+        depth = min(max(sinkage, 1e-4), self._radius[wheel])
+        angle = math.acos(1.0 - depth / self._radius[wheel])
         # Beyond three times the rim speed the shear is saturated long since.
         torque, pull, d_torque, d_pull, _ = self._forces.forces(
             wheel,
@@ -150,18 +156,24 @@ class WheelModels:
             cohesion,
             friction,
             shear_modulus,
-            centroid,
+            (centroid - mound * high * high) * angle,
             leaving_angle=leaving_angle,
             rim_speed=rim_speed,
             pass_number=self._passes[wheel],
         )
-        t, f = d_torque, d_pull
-        return WheelForces(
-            torque,
-            pull,
-            (t[0], t[1], t[3] * cohesion + t[4] * friction, t[5] * shear_modulus, t[6]),
-            (f[0], f[1], f[3] * cohesion + f[4] * friction, f[5] * shear_modulus, f[6]),
+        by_ratio = 2.0 * mound * high / 0.6 * angle
+        t, f = (
+            (
+                d[0] + d[6] * by_ratio,
+                d[1],
+                d[3] * cohesion + d[4] * friction,
+                d[5] * shear_modulus,
+                d[6] * angle,
+                -d[6] * angle * high * high,
+            )
+            for d in (d_torque, d_pull)
         )
+        return WheelForces(torque, pull, t, f)
 
     def bearing(
         self,

@@ -23,6 +23,7 @@ from wheel_terra_estimator.estimation.filter_settings import FilterSettings
 from wheel_terra_estimator.estimation.filter_state import (
     CENTROID,
     GRAVITY_BIAS,
+    MOUND,
     SHEAR_MODULUS,
     SHEAR_STRENGTH,
     SLIP_SINKAGE,
@@ -77,6 +78,7 @@ class _Run:
     torque_sum: list[float] = field(default_factory=list)
     torque_count: list[int] = field(default_factory=list)
     torque_held: list[float] = field(default_factory=list)
+    torque_now: list[float] = field(default_factory=list)  # smoothed, by sensor or model
     sinkage_sum: list[float] = field(default_factory=list)
     sinkage_count: list[int] = field(default_factory=list)
     sinkage_rejected: list[int] = field(default_factory=list)
@@ -98,6 +100,7 @@ class _Run:
     ratio: float = 0.95  # remembered v / rim speed
     ratio_std: float = 0.3
     drive_direction: float = 0.0
+    fresh_travel: float = 0.0  # [m] since the start or the last change of direction
     load: list[float] = field(default_factory=list)
     pull: list[float] = field(default_factory=list)
     pull_std: list[float] = field(default_factory=list)
@@ -151,6 +154,8 @@ class WheelSoilEstimator:
         self._monitor = StuckMonitor(self._stuck_tuning)
         # Below this rim speed v / rim speed is not told from noise.
         self._low_rim = max(3.0 * settings.rest_speed, 0.005)
+        # Until a contact is new all along, its shear is not that of the steady model.
+        self._contact_length = 0.5 * min(settings.rim_radius)
         rate = max(float(settings.sensors.imu_rate), 1.0)
         sensors = settings.sensors
         # Attitude errors change within about half a second over rough ground.
@@ -175,7 +180,7 @@ class WheelSoilEstimator:
         self._run.yaw_bias, self._run.yaw_bias_weight = old.yaw_bias, 0.5 * old.yaw_bias_weight
         self._run.rejected = dict(old.rejected)
         layout = self._layout
-        kept = [GRAVITY_BIAS, SHEAR_STRENGTH, SHEAR_MODULUS, SLIP_SINKAGE, CENTROID]
+        kept = [GRAVITY_BIAS, SHEAR_STRENGTH, SHEAR_MODULUS, SLIP_SINKAGE, CENTROID, MOUND]
         kept += range(layout.size)[layout.stiffness]
         prior = self._filter.covariance
         fresh = prior.copy()
@@ -194,6 +199,7 @@ class WheelSoilEstimator:
             torque_sum=[0.0] * n,
             torque_count=[0] * n,
             torque_held=[_NAN] * n,
+            torque_now=[0.0] * n,
             sinkage_sum=[0.0] * n,
             sinkage_count=[0] * n,
             sinkage_rejected=[0] * n,
@@ -237,7 +243,10 @@ class WheelSoilEstimator:
         P[SHEAR_STRENGTH, SHEAR_STRENGTH] = s.shear_strength_std**2
         P[SHEAR_MODULUS, SHEAR_MODULUS] = s.shear_modulus_std**2
         P[SLIP_SINKAGE, SLIP_SINKAGE] = 0.1**2
-        P[CENTROID, CENTROID] = 0.04**2
+        P[CENTROID, CENTROID] = 0.06**2
+        mound_known = 'soil_mound' in self._configuration.effects
+        mean[MOUND] = 0.0 if mound_known else 0.05
+        P[MOUND, MOUND] = 0.1**2
         n = s.wheel_count
         # Static sinkage by the bearing law: where the law carries the load at zero slip.
         for i in range(n):
@@ -249,8 +258,8 @@ class WheelSoilEstimator:
         P[layout.shear_error, layout.shear_error] = np.eye(n) * s.shear_error_std**2
         upper = np.full(layout.size, np.inf)
         upper[SPEED], upper[GRAVITY_BIAS] = 20.0, 2.0
-        upper[SHEAR_STRENGTH], upper[SHEAR_MODULUS] = 1.0, 1.5
-        upper[SLIP_SINKAGE], upper[CENTROID] = 0.8, 0.25
+        upper[SHEAR_STRENGTH], upper[SHEAR_MODULUS] = 1.0, 1.0
+        upper[SLIP_SINKAGE], upper[CENTROID], upper[MOUND] = 0.8, 0.3, 0.6
         upper[layout.stiffness], upper[layout.shear_error] = 3.0, 1.5
         lower = -upper
         upper[layout.sinkage] = [0.9 * r for r in s.rim_radius]
@@ -412,7 +421,7 @@ class WheelSoilEstimator:
             run.force = (window.force_x / count, window.force_y / count, window.force_z / count)
             run.force_known = True
             run.yaw_rate = window.yaw_rate / count
-            run.load = [float(w) for w in s.load.loads(run.force)]
+            run.load = self._loads()
         rim = self._representative_rim(run.yaw_rate)
         self._follow_direction(rim)
         rims = [self._rim(i) for i in range(s.wheel_count)]
@@ -424,6 +433,15 @@ class WheelSoilEstimator:
         self._fuse_rest(time, rims, rim, still)
         self._fuse_models(dt, rims, still)
         self._after(time, dt, rim, rims, still, before)
+
+    def _loads(self) -> list[float]:
+        """Return the wheel loads for the last specific force, pulls and torques [N]."""
+        run, s = self._run, self._settings
+        moment = [
+            (torque if torque == torque else 0.0) - pull * r
+            for torque, pull, r in zip(run.torque_now, run.pull, s.rim_radius, strict=True)
+        ]
+        return [float(w) for w in s.load.loads(run.force, run.pull, moment)]
 
     def _follow_direction(self, rim: float | None) -> None:
         """Forget v / rim speed where the drive changes its direction (up becomes down)."""
@@ -437,6 +455,7 @@ class WheelSoilEstimator:
                 run.ratio = min(max(0.9 - demand, 0.2), 1.1)
             run.ratio_std = 0.3
             run.drive_direction = direction
+            run.fresh_travel = 0.0
 
     def _predict(self, time: float, dt: float, rims: list[float], still: bool) -> None:
         run, s, layout = self._run, self._settings, self._layout
@@ -456,13 +475,14 @@ class WheelSoilEstimator:
         travel = 0.0
         if not still and dt > 0.0:
             travel = self._predict_wheels(x, mean, F, Q, dt, rims)
+        run.fresh_travel += travel
         if travel > 0.0:
             walk = float(s.filter.soil_walk) ** 2 * travel
             known = run.reference_time is not None and time - run.reference_time < 20.0
             learn = walk if known else 0.1 * walk
             forget = math.exp(-travel / 100.0)
             for index, walk_std in (
-                (SHEAR_STRENGTH, 0.05),
+                (SHEAR_STRENGTH, 0.1),
                 (SHEAR_MODULUS, 0.1),
                 (SLIP_SINKAGE, 0.05),
             ):
@@ -471,7 +491,8 @@ class WheelSoilEstimator:
                 Q[index, index] = walk_std**2 * learn
             mean[CENTROID] *= forget
             F[CENTROID, CENTROID] = forget
-            Q[CENTROID, CENTROID] = 0.03**2 * walk
+            Q[CENTROID, CENTROID] = 0.05**2 * walk
+            Q[MOUND, MOUND] = 0.05**2 * walk
             n = s.wheel_count
             k = layout.stiffness
             Q[k, k] = (0.15**2 + np.eye(n) * 0.3**2) * walk
@@ -672,7 +693,9 @@ class WheelSoilEstimator:
             if run.torque_count[i]:
                 run.torque_held[i] = torque[i]
             run.torque_sum[i], run.torque_count[i] = 0.0, 0
-        if not still and dt > 0.0:
+        if still:
+            run.fresh_travel = 0.0
+        elif run.fresh_travel > self._contact_length:
             self._model_rows(rims, torque, residuals, variances, rows)
         if rows:
             self._filter.update(np.array(residuals), np.array(rows), np.array(variances))
@@ -754,13 +777,14 @@ class WheelSoilEstimator:
         forces = self._forces(i, rim, direction)
         row_pull, row_torque = np.zeros(layout.size), np.zeros(layout.size)
         for row, derivatives in ((row_pull, forces.d_pull), (row_torque, forces.d_torque)):
-            by_ratio, by_sinkage, by_strength, by_modulus, by_centroid = derivatives
+            by_ratio, by_sinkage, by_strength, by_modulus, by_centroid, by_mound = derivatives
             # The ratio is that of the direction of rolling: the two signs cancel.
             row[SPEED] = by_ratio / abs(rim)
             row[zi] = direction * by_sinkage
             row[SHEAR_STRENGTH] = row[ei] = direction * by_strength
             row[SHEAR_MODULUS] = direction * by_modulus
             row[CENTROID] = direction * by_centroid
+            row[MOUND] = direction * by_mound
         return direction * forces.pull, direction * forces.torque, row_pull, row_torque
 
     def _forces(self, i: int, rim: float, direction: float) -> WheelForces:
@@ -776,6 +800,7 @@ class WheelSoilEstimator:
             float(x[SHEAR_STRENGTH] + x[layout.shear_error.start + i]),
             float(x[SHEAR_MODULUS]),
             float(x[CENTROID]),
+            float(x[MOUND]),
             abs(rim),
             self._leaving(i),
         )
@@ -807,7 +832,7 @@ class WheelSoilEstimator:
         self._pulls(rims)
 
     def _pulls(self, rims: list[float]) -> None:
-        run, s, layout = self._run, self._settings, self._layout
+        run, s = self._run, self._settings
         P = self._filter.covariance
         slope_share = run.force[0] / max(run.force[2], 0.1)
         zero = float(s.sensors.torque_zero_std)
@@ -818,11 +843,13 @@ class WheelSoilEstimator:
             if rim != rim or abs(rim) < 2.0 * s.rest_speed or load < 1e-3:
                 # Static friction carries the slope.
                 run.pull[i] = load * slope_share
+                run.torque_now[i] = run.pull[i] * s.rim_radius[i]
                 run.pull_std[i] = (0.1 * load if run.force_known else load) + 1e-3
                 continue
             direction = 1.0 if rim > 0.0 else -1.0
             forces = self._forces(i, rim, direction)
             run.pull[i] = direction * forces.pull
+            run.torque_now[i] = direction * forces.torque
             radius = s.shear_radius[i]
             run.pull_std[i] = math.sqrt(
                 max(float(variances[i]), 0.0)
@@ -925,6 +952,7 @@ class WheelSoilEstimator:
                     strength,
                     float(x[SHEAR_MODULUS]),
                     float(x[CENTROID]),
+                    float(x[MOUND]),
                     _NAN,
                     _NAN,
                 ).pull

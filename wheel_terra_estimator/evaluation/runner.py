@@ -1,0 +1,101 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Run the estimator over a drive and keep what it said, aligned with the truth."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.estimation.estimates import EstimateSet
+from wheel_terra_estimator.estimation.measurements import (
+    InertialReading,
+    Measurement,
+    ReferenceVelocity,
+    SinkageReading,
+    WheelOdometry,
+)
+
+FloatArray = NDArray[np.float64]
+
+MODES = ('reference', 'no_reference', 'no_torque', 'no_sinkage', 'no_orientation')
+"""What the estimator gets: everything, or everything but one input."""
+
+
+@dataclass(frozen=True)
+class Record:
+    """Estimates of a drive: k sets, n wheels."""
+
+    stamp: NDArray[np.int64]
+    slip: FloatArray
+    slip_std: FloatArray
+    sinkage: FloatArray
+    sinkage_std: FloatArray
+    drawbar_pull: FloatArray
+    drawbar_pull_std: FloatArray
+    normal_load: FloatArray
+    slip_class: NDArray[np.uint8]
+    stuck: NDArray[np.bool_]
+    rim_travel_left: FloatArray
+    speed: FloatArray  # (k,)
+    speed_std: FloatArray
+    health: dict[str, Any]
+
+
+def without(measurements: Iterable[Measurement], mode: str) -> Iterable[Measurement]:
+    """Take out of a drive what a mode does not get."""
+    for measurement in measurements:
+        if mode == 'no_reference' and isinstance(measurement, ReferenceVelocity):
+            continue
+        if mode == 'no_sinkage' and isinstance(measurement, SinkageReading):
+            continue
+        if mode == 'no_torque' and isinstance(measurement, WheelOdometry):
+            yield replace(measurement, torque=np.full_like(measurement.torque, np.nan))
+        elif mode == 'no_orientation' and isinstance(measurement, InertialReading):
+            yield replace(measurement, orientation=None)
+        else:
+            yield measurement
+
+
+def run_estimator(
+    configuration: Configuration, measurements: Iterable[Measurement]
+) -> tuple[list[EstimateSet], dict[str, Any]]:
+    """Run the core over measurements in the order of arrival; return its sets and its health."""
+    from wheel_terra_estimator.estimation.core import EstimatorCore
+
+    core = EstimatorCore(configuration)
+    sets: list[EstimateSet] = []
+    for measurement in measurements:
+        sets += core.add(measurement)
+    sets += core.flush()
+    return sets, core.health()
+
+
+def record(sets: Sequence[EstimateSet], health: dict[str, Any]) -> Record:
+    """Stack the sets of a drive."""
+    return Record(
+        stamp=np.array([s.stamp for s in sets], dtype=np.int64),
+        speed=np.array([s.forward_velocity for s in sets]),
+        speed_std=np.sqrt([s.forward_velocity_variance for s in sets]),
+        stuck=np.array([s.stuck for s in sets]),
+        health=health,
+        **{
+            name: np.array([getattr(s, name) for s in sets])
+            for name in (
+                'slip',
+                'slip_std',
+                'sinkage',
+                'sinkage_std',
+                'drawbar_pull',
+                'drawbar_pull_std',
+                'normal_load',
+                'slip_class',
+                'rim_travel_left',
+            )
+        },
+    )
