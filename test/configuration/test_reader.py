@@ -140,8 +140,10 @@ def test_effects_that_are_on():
             'effects.bulldozing.kb': 1.0,
         }
     )
-    assert c.effects == {'lug_digging': {'kd': 2.0}}
-    assert c.effects_std == {'lug_digging': {'kd': 0.1}}
+    assert list(c.effects) == list(c.effects_std) == ['lug_digging']
+    assert c.effects['lug_digging']['kd'] == 2.0
+    assert c.effects_std['lug_digging']['kd'] == 0.1
+    assert set(c.effects['lug_digging']) == set(catalogue()['lug_digging'].defaults())
 
 
 def test_arrays_of_any_kind_and_parameters_of_every_node():
@@ -351,7 +353,7 @@ def test_a_written_model_is_read_back(tmp_path):
     assert file.read_text().startswith('# Made by a test.\n# Second line.\n/**:\n')
     again = reader.load([file])
     assert again.flat() == c.flat() and again.stated == c.stated
-    assert again.effects == {'lug_digging': {'kd': 1.25}}
+    assert again.effects['lug_digging']['kd'] == 1.25
     keys = ['soil.cohesion', 'effects.lug_digging.enabled', 'provenance']
     c.write(file, keys)
     part = reader.load([file], complete=False)
