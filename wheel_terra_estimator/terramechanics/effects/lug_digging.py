@@ -10,18 +10,33 @@ from typing import Any
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter
 
+_STEADY = 0.95  # slip above which a steady state is not known; the term grows no further there
+
 
 def _dig(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
-    contact.sinkage = contact.sinkage + p.kd * contact.lug_height * maths.maximum(contact.slip, 0.0)
+    slip = maths.maximum(contact.slip, 0.0)
+    again = slip / (1.0 - maths.minimum(slip, _STEADY))  # lugs per advance, less the first
+    contact.sinkage = contact.sinkage + p.kd * contact.lug_height * slip * (1.0 + p.rework * again)
 
 
 EFFECT = Effect(
     name='lug_digging',
     claim='lugs dig soil out: sinkage grows with lug height times slip, forces do not change',
-    symbol='z += kd h s',
+    symbol='z += kd h s  (rework = 1: kd h s/(1 - s))',
     parameters=(
         EffectParameter(
             'kd', '-', 1.0, 0.0, 4.0, 1.0, 'half_normal', 'share of the lug height dug at s = 1'
+        ),
+        EffectParameter(
+            'rework',
+            '-',
+            0.0,
+            0.0,
+            1.0,
+            0.3,
+            'half_normal',
+            'digging counted per rim travel (0, equation 12) or per advance (1): convex in slip',
+            free=False,
         ),
     ),
     touches=frozenset({'sinkage'}),

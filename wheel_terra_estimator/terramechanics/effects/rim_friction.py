@@ -1,0 +1,48 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Soil slides on a smooth rim at less than its internal friction."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+from wheel_terra_estimator.terramechanics.contact import Contact
+from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter
+
+
+def _slide(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
+    bare = maths.exp(-contact.lug_height / p.ring_height)
+    contact.tan_friction = contact.tan_friction * (1.0 - p.loss * bare)
+
+
+EFFECT = Effect(
+    name='rim_friction',
+    claim='soil slides on a smooth rim at less than its internal friction; lugs restore it',
+    symbol='tan(phi) *= 1 - loss exp(-h/ring_height)',
+    parameters=(
+        EffectParameter(
+            'loss', '-', 0.25, 0.0, 0.9, 0.25, 'half_normal', 'share of the friction lost at h = 0'
+        ),
+        EffectParameter(
+            'ring_height',
+            'm',
+            0.003,
+            0.0005,
+            0.05,
+            0.002,
+            'normal',
+            'lug height at which a ring of soil begins to move with the wheel',
+            prior_mean=0.003,
+            free=False,
+        ),
+    ),
+    touches=frozenset({'sinkage', 'drawbar_pull', 'torque'}),
+    needs=('lug_height',),
+    confounded_with={'cohesion': 'a load series; a lugged wheel'},
+    validity='metal rims in dry sand; the transition between smooth and lugged is assumed',
+    source='Ding et al. 2010 section 2.4 in words (metal-soil friction is below soil friction); '
+    'formula reconstructed',
+    candidate=False,
+    on_inputs=_slide,
+)
