@@ -126,7 +126,7 @@ def test_engine_grows_beyond_the_largest_time_step(tmp_path, factor, stable, rat
     assert (off < 0.05) if stable else (off > 0.5)
 
 
-SMALL = ['-p', 'bed.length:=0.45', '-p', 'operation.start:=0.2', '-p', 'numerics.frames:=4',
+SMALL = ['-p', 'bed.length:=0.45', '-p', 'bed.grain_scale:=2.5', '-p', 'operation.start:=0.2', '-p', 'numerics.frames:=4',
          '-p', 'bed.settling_time:=0.8', '-p', 'operation.speed_factor:=8.0']  # fmt: skip
 
 
@@ -205,7 +205,7 @@ def test_interrupted_run_goes_on_and_leaves_no_half_result(coarse_run, tmp_path,
     series = np.loadtxt(output / 'time_series.csv', delimiter=',', skiprows=1)
     assert series[: len(kept), 1] == pytest.approx(kept[:, 1], rel=1e-6)
     steps = np.diff(series[:, 0])
-    assert steps == pytest.approx(np.full_like(steps, steps[0]), rel=1e-4)
+    assert steps == pytest.approx(np.full_like(steps, steps[0]), rel=1e-3)
     # No jump where it was taken up: neither of the axle nor of the load that it carries.
     jump = np.abs(np.diff(series[:, 1]))
     assert jump[len(kept) - 1] < 3 * np.median(jump) + 1e-4
@@ -233,3 +233,25 @@ def test_engine_module_is_not_imported_by_the_package():
     )
     subprocess.run([sys.executable, '-c', code], check=True)
     assert engine_module.SOIL == 1
+
+
+def test_bed_that_does_not_settle_is_said(tmp_path, capsys):
+    command = ['soilbin', 'run', 'quick', '-o', str(tmp_path / 'out'), '--no-cache', *SMALL]
+    command += ['-p', 'bed.settled_speed:=1.0e-9', '-p', 'bed.settling_time:=0.03']
+    assert main(command) == 2
+    said = capsys.readouterr().err.strip().splitlines()[-1]
+    assert 'still moves at' in said
+    assert 'raise soilbin.bed.settling_time' in said
+
+
+def test_damaged_kept_bed_is_made_again(coarse_run, tmp_path):
+    _, cache = coarse_run
+    broken = tmp_path / 'cache'
+    broken.mkdir()
+    for path in cache.iterdir():
+        (broken / path.name).write_bytes(path.read_bytes()[:2000])
+    command = ['soilbin', 'run', 'quick', '--wheel', '2', '-o', str(tmp_path / 'out'),
+               '--cache', str(broken), *SMALL, '--duration', '2']  # fmt: skip
+    assert main(command) == 0
+    # The two that this run needed are whole again.
+    assert sum(path.stat().st_size > 10_000 for path in broken.iterdir()) == 2

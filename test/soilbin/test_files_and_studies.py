@@ -190,3 +190,33 @@ def test_engine_absent_or_failing_gives_one_line(tmp_path, monkeypatch, capsys, 
     assert len(said) == 1
     assert words in said[0]
     assert not (output / 'summary.json').exists()
+
+
+def test_full_disk_at_the_end_leaves_no_summary(tmp_path, monkeypatch, capsys):
+    import numpy as np
+
+    from wheel_terra_estimator.soilbin import launch
+
+    def full(*_, **__):
+        raise OSError(28, 'No space left on device')
+
+    def finished(case, work, cache, report):
+        work.mkdir(parents=True)
+        np.save(work / 'series.npy', np.zeros((5, 12)))
+        return {'stopped': ''}
+
+    monkeypatch.setattr(launch, 'run_case', finished)
+    monkeypatch.setattr(np, 'savetxt', full)
+    output = tmp_path / 'out'
+    assert main(['soilbin', 'run', 'quick', '-o', str(output), '--no-cache']) == 2
+    assert 'No space left on device; free some space' in capsys.readouterr().err
+    assert not (output / 'summary.json').exists()
+    assert (output / '.work' / 'series.npy').exists()  # --resume only has to write it again
+
+
+def test_dask_absent_gives_one_line(tmp_path, monkeypatch):
+    import sys
+
+    monkeypatch.setitem(sys.modules, 'dask.distributed', None)
+    with pytest.raises(UserError, match=r"pip install 'wheel_terra_estimator\[cluster\]'"):
+        study.run_study(jobs(1), tmp_path / 'a.csv', tmp_path, None, 1, dask='local')

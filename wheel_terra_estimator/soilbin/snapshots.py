@@ -8,11 +8,13 @@ import dataclasses
 import hashlib
 import json
 import os
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
 from wheel_terra_estimator.soilbin.case import Case
 
+ROOM = 100_000_000  # [bytes] free on the disk, or nothing is kept: the engine does not say
 FORMAT = 1  # raise when the stages change what a bed is
 
 
@@ -52,6 +54,8 @@ def store(target: Path | None, write: Callable[[Path], None]) -> None:
     part = target.with_suffix(f'.part{os.getpid()}')
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
+        if shutil.disk_usage(target.parent).free < ROOM:
+            return
         write(part)
         if part.exists() and part.stat().st_size > 0:
             part.replace(target)

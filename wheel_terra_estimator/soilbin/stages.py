@@ -73,17 +73,26 @@ class Run:
         """Stages (i) and (ii): settle, turn; both are kept for other runs."""
         settled = snapshots.path(self.cache, self.case, 'settled')
         turned = snapshots.path(self.cache, self.case, 'turned')
-        if turned and turned.exists():
-            self.engine.load_bed(turned)
-        else:
-            if settled and settled.exists():
-                self.engine.load_bed(settled)
-            else:
+        if not self._load_kept(turned):
+            if not self._load_kept(settled):
                 self.consolidate()
                 snapshots.store(settled, self.engine.save)
             self.turn()
             snapshots.store(turned, self.engine.save)
         self.engine.tilt(self.case.operation.slope, self.case.operation.slope, 1)
+
+    def _load_kept(self, bed: Path | None) -> bool:
+        """Load a kept bed; one that the engine cannot read is removed and made again."""
+        if bed is None or not bed.exists():
+            return False
+        try:
+            self.engine.load_bed(bed)
+        except Exception:  # the engine knows no other kind
+            bed.unlink(missing_ok=True)
+            self.engine.close()
+            self.engine = BinEngine(self.case)
+            return False
+        return True
 
     def consolidate(self) -> None:
         """Stage (i): the grains settle under their own weight in the level bin."""
