@@ -185,7 +185,7 @@ class EstimatorNode(Node):
 
 def spin(node: Node) -> None:
     """Serve a node until the context ends."""
-    if node.get_parameter('executor').value == 'events':
+    if node.has_parameter('executor') and node.get_parameter('executor').value == 'events':
         from rclpy.experimental import EventsExecutor
 
         executor = EventsExecutor()
