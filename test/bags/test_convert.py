@@ -25,6 +25,7 @@ from wheel_terra_estimator.bags.convert import (
 )
 from wheel_terra_estimator.estimation.estimates import EstimateSet
 
+
 @pytest.fixture
 def converter(rover: Any) -> InputConverter:
     return InputConverter(input_layout(rover))

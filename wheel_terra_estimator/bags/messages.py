@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from wheel_terra_estimator.bags.convert import BASE_FRAME, JOINT_STATE
 from wheel_terra_estimator.bags.diagnostics import Status
@@ -119,7 +119,7 @@ class MessageFactory:
         header: Any,
         specific_force: Sequence[float],
         angular_rate: Sequence[float],
-        orientation: Sequence[float] | None,
+        orientation: Sequence[float] | NDArray[np.float64] | None,
         variances: tuple[float, float, float] = (0.0, 0.0, 0.0),
     ) -> Any:
         """Return an Imu; ``variances`` of orientation, angular rate and specific force."""
@@ -129,7 +129,9 @@ class MessageFactory:
         return self.make(
             'sensor_msgs/msg/Imu',
             header=header,
-            orientation=self.quaternion(*(orientation or (0.0, 0.0, 0.0, 1.0))),
+            orientation=self.quaternion(
+                *((0.0, 0.0, 0.0, 1.0) if orientation is None else orientation)
+            ),
             orientation_covariance=of_orientation,
             angular_velocity=self.vector(*angular_rate),
             angular_velocity_covariance=of_rate,

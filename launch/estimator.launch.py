@@ -1,0 +1,53 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Start the estimator node.
+
+``ros2 launch wheel_terra_estimator estimator.launch.py params_file:=generic_six_wheel``
+"""
+
+from launch.actions import DeclareLaunchArgument, OpaqueFunction
+from launch.substitutions import LaunchConfiguration
+from launch_ros.actions import Node
+
+from launch import LaunchDescription
+from wheel_terra_estimator.configuration import shipped
+
+ARGUMENTS = {
+    'params_file': (
+        'generic_six_wheel',
+        'parameter files, separated by commas, later ones win: paths, or names of shipped files',
+    ),
+    'namespace': ('', 'namespace of the node and its topics'),
+    'use_sim_time': ('false', 'take the time from /clock'),
+    'log_level': ('info', 'debug, info, warn, error, fatal'),
+    'record_arrival': ('', 'file that logs the order in which inputs arrive'),
+}
+
+
+def start(context):
+    """Make the node, once the arguments are known."""
+    values = {name: LaunchConfiguration(name).perform(context) for name in ARGUMENTS}
+    files = [str(shipped.find(name.strip())) for name in values['params_file'].split(',')]
+    own = {'use_sim_time': values['use_sim_time'].lower() in ('true', '1', 'yes', 'on')}
+    if values['record_arrival']:
+        own['record_arrival'] = values['record_arrival']
+    return [
+        Node(
+            package='wheel_terra_estimator',
+            executable='estimator_node',
+            name='wheel_terra_estimator',
+            namespace=values['namespace'],
+            parameters=[*files, own],
+            arguments=['--ros-args', '--log-level', values['log_level']],
+            output='screen',
+        )
+    ]
+
+
+def generate_launch_description():
+    """Declare the arguments and start the node."""
+    declared = [
+        DeclareLaunchArgument(name, default_value=default, description=meaning)
+        for name, (default, meaning) in ARGUMENTS.items()
+    ]
+    return LaunchDescription([*declared, OpaqueFunction(function=start)])
