@@ -204,7 +204,7 @@ class _WindowFinder:
         self.configuration = configuration
         self.settings = FilterSettings.from_configuration(configuration)
         self.stretches: Counter[str] = Counter()
-        self.seconds: Counter[str] = Counter()
+        self.seconds: dict[str, float] = {}
         self._last = ''
 
     def search(self) -> list[Window]:
@@ -247,7 +247,7 @@ class _WindowFinder:
         if one or quality != self._last:
             self.stretches[quality] += 1
         self._last = quality
-        self.seconds[quality] += step
+        self.seconds[quality] = self.seconds.get(quality, 0.0) + step
         return now + step
 
     def _duration(self, rate: float) -> tuple[float, int]:
@@ -367,14 +367,14 @@ def _drifts(values: FloatArray, allowed: float) -> bool:
 
 def _correlation(blocks: Iterable[FloatArray]) -> float:
     """Return the lag-one correlation within blocks (k, n), pooled, corrected for shortness."""
-    above = below = weight = 0.0
+    above = below = 0.0
+    length = 0
     for block in blocks:
         d = block - block.mean(0)
         d = d[:, np.isfinite(d).all(0)]
         if d.size:
             above += float((d[1:] * d[:-1]).sum())
             below += float((d * d).sum())
-            weight += d.shape[1]
             length = len(d)
     if below <= 0.0:
         return 0.0
@@ -561,7 +561,7 @@ def _wheel(wheels: object, i: int) -> dict[str, float]:
 def _notes(
     finder: _WindowFinder, windows: list[Window], merged: list[Window], left_out: int
 ) -> tuple[str, ...]:
-    used = finder.seconds[GOOD]
+    used = finder.seconds.get(GOOD, 0.0)
     total = sum(finder.seconds.values())
     passages = [w.passages for w in windows]
     kind = 'smooth wheels'
@@ -576,7 +576,7 @@ def _notes(
     rest = [
         f'{key} {finder.seconds[key]:.0f} s'
         for key in QUALITIES
-        if key != GOOD and finder.seconds[key] >= 0.5
+        if key != GOOD and finder.seconds.get(key, 0.0) >= 0.5
     ]
     if rest:
         notes.append('not used: ' + ', '.join(rest))

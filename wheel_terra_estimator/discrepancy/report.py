@@ -1,0 +1,318 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""The report of a diagnosis for people: one HTML file, and its pictures beside it."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Callable
+from io import BytesIO
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from wheel_terra_estimator.discrepancy import report_pictures as pictures
+from wheel_terra_estimator.discrepancy.model_file import corrected
+from wheel_terra_estimator.discrepancy.result import Diagnosis, FittedParameter, NextMeasurement
+from wheel_terra_estimator.discrepancy.table import QUANTITIES
+from wheel_terra_estimator.reporting.html import render, write_page
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+TEMPLATES = Path(__file__).parent / 'templates'
+_RESOLUTION = 120  # [dots per inch]
+_TONES = {'agrees': 'good', 'named': 'warn', 'unexplained': 'bad'}
+
+
+def write_report(folder: str | Path, diagnosis: Diagnosis) -> Path:
+    """Write ``report.html`` with its pictures into a folder that exists.
+
+    Parameters
+    ----------
+    folder : str or pathlib.Path
+        Pictures are written there as PNG files as well; the page itself needs none of them.
+    diagnosis : Diagnosis
+        What was found.
+
+    Returns
+    -------
+    pathlib.Path
+        The page.
+    """
+    folder = Path(folder)
+    configuration, keys = corrected(diagnosis)
+    new, old = configuration.flat(), diagnosis.configuration.flat()
+    page = render(
+        'diagnosis.html',
+        TEMPLATES,
+        diagnosis=diagnosis,
+        tone=_TONES[diagnosis.verdict],
+        title=Path(diagnosis.table.name).name,
+        cards=_cards(diagnosis),
+        figures=_figures(folder, diagnosis),
+        gap=[_gap_row(name, item) for name, item in diagnosis.gap.items()],
+        effects=[_effect(effect) for effect in diagnosis.effects],
+        candidates=_candidates(diagnosis),
+        soil=[_soil_row(shift) for shift in diagnosis.soil],
+        noise=_noise(diagnosis),
+        outliers=[
+            (int(diagnosis.table.lines[row]), pictures.words(quantity), f'{size:.1f}')
+            for row, quantity, size in diagnosis.outliers
+        ],
+        next_measurements=[_next(item) for item in diagnosis.next_measurement],
+        visible=[
+            (name, f'{parameter} {number(size)}{_unit(unit)}')
+            for name, (parameter, size, unit) in sorted(diagnosis.smallest_visible.items())
+        ],
+        changes=[
+            (key, shown(old.get(key)), shown(new[key]))
+            for key in keys
+            if key in new and shown(old.get(key)) != shown(new[key])
+        ],
+        sources=_sources(diagnosis),
+    )
+    path = folder / 'report.html'
+    write_page(path, page)
+    return path
+
+
+def number(value: float, digits: int = 3) -> str:
+    """Return a number for people: significant digits, no exponent where it is readable without."""
+    if not np.isfinite(value):
+        return '-'
+    if value == 0.0:
+        return '0'
+    text = f'{value:.{digits}g}'
+    if 'e' in text and 1e-4 <= abs(value) < 1e5:
+        decimals = max(digits - 1 - int(np.floor(np.log10(abs(value)))), 0)
+        text = f'{value:.{decimals}f}'
+    return text
+
+
+def shown(value: Any) -> str:
+    """Return a configuration value for people."""
+    if value is None:
+        return 'not set'
+    if isinstance(value, bool):
+        return 'true' if value else 'false'
+    if isinstance(value, float):
+        return number(value, 4)
+    if isinstance(value, list | tuple):
+        return '[' + ', '.join(shown(item) for item in value) + ']'
+    return str(value)
+
+
+def _unit(unit: str) -> str:
+    return '' if unit in ('', '-') else f' {unit}'
+
+
+def _cards(diagnosis: Diagnosis) -> list[dict[str, str]]:
+    cards = []
+    if diagnosis.effects:
+        first = diagnosis.effects[0]
+        cards.append(
+            {'value': f'{100 * first.confidence:.0f} %', 'label': 'confidence of the name'}
+        )
+        if first.confounded_with:
+            cards.append(
+                {
+                    'value': f'{100 * first.confidence_of_set:.0f} %',
+                    'label': 'that it is the name or one it is confounded with',
+                }
+            )
+    worst = max(
+        diagnosis.gap.items(),
+        key=lambda item: item[1].before / (item[1].noise or 1e9),
+        default=None,
+    )
+    if worst is not None:
+        name, item = worst
+        scale, unit = pictures.SHOWN[name]
+        last = item.after if diagnosis.effects else item.refit
+        cards.append(
+            {
+                'value': f'{number(scale * item.before, 2)} → {number(scale * last, 2)} {unit}',
+                'label': f'rms error of {pictures.words(name)} on rows the fit did not see',
+            }
+        )
+    shares = [g.shrink for g in diagnosis.gap.values() if g.shrink is not None]
+    if diagnosis.effects and shares:
+        cards.append(
+            {'value': f'{100 * max(shares):.0f} %', 'label': 'of the excess gap closed at best'}
+        )
+    cards.append({'value': str(len(diagnosis.table)), 'label': 'rows'})
+    cards.append({'value': f'{diagnosis.seconds:.2f} s', 'label': 'time of the diagnosis'})
+    return cards
+
+
+def _figures(folder: Path, diagnosis: Diagnosis) -> dict[str, Any]:
+    """Draw, write and embed every picture that this diagnosis has."""
+    drawn: dict[str, Any] = {'residuals': []}
+
+    def keep(name: str, draw: Callable[[], Figure | None]) -> str | None:
+        figure = draw()
+        if figure is None:
+            return None
+        buffer = BytesIO()
+        figure.savefig(buffer, format='png', dpi=_RESOLUTION, metadata={'Software': None})
+        (folder / f'{name}.png').write_bytes(buffer.getvalue())
+        return 'data:image/png;base64,' + base64.b64encode(buffer.getvalue()).decode()
+
+    drawn['parity'] = keep(
+        'measured_against_model', lambda: pictures.measured_against_model(diagnosis)
+    )
+    for name in pictures.colour_inputs(diagnosis):
+        source = keep(
+            f'residuals_by_{name}',
+            lambda name=name: pictures.residuals(diagnosis, name),  # type: ignore[misc]
+        )
+        drawn['residuals'].append((pictures.words(name), source))
+    drawn['where'] = keep('where', lambda: pictures.where_map(diagnosis))
+    drawn['signature'] = keep('signature', lambda: pictures.signature(diagnosis))
+    drawn['gap'] = keep('gap', lambda: pictures.gap(diagnosis))
+    proposed = next((m for m in diagnosis.next_measurement if m.rows is not None), None)
+    drawn['rivals'] = (
+        keep('next_measurement', lambda: pictures.rivals(proposed)) if proposed else None
+    )
+    drawn['rivals_title'] = proposed.what if proposed else ''
+    return drawn
+
+
+def _gap_row(name: str, item: Any) -> dict[str, str]:
+    scale, unit = pictures.SHOWN[name]
+    row = {
+        'name': f'{pictures.words(name)} [{unit}]',
+        'before': number(scale * item.before),
+        'refit': number(scale * item.refit),
+        'after': number(scale * item.after),
+        'noise': '-' if item.noise is None else number(scale * item.noise),
+        'floor': number(scale * item.floor, 2) if item.floor else '-',
+        'rows': str(item.rows),
+        'shrink': '-',
+    }
+    if item.shrink is not None:
+        row['shrink'] = f'{100 * item.shrink:.0f} %'
+        if item.shrink_low is not None and item.shrink_high is not None:
+            row['shrink'] += f' ({100 * item.shrink_low:.0f} to {100 * item.shrink_high:.0f})'
+    return row
+
+
+def _parameter(name: str, item: FittedParameter) -> str:
+    text = f'{name} = {number(item.value)} ± {number(item.std, 2)}{_unit(item.unit)}'
+    reach = item.upper - item.lower
+    if np.isfinite(reach) and min(item.value - item.lower, item.upper - item.value) < 1e-3 * reach:
+        text += ' (at its bound)'
+    return text
+
+
+def _effect(effect: Any) -> dict[str, Any]:
+    return {
+        'name': pictures.words(effect.name),
+        'key': effect.name,
+        'claim': effect.claim,
+        'parameters': [
+            (_parameter(name, item), item.meaning) for name, item in effect.parameters.items()
+        ],
+        'confidence': f'{100 * effect.confidence:.0f} %',
+        'confidence_of_set': f'{100 * effect.confidence_of_set:.0f} %',
+        'confounded': [
+            (pictures.words(name), effect.separates.get(name, ''))
+            for name in effect.confounded_with
+        ],
+        'remainder': effect.remainder,
+    }
+
+
+def _candidates(diagnosis: Diagnosis) -> list[dict[str, Any]]:
+    best = max((c.log_evidence for c in diagnosis.candidates), default=0.0)
+    span = max(best, 10.0)
+    rows = []
+    for candidate in diagnosis.candidates:
+        rows.append(
+            {
+                'label': pictures.words(candidate.label),
+                'chosen': bool(candidate.names)
+                and set(candidate.names) == {effect.name for effect in diagnosis.effects},
+                'parameters': [
+                    f'{key.split(".")[-1]} {number(item.value)} ± {number(item.std, 2)}'
+                    + _unit(item.unit)
+                    for key, item in candidate.parameters.items()
+                ],
+                'log_evidence': f'{candidate.log_evidence:.1f}',
+                'bar': f'{100 * float(np.clip(candidate.log_evidence / span, 0.0, 1.0)):.0f}',
+                'probability': _share(candidate.probability),
+                'held_out_gain': f'{candidate.held_out_gain:.1f}',
+                'fit': f'{candidate.chi2:.0f} / {candidate.degrees_of_freedom:.0f}',
+                'size': f'{candidate.size:.1f}',
+                'why_not': candidate.why_not,
+            }
+        )
+    return rows
+
+
+def _share(value: float) -> str:
+    if value < 0.001:
+        return '< 0.1 %'
+    return '> 99.9 %' if value > 0.999 else f'{100 * value:.1f} %'
+
+
+def _soil_row(shift: Any) -> dict[str, Any]:
+    return {
+        'name': pictures.words(shift.name),
+        'unit': '' if shift.unit == '-' else shift.unit,
+        'before': f'{number(shift.before)} ± {number(shift.prior_std, 2)}',
+        'refit': number(shift.refit),
+        'after': f'{number(shift.after)} ± {number(shift.after_std, 2)}',
+        'pull': f'{shift.pull:+.1f}',
+        'far': abs(shift.pull) > 2.0,
+        'left': f'{50 + 12.5 * float(np.clip(shift.pull, -4, 4)):.1f}',
+    }
+
+
+def _noise(diagnosis: Diagnosis) -> list[tuple[str, str, str]]:
+    rows = []
+    for q, name in enumerate(QUANTITIES):
+        if name in diagnosis.noise.origin and name in diagnosis.table.quantities:
+            scale, unit = pictures.SHOWN[name]
+            std = float(np.nanmedian(diagnosis.noise.std[:, q]))
+            rows.append(
+                (
+                    pictures.words(name),
+                    f'{number(scale * std, 2)} {unit}',
+                    diagnosis.noise.origin[name],
+                )
+            )
+    return rows
+
+
+def _next(item: NextMeasurement) -> dict[str, Any]:
+    rows = None
+    if item.rows is not None:
+        names = [name for name in item.rows if len(item.rows[name])]
+        count = len(item.rows[names[0]]) if names else 0
+        ranges = []
+        for name in names:
+            factor, unit = pictures.shown_input(name)
+            values = factor * np.asarray(item.rows[name], dtype=float)
+            low, high = float(values.min()), float(values.max())
+            text = number(low) if np.isclose(low, high) else f'{number(low)} to {number(high)}'
+            ranges.append(f'{pictures.words(name)} {text}{_unit(unit)}')
+        rows = f'{count} rows: ' + ', '.join(ranges)
+    return {
+        'what': item.what,
+        'rows': rows,
+        'separates': ' / '.join(pictures.words(name) for name in item.separates),
+        'now': f'{item.distance_now:.1f}',
+        'then': f'{item.distance_then:.1f}' if np.isfinite(item.distance_then) else 'decides',
+    }
+
+
+def _sources(diagnosis: Diagnosis) -> list[tuple[str, str]]:
+    """Sources of the effects used: the named ones and those that were on before."""
+    from wheel_terra_estimator.terramechanics.effects import catalogue
+
+    known = catalogue()
+    names = dict.fromkeys([*(e.name for e in diagnosis.effects), *diagnosis.base_effects])
+    return [(pictures.words(name), known[name].source) for name in names if name in known]

@@ -1,0 +1,446 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Pictures of a diagnosis. Every function returns a figure and leaves no global state behind."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wheel_terra_estimator.discrepancy.result import Diagnosis, NextMeasurement
+from wheel_terra_estimator.discrepancy.table import INPUT_UNITS, QUANTITIES
+from wheel_terra_estimator.reporting.style import LINE_COLOURS, picture_style
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+FloatArray = NDArray[np.float64]
+
+# How numbers are shown to people: factor and unit.
+SHOWN = {'sinkage': (1e3, 'mm'), 'drawbar_pull': (1.0, 'N'), 'torque': (1.0, 'N m')}
+SHOWN_INPUT = {
+    'slope': (180.0 / np.pi, 'deg'),
+    'wheel_radius': (1e3, 'mm'),
+    'wheel_width': (1e3, 'mm'),
+    'lug_height': (1e3, 'mm'),
+    'leaving_angle': (180.0 / np.pi, 'deg'),
+}
+BLUE, RED, GREEN, PURPLE = LINE_COLOURS[0], LINE_COLOURS[1], LINE_COLOURS[2], LINE_COLOURS[6]
+GREY = '#9aa5b1'
+COLOUR_MAP = 'viridis'
+_DISCRETE = ('#E69F00', '#009E73', '#0072B2', '#7B4FA3', '#111111')
+
+
+def words(name: str) -> str:
+    """Name of a quantity or input for people."""
+    return name.replace('_', ' ')
+
+
+def shown_input(name: str) -> tuple[float, str]:
+    """Return factor and unit in which an input is shown."""
+    return SHOWN_INPUT.get(name, (1.0, INPUT_UNITS.get(name, '-')))
+
+
+def label(name: str, unit: str) -> str:
+    """Axis label."""
+    return words(name) if unit == '-' else f'{words(name)} [{unit}]'
+
+
+def measured_against_model(diagnosis: Diagnosis) -> Figure:
+    """Draw measured over modelled values, before and after, one panel per quantity."""
+    curves, table = diagnosis.curves, diagnosis.table
+    with picture_style():
+        figure, axes = _panels(1, table.quantities, height=2.7)
+        for axis, name in zip(axes[0], table.quantities, strict=True):
+            q, (scale, unit) = QUANTITIES.index(name), SHOWN[name]
+            measured = scale * table.measured[:, q]
+            good = np.isfinite(measured) & ~_set_apart(diagnosis, q)
+            after = scale * curves.after[:, q]
+            axis.plot(
+                scale * curves.before[good, q],
+                measured[good],
+                'o',
+                ms=4.5,
+                mfc='none',
+                mec=GREY,
+                label='as configured',
+            )
+            axis.plot(after[good], measured[good], 'o', ms=4, color=BLUE, label=_last(diagnosis))
+            values = np.concatenate([measured[good], after[good], scale * curves.before[good, q]])
+            ends = np.array([values.min(), values.max()])
+            axis.plot(ends, ends, color='#1f2933', lw=0.8)
+            axis.set(xlabel=f'model [{unit}]', title=words(name))
+            axis.set_ylabel(f'measured [{unit}]')
+        axes[0][0].legend(loc='upper left')
+    return figure
+
+
+def residuals(diagnosis: Diagnosis, colour_by: str) -> Figure:
+    """Draw measured minus model against slip, coloured by an input, before and after.
+
+    Columns: as configured, soil refitted, effect added (the same again where nothing was named).
+    The grey band is two standard deviations of noise and floor.
+    """
+    curves, table = diagnosis.curves, diagnosis.table
+    stages = [
+        ('as configured', curves.before),
+        ('soil refitted', curves.refit),
+    ]
+    if diagnosis.effects:
+        stages.append((_last(diagnosis), curves.after))
+    factor, unit = shown_input(colour_by)
+    slip, colour = table.columns['slip'], factor * table.columns[colour_by]
+    few = np.unique(np.round(colour[np.isfinite(colour)], 9))
+    discrete = len(few) <= 5
+    with picture_style():
+        figure, axes = _panels(
+            len(table.quantities),
+            stages,
+            height=1.95,
+            bar=not discrete,
+            legend=discrete,
+            shared=True,
+        )
+        drawn = None
+        for row, name in zip(axes, table.quantities, strict=True):
+            q, (scale, quantity_unit) = QUANTITIES.index(name), SHOWN[name]
+            outside = _set_apart(diagnosis, q)
+            error = [scale * (table.measured[:, q] - values[:, q]) for _, values in stages]
+            reach = 1.12 * max(float(np.nanmax(np.abs(e[~outside]))) for e in error)
+            for axis, (title, _), residual in zip(row, stages, error, strict=True):
+                _band(axis, slip, 2 * scale * curves.band[:, q])
+                if discrete:
+                    for value, shade in zip(few, _DISCRETE, strict=False):
+                        chosen = ~outside & np.isclose(colour, value)
+                        axis.plot(slip[chosen], residual[chosen], 'o', ms=4, color=shade)
+                else:
+                    drawn = axis.scatter(
+                        slip[~outside],
+                        residual[~outside],
+                        c=colour[~outside],
+                        s=17,
+                        cmap=COLOUR_MAP,
+                        vmin=np.nanmin(colour),
+                        vmax=np.nanmax(colour),
+                    )
+                axis.plot(slip[outside], np.clip(residual[outside], -reach, reach), 'x', color=RED)
+                axis.set_ylim(-reach, reach)
+                if name == table.quantities[0]:
+                    axis.set_title(title)
+                if name == table.quantities[-1]:
+                    axis.set_xlabel('slip')
+            row[0].set_ylabel(f'{words(name)} [{quantity_unit}]')
+            for axis in row[1:]:
+                axis.tick_params(labelleft=False)
+        if discrete:
+            from matplotlib.lines import Line2D
+
+            handles = [Line2D([], [], marker='o', ms=5, ls='', color=c) for c in _DISCRETE]
+            texts = [f'{words(colour_by)} {value:.3g} {unit}'.removesuffix(' -') for value in few]
+            _legend(figure, handles[: len(few)], texts)
+        else:
+            _colour_bar(figure, drawn, label(colour_by, unit))
+    return figure
+
+
+def where_map(diagnosis: Diagnosis) -> Figure:
+    """Draw where the soil-refitted model and the measurement disagree, for every quantity."""
+    table, curves, where = diagnosis.table, diagnosis.curves, diagnosis.where
+    second = _second_input(diagnosis)
+    factor, unit = shown_input(second)
+    x, y = table.columns['slip'], factor * table.columns[second]
+    with picture_style():
+        figure, axes = _panels(1, table.quantities, height=2.7, bar=True)
+        drawn = None
+        for axis, name in zip(axes[0], table.quantities, strict=True):
+            q = QUANTITIES.index(name)
+            sigma = (table.measured[:, q] - curves.refit[:, q]) / curves.band[:, q]
+            good = np.isfinite(sigma)
+            drawn = axis.scatter(
+                x[good],
+                y[good],
+                c=np.clip(sigma[good], -6, 6),
+                s=20 + 14 * np.minimum(np.abs(sigma[good]), 8),
+                cmap='RdBu_r',
+                vmin=-6,
+                vmax=6,
+                edgecolors='#5b6875',
+                linewidths=0.4,
+            )
+            share = where.shares.get(name)
+            share_text = '' if share is None else f', {100 * share:.0f} % of the misfit'
+            axis.set(title=words(name) + share_text, xlabel='slip')
+            if name == where.quantity:
+                _box(axis, diagnosis, second)
+        axes[0][0].set_ylabel(label(second, unit))
+        _colour_bar(figure, drawn, 'measured minus model [s.d.]')
+    return figure
+
+
+def signature(diagnosis: Diagnosis) -> Figure | None:
+    """Draw the signature of the named (or best) effect over what the soil refit left."""
+    table, curves = diagnosis.table, diagnosis.curves
+    if curves.signature is None:
+        return None
+    slip = table.columns['slip']
+    with picture_style():
+        figure, axes = _panels(1, table.quantities, height=2.5, legend=True)
+        for axis, name in zip(axes[0], table.quantities, strict=True):
+            q, (scale, unit) = QUANTITIES.index(name), SHOWN[name]
+            residual = scale * (table.measured[:, q] - curves.refit[:, q])
+            inside = ~_set_apart(diagnosis, q)
+            _band(axis, slip, 2 * scale * curves.band[:, q])
+            axis.plot(
+                slip[inside],
+                residual[inside],
+                'o',
+                ms=3.5,
+                color='#7b8794',
+                label='measured minus soil refit',
+            )
+            axis.plot(
+                slip,
+                scale * curves.signature[:, q],
+                'o',
+                ms=4.5,
+                color=BLUE,
+                label=words(curves.signature_name),
+                alpha=0.85,
+            )
+            if curves.rival_signature is not None:
+                axis.plot(
+                    slip,
+                    scale * curves.rival_signature[:, q],
+                    'D',
+                    ms=4,
+                    mfc='none',
+                    mec=RED,
+                    label=f'next best: {words(curves.rival_name)}',
+                )
+            axis.set(xlabel='slip', title=words(name))
+            axis.set_ylabel(f'[{unit}]')
+        handles, labels = axes[0][0].get_legend_handles_labels()
+        _legend(figure, handles, labels)
+    return figure
+
+
+def gap(diagnosis: Diagnosis) -> Figure:
+    """Draw the error on unseen rows: as configured, soil refitted, effect added, noise floor."""
+    names = list(diagnosis.gap)
+    with picture_style():
+        figure, axes = _panels(1, names, height=2.2)
+        for axis, name in zip(axes[0], names, strict=True):
+            (scale, unit), item = SHOWN[name], diagnosis.gap[name]
+            stages = [('as\nconfigured', item.before, GREY), ('soil\nrefitted', item.refit, PURPLE)]
+            if diagnosis.effects:
+                stages.append(('effect\nadded', item.after, BLUE))
+            intervals = _intervals(diagnosis, name)
+            for i, (_, value, colour) in enumerate(stages):
+                axis.bar(i, scale * value, width=0.62, color=colour)
+                low, high = intervals[i]
+                axis.plot([i, i], [scale * low, scale * high], color='#1f2933', lw=1.2)
+                axis.annotate(
+                    f'{scale * value:.3g}',
+                    (i, scale * max(high, value)),
+                    (0, 3),
+                    textcoords='offset points',
+                    ha='center',
+                    fontsize=8.5,
+                )
+            if item.noise is not None:
+                floor = scale * float(np.hypot(item.noise, item.floor))
+                axis.axhline(floor, color=RED, lw=1.1, ls='--')
+            axis.set_xticks(range(len(stages)), [s[0] for s in stages])
+            axis.set(title=words(name), xlim=(-0.55, len(stages) - 0.45))
+            axis.set_ylabel(f'rms on unseen rows [{unit}]')
+            axis.grid(axis='x', visible=False)
+            axis.margins(y=0.14)
+    return figure
+
+
+def rivals(item: NextMeasurement) -> Figure | None:
+    """Draw what the rivals predict on proposed rows, for the quantities in which they part."""
+    if item.rows is None or len(item.predictions) < 2:
+        return None
+    x_name = 'slip' if np.ptp(item.rows.get('slip', np.zeros(1))) > 0 else _widest(item.rows)
+    factor, unit = shown_input(x_name)
+    x = factor * np.asarray(item.rows[x_name], dtype=float)
+    order = np.argsort(x, kind='stable')
+    with picture_style():
+        figure, axes = _panels(1, QUANTITIES, height=2.2, legend=True)
+        for axis, name in zip(axes[0], QUANTITIES, strict=True):
+            q, (scale, quantity_unit) = QUANTITIES.index(name), SHOWN[name]
+            for (rival, values), colour, marker in zip(
+                item.predictions.items(), (BLUE, RED, GREEN, PURPLE), 'oDs^', strict=False
+            ):
+                axis.plot(
+                    x[order],
+                    scale * np.asarray(values)[order, q],
+                    marker,
+                    ms=4.5,
+                    color=colour,
+                    mfc='none' if marker != 'o' else colour,
+                    label=words(rival),
+                )
+            axis.set(title=words(name), xlabel=label(x_name, unit))
+            axis.set_ylabel(f'predicted [{quantity_unit}]')
+        handles, labels = axes[0][0].get_legend_handles_labels()
+        _legend(figure, handles, labels)
+    return figure
+
+
+def colour_inputs(diagnosis: Diagnosis) -> list[str]:
+    """Return the inputs by which residuals are coloured: load, slope, and what matters most."""
+    varying = diagnosis.table.varying()
+    chosen: list[str] = [name for name in ('normal_load', 'slope') if name in varying]
+    trend = diagnosis.where.trend_input
+    for name in (trend, *varying):
+        if len(chosen) < 2 and name in varying and name not in chosen and name != 'slip':
+            chosen.append(name)
+    if trend in varying and trend not in chosen and trend != 'slip':
+        chosen.append(trend)
+    return chosen or ['normal_load']
+
+
+def _panels(
+    rows: int,
+    columns: Sequence[Any],
+    height: float,
+    *,
+    bar: bool = False,
+    legend: bool = False,
+    shared: bool = False,
+) -> tuple[Figure, Any]:
+    """Return a figure with a grid of axes, margins in inches.
+
+    Fixed margins: a layout engine would draw every figure three times over. ``bar`` leaves room
+    for a colour bar on the right, ``legend`` for a line above; ``shared``: the axes of a row have
+    the same y axis.
+    """
+    from matplotlib.figure import Figure
+
+    count = len(columns)
+    left, right = 0.72, 0.95 if bar else 0.12
+    top, bottom = 0.62 if legend else 0.34, 0.5
+    between = 0.12 if shared else 0.72
+    cell = (2.73 if count > 2 else 3.4) + (0.5 if shared else 0.0)
+    width = left + right + count * cell + (count - 1) * between
+    gap = 0.28
+    total = top + bottom + rows * height + (rows - 1) * gap
+    figure = Figure(figsize=(width, total), layout='none')  # type: ignore[arg-type]
+    axes = figure.subplots(rows, count, squeeze=False)
+    figure.subplots_adjust(
+        left=left / width,
+        right=1 - right / width,
+        top=1 - top / total,
+        bottom=bottom / total,
+        wspace=between / cell,
+        hspace=gap / height,
+    )
+    return figure, axes
+
+
+def _colour_bar(figure: Figure, drawn: Any, text: str) -> None:
+    """Add a colour bar in the margin that `_panels` left for it."""
+    width, height = figure.get_size_inches()
+    place = figure.add_axes((1 - 0.82 / width, 0.5 / height, 0.14 / width, 1 - 0.84 / height))
+    bar = figure.colorbar(drawn, cax=place)
+    bar.set_label(text)
+    bar.outline.set_visible(False)
+    place.grid(visible=False)
+
+
+def _legend(figure: Figure, handles: Any, labels: Any) -> None:
+    """Put a legend above the panels."""
+    width, height = figure.get_size_inches()
+    figure.legend(
+        handles,
+        labels,
+        loc='upper left',
+        bbox_to_anchor=(0.6 / width, 1.0 - 0.02 / height),
+        ncols=len(labels),
+        columnspacing=1.4,
+        handletextpad=0.4,
+    )
+
+
+def _band(axis: Axes, slip: FloatArray, half: FloatArray) -> None:
+    """Shade plus and minus ``half`` around zero."""
+    order = np.argsort(slip)
+    order = order[np.isfinite(half[order])]
+    axis.fill_between(slip[order], -half[order], half[order], color='#e3e8ee', lw=0, zorder=0)
+    axis.axhline(0.0, color='#1f2933', lw=0.8)
+
+
+def _last(diagnosis: Diagnosis) -> str:
+    names = [words(effect.name) for effect in diagnosis.effects]
+    return f'with {" and ".join(names)}' if names else 'soil refitted'
+
+
+def _set_apart(diagnosis: Diagnosis, q: int) -> NDArray[np.bool_]:
+    mask = np.zeros(len(diagnosis.table), dtype=bool)
+    for row, quantity, _ in diagnosis.outliers:
+        mask[row] |= QUANTITIES.index(quantity) == q
+    return mask
+
+
+def _second_input(diagnosis: Diagnosis) -> str:
+    """Input beside slip that the map is drawn over."""
+    varying = [name for name in diagnosis.table.varying() if name != 'slip']
+    box = [side.input for side in diagnosis.where.box if side.input != 'slip']
+    for name in (*box, diagnosis.where.trend_input, 'normal_load', *varying):
+        if name in varying:
+            return name
+    return 'normal_load'
+
+
+def _box(axis: Axes, diagnosis: Diagnosis, second: str) -> None:
+    """Frame the region in which the gap is largest."""
+    from matplotlib.patches import Rectangle
+
+    sides = {side.input: side for side in diagnosis.where.box}
+    if not sides.keys() & {'slip', second}:
+        return
+    table = diagnosis.table
+    ends = []
+    for name in ('slip', second):
+        factor = 1.0 if name == 'slip' else shown_input(name)[0]
+        values = factor * table.columns[name]
+        margin = 0.04 * float(np.ptp(values))
+        side = sides.get(name)
+        low = float(values.min()) if side is None else max(factor * side.low, values.min())
+        high = float(values.max()) if side is None else min(factor * side.high, values.max())
+        ends.append((low - margin, high + margin))
+    (x0, x1), (y0, y1) = ends
+    axis.add_patch(
+        Rectangle((x0, y0), x1 - x0, y1 - y0, fill=False, ec=RED, lw=1.4, ls='--', zorder=3)
+    )
+
+
+def _intervals(diagnosis: Diagnosis, name: str) -> list[tuple[float, float]]:
+    """Return 90 % bootstrap intervals over the rows of the three root-mean-square errors."""
+    q = QUANTITIES.index(name)
+    curves, measured = diagnosis.curves, diagnosis.table.measured[:, q]
+    good = np.isfinite(measured) & ~_set_apart(diagnosis, q)
+    draws = np.random.default_rng(0).integers(0, good.sum(), (400, good.sum()))
+    result = []
+    for values in (curves.before, curves.held_out_refit, curves.held_out_after):
+        squared = (measured - values[:, q])[good] ** 2
+        rms = np.sqrt(np.nanmean(squared[draws], axis=1))
+        low, high = np.nanquantile(rms, [0.05, 0.95])
+        result.append((float(low), float(high)))
+    return result
+
+
+def _widest(rows: Any) -> str:
+    """Return the input that varies most over proposed rows."""
+
+    def spread(name: str) -> float:
+        values = np.asarray(rows[name], dtype=float)
+        return float(np.ptp(values) / max(np.abs(values).max(), 1e-12))
+
+    return max((name for name in rows if name in INPUT_UNITS), key=spread)
