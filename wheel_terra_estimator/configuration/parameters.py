@@ -657,12 +657,21 @@ DECLARED: tuple[Parameter, ...] = (
         'filter.ratio_walk',
         0.25,
         '1/sqrt(m)',
-        'random walk of ground speed over rim speed per rim travel',
+        'random walk of ground speed over rim speed per rim travel, at most',
+        above=0.0,
+    ),
+    number('filter.ratio_walk_least', 0.03, '1/sqrt(m)', 'the same, at least', above=0.0),
+    number(
+        'filter.demand_walk',
+        0.015,
+        '1/sqrt(m)',
+        'random walk of the pull that the ground asks for, as a share of the load; over the slope '
+        'of the traction curve it gives the walk of the speed ratio',
         above=0.0,
     ),
     number(
         'filter.shear_error_std',
-        0.08,
+        0.05,
         '-',
         'error of the shear model per wheel, as a share of the shear stress',
         above=0.0,

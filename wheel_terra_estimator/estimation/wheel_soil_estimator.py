@@ -54,6 +54,7 @@ from wheel_terra_estimator.estimation.stuck_warning import (
 
 FloatArray = NDArray[np.float64]
 _NAN = math.nan
+_SLOPE_KEEP = 0.9  # per cycle
 
 
 @dataclass
@@ -99,9 +100,12 @@ class _Run:
     yaw_bias_weight: float = 0.0
     ratio: float = 0.95  # remembered v / rim speed
     ratio_std: float = 0.3
+    ratio_walk: float = 0.25  # of v / rim speed [1/sqrt(m)]
     drive_direction: float = 0.0
     fresh_travel: float = 0.0  # [m] since the start or the last change of direction
     load: list[float] = field(default_factory=list)
+    torque_slope: list[float] = field(default_factory=list)  # by v/(r w), smoothed; nan = none
+    pull_slope: list[float] = field(default_factory=list)
     pull: list[float] = field(default_factory=list)
     pull_std: list[float] = field(default_factory=list)
     sinkage_rate: list[float] = field(default_factory=list)
@@ -212,6 +216,8 @@ class WheelSoilEstimator:
             slip_std=[1.0] * n,
             wheel_class=[int(SlipClass.UNKNOWN)] * n,
             pull=[0.0] * n,
+            torque_slope=[_NAN] * n,
+            pull_slope=[_NAN] * n,
             sinkage_rate=[0.0] * n,
             sinkage_rate_std=[1.0] * n,
             pull_margin=[0.0] * n,
@@ -230,6 +236,7 @@ class WheelSoilEstimator:
         self._monitor = StuckMonitor(self._stuck_tuning)
         self._filter = self._initial_filter()
         self._jacobian_pull = np.zeros((n, self._layout.size))
+        self._linear: tuple[FloatArray, FloatArray, FloatArray, FloatArray] | None = None
 
     def _initial_filter(self) -> GatedFilter:
         s, layout = self._settings, self._layout
@@ -388,7 +395,7 @@ class WheelSoilEstimator:
             ratio=run.ratio,
             ratio_std=run.ratio_std,
             low_rim=self._low_rim,
-            ratio_walk=float(self._settings.filter.ratio_walk),
+            ratio_walk=run.ratio_walk,
             window=run.window,
             acceleration_noise=self._acceleration_noise,
         )
@@ -695,6 +702,8 @@ class WheelSoilEstimator:
             run.torque_sum[i], run.torque_count[i] = 0.0, 0
         if still:
             run.fresh_travel = 0.0
+            run.torque_slope = [_NAN] * n
+            run.pull_slope = [_NAN] * n
         elif run.fresh_travel > self._contact_length:
             self._model_rows(rims, torque, residuals, variances, rows)
         if rows:
@@ -715,7 +724,8 @@ class WheelSoilEstimator:
         balance = np.zeros(size)
         balance_sum = 0.0
         open_variance = 0.0
-        jacobian = np.zeros((s.wheel_count, size))
+        jacobian, jacobian_torque = np.zeros((2, s.wheel_count, size))
+        pulls, torques = np.zeros((2, s.wheel_count))
         gate = float(s.filter.gate)
         for i, rim in enumerate(rims):
             load = run.load[i]
@@ -727,7 +737,8 @@ class WheelSoilEstimator:
                 continue
             direction = 1.0 if rim > 0.0 else -1.0
             pull, torque_model, row_pull, row_torque = self._wheel_rows(i, rim, direction)
-            jacobian[i] = row_pull
+            jacobian[i], jacobian_torque[i] = row_pull, row_torque
+            pulls[i], torques[i] = pull, torque_model
             balance += row_pull
             balance_sum += pull
             reading = torque[i]
@@ -745,6 +756,8 @@ class WheelSoilEstimator:
                 variances.append(variance)
                 rows.append(row_torque)
         self._jacobian_pull = jacobian
+        self._linear = (x.copy(), pulls, jacobian_torque, torques)
+        self._set_ratio_walk(jacobian, rims)
         if run.force_known and run.window.count:
             weight = s.mass * run.force[2]
             tilt = 0.0
@@ -768,6 +781,20 @@ class WheelSoilEstimator:
             variances.append(variance)
             rows.append(balance)
 
+    def _set_ratio_walk(self, jacobian: FloatArray, rims: list[float]) -> None:
+        """Let the slip walk as what the ground asks does, over the slope of the traction curve.
+
+        Where the curve is steep, a change of demand changes the slip little; on the plateau the
+        same change makes the rover dig in.
+        """
+        run, s = self._run, self._settings
+        steepness = sum(
+            float(jacobian[i, SPEED]) * abs(rim) for i, rim in enumerate(rims) if rim == rim
+        ) / max(sum(run.load), 1e-3)
+        least, most = float(s.filter.ratio_walk_least), float(s.filter.ratio_walk)
+        walk = float(s.filter.demand_walk) / max(-steepness, 1e-3)
+        run.ratio_walk = min(max(walk, least), most)
+
     def _wheel_rows(
         self, i: int, rim: float, direction: float
     ) -> tuple[float, float, FloatArray, FloatArray]:
@@ -775,9 +802,13 @@ class WheelSoilEstimator:
         layout = self._layout
         zi, ei = layout.sinkage.start + i, layout.shear_error.start + i
         forces = self._forces(i, rim, direction)
+        slopes = self._smooth_slopes(i, forces)
         row_pull, row_torque = np.zeros(layout.size), np.zeros(layout.size)
-        for row, derivatives in ((row_pull, forces.d_pull), (row_torque, forces.d_torque)):
-            by_ratio, by_sinkage, by_strength, by_modulus, by_centroid, by_mound = derivatives
+        for row, derivatives, by_ratio in (
+            (row_pull, forces.d_pull, slopes[1]),
+            (row_torque, forces.d_torque, slopes[0]),
+        ):
+            _, by_sinkage, by_strength, by_modulus, by_centroid, by_mound = derivatives
             # The ratio is that of the direction of rolling: the two signs cancel.
             row[SPEED] = by_ratio / abs(rim)
             row[zi] = direction * by_sinkage
@@ -786,6 +817,22 @@ class WheelSoilEstimator:
             row[CENTROID] = direction * by_centroid
             row[MOUND] = direction * by_mound
         return direction * forces.pull, direction * forces.torque, row_pull, row_torque
+
+    def _smooth_slopes(self, i: int, forces: WheelForces) -> tuple[float, float]:
+        """Return dT and dF by v/(r w), smoothed over about a second.
+
+        The curves bend within the uncertainty of the slip. A slope taken at the noisy estimate is
+        correlated with its error, which pulls the slip to the flat side; a smoothed one is not.
+        """
+        run = self._run
+        keep = _SLOPE_KEEP
+        for smoothed, new in (
+            (run.torque_slope, forces.d_torque[0]),
+            (run.pull_slope, forces.d_pull[0]),
+        ):
+            old = smoothed[i]
+            smoothed[i] = new if old != old else keep * old + (1.0 - keep) * new
+        return run.torque_slope[i], run.pull_slope[i]
 
     def _forces(self, i: int, rim: float, direction: float) -> WheelForces:
         """Return the forces of a turning wheel at the present state, in its own direction."""
@@ -832,30 +879,40 @@ class WheelSoilEstimator:
         self._pulls(rims)
 
     def _pulls(self, rims: list[float]) -> None:
+        """Work out pulls and torques after the update, to first order from the last pass."""
         run, s = self._run, self._settings
-        P = self._filter.covariance
+        x, P = self._filter.mean, self._filter.covariance
         slope_share = run.force[0] / max(run.force[2], 0.1)
         zero = float(s.sensors.torque_zero_std)
         gain = float(s.sensors.torque_gain_std)
-        variances = np.einsum('ij,jk,ik->i', self._jacobian_pull, P, self._jacobian_pull)
+        linear, self._linear = self._linear, None
+        if linear is not None:
+            before, pulls, jacobian_torque, torques = linear
+            moved = x - before
+            pulls = pulls + self._jacobian_pull @ moved
+            torques = torques + jacobian_torque @ moved
+            spread = np.einsum('ij,jk,ik->i', self._jacobian_pull, P, self._jacobian_pull)
         for i, rim in enumerate(rims):
             load = run.load[i]
-            if rim != rim or abs(rim) < 2.0 * s.rest_speed or load < 1e-3:
+            turning = rim == rim and abs(rim) >= 2.0 * s.rest_speed and load >= 1e-3
+            if not turning:
                 # Static friction carries the slope.
                 run.pull[i] = load * slope_share
                 run.torque_now[i] = run.pull[i] * s.rim_radius[i]
                 run.pull_std[i] = (0.1 * load if run.force_known else load) + 1e-3
                 continue
-            direction = 1.0 if rim > 0.0 else -1.0
-            forces = self._forces(i, rim, direction)
-            run.pull[i] = direction * forces.pull
-            run.torque_now[i] = direction * forces.torque
+            if linear is None:
+                # The contact is fresh after a start: the load's share is the best guess.
+                run.pull[i] = load * slope_share
+                run.pull_std[i] = 0.1 * load + 1e-3
+                continue
+            run.pull[i], run.torque_now[i] = float(pulls[i]), float(torques[i])
             radius = s.shear_radius[i]
             run.pull_std[i] = math.sqrt(
-                max(float(variances[i]), 0.0)
-                + (s.load_std * forces.pull) ** 2
+                max(float(spread[i]), 0.0)
+                + (s.load_std * run.pull[i]) ** 2
                 + (zero / radius) ** 2
-                + (0.5 * gain * forces.torque / radius) ** 2
+                + (0.5 * gain * run.torque_now[i] / radius) ** 2
                 + (0.01 * load) ** 2
             )
 
@@ -956,7 +1013,7 @@ class WheelSoilEstimator:
                     _NAN,
                     _NAN,
                 ).pull
-                for slip in (0.2, 0.4, 0.6, 0.8, 0.95)
+                for slip in (0.3, 0.6, 0.9)
             )
             direction = run.drive_direction or 1.0
             demand = direction * load * run.force[0] / max(run.force[2], 0.1)
