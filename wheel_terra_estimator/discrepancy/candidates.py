@@ -16,7 +16,11 @@ from numpy.typing import NDArray
 from wheel_terra_estimator.discrepancy.evidence import Floor, Posterior, evidence, marginal
 from wheel_terra_estimator.discrepancy.fitting import Fit, fit
 from wheel_terra_estimator.discrepancy.forward import Forward
-from wheel_terra_estimator.discrepancy.parameters import Coordinate, effect_coordinates
+from wheel_terra_estimator.discrepancy.parameters import (
+    Coordinate,
+    effect_coordinates,
+    loose_precision,
+)
 from wheel_terra_estimator.discrepancy.problem import Problem
 from wheel_terra_estimator.discrepancy.signatures import shapes
 from wheel_terra_estimator.terramechanics.effects.base import Effect
@@ -141,12 +145,11 @@ def linear_starts(
             problem.rotate(sensitivity[:, keep]),
             base.variance,
             0.0,
+            loose_precision([coordinates[index][k] for k in keep]),
         )
-        weights = reduced.jacobian / base.variance[:, None]
-        precision = reduced.jacobian.T @ weights + np.eye(len(keep))
-        mean = np.linalg.solve(
-            precision, weights.T @ (reduced.residual + reduced.jacobian @ reduced.u)
-        )
+        precision = reduced.precision()
+        target = reduced.residual + reduced.jacobian @ reduced.u
+        mean = np.linalg.solve(precision, reduced.jacobian.T @ (target / base.variance))
         strength = np.clip(mean[-1], own[0].lower, own[0].upper)
         score = _linear_gain(precision, mean, strength, reduced)
         neutral = own[0].coordinate(own[0].neutral)

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from scipy.special import log_ndtr, logsumexp
 
 from wheel_terra_estimator.discrepancy.fitting import Fit
+from wheel_terra_estimator.discrepancy.parameters import EFFECT_SCALES, WIDENING, WORSE_SHARE
 from wheel_terra_estimator.discrepancy.problem import Problem
 
 FloatArray = NDArray[np.float64]
@@ -68,6 +69,9 @@ def evidence(
 ) -> Posterior:
     """Return the evidence of a fit for every floor.
 
+    Soil as good as stated or worse, and effects small or large, are weighed alike: each floor's
+    evidence is the mean over these scales of the priors.
+
     Parameters
     ----------
     noise_freedom : numpy.ndarray
@@ -75,55 +79,77 @@ def evidence(
     """
     jacobian = fitted.jacobian
     target = fitted.residual + jacobian @ fitted.u
-    count, p = len(floors), len(fitted.u)
-    factor = np.ones((count, 3))
+    factor = np.ones((len(floors), 3))
     unknown = np.isfinite(noise_freedom)
-    passes = 4 if unknown.any() else 1
-    penalty = np.zeros(count)
-    for turn in range(passes):
-        variance = np.array(
-            [problem.variance(f.amplitude, k) for f, k in zip(floors, factor, strict=True)]
-        )
-        weighted = jacobian[None] / variance[:, :, None]
-        precision = np.swapaxes(weighted, 1, 2) @ jacobian + np.eye(p)
-        right = (target / variance) @ jacobian
-        covariance = np.linalg.inv(precision)
-        mean = np.einsum('fpq,fq->fp', covariance, right)
-        if turn < passes - 1:
-            factor = _noise_factor(
-                problem, target, jacobian, mean, covariance, variance, factor, noise_freedom
-            )
-    log_det = np.linalg.slogdet(precision)[1]
+    for _ in range(3 if unknown.any() else 0):
+        variance = _variances(problem, floors, factor)
+        factor = _noise_factor(problem, fitted, target, variance, factor, noise_freedom)
+    variance = _variances(problem, floors, factor)
+    weighted = jacobian[None] / variance[:, :, None]
+    information = np.swapaxes(weighted, 1, 2) @ jacobian  # (F, P, P)
+    right = (target / variance) @ jacobian
+    priors, weights = _prior_precisions(fitted)  # (S, P), (S,)
+    precision = information[None] + priors[:, None, :, None] * np.eye(len(fitted.u))
+    covariance = np.asarray(np.linalg.inv(precision), dtype=float)
+    mean = np.einsum('sfpq,fq->sfp', covariance, right)
     value = -0.5 * (
         np.log(variance).sum(axis=1)
         + (target**2 / variance).sum(axis=1)
-        - (right * mean).sum(axis=1)
-        + log_det
+        - (right * mean).sum(axis=2)
+        + np.linalg.slogdet(precision)[1]
+        - np.log(priors).sum(axis=1)[:, None]
         + problem.size * np.log(2.0 * np.pi)
     )
     value -= problem.log_std
     if unknown.any():
-        known = noise_freedom[unknown]
-        square = factor[:, unknown] ** 2
         # log density of a scaled inverse chi-square in ln(factor^2), relative to its mode.
-        penalty = (0.5 * known * (-np.log(square) - 1.0 / square + 1.0)).sum(axis=1)
-    value += penalty + _truncation(fitted, mean, covariance)
-    return Posterior(value, mean, covariance, factor)
+        square = factor[:, unknown] ** 2
+        value += (0.5 * noise_freedom[unknown] * (1.0 - np.log(square) - 1.0 / square)).sum(axis=1)
+    value += _truncation(fitted, mean, covariance, priors)
+    best = np.argmax(value, axis=0)
+    rows = np.arange(len(floors))
+    return Posterior(
+        logsumexp(value + np.log(weights)[:, None], axis=0),
+        mean[best, rows],
+        covariance[best, rows],
+        factor,
+    )
+
+
+def _variances(problem: Problem, floors: tuple[Floor, ...], factor: FloatArray) -> FloatArray:
+    return np.array([problem.variance(f.amplitude, k) for f, k in zip(floors, factor, strict=True)])
+
+
+def _prior_precisions(fitted: Fit) -> tuple[FloatArray, FloatArray]:
+    """(S, P) prior precisions of u for all combinations of the priors' scales; (S,) their shares."""
+    soil = np.array([c.role == 'soil' for c in fitted.coordinates])
+    strength = np.array([c.role == 'strength' for c in fitted.coordinates])
+    sizes = EFFECT_SCALES if strength.any() else (1.0,)
+    combinations, weights = [], []
+    for width, share in ((1.0 / WIDENING, 1.0 - WORSE_SHARE), (1.0, WORSE_SHARE)):
+        for size in sizes:
+            scale = np.where(soil, width, np.where(strength, size, 1.0))
+            combinations.append(scale**-2)
+            weights.append(share / len(sizes))
+    return np.array(combinations), np.array(weights)
 
 
 def _noise_factor(
     problem: Problem,
+    fitted: Fit,
     target: FloatArray,
-    jacobian: FloatArray,
-    mean: FloatArray,
-    covariance: FloatArray,
     variance: FloatArray,
     factor: FloatArray,
     noise_freedom: FloatArray,
 ) -> FloatArray:
     """One step of expectation maximisation for the factor on the noise of each quantity."""
+    jacobian = fitted.jacobian
+    weighted = jacobian[None] / variance[:, :, None]
+    precision = np.swapaxes(weighted, 1, 2) @ jacobian + np.diag(fitted.prior)
+    covariance = np.linalg.inv(precision)
+    mean = np.einsum('fpq,fq->fp', covariance, (target / variance) @ jacobian)
     left = target[None] - mean @ jacobian.T
-    spread = np.einsum('mp,fpq,mq->fm', jacobian, covariance, jacobian)
+    spread = ((jacobian[None] @ covariance) * jacobian[None]).sum(axis=2)
     new = factor.copy()
     for q in range(3):
         mine = problem.block == q
@@ -138,21 +164,26 @@ def _noise_factor(
     return np.clip(new, 0.3, 4.0)
 
 
-def _truncation(fitted: Fit, mean: FloatArray, covariance: FloatArray) -> FloatArray:
-    """Log of posterior mass over prior mass inside the bounds of the effects' coordinates."""
-    total = np.zeros(len(mean))
+def _truncation(
+    fitted: Fit, mean: FloatArray, covariance: FloatArray, priors: FloatArray
+) -> FloatArray:
+    """Log of posterior over prior mass inside the bounds of the effects' coordinates: (S, F)."""
+    total = np.zeros(mean.shape[:2])
     for index, c in enumerate(fitted.coordinates):
         if c.owner == 'soil':
             continue
-        std = np.sqrt(covariance[:, index, index])
-        a, b = (c.lower - mean[:, index]) / std, (c.upper - mean[:, index]) / std
-        # log(Phi(b) - Phi(a)) on the side where it does not cancel.
-        swap = a > 0.0
-        a, b = np.where(swap, -b, a), np.where(swap, -a, b)
-        high, low = log_ndtr(b), log_ndtr(a)
-        total += high + np.log1p(-np.exp(np.minimum(low - high, -1e-12)))
-        total -= c.log_prior_mass
+        std = np.sqrt(covariance[..., index, index])
+        inside = _log_mass((c.lower - mean[..., index]) / std, (c.upper - mean[..., index]) / std)
+        own = np.sqrt(priors[:, index])
+        total += inside - _log_mass(c.lower * own, c.upper * own)[:, None]
     return total
+
+
+def _log_mass(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Log of the standard normal's mass between a and b, on the side where it does not cancel."""
+    swap = a > 0.0
+    low, high = log_ndtr(np.where(swap, -b, a)), log_ndtr(np.where(swap, -a, b))
+    return high + np.log1p(-np.exp(np.minimum(low - high, -1e-12)))
 
 
 def marginal(posterior: Posterior, floors: tuple[Floor, ...]) -> float:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wheel_terra_estimator.discrepancy.forward import Forward
-from wheel_terra_estimator.discrepancy.parameters import Coordinate, bounds
+from wheel_terra_estimator.discrepancy.parameters import Coordinate, bounds, loose_precision
 from wheel_terra_estimator.discrepancy.problem import Problem
 
 FloatArray = NDArray[np.float64]
@@ -43,6 +43,8 @@ class Fit:
         (m,) of the fit.
     objective : float
         Half of chi-square plus prior.
+    prior : numpy.ndarray
+        (P,) precision of u in the fit.
     """
 
     names: tuple[str, ...]
@@ -55,11 +57,12 @@ class Fit:
     jacobian: FloatArray
     variance: FloatArray
     objective: float
+    prior: FloatArray
 
     def precision(self) -> FloatArray:
         """Posterior precision of u."""
         weighted = self.jacobian / self.variance[:, None]
-        return self.jacobian.T @ weighted + np.eye(len(self.u))
+        return self.jacobian.T @ weighted + np.diag(self.prior)
 
     def within(self, problem: Problem, observed: FloatArray) -> Fit:
         """Return the same fit seen through other noise: same cells, another rotation."""
@@ -100,6 +103,7 @@ def fit(
     """
     count = len(hypotheses)
     limits = [bounds(coordinates) for _, coordinates in hypotheses]
+    priors = [loose_precision(coordinates) for _, coordinates in hypotheses]
     trial = [
         np.clip(np.asarray(s, dtype=float), *limit) for s, limit in zip(starts, limits, strict=True)
     ]
@@ -119,7 +123,7 @@ def fit(
         for index, b in enumerate(active):
             u = trial[b]
             residual = problem.rotate(observed - problem.flat(state.outputs[index]))
-            objective = 0.5 * float(residual @ (residual / variances[b]) + u @ u)
+            objective = 0.5 * float(residual @ (residual / variances[b]) + u @ (priors[b] * u))
             previous = best[b]
             angle[b] = state.angle[index]
             improved = previous is None or objective <= previous.objective
@@ -136,6 +140,7 @@ def fit(
                     problem.rotate(sensitivity),
                     variances[b],
                     objective,
+                    priors[b],
                 )
                 damping[b] = max(0.1 * damping[b], 1e-6)
             else:
@@ -162,7 +167,9 @@ def _step(
     """Return a bounded Gauss-Newton step and the fall of the objective that it should bring."""
     lower, upper = limit
     precision = current.precision()
-    gradient = current.jacobian.T @ (current.residual / current.variance) - current.u
+    gradient = (
+        current.jacobian.T @ (current.residual / current.variance) - current.prior * current.u
+    )
     damped = precision + damping * np.diag(np.diag(precision))
     free = np.ones(len(current.u), dtype=bool)
     step = np.zeros(len(current.u))

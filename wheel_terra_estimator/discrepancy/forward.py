@@ -35,14 +35,14 @@ FloatArray = NDArray[np.float64]
 STEP = 1e-5  # of u, for one-sided differences
 NODES = 8  # quadrature nodes on each side of the peak stress
 _LEAST_ANGLE, _GREATEST_ANGLE = 1e-3, 1.55  # [rad]
-_TOLERANCE, _ITERATIONS = 1e-7, 60  # relative to the load
+_TOLERANCE, _ITERATIONS = 1e-6, 60  # relative to the load
 
 
 @dataclass
 class State:
     """Solutions of B hypotheses at N rows.
 
-    ``u`` are their coordinates, ``angle`` (B, N) entrance angles, ``outputs`` (B, N, 3), ``jacobian``
+    ``u`` are their coordinates, ``angle`` (B, N) entrance angles, ``outputs`` (B, N, 3), `jacobian`
     one (N, 3, P_b) array per hypothesis (derivative by u).
     """
 
@@ -141,15 +141,52 @@ class Forward:
         jacobian: bool = True,
     ) -> State:
         """Solve the load balance of every hypothesis; with Jacobians by u unless told otherwise."""
+        if start is not None:
+            start = np.broadcast_to(start, (len(u), len(self.points)))
+        dear = [self._acts_on_stress(h) for h in hypotheses]
+        if any(dear) and not all(dear):
+            return self._split(hypotheses, u, start, jacobian, dear)
         columns = [
             {c.key: float(c.value(x)) for c, x in zip(h, values, strict=True)}
             for h, values in zip(hypotheses, u, strict=True)
         ]
-        contact, terms = self._contact(hypotheses, columns)
-        angle, outputs = self._balance(contact, terms, (len(u), len(self.points)), start)
+        angle, outputs = self._balance(hypotheses, columns, start)
         if not jacobian:
             return State([np.asarray(x) for x in u], angle, outputs, [], [])
         return self._differences(hypotheses, u, columns, angle, outputs)
+
+    def _acts_on_stress(self, hypothesis: Sequence[Coordinate]) -> bool:
+        """Whether a term of the hypothesis works at every node of the quadrature, at a price."""
+        owners = {c.owner for c in hypothesis} - {'soil'} - self.base_effects.keys()
+        return any(self.catalogue[name].on_normal_stress is not None for name in owners)
+
+    def _split(
+        self,
+        hypotheses: Sequence[Sequence[Coordinate]],
+        u: Sequence[FloatArray],
+        start: FloatArray | None,
+        jacobian: bool,
+        dear: Sequence[bool],
+    ) -> State:
+        """Solve the dear hypotheses apart, so that the others need not pay for them."""
+        angle = np.empty((len(u), len(self.points)))
+        outputs = np.empty((*angle.shape, 3))
+        jacobians: list[FloatArray] = [np.empty(0)] * (len(u) if jacobian else 0)
+        slopes = list(jacobians)
+        for group in (
+            [b for b, d in enumerate(dear) if d],
+            [b for b, d in enumerate(dear) if not d],
+        ):
+            part = self.solve(
+                [hypotheses[b] for b in group],
+                [u[b] for b in group],
+                None if start is None else start[group],
+                jacobian,
+            )
+            angle[group], outputs[group] = part.angle, part.outputs
+            for k, b in enumerate(group if jacobian else ()):
+                jacobians[b], slopes[b] = part.jacobian[k], part.angle_slope[k]
+        return State([np.asarray(x) for x in u], angle, outputs, jacobians, slopes)
 
     def _differences(
         self,
@@ -159,7 +196,7 @@ class Forward:
         angle: FloatArray,
         outputs: FloatArray,
     ) -> State:
-        """Jacobians by the implicit function theorem: dy/du at fixed angle, then along the balance."""
+        """Jacobians (implicit functions): dy/du at fixed angle, then along the balance."""
         copies: list[dict[str, float]] = []
         owner: list[int] = []
         for b, (hypothesis, values) in enumerate(zip(hypotheses, u, strict=True)):
@@ -205,25 +242,54 @@ class Forward:
         return (other - base) / step[:, None]
 
     def _balance(
-        self, contact: Contact, terms: Terms, shape: tuple[int, int], start: FloatArray | None
+        self,
+        hypotheses: Sequence[Sequence[Coordinate]],
+        columns: Sequence[Mapping[str, float]],
+        start: FloatArray | None,
     ) -> tuple[FloatArray, FloatArray]:
-        """Solve the load balance for the entrance angle by safeguarded Newton steps."""
+        """Solve the load balance of every hypothesis for the entrance angle.
+
+        Load grows nearly like a power of the angle, so secant steps run on logarithms, inside a
+        bracket; hypotheses that have converged leave the batch.
+        """
+        shape = (len(columns), len(self.points))
+        angles, solved = np.empty(shape), np.empty((*shape, 3))
+        live = np.arange(len(columns))
+        contact, terms = self._contact(hypotheses, columns)
         first = explicit_entrance_angle(contact) if start is None else start
         angle = np.array(np.broadcast_to(first, shape))
         low, high = np.full(shape, _LEAST_ANGLE), np.full(shape, _GREATEST_ANGLE)
-        slope = np.ones(shape)
+        exponent, keep = np.zeros(shape), np.ones(len(columns), dtype=bool)
+        before = old_ratio = np.zeros(shape)
         for iteration in range(_ITERATIONS):
-            residual, outputs = self._response(contact, terms, angle)
-            if iteration and np.max(np.abs(residual) / contact.normal_load) < _TOLERANCE:
-                break
-            # With a good start the first slope serves for all steps.
-            if iteration % (4 if start is not None else 2) == 0:
-                beyond, _ = self._response(contact, terms, angle + 1e-6)
-                slope = (beyond - residual) / 1e-6
-            low = np.where(residual < 0.0, angle, low)
-            high = np.where(residual < 0.0, high, angle)
+            if len(live) < len(angle):
+                angle, low, high = angle[keep], low[keep], high[keep]
+                exponent, before, old_ratio = exponent[keep], before[keep], old_ratio[keep]
+                contact, terms = self._contact(hypotheses, [columns[int(b)] for b in live])
+            balance, outputs = self._response(contact, terms, angle)
+            relative = balance / contact.normal_load
             with np.errstate(divide='ignore', invalid='ignore'):
-                new = angle - residual / slope
-            inside = (new > low) & (new < high)
-            angle = np.where(inside, new, 0.5 * (low + high))
-        return angle, outputs
+                ratio = np.log(np.maximum(1.0 + relative, 1e-9))
+                if iteration == 0:
+                    beyond, _ = self._response(contact, terms, angle * (1.0 + 1e-5))
+                    further = np.log(np.maximum(1.0 + beyond / contact.normal_load, 1e-9))
+                    exponent = (further - ratio) / np.log1p(1e-5)
+                else:
+                    secant = (ratio - old_ratio) / np.log(angle / before)
+                    usable = np.isfinite(secant) & (secant > 0.2) & (np.abs(ratio) > 1e-9)
+                    exponent = np.where(usable, secant, exponent)
+                proposal = angle * np.exp(-ratio / exponent)
+            done = np.max(np.abs(relative), axis=1) < _TOLERANCE
+            narrow = np.max(high - low, axis=1) < 1e-12
+            finished = done | narrow | (iteration == _ITERATIONS - 1)
+            angles[live[finished]], solved[live[finished]] = angle[finished], outputs[finished]
+            if finished.all():
+                break
+            low = np.where(relative < 0.0, np.maximum(low, angle), low)
+            high = np.where(relative >= 0.0, np.minimum(high, angle), high)
+            before, old_ratio = angle, ratio
+            inside = (proposal > low) & (proposal < high) & (exponent > 0.2)
+            angle = np.where(inside, proposal, np.sqrt(low * high))
+            keep = ~finished
+            live = live[~finished]
+        return angles, solved

@@ -64,8 +64,7 @@ def hold_out(
         score = 0.0
         for label in labels:
             out = cell_group == label
-            u, spread = _without(fitted, covariance, target, ~out)
-            u = np.clip(u, *limits)
+            u = np.clip(_without(fitted, covariance, target, ~out), *limits)
             # Score: the group given all the rest, by the full covariance.
             score += _group_score(fitted, covariance, target, out)
             tasks.append((fitted, u))
@@ -88,17 +87,17 @@ def hold_out(
 
 def _without(
     fitted: Fit, covariance: FloatArray, target: FloatArray, kept: NDArray[np.bool_]
-) -> tuple[FloatArray, FloatArray]:
+) -> FloatArray:
     jacobian = fitted.sensitivity[kept]
     weighted = np.linalg.solve(covariance[np.ix_(kept, kept)], jacobian)
-    precision = jacobian.T @ weighted + np.eye(len(fitted.u))
-    return np.linalg.solve(precision, weighted.T @ target[kept]), precision
+    precision = jacobian.T @ weighted + np.diag(fitted.prior)
+    return np.linalg.solve(precision, weighted.T @ target[kept])
 
 
 def _group_score(
     fitted: Fit, covariance: FloatArray, target: FloatArray, out: NDArray[np.bool_]
 ) -> float:
-    total = covariance + fitted.sensitivity @ fitted.sensitivity.T
+    total = covariance + (fitted.sensitivity / fitted.prior) @ fitted.sensitivity.T
     across = np.linalg.solve(total[np.ix_(~out, ~out)], total[np.ix_(~out, out)])
     error = target[out] - across.T @ target[~out]
     spread = total[np.ix_(out, out)] - total[np.ix_(out, ~out)] @ across

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.discrepancy.result import Diagnosis
+from wheel_terra_estimator.terramechanics.soil import Soil
 
 
 def corrected(diagnosis: Diagnosis) -> tuple[Configuration, list[str]]:
@@ -35,7 +36,7 @@ def corrected(diagnosis: Diagnosis) -> tuple[Configuration, list[str]]:
     return diagnosis.configuration.replace(changes), [*kept, *changes]  # type: ignore[arg-type]
 
 
-def _soil_keys(name: str, value: float, std: float, soil: object) -> dict[str, float]:
+def _soil_keys(name: str, value: float, std: float, soil: Soil) -> dict[str, float]:
     if name == 'stiffness':
         return {
             f'soil.{field}': getattr(soil, field) * value

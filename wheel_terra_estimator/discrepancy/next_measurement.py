@@ -77,13 +77,11 @@ def _menu(setting: Setting) -> list[tuple[str, OperatingPoints]]:
     """Return the blocks of rows that a laboratory could add."""
     old = setting.forward.points
     wheel = Wheel(
-        *(
-            float(np.median(np.broadcast_to(values, (len(old),))))
-            for values in (old.wheel.radius, old.wheel.width)
-        ),
-        lug_height=float(np.max(old.wheel.lug_height)),
-        lug_count=float(np.median(old.wheel.lug_count)),
-        lug_thickness=float(np.median(old.wheel.lug_thickness)),
+        float(np.median(old.wheel.radius)),
+        float(np.median(old.wheel.width)),
+        float(np.max(old.wheel.lug_height)),
+        float(np.median(old.wheel.lug_count)),
+        float(np.median(old.wheel.lug_thickness)),
     )
     rate = np.asarray(old.angular_velocity, dtype=float)
     speed = float(np.nanmedian(rate)) if np.isfinite(rate).any() else np.nan
@@ -153,7 +151,7 @@ def _distance(
     if new is not None:
         difference = np.concatenate([difference, new[0]])
         jacobian = np.concatenate([jacobian, new[1]])
-    precision = jacobian.T @ jacobian + np.eye(jacobian.shape[1])
+    precision = jacobian.T @ jacobian + np.diag(rival.prior)
     step = np.linalg.solve(precision, jacobian.T @ difference)
     return float(np.linalg.norm(difference - jacobian @ step))
 

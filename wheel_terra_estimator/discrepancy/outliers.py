@@ -36,7 +36,7 @@ def find_outliers(
         (m,) cells that the fit was asked to match.
     """
     outputs = problem.flat(fitted.outputs)
-    jacobian = problem.rotate(fitted.sensitivity)
+    jacobian = problem.rotate(fitted.sensitivity) / np.sqrt(fitted.prior)
     residual = observed - outputs
     inverse = problem.rotation.T @ inverse_covariance(variance, jacobian) @ problem.rotation
     target = residual + fitted.sensitivity @ fitted.u

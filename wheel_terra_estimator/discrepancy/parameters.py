@@ -3,8 +3,7 @@
 """Free parameters in coordinates whose prior is a standard normal.
 
 Soil parameters move under a prior that is wide on purpose: a soil number which is wrong by more
-than stated must not come out as a missing effect. Widening it costs next to nothing, because the
-rows themselves determine the soil.
+than stated must not come out as a missing effect.
 """
 
 from __future__ import annotations
@@ -21,17 +20,23 @@ from wheel_terra_estimator.terramechanics.soil import Soil
 
 FloatArray = NDArray[np.float64]
 
-# Least prior standard deviation of the soil parameters in a diagnosis.
-STIFFNESS_STD = 0.25  # of ln k
-EXPONENT_STD = 0.10
-FRICTION_STD = 0.12  # of ln tan(phi)
-SHEAR_MODULUS_STD = 0.30  # of ln K
-COHESION_STD = 0.40  # of c, plus COHESION_FLOOR
-COHESION_FLOOR = 30.0  # [Pa]
-PEAK_RATIO_STD = 0.08
-LEAVING_RATIO_STD = 0.08
-# Stated uncertainties are usually optimistic: they count this many times.
-STATED_FACTOR = 2.0
+# Standard deviations of the soil parameters where the configuration states none.
+STIFFNESS_STD = 0.10  # of ln k
+EXPONENT_STD = 0.05
+FRICTION_STD = 0.05  # of ln tan(phi)
+SHEAR_MODULUS_STD = 0.10  # of ln K
+COHESION_STD = 0.20  # of c, plus COHESION_FLOOR
+COHESION_FLOOR = 10.0  # [Pa]
+PEAK_RATIO_STD = 0.03
+LEAVING_RATIO_STD = 0.03
+# Stated uncertainties are often optimistic: the coordinates are this many times wider, and the
+# evidence weighs both widths.
+WIDENING = 2.5
+WORSE_SHARE = 0.15  # prior probability of the wider one
+# The same for the strength of an effect: small and large ones are weighed against each other.
+EFFECT_SCALES = (0.3, 2.0)
+# During fits the strength is held loosely, so that a strong effect is not pulled back.
+LOOSE = 3.0
 
 
 @dataclass(frozen=True)
@@ -48,6 +53,8 @@ class Coordinate:
         In the space of the transform.
     lower, upper : float
         Bounds of u.
+    role : str
+        ``soil``, ``strength`` (vanishes at the centre of its prior) or ``shape``.
     logarithmic : bool
         The transform is the exponential.
     neutral : float
@@ -63,6 +70,7 @@ class Coordinate:
     lower: float = -math.inf
     upper: float = math.inf
     logarithmic: bool = False
+    role: str = 'soil'
     neutral: float = 0.0
     unit: str = '-'
     meaning: str = ''
@@ -71,15 +79,6 @@ class Coordinate:
     def key(self) -> str:
         """Unique name."""
         return f'{self.owner}.{self.name}'
-
-    @property
-    def log_prior_mass(self) -> float:
-        """Log of the standard normal's mass inside the bounds."""
-        if self.owner == 'soil':
-            return 0.0
-        from scipy.special import ndtr
-
-        return math.log(max(ndtr(self.upper) - ndtr(self.lower), 1e-12))
 
     def value(self, u: FloatArray | float) -> FloatArray:
         """Return the parameter's value [its unit]."""
@@ -105,12 +104,12 @@ def soil_coordinates(soil: Soil, stated: Mapping[str, float]) -> tuple[Coordinat
         Field of ``Soil`` -> standard deviation that the configuration states explicitly [SI].
     """
 
-    def width(field: str, least: float, relative_to: float = 1.0) -> float:
-        return max(least, STATED_FACTOR * stated.get(field, 0.0) / relative_to)
+    def width(field: str, usual: float, relative_to: float = 1.0) -> float:
+        return WIDENING * (stated[field] / relative_to if field in stated else usual)
 
-    def logarithm(field: str, value: float, least: float) -> Coordinate:
+    def logarithm(field: str, value: float, usual: float) -> Coordinate:
         unit = {'shear_modulus': 'm'}.get(field, '-')
-        scale = width(field, least, value)
+        scale = width(field, usual, value)
         return Coordinate('soil', field, math.log(value), scale, -6.0, 6.0, True, unit=unit)
 
     def shifted(
@@ -123,9 +122,7 @@ def soil_coordinates(soil: Soil, stated: Mapping[str, float]) -> tuple[Coordinat
 
     tan_friction = math.tan(float(soil.friction_angle))
     slope = 1.0 / math.cos(float(soil.friction_angle)) ** 2
-    friction = max(
-        FRICTION_STD, STATED_FACTOR * stated.get('friction_angle', 0.0) * slope / tan_friction
-    )
+    friction = width('friction_angle', FRICTION_STD, tan_friction / slope)
     cohesion = float(soil.cohesion)
     return (
         Coordinate(
@@ -201,6 +198,7 @@ def _of_parameter(effect: Effect, p: EffectParameter) -> Coordinate:
         p.prior_scale,
         lower,
         upper,
+        role='strength' if p.neutral == p.prior_mean else 'shape',
         neutral=p.neutral,
         unit=p.unit,
         meaning=p.meaning,
@@ -233,6 +231,11 @@ def base_coordinates(
                     )
                 )
     return tuple(found)
+
+
+def loose_precision(coordinates: Sequence[Coordinate]) -> FloatArray:
+    """Return the (P,) prior precision of u during fits."""
+    return np.array([LOOSE**-2 if c.role == 'strength' else 1.0 for c in coordinates])
 
 
 def bounds(coordinates: Sequence[Coordinate]) -> tuple[FloatArray, FloatArray]:

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.intp]
@@ -75,9 +75,7 @@ class Problem:
         """Whiten and rotate (m,) or (m, P) cells."""
         return self.rotation @ cells
 
-    def variance(
-        self, amplitude: FloatArray | float, noise: FloatArray | float = 1.0
-    ) -> FloatArray:
+    def variance(self, amplitude: ArrayLike, noise: ArrayLike = 1.0) -> FloatArray:
         """Return (m,) variances of the rotated axes.
 
         Parameters

@@ -9,15 +9,13 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy.special import logsumexp
 
 from wheel_terra_estimator.discrepancy.gap_test import chi_square_p_value
 from wheel_terra_estimator.discrepancy.selection import Selection
 
-Variance: TypeAlias = Callable[
-    [tuple[float, float, float], NDArray[np.float64]], NDArray[np.float64]
-]
+Variance: TypeAlias = Callable[[ArrayLike, ArrayLike], NDArray[np.float64]]
 
 # Misfit that even the best floor leaves improbable.
 IMPROBABLE = 1e-3

@@ -28,9 +28,10 @@ PRIOR_NOTHING, PRIOR_ONE, PRIOR_TWO = 0.50, 0.45, 0.05
 # Prior of the structural error: floors that a good model may have ...
 _FLOORS = ((0.0, 0.60), (0.007, 0.10), (0.015, 0.12), (0.025, 0.10), (0.04, 0.04))
 # ... and smooth misfits that ask for a name, in all quantities or in one of them.
-_UNEXPLAINED_PRIOR = 0.04
+_UNEXPLAINED_PRIOR = 0.10
 _UNEXPLAINED = (0.08, 0.16, 0.35)
-_UNEXPLAINED_SINGLE = (0.04, 0.12, 0.35)
+_UNEXPLAINED_SOME = (0.015, 0.03, 0.06, 0.15, 0.4)
+_SOME = ((1, 0, 0), (0, 1, 0), (0, 0, 1), (0, 1, 1))
 
 _PAIR_SEEDS = 4  # best single effects to which a second one is added
 _PAIRS = 8  # pairs that are fitted
@@ -51,10 +52,9 @@ def default_floors(greatest: float | None = None) -> tuple[Floor, ...]:
         share = (1.0 - _UNEXPLAINED_PRIOR) / total
         floors = [Floor((a, a, a), math.log(p * share), False) for a, p in kept]
     patterns = [(a, a, a) for a in _UNEXPLAINED]
-    for q, a in itertools.product(range(3), _UNEXPLAINED_SINGLE):
-        single = [0.0, 0.0, 0.0]
-        single[q] = a
-        patterns.append((single[0], single[1], single[2]))
+    patterns += [
+        (a * z, a * f, a * t) for (z, f, t), a in itertools.product(_SOME, _UNEXPLAINED_SOME)
+    ]
     each = math.log(_UNEXPLAINED_PRIOR / len(patterns))
     floors.extend(Floor(pattern, each, True) for pattern in patterns)
     return tuple(floors)

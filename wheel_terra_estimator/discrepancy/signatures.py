@@ -19,8 +19,8 @@ from wheel_terra_estimator.terramechanics.effects.base import Effect
 
 FloatArray = NDArray[np.float64]
 
-LARGE = 2.5  # prior deviations: a size that would surprise nobody
-SEEN = 3.0  # d' from which an effect counts as visible
+LARGE = 4.0  # prior deviations: no effect is expected to be larger
+SEEN = 2.0  # d' from which an effect counts as visible
 CLEAR = 5.0  # d' from which it would have been named
 _ONSETS = (-1.0, 0.0, 1.0)  # of parameters that only shape an effect, in prior deviations
 _DEPTHS = (0.4, 0.65, 0.85)  # of those that are a depth: share of the deepest row
@@ -60,7 +60,8 @@ def against_soil(fitted: Fit, variance: FloatArray, vectors: FloatArray) -> Floa
 
 def distance(fitted: Fit, variance: FloatArray, change: FloatArray) -> float:
     """Return d' of a rotated change of the cells beyond what the soil can imitate."""
-    return float(np.sqrt(max(change @ against_soil(fitted, variance, change), 0.0)))
+    square = float(change @ against_soil(fitted, variance, change))
+    return max(square, 0.0) ** 0.5
 
 
 def unavailable(effect: Effect, table: SteadyTable, lug_height: FloatArray) -> str:

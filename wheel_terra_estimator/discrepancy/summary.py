@@ -26,10 +26,10 @@ def gaps(
 ) -> dict[str, QuantityGap]:
     """Return the held-out errors of each quantity; cells set apart as outliers do not count."""
     measured = table.measured.copy()
-    for row, quantity, _ in findings.outliers:
-        measured[row, quantity] = np.nan
+    for row, column, _ in findings.outliers:
+        measured[row, column] = np.nan
     rng = np.random.default_rng(_SEED)
-    found = {}
+    found: dict[str, QuantityGap] = {}
     for q, quantity in enumerate(QUANTITIES):
         mine = np.isfinite(measured[:, q])
         if not mine.any():
@@ -53,7 +53,9 @@ def gaps(
             if shrink is not None and len(values) > _DRAWS // 2:
                 low, high = (float(v) for v in np.quantile(values, (0.05, 0.95)))
         found[quantity] = QuantityGap(
-            *(float(np.sqrt(errors[key].mean())) for key in ('before', 'refit', 'after')),
+            float(np.sqrt(errors['before'].mean())),
+            float(np.sqrt(errors['refit'].mean())),
+            float(np.sqrt(errors['after'].mean())),
             noise,
             float(least),
             count,
@@ -132,7 +134,8 @@ def sentence(
     """Return the verdict in words."""
     within = f', within a model-error floor of {100 * floor:.1f} % of the range' if floor else ''
     if verdict.word == 'agrees':
-        return f'Model and measurement agree once the soil is refitted{within} (p = {gap_p_value:.2g}).'
+        agreed = 'Model and measurement agree once the soil is refitted'
+        return f'{agreed}{within} (p = {gap_p_value:.2g}).'
     if verdict.word == 'unexplained':
         return (
             'Model and measurement disagree, and none of the known effects explains it '

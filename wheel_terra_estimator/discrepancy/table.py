@@ -75,8 +75,11 @@ class SteadyTable:
     @property
     def quantities(self) -> tuple[str, ...]:
         """The quantities that at least one row has."""
-        present = np.isfinite(self.measured).any(axis=0)
-        return tuple(q for q, here in zip(QUANTITIES, present, strict=True) if here)
+        return tuple(
+            quantity
+            for q, quantity in enumerate(QUANTITIES)
+            if np.isfinite(self.measured[:, q]).any()
+        )
 
     def varying(self) -> tuple[str, ...]:
         """Return the input columns that hold more than one value."""
@@ -322,14 +325,14 @@ def _check_ranges(name: str, arrays: Mapping[str, FloatArray], lines: NDArray[np
             )
             low = arrays[column] < 0.0 if column == 'lug_height' else arrays[column] <= 0.0
             refuse(low, column, 'is not a positive length in m')
-    for column, low, high in (
+    for column, least, most in (
         ('lug_count', 0.0, 1000.0),
         ('gravity', 1e-3, 100.0),
         ('pass_number', 1.0, 1000.0),
     ):
         if column in arrays:
-            bad = (arrays[column] < low) | (arrays[column] > high)
-            refuse(bad, column, f'is outside {low:g}..{high:g}')
+            bad = (arrays[column] < least) | (arrays[column] > most)
+            refuse(bad, column, f'is outside {least:g}..{most:g}')
     if 'angular_velocity' in arrays:
         fast = abs(arrays['angular_velocity']) > 60.0
         refuse(fast, 'angular_velocity', 'looks like degrees per second; give rad/s')

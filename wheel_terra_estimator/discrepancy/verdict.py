@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""From posterior weights to a verdict: agrees, named or unexplained; and to the set that stays open.
+"""From posterior weights to a verdict, and to the set of names that stays open.
 
 The thresholds were chosen on campaigns apart from those that score them (docs/diagnose.md).
 """
@@ -10,9 +10,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import logsumexp
 
 from wheel_terra_estimator.discrepancy.selection import Selection
+
+FloatArray = NDArray[np.float64]
 
 # "Something is missing" must beat "nothing is missing" by these odds.
 ODDS_TO_SPEAK = 3.0
@@ -66,7 +69,7 @@ def decide(selection: Selection) -> Verdict:
 
 
 def _rivals(
-    selection: Selection, total: np.ndarray, names: tuple[str, ...], name: str
+    selection: Selection, total: FloatArray, names: tuple[str, ...], name: str
 ) -> tuple[str, ...]:
     """Return effects that could stand in the place of ``name``, most probable first."""
     others = set(names) - {name}

@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Where model and measurement disagree: a scan over boxes of the inputs, calibrated by simulation."""
+"""Where model and measurement disagree: a scan over boxes of the inputs, calibrated."""
 
 from __future__ import annotations
 
@@ -44,7 +44,8 @@ def locate(table: SteadyTable, problem: Problem, nothing: Fit, observed: FloatAr
     boxes, sides = _boxes(table, names)
     values = np.where(mine, residual[:, worst], 0.0)
     share_inside = float('nan')
-    p_value, box, inside = 1.0, (), mine
+    p_value, inside = 1.0, mine
+    box: tuple[InputRange, ...] = ()
     if len(boxes):
         counts = np.maximum(boxes @ mine, 1.0)
         score = _score(boxes @ values**2, counts)
@@ -133,7 +134,7 @@ def _simulated(problem: Problem, nothing: Fit, quantity: int, rows: int) -> Floa
     rng = np.random.default_rng(_SEED)
     jacobian = nothing.sensitivity / problem.std[:, None]
     noise = rng.standard_normal((problem.size, _DRAWS))
-    precision = jacobian.T @ jacobian + np.eye(jacobian.shape[1])
+    precision = jacobian.T @ jacobian + np.diag(nothing.prior)
     draws = noise - jacobian @ np.linalg.solve(precision, jacobian.T @ noise)
     mine = problem.quantity == quantity
     full = np.zeros((_DRAWS, rows))

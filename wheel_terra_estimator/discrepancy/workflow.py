@@ -62,7 +62,7 @@ class Options:
     effects : tuple of str or None
         Effects that may be named; None = all candidates of the catalogue.
     floor : float or None
-        Greatest model-error floor, share of each quantity's range; None = up to 4 %, as the data ask.
+        Greatest model-error floor, share of each quantity's range; None = as the data ask, to 4 %.
     """
 
     effects: tuple[str, ...] | None = None
@@ -121,7 +121,7 @@ def operating_points(table: SteadyTable, configuration: Configuration) -> Operat
     wheels, columns = configuration.wheels, table.columns
     stated = configuration.stated
     values = {}
-    for column, field in (
+    for name, field in (
         ('wheel_radius', 'radius'),
         ('wheel_width', 'width'),
         ('lug_height', 'lug_height'),
@@ -129,12 +129,12 @@ def operating_points(table: SteadyTable, configuration: Configuration) -> Operat
     ):
         first = getattr(wheels, field)
         default = float(first[0]) if len(first) else float('nan')
-        if column in columns:
-            values[field] = np.where(np.isfinite(columns[column]), columns[column], default)
+        if name in columns:
+            values[field] = np.where(np.isfinite(columns[name]), columns[name], default)
         else:
             if field in ('radius', 'width') and f'wheels.{field}' not in stated:
                 raise UserError(
-                    f'{table.name}: no column {column}, and no wheel in the configuration; '
+                    f'{table.name}: no column {name}, and no wheel in the configuration; '
                     f'add the column, or --config with wheels.{field}'
                 )
             values[field] = np.full(len(table), default)
@@ -494,7 +494,7 @@ def _next(findings: Findings, verdict: Verdict, after: Fit) -> tuple[NextMeasure
 
 def _soil_shifts(findings: Findings, after: Fit, variance: FloatArray) -> tuple[SoilShift, ...]:
     weighted = after.jacobian / variance[:, None]
-    covariance = np.linalg.inv(weighted.T @ after.jacobian + np.eye(len(after.u)))
+    covariance = np.linalg.inv(weighted.T @ after.jacobian + np.diag(after.prior))
     refit = findings.nothing.values()
     found = []
     for index, c in enumerate(after.coordinates):
