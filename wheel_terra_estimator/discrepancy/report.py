@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 TEMPLATES = Path(__file__).parent / 'templates'
-_RESOLUTION = 120  # [dots per inch]
+_RESOLUTION = 110  # [dots per inch]
 _TONES = {'agrees': 'good', 'named': 'warn', 'unexplained': 'bad'}
 
 

@@ -4,7 +4,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -53,7 +54,7 @@ def label(name: str, unit: str) -> str:
 def measured_against_model(diagnosis: Diagnosis) -> Figure:
     """Draw measured over modelled values, before and after, one panel per quantity."""
     curves, table = diagnosis.curves, diagnosis.table
-    with picture_style():
+    with _style():
         figure, axes = _panels(1, table.quantities, height=2.7)
         for axis, name in zip(axes[0], table.quantities, strict=True):
             q, (scale, unit) = QUANTITIES.index(name), SHOWN[name]
@@ -96,7 +97,7 @@ def residuals(diagnosis: Diagnosis, colour_by: str) -> Figure:
     slip, colour = table.columns['slip'], factor * table.columns[colour_by]
     few = np.unique(np.round(colour[np.isfinite(colour)], 9))
     discrete = len(few) <= 5
-    with picture_style():
+    with _style():
         figure, axes = _panels(
             len(table.quantities),
             stages,
@@ -128,14 +129,12 @@ def residuals(diagnosis: Diagnosis, colour_by: str) -> Figure:
                         vmax=np.nanmax(colour),
                     )
                 axis.plot(slip[outside], np.clip(residual[outside], -reach, reach), 'x', color=RED)
-                axis.set_ylim(-reach, reach)
                 if name == table.quantities[0]:
                     axis.set_title(title)
                 if name == table.quantities[-1]:
                     axis.set_xlabel('slip')
+            row[0].set_ylim(-reach, reach)
             row[0].set_ylabel(f'{words(name)} [{quantity_unit}]')
-            for axis in row[1:]:
-                axis.tick_params(labelleft=False)
         if discrete:
             from matplotlib.lines import Line2D
 
@@ -153,7 +152,7 @@ def where_map(diagnosis: Diagnosis) -> Figure:
     second = _second_input(diagnosis)
     factor, unit = shown_input(second)
     x, y = table.columns['slip'], factor * table.columns[second]
-    with picture_style():
+    with _style():
         figure, axes = _panels(1, table.quantities, height=2.7, bar=True)
         drawn = None
         for axis, name in zip(axes[0], table.quantities, strict=True):
@@ -187,7 +186,7 @@ def signature(diagnosis: Diagnosis) -> Figure | None:
     if curves.signature is None:
         return None
     slip = table.columns['slip']
-    with picture_style():
+    with _style():
         figure, axes = _panels(1, table.quantities, height=2.5, legend=True)
         for axis, name in zip(axes[0], table.quantities, strict=True):
             q, (scale, unit) = QUANTITIES.index(name), SHOWN[name]
@@ -231,7 +230,7 @@ def signature(diagnosis: Diagnosis) -> Figure | None:
 def gap(diagnosis: Diagnosis) -> Figure:
     """Draw the error on unseen rows: as configured, soil refitted, effect added, noise floor."""
     names = list(diagnosis.gap)
-    with picture_style():
+    with _style():
         figure, axes = _panels(1, names, height=2.2)
         for axis, name in zip(axes[0], names, strict=True):
             (scale, unit), item = SHOWN[name], diagnosis.gap[name]
@@ -270,7 +269,7 @@ def rivals(item: NextMeasurement) -> Figure | None:
     factor, unit = shown_input(x_name)
     x = factor * np.asarray(item.rows[x_name], dtype=float)
     order = np.argsort(x, kind='stable')
-    with picture_style():
+    with _style():
         figure, axes = _panels(1, QUANTITIES, height=2.2, legend=True)
         for axis, name in zip(axes[0], QUANTITIES, strict=True):
             q, (scale, quantity_unit) = QUANTITIES.index(name), SHOWN[name]
@@ -306,6 +305,15 @@ def colour_inputs(diagnosis: Diagnosis) -> list[str]:
     return chosen or ['normal_load']
 
 
+@contextmanager
+def _style() -> Iterator[None]:
+    """Style of all pictures; titles at a fixed height, which saves a layout of every axis."""
+    import matplotlib as mpl
+
+    with picture_style(), mpl.rc_context({'axes.titley': 1.01}):
+        yield
+
+
 def _panels(
     rows: int,
     columns: Sequence[Any],
@@ -332,7 +340,11 @@ def _panels(
     gap = 0.28
     total = top + bottom + rows * height + (rows - 1) * gap
     figure = Figure(figsize=(width, total), layout='none')  # type: ignore[arg-type]
-    axes = figure.subplots(rows, count, squeeze=False)
+    axes = figure.subplots(
+        rows, count, squeeze=False, sharex=shared, sharey='row' if shared else False
+    )
+    for axis in axes.flat:
+        axis.locator_params(nbins=5)
     figure.subplots_adjust(
         left=left / width,
         right=1 - right / width,
