@@ -39,6 +39,7 @@ class InertialWindow:
     force_y: float = 0.0
     force_z: float = 0.0
     yaw_rate: float = 0.0
+    pitch_rate: float = 0.0
     speed_change: float = 0.0  # integral of f_x - g_x [m/s]
     duration: float = 0.0  # [s] covered by that integral
 
@@ -98,6 +99,7 @@ def take_inertial(
     window.force_y += float(reading.specific_force[1])
     window.force_z += float(reading.specific_force[2])
     window.yaw_rate += float(reading.angular_rate[2]) - yaw_bias
+    window.pitch_rate += float(reading.angular_rate[1])
     if 0.0 < dt <= _LONGEST_GAP:
         window.speed_change += (force_x - gravity * attitude.sine_up) * dt
         window.duration += dt

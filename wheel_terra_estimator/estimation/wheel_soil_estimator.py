@@ -55,6 +55,7 @@ from wheel_terra_estimator.estimation.stuck_warning import (
 FloatArray = NDArray[np.float64]
 _NAN = math.nan
 _SLOPE_KEEP = 0.9  # per cycle
+_LEAST_SLIP_STD = 0.012
 
 
 @dataclass
@@ -96,12 +97,15 @@ class _Run:
     force: tuple[float, float, float] = (0.0, 0.0, 0.0)  # specific force of the last window
     force_known: bool = False
     yaw_rate: float = 0.0
+    turned_up: float = 0.0  # nose-up rotation over the last rover length [rad]
+    turned_over: float = 0.0  # and the travel that it took [m]
     yaw_bias: float = 0.0
     yaw_bias_weight: float = 0.0
     ratio: float = 0.95  # remembered v / rim speed
     ratio_std: float = 0.3
     ratio_walk: float = 0.25  # of v / rim speed [1/sqrt(m)]
     drive_direction: float = 0.0
+    starting: bool = False
     fresh_travel: float = 0.0  # [m] since the start or the last change of direction
     load: list[float] = field(default_factory=list)
     torque_slope: list[float] = field(default_factory=list)  # by v/(r w), smoothed; nan = none
@@ -159,6 +163,7 @@ class WheelSoilEstimator:
         # Below this rim speed v / rim speed is not told from noise.
         self._low_rim = max(3.0 * settings.rest_speed, 0.005)
         # Until a contact is new all along, its shear is not that of the steady model.
+        self._curvature_length = 0.5 * (max(settings.longitudinal) - min(settings.longitudinal))
         self._contact_length = 0.5 * min(settings.rim_radius)
         rate = max(float(settings.sensors.imu_rate), 1.0)
         sensors = settings.sensors
@@ -427,7 +432,7 @@ class WheelSoilEstimator:
             count = window.count
             run.force = (window.force_x / count, window.force_y / count, window.force_z / count)
             run.force_known = True
-            run.yaw_rate = window.yaw_rate / count
+            self._follow_turning(window, dt)
             run.load = self._loads()
         rim = self._representative_rim(run.yaw_rate)
         self._follow_direction(rim)
@@ -440,6 +445,33 @@ class WheelSoilEstimator:
         self._fuse_rest(time, rims, rim, still)
         self._fuse_models(dt, rims, still)
         self._after(time, dt, rim, rims, still, before)
+
+    def _follow_turning(self, window: InertialWindow, dt: float) -> None:
+        """Smooth the yaw rate while it is steady; measure how the ground curves along the path."""
+        run, s = self._run, self._settings
+        yaw_rate = window.yaw_rate / window.count
+        noise = float(s.sensors.angular_rate_std) / math.sqrt(window.count)
+        steady = abs(yaw_rate - run.yaw_rate) < 3.0 * noise
+        run.yaw_rate += (0.25 if steady else 1.0) * (yaw_rate - run.yaw_rate)
+        # Nose-up rotation over travel, both forgotten over the length of the rover.
+        travel = float(self._filter.mean[SPEED]) * dt
+        keep = math.exp(-abs(travel) / max(self._curvature_length, 0.1))
+        run.turned_up = keep * run.turned_up - window.pitch_rate / window.count * dt
+        run.turned_over = keep * run.turned_over + travel
+
+    def _yaw_std(self) -> float:
+        """Return the standard deviation of the smoothed yaw rate [rad/s]."""
+        sensors = self._settings.sensors
+        per_cycle = max(float(sensors.imu_rate) * float(self._settings.filter.period), 1.0)
+        noise = float(sensors.angular_rate_std) / math.sqrt(per_cycle)
+        return math.hypot(0.4 * noise, float(sensors.angular_rate_bias_std))
+
+    def _curvature(self) -> float:
+        """Return slope gained per travel [rad/m]: front wheels may climb steeper ground."""
+        over = self._run.turned_over
+        if abs(over) < 0.1 * self._curvature_length:
+            return 0.0
+        return min(max(self._run.turned_up / over, -0.3), 0.3)
 
     def _loads(self) -> list[float]:
         """Return the wheel loads for the last specific force, pulls and torques [N]."""
@@ -455,6 +487,10 @@ class WheelSoilEstimator:
         run = self._run
         if rim is None or abs(rim) < self._low_rim:
             return
+        if run.starting:
+            # The contact forms anew, and with it what the shear model gets wrong.
+            run.starting = False
+            self._filter.widen(SHEAR_STRENGTH, 0.1**2)
         direction = 1.0 if rim > 0.0 else -1.0
         if direction != run.drive_direction:
             if run.drive_direction != 0.0:
@@ -702,6 +738,7 @@ class WheelSoilEstimator:
             run.torque_sum[i], run.torque_count[i] = 0.0, 0
         if still:
             run.fresh_travel = 0.0
+            run.starting = True
             run.torque_slope = [_NAN] * n
             run.pull_slope = [_NAN] * n
         elif run.fresh_travel > self._contact_length:
@@ -739,12 +776,19 @@ class WheelSoilEstimator:
             pull, torque_model, row_pull, row_torque = self._wheel_rows(i, rim, direction)
             jacobian[i], jacobian_torque[i] = row_pull, row_torque
             pulls[i], torques[i] = pull, torque_model
+            # Turning shears the soil sideways too, which the model does not know: ten cycles of
+            # it are one piece of information.
+            side = abs(run.yaw_rate * s.longitudinal[i]) / abs(rim)
+            scrub = 10.0 * min(side, 1.0) ** 2
+            open_variance += scrub * (0.1 * load) ** 2
             balance += row_pull
             balance_sum += pull
             reading = torque[i]
             if reading == reading:
                 variance = (
-                    float(s.sensors.torque_std) ** 2 + (torque_model * s.load_std) ** 2 + 1e-6
+                    float(s.sensors.torque_std) ** 2
+                    + (s.load_std**2 + scrub) * torque_model**2
+                    + 1e-6
                 )
                 residual = reading - torque_model
                 total = float(row_torque @ P @ row_torque) + variance
@@ -766,7 +810,11 @@ class WheelSoilEstimator:
                 tilt += gain * float(x[zi])
                 # Specific force along the ground: f_x - f_z * tilt (body pitched up by the ruts).
                 balance[zi] += weight * gain
-            residual = s.mass * run.force[0] - (balance_sum + weight * tilt)
+            # On curved ground the wheels' own slopes differ from the body's.
+            uphill = self._curvature() * sum(
+                w * x_i for w, x_i in zip(run.load, s.longitudinal, strict=True)
+            )
+            residual = s.mass * run.force[0] - (balance_sum + weight * tilt - uphill)
             noise = float(s.sensors.specific_force_std) ** 2 / run.window.count
             variance = (
                 s.mass**2 * (noise + float(s.sensors.specific_force_bias_std) ** 2)
@@ -866,9 +914,10 @@ class WheelSoilEstimator:
         x, P = self._filter.mean, self._filter.covariance
         run.cycle_time = time
         run.rim_at_cycle = rim
-        if rim is not None and abs(rim) > self._low_rim:
+        settled = run.fresh_travel > self._contact_length
+        if rim is not None and abs(rim) > 2.0 * self._low_rim and settled:
             run.ratio = min(max(float(x[SPEED]) / rim, -0.5), 2.0)
-            run.ratio_std = min(max(math.sqrt(float(P[SPEED, SPEED])) / abs(rim), 0.02), 0.5)
+            run.ratio_std = min(max(math.sqrt(float(P[SPEED, SPEED])) / abs(rim), 0.1), 0.5)
         if dt > 0.0:
             keep = math.exp(-dt / 0.5)
             change = (x[layout.sinkage] - sinkage_before) / dt
@@ -876,7 +925,16 @@ class WheelSoilEstimator:
                 run.sinkage_rate[i] += (1.0 - keep) * (float(change[i]) - run.sinkage_rate[i])
                 zi = layout.sinkage.start + i
                 run.sinkage_rate_std[i] = math.sqrt(2.0 * float(P[zi, zi])) / 1.0
+        self._floor_speed_variance(rims)
         self._pulls(rims)
+
+    def _floor_speed_variance(self, rims: list[float]) -> None:
+        """Keep a least slip deviation: no set of soil models is better than that."""
+        typical = sum(abs(r) for r in rims if r == r) / len(rims)
+        least = (_LEAST_SLIP_STD * typical) ** 2
+        lacking = least - float(self._filter.covariance[SPEED, SPEED])
+        if lacking > 0.0:
+            self._filter.widen(SPEED, lacking)
 
     def _pulls(self, rims: list[float]) -> None:
         """Work out pulls and torques after the update, to first order from the last pass."""
@@ -923,17 +981,17 @@ class WheelSoilEstimator:
         speed, variance = self._current_speed()
         speed_std = math.sqrt(max(variance, 0.0))
         yaw = run.yaw_rate
-        if run.window.count:
-            yaw = run.window.yaw_rate / run.window.count
-        yaw_std = math.hypot(
-            float(s.sensors.angular_rate_std), float(s.sensors.angular_rate_bias_std)
-        )
+        yaw_std = self._yaw_std()
         rate_std = float(s.sensors.wheel_rate_std)
         motion = []
+        stopped = run.still_since is not None and time >= run.sliding_until
         for i in range(s.wheel_count):
             rim = self._rim(i)
             v = speed - yaw * s.lateral[i]
             v_std = math.hypot(speed_std, yaw_std * s.lateral[i])
+            if stopped and abs(speed) < s.rest_speed:
+                # All wheels stand: what the gyro says beside them is noise.
+                v, v_std = 0.0, 0.0
             if rim != rim:
                 run.slip_std[i] = min(run.slip_std[i] + 0.02, 1.0)
                 run.resting[i] = False
@@ -964,7 +1022,7 @@ class WheelSoilEstimator:
     ) -> None:
         run, s = self._run, self._settings
         rest = s.rest_speed
-        if abs(rim) < rest and abs(v) < max(rest, 1.0 * v_std):
+        if abs(rim) < rest and abs(v) < max(rest, 2.0 * v_std):
             if run.rest_since[i] != run.rest_since[i]:
                 run.rest_since[i] = time
             run.resting[i] = time - run.rest_since[i] >= s.rest_time - 1e-6
@@ -1028,9 +1086,7 @@ class WheelSoilEstimator:
         x, P = self._filter.mean, self._filter.covariance
         speed, variance = self._current_speed()
         rims = [self._rim(i) for i in range(n)]
-        yaw_std = math.hypot(
-            float(s.sensors.angular_rate_std), float(s.sensors.angular_rate_bias_std)
-        )
+        yaw_std = self._yaw_std()
         slip_velocity, slip_velocity_std = [], []
         for i in range(n):
             rim = rims[i]

@@ -134,8 +134,9 @@ KINDS: Mapping[str, Mapping[str, Any]] = {
     'entrapment_slope': _kind(
         _HIT,
         'steepening slope until the rover makes no way',
-        slope__position=[0.0, 0.6, 2.4],
-        slope__angle_deg=[0.0, 10.0, 32.0],
+        slope__position=[0.0, 1.0, 4.0],
+        slope__angle_deg=[0.0, 14.0, 32.0],
+        duration=140.0,
     ),
     'near_stuck': _kind(
         _HIT,
