@@ -121,7 +121,7 @@ def _variances(problem: Problem, floors: tuple[Floor, ...], factor: FloatArray) 
 
 
 def _prior_precisions(fitted: Fit) -> tuple[FloatArray, FloatArray]:
-    """(S, P) prior precisions of u for all combinations of the priors' scales; (S,) their shares."""
+    """(S, P) prior precisions of u for all combinations of scales; (S,) their shares."""
     soil = np.array([c.role == 'soil' for c in fitted.coordinates])
     strength = np.array([c.role == 'strength' for c in fitted.coordinates])
     sizes = EFFECT_SCALES if strength.any() else (1.0,)

@@ -13,11 +13,16 @@ from wheel_terra_estimator.discrepancy.problem import OUTLIER_FACTOR, Problem
 FloatArray = NDArray[np.float64]
 
 SHARE = 0.02  # prior share of outliers among the cells
+NARROW = 0.12  # size of features narrow in slip that rows share [share of the range]
 GREATEST_SHARE = 0.12  # of the cells of a table
 
 
 def find_outliers(
-    problem: Problem, fitted: Fit, variance: FloatArray, observed: FloatArray
+    problem: Problem,
+    fitted: Fit,
+    variance: FloatArray,
+    observed: FloatArray,
+    narrow: FloatArray,
 ) -> list[tuple[int, int, float]]:
     """Return (row, quantity, deviation) of the cells to be set apart, worst first.
 
@@ -34,11 +39,15 @@ def find_outliers(
         (m,) of the rotated axes, wide enough for a structural error.
     observed : numpy.ndarray
         (m,) cells that the fit was asked to match.
+    narrow : numpy.ndarray
+        (N, N) correlation of features narrow in slip that rows share (see ``slip_features``).
     """
     outputs = problem.flat(fitted.outputs)
     jacobian = problem.rotate(fitted.sensitivity) / np.sqrt(fitted.prior)
     residual = observed - outputs
     inverse = problem.rotation.T @ inverse_covariance(variance, jacobian) @ problem.rotation
+    if narrow.any():
+        inverse = np.linalg.inv(np.linalg.inv(inverse) + _shared_features(problem, narrow))
     target = residual + fitted.sensitivity @ fitted.u
     extra = (OUTLIER_FACTOR**2 - 1.0) * problem.std**2
     found: list[tuple[int, int, float]] = []
@@ -60,6 +69,14 @@ def find_outliers(
         share = extra[worst] / (1.0 + extra[worst] * diagonal[worst])
         inverse = inverse - share * np.outer(column, column)
     return found
+
+
+def _shared_features(problem: Problem, narrow: FloatArray) -> FloatArray:
+    """(m, m) covariance of the cells by features that are narrow in slip."""
+    scale = NARROW * problem.scale[problem.quantity]
+    same = problem.quantity[:, None] == problem.quantity[None, :]
+    correlation = narrow[np.ix_(problem.row, problem.row)]
+    return np.where(same, correlation * np.outer(scale, scale), 0.0)
 
 
 def inverse_covariance(variance: FloatArray, jacobian: FloatArray) -> FloatArray:

@@ -21,6 +21,8 @@ IndexArray = NDArray[np.intp]
 
 # Structural errors are smooth over about a third of the range of an input, with slower parts.
 _LENGTHS = (0.35, 1.0)
+# A hump or a ripple in slip that all loads, slopes and wheels share is no outlier either.
+_SLIP_LENGTH, _OTHER_LENGTH = 0.08, 3.0
 # A cell set apart as an outlier is taken to have this many times its noise.
 OUTLIER_FACTOR = 12.0
 
@@ -106,6 +108,23 @@ def kernel(inputs: FloatArray) -> FloatArray:
     return np.mean([np.exp(-0.5 * square / length**2) for length in _LENGTHS], axis=0)
 
 
+def slip_features(inputs: FloatArray, slip: int | None) -> FloatArray:
+    """(N, N) correlation of a misfit that is narrow in slip and shared along all other inputs.
+
+    Parameters
+    ----------
+    slip : int or None
+        Column of the slip in `inputs`; without it, or without another input, nothing can be shared
+        and the result is zero.
+    """
+    if slip is None or inputs.shape[1] < 2:
+        return np.zeros((len(inputs), len(inputs)))
+    lengths = np.full(inputs.shape[1], _OTHER_LENGTH)
+    lengths[slip] = _SLIP_LENGTH
+    scaled = inputs / lengths
+    return np.exp(-0.5 * ((scaled[:, None, :] - scaled[None, :, :]) ** 2).sum(axis=-1))
+
+
 def build_problem(
     measured: FloatArray,
     std: FloatArray,
@@ -114,6 +133,7 @@ def build_problem(
     outliers: Sequence[tuple[int, int]] = (),
     by_slip: FloatArray | None = None,
     slip_std: FloatArray | None = None,
+    slip_group: IndexArray | None = None,
 ) -> Problem:
     """Return the problem of an (N, 3) table.
 
@@ -129,7 +149,9 @@ def build_problem(
         Cells set apart.
     by_slip, slip_std : numpy.ndarray, optional
         (N, 3) derivative by the recorded slip and (N,) its standard deviation: an error common to
-        the quantities of a row.
+        the quantities of a row, and to the rows of a group.
+    slip_group : numpy.ndarray, optional
+        (N,) rows that share one reading of the slip.
     """
     row, quantity = np.nonzero(np.isfinite(measured))
     deviation = std[row, quantity].copy()
@@ -139,7 +161,7 @@ def build_problem(
     deviation[apart] *= OUTLIER_FACTOR
     correlation = kernel(inputs)
     m = len(row)
-    if by_slip is None or slip_std is None or not (slip_std > 0.0).any():
+    if by_slip is None or slip_std is None or slip_group is None:
         rotation, roughness = np.zeros((m, m)), np.empty(m)
         block = np.empty(m, dtype=np.intp)
         at = 0
@@ -159,9 +181,8 @@ def build_problem(
     else:
         common = by_slip[row, quantity]
         noise = np.diag(deviation**2)
-        noise += np.where(
-            row[:, None] == row[None, :], np.outer(common, common) * slip_std[row] ** 2, 0.0
-        )
+        together = slip_group[row][:, None] == slip_group[row][None, :]
+        noise += np.where(together, np.outer(common * slip_std[row], common * slip_std[row]), 0.0)
         lower = np.linalg.cholesky(noise)
         smooth = np.where(
             quantity[:, None] == quantity[None, :],

@@ -29,6 +29,8 @@ class Remainder:
     ----------
     probability : float
         That a smooth misfit beyond the model-error floor is left.
+    probability_of_any : float
+        That any structural error of more than one per cent is left, floor included.
     amplitude : float
         Most probable amplitude of the structural error, share of the range.
     p_value : float
@@ -36,6 +38,7 @@ class Remainder:
     """
 
     probability: float
+    probability_of_any: float
     amplitude: float
     p_value: float
 
@@ -43,6 +46,11 @@ class Remainder:
     def significant(self) -> bool:
         """True where something is left that wants a name."""
         return self.probability > 0.5 or self.p_value < IMPROBABLE
+
+    @property
+    def noticeable(self) -> bool:
+        """True where noise alone is not enough: also a misfit within the model-error floor."""
+        return self.significant or self.probability_of_any > 0.8
 
 
 def remainder(selection: Selection, index: int, variance_of: Variance) -> Remainder:
@@ -57,10 +65,15 @@ def remainder(selection: Selection, index: int, variance_of: Variance) -> Remain
     joint = selection.log_joint[index]
     share = float(np.exp(logsumexp(joint[selection.unexplained]) - logsumexp(joint)))
     top = int(np.argmax(joint))
+    real = np.array([floor.largest >= 0.01 for floor in selection.floors])
+    any_share = float(np.exp(logsumexp(joint[real]) - logsumexp(joint)))
     quiet = [k for k, floor in enumerate(selection.floors) if not floor.unexplained]
     best = quiet[int(np.argmax(joint[quiet]))]
     floor = selection.floors[best]
     variance = variance_of(floor.amplitude, explanation.posterior.noise_factor[best])
     return Remainder(
-        share, selection.floors[top].largest, chi_square_p_value(explanation.fitted, variance)
+        share,
+        any_share,
+        selection.floors[top].largest,
+        chi_square_p_value(explanation.fitted, variance),
     )

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,9 +15,9 @@ from wheel_terra_estimator.discrepancy.candidates import FIT_FLOOR, Explanation,
 from wheel_terra_estimator.discrepancy.evidence import Floor
 from wheel_terra_estimator.discrepancy.fitting import Fit, fit
 from wheel_terra_estimator.discrepancy.forward import Forward
-from wheel_terra_estimator.discrepancy.outliers import find_outliers
+from wheel_terra_estimator.discrepancy.outliers import find_outliers, inverse_covariance
 from wheel_terra_estimator.discrepancy.parameters import Coordinate
-from wheel_terra_estimator.discrepancy.problem import Problem, build_problem
+from wheel_terra_estimator.discrepancy.problem import Problem, build_problem, slip_features
 from wheel_terra_estimator.discrepancy.result import Noise
 from wheel_terra_estimator.discrepancy.selection import (
     Selection,
@@ -34,6 +34,8 @@ FloatArray = NDArray[np.float64]
 _FLEXIBLE = 0.25  # floor of the first robust pass: wide enough for any effect [share of range]
 _ROBUST_FLOOR = 0.02  # floor of the later ones
 _PASSES = 3
+_LATENT_FLOOR = 0.03  # structural error allowed while slips are moved [share of range]
+_FARTHEST = 2.0  # a slip is moved by at most so many of its deviations
 
 
 @dataclass(frozen=True)
@@ -80,7 +82,7 @@ def search(
     """
     scale = _ranges(table)
     noise = noises.stated_noise(table, scale)
-    builder = _Builder(table, forward, scale)
+    builder = _Builder(table, forward, scale, noise.std)
     problem, observed = builder.build(noise.std, ())
     nothing = _fit_nothing(forward, problem, observed, nuisance, None)
     if builder.latent:
@@ -91,7 +93,9 @@ def search(
     # A smooth misfit of any size is allowed here, so that an effect does not look like outliers.
     problem, observed = builder.build(noise.std, ())
     nothing = _fit_nothing(builder.forward, problem, observed, nuisance, nothing)
-    outliers = find_outliers(problem, nothing, problem.variance(_FLEXIBLE), observed)
+    outliers = find_outliers(
+        problem, nothing, problem.variance(_FLEXIBLE), observed, builder.narrow
+    )
     if outliers:
         noise = builder.estimate(noise, nothing, outliers)
     lug_height = np.broadcast_to(forward.points.wheel.lug_height, (len(table),))
@@ -194,24 +198,62 @@ def _outliers_of_best(
     best = selection.explanations[0]
     floor = selection.floors[int(np.argmax(selection.probability[0]))]
     amplitude = np.maximum(np.array(floor.amplitude), _ROBUST_FLOOR)
-    return find_outliers(problem, best.fitted, problem.variance(amplitude), observed)
+    return find_outliers(
+        problem, best.fitted, problem.variance(amplitude), observed, builder.narrow
+    )
+
+
+def _slip_groups(table: SteadyTable) -> NDArray[np.intp]:
+    """(N,) rows that share a reading of the slip: equal to the last digit, not a set value."""
+    slip = table.columns['slip']
+    _, group = np.unique(slip, return_inverse=True)
+    group = np.ravel(group)
+    nominal = np.abs(slip - np.round(slip, 2)) < 1e-9
+    return np.where(nominal, group.max() + 1 + np.arange(len(slip)), group).astype(np.intp)
 
 
 class _Builder:
     """Makes problems of one table, with the recorded slip as a latent variable where needed."""
 
-    def __init__(self, table: SteadyTable, forward: Forward, scale: FloatArray) -> None:
+    def __init__(
+        self, table: SteadyTable, forward: Forward, scale: FloatArray, noise_std: FloatArray
+    ) -> None:
         self.table = table
         self.forward = forward
         self.scale = scale
+        self.noise_std = noise_std
         self.inputs = _inputs(table)
+        names = table.varying()
+        self.narrow = slip_features(self.inputs, names.index('slip') if 'slip' in names else None)
         self.latent = bool((table.slip_std > 0.0).any())
         self._by_slip: FloatArray | None = None
         self._moved = np.zeros(len(table))
+        self._group = _slip_groups(table)
 
     def linearise(self, nothing: Fit) -> None:
-        """Linearise the slip errors around the most probable slips."""
+        """Linearise the slip errors around the most probable slips, given all quantities.
+
+        Where the curves bend within an error of the slip, a tangent at the reading is not enough.
+        """
+        slip, std = self.table.columns['slip'], self.table.slip_std
         self._by_slip = self.forward.by_slip(nothing.coordinates, nothing.u, nothing.angle)
+        problem, observed = self.build(self.noise_std, ())
+        here = nothing.within(problem, observed)
+        inverse = problem.rotation.T @ inverse_covariance(
+            problem.variance(_LATENT_FLOOR), here.jacobian
+        )
+        cells = inverse @ (here.residual + here.jacobian @ here.u)
+        pull = np.bincount(
+            self._group[problem.row],
+            problem.flat(self._by_slip) * std[problem.row] * cells,
+            minlength=self._group.max() + 1,
+        )
+        moved = np.clip(pull[self._group], -_FARTHEST, _FARTHEST) * std
+        moved = np.clip(slip + moved, -0.97, 0.97) - slip
+        self.forward = self.forward.at(replace(self.forward.points, slip=slip + moved))
+        self._moved = moved
+        angle = self.forward.solve([nothing.coordinates], [nothing.u], jacobian=False).angle[0]
+        self._by_slip = self.forward.by_slip(nothing.coordinates, nothing.u, angle)
 
     def build(
         self, std: FloatArray, outliers: list[tuple[int, int, float]] | tuple[()]
@@ -225,8 +267,13 @@ class _Builder:
             [(row, quantity) for row, quantity, _ in outliers],
             self._by_slip,
             self.table.slip_std,
+            self._group,
         )
-        return self.last, self.last.observed
+        observed = self.last.observed
+        if self._by_slip is not None:
+            # The reading lies off the point of linearisation: the tangent takes the cells along.
+            observed = observed + self.last.flat(self._by_slip * self._moved[:, None])
+        return self.last, observed
 
     def estimate(
         self, noise: Noise, fitted: Fit, outliers: list[tuple[int, int, float]] | tuple[()]

@@ -13,6 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import logsumexp
 
+from wheel_terra_estimator.discrepancy.remainder import (
+    IMPROBABLE,
+    Remainder,
+    Variance,
+    remainder,
+)
 from wheel_terra_estimator.discrepancy.selection import Selection
 
 FloatArray = NDArray[np.float64]
@@ -22,6 +28,10 @@ ODDS_TO_SPEAK = 3.0
 # Members of the open set: tempered weights are added up to this mass.
 SET_MASS = 0.97
 TEMPERATURE = 1.5
+
+
+# A named set that leaves something must at least have removed this share of the excess misfit.
+MOST = 0.9
 
 
 @dataclass(frozen=True)
@@ -36,36 +46,52 @@ class Verdict:
         Explanation that is reported as the fit: of the named set, else of nothing.
     open_sets : tuple of tuple of str
         For each named effect, the others that the data cannot tell from it.
-    probability_something : float
-        That anything beyond soil and floor is there.
+    left : Remainder
+        What that explanation leaves.
     """
 
     word: str
     index: int
     open_sets: tuple[tuple[str, ...], ...]
-    probability_something: float
+    left: Remainder
 
 
-def decide(selection: Selection) -> Verdict:
-    """Return the verdict on a selection."""
+def decide(selection: Selection, variance_of: Variance) -> Verdict:
+    """Return the verdict on a selection.
+
+    Parameters
+    ----------
+    variance_of : callable
+        (amplitude, noise factor) -> (m,) variances of the rotated axes.
+    """
     joint, unexplained = selection.log_joint, selection.unexplained
-    total = np.array([logsumexp(row) for row in joint])
+    total = np.asarray(logsumexp(joint, axis=1))
     nothing = next(h for h, e in enumerate(selection.explanations) if not e.names)
+    left = remainder(selection, nothing, variance_of)
     agrees = float(logsumexp(joint[nothing][~unexplained]))
     rest = float(logsumexp(joint[nothing][unexplained]))
     named = [h for h, e in enumerate(selection.explanations) if e.names]
-    something = rest
-    if named:
-        something = float(logsumexp([rest, *total[named]]))
-    probability = float(1.0 / (1.0 + np.exp(np.clip(agrees - something, -700, 700))))
-    if something - agrees < np.log(ODDS_TO_SPEAK):
-        return Verdict('agrees', nothing, (), probability)
-    if not named or rest > logsumexp(total[named]):
-        return Verdict('unexplained', nothing, (), probability)
+    effects = float(logsumexp(total[named])) if named else -np.inf
+    if np.logaddexp(effects, rest) - agrees < np.log(ODDS_TO_SPEAK):
+        word = 'agrees' if left.p_value > IMPROBABLE else 'unexplained'
+        return Verdict(word, nothing, (), left)
+    if not named or rest > effects:
+        return Verdict('unexplained', nothing, (), left)
     best = max(named, key=lambda h: total[h])
+    after = remainder(selection, best, variance_of)
+    if after.significant and _explained(selection, nothing, best) < MOST:
+        return Verdict('unexplained', nothing, (), left)
     names = selection.explanations[best].names
     open_sets = tuple(_rivals(selection, total, names, name) for name in names)
-    return Verdict('named', best, open_sets, probability)
+    return Verdict('named', best, open_sets, after)
+
+
+def _explained(selection: Selection, nothing: int, best: int) -> float:
+    """Share of the squared misfit in excess of the noise that a set of effects removes."""
+    before = selection.explanations[nothing].fitted.residual
+    after = selection.explanations[best].fitted.residual
+    excess = float(before @ before) - len(before)
+    return (float(before @ before) - float(after @ after)) / max(excess, 1e-9)
 
 
 def _rivals(

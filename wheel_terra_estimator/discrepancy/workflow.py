@@ -22,7 +22,7 @@ from wheel_terra_estimator.discrepancy.parameters import (
     base_coordinates,
     soil_coordinates,
 )
-from wheel_terra_estimator.discrepancy.remainder import Remainder, remainder
+from wheel_terra_estimator.discrepancy.remainder import Remainder
 from wheel_terra_estimator.discrepancy.result import (
     Candidate,
     Curves,
@@ -218,16 +218,9 @@ def _report(
 ) -> Diagnosis:
     setting, selection, nothing = findings.setting, findings.selection, findings.nothing
     problem = setting.problem
-    verdict = decide(selection)
-    left = remainder(selection, verdict.index, problem.variance)
-    explanation = selection.explanations[verdict.index]
-    if verdict.word == 'named' and left.significant and not _explains_most(findings, verdict):
-        verdict = Verdict(
-            'unexplained', _index_of_nothing(findings), (), verdict.probability_something
-        )
-        left = remainder(selection, verdict.index, problem.variance)
-        explanation = selection.explanations[verdict.index]
-    after = explanation.fitted
+    verdict = decide(selection, problem.variance)
+    left = verdict.left
+    after = selection.explanations[verdict.index].fitted
     quiet = [k for k, floor in enumerate(selection.floors) if not floor.unexplained]
     floor_index = quiet[int(np.argmax(selection.log_joint[verdict.index][quiet]))]
     floor = selection.floors[floor_index].largest
@@ -281,15 +274,6 @@ def _report(
 
 def _index_of_nothing(findings: Findings) -> int:
     return next(h for h, e in enumerate(findings.selection.explanations) if not e.names)
-
-
-def _explains_most(findings: Findings, verdict: Verdict) -> bool:
-    """Whether the named set removes nearly all of the misfit in excess of the noise."""
-    m = findings.setting.problem.size
-    nothing = float((findings.nothing.residual**2).sum())
-    after = findings.selection.explanations[verdict.index].fitted
-    rest = float((after.residual**2).sum())
-    return nothing - rest >= 0.9 * (nothing - m)
 
 
 def _shown(findings: Findings, chosen: int) -> list[int]:
@@ -351,7 +335,7 @@ def _named(
                     sure.of_name,
                     sure.of_set,
                     rivals,
-                    left.significant,
+                    left.noticeable,
                     known[name].claim,
                     known[name].source,
                     {
