@@ -55,7 +55,7 @@ SETTLING_TRAVEL = 0.5  # rim travel after standing, in wheel radii, that is not 
 
 # Greatest drift over a window: share of the mean, and an absolute amount that is always allowed.
 _DRIFT = {'wheel rate': (0.10, 0.01), 'slip': (0.10, 0.02), 'slope': (0.0, 0.0035)}
-_CREEP = (0.10, 0.5e-3)  # of the sinkage [m]
+_CREEP = (0.10, 0.5e-3, 0.02)  # share of the sinkage, least [m], most in wheel radii
 
 GOOD = 'steady'
 QUALITIES = (
@@ -293,7 +293,8 @@ class _WindowFinder:
             if _drifts(values, max(share * abs(values.mean()), always)):
                 return f'{what} changes', None
         depth = sinkage.mean(1) if np.isfinite(sinkage).all() else np.zeros(count)
-        if _drifts(depth, max(_CREEP[0] * depth.mean(), _CREEP[1])):
+        radius = float(np.mean(self.settings.rim_radius))
+        if _drifts(depth, np.clip(_CREEP[0] * depth.mean(), _CREEP[1], _CREEP[2] * radius)):
             return 'digging in', None
         mass, wheels = self.settings.mass, self.settings.wheel_count
         along = force[:, 0] * np.cos(tilt) - force[:, 2] * np.sin(tilt)
@@ -306,7 +307,7 @@ class _WindowFinder:
             end,
             passages,
             slip.mean(0),
-            self.settings.load.loads([float(f) for f in mean]),
+            self._loads(mean, _mean(torque), float(along.mean())),
             direction * _mean(torque),
             _mean(sinkage),
             rate.mean(0),
@@ -316,6 +317,14 @@ class _WindowFinder:
             {'slip': slip, 'torque': torque, 'sinkage': sinkage, 'pull': pull[:, None]},
             float(np.sqrt(stated.mean() / len(stated))) if stated.size else 0.0,
         )
+
+    def _loads(self, force: FloatArray, torque: FloatArray, along: float) -> FloatArray:
+        """Return the normal loads [N]; each wheel's moment about its hub shifts them."""
+        settings = self.settings
+        pull = np.full(settings.wheel_count, settings.mass * along / settings.wheel_count)
+        if np.isnan(torque).any():
+            return settings.load.loads(force, pull)
+        return settings.load.loads(force, pull, torque - pull * np.asarray(settings.rim_radius))
 
     def _slip(self, start: float, end: float, count: int, rate: FloatArray) -> FloatArray:
         """Return the slip of each wheel in each segment, (count, n)."""
@@ -355,14 +364,14 @@ def _mean(values: FloatArray) -> FloatArray:
     return np.where(enough, total / np.maximum(good.sum(0), 1), np.nan)
 
 
-def _drifts(values: FloatArray, allowed: float) -> bool:
+def _drifts(values: FloatArray, allowed: float | np.floating) -> bool:
     """Return whether the segments drift by more than ``allowed``, and significantly so."""
     n = len(values)
     x = (np.arange(n) - (n - 1) / 2) / n
     slope = float(x @ values / (x @ x))
     residual = values - values.mean() - slope * x
     error = float(np.sqrt(residual @ residual / max(n - 2, 1) / (x @ x)))
-    return abs(slope) > allowed and abs(slope) > 2 * error
+    return bool(abs(slope) > max(float(allowed), 2 * error))
 
 
 def _correlation(blocks: Iterable[FloatArray]) -> float:
