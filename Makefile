@@ -1,0 +1,60 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+#
+# make demo    the shipped drives through the real node: estimates, report, key numbers
+# make test    all tests
+# make lint    ruff and mypy
+# make clean   remove what these made
+#
+# Each sets up what it needs in a virtual environment (.venv) with pinned versions, once.
+
+PYTHON ?= python3
+VENV ?= .venv
+PYTEST_ARGUMENTS ?=
+# With a sourced Jazzy, its own rclpy is used, and the numpy that it was built for.
+ifdef ROS_DISTRO
+RUNTIME ?= requirements/oldest.txt
+ROS ?=
+else
+RUNTIME ?= requirements/runtime.txt
+ROS ?= -r requirements/ros.txt
+endif
+
+BIN := $(VENV)/bin
+PINS := $(wildcard requirements/*.txt)
+PIP := $(BIN)/python -m pip --disable-pip-version-check install -qq
+# Tests and demo stay on this machine and do not fight over cores.
+export OMP_NUM_THREADS ?= 1
+export OPENBLAS_NUM_THREADS ?= 1
+export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
+
+.PHONY: help demo test lint clean
+help:
+	@sed -n 's/^# \(make .*\)/\1/p' Makefile
+
+demo: $(VENV)/.runtime
+	@$(BIN)/python tools/demo.py
+
+test: $(VENV)/.test
+	$(BIN)/python -m pytest -m 'not slow' $(PYTEST_ARGUMENTS)
+
+lint: $(VENV)/.test
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+
+$(VENV)/.runtime: $(PINS) setup.py pyproject.toml
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 10))' || \
+	  { echo 'Python 3.10 or newer is needed; name it: make PYTHON=python3.12 ...'; exit 1; }
+	@echo 'Setting up $(VENV) (downloads once) ...'
+	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	@$(PIP) -r $(RUNTIME) $(ROS)
+	@$(PIP) --no-deps --editable .
+	@touch $@
+
+$(VENV)/.test: $(VENV)/.runtime
+	@$(PIP) -r $(RUNTIME) $(ROS) -r requirements/test.txt
+	@touch $@
+
+clean:
+	rm -rf $(VENV) demo_output build install log *.egg-info
