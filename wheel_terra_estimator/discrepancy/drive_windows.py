@@ -365,13 +365,18 @@ def _mean(values: FloatArray) -> FloatArray:
 
 
 def _drifts(values: FloatArray, allowed: float | np.floating) -> bool:
-    """Return whether the segments drift by more than ``allowed``, and significantly so."""
+    """Return whether the mean before some moment differs from that after it, and significantly.
+
+    All moments are tried: a drift parts the halves, a step at the end parts the last segment. The
+    noise comes from successive differences, in which a step counts once.
+    """
     n = len(values)
-    x = (np.arange(n) - (n - 1) / 2) / n
-    slope = float(x @ values / (x @ x))
-    residual = values - values.mean() - slope * x
-    error = float(np.sqrt(residual @ residual / max(n - 2, 1) / (x @ x)))
-    return bool(abs(slope) > max(float(allowed), 2 * error))
+    before = np.arange(1, n)
+    total = np.cumsum(values)[:-1]
+    parted = (values.sum() - total) / (n - before) - total / before
+    noise = float(np.median(np.abs(np.diff(values)))) / 0.954  # of the difference of two normals
+    error = noise * np.sqrt(1 / before + 1 / (n - before))
+    return bool(np.any((np.abs(parted) > float(allowed)) & (np.abs(parted) > 3 * error)))
 
 
 def _correlation(blocks: Iterable[FloatArray]) -> float:
