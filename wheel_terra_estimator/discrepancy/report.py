@@ -26,15 +26,15 @@ _RESOLUTION = 110  # [dots per inch]
 _TONES = {'agrees': 'good', 'named': 'warn', 'unexplained': 'bad'}
 
 
-def write_report(folder: str | Path, diagnosis: Diagnosis) -> Path:
+def write_report(diagnosis: Diagnosis, folder: str | Path) -> Path:
     """Write ``report.html`` with its pictures into a folder that exists.
 
     Parameters
     ----------
-    folder : str or pathlib.Path
-        Pictures are written there as PNG files as well; the page itself needs none of them.
     diagnosis : Diagnosis
         What was found.
+    folder : str or pathlib.Path
+        Pictures are written there as PNG files as well; the page itself needs none of them.
 
     Returns
     -------
