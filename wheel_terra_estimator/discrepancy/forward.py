@@ -63,18 +63,28 @@ class Forward:
         base_effects: Mapping[str, Mapping[str, float]],
         catalogue: Mapping[str, Effect],
         nodes: int = NODES,
+        active: NDArray[np.bool_] | None = None,
     ) -> None:
         self.points = points
         self.soil = soil
         self.base_effects = {name: dict(values) for name, values in base_effects.items()}
         self.catalogue = catalogue
         self.nodes = nodes
+        self.active = active
         measured = np.asarray(points.leaving_angle, dtype=float)
         self._leaving_angle = None if np.isnan(measured).all() else measured
 
     def at(self, points: OperatingPoints) -> Forward:
         """Return the same model at other points."""
-        return Forward(points, self.soil, self.base_effects, self.catalogue, self.nodes)
+        same_rows = len(points) == len(self.points) and self.active is not None
+        return Forward(
+            points,
+            self.soil,
+            self.base_effects,
+            self.catalogue,
+            self.nodes,
+            self.active if same_rows else None,
+        )
 
     def _contact(
         self, hypotheses: Sequence[Sequence[Coordinate]], columns: Sequence[Mapping[str, float]]
@@ -104,7 +114,10 @@ class Forward:
         for name in names:
             resting = {**self.catalogue[name].defaults(), **self.base_effects.get(name, {})}
             settings[name] = {
-                p: stacked.get(f'{name}.{p}', value * one) for p, value in resting.items()
+                p: self._where_active(name, p, stacked[f'{name}.{p}'])
+                if f'{name}.{p}' in stacked
+                else value * one
+                for p, value in resting.items()
             }
         terms = Terms(settings)
         return build_contact(self.points, soil, self.soil.pressure_law, terms), terms
@@ -124,6 +137,13 @@ class Forward:
         outputs[..., 1] = contact.drawbar_pull
         outputs[..., 2] = contact.torque
         return load - contact.normal_load, outputs
+
+    def _where_active(self, name: str, parameter: str, values: FloatArray) -> FloatArray:
+        """Put a candidate's parameter at neutral on rows of a reference."""
+        if self.active is None or name in self.base_effects:
+            return values
+        neutral = self.catalogue[name].parameter(parameter).neutral
+        return np.where(self.active, values, neutral)
 
     def _resting_value(self, coordinate: Coordinate) -> float:
         """Value of a coordinate in hypotheses that do not have it."""

@@ -47,13 +47,13 @@ class HeldOut:
 def hold_out(
     setting: Setting, fits: list[Fit], variances: list[FloatArray], groups: IndexArray
 ) -> list[HeldOut]:
-    """Leave each group out of each fit.
+    """Leave each group out of each fit; rows of a negative group (a reference) always stay in.
 
     The parameters without a group come from one linear step off the full fit (exact but for the
     curvature of the model in that step); the predictions are those of the full model.
     """
     problem = setting.problem
-    labels = np.unique(groups)
+    labels = np.unique(groups[groups >= 0])
     cell_group = groups[problem.row]
     tasks, scores = [], []
     unrotate = np.linalg.inv(problem.rotation)

@@ -13,7 +13,8 @@ from wheel_terra_estimator.discrepancy.problem import OUTLIER_FACTOR, Problem
 FloatArray = NDArray[np.float64]
 
 SHARE = 0.02  # prior share of outliers among the cells
-NARROW = 0.12  # size of features narrow in slip that rows share [share of the range]
+# Sizes of features narrow in slip that rows may share [share of the range].
+NARROW = (0.0, 0.05, 0.15)
 GREATEST_SHARE = 0.12  # of the cells of a table
 
 
@@ -27,7 +28,8 @@ def find_outliers(
     """Return (row, quantity, deviation) of the cells to be set apart, worst first.
 
     Each cell is predicted from all others (soil, effects and a smooth error free); one at a time,
-    the cell that gains most from a twelve times larger noise is set apart.
+    the cell that gains most from a twelve times larger noise is set apart. A hump or a ripple in
+    slip that all loads share competes with outliers: the evidence says which of the two it is.
 
     Parameters
     ----------
@@ -42,38 +44,52 @@ def find_outliers(
     narrow : numpy.ndarray
         (N, N) correlation of features narrow in slip that rows share (see ``slip_features``).
     """
-    outputs = problem.flat(fitted.outputs)
     jacobian = problem.rotate(fitted.sensitivity) / np.sqrt(fitted.prior)
-    residual = observed - outputs
     inverse = problem.rotation.T @ inverse_covariance(variance, jacobian) @ problem.rotation
-    if narrow.any():
-        inverse = np.linalg.inv(np.linalg.inv(inverse) + _shared_features(problem, narrow))
-    target = residual + fitted.sensitivity @ fitted.u
+    target = observed - problem.flat(fitted.outputs) + fitted.sensitivity @ fitted.u
+    best, found = -np.inf, []
+    for amplitude in NARROW if narrow.any() else NARROW[:1]:
+        wider = inverse
+        if amplitude:
+            shared = _shared_features(problem, narrow, amplitude)
+            wider = np.linalg.inv(np.linalg.inv(inverse) + shared)
+        score, cells = _set_apart(problem, wider, target)
+        if score > best:
+            best, found = score, cells
+    return found
+
+
+def _set_apart(
+    problem: Problem, inverse: FloatArray, target: FloatArray
+) -> tuple[float, list[tuple[int, int, float]]]:
+    """Set cells apart greedily; return the log evidence of the result and the cells."""
     extra = (OUTLIER_FACTOR**2 - 1.0) * problem.std**2
+    price = np.log((1.0 - SHARE) / SHARE)
+    score = 0.5 * (np.linalg.slogdet(inverse)[1] - float(target @ inverse @ target))
     found: list[tuple[int, int, float]] = []
     apart = np.zeros(problem.size, dtype=bool)
     for _ in range(int(GREATEST_SHARE * problem.size)):
-        diagonal = np.diag(inverse)
-        error = (inverse @ target) / diagonal
-        own = 1.0 / diagonal
+        own = 1.0 / np.diag(inverse)
+        error = (inverse @ target) * own
         gain = 0.5 * error**2 * (1.0 / own - 1.0 / (own + extra))
         gain -= 0.5 * np.log1p(extra / own)
         gain[apart] = -np.inf
         worst = int(np.argmax(gain))
-        if gain[worst] < np.log((1.0 - SHARE) / SHARE):
+        if gain[worst] < price:
             break
+        score += float(gain[worst]) - price
         apart[worst] = True
         deviation = float(error[worst] / problem.std[worst])
         found.append((int(problem.row[worst]), int(problem.quantity[worst]), deviation))
         column = inverse[:, worst].copy()
-        share = extra[worst] / (1.0 + extra[worst] * diagonal[worst])
+        share = extra[worst] / (1.0 + extra[worst] / own[worst])
         inverse = inverse - share * np.outer(column, column)
-    return found
+    return score, found
 
 
-def _shared_features(problem: Problem, narrow: FloatArray) -> FloatArray:
+def _shared_features(problem: Problem, narrow: FloatArray, amplitude: float) -> FloatArray:
     """(m, m) covariance of the cells by features that are narrow in slip."""
-    scale = NARROW * problem.scale[problem.quantity]
+    scale = amplitude * problem.scale[problem.quantity]
     same = problem.quantity[:, None] == problem.quantity[None, :]
     correlation = narrow[np.ix_(problem.row, problem.row)]
     return np.where(same, correlation * np.outer(scale, scale), 0.0)

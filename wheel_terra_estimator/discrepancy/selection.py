@@ -60,6 +60,16 @@ def default_floors(greatest: float | None = None) -> tuple[Floor, ...]:
     return tuple(floors)
 
 
+def shared_floors() -> tuple[Floor, ...]:
+    """Return the assumptions on a structural error that table and reference have in common.
+
+    However large, it is no gap: it is there without the effect in question as well.
+    """
+    amplitudes = (0.0, 0.015, 0.03, 0.06, 0.12, 0.25)
+    each = -math.log(len(amplitudes))
+    return tuple(Floor((a, a, a), each, False) for a in amplitudes)
+
+
 @dataclass(frozen=True)
 class Selection:
     """All hypotheses with their posterior probabilities.
@@ -111,6 +121,11 @@ class Selection:
         logs = np.array([value for _, value in singles]) / temperature
         shares = np.exp(logs - logsumexp(logs))
         return {name: float(s) for (name, _), s in zip(singles, shares, strict=True)}
+
+
+def log_mass(values: FloatArray) -> float:
+    """Return the logarithm of a sum of exponentials; minus infinity for none."""
+    return float(logsumexp(values)) if len(values) else -math.inf
 
 
 def weigh(

@@ -27,7 +27,8 @@ def gaps(
     """Return the held-out errors of each quantity; cells set apart as outliers do not count."""
     measured = table.measured.copy()
     for row, column, _ in findings.outliers:
-        measured[row, column] = np.nan
+        if row < len(table):
+            measured[row, column] = np.nan
     rng = np.random.default_rng(_SEED)
     found: dict[str, QuantityGap] = {}
     for q, quantity in enumerate(QUANTITIES):
@@ -40,7 +41,7 @@ def gaps(
             'refit': (curves.held_out_refit - measured)[mine, q] ** 2,
             'after': (curves.held_out_after - measured)[mine, q] ** 2,
         }
-        noise = float(np.sqrt(np.mean(findings.noise.std[mine, q] ** 2)))
+        noise = float(np.sqrt(np.mean(findings.noise.std[: len(table)][mine, q] ** 2)))
         least = floor * findings.setting.problem.scale[q]
         shrink = low = high = None
         if findings.selection is not None and not np.array_equal(errors['refit'], errors['after']):

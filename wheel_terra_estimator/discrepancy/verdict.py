@@ -19,7 +19,7 @@ from wheel_terra_estimator.discrepancy.remainder import (
     Variance,
     remainder,
 )
-from wheel_terra_estimator.discrepancy.selection import Selection
+from wheel_terra_estimator.discrepancy.selection import Selection, log_mass
 
 FloatArray = NDArray[np.float64]
 
@@ -69,7 +69,7 @@ def decide(selection: Selection, variance_of: Variance) -> Verdict:
     nothing = next(h for h, e in enumerate(selection.explanations) if not e.names)
     left = remainder(selection, nothing, variance_of)
     agrees = float(logsumexp(joint[nothing][~unexplained]))
-    rest = float(logsumexp(joint[nothing][unexplained]))
+    rest = log_mass(joint[nothing][unexplained])
     named = [h for h, e in enumerate(selection.explanations) if e.names]
     effects = float(logsumexp(total[named])) if named else -np.inf
     if np.logaddexp(effects, rest) - agrees < np.log(ODDS_TO_SPEAK):

@@ -24,14 +24,17 @@ _SURE = 0.05
 _LABELS = {'sinkage': 'sinkage', 'drawbar_pull': 'drawbar pull', 'torque': 'torque'}
 
 
-def locate(table: SteadyTable, problem: Problem, nothing: Fit, observed: FloatArray) -> Where:
+def locate(
+    table: SteadyTable, problem: Problem, nothing: Fit, observed: FloatArray, rows: int
+) -> Where:
     """Return the region of the inputs in which the soil-refitted model is worst.
 
     The residuals after a refit are neither independent nor equal in size; the p-value therefore
-    comes from noise drawn and refitted on the same rows (linear), under the same scan.
+    comes from noise drawn and refitted on the same rows (linear), under the same scan. Only the
+    first `rows` are looked at; the others are a reference.
     """
     cells = (observed - problem.flat(nothing.outputs)) / problem.std
-    cells = np.where(problem.outlier, 0.0, cells)
+    cells = np.where(problem.outlier | (problem.row >= rows), 0.0, cells)
     residual = np.full((len(table), 3), np.nan)
     residual[problem.row, problem.quantity] = cells
     present = [q for q in range(3) if (problem.quantity == q).any()]
@@ -39,7 +42,7 @@ def locate(table: SteadyTable, problem: Problem, nothing: Fit, observed: FloatAr
     total = sum(excess.values())
     shares = {QUANTITIES[q]: excess[q] / total for q in present}
     worst = max(present, key=lambda q: excess[q])
-    mine = np.isfinite(residual[:, worst])
+    mine = np.isfinite(residual[:, worst]) & (np.arange(len(table)) < rows)
     names = [name for name in table.varying() if np.isfinite(table.columns[name]).all()]
     boxes, sides = _boxes(table, names)
     values = np.where(mine, residual[:, worst], 0.0)
@@ -50,7 +53,7 @@ def locate(table: SteadyTable, problem: Problem, nothing: Fit, observed: FloatAr
         counts = np.maximum(boxes @ mine, 1.0)
         score = _score(boxes @ values**2, counts)
         best = int(np.argmax(score))
-        null = _simulated(problem, nothing, worst, len(table))
+        null = np.where(mine, _simulated(problem, nothing, worst, len(table)), 0.0)
         strongest = _score(boxes @ (null.T**2), counts[:, None]).max(axis=0)
         p_value = float((1 + (strongest >= score[best]).sum()) / (1 + len(strongest)))
         chosen = (boxes[best] > 0) & mine

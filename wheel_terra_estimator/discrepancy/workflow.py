@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,7 @@ from wheel_terra_estimator.discrepancy.parameters import (
     base_coordinates,
     soil_coordinates,
 )
+from wheel_terra_estimator.discrepancy.reference import join, shared_error
 from wheel_terra_estimator.discrepancy.remainder import Remainder
 from wheel_terra_estimator.discrepancy.result import (
     Candidate,
@@ -33,7 +34,7 @@ from wheel_terra_estimator.discrepancy.result import (
     SoilShift,
 )
 from wheel_terra_estimator.discrepancy.search import Findings, search
-from wheel_terra_estimator.discrepancy.selection import default_floors
+from wheel_terra_estimator.discrepancy.selection import default_floors, shared_floors
 from wheel_terra_estimator.discrepancy.signatures import CLEAR, distance
 from wheel_terra_estimator.discrepancy.table import (
     QUANTITIES,
@@ -95,19 +96,21 @@ def diagnose(
     """
     started = time.perf_counter()
     chosen = options or Options()
-    points = operating_points(table, configuration)
+    both, active = (table, None) if reference is None else join(table, reference)
+    points = operating_points(both, configuration)
     check_against_wheel(
-        table,
-        np.broadcast_to(points.wheel.radius, (len(table),)),
-        np.broadcast_to(points.wheel.width, (len(table),)),
+        both,
+        np.broadcast_to(points.wheel.radius, (len(both),)),
+        np.broadcast_to(points.wheel.width, (len(both),)),
     )
     known = catalogue()
     effects = _effects_to_try(configuration, chosen, known)
-    forward = Forward(points, configuration.soil, configuration.effects, known)
-    _check_soil_carries(table, forward, configuration)
+    forward = Forward(points, configuration.soil, configuration.effects, known, active=active)
+    _check_soil_carries(both, forward, configuration)
     nuisance = nuisance_coordinates(configuration, known)
-    findings = search(table, forward, nuisance, effects, default_floors(chosen.floor))
-    return _report(table, configuration, findings, known, started)
+    floors = default_floors(chosen.floor) if reference is None else shared_floors()
+    findings = search(both, forward, nuisance, effects, floors)
+    return _report(table, both, configuration, findings, known, started)
 
 
 def operating_points(table: SteadyTable, configuration: Configuration) -> OperatingPoints:
@@ -211,6 +214,7 @@ def _check_soil_carries(table: SteadyTable, forward: Forward, configuration: Con
 
 def _report(
     table: SteadyTable,
+    both: SteadyTable,
     configuration: Configuration,
     findings: Findings,
     known: Mapping[str, Effect],
@@ -226,12 +230,12 @@ def _report(
     floor = selection.floors[floor_index].largest
     variance = problem.variance(floor)
     shown = _shown(findings, verdict.index)
-    groups = slip_groups(table)
+    groups = np.where(np.arange(len(both)) < len(table), slip_groups(both), -1)
     kept = [nothing, *(selection.explanations[h].fitted for h in shown)]
     outs = hold_out(setting, kept, [variance] * len(kept), groups)
     gains = dict(zip(shown, (o.log_score - outs[0].log_score for o in outs[1:]), strict=True))
     held_after = outs[1 + shown.index(verdict.index)] if after.names else outs[0]
-    curves = _curves(table, configuration, findings, after, outs[0], held_after, floor)
+    curves = _curves(len(table), findings, after, outs[0], held_after, floor)
     names = {name: s for name, s in findings.signatures.items() if name in setting.effects}
     one_sided = {
         name for name in names if all(p.prior == 'half_normal' for p in known[name].parameters[:1])
@@ -256,17 +260,19 @@ def _report(
         gap=summary.gaps(table, findings, curves, floor),
         not_visible=dict(findings.not_visible),
         smallest_visible=_smallest_visible(findings, known),
-        where=locate(table, problem, nothing, setting.observed),
+        where=locate(both, problem, nothing, setting.observed, len(table)),
         next_measurement=_next(findings, verdict, after),
         curves=curves,
-        noise=findings.noise,
+        noise=replace(findings.noise, std=findings.noise.std[: len(table)]),
         soil=_soil_shifts(findings, after, variance),
-        outliers=tuple((r, QUANTITIES[q], size) for r, q, size in findings.outliers),
+        outliers=tuple(
+            (r, QUANTITIES[q], size) for r, q, size in findings.outliers if r < len(table)
+        ),
         gap_p_value=gap_p_value,
         remainder_p_value=left.p_value,
         remainder_amplitude=left.amplitude,
         floor=floor,
-        notes=summary.notes(table, findings, after),
+        notes=summary.notes(both, findings, after),
         base_effects=tuple(configuration.effects),
         seconds=time.perf_counter() - started,
     )
@@ -403,8 +409,7 @@ def _candidates(
 
 
 def _curves(
-    table: SteadyTable,
-    configuration: Configuration,
+    rows: int,
     findings: Findings,
     after: Fit,
     held_refit: HeldOut,
@@ -413,6 +418,9 @@ def _curves(
 ) -> Curves:
     setting = findings.setting
     nuisance = setting.nuisance
+    refit_error, after_error = (
+        _shared_error(findings, fitted, floor) for fitted in (findings.nothing, after)
+    )
     configured = setting.forward.solve([nuisance], [np.zeros(len(nuisance))], jacobian=False)
     band = np.sqrt(findings.noise.std**2 + (floor * setting.problem.scale) ** 2)
     singles = [e.fitted for e in findings.selection.explanations if len(e.names) == 1]
@@ -420,17 +428,26 @@ def _curves(
     shapes = [_signature_shape(findings, f) for f in ordered[:2]]
     labels = [' + '.join(f.names) for f in ordered[:2]]
     return Curves(
-        configured.outputs[0],
-        findings.nothing.outputs,
-        after.outputs,
-        held_refit.outputs,
-        held_after.outputs,
-        band,
-        shapes[0] if shapes else None,
+        configured.outputs[0][:rows],
+        (findings.nothing.outputs + refit_error)[:rows],
+        (after.outputs + after_error)[:rows],
+        (held_refit.outputs + refit_error)[:rows],
+        (held_after.outputs + after_error)[:rows],
+        band[:rows],
+        shapes[0][:rows] if shapes else None,
         labels[0] if labels else '',
-        shapes[1] if len(shapes) > 1 else None,
+        shapes[1][:rows] if len(shapes) > 1 else None,
         labels[1] if len(labels) > 1 else '',
     )
+
+
+def _shared_error(findings: Findings, fitted: Fit, floor: float) -> FloatArray:
+    """(N, 3) structural error known from a reference; zero without one."""
+    setting = findings.setting
+    active = setting.forward.active
+    if active is None or floor == 0.0:
+        return np.zeros_like(fitted.outputs)
+    return shared_error(setting.problem, fitted, setting.observed, floor, active)
 
 
 def _signature_shape(findings: Findings, fitted: Fit) -> FloatArray:
