@@ -1,0 +1,144 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Least-squares fits of the model to measured rows, and how errors are written down."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from wheel_terra_estimator.terramechanics.model import WheelSoilModel
+from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
+from wheel_terra_estimator.terramechanics.soil import Soil
+
+FloatArray = NDArray[np.float64]
+Effects = dict[str, dict[str, float]]
+
+
+@dataclass(frozen=True)
+class Free:
+    """A parameter to be fitted: expected value, its uncertainty, allowed range."""
+
+    name: str
+    expected: float
+    scale: float
+    lower: float
+    upper: float
+
+
+@dataclass(frozen=True)
+class Model:
+    """Soil and effects, changed by parameter name."""
+
+    soil: Soil
+    effects: Effects
+
+    def with_values(self, values: Mapping[str, float]) -> Model:
+        """Return the model with some parameters set (an effect named there is switched on)."""
+        soil, effects = self.soil, {k: dict(v) for k, v in self.effects.items()}
+        for name, value in values.items():
+            kind, _, rest = name.partition('.')
+            if kind == 'soil':
+                soil = replace(soil, **{rest: float(value)})
+            else:
+                effect, parameter = rest.split('.')
+                effects.setdefault(effect, {})[parameter] = float(value)
+        return Model(soil, effects)
+
+    def predict(self, points: OperatingPoints, method: str = 'quadrature') -> FloatArray:
+        """Return (N, 3) sinkage, drawbar pull, torque."""
+        model = WheelSoilModel(self.soil, self.effects, method, strict=False)
+        return model.steady_state(points).outputs()
+
+
+def fit(
+    model: Model,
+    data: Sequence[tuple[OperatingPoints, FloatArray]],
+    sigma: Sequence[float],
+    free: Sequence[Free],
+    prior_weight: float = 0.3,
+) -> tuple[Model, dict[str, float]]:
+    """Fit parameters to rows; a weak pull towards the expected values settles what rows do not.
+
+    Parameters
+    ----------
+    data : sequence of (points, measured)
+        ``measured`` is (N, 3), nan = not measured.
+    sigma : sequence of float
+        Weight of an error in sinkage [m], pull [N], torque [N m].
+    """
+    names = [item.name for item in free]
+    expected = np.array([item.expected for item in free])
+    scale = np.array([item.scale for item in free])
+
+    def residual(x: Any) -> FloatArray:
+        trial = model.with_values(dict(zip(names, x, strict=True)))
+        parts = [prior_weight * (x - expected) / scale]
+        for points, measured in data:
+            error = (trial.predict(points) - measured) / np.asarray(sigma)
+            parts.append(np.where(np.isnan(error), 0.0, error).ravel())
+        return np.concatenate(parts)
+
+    bounds = ([item.lower for item in free], [item.upper for item in free])
+    found = least_squares(residual, expected, bounds=bounds, x_scale=scale)
+    values = {name: float(value) for name, value in zip(names, found.x, strict=True)}
+    return model.with_values(values), values
+
+
+@dataclass(frozen=True)
+class Misfit:
+    """Errors of a prediction against measured rows."""
+
+    pull_rms: float
+    pull_worst: float
+    pull_range: float
+    sinkage_rms: float
+    torque_rms: float
+
+    @classmethod
+    def of(cls, predicted: FloatArray, measured: FloatArray) -> Misfit:
+        """Compare (N, 3) with (N, 3); nan = not measured."""
+        error = predicted - measured
+        rms = [
+            float(np.sqrt(np.nanmean(e**2))) if np.isfinite(e).any() else np.nan for e in error.T
+        ]
+        pull = measured[:, 1]
+        known = np.isfinite(pull).any()
+        return cls(
+            rms[1],
+            float(np.nanmax(np.abs(error[:, 1]))) if known else np.nan,
+            float(np.nanmax(pull) - np.nanmin(pull)) if known else np.nan,
+            rms[0],
+            rms[2],
+        )
+
+    def row(self, label: str) -> str:
+        """Return a row of the table that ``HEADER`` starts."""
+        cells = [
+            f'{self.pull_rms:.2f}',
+            f'{100 * self.pull_rms / self.pull_range:.1f} %',
+            f'{100 * self.pull_worst / self.pull_range:.1f} %',
+            f'{1e3 * self.sinkage_rms:.2f}',
+            f'{self.torque_rms:.2f}',
+        ]
+        return (
+            f'| {label} | '
+            + ' | '.join(c.replace('nan %', '-').replace('nan', '-') for c in cells)
+            + ' |'
+        )
+
+
+HEADER = (
+    '| | pull rms [N] | of its range | worst, of its range | sinkage rms [mm] | torque rms [N m] |\n'
+    '|---|---|---|---|---|---|'
+)
+
+
+def listed(values: Mapping[str, float]) -> str:
+    """Return fitted values as text, names without their section."""
+    return ', '.join(f'{name.split(".", 1)[1]} = {value:.4g}' for name, value in values.items())
