@@ -1,0 +1,197 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""The report for people says what the diagnosis says, and needs nothing beside itself."""
+
+from __future__ import annotations
+
+import base64
+import re
+import struct
+import zlib
+from dataclasses import replace
+from html.parser import HTMLParser
+
+import campaign_tools  # noqa: F401
+import numpy as np
+import pytest
+from campaigns import Plan, make_campaign, scoring
+
+from wheel_terra_estimator.configuration import reader
+from wheel_terra_estimator.discrepancy.model_file import write_model
+from wheel_terra_estimator.discrepancy.report import number, write_report
+
+
+class Page(HTMLParser):
+    """Text, links and table rows of a page; complains about tags that do not close."""
+
+    VOID = ('meta', 'img', 'br', 'link', 'hr')
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.sources: list[str] = []
+        self.rows: list[list[str]] = []
+        self.text = ''
+        self.feed(text)
+        assert not self.open, f'not closed: {self.open}'
+
+    def handle_starttag(self, tag, attributes):
+        if tag not in self.VOID:
+            self.open.append(tag)
+        self.sources += [value for key, value in attributes if key in ('src', 'href')]
+        if tag == 'tr':
+            self.rows.append([])
+        elif tag in ('td', 'th') and self.rows:
+            self.rows[-1].append('')
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        if self.open and self.open[-1] not in ('style', 'script'):
+            self.text += data
+        if self.rows and self.rows[-1] and {'td', 'th'} & set(self.open):
+            self.rows[-1][-1] += data.strip() + ' '
+
+    def row(self, first: str) -> list[str]:
+        found = [row for row in self.rows if row and row[0].strip() == first]
+        assert found, f'no row {first!r} among {[row[0] for row in self.rows if row]}'
+        return [cell.strip() for cell in found[0]]
+
+
+def grey_levels(png: bytes) -> tuple[int, int, int]:
+    """Width, height and the number of distinct byte values in a PNG file's pixel data."""
+    assert png[:8] == b'\x89PNG\r\n\x1a\n'
+    width, height = struct.unpack('>II', png[16:24])
+    data, place = b'', 8
+    while place < len(png):
+        (length,) = struct.unpack('>I', png[place : place + 4])
+        if png[place + 4 : place + 8] == b'IDAT':
+            data += png[place + 8 : place + 8 + length]
+        place += 12 + length
+    return width, height, len(set(zlib.decompress(data)))
+
+
+def campaign_diagnosis(seed=12, design='slope48', **plan):
+    return scoring.diagnose(make_campaign(seed, design, Plan(**plan)))
+
+
+@pytest.fixture(scope='module')
+def named():
+    """A diagnosis that names an effect, of a table with outliers and gaps."""
+    for seed in range(12, 40):
+        campaign = make_campaign(seed, 'slope48', Plan(outliers=0.03, missing=0.03))
+        if campaign.distances[0] > 12:
+            diagnosis = scoring.diagnose(campaign)
+            if diagnosis.verdict == 'named':
+                return diagnosis
+    raise AssertionError('no campaign was named')
+
+
+@pytest.fixture(scope='module')
+def page(named, tmp_path_factory):
+    folder = tmp_path_factory.mktemp('report')
+    path = write_report(named, folder)
+    return Page(path.read_text(encoding='utf-8')), folder
+
+
+def test_page_needs_nothing_from_elsewhere(page):
+    parsed, _ = page
+    assert len(parsed.sources) >= 6
+    assert all(source.startswith('data:') for source in parsed.sources)
+
+
+def test_every_picture_is_in_the_page_and_beside_it(page):
+    parsed, folder = page
+    embedded = {base64.b64decode(source.partition('base64,')[2]) for source in parsed.sources}
+    files = {path.name: path.read_bytes() for path in folder.glob('*.png')}
+    assert set(files.values()) == embedded
+    assert {'residuals_by_normal_load.png', 'residuals_by_slope.png', 'where.png'} <= set(files)
+    assert {'measured_against_model.png', 'gap.png', 'signature.png'} <= set(files)
+    for name, content in files.items():
+        width, height, levels = grey_levels(content)
+        assert width > 600 and height > 250 and levels > 100, f'{name} looks empty'
+
+
+def test_numbers_are_those_of_the_diagnosis(page, named):
+    parsed, _ = page
+    assert named.sentence in re.sub(r'\s+', ' ', parsed.text)
+    first = named.effects[0]
+    assert f'{100 * first.confidence:.0f} %' in parsed.text
+    for name, item in first.parameters.items():
+        assert f'{name} = {number(item.value)} ± {number(item.std, 2)}' in parsed.text
+    for quantity, unit, scale in (('sinkage', 'mm', 1e3), ('drawbar pull', 'N', 1.0)):
+        gap = named.gap[quantity.replace(' ', '_')]
+        cells = parsed.row(f'{quantity} [{unit}]')
+        assert cells[1:4] == [number(scale * x) for x in (gap.before, gap.refit, gap.after)]
+    for candidate in named.candidates:
+        cells = parsed.row(candidate.label.replace('_', ' '))
+        assert cells[1] == f'{candidate.log_evidence:.1f}'
+        assert cells[-1] == candidate.why_not
+    for shift in named.soil:
+        cells = parsed.row(shift.name.replace('_', ' '))
+        assert cells[5] == f'{shift.pull:+.1f}'
+    for item in named.next_measurement:
+        assert item.what in parsed.text
+    for name in named.not_visible:
+        assert name.replace('_', ' ') in parsed.text
+    assert first.source in parsed.text
+
+
+def test_outliers_are_listed_with_their_line(page, named):
+    parsed, _ = page
+    assert named.outliers
+    for row, quantity, _ in named.outliers:
+        assert f'line {named.table.lines[row]} {quantity.replace("_", " ")}' in parsed.text
+
+
+def test_changed_keys_are_those_of_the_model_file(page, named, tmp_path):
+    parsed, _ = page
+    write_model(named, tmp_path / 'model.yaml')
+    new = reader.load([tmp_path / 'model.yaml'], complete=False).flat()
+    effect = named.effects[0]
+    assert parsed.row(f'effects.{effect.name}.enabled')[1:] == ['false', 'true']
+    key = 'soil.frictional_modulus'
+    before, after = parsed.row(key)[1:]
+    assert float(after) == pytest.approx(new[key], rel=1e-3)
+    assert float(before) == pytest.approx(named.configuration.flat()[key], rel=1e-3)
+
+
+@pytest.mark.parametrize('plan', [{'hide': 'none'}, {'drop': 'torque'}, {'noise_given': False}])
+def test_every_kind_of_diagnosis_has_a_report(plan, tmp_path):
+    diagnosis = campaign_diagnosis(4, 'basic16', **plan)
+    parsed = Page(write_report(diagnosis, tmp_path).read_text(encoding='utf-8'))
+    assert {'agrees': 'Agrees.', 'named': 'Named.', 'unexplained': 'Unexplained.'}[
+        diagnosis.verdict
+    ] in parsed.text
+    if plan.get('drop'):
+        assert not any(row and row[0].strip() == 'torque [N m]' for row in parsed.rows)
+
+
+def test_unexplained_says_so(named, tmp_path):
+    odd = replace(named, verdict='unexplained', effects=(), sentence='None of the known effects.')
+    parsed = Page(write_report(odd, tmp_path).read_text(encoding='utf-8'))
+    assert 'Unexplained. None of the known effects.' in re.sub(r'\s+', ' ', parsed.text)
+    assert 'What was added' not in parsed.text
+
+
+def test_names_from_the_table_cannot_break_the_page(named, tmp_path):
+    table = replace(named.table, name='<b>&"x".csv')
+    parsed = Page(write_report(replace(named, table=table), tmp_path).read_text(encoding='utf-8'))
+    assert '<b>&"x".csv' in parsed.text
+
+
+def test_global_picture_settings_stay(named, tmp_path):
+    import matplotlib as mpl
+
+    before = dict(mpl.rcParams)
+    write_report(named, tmp_path)
+    assert dict(mpl.rcParams) == before
+
+
+@pytest.mark.parametrize(
+    ('value', 'text'),
+    [(0.0, '0'), (1234.5, '1234'), (0.00176, '0.00176'), (3.2e7, '3.2e+07'), (np.nan, '-')],
+)
+def test_numbers_for_people(value, text):
+    assert number(value, 4 if value == 1234.5 else 3) == text
