@@ -270,6 +270,12 @@ def test_a_looped_bag_begins_a_new_run_that_keeps_the_soil():
     assert kept[0] is False and kept == sorted(kept) and kept.count(True) >= 2
 
 
+def test_what_max_lag_holds_back_is_not_lost_when_the_clock_steps_back():
+    core, _ = make_core(max_lag=0.3)
+    once = drive(2.0)
+    assert times(play(core, once + once)) == [round(0.1 * i, 6) for i in range(20)] * 2
+
+
 def test_odometry_alone_can_step_back():
     core, _ = make_core()
     first = [odometry(0.1 * i) for i in range(30)]

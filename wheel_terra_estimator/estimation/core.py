@@ -124,6 +124,7 @@ ReferenceVelocity
                 self._checks.refuse(arrival.channel, 'stamp far ahead of all others')
         if judgement.stepped_back:
             self._clock_steps += 1
+            sets += self._timeline.flush()
             self._timeline.end_run(keep_soil=True)
         for arrival in judgement.accepted:
             sets += self._insert(arrival)
