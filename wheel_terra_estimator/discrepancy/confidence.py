@@ -23,12 +23,13 @@ from wheel_terra_estimator.discrepancy.verdict import Verdict
 
 FEATURES = (
     'one',
-    'margin',
-    'margin_of_set',
-    'gain',
-    'remainder',
-    'two',
-    'open',
+    'margin',  # log odds of the name against everything without it
+    'margin_of_set',  # the same of the name and its rivals
+    'gain',  # log evidence over nothing, compressed
+    'remainder',  # something is left beyond the floor
+    'floor',  # probability of a structural error
+    'two',  # two effects are named
+    'open',  # number of rivals
     'noise_unknown',
 )
 
@@ -64,6 +65,7 @@ def features(
         'margin_of_set': _squash(margin(covered)),
         'gain': float(np.log1p(max(total[verdict.index] - total[nothing], 0.0))),
         'remainder': float(left.significant),
+        'floor': left.probability_of_any,
         'two': float(len(selection.explanations[verdict.index].names) - 1),
         'open': float(len(verdict.open_sets[place])),
         'noise_unknown': float(not noise_known),

@@ -4,6 +4,9 @@
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -21,7 +24,7 @@ GREATEST_SHARE = 0.12  # of the cells of a table
 def find_outliers(
     problem: Problem,
     fitted: Fit,
-    variance: FloatArray,
+    variances: Sequence[FloatArray],
     observed: FloatArray,
     narrow: FloatArray,
 ) -> list[tuple[int, int, float]]:
@@ -37,22 +40,22 @@ def find_outliers(
         Built without any cell set apart.
     fitted : Fit
         Its linearisation.
-    variance : numpy.ndarray
-        (m,) of the rotated axes, wide enough for a structural error.
+    variances : sequence of numpy.ndarray
+        (m,) of the rotated axes, for a structural error that is small and one that is large.
     observed : numpy.ndarray
         (m,) cells that the fit was asked to match.
     narrow : numpy.ndarray
         (N, N) correlation of features narrow in slip that rows share (see ``slip_features``).
     """
     jacobian = problem.rotate(fitted.sensitivity) / np.sqrt(fitted.prior)
-    inverse = problem.rotation.T @ inverse_covariance(variance, jacobian) @ problem.rotation
     target = observed - problem.flat(fitted.outputs) + fitted.sensitivity @ fitted.u
     best, found = -np.inf, []
-    for amplitude in NARROW if narrow.any() else NARROW[:1]:
-        wider = inverse
+    widths = NARROW if narrow.any() else NARROW[:1]
+    for variance, amplitude in itertools.product(variances, widths):
+        wider = problem.rotation.T @ inverse_covariance(variance, jacobian) @ problem.rotation
         if amplitude:
             shared = _shared_features(problem, narrow, amplitude)
-            wider = np.linalg.inv(np.linalg.inv(inverse) + shared)
+            wider = np.linalg.inv(np.linalg.inv(wider) + shared)
         score, cells = _set_apart(problem, wider, target)
         if score > best:
             best, found = score, cells

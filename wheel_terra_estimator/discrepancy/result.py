@@ -59,6 +59,8 @@ class NamedEffect:
         True where something smooth is left that it does not explain.
     separates : mapping
         Confounded name -> what would separate the two, from the catalogue.
+    features : mapping
+        What the confidence was computed from (``confidence.FEATURES``).
     """
 
     name: str
@@ -70,6 +72,7 @@ class NamedEffect:
     claim: str = ''
     source: str = ''
     separates: Mapping[str, str] = field(default_factory=dict)
+    features: Mapping[str, float] = field(default_factory=dict)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the keys of ``report.json``."""

@@ -94,7 +94,7 @@ def search(
     problem, observed = builder.build(noise.std, ())
     nothing = _fit_nothing(builder.forward, problem, observed, nuisance, nothing)
     outliers = find_outliers(
-        problem, nothing, problem.variance(_FLEXIBLE), observed, builder.narrow
+        problem, nothing, _variances(problem, _FLEXIBLE), observed, builder.narrow
     )
     if outliers:
         noise = builder.estimate(noise, nothing, outliers)
@@ -190,6 +190,14 @@ def _select(setting: Setting, nothing: Fit) -> Selection:
     return weigh(explanations, setting.floors, len(setting.effects))
 
 
+def _variances(problem: Problem, amplitude: FloatArray | float) -> list[FloatArray]:
+    """Return the variances with a small structural error, and with one of at least `amplitude`."""
+    small = problem.variance(_ROBUST_FLOOR)
+    if np.max(amplitude) <= _ROBUST_FLOOR:
+        return [small]
+    return [small, problem.variance(np.maximum(amplitude, _ROBUST_FLOOR))]
+
+
 def _outliers_of_best(
     builder: _Builder, noise: Noise, selection: Selection
 ) -> list[tuple[int, int, float]]:
@@ -197,9 +205,12 @@ def _outliers_of_best(
     problem, observed = builder.build(noise.std, ())
     best = selection.explanations[0]
     floor = selection.floors[int(np.argmax(selection.probability[0]))]
-    amplitude = np.maximum(np.array(floor.amplitude), _ROBUST_FLOOR)
     return find_outliers(
-        problem, best.fitted, problem.variance(amplitude), observed, builder.narrow
+        problem,
+        best.fitted,
+        _variances(problem, np.array(floor.amplitude)),
+        observed,
+        builder.narrow,
     )
 
 

@@ -349,6 +349,7 @@ def _named(
                         or known[rival].confounded_with.get(name, '')
                         for rival in rivals
                     },
+                    values,
                 ),
             )
         )

@@ -1,0 +1,144 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Refit the map from posterior weights to confidence (discrepancy/confidence_map.json).
+
+    python tools/fit_confidence.py run names.jsonl --processes 2    # campaigns; resumable
+    python tools/fit_confidence.py fit names.jsonl                  # writes the map, prints errors
+
+Campaigns of all groups of the slow study, on seeds of their own. The calibration error is that of
+predictions for a design which the fit did not see.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+
+for _name in ('OMP_NUM_THREADS', 'OPENBLAS_NUM_THREADS'):
+    os.environ.setdefault(_name, '1')
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+import numpy as np  # noqa: E402
+from campaigns import make_campaign, scoring  # noqa: E402
+from campaigns.groups import GROUPS  # noqa: E402
+
+from wheel_terra_estimator.discrepancy import confidence  # noqa: E402
+
+FIRST_SEED = 50_000  # below 100,000: not for scoring
+RIDGE = 1.0  # prior precision of the coefficients
+MAP = Path(confidence.__file__).with_name('confidence_map.json')
+
+
+def names_of(task: tuple[str, str, int]) -> list[dict[str, object]]:
+    """Return one record per name that the workflow gives to a campaign."""
+    group, design, seed = task
+    key = f'{group} {design} {seed}'
+    try:
+        campaign = make_campaign(seed, design, GROUPS[group].plan)
+        diagnosis = scoring.diagnose(campaign)
+    except Exception as error:
+        return [{'key': key, 'error': str(error)}]
+    return [
+        {
+            'key': key,
+            'design': design,
+            'features': dict(effect.features),
+            'right': effect.name in campaign.hidden,
+            'in_set': bool({effect.name, *effect.confounded_with} & set(campaign.hidden)),
+        }
+        for effect in diagnosis.effects
+    ] or [{'key': key}]
+
+
+def run(file: Path, per_group: int, processes: int) -> None:
+    """Diagnose campaigns and append their names to the file."""
+    done = set()
+    if file.exists():
+        done = {json.loads(line)['key'] for line in file.read_text().splitlines()}
+    todo = [
+        (group, design, FIRST_SEED + i)
+        for i in range(per_group)
+        for group, kind in GROUPS.items()
+        for design in kind.designs
+        if f'{group} {design} {FIRST_SEED + i}' not in done
+    ]
+    with ProcessPoolExecutor(processes) as pool, file.open('a') as stream:
+        for records in pool.map(names_of, todo):
+            stream.writelines(json.dumps(record) + '\n' for record in records)
+            stream.flush()
+
+
+def logistic(features: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Return ridge-penalised logistic coefficients (Newton)."""
+    weights = np.zeros(features.shape[1])
+    for _ in range(40):
+        p = 1.0 / (1.0 + np.exp(-features @ weights))
+        gradient = features.T @ (right - p) - RIDGE * weights
+        hessian = (features * (p * (1.0 - p))[:, None]).T @ features
+        step = np.linalg.solve(hessian + RIDGE * np.eye(len(weights)), gradient)
+        weights += step
+        if np.abs(step).max() < 1e-8:
+            break
+    return weights
+
+
+def calibration_error(p: np.ndarray, right: np.ndarray, bins: int = 10) -> float:
+    """Return the mean distance of stated and found frequency over bins of equal width."""
+    place = np.minimum((p * bins).astype(int), bins - 1)
+    return float(
+        sum(
+            np.abs(p[place == b].mean() - right[place == b].mean()) * np.mean(place == b)
+            for b in np.unique(place)
+        )
+    )
+
+
+def fit(file: Path) -> None:
+    """Fit the map, print its errors on designs left out, write it."""
+    records = [json.loads(line) for line in file.read_text().splitlines()]
+    records = [record for record in records if 'features' in record]
+    x = np.array([[record['features'][name] for name in confidence.FEATURES] for record in records])
+    design = np.array([record['design'] for record in records])
+    result: dict[str, object] = {'features': list(confidence.FEATURES), 'names': len(records)}
+    for key, target in (('name', 'right'), ('set', 'in_set')):
+        right = np.array([float(record[target]) for record in records])
+        left_out = np.empty(len(right))
+        for one in np.unique(design):
+            mine = design == one
+            left_out[mine] = 1.0 / (1.0 + np.exp(-x[mine] @ logistic(x[~mine], right[~mine])))
+        sure = left_out > 0.9
+        print(
+            f'{key}: {len(right)} names, {right.mean():.3f} right; calibration error '
+            f'{calibration_error(left_out, right):.3f}; said above 0.9: {sure.mean():.2f}, '
+            f'of these right: {right[sure].mean():.3f}'
+        )
+        result[key] = [round(float(w), 4) for w in logistic(x, right)]
+    MAP.write_text(json.dumps(result, indent=1) + '\n')
+
+
+def main() -> None:
+    """Run the command."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    commands = parser.add_subparsers(dest='command', required=True)
+    runner = commands.add_parser('run')
+    runner.add_argument('file', type=Path)
+    runner.add_argument('--per-group', type=int, default=20, help='campaigns per group and design')
+    runner.add_argument('--processes', type=int, default=1)
+    fitter = commands.add_parser('fit')
+    fitter.add_argument('file', type=Path)
+    arguments = parser.parse_args()
+    if arguments.command == 'run':
+        run(arguments.file, arguments.per_group, arguments.processes)
+    else:
+        fit(arguments.file)
+
+
+if __name__ == '__main__':
+    main()
