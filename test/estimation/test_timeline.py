@@ -388,3 +388,34 @@ def test_thinning_does_not_depend_on_the_order_of_arrival(order):
     stream.sort(key=lambda m: m.stamp)
     expected = play(ordered, [odometry(0.0), *stream, odometry(1.1)])
     assert essence(sets)[-1] == essence(expected)[-1]
+
+
+# -- Whatever comes -------------------------------------------------------------------------------
+
+
+@settings(max_examples=150, deadline=None)
+@given(
+    st.lists(
+        st.tuples(
+            st.sampled_from([odometry, imu, sinkage, reference]),
+            st.sampled_from([0.01, 0.1, 0.0, 0.5, 3.0, 100.0, -0.05, -0.9, -1.1, -2.5, -50.0]),
+            st.booleans(),
+        ),
+        min_size=1,
+        max_size=120,
+    ),
+    st.sampled_from([0.0, 0.15, 1.5]),
+    st.sampled_from([0.0, 0.3, 2.0]),
+)
+def test_stamps_strictly_increase_within_a_run_whatever_comes(stream, max_lag, history):
+    core, _ = make_core(max_lag=max_lag, history=history)
+    clock, stamps = 60.0, []
+    for kind, step, is_clock in stream:
+        t = clock + step
+        if is_clock:
+            clock = t = max(t, 1.0)
+        stamps += [s.stamp for s in core.add(kind(t))]
+        backwards = sum(b <= a for a, b in pairwise(stamps))
+        assert backwards <= core.health()['clock_steps_back']
+    stamps += [s.stamp for s in core.flush()]
+    assert sum(b <= a for a, b in pairwise(stamps)) <= core.health()['clock_steps_back']
