@@ -22,7 +22,7 @@ from wheel_terra_estimator.simulation.drive import simulate
 from wheel_terra_estimator.simulation.scenario import load
 
 DATA = Path(__file__).resolve().parents[1] / 'data' / 'demo'
-SCENARIO, SEED = 'climb_soft_patch', 1
+SCENARIO, SEED, DURATION = 'climb_soft_patch', 5, 112.0
 PIECE = (6.0, 36.0)
 """Part of the Pathfinder drive [s after its start]: standing, starting and driving."""
 
@@ -60,7 +60,7 @@ def main() -> None:
     scenario = load(SCENARIO, parameters=['sensors.imu_rate:=20.0'])
     with TemporaryDirectory() as folder:
         plain = Path(folder) / 'entrapment'
-        write_simulated_drive(simulate(scenario, SEED), plain)
+        write_simulated_drive(simulate(scenario, SEED, DURATION), plain)
         repack(plain, DATA / 'entrapment')
     repack(arguments.pathfinder, DATA / 'pathfinder', PIECE)
 
