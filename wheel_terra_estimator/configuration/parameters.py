@@ -663,7 +663,7 @@ DECLARED: tuple[Parameter, ...] = (
     number('filter.ratio_walk_least', 0.03, '1/sqrt(m)', 'the same, at least', above=0.0),
     number(
         'filter.demand_walk',
-        0.015,
+        0.025,
         '1/sqrt(m)',
         'random walk of the pull that the ground asks for, as a share of the load; over the slope '
         'of the traction curve it gives the walk of the speed ratio',
@@ -677,8 +677,15 @@ DECLARED: tuple[Parameter, ...] = (
         above=0.0,
     ),
     number(
+        'filter.shear_error_common_std',
+        0.12,
+        '-',
+        'the part of it that all wheels share',
+        at_least=0.0,
+    ),
+    number(
         'filter.shear_error_length',
-        0.3,
+        0.5,
         'm',
         'travel over which that error changes',
         above=0.0,

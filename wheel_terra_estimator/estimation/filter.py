@@ -9,6 +9,8 @@ from one pass over the models and are handed in as they are.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from filterpy.kalman import ExtendedKalmanFilter
 from numpy.typing import NDArray
@@ -70,10 +72,28 @@ class GatedFilter:
         """Return the (m,) diagonal of H P H^T + R."""
         return np.einsum('ij,jk,ik->i', H, self._ekf.P, H) + noise
 
-    def update(self, residual: FloatArray, H: FloatArray, noise: FloatArray) -> None:
-        """Fuse m readings: residual z - h(x) (m,), H (m, n), variances (m,)."""
+    def update(
+        self,
+        residual: FloatArray,
+        H: FloatArray,
+        noise: FloatArray,
+        considered: Sequence[int] = (),
+    ) -> None:
+        """Fuse m readings: residual z - h(x) (m,), H (m, n), variances (m,).
+
+        Entries that are `considered` (Schmidt) keep mean and variance: their uncertainty counts,
+        but these readings must not teach them.
+        """
         ekf = self._ekf
-        ekf.update(residual, lambda _: H, lambda _: 0.0, R=np.diag(noise))
+        before, P = ekf.x, ekf.P
+        R = np.diag(noise)
+        ekf.update(residual, lambda _: H, lambda _: 0.0, R=R)
+        if considered:
+            gain = ekf.K
+            gain[list(considered)] = 0.0
+            rest = np.eye(len(before)) - gain @ H
+            ekf.x = before + gain @ residual
+            ekf.P = rest @ P @ rest.T + gain @ R @ gain.T
         self._keep_sound()
 
     def set(self, index: int, value: float, variance: float) -> None:

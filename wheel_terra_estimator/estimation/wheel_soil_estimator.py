@@ -56,6 +56,8 @@ FloatArray = NDArray[np.float64]
 _NAN = math.nan
 _SLOPE_KEEP = 0.9  # per cycle
 _LEAST_SLIP_STD = 0.012
+# Slip of a rover in loose soil on level ground, its spread, and the rim travel of its changes [m].
+_USUAL_SLIP, _USUAL_STD, _USUAL_LENGTH = 0.12, 0.2, 1.0
 
 
 @dataclass
@@ -98,6 +100,7 @@ class _Run:
     force_known: bool = False
     yaw_rate: float = 0.0
     turned_up: float = 0.0  # nose-up rotation over the last rover length [rad]
+    side_motion: float = 0.0  # of the outer wheels over the fastest rim speed
     turned_over: float = 0.0  # and the travel that it took [m]
     yaw_bias: float = 0.0
     yaw_bias_weight: float = 0.0
@@ -163,6 +166,9 @@ class WheelSoilEstimator:
         # Below this rim speed v / rim speed is not told from noise.
         self._low_rim = max(3.0 * settings.rest_speed, 0.005)
         # Until a contact is new all along, its shear is not that of the steady model.
+        n = settings.wheel_count
+        common = float(tuning.shear_error_common_std)
+        self._shear_error_covariance = np.eye(n) * settings.shear_error_std**2 + common**2
         self._curvature_length = 0.5 * (max(settings.longitudinal) - min(settings.longitudinal))
         self._contact_length = 0.5 * min(settings.rim_radius)
         rate = max(float(settings.sensors.imu_rate), 1.0)
@@ -267,7 +273,7 @@ class WheelSoilEstimator:
         P[layout.sinkage, layout.sinkage] = np.diag((0.5 * z + 0.005) ** 2)
         shared, own = s.stiffness_std, 0.5 * s.stiffness_std
         P[layout.stiffness, layout.stiffness] = shared**2 + np.eye(n) * own**2
-        P[layout.shear_error, layout.shear_error] = np.eye(n) * s.shear_error_std**2
+        P[layout.shear_error, layout.shear_error] = self._shear_error_covariance
         upper = np.full(layout.size, np.inf)
         upper[SPEED], upper[GRAVITY_BIAS] = 20.0, 2.0
         upper[SHEAR_STRENGTH], upper[SHEAR_MODULUS] = 1.0, 1.0
@@ -434,8 +440,13 @@ class WheelSoilEstimator:
             run.force_known = True
             self._follow_turning(window, dt)
             run.load = self._loads()
+            self._note_turning()
         rim = self._representative_rim(run.yaw_rate)
         self._follow_direction(rim)
+        if run.rim_at_cycle is None and rim is not None:
+            # First sight of the wheels: between rolling and spinning, or at rest.
+            spread = max(0.3 * abs(rim), s.rest_speed)
+            self._filter.set(SPEED, run.ratio * rim, spread * spread)
         rims = [self._rim(i) for i in range(s.wheel_count)]
         still = all(r != r or abs(r) < s.rest_speed for r in rims) and any(r == r for r in rims)
         before = self._filter.mean[self._layout.sinkage].copy()
@@ -458,6 +469,22 @@ class WheelSoilEstimator:
         keep = math.exp(-abs(travel) / max(self._curvature_length, 0.1))
         run.turned_up = keep * run.turned_up - window.pitch_rate / window.count * dt
         run.turned_over = keep * run.turned_over + travel
+
+    def _reference_known(self) -> bool:
+        """Say whether a fix came within the last travel over which soil is learned."""
+        run = self._run
+        return run.reference_time is not None and run.time - run.reference_time < 20.0
+
+    def _note_turning(self) -> None:
+        """Open the shear strength where turning begins or ends: the contacts form anew."""
+        run = self._run
+        known = [abs(r) for r in run.rim_speed if r == r]
+        fastest = max(known, default=0.0)
+        if fastest <= self._low_rim:
+            return
+        side = min(abs(run.yaw_rate) * self._curvature_length / fastest, 1.0)
+        self._filter.widen(SHEAR_STRENGTH, (0.3 * (side - run.side_motion)) ** 2)
+        run.side_motion = side
 
     def _yaw_std(self) -> float:
         """Return the standard deviation of the smoothed yaw rate [rad/s]."""
@@ -508,6 +535,8 @@ class WheelSoilEstimator:
         mean = x.copy()
         F = np.eye(size)
         Q = np.zeros((size, size))
+        if not still and not self._reference_known():
+            step = self._lean_on_experience(step, dt)
         mean[SPEED] = step.speed_gain * x[SPEED] + step.bias_gain * x[GRAVITY_BIAS] + step.constant
         F[SPEED, SPEED] = step.speed_gain
         F[SPEED, GRAVITY_BIAS] = step.bias_gain
@@ -521,8 +550,7 @@ class WheelSoilEstimator:
         run.fresh_travel += travel
         if travel > 0.0:
             walk = float(s.filter.soil_walk) ** 2 * travel
-            known = run.reference_time is not None and time - run.reference_time < 20.0
-            learn = walk if known else 0.1 * walk
+            learn = walk if self._reference_known() else 0.0
             forget = math.exp(-travel / 100.0)
             for index, walk_std in (
                 (SHEAR_STRENGTH, 0.1),
@@ -543,8 +571,28 @@ class WheelSoilEstimator:
             e = layout.shear_error
             mean[e] *= hold
             F[e, e] *= hold
-            Q[e, e] = np.eye(n) * s.shear_error_std**2 * (1.0 - hold * hold)
+            Q[e, e] = self._shear_error_covariance * (1.0 - hold * hold)
         self._filter.predict(mean, F, Q)
+
+    def _lean_on_experience(self, step: SpeedStep, dt: float) -> SpeedStep:
+        """Without fixes, let v / rim speed return to what such a slope usually takes.
+
+        On deep or saturated contacts torque and pull hardly change with slip. There the posterior
+        is the prior, and a random walk is no prior: it ends anywhere.
+        """
+        run = self._run
+        rim = self._representative_rim(run.yaw_rate)
+        if rim is None or abs(rim) < self._low_rim:
+            return step
+        demand = run.drive_direction * run.force[0] / max(run.force[2], 0.1)
+        usual = 1.0 - min(max(_USUAL_SLIP + (1.2 if demand > 0.0 else 0.4) * demand, -0.2), 0.8)
+        keep = math.exp(-abs(rim) * dt / _USUAL_LENGTH)
+        return SpeedStep(
+            keep * step.speed_gain,
+            keep * step.bias_gain,
+            keep * step.constant + (1.0 - keep) * usual * rim,
+            keep * keep * step.variance + (1.0 - keep * keep) * (_USUAL_STD * rim) ** 2,
+        )
 
     def _predict_wheels(
         self,
@@ -659,7 +707,7 @@ class WheelSoilEstimator:
             typical = sum(spread) / len(spread) if spread else 0.0
             if rim is not None and typical > s.rest_speed and abs(rim) < 0.2 * typical:
                 # Spin in place: the body stays where it is, to a share of the rim speed.
-                self._fuse_speed(0.0, max(0.1 * typical, 0.002) ** 2)
+                self._fuse_speed(0.0, max(0.3 * typical, 0.002) ** 2)
             return
         if run.still_since is None:
             run.still_since = time
@@ -744,7 +792,11 @@ class WheelSoilEstimator:
         elif run.fresh_travel > self._contact_length:
             self._model_rows(rims, torque, residuals, variances, rows)
         if rows:
-            self._filter.update(np.array(residuals), np.array(rows), np.array(variances))
+            # Without fixes slip and shear strength are not told apart: do not let them drift.
+            held = () if self._reference_known() else (SHEAR_STRENGTH, SHEAR_MODULUS)
+            self._filter.update(
+                np.array(residuals), np.array(rows), np.array(variances), considered=held
+            )
         run.window = InertialWindow()
 
     def _model_rows(
