@@ -9,6 +9,8 @@ Four signs, each with a hold time of its own, any of which raises the warning:
   seconds, passes 0.9 within the horizon;
 * *held wheels*: the rover makes little of what its fastest wheel offers while at least half of its
   wheels slip heavily or stand (torque-limited wheels stall as often as they spin);
+* *bogging down*: wheels pull near their limit while the rover loses speed against its fastest
+  wheel so fast that it would stand within seconds;
 * *stall*: without any speed, two or more wheels pull near their torque limit while they turn much
   slower than the fastest. Pulling away from rest looks the same: a start mask keeps it out.
 
@@ -29,6 +31,7 @@ from wheel_terra_estimator.estimation.speed_process import median
 _ENTRAPPED_SLIP = 0.9
 _DIGGING_SLIP = 0.8
 _TREND_WINDOW = 5.0  # [s]
+_BOG_WINDOW = 1.5  # [s] over which the loss of speed is taken
 _LONGEST_TIME = 600.0  # [s] said where no entrapment is in sight
 
 
@@ -46,6 +49,10 @@ class StuckTuning:
     look_ahead_hold: float = 1.0
     held_slip: float = 0.6
     held_hold: float = 0.5
+    bog_slip: float = 0.35
+    bog_time: float = 6.0  # [s] to a stand
+    bog_torque: float = 0.5  # of the torque limit, second strongest wheel
+    bog_hold: float = 0.2
     stall_ratio: float = 0.6
     stall_torque: float = 0.7  # of the torque limit
     stall_hold: float = 0.5
@@ -84,9 +91,10 @@ class _Memory:
     since: dict[str, float] = field(default_factory=dict)
     rolling_since: float | None = None
     cruise: float = 0.0
-    trend: deque[tuple[float, float, float, float]] = field(default_factory=deque)
+    trend: deque[tuple[float, float]] = field(default_factory=deque)
     rim_travel: float = 0.0
     last_time: float | None = None
+    speeds: deque[tuple[float, float]] = field(default_factory=deque)
 
 
 class StuckMonitor:
@@ -109,6 +117,7 @@ class StuckMonitor:
             deque(m.trend),
             m.rim_travel,
             m.last_time,
+            deque(m.speeds),
         )
 
     def restore(self, memory: _Memory) -> None:
@@ -163,6 +172,7 @@ class StuckMonitor:
         else:
             memory.since.pop('ahead', None)
         self._held_wheels_sign(time, speed, speed_known, moving, stalled, fastest, signs)
+        self._bog_sign(time, speed, wheels, moving, fastest, signs)
         self._stall_sign(time, moving, stalled, fastest, signs)
 
         if signs:
@@ -226,16 +236,12 @@ class StuckMonitor:
             trend.clear()
             return 0.0
         if not trend or time - trend[-1][0] >= 0.2 - 1e-9:
-            trend.append((time, typical, 0.0, 0.0))
+            trend.append((time, typical))
         while trend and time - trend[0][0] > _TREND_WINDOW:
             trend.popleft()
         if len(trend) < 5 or trend[-1][0] - trend[0][0] < 1.0:
             return 0.0
-        n = len(trend)
-        t_mean = math.fsum(e[0] for e in trend) / n
-        s_mean = math.fsum(e[1] for e in trend) / n
-        top = math.fsum((e[0] - t_mean) * (e[1] - s_mean) for e in trend)
-        return top / math.fsum((e[0] - t_mean) ** 2 for e in trend)
+        return _slope(trend)
 
     def _stalled(
         self, time: float, wheels: Sequence[WheelMotionState], fastest: float
@@ -286,6 +292,38 @@ class StuckMonitor:
         else:
             memory.since.pop('held', None)
 
+    def _bog_sign(
+        self,
+        time: float,
+        speed: float,
+        wheels: Sequence[WheelMotionState],
+        moving: Sequence[WheelMotionState],
+        fastest: float,
+        signs: dict[str, str],
+    ) -> None:
+        tuning, memory = self._tuning, self._memory
+        speeds = memory.speeds
+        speeds.append((time, speed))
+        while time - speeds[0][0] > _BOG_WINDOW + 1e-6:
+            speeds.popleft()
+        bogging, left = False, 0.0
+        torques = sorted((w.torque_share for w in wheels if w.torque_share >= 0.0), reverse=True)
+        # Two wheels or more: one alone may stand against a stone.
+        if len(torques) > 1 and torques[1] > tuning.bog_torque and moving and fastest > 0.0:
+            direction = 1.0 if max(moving, key=lambda w: abs(w.rim_speed)).rim_speed > 0 else -1.0
+            ahead = direction * speed
+            loss = -direction * _slope(speeds)
+            left = max(ahead, 0.0) / loss if loss > 1e-6 else math.inf
+            bogging = 1.0 - ahead / fastest > tuning.bog_slip and left < tuning.bog_time
+            bogging = bogging and memory.rolling_since is not None
+        if bogging:
+            if self._held('bog', time, tuning.bog_hold):
+                signs['bog'] = (
+                    f'bogging down: stands in {left:.1f} s, wheels near their torque limit'
+                )
+        else:
+            memory.since.pop('bog', None)
+
     def _stall_sign(
         self,
         time: float,
@@ -300,3 +338,14 @@ class StuckMonitor:
                 signs['stall'] = f'{count} wheels stalled near their torque limit'
         else:
             self._memory.since.pop('stall', None)
+
+
+def _slope(samples: Sequence[tuple[float, float]] | deque[tuple[float, float]]) -> float:
+    """Return the least-squares slope of values over time, 0 for too few."""
+    n = len(samples)
+    if n < 5:
+        return 0.0
+    t_mean = math.fsum(t for t, _ in samples) / n
+    s_mean = math.fsum(s for _, s in samples) / n
+    spread = math.fsum((t - t_mean) ** 2 for t, _ in samples)
+    return math.fsum((t - t_mean) * (s - s_mean) for t, s in samples) / max(spread, 1e-12)
