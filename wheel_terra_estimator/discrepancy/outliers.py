@@ -17,7 +17,7 @@ FloatArray = NDArray[np.float64]
 
 SHARE = 0.02  # prior share of outliers among the cells
 # Sizes of features narrow in slip that rows may share [share of the range].
-NARROW = (0.0, 0.05, 0.15)
+NARROW = (0.05, 0.15)
 GREATEST_SHARE = 0.12  # of the cells of a table
 
 
@@ -49,14 +49,20 @@ def find_outliers(
     """
     jacobian = problem.rotate(fitted.sensitivity) / np.sqrt(fitted.prior)
     target = observed - problem.flat(fitted.outputs) + fitted.sensitivity @ fitted.u
-    best, found = -np.inf, []
-    widths = NARROW if narrow.any() else NARROW[:1]
-    for variance, amplitude in itertools.product(variances, widths):
-        wider = problem.rotation.T @ inverse_covariance(variance, jacobian) @ problem.rotation
-        if amplitude:
-            shared = _shared_features(problem, narrow, amplitude)
-            wider = np.linalg.inv(np.linalg.inv(wider) + shared)
-        score, cells = _set_apart(problem, wider, target)
+    best, found, chosen = -np.inf, [], None
+    for variance in variances:
+        inverse = problem.rotation.T @ inverse_covariance(variance, jacobian) @ problem.rotation
+        score, cells = _set_apart(problem, inverse, target)
+        if score > best:
+            best, found, chosen = score, cells, inverse
+    counts = np.bincount([q for _, q, _ in found], minlength=3)
+    if chosen is None or not narrow.any():
+        return found
+    # Several cells of one quantity: outliers, or a feature that they share?
+    plain = np.linalg.inv(chosen)
+    for quantity, amplitude in itertools.product(np.flatnonzero(counts >= 2), NARROW):
+        shared = _shared_features(problem, narrow, amplitude, int(quantity))
+        score, cells = _set_apart(problem, np.linalg.inv(plain + shared), target)
         if score > best:
             best, found = score, cells
     return found
@@ -90,12 +96,12 @@ def _set_apart(
     return score, found
 
 
-def _shared_features(problem: Problem, narrow: FloatArray, amplitude: float) -> FloatArray:
-    """(m, m) covariance of the cells by features that are narrow in slip."""
-    scale = amplitude * problem.scale[problem.quantity]
-    same = problem.quantity[:, None] == problem.quantity[None, :]
-    correlation = narrow[np.ix_(problem.row, problem.row)]
-    return np.where(same, correlation * np.outer(scale, scale), 0.0)
+def _shared_features(
+    problem: Problem, narrow: FloatArray, amplitude: float, quantity: int
+) -> FloatArray:
+    """(m, m) covariance of the cells by features of one quantity that are narrow in slip."""
+    scale = np.where(problem.quantity == quantity, amplitude * problem.scale[quantity], 0.0)
+    return narrow[np.ix_(problem.row, problem.row)] * np.outer(scale, scale)
 
 
 def inverse_covariance(variance: FloatArray, jacobian: FloatArray) -> FloatArray:

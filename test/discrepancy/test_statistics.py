@@ -1,0 +1,246 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""The statistics against brute force: evidence, tests, noise, outliers, Jacobians."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import kstest, multivariate_normal
+
+from wheel_terra_estimator.discrepancy import gap_test, noise, outliers
+from wheel_terra_estimator.discrepancy.evidence import Floor, evidence
+from wheel_terra_estimator.discrepancy.fitting import Fit, fit
+from wheel_terra_estimator.discrepancy.forward import Forward
+from wheel_terra_estimator.discrepancy.parameters import (
+    EFFECT_SCALES,
+    WIDENING,
+    WORSE_SHARE,
+    Coordinate,
+    effect_coordinates,
+    soil_coordinates,
+)
+from wheel_terra_estimator.discrepancy.problem import build_problem, kernel, slip_features
+from wheel_terra_estimator.discrepancy.result import Noise
+from wheel_terra_estimator.discrepancy.signatures import signatures
+from wheel_terra_estimator.discrepancy.table import check_table
+from wheel_terra_estimator.terramechanics.effects import catalogue
+from wheel_terra_estimator.terramechanics.model import WheelSoilModel
+from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
+from wheel_terra_estimator.terramechanics.soil import Soil
+from wheel_terra_estimator.terramechanics.wheel import Wheel
+
+SOIL = Soil(15600.0, 2.4e6, 1.1, 250.0, np.radians(31.9), 0.011, 0.4, -0.2)
+WHEEL = Wheel(0.157, 0.165, 0.01, 30.0, 0.002)
+NO_FLOOR = (Floor((0.0, 0.0, 0.0), 0.0, False),)
+KNOWN = np.full(3, np.inf)
+
+
+@pytest.fixture(scope='module')
+def forward():
+    slip = np.tile(np.linspace(0.03, 0.8, 8), 2)
+    points = OperatingPoints(
+        slip, np.repeat([60.0, 110.0], 8), WHEEL, pass_number=np.tile([1, 2], 8)
+    )
+    return Forward(points, SOIL, {}, catalogue())
+
+
+@pytest.fixture(scope='module')
+def setting(forward):
+    """Truth, inputs and noise of a table on these points."""
+    soil = soil_coordinates(SOIL, {})
+    truth = forward.solve([soil], [np.zeros(len(soil))], jacobian=False).outputs[0]
+    std = np.broadcast_to([4e-4, 1.0, 0.1], truth.shape)
+    points = forward.points
+    inputs = np.column_stack([points.slip / 0.8, (points.normal_load - 60.0) / 50.0])
+    return soil, truth, std, inputs, np.ptp(truth, axis=0)
+
+
+def test_batched_model_is_the_package_model(forward):
+    """Outputs and Jacobians against terramechanics, one hypothesis at a time, other steps."""
+    soil = soil_coordinates(SOIL, {})
+    names = [name for name, effect in catalogue().items() if effect.candidate]
+    hypotheses = [(*soil, *effect_coordinates(catalogue()[name])) for name in names]
+    u = [
+        np.concatenate([np.zeros(len(soil)), np.full(len(h) - len(soil), 0.4)]) for h in hypotheses
+    ]
+    state = forward.solve(hypotheses, u)
+    for b, name in enumerate(names):
+        own = effect_coordinates(catalogue()[name])
+        values = {c.name: float(c.value(0.4)) for c in own}
+        keys = ['soil.cohesion', *(f'effects.{name}.{c.name}' for c in own)]
+        expected, jacobian = WheelSoilModel(SOIL, {name: values}).jacobian(forward.points, keys)
+        scale = np.abs(expected.outputs()).max(axis=0)
+        np.testing.assert_allclose(state.outputs[b] / scale, expected.outputs() / scale, atol=3e-4)
+        columns = [4, *range(len(soil), len(soil) + len(own))]
+        scales = [soil[4].scale, *(c.scale for c in own)]
+        for column, unit, k in zip(columns, scales, range(len(keys)), strict=True):
+            mine = state.jacobian[b][:, :, column] / scale
+            theirs = jacobian[:, :, k] * unit / scale
+            np.testing.assert_allclose(mine, theirs, atol=2e-3 + 0.02 * np.abs(theirs).max())
+
+
+def linear_fit(rng, problem, columns, coordinates):
+    sensitivity = rng.standard_normal((problem.size, columns)) * problem.std[:, None]
+    rotated = problem.rotate(sensitivity)
+    return Fit(
+        ('e',),
+        coordinates,
+        np.zeros(columns),
+        np.zeros((problem.size // 3, 3)),
+        np.zeros(problem.size // 3),
+        sensitivity,
+        problem.rotate(problem.observed),
+        rotated,
+        np.ones(problem.size),
+        0.0,
+        np.ones(columns),
+    )
+
+
+def test_evidence_is_the_integral_over_parameters(setting):
+    """A linear model with one soil and one bounded effect parameter, against a grid."""
+    rng = np.random.default_rng(1)
+    _, truth, std, inputs, scale = setting
+    measured = std * rng.standard_normal(truth.shape)
+    problem = build_problem(measured, std, inputs, scale)
+    coordinates = (
+        Coordinate('soil', 'a', 0.0, 1.0),
+        Coordinate('e', 'b', 0.0, 1.0, 0.0, 3.0, role='strength'),
+    )
+    model = linear_fit(rng, problem, 2, coordinates)
+    amplitude = 0.02
+    floor = Floor((amplitude,) * 3, 0.0, False)
+    got = evidence(problem, model, (floor,), KNOWN).log_evidence[0]
+
+    row, quantity = problem.row, problem.quantity
+    smooth = kernel(inputs)[np.ix_(row, row)] * (quantity[:, None] == quantity[None, :])
+    smooth = smooth * np.outer(scale[quantity], scale[quantity]) * amplitude**2
+    density = multivariate_normal(np.zeros(problem.size), np.diag(problem.std**2) + smooth)
+    total = 0.0
+    for width, share in ((1 / WIDENING, 1 - WORSE_SHARE), (1.0, WORSE_SHARE)):
+        for size in EFFECT_SCALES:
+            a = np.linspace(-6, 6, 121) * width
+            b = (np.arange(300) + 0.5) / 100.0
+            mesh = np.array([(x, y) for x in a for y in b])
+            likelihood = density.pdf(problem.observed - mesh @ model.sensitivity.T)
+            prior_a = np.exp(-0.5 * (mesh[:, 0] / width) ** 2)
+            prior_b = np.exp(-0.5 * (mesh[:, 1] / size) ** 2)
+            prior = prior_a * prior_b / (prior_a * prior_b).sum()
+            total += share / len(EFFECT_SCALES) * float(likelihood @ prior)
+    assert got == pytest.approx(np.log(total), abs=0.02)
+
+
+def test_rotation_gives_the_dense_covariance(setting):
+    _, truth, std, inputs, scale = setting
+    by_slip = np.outer(np.linspace(1, 2, len(truth)), [1e-3, 5.0, 1.0])
+    group = np.arange(len(truth)) // 2
+    problem = build_problem(
+        truth, std, inputs, scale, (), by_slip, np.full(len(truth), 0.02), group
+    )
+    back = np.linalg.inv(problem.rotation)
+    dense = (back * problem.variance(0.03)) @ back.T
+    row, quantity = problem.row, problem.quantity
+    expected = np.diag(problem.std**2)
+    error = 0.02 * by_slip[row, quantity]
+    expected += np.outer(error, error) * (group[row][:, None] == group[row][None, :])
+    smooth = kernel(inputs)[np.ix_(row, row)] * (quantity[:, None] == quantity[None, :])
+    expected += 0.03**2 * smooth * np.outer(scale[quantity], scale[quantity])
+    root = np.sqrt(np.diag(expected))
+    np.testing.assert_allclose(
+        dense / np.outer(root, root), expected / np.outer(root, root), atol=1e-8
+    )
+
+
+def test_gap_tests_are_calibrated(forward, setting):
+    """P-values of tables in which nothing is missing are uniform; a real effect gives tiny ones."""
+    soil, truth, std, inputs, scale = setting
+    rng = np.random.default_rng(3)
+    names = ('lug_digging', 'bulldozing', 'drivetrain_friction', 'sinkage_offset')
+    effects = {name: catalogue()[name] for name in names}
+    problem = build_problem(truth, std, inputs, scale)
+    one = np.ones(problem.size)
+    at_truth = fit(
+        forward, problem, problem.observed, [((), soil)], [np.zeros(len(soil))], [one], None, 3
+    )[0]
+    found = signatures(forward, problem, at_truth, effects, 0.015)
+    scans, squares = [], []
+    for _ in range(200):
+        shift = at_truth.sensitivity @ rng.standard_normal(len(soil))
+        cells = problem.observed + shift + problem.std * rng.standard_normal(problem.size)
+        case = replace(at_truth, residual=problem.rotate(cells - problem.observed))
+        scans.append(gap_test.scan_p_value(case, one, found, set(names[:3])))
+        squares.append(gap_test.chi_square_p_value(case, one))
+    assert kstest(scans, 'uniform').pvalue > 1e-3
+    assert kstest(squares, 'uniform').pvalue > 1e-3
+    digging = problem.rotate(problem.flat(np.outer(0.004 * forward.points.slip, [1.0, 0, 0])))
+    real = replace(at_truth, residual=digging)
+    assert gap_test.scan_p_value(real, one, found, set(names[:3])) < 1e-3
+
+
+def test_outliers_are_found_and_a_hump_is_none(forward, setting):
+    soil, truth, std, inputs, scale = setting
+    rng = np.random.default_rng(5)
+    narrow = slip_features(inputs, 0)
+
+    def cells_apart(measured):
+        problem = build_problem(measured, std, inputs, scale)
+        one = [problem.variance(0.02), problem.variance(0.25)]
+        nothing = fit(
+            forward, problem, problem.observed, [((), soil)], [np.zeros(len(soil))], [one[0]]
+        )[0]
+        found = outliers.find_outliers(problem, nothing, one, problem.observed, narrow)
+        return {cell[:2] for cell in found}
+
+    clean = truth + std * rng.standard_normal(truth.shape)
+    assert not cells_apart(clean)
+    spoilt = clean.copy()
+    spoilt[3, 1] += 9.0 * std[3, 1]
+    spoilt[10, 0] -= 9.0 * std[10, 0]
+    assert cells_apart(spoilt) == {(3, 1), (10, 0)}
+    hump = clean.copy()
+    hump[[3, 11], 1] += 9.0 * std[3, 1]  # the same slip at both loads
+    assert not cells_apart(hump) & {(3, 1), (11, 1)}
+
+
+def test_noise_is_estimated_beside_an_effect(forward, setting):
+    soil, truth, std, inputs, scale = setting
+    rng = np.random.default_rng(7)
+    bent = truth.copy()
+    bent[:, 0] += 0.006 * forward.points.slip  # an effect of many deviations
+    ratios = []
+    for _ in range(6):
+        measured = bent + std * rng.standard_normal(truth.shape)
+        guess = np.broadcast_to(0.01 * scale, truth.shape)
+        origin = dict.fromkeys(('sinkage', 'drawbar_pull', 'torque'), 'estimated')
+        problem = build_problem(measured, guess, inputs, scale)
+        nothing = fit(
+            forward,
+            problem,
+            problem.observed,
+            [((), soil)],
+            [np.zeros(len(soil))],
+            [problem.variance(0.1)],
+        )[0]
+        before = Noise(guess, origin, dict.fromkeys(origin, 0.0))
+        after = noise.estimate_noise(before, nothing, problem, problem.observed)
+        ratios.append(after.std[0] / std[0])
+    assert np.all(np.exp(np.mean(np.log(ratios), axis=0)) == pytest.approx(1.0, rel=0.3))
+
+
+def test_repeats_give_the_noise():
+    rng = np.random.default_rng(2)
+    slip = np.repeat(np.linspace(0.1, 0.8, 8), 5)
+    table = check_table(
+        'x',
+        {
+            'slip': slip,
+            'normal_load': np.full(40, 80.0),
+            'torque': 3.0 + slip + 0.05 * rng.standard_normal(40),
+        },
+    )
+    std, freedom = noise.repeats(table, 2)
+    assert freedom == 32
+    assert std == pytest.approx(0.05, rel=0.3)
