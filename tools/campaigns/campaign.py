@@ -58,6 +58,8 @@ class Plan:
     drive : bool
         Rows as from a drive: slip follows from the slope and is uncertain, pull is only known as
         the mean over the wheels.
+    names : tuple of str
+        Hide these instead of some drawn by lot (``distance_left`` is then not measured).
     """
 
     hide: str = 'one'
@@ -70,6 +72,7 @@ class Plan:
     drop: str = ''
     noise_given: bool = True
     drive: bool = False
+    names: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -266,7 +269,7 @@ def _hide(
     if plan.hide == 'none':
         return (), (), (), ()
     if plan.hide == 'outside':
-        catalogue, names = OUTSIDE, [str(rng.choice(sorted(OUTSIDE)))]
+        catalogue, names = OUTSIDE, [*plan.names] or [str(rng.choice(sorted(OUTSIDE)))]
     else:
         catalogue = OTHER if plan.other_formula else LISTED
         possible = [
@@ -275,7 +278,8 @@ def _hide(
             if not kind.requires or np.any(np.isfinite(measured[kind.requires]))
         ]
         count = 2 if plan.hide == 'two' else 1
-        names = [str(name) for name in rng.choice(sorted(possible), count, replace=False)]
+        drawn = rng.choice(sorted(possible), count, replace=False)
+        names = [*plan.names] or [str(name) for name in drawn]
     sizes, effects, spices = [], [], []
     for name in names:
         low = 4.0 if plan.hide == 'two' else 2.5
@@ -306,7 +310,7 @@ def _sizes_seen(
         ), float('nan')
     distances = tuple(ruler.distance((effect,)) for effect in effects)
     left = float('nan')
-    if plan.hide == 'outside':
+    if plan.hide == 'outside' and not plan.names:
         left = ruler.distance(effects, tuple(listed_kinds(rows).values()))
     return distances, left
 

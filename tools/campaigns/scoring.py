@@ -37,6 +37,8 @@ FIELDS = (
     'both',
     'excess_refit',
     'excess_after',
+    'measured_refit',
+    'measured_after',
     'worse_z',
     'value',
     'std',
@@ -116,7 +118,8 @@ def _held_out(campaign: Campaign, diagnosis: Any) -> Record:
 
     The truth is known here, so no noise has to be subtracted: what is counted is what is left of
     the effect (and of structural error) after the soil refit and after the effect was added.
-    ``worse_z`` asks the same of the measured cells: standard errors by which adding the effect made
+    ``measured_*`` are the same figures as a user can have them: from the measured cells, with the
+    squares of noise and floor subtracted. ``worse_z`` asks the same of the measured cells: standard errors by which adding the effect made
     the held-out squared error smaller (negative: larger).
     """
     kept = diagnosis.table.lines - 2  # the header is line 1
@@ -126,6 +129,10 @@ def _held_out(campaign: Campaign, diagnosis: Any) -> Record:
     measured = np.stack([campaign.table.get(key, nothing) for key in OUTPUTS], 1)[kept]
     curves = diagnosis.curves
     inside = np.isfinite(std) & np.isfinite(measured)
+
+    def beyond(predicted: np.ndarray) -> float:
+        squares = (((predicted - measured) / np.maximum(curves.band, std))[inside]) ** 2
+        return float(np.sqrt(max(np.mean(squares) - 1.0, 0.0)))
 
     def excess(predicted: np.ndarray) -> float:
         return float(np.sqrt(np.mean((((predicted - truth) / std)[inside]) ** 2)))
@@ -138,5 +145,7 @@ def _held_out(campaign: Campaign, diagnosis: Any) -> Record:
     return {
         'excess_refit': excess(curves.held_out_refit),
         'excess_after': excess(curves.held_out_after),
+        'measured_refit': beyond(curves.held_out_refit),
+        'measured_after': beyond(curves.held_out_after),
         'worse_z': float(np.mean(gain) / spread) if spread > 0 else 0.0,
     }

@@ -1,0 +1,103 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""A user's own effect, registered from a file, takes part like the built-in ones."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import campaign_tools  # noqa: F401
+import numpy as np
+import pytest
+from campaigns import Plan, make_campaign
+
+from wheel_terra_estimator.cli.main import main
+from wheel_terra_estimator.configuration import reader
+from wheel_terra_estimator.terramechanics import effects
+
+EXAMPLE = Path(__file__).parents[2] / 'docs' / 'discrepancy' / 'examples' / 'side_drag.py'
+
+
+@pytest.fixture(autouse=True)
+def _clean_catalogue(monkeypatch):
+    monkeypatch.setattr(effects, '_registered', dict(effects._registered))
+
+
+@pytest.fixture(scope='module')
+def rubbing_table(tmp_path_factory):
+    """A table with side drag in it, made without the package."""
+    for seed in range(50):
+        campaign = make_campaign(seed, 'sweep40', Plan(hide='outside', names=('side_drag',)))
+        if 20 < campaign.distances[0] < 60:
+            folder = tmp_path_factory.mktemp('own')
+            campaign.write_csv(folder / 'rig.csv')
+            lines = ['/**:', '  ros__parameters:']
+            for key, value in campaign.settings().items():
+                lines.append(f'    {key}: {json.dumps(value)}')
+            (folder / 'rig.yaml').write_text('\n'.join(lines) + '\n')
+            return folder, campaign
+    raise AssertionError('no campaign of this size')
+
+
+def diagnose(folder, name, *more):
+    arguments = ['diagnose', str(folder / 'rig.csv'), '--config', str(folder / 'rig.yaml')]
+    assert main([*arguments, '-o', str(folder / name), '--no-pictures', *more]) == 0
+    return json.loads((folder / name / 'report.json').read_text())
+
+
+def test_it_is_named_with_its_size_and_the_model_file_works(rubbing_table, capsys):
+    folder, campaign = rubbing_table
+    report = diagnose(folder, 'with', '--effects', str(EXAMPLE))
+    assert report['verdict'] == 'named'
+    assert report['effects'][0]['name'] == 'side_drag'
+    gain = report['effects'][0]['parameters']['gain']
+    assert gain['value'] == pytest.approx(campaign.sizes[0], rel=0.35)
+    for quantity in ('drawbar_pull', 'torque'):
+        gap = report['gap'][quantity]
+        assert gap['after'] <= gap['refit'] * 1.05
+    # The corrected model is a configuration like any other, for whoever has the effect.
+    effects.load_file(EXAMPLE)
+    model = reader.load([folder / 'rig.yaml', folder / 'with' / 'model.yaml'], complete=False)
+    assert model.effects['side_drag']['gain'] == pytest.approx(gain['value'], rel=1e-6)
+
+
+def test_without_it_nobody_claims_to_know(rubbing_table):
+    folder, _ = rubbing_table
+    report = diagnose(folder, 'without')
+    assert 'side_drag' not in {effect['name'] for effect in report['effects']}
+    assert 'side_drag' not in {candidate['name'] for candidate in report['candidates']}
+    known = diagnose(folder, 'known', '--effects', str(EXAMPLE))
+    best = max(candidate['log_evidence'] for candidate in report['candidates'])
+    mine = max(candidate['log_evidence'] for candidate in known['candidates'])
+    assert mine > best + 5
+
+
+def test_the_term_is_the_formula_in_its_symbol():
+    """The example's own arithmetic, against a plain evaluation."""
+    from wheel_terra_estimator.terramechanics.model import WheelSoilModel
+    from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
+    from wheel_terra_estimator.terramechanics.wheel import Wheel
+
+    effects.load_file(EXAMPLE)
+    soil = reader.from_parameters({}, complete=False).soil
+    points = OperatingPoints(
+        slip=np.array([0.1, 0.5]), normal_load=80.0, wheel=Wheel(radius=0.157, width=0.165)
+    )
+    plain = WheelSoilModel(soil, {}).steady_state(points)
+    rubbing = WheelSoilModel(soil, {'side_drag': {'gain': 10.0}}).steady_state(points)
+    z = plain.sinkage
+    drag = 10 * soil.density * 9.80665 * np.tan(soil.friction_angle) * z**2 * np.sqrt(2 * 0.157 * z)
+    assert plain.drawbar_pull - rubbing.drawbar_pull == pytest.approx(drag, rel=1e-6)
+    assert rubbing.torque - plain.torque == pytest.approx(0.157 * drag, rel=1e-6)
+    assert rubbing.sinkage == pytest.approx(plain.sinkage, rel=1e-9)
+
+
+def test_a_broken_file_is_one_line(rubbing_table, tmp_path, capsys):
+    folder, _ = rubbing_table
+    broken = tmp_path / 'broken.py'
+    broken.write_text('import nothing_of_that_name\n')
+    command = ['diagnose', str(folder / 'rig.csv'), '--config', str(folder / 'rig.yaml')]
+    assert main([*command, '-o', str(folder / 'x'), '--effects', str(broken)]) == 2
+    message = capsys.readouterr().err
+    assert 'broken.py' in message and message.count('\n') == 1
