@@ -69,6 +69,8 @@ class Drive:
         Its sensors.
     configuration : Configuration
         What is true of rover and base soil in this drive.
+    speed_factor : float
+        Factor on the commands of the scenario, as drawn [-].
     step_length : float
         Duration of a step [s].
     last_truth : Truth
@@ -100,14 +102,14 @@ class Drive:
             for p in scenario.patches
         ]
         slope_shift = draw.slope * variation.standard_normal()
-        self._speed_factor = factor(draw.speed)
+        self.speed_factor = factor(draw.speed)
         changes = {'rover.mass': truth.rover.mass * factor(draw.mass)}
         radius_factor = factor(draw.radius)
         if radius_factor != 1.0:
             changes['wheels.radius'] = (truth.wheels.radius * radius_factor).tolist()
         self.configuration = truth.replace(changes)
         profile = scenario.profile
-        fastest = self._speed_factor * float(
+        fastest = self.speed_factor * float(
             np.max(
                 np.abs(profile.forward)
                 + np.abs(profile.turn_rate) * np.abs(truth.wheels.y).max(initial=0.0)
@@ -166,7 +168,7 @@ class Drive:
         rows: list[Truth] = []
         period = self.sensors.odometry_period
         due = period
-        factor = self._speed_factor
+        factor = self.speed_factor
         for _ in range(round(duration / self.step_length)):
             command = profile.at(self.plant.time)
             arrivals += self.step(Command(factor * command.forward, factor * command.turn_rate))

@@ -364,6 +364,11 @@ class RoverPlant:
                 break
         for _ in range(80):
             self._advance(Command(0.0), LONGEST_STEP)
+            if (
+                np.abs(self._speeds).max() < 1e-7
+                and np.abs(self._load - self._carried).max() < 0.01
+            ):
+                break
         self._time = 0.0
         self._position = np.zeros(3)
         self._straight = 0.0

@@ -1,0 +1,119 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""``wheel-terra simulate``: the bag that a user gets, and one line for what cannot be done."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from wheel_terra_estimator.bags.convert import INPUT_TYPES, stamp_of
+from wheel_terra_estimator.bags.reader import MeasurementReader
+from wheel_terra_estimator.bags.simulated_drive import TRUTH_TOPICS
+from wheel_terra_estimator.bags.storage import open_bag
+from wheel_terra_estimator.bags.truth import read_truth
+from wheel_terra_estimator.cli.main import main
+from wheel_terra_estimator.estimation.measurements import WheelOdometry
+from wheel_terra_estimator.simulation.drive import simulate
+from wheel_terra_estimator.simulation.scenario import load
+
+
+@pytest.fixture(scope='module')
+def bag_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp('bags') / 'drive'
+    status = main(
+        ['simulate', '--scenario', 'turns', '--seed', '3', '--duration', '6', '-o', str(path)]
+    )
+    assert status == 0
+    return path
+
+
+def test_the_bag_has_inputs_and_truth_of_the_contract(bag_path: Path) -> None:
+    with open_bag(bag_path) as bag:
+        found = {name: topic.type for name, topic in bag.topics.items()}
+    wanted = {f'/{name}': kind for name, kind in INPUT_TYPES.items() if name != 'leaving_angle'}
+    assert found == {**wanted, **TRUTH_TOPICS}
+
+
+def test_reading_it_back_gives_the_measurements(bag_path: Path) -> None:
+    drive = simulate(load('turns'), 3, 6.0)
+    with open_bag(bag_path) as bag:
+        read = [m for _, m in MeasurementReader(bag, {}, drive.configuration).measurements()]
+    made = [a.measurement for a in drive.arrivals]
+    assert len(read) == len(made)
+    for a, b in zip(read, made, strict=True):
+        assert type(a) is type(b)
+        assert a.stamp == b.stamp
+        if isinstance(a, WheelOdometry):
+            np.testing.assert_array_equal(a.rate, b.rate)
+            np.testing.assert_array_equal(a.torque, b.torque)
+
+
+def test_truth_in_the_bag_is_that_of_the_drive(bag_path: Path) -> None:
+    drive = simulate(load('turns'), 3, 6.0)
+    with open_bag(bag_path) as bag:
+        truth = read_truth(bag, {}, drive.configuration)
+        classes = [m for m in bag.messages(('/ground_truth/slip_class',))]
+    assert truth is not None
+    np.testing.assert_array_equal(truth.slip.stamp, drive.truth.stamp)
+    known = ~np.isnan(drive.truth.slip)
+    np.testing.assert_array_equal(truth.slip.value[known], drive.truth.slip[known])
+    np.testing.assert_array_equal(truth.sinkage.value, drive.truth.sinkage)
+    np.testing.assert_array_equal(truth.drawbar_pull.value, drive.truth.drawbar_pull)
+    assert np.isfinite(truth.slip.value).all()
+    assert len(classes) == len(drive.truth.stamp)
+
+
+def test_log_times_are_arrivals(bag_path: Path) -> None:
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.ROS2_JAZZY)
+    with open_bag(bag_path) as bag:
+        late = [
+            m.log_time - stamp_of(store.deserialize_cdr(m.data, 'nav_msgs/msg/Odometry'))
+            for m in bag.messages(('/reference_odom',))
+        ]
+    assert late
+    assert min(late) >= 0.4e9
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'words'),
+    [
+        ([], '-o DIR is missing'),
+        (['-o', 'x', '--scenario', 'clim_soft_patch'], 'climb_soft_patch'),
+        (['-o', 'x', '--seed', '-1'], '--seed'),
+        (['-o', 'x', '--duration', '0'], '--duration'),
+        (['-o', 'x', '-p', 'rover.mas:=3.0'], 'rover.mass'),
+    ],
+)
+def test_bad_arguments(
+    arguments: list[str],
+    words: str,
+    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(['simulate', *arguments]) == 2
+    error = capsys.readouterr().err
+    assert words in error
+    assert error.count('\n') == 1
+    assert not list(tmp_path.iterdir())
+
+
+def test_an_earlier_bag_is_kept_unless_overwrite(
+    bag_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = ['simulate', '--duration', '1', '-o', str(bag_path)]
+    before = sorted((p.name, p.stat().st_mtime_ns) for p in bag_path.iterdir())
+    assert main(arguments) == 2
+    assert '--overwrite' in capsys.readouterr().err
+    assert sorted((p.name, p.stat().st_mtime_ns) for p in bag_path.iterdir()) == before
+
+
+def test_list_names_the_shipped_scenarios(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(['simulate', '--list']) == 0
+    assert 'climb_soft_patch' in capsys.readouterr().out

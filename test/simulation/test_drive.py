@@ -1,0 +1,230 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Whole drives: seeds, sensors against truth, and what the scenarios promise."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from wheel_terra_estimator.estimation.measurements import (
+    InertialReading,
+    LeavingAngleReading,
+    ReferenceVelocity,
+    SinkageReading,
+    WheelOdometry,
+)
+from wheel_terra_estimator.simulation.commands import Command
+from wheel_terra_estimator.simulation.drive import Drive, SimulatedDrive, simulate
+from wheel_terra_estimator.simulation.scenario import load, shipped_scenarios
+from wheel_terra_estimator.simulation.sensors import START
+from wheel_terra_estimator.simulation.truth import entrapped, slip_classes
+
+LEVEL: dict[str, Any] = {'configuration': ['generic_six_wheel', 'test_sand'], 'duration': 20.0}
+EXACT = {
+    **LEVEL,
+    'sensors.noise': 0.0,
+    'sensors.encoder_counts': 0,
+    'sensors.sinkage_outliers': 0.0,
+    'sensors.sinkage_dropouts': 0.0,
+    'sensors.reference_dropouts': 0.0,
+    'sensors.jitter': 0.0,
+    'sensors.leaving_angle': True,
+}
+
+
+def kind(drive: SimulatedDrive, type_: type) -> list[Any]:
+    return [a.measurement for a in drive.arrivals if isinstance(a.measurement, type_)]
+
+
+@pytest.fixture(scope='module')
+def exact() -> SimulatedDrive:
+    return simulate(load(EXACT | {'slope.angle_deg': [6.0]}))
+
+
+def test_exact_sensors_show_the_truth(exact: SimulatedDrive) -> None:
+    truth = exact.truth
+    row = {int(stamp): i for i, stamp in enumerate(truth.stamp)}
+    odometry = kind(exact, WheelOdometry)
+    assert len(odometry) == len(truth.stamp) - 1  # the first one needs an earlier count
+    for message in odometry[10:]:
+        i = row[message.stamp]
+        mean = 0.5 * (truth.wheel_rate[i] + truth.wheel_rate[i - 1])
+        np.testing.assert_allclose(message.rate, mean, atol=3e-3)
+        np.testing.assert_allclose(message.torque, truth.torque[i], rtol=1e-6)
+    for message in kind(exact, SinkageReading)[10:]:
+        sinkage = np.stack([np.interp(message.stamp, truth.stamp, z) for z in truth.sinkage.T])
+        np.testing.assert_allclose(message.sinkage, sinkage, atol=2e-4)
+    for message in kind(exact, ReferenceVelocity)[2:]:
+        speed = np.interp(message.stamp, truth.stamp, truth.forward_velocity)
+        assert message.forward == pytest.approx(speed, abs=5e-4)
+        assert message.variance == pytest.approx(0.003**2)
+    inertial = kind(exact, InertialReading)
+    assert len(inertial) == pytest.approx(50 * 20, abs=1)
+    # Pitch is nose-up negative in the quaternion (REP 103); at rest x shows g sin(pitch).
+    assert inertial[-1].orientation[1] == pytest.approx(-np.sin(np.radians(6.0) / 2), abs=0.005)
+    assert inertial[-1].specific_force[0] == pytest.approx(9.80665 * np.sin(np.radians(6)), abs=0.1)
+    assert all((m.leaving_angle <= 0.0).all() for m in kind(exact, LeavingAngleReading))
+
+
+def test_reference_comes_late_by_its_delay() -> None:
+    for delay in (0.0, 0.4, 2.0):
+        drive = simulate(load(EXACT | {'sensors.reference_delay': delay, 'duration': 4.0}))
+        late = [
+            a.arrival - a.measurement.stamp
+            for a in drive.arrivals
+            if isinstance(a.measurement, ReferenceVelocity)
+        ]
+        np.testing.assert_allclose(late, delay * 1e9)
+        arrivals = [a.arrival for a in drive.arrivals]
+        assert arrivals == sorted(arrivals)
+
+
+def test_a_seed_is_a_drive() -> None:
+    scenario = load('firm_drive')
+    first, again, other = (simulate(scenario, seed, 3.0) for seed in (1, 1, 2))
+    np.testing.assert_array_equal(first.truth.sinkage, again.truth.sinkage)
+    assert [a.arrival for a in first.arrivals] == [a.arrival for a in again.arrivals]
+    assert not np.allclose(first.truth.sinkage, other.truth.sinkage)
+
+
+def test_sensors_do_not_change_the_drive() -> None:
+    whole = simulate(load('firm_drive'), 3, 3.0)
+    blind = simulate(load('firm_drive', sensors__sinkage=False, sensors__torque=False), 3, 3.0)
+    np.testing.assert_array_equal(whole.truth.sinkage, blind.truth.sinkage)
+    assert not kind(blind, SinkageReading)
+    assert all(np.isnan(m.torque).all() for m in kind(blind, WheelOdometry))
+
+
+def test_noise_has_the_stated_size() -> None:
+    drive = simulate(
+        load(LEVEL | {'sensors.sinkage_outliers': 0.0, 'duration': 25.0, 'drive.forward': [0.0]}),
+        4,
+    )
+    figures = drive.configuration.sensors
+    sinkage = np.array([m.sinkage for m in kind(drive, SinkageReading)])
+    assert np.nanstd(sinkage, axis=0).mean() == pytest.approx(figures.sinkage_std, rel=0.15)
+    assert 0.005 < np.isnan(sinkage).mean() < 0.04
+    torque = np.array([m.torque for m in kind(drive, WheelOdometry)])
+    assert torque.std(axis=0).mean() == pytest.approx(figures.torque_std, rel=0.15)
+    force = np.array([m.specific_force for m in kind(drive, InertialReading)])
+    assert force.std(axis=0).mean() == pytest.approx(figures.specific_force_std, rel=0.15)
+
+
+def test_encoder_steps_show_in_the_rate() -> None:
+    drive = simulate(load(EXACT | {'sensors.encoder_counts': 1000, 'duration': 5.0}))
+    step = 2.0 * np.pi / 1000 / 0.1
+    rates = np.array([m.rate for m in kind(drive, WheelOdometry)])
+    np.testing.assert_allclose(rates / step, np.round(rates / step), atol=1e-6)
+
+
+def test_sensor_faults_come_and_go() -> None:
+    drive = simulate(
+        load(
+            EXACT
+            | {
+                'duration': 12.0,
+                'faults.kind': ['no_sinkage', 'no_wheel_odometry', 'zero_stamps'],
+                'faults.wheel': ['front_left', '', ''],
+                'faults.start': [2.0, 4.0, 8.0],
+                'faults.end': [3.0, 6.0, 9.0],
+            }
+        )
+    )
+    missing = [
+        (m.stamp - START) * 1e-9 for m in kind(drive, SinkageReading) if np.isnan(m.sinkage[0])
+    ]
+    assert 1.99 <= min(missing) <= max(missing) < 3.0
+    stamps = np.array([m.stamp for m in kind(drive, WheelOdometry)])
+    times = (stamps[stamps > 0] - START) * 1e-9
+    assert not ((times >= 4.0) & (times < 5.99)).any()
+    assert 5 < (stamps == 0).sum() < 15
+
+
+def test_wheel_faults_concern_their_wheel() -> None:
+    drive = simulate(
+        load(
+            EXACT
+            | {
+                'duration': 30.0,
+                'faults.kind': ['overspeed', 'locked', 'lifted'],
+                'faults.wheel': ['middle_left', 'rear_right', 'front_right'],
+                'faults.start': [10.0, 10.0, 20.0],
+                'faults.end': [18.0, 18.0, 30.0],
+            }
+        )
+    )
+    truth = drive.truth
+    row = np.searchsorted(truth.stamp, START + 17 * 10**9)
+    assert truth.slip[row, 2] > 0.6
+    assert truth.slip[row, 5] == -1.0
+    assert np.abs(truth.slip[row, [0, 1, 3, 4]]).max() < truth.slip[row, 2]
+    assert truth.normal_load[-1, 1] < 0.1 * truth.normal_load[-1].mean()
+
+
+def test_closed_loop_steps_and_profile_agree() -> None:
+    scenario = load('firm_drive')
+    whole = simulate(scenario, 5, 3.0)
+    drive = Drive(scenario, 5)
+    arrivals = []
+    while drive.plant.time < 3.0 - 1e-9:
+        command = scenario.profile.at(drive.plant.time)
+        factor = drive.speed_factor
+        arrivals += drive.step(Command(factor * command.forward, factor * command.turn_rate))
+    assert drive.last_truth.forward_velocity == whole.truth.forward_velocity[-1]
+    assert len(arrivals) == len(whole.arrivals)
+
+
+def test_classes_have_their_upper_bound_included() -> None:
+    slip = np.array([0.0, 0.3, 0.30001, -0.6, 0.9, 0.91, -1.0, np.nan])
+    classes = slip_classes(slip, np.array([0.3, 0.6, 0.9]))
+    assert classes.tolist() == [0, 0, 1, 1, 2, 3, 3, 255]
+
+
+def test_entrapment_needs_a_second_and_clears_after_three() -> None:
+    stamp = (np.arange(120) * 10**8).astype(np.int64)
+    slip = np.full((120, 4), 0.2)
+    slip[20:28] = 0.95  # 0.8 s: too short
+    slip[40:60] = 0.95
+    slip[60:, :] = 0.5
+    stuck = entrapped(stamp, slip)
+    assert not stuck[:50].any()
+    assert stuck[50:90].all()
+    assert not stuck[91:].any()
+    assert not entrapped(stamp, -np.abs(slip)).any()  # skidding is no entrapment
+
+
+def test_the_soft_patch_entraps() -> None:
+    truth = simulate(load('climb_soft_patch'), 5, 105.0).truth
+    median = np.nanmedian(truth.slip[10:], axis=1)
+    assert truth.stuck[-1]
+    assert truth.sinkage[-1].max() > 2.0 * truth.sinkage[100].max()
+    high = np.flatnonzero(median > 0.6)[0]
+    assert truth.stamp[truth.stuck][0] - truth.stamp[10 + high] > 3e9
+
+
+def test_the_descent_skids() -> None:
+    truth = simulate(load('downhill_skid'), 0, 50.0).truth
+    assert np.nanmedian(truth.slip[-1]) < -0.03
+    assert not truth.stuck.any()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize('name', sorted(shipped_scenarios()))
+def test_scenarios_do_what_they_say(name: str) -> None:
+    entraps = {'climb_soft_patch', 'slow_entrapment', 'stalling_drives'}
+    found = []
+    for seed in range(6):
+        truth = simulate(load(name), seed).truth
+        moving = ~np.isnan(truth.slip).all(axis=1)
+        found.append((truth.stuck.any(), np.nanmedian(truth.slip[moving], axis=1).max()))
+        if name == 'near_stuck_recovery':
+            assert np.nanmedian(truth.slip[-1]) < 0.6
+    stuck = [s for s, _ in found]
+    assert sum(stuck) >= 3 if name in entraps else not any(stuck)
+    if name == 'near_stuck_recovery':
+        assert all(0.55 < greatest < 0.88 for _, greatest in found)
+    if name == 'firm_drive':
+        assert all(greatest < 0.6 for _, greatest in found)

@@ -1,0 +1,107 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Scenario files: all shipped ones load, bad ones are refused in one line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from wheel_terra_estimator.configuration import shipped
+from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.simulation import scenario as scenarios
+
+NAMES = sorted(scenarios.shipped_scenarios())
+
+
+def test_the_kinds_of_drives_are_there() -> None:
+    assert {
+        'firm_drive',
+        'climb_soft_patch',
+        'stop_and_go',
+        'turns',
+        'downhill_skid',
+        'near_stuck_recovery',
+        'low_gravity',
+        'free_spinning_wheel',
+        'stalled_wheel',
+        'changing_soil',
+        'sensor_faults',
+        'reverse',
+    } <= set(NAMES)
+
+
+@pytest.mark.parametrize('name', NAMES)
+def test_shipped_scenarios_load(name: str) -> None:
+    scenario = scenarios.load(name)
+    assert scenario.description
+    assert scenario.duration > 60.0
+    assert scenario.variation.stiffness == pytest.approx(0.2)
+    # The estimator is not told the truth.
+    assert scenario.truth.effects != scenario.configuration.effects
+
+
+@pytest.mark.parametrize(
+    ('changes', 'words'),
+    [
+        ({'drive.foward': [0.1]}, ['unknown key', 'drive.foward', 'drive.forward']),
+        ({'duration': -1.0}, ['duration', 'above 0']),
+        ({'duration': 'long'}, ['duration', 'not a number']),
+        ({'drive.time': [0.0, 5.0, 3.0]}, ['drive.time', 'decrease']),
+        ({'drive.time': [0.0, 1.0], 'drive.forward': [0.1, 0.1, 0.2]}, ['drive.forward', '3']),
+        ({'slope.position': [1.0, 0.0], 'slope.angle_deg': [0.0]}, ['slope.position']),
+        ({'slope.angle_deg': [80.0]}, ['slope.angle_deg', '60']),
+        ({'patches.start': [1.0]}, ['patches.end', 'missing']),
+        ({'patches.start': [1.0, 2.0], 'patches.end': [1.0, 2.0, 3.0]}, ['patches.end']),
+        ({'faults.kind': ['exploded']}, ['faults.kind', 'exploded']),
+        ({'faults.kind': ['locked']}, ['faults.start', 'missing']),
+        (
+            {
+                'faults.kind': ['locked'],
+                'faults.wheel': ['fifth'],
+                'faults.start': [0.0],
+                'faults.end': [1.0],
+            },
+            ['fifth', 'front_left'],
+        ),
+        ({'configuration': ['no_such_rover']}, ['no_such_rover']),
+        ({'truth': ['soil.cohesoin:=1.0']}, ['soil.cohesoin', 'soil.cohesion']),
+    ],
+)
+def test_bad_scenarios_are_refused(changes: dict, words: list[str]) -> None:
+    with pytest.raises(UserError) as caught:
+        scenarios.load(changes)
+    message = str(caught.value)
+    assert '\n' not in message
+    for word in words:
+        assert word in message
+
+
+def test_a_file_that_is_not_a_scenario_is_named(tmp_path: Path) -> None:
+    path = tmp_path / 'mine.yaml'
+    path.write_text('/**:\n  ros__parameters:\n    duraton: 3.0\n')
+    with pytest.raises(UserError, match=r'mine\.yaml.*duraton.*duration'):
+        scenarios.load(path)
+    with pytest.raises(UserError, match='no such file'):
+        scenarios.load(tmp_path / 'missing.yaml')
+
+
+def test_changes_and_parameters_win_over_the_file() -> None:
+    scenario = scenarios.load(
+        'firm_drive', parameters=['rover.mass:=99.0'], sensors__reference=False, duration=5.0
+    )
+    assert scenario.configuration.rover.mass == scenario.truth.rover.mass == 99.0
+    assert scenario.duration == 5.0
+    assert not scenario.sensors.reference
+
+
+def test_degrees_become_radians() -> None:
+    scenario = scenarios.load({'slope.angle_deg': [10.0]})
+    np.testing.assert_allclose(scenario.slope.angle, np.radians([10.0]))
+
+
+def test_every_scenario_file_is_listed() -> None:
+    found = [key for key in shipped.files() if key.startswith('scenarios/')]
+    assert len(found) == len(NAMES)

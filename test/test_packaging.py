@@ -1,0 +1,148 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""The package as ROS and pip see it."""
+
+from __future__ import annotations
+
+import importlib
+import re
+import subprocess
+import sys
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+
+import pytest
+
+import wheel_terra_estimator
+from wheel_terra_estimator.configuration import reader, shipped
+
+ROOT = Path(__file__).resolve().parents[1]
+NAME = 'wheel_terra_estimator'
+SOURCES = sorted(
+    path for top in (NAME, 'test', 'tools', 'launch') for path in (ROOT / top).rglob('*.py')
+)
+
+
+@pytest.fixture(scope='module')
+def manifest() -> ElementTree.Element:
+    return ElementTree.parse(ROOT / 'package.xml').getroot()
+
+
+def setup_text() -> str:
+    return (ROOT / 'setup.py').read_text()
+
+
+def entry_points() -> dict[str, tuple[str, str]]:
+    found = re.findall(r"'([\w-]+) = ([\w.]+):(\w+)'", setup_text())
+    return {name: (module, function) for name, module, function in found}
+
+
+def test_manifest_is_format_3_of_an_ament_python_package(manifest: ElementTree.Element) -> None:
+    assert manifest.tag == 'package'
+    assert manifest.get('format') == '3'
+    assert manifest.findtext('name') == NAME
+    assert manifest.findtext('export/build_type') == 'ament_python'
+    assert manifest.findtext('license') == 'Apache-2.0'
+    for tag in ('description', 'maintainer', 'author'):
+        assert (manifest.findtext(tag) or '').strip(), tag
+    order = [child.tag for child in manifest]
+    assert order.index('version') < order.index('description') < order.index('maintainer')
+
+
+def test_rosdep_keys_only(manifest: ElementTree.Element) -> None:
+    keys = [e.text or '' for e in manifest if e.tag.endswith('depend')]
+    assert len(keys) == len(set(keys))
+    assert all(re.fullmatch(r'[a-z][a-z0-9_-]*', key) for key in keys)
+    wanted = {'numpy', 'scipy', 'yaml', 'matplotlib', 'jinja2', 'tqdm', 'filterpy', 'rosbags'}
+    for word in wanted:
+        assert any(re.fullmatch(rf'python3-{word}(-pip)?', key) for key in keys), word
+    assert {'rclpy', 'sensor_msgs', 'nav_msgs', 'diagnostic_msgs', 'std_srvs'} <= set(keys)
+
+
+def test_one_version_everywhere(manifest: ElementTree.Element) -> None:
+    versions = {
+        manifest.findtext('version'),
+        re.search(r"version='([\d.]+)'", setup_text())[1],
+        wheel_terra_estimator.__version__,
+    }
+    assert versions == {'0.1.0'}
+
+
+def test_every_source_file_has_its_licence() -> None:
+    assert len(SOURCES) > 100
+    for path in SOURCES:
+        head = path.read_text(encoding='utf-8').splitlines()[:3]
+        text = '\n'.join(head)
+        assert 'Copyright 2026 wheel_terra_estimator developers' in text, path
+        assert 'SPDX-License-Identifier: Apache-2.0' in text, path
+
+
+def test_ros_finds_the_package() -> None:
+    assert (ROOT / 'resource' / NAME).is_file()
+    assert '/lib/wheel_terra_estimator' in (ROOT / 'setup.cfg').read_text()
+    assert {'wheel-terra', 'estimator_node', 'traction_limiter_node'} == set(entry_points())
+
+
+@pytest.mark.parametrize('name', sorted(entry_points()))
+def test_entry_points_exist(name: str) -> None:
+    module, function = entry_points()[name]
+    if '.ros.' in module:
+        pytest.importorskip('rclpy')
+    assert callable(getattr(importlib.import_module(module), function))
+
+
+def test_commands_show_their_help() -> None:
+    from wheel_terra_estimator.cli.main import COMMANDS
+
+    for command in COMMANDS:
+        result = subprocess.run(
+            [sys.executable, '-m', f'{NAME}.cli.main', command, '--help'],
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert result.returncode == 0, result.stderr
+        assert 'usage' in result.stdout
+
+
+@pytest.mark.parametrize('name', sorted(shipped.files()))
+def test_shipped_files_load(name: str) -> None:
+    folder = name.split('/')[0]
+    if folder in ('rovers', 'soils', 'demo'):
+        configuration = reader.load([name], complete=folder == 'rovers')
+        assert configuration.stated
+    elif folder == 'scenarios':
+        from wheel_terra_estimator.simulation.scenario import load
+
+        assert load(name.split('/')[1]).description
+
+
+def test_every_shipped_folder_is_installed() -> None:
+    # Not run as a whole: only the list of shared files is wanted.
+    namespace: dict = {'__file__': str(ROOT / 'setup.py')}
+    exec(compile(setup_text().split('\nsetup(')[0], 'setup.py', 'exec'), namespace)
+    installed = {file for _, files in namespace['shared_files']() for file in files}
+    on_disk = {
+        p.relative_to(ROOT).as_posix()
+        for top in ('config', 'launch')
+        for p in (ROOT / top).rglob('*')
+        if p.is_file() and p.suffix != '.pyc'
+    }
+    assert on_disk <= installed
+    assert 'package.xml' in installed
+
+
+def test_no_path_of_a_machine_is_committed() -> None:
+    # Words are put together so that this file does not find itself.
+    words = ['/work' + '/', '/home' + '/', '/root' + '/']
+    files = [
+        *SOURCES,
+        *(p for p in (ROOT / 'docs').rglob('*.md')),
+        *(p for p in (ROOT / 'config').rglob('*.yaml')),
+        ROOT / 'Makefile',
+        ROOT / 'setup.py',
+    ]
+    for path in files:
+        text = path.read_text(encoding='utf-8')
+        for word in words:
+            assert word not in text, f'{path}: {word}'
