@@ -134,7 +134,8 @@ class Misfit:
 
 
 HEADER = (
-    '| | pull rms [N] | of its range | worst, of its range | sinkage rms [mm] | torque rms [N m] |\n'
+    '| | pull rms [N] | of its range | worst, of its range | sinkage rms [mm] '
+    '| torque rms [N m] |\n'
     '|---|---|---|---|---|---|'
 )
 

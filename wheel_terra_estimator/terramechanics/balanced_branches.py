@@ -77,15 +77,19 @@ def balanced_forces(
         sin_middle, cos_middle = math.sin(middle + shift), math.cos(middle + shift)
         if shift:
             sine, cosine = sine * cos_d + cosine * sin_d, cosine * cos_d - sine * sin_d
-        cut = spread * span * span
-        weight = area * span * (1.0 - cut)
-        normal, friction, sticking = r * weight, grip * weight * share, drag * span * share
+        # A branch is an arc: its resultant is a little smaller than the sum of its stresses.
+        cut, arc = spread * span * span, 1.0 - span * span / 24.0
+        whole = area * span
+        weight = whole * (1.0 - cut)
+        normal, friction = r * weight, grip * weight * share
+        whole_sticking = drag * span * share
+        sticking = whole_sticking * arc
         lift += normal * cosine + friction * sine
         push += friction * cosine - normal * sine
-        torque_unit += friction
+        torque_unit += grip * whole * share
         fixed_lift += sticking * sin_middle
         fixed_push += sticking * cos_middle
-        fixed_torque += sticking
+        fixed_torque += whole_sticking
         branches.append(
             (span, weight, cut, normal, friction, sticking, share, slope, x, pace, climb, sine,
              cosine, sin_middle, cos_middle)
@@ -113,12 +117,16 @@ def balanced_forces(
             cosine, sin_middle, cos_middle,
         ) in branches:  # fmt: skip
             d_share = slope * (entering - pace * d_angle - climb * d_ratio) / modulus
-            d_weight = (d_area * span + area * d_span) * (1.0 - cut) - area * span * span * (
+            d_whole = d_area * span + area * d_span
+            d_weight = d_whole * (1.0 - cut) - area * span * span * (
                 d_spread * span + 2.0 * spread * d_span
             )
             d_normal = sigma * r * d_weight
             d_friction = sigma * grip * (d_weight * share + weight * d_share)
-            d_sticking = drag * (d_span * share + span * d_share)
+            square = span * span
+            d_sticking = drag * (
+                d_span * (1.0 - 0.125 * square) * share + span * (1.0 - square / 24.0) * d_share
+            )
             normal_now, friction_now = sigma * normal, sigma * friction
             d_lift += (
                 d_normal * cosine
@@ -134,7 +142,8 @@ def balanced_forces(
                 - (friction_now * sine + normal_now * cosine) * d_angle
                 - sticking * sin_middle * d_middle
             )
-            d_torque += d_friction + d_sticking
+            d_torque += sigma * grip * (d_whole * share + area * span * d_share)
+            d_torque += drag * (d_span * share + span * d_share)
             # The rear branch comes second.
             d_span, d_middle = d_tm - d_t2, 0.5 * (d_tm + d_t2)
             d_angle = d_t2 + d_span * centroid + rear * d_centroid
@@ -151,19 +160,20 @@ def balanced_forces(
         span, weight, _, normal, friction, sticking, share, slope, x, _, _, sine, cosine,
         sin_middle, cos_middle,
     ) in branches:  # fmt: skip
+        arc = 1.0 - span * span / 24.0
         unit = R * span * share
-        c_lift += unit * sin_middle
-        c_push += unit * cos_middle
+        c_lift += unit * arc * sin_middle
+        c_push += unit * arc * cos_middle
         c_torque += unit
         unit = R * weight * share * sigma
         m_lift += unit * sine
         m_push += unit * cosine
-        m_torque += unit
+        m_torque += R * area * span * share * sigma
         fading = -slope * x / modulus
         rubbing, clinging = sigma * grip * weight * fading, drag * span * fading
-        k_lift += rubbing * sine + clinging * sin_middle
-        k_push += rubbing * cosine + clinging * cos_middle
-        k_torque += rubbing + clinging
+        k_lift += rubbing * sine + clinging * arc * sin_middle
+        k_push += rubbing * cosine + clinging * arc * cos_middle
+        k_torque += sigma * grip * area * span * fading + clinging
         friction, normal = sigma * friction, sigma * normal
         s_lift += friction * cosine - normal * sine + sticking * cos_middle
         s_push -= friction * sine + normal * cosine + sticking * sin_middle

@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""A self-propelled wheel on a slope: slip from the balance, coefficients (Nakashima et al. 2010)."""
+"""A self-propelled wheel on a slope: slip from the balance, coefficients (Nakashima 2010)."""
 
 from __future__ import annotations
 

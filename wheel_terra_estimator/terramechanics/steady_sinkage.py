@@ -115,19 +115,7 @@ class SteadySinkage:
             max(soil.cohesion if cohesion is None else cohesion, 0.0),
             max(soil.shear_modulus if shear_modulus is None else shear_modulus, 1e-6),
         )
-        contact = self._wheels[index][0]
-        contact.rim_speed, contact.pass_number = rim_speed, pass_number
-        contact.slope, contact.direction = 0.0, 1.0
-        self._inputs(index, given)
-        angle = self._explicit_angle(contact)
-        for _ in range(_STEPS):
-            force, moved = self._carried(contact, angle), self._carried(contact, angle * 1.001)
-            if force <= 0.0 or moved <= force:
-                angle = min(1.5 * angle, _LARGEST)
-                continue
-            power = 0.001 / math.log(moved / force)
-            ratio = (contact.normal_load / force) ** min(power, 1.0)
-            angle = min(max(angle * ratio, _SMALLEST), _LARGEST)
+        contact, angle = self._balanced(index, given, rim_speed, pass_number)
         balance = self._balance(contact, angle)
         depth, lift = self._depth(contact, angle)
         if angle >= _LARGEST or abs(balance) > 0.05 * contact.normal_load:
@@ -145,6 +133,54 @@ class SteadySinkage:
             lifted = (self._depth(contact, angle)[1] - lift) / change
             derivatives.append(-rise / slope * deepening + lifted)
         return depth, tuple(derivatives), True
+
+    def state(
+        self,
+        index: int,
+        speed_ratio: float,
+        normal_load: float,
+        *,
+        rim_speed: float = math.nan,
+        pass_number: float = 1.0,
+    ) -> tuple[float, float, float]:
+        """Steady sinkage [m], drawbar pull [N] and torque [N m] in the configured soil."""
+        soil = self._soil
+        given = (
+            max(speed_ratio, 0.0),
+            max(normal_load, 1e-3),
+            0.0,
+            0.0,
+            math.tan(soil.friction_angle),
+            soil.cohesion,
+            soil.shear_modulus,
+        )
+        contact, angle = self._balanced(index, given, rim_speed, pass_number)
+        set_angles(contact, angle, None, self._terms, ScalarMaths)
+        _, contact.drawbar_pull, contact.torque = closed_form.forces(
+            contact, self._terms, ScalarMaths
+        )
+        contact.sinkage = contact.radius * (1.0 - math.cos(angle))
+        self._terms.apply('on_outputs', contact, ScalarMaths)
+        return contact.sinkage, contact.drawbar_pull, contact.torque
+
+    def _balanced(
+        self, index: int, given: tuple[float, ...], rim_speed: float, pass_number: float
+    ) -> tuple[Contact, float]:
+        """Set the contact of a wheel and find its entrance angle."""
+        contact = self._wheels[index][0]
+        contact.rim_speed, contact.pass_number = rim_speed, pass_number
+        contact.slope, contact.direction = 0.0, 1.0
+        self._inputs(index, given)
+        angle = self._explicit_angle(contact)
+        for _ in range(_STEPS):
+            force, moved = self._carried(contact, angle), self._carried(contact, angle * 1.001)
+            if force <= 0.0 or moved <= force:
+                angle = min(1.5 * angle, _LARGEST)
+                continue
+            power = 0.001 / math.log(moved / force)
+            ratio = (contact.normal_load / force) ** min(power, 1.0)
+            angle = min(max(angle * ratio, _SMALLEST), _LARGEST)
+        return contact, angle
 
     def _inputs(self, index: int, given: tuple[float, ...]) -> None:
         """Set the contact of a wheel to the inputs, stage ``on_inputs`` done."""
