@@ -43,7 +43,7 @@ class StuckTuning:
     travel: float = 0.3  # [m]
     clear_slip: float = 0.6
     clear_time: float = 3.0
-    dig_hold: float = 1.0
+    dig_hold: float = 1.5
     look_ahead: float = 10.0
     look_ahead_slip: float = 0.5
     look_ahead_hold: float = 1.0

@@ -1,0 +1,191 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""The nine snow immobilisations of FrostyBoy and the firm-ground drive of Pathfinder."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wheel_terra_estimator.configuration import reader
+from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.estimation.measurements import (
+    InertialReading,
+    Measurement,
+    ReferenceVelocity,
+    WheelOdometry,
+)
+from wheel_terra_estimator.evaluation.runner import Record, record, run_estimator
+
+FloatArray = NDArray[np.float64]
+_WHEELS = ('fl', 'fr', 'rl', 'rr')
+_START = 1_000_000_000
+LONGEST_LEAD = 20.0
+"""A warning counts for an event if it is in force at the end of the event [s] and not older."""
+
+
+@dataclass(frozen=True)
+class SnowEvent:
+    """One recorded immobilisation, rows at 10 Hz; indices count from 0."""
+
+    name: str
+    stamp: NDArray[np.int64]
+    measurements: list[Measurement]
+    speed: FloatArray  # truth [m/s]
+    rim: FloatArray  # (k, 4) [m/s]
+    slip: FloatArray  # (k, 4) truth
+    start: int
+    stop: int
+    author: int  # last index at which the author's detector warned
+
+
+@dataclass(frozen=True)
+class EventScore:
+    """When the estimator warned of an event."""
+
+    name: str
+    warned: float | None  # [s] from the start of the recording, of the warning in force
+    author: float
+    start: float
+    stop: float
+    all_warnings: tuple[float, ...]
+    late_classes: int  # wheels whose slip above 0.9 was not in class 3 within the time allowed
+    high_slip_runs: int
+
+    @property
+    def lead(self) -> float | None:
+        """Time by which the warning is before the author's [s]."""
+        return None if self.warned is None else self.author - self.warned
+
+
+def snow_events(folder: Path) -> Iterator[SnowEvent]:
+    """Read the events of a folder with ``events.csv`` and one file per event."""
+    index = folder / 'events.csv'
+    if not index.is_file():
+        raise UserError(f'{index}: not found; --measured names the folder of the measured data')
+    with index.open(encoding='utf-8', newline='') as stream:
+        for row in csv.DictReader(stream):
+            yield _snow_event(folder / f'{row["event"]}.csv', row)
+
+
+def _snow_event(path: Path, row: dict[str, str]) -> SnowEvent:
+    data = np.genfromtxt(path, delimiter=',', names=True)
+    stamp = _START + np.round(data['t'] * 1e9).astype(np.int64)
+    rate = np.stack([data[f'w{w}'] for w in _WHEELS], axis=1)
+    torque = np.stack([data[f'T_{w}'] for w in _WHEELS], axis=1)
+    force = np.stack([data[f'a_{a}'] for a in 'XYZ'], axis=1)
+    yaw_rate = -data['angAccel_Z']  # recorded clockwise positive
+    roll, pitch = 0.5 * np.radians(data['roll']), 0.5 * np.radians(data['pitch'])
+    orientation = np.stack(
+        [
+            np.sin(roll) * np.cos(pitch),
+            np.cos(roll) * np.sin(pitch),
+            -np.sin(roll) * np.sin(pitch),
+            np.cos(roll) * np.cos(pitch),
+        ],
+        axis=1,
+    )
+    measurements: list[Measurement] = []
+    for i, when in enumerate(stamp.tolist()):
+        measurements += [
+            WheelOdometry(when, rate[i], torque[i]),
+            InertialReading(when, force[i], np.array([0.0, 0.0, yaw_rate[i]]), orientation[i]),
+            ReferenceVelocity(when, float(data['v_X'][i]), 0.0),
+        ]
+    y = np.array([0.571, -0.571, 0.571, -0.571])
+    rim = 0.265 * rate
+    from wheel_terra_estimator.evaluation.baselines import slip_of
+
+    return SnowEvent(
+        name=row['event'],
+        stamp=stamp,
+        measurements=measurements,
+        speed=data['v_X'],
+        rim=rim,
+        slip=slip_of(data['v_X'], yaw_rate, rim, y),
+        start=int(row['start_index_1based']) - 1,
+        stop=int(row['stop_index_1based']) - 1,
+        author=int(row['author_detection_indices'].split(';')[-1]) - 1,
+    )
+
+
+def score_snow_event(event: SnowEvent, reference_rate: float) -> tuple[EventScore, Record]:
+    """Run the estimator over an event; `reference_rate` 0 = without any speed."""
+    configuration = snow_configuration(reference_rate)
+    given = (
+        m
+        for m in event.measurements
+        if reference_rate > 0.0 or not isinstance(m, ReferenceVelocity)
+    )
+    kept = record(*run_estimator(configuration, given))
+    time = (kept.stamp - _START) * 1e-9
+    rises = np.flatnonzero(np.diff(np.concatenate([[0], kept.stuck.astype(int)])) == 1)
+    last = int(np.searchsorted(kept.stamp, event.stamp[event.stop]))
+    before = rises[rises <= last]
+    warned = None
+    if len(before) and kept.stuck[min(last, len(kept.stuck) - 1)]:
+        rise = float(time[before[-1]])
+        if time[min(last, len(time) - 1)] - rise <= LONGEST_LEAD:
+            warned = rise
+    late, runs = _late_classes(event, kept)
+    return (
+        EventScore(
+            event.name,
+            warned,
+            *(float((event.stamp[i] - _START) * 1e-9) for i in (event.author, event.start)),
+            float((event.stamp[event.stop] - _START) * 1e-9),
+            tuple(float(time[r]) for r in rises),
+            late,
+            runs,
+        ),
+        kept,
+    )
+
+
+def snow_configuration(reference_rate: float) -> Configuration:
+    """Return FrostyBoy's configuration with the reference thinned."""
+    rate = reference_rate if reference_rate > 0.0 else 0.0
+    return reader.load(['frostyboy'], [f'reference_odom_max_rate:={rate}'])
+
+
+def _late_classes(event: SnowEvent, kept: Record) -> tuple[int, int]:
+    """Count stretches of slip above 0.9 for 0.5 s (rim above 0.1 m/s) not in class 3 within 1 s."""
+    high = (event.slip > 0.9) & (np.abs(event.rim) > 0.1)
+    position = np.clip(np.searchsorted(kept.stamp, event.stamp), 0, len(kept.stamp) - 1)
+    said = kept.slip_class[position] == 3
+    late = runs = 0
+    for wheel in range(high.shape[1]):
+        row = 0
+        while row < len(high):
+            end = row
+            while end < len(high) and high[end, wheel]:
+                end += 1
+            if end - row > 5:  # 0.5 s at 10 Hz
+                if end - row > 15 or end == len(high):
+                    runs += 1
+                    late += not said[row : min(row + 16, end), wheel].any()
+                elif end - row > 5:
+                    runs += 1
+                    late += not said[row : min(row + 16, len(high)), wheel].any()
+            row = max(end, row + 1)
+    return late, runs
+
+
+def pathfinder_record(bag: Path, reference_rate: float) -> Record:
+    """Run the estimator over the Pathfinder bag; `reference_rate` 0 = without the reference."""
+    from wheel_terra_estimator.bags.reader import read
+
+    configuration = reader.load(['pathfinder'], [f'reference_odom_max_rate:={reference_rate}'])
+    remaps = {'reference_odom': '/truth/odometry'}
+    given = (
+        m
+        for _, m in read(bag, remaps, configuration)
+        if reference_rate > 0.0 or not isinstance(m, ReferenceVelocity)
+    )
+    return record(*run_estimator(configuration, given))

@@ -1,0 +1,191 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Scores of a record against the truth, and their sums over drives.
+
+Scored where rim or ground speed exceeds 5 mm/s, after the first 10 s. The truth has no
+hysteresis; class accuracy within 0.05 of a border is listed apart.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wheel_terra_estimator.evaluation.runner import Record
+from wheel_terra_estimator.simulation.truth import TruthTable
+
+FloatArray = NDArray[np.float64]
+
+LEAST_SPEED, FIRST_SECONDS, NEAR_BORDER = 0.005, 10.0, 0.05
+LEAST_LOAD = 0.1
+"""Pull is scored on wheels that carry at least this share of the mean load."""
+
+
+@dataclass(frozen=True)
+class Samples:
+    """Scored samples, one entry per wheel and stamp, of one or more drives."""
+
+    true_slip: FloatArray
+    slip_error: FloatArray
+    slip_std: FloatArray
+    sinkage_error: FloatArray
+    sinkage_std: FloatArray
+    pull_error: FloatArray  # over the load
+    pull_std: FloatArray
+    true_class: NDArray[np.uint8]
+    said_class: NDArray[np.uint8]
+    held_error: FloatArray  # slip, baselines
+    dead_reckoned_error: FloatArray
+    shared_pull_error: FloatArray  # over the load, baseline: m f_x shared by load
+
+    @classmethod
+    def joined(cls, parts: Iterable[Samples]) -> Samples:
+        """Return the samples of several drives."""
+        parts = list(parts)
+        return cls(*(np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(cls)))
+
+    def where(self, mask: NDArray[np.bool_]) -> Samples:
+        """Return a part of the samples."""
+        return Samples(*(getattr(self, f.name)[mask] for f in fields(self)))
+
+    def __len__(self) -> int:
+        return len(self.true_slip)
+
+
+@dataclass(frozen=True)
+class Warnings:
+    """Stuck warnings of one drive; times in seconds from its start."""
+
+    entrapped: float | None  # when the truth was entrapped
+    raised: tuple[float, ...]
+    lead_time: float | None  # of the warning in force at the entrapment
+    lead_travel: float | None  # rim travel [m]
+    false_alarms: int  # warnings after which the median |slip| did not pass 0.75 within 20 s
+    duration: float
+    distance: float  # rim travel [m]
+
+
+def samples(
+    truth: TruthTable,
+    record: Record,
+    held_slip: FloatArray,
+    dead_reckoned_slip: FloatArray,
+    slip_radius: FloatArray,
+) -> Samples:
+    """Return the scored samples of a drive."""
+    position = np.clip(np.searchsorted(record.stamp, truth.stamp), 0, len(record.stamp) - 1)
+    matched = record.stamp[position] == truth.stamp
+    rim = np.abs(truth.wheel_rate) * slip_radius
+    ground = np.abs(truth.wheel_rate * slip_radius - truth.slip_velocity)
+    late = (truth.stamp - truth.stamp[0]) * 1e-9 > FIRST_SECONDS
+    scored = (np.maximum(rim, ground) > LEAST_SPEED) & ~np.isnan(truth.slip)
+    scored &= (late & matched)[:, None]
+    load = truth.normal_load
+    carried = load > LEAST_LOAD * load.mean()
+    total = truth.drawbar_pull.sum(axis=1, keepdims=True)
+    shared = total * load / load.sum(axis=1, keepdims=True)
+
+    def take(values: FloatArray) -> FloatArray:
+        return np.asarray(values[scored], dtype=np.float64)
+
+    def over_load(values: FloatArray) -> FloatArray:
+        return take(np.where(carried, values / np.maximum(load, 1e-3), np.nan))
+
+    return Samples(
+        true_slip=take(truth.slip),
+        slip_error=take(record.slip[position] - truth.slip),
+        slip_std=take(record.slip_std[position]),
+        sinkage_error=take(record.sinkage[position] - truth.sinkage),
+        sinkage_std=take(record.sinkage_std[position]),
+        pull_error=over_load(record.drawbar_pull[position] - truth.drawbar_pull),
+        pull_std=over_load(record.drawbar_pull_std[position]),
+        true_class=truth.slip_class[scored],
+        said_class=record.slip_class[position][scored],
+        held_error=take(held_slip - truth.slip),
+        dead_reckoned_error=take(dead_reckoned_slip - truth.slip),
+        shared_pull_error=over_load(shared - truth.drawbar_pull),
+    )
+
+
+def warnings(truth: TruthTable, record: Record, slip_radius: FloatArray) -> Warnings:
+    """Return how the stuck warning did in a drive."""
+    time = (truth.stamp - truth.stamp[0]) * 1e-9
+    position = np.clip(np.searchsorted(record.stamp, truth.stamp), 0, len(record.stamp) - 1)
+    stuck = record.stuck[position]
+    rises = np.flatnonzero(np.diff(np.concatenate([[0], stuck.astype(int)])) == 1)
+    rim = np.abs(truth.wheel_rate * slip_radius).mean(axis=1)
+    travel = np.concatenate([[0.0], np.cumsum(rim[1:] * np.diff(time))])
+    turning = ~np.isnan(truth.slip).all(axis=1)
+    median = np.zeros(len(time))
+    median[turning] = np.nanmedian(np.abs(truth.slip[turning]), axis=1)
+    false_alarms = 0
+    for rise in rises:
+        soon = (time >= time[rise]) & (time <= time[rise] + 20.0)
+        if median[soon].max(initial=0.0) < 0.75:
+            false_alarms += 1
+    entrapped = truth.first_stuck()
+    lead_time = lead_travel = None
+    if entrapped is not None:
+        row = int(np.searchsorted(time, entrapped - 1e-6))
+        before = rises[rises <= row]
+        if stuck[row] and len(before):
+            lead_time = float(time[row] - time[before[-1]])
+            lead_travel = float(travel[row] - travel[before[-1]])
+    return Warnings(
+        entrapped,
+        tuple(float(time[r]) for r in rises),
+        lead_time,
+        lead_travel,
+        false_alarms,
+        float(time[-1]),
+        float(travel[-1]),
+    )
+
+
+def rms(values: FloatArray) -> float:
+    """Return the root mean square of the values that are there."""
+    values = values[~np.isnan(values)]
+    return float(np.sqrt(np.mean(values**2))) if len(values) else float('nan')
+
+
+def coverage(error: FloatArray, std: FloatArray) -> float:
+    """Return the share of errors within the 95 % interval."""
+    there = ~np.isnan(error) & ~np.isnan(std)
+    return (
+        float((np.abs(error[there]) <= 1.96 * std[there]).mean()) if there.any() else float('nan')
+    )
+
+
+def three_class_accuracy(data: Samples, near_border: bool = False) -> float:
+    """Return the share of right classes low, moderate, high and above, by place of the truth."""
+    return _accuracy(data, (0.3, 0.6), near_border)
+
+
+def two_class_accuracy(data: Samples, near_border: bool = False) -> float:
+    """Return the share of right calls below or above 0.6."""
+    return _accuracy(data, (0.6,), near_border)
+
+
+def _accuracy(data: Samples, borders: Sequence[float], near_border: bool) -> float:
+    magnitude = np.abs(data.true_slip)
+    distance = np.min(np.abs(magnitude[:, None] - np.array(borders)), axis=1)
+    chosen = (distance <= NEAR_BORDER) == near_border
+    if not chosen.any():
+        return float('nan')
+    upper = (0, 1, 2) if len(borders) == 2 else (0, 0, 1)
+    level = np.array([*upper, upper[-1]])
+    known = data.said_class != 255
+    said = level[np.where(known, np.minimum(data.said_class, 3), 0)]
+    right = known & (said == level[data.true_class])
+    return float(right[chosen].mean())
+
+
+def confusion(data: Samples) -> NDArray[np.int64]:
+    """Return counts (4, 5): true class low .. stuck against said class low .. stuck, unknown."""
+    counts = np.zeros((4, 5), dtype=np.int64)
+    said = np.where(data.said_class == 255, 4, data.said_class)
+    np.add.at(counts, (data.true_class, said), 1)
+    return counts
