@@ -55,7 +55,7 @@ def test_truth_in_the_bag_is_that_of_the_drive(bag_path: Path) -> None:
     drive = simulate(load('turns'), 3, 6.0)
     with open_bag(bag_path) as bag:
         truth = read_truth(bag, {}, drive.configuration)
-        classes = [m for m in bag.messages(('/ground_truth/slip_class',))]
+        classes = list(bag.messages(('/ground_truth/slip_class',)))
     assert truth is not None
     np.testing.assert_array_equal(truth.slip.stamp, drive.truth.stamp)
     known = ~np.isnan(drive.truth.slip)

@@ -113,7 +113,7 @@ def test_weak_drives_stall(plant: MakePlant) -> None:
     configuration = rover(f'wheels.torque_limit:={[6.0] * 6}')
     truth = drive(plant(configuration, slope_deg=10.0), 12.0)
     np.testing.assert_allclose(np.abs(truth.torque).max(), 6.0, rtol=0.05)
-    assert np.abs(truth.forward_velocity) < 0.005 or truth.forward_velocity < 0.0
+    assert abs(truth.forward_velocity) < 0.01
 
 
 def test_descent_skids_and_a_locked_wheel_is_dragged(plant: MakePlant) -> None:
