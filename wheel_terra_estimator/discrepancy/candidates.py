@@ -126,12 +126,15 @@ def linear_starts(
         coordinates,
         [np.concatenate([base.u, shape]) for _, _, shape in trials],
         np.broadcast_to(base.angle, (len(trials), len(base.angle))),
+        # At neutral strength everything but the strength has the derivatives of the base.
+        by=[[len(base.u)]] * len(trials),
     )
     problem, fixed = setting.problem, len(base.u)
     best: dict[str, tuple[float, tuple[str, ...], FloatArray]] = {}
     for index, (name, own, shape) in enumerate(trials):
         outputs = state.outputs[index]
-        sensitivity = problem.flat(state.jacobian[index])
+        own_column = problem.flat(state.jacobian[index])
+        sensitivity = np.concatenate([base.sensitivity, own_column], axis=1)
         residual = problem.rotate(setting.observed - problem.flat(outputs))
         keep = [*range(fixed), fixed]  # the strength only: the shape has no gradient here
         reduced = Fit(
@@ -140,9 +143,9 @@ def linear_starts(
             np.concatenate([base.u, shape])[keep],
             outputs,
             state.angle[index],
-            sensitivity[:, keep],
+            sensitivity,
             residual,
-            problem.rotate(sensitivity[:, keep]),
+            problem.rotate(sensitivity),
             base.variance,
             0.0,
             loose_precision([coordinates[index][k] for k in keep]),

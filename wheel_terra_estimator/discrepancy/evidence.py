@@ -117,7 +117,7 @@ def evidence(
 
 
 def _variances(problem: Problem, floors: tuple[Floor, ...], factor: FloatArray) -> FloatArray:
-    return np.array([problem.variance(f.amplitude, k) for f, k in zip(floors, factor, strict=True)])
+    return problem.variance(np.array([floor.amplitude for floor in floors]), factor)
 
 
 def _prior_precisions(fitted: Fit) -> tuple[FloatArray, FloatArray]:

@@ -159,13 +159,19 @@ class Forward:
         u: Sequence[FloatArray],
         start: FloatArray | None = None,
         jacobian: bool = True,
+        by: Sequence[Sequence[int]] | None = None,
     ) -> State:
-        """Solve the load balance of every hypothesis; with Jacobians by u unless told otherwise."""
+        """Solve the load balance of every hypothesis; with Jacobians by u unless told otherwise.
+
+        ``by`` names the coordinates of each hypothesis by which to differentiate (default: all).
+        """
+        if by is None:
+            by = [range(len(h)) for h in hypotheses]
         if start is not None:
             start = np.broadcast_to(start, (len(u), len(self.points)))
         dear = [self._acts_on_stress(h) for h in hypotheses]
         if any(dear) and not all(dear):
-            return self._split(hypotheses, u, start, jacobian, dear)
+            return self._split(hypotheses, u, start, jacobian, by, dear)
         columns = [
             {c.key: float(c.value(x)) for c, x in zip(h, values, strict=True)}
             for h, values in zip(hypotheses, u, strict=True)
@@ -173,7 +179,7 @@ class Forward:
         angle, outputs = self._balance(hypotheses, columns, start)
         if not jacobian:
             return State([np.asarray(x) for x in u], angle, outputs, [], [])
-        return self._differences(hypotheses, u, columns, angle, outputs)
+        return self._differences(hypotheses, u, by, columns, angle, outputs)
 
     def _acts_on_stress(self, hypothesis: Sequence[Coordinate]) -> bool:
         """Whether a term of the hypothesis works at every node of the quadrature, at a price."""
@@ -186,6 +192,7 @@ class Forward:
         u: Sequence[FloatArray],
         start: FloatArray | None,
         jacobian: bool,
+        by: Sequence[Sequence[int]],
         dear: Sequence[bool],
     ) -> State:
         """Solve the dear hypotheses apart, so that the others need not pay for them."""
@@ -202,6 +209,7 @@ class Forward:
                 [u[b] for b in group],
                 None if start is None else start[group],
                 jacobian,
+                [by[b] for b in group],
             )
             angle[group], outputs[group] = part.angle, part.outputs
             for k, b in enumerate(group if jacobian else ()):
@@ -212,6 +220,7 @@ class Forward:
         self,
         hypotheses: Sequence[Sequence[Coordinate]],
         u: Sequence[FloatArray],
+        by: Sequence[Sequence[int]],
         columns: Sequence[dict[str, float]],
         angle: FloatArray,
         outputs: FloatArray,
@@ -222,7 +231,7 @@ class Forward:
         for b, (hypothesis, values) in enumerate(zip(hypotheses, u, strict=True)):
             copies.append(columns[b])
             owner.append(b)
-            for c, x in zip(hypothesis, values, strict=True):
+            for c, x in ((hypothesis[k], values[k]) for k in by[b]):
                 copies.append({**columns[b], c.key: float(c.value(x + self._step(c, x)))})
                 owner.append(b)
         contact, terms = self._contact(hypotheses, copies)
@@ -233,8 +242,8 @@ class Forward:
         beyond, moved = self._response(contact, terms, angle + step)
         jacobians, slopes, at = [], [], 0
         for b, hypothesis in enumerate(hypotheses):
-            count = len(hypothesis)
-            steps = np.array([self._step(c, x) for c, x in zip(hypothesis, u[b], strict=True)])
+            count = len(by[b])
+            steps = np.array([self._step(hypothesis[k], u[b][k]) for k in by[b]])
             base_r, base_y = residual[at], shifted[at]
             by_angle = (beyond[b] - base_r) / step
             y_by_angle = (moved[b] - base_y) / step

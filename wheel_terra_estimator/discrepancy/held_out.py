@@ -4,13 +4,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wheel_terra_estimator.discrepancy.candidates import Setting
 from wheel_terra_estimator.discrepancy.fitting import Fit
+from wheel_terra_estimator.discrepancy.outliers import inverse_covariance
 from wheel_terra_estimator.discrepancy.parameters import bounds
 from wheel_terra_estimator.discrepancy.table import SteadyTable
 
@@ -28,47 +29,55 @@ def slip_groups(table: SteadyTable) -> IndexArray:
     return np.minimum(rank * GROUPS // max(len(levels), 1), GROUPS - 1).astype(np.intp)
 
 
-@dataclass(frozen=True)
-class HeldOut:
-    """Predictions of each row by fits without its group.
+def log_scores(
+    setting: Setting, fits: Sequence[Fit], variance: FloatArray, groups: IndexArray
+) -> list[float]:
+    """Return the sum of the log predictive densities of the groups, each given all the rest.
 
-    Attributes
-    ----------
-    outputs : numpy.ndarray
-        (N, 3).
-    log_score : float
-        Sum of the log predictive densities of the groups, structural error included.
+    Around the fit everything is Gaussian, so that blocks of the inverse covariance suffice.
     """
-
-    outputs: FloatArray
-    log_score: float
+    problem = setting.problem
+    cell_group = groups[problem.row]
+    scores = []
+    for fitted in fits:
+        jacobian = fitted.jacobian / np.sqrt(fitted.prior)
+        inverse = problem.rotation.T @ inverse_covariance(variance, jacobian) @ problem.rotation
+        target = setting.observed - problem.flat(fitted.outputs) + fitted.sensitivity @ fitted.u
+        pull = inverse @ target
+        score = 0.0
+        for label in _labels(groups):
+            out = np.flatnonzero(cell_group == label)
+            if not out.size:
+                continue
+            block = inverse[np.ix_(out, out)]
+            square = float(pull[out] @ np.linalg.solve(block, pull[out]))
+            log_det = float(np.linalg.slogdet(block)[1])
+            score += 0.5 * (log_det - square - out.size * np.log(2.0 * np.pi))
+        scores.append(score)
+    return scores
 
 
 def hold_out(
-    setting: Setting, fits: list[Fit], variances: list[FloatArray], groups: IndexArray
-) -> list[HeldOut]:
-    """Leave each group out of each fit; rows of a negative group (a reference) always stay in.
+    setting: Setting, fits: Sequence[Fit], variance: FloatArray, groups: IndexArray
+) -> list[FloatArray]:
+    """Return the (N, 3) predictions of every fit, each row by parameters found without its group.
 
-    The parameters without a group come from one linear step off the full fit (exact but for the
-    curvature of the model in that step); the predictions are those of the full model.
+    Rows of a negative group (a reference) always stay in. The parameters without a group come from
+    one linear step off the full fit (exact but for the curvature of the model in that step); the
+    predictions are those of the full model.
     """
     problem = setting.problem
-    labels = np.unique(groups[groups >= 0])
+    labels = _labels(groups)
     cell_group = groups[problem.row]
-    tasks, scores = [], []
     unrotate = np.linalg.inv(problem.rotation)
-    for fitted, variance in zip(fits, variances, strict=True):
-        covariance = (unrotate * variance) @ unrotate.T
+    covariance = (unrotate * variance) @ unrotate.T
+    tasks = []
+    for fitted in fits:
         target = setting.observed - problem.flat(fitted.outputs) + fitted.sensitivity @ fitted.u
         limits = bounds(fitted.coordinates)
-        score = 0.0
         for label in labels:
-            out = cell_group == label
-            u = np.clip(_without(fitted, covariance, target, ~out), *limits)
-            # Score: the group given all the rest, by the full covariance.
-            score += _group_score(fitted, covariance, target, out)
-            tasks.append((fitted, u))
-        scores.append(score)
+            kept = cell_group != label
+            tasks.append((fitted, np.clip(_without(fitted, covariance, target, kept), *limits)))
     state = setting.forward.solve(
         [fitted.coordinates for fitted, _ in tasks],
         [u for _, u in tasks],
@@ -76,34 +85,24 @@ def hold_out(
         jacobian=False,
     )
     results = []
-    for index, score in enumerate(scores):
-        outputs = np.empty_like(fits[index].outputs)
+    for index, fitted in enumerate(fits):
+        outputs = fitted.outputs.copy()
         for k, label in enumerate(labels):
             rows = groups == label
             outputs[rows] = state.outputs[index * len(labels) + k][rows]
-        results.append(HeldOut(outputs, score))
+        results.append(outputs)
     return results
+
+
+def _labels(groups: IndexArray) -> IndexArray:
+    return np.unique(groups[groups >= 0])
 
 
 def _without(
     fitted: Fit, covariance: FloatArray, target: FloatArray, kept: NDArray[np.bool_]
 ) -> FloatArray:
+    """Return the parameters that the kept cells ask for."""
     jacobian = fitted.sensitivity[kept]
     weighted = np.linalg.solve(covariance[np.ix_(kept, kept)], jacobian)
     precision = jacobian.T @ weighted + np.diag(fitted.prior)
-    return np.linalg.solve(precision, weighted.T @ target[kept])
-
-
-def _group_score(
-    fitted: Fit, covariance: FloatArray, target: FloatArray, out: NDArray[np.bool_]
-) -> float:
-    total = covariance + (fitted.sensitivity / fitted.prior) @ fitted.sensitivity.T
-    across = np.linalg.solve(total[np.ix_(~out, ~out)], total[np.ix_(~out, out)])
-    error = target[out] - across.T @ target[~out]
-    spread = total[np.ix_(out, out)] - total[np.ix_(out, ~out)] @ across
-    sign, log_det = np.linalg.slogdet(spread)
-    if sign <= 0.0:
-        return -np.inf
-    return float(
-        -0.5 * (error @ np.linalg.solve(spread, error) + log_det + len(error) * np.log(2 * np.pi))
-    )
+    return np.asarray(np.linalg.solve(precision, weighted.T @ target[kept]))

@@ -83,15 +83,17 @@ class Problem:
         Parameters
         ----------
         amplitude : float or numpy.ndarray
-            Share of the range; (3,) per quantity.
+            Share of the range; (3,) per quantity, or (F, 3) for (F, m) variances.
         noise : float or numpy.ndarray
-            Factor on the noise standard deviation; (3,) per quantity.
+            Factor on the noise standard deviation; (3,) or (F, 3) per quantity.
         """
-        a = np.broadcast_to(np.asarray(amplitude, dtype=float), (3,))
-        k = np.broadcast_to(np.asarray(noise, dtype=float), (3,))
+        a, k = np.broadcast_arrays(
+            *(np.atleast_1d(np.asarray(x, dtype=float)) for x in (amplitude, noise)), np.ones(3)
+        )[:2]
         if (self.block < 0).any():
-            return k.mean() ** 2 + a.max() ** 2 * self.roughness
-        return k[self.block] ** 2 + a[self.block] ** 2 * self.roughness
+            k, a = k.mean(axis=-1, keepdims=True), a.max(axis=-1, keepdims=True)
+            return np.asarray(k**2 + a**2 * self.roughness)
+        return np.asarray(k[..., self.block] ** 2 + a[..., self.block] ** 2 * self.roughness)
 
 
 def kernel(inputs: FloatArray) -> FloatArray:

@@ -16,7 +16,7 @@ from wheel_terra_estimator.discrepancy import confidence as confidences
 from wheel_terra_estimator.discrepancy import gap_test, next_measurement, summary
 from wheel_terra_estimator.discrepancy.fitting import Fit
 from wheel_terra_estimator.discrepancy.forward import Forward
-from wheel_terra_estimator.discrepancy.held_out import HeldOut, hold_out, slip_groups
+from wheel_terra_estimator.discrepancy.held_out import hold_out, log_scores, slip_groups
 from wheel_terra_estimator.discrepancy.parameters import (
     Coordinate,
     base_coordinates,
@@ -232,10 +232,10 @@ def _report(
     shown = _shown(findings, verdict.index)
     groups = np.where(np.arange(len(both)) < len(table), slip_groups(both), -1)
     kept = [nothing, *(selection.explanations[h].fitted for h in shown)]
-    outs = hold_out(setting, kept, [variance] * len(kept), groups)
-    gains = dict(zip(shown, (o.log_score - outs[0].log_score for o in outs[1:]), strict=True))
-    held_after = outs[1 + shown.index(verdict.index)] if after.names else outs[0]
-    curves = _curves(len(table), findings, after, outs[0], held_after, floor)
+    scores = log_scores(setting, kept, variance, groups)
+    gains = dict(zip(shown, (score - scores[0] for score in scores[1:]), strict=True))
+    outs = hold_out(setting, [nothing, after] if after.names else [nothing], variance, groups)
+    curves = _curves(len(table), findings, after, outs[0], outs[-1], floor)
     names = {name: s for name, s in findings.signatures.items() if name in setting.effects}
     one_sided = {
         name for name in names if all(p.prior == 'half_normal' for p in known[name].parameters[:1])
@@ -413,8 +413,8 @@ def _curves(
     rows: int,
     findings: Findings,
     after: Fit,
-    held_refit: HeldOut,
-    held_after: HeldOut,
+    held_refit: FloatArray,
+    held_after: FloatArray,
     floor: float,
 ) -> Curves:
     setting = findings.setting
@@ -432,8 +432,8 @@ def _curves(
         configured.outputs[0][:rows],
         (findings.nothing.outputs + refit_error)[:rows],
         (after.outputs + after_error)[:rows],
-        (held_refit.outputs + refit_error)[:rows],
-        (held_after.outputs + after_error)[:rows],
+        (held_refit + refit_error)[:rows],
+        (held_after + after_error)[:rows],
         band[:rows],
         shapes[0][:rows] if shapes else None,
         labels[0] if labels else '',
