@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wheel_terra_estimator.terramechanics import closed_form, quadrature
+from wheel_terra_estimator.terramechanics.checks import check_range
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects import EffectSettings, catalogue, check_settings
 from wheel_terra_estimator.terramechanics.load_balance import (
@@ -113,6 +114,10 @@ class WheelSoilModel:
         """
         terms = Terms(self.effects)
         contact = build_contact(points, self._soil, self.soil.pressure_law, terms)
+        if not np.all(np.asarray(contact.bearing_modulus) > 0.0):
+            check_range(
+                'bearing modulus kc/b + kphi', contact.bearing_modulus, 0.0, open_lower=True
+            )
         angle, carries = self._entrance_angle(contact, points, terms)
         if self.strict and not carries.all():
             worst = int(np.flatnonzero(~carries)[0])

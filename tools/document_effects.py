@@ -1,0 +1,76 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Write docs/effects.md and a picture per effect from the catalogue.
+
+python tools/document_effects.py
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from wheel_terra_estimator.cli.effects import as_markdown
+from wheel_terra_estimator.reporting.style import LINE_COLOURS, picture_style
+from wheel_terra_estimator.terramechanics.effects import Effect, catalogue
+from wheel_terra_estimator.terramechanics.model import WheelSoilModel
+from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
+from wheel_terra_estimator.terramechanics.soil import Soil
+from wheel_terra_estimator.terramechanics.wheel import Wheel
+
+ROOT = Path(__file__).resolve().parents[1]
+SOIL = Soil(15.6e3, 2407.4e3, 1.1, 250.0, np.radians(31.9), 0.0114, 0.5, -0.2, 1605.0)
+SLIP = np.linspace(0.0, 0.9, 31)
+# What an effect needs to be seen besides slip: a slope, a second pass, another speed, bare rim.
+SETTINGS = {
+    'slope': {'slope': 0.2},
+    'pass_number': {'pass_number': 2},
+    'angular_velocity': {'angular_velocity': 2.0},
+}
+SMOOTH = frozenset({'rim_friction'})
+
+
+def draw(effect: Effect, path: Path) -> None:
+    """Draw sinkage, pull and torque without the effect, at half, one and twice its default."""
+    from matplotlib.figure import Figure
+
+    parameter = effect.parameters[0]
+    inputs: dict[str, float] = {}
+    for need in effect.needs:
+        inputs.update(SETTINGS.get(need, {}))
+    wheel = Wheel(0.1574, 0.165, 0.0 if effect.name in SMOOTH else 0.010, 30)
+    points = OperatingPoints(SLIP, 80.0, wheel, **inputs)
+    values = [None, *(factor * parameter.default for factor in (0.5, 1.0, 2.0))]
+    with picture_style():
+        figure = Figure(figsize=(8.2, 2.5))
+        axes = figure.subplots(1, 3)
+        for value, colour in zip(values, LINE_COLOURS, strict=False):
+            if value is not None and not parameter.lower <= value <= parameter.upper:
+                continue
+            settings = {} if value is None else {effect.name: {parameter.name: value}}
+            outputs = WheelSoilModel(SOIL, settings, strict=False).steady_state(points).outputs()
+            label = 'off' if value is None else f'{parameter.name} = {value:g} {parameter.unit}'
+            for axis, column, scale in zip(axes, outputs.T, (1e3, 1.0, 1.0), strict=True):
+                axis.plot(SLIP, scale * column, color=colour, label=label)
+        for axis, text in zip(
+            axes, ('sinkage [mm]', 'drawbar pull [N]', 'torque [N m]'), strict=True
+        ):
+            axis.set_xlabel('slip [-]')
+            axis.set_ylabel(text)
+        axes[0].invert_yaxis()
+        axes[0].legend(fontsize=7)
+        figure.savefig(path, metadata={'Date': None})
+
+
+def main() -> None:
+    """Write the page and the pictures."""
+    folder = ROOT / 'docs' / 'models' / 'effects'
+    folder.mkdir(parents=True, exist_ok=True)
+    for effect in catalogue().values():
+        draw(effect, folder / f'{effect.name}.svg')
+    (ROOT / 'docs' / 'effects.md').write_text(as_markdown(catalogue()), encoding='utf-8')
+
+
+if __name__ == '__main__':
+    main()
