@@ -181,7 +181,7 @@ def check_table(
             f'{copies} rows are exact copies of others and were counted once; '
             'a repeated measurement would scatter'
         )
-    _check_range_of_design(table)
+    _check_range_of_design(table, remarks)
     constant = [key for key in inputs if key in INPUT_UNITS and key not in table.varying()]
     if constant:
         remarks.append(f'constant in this table: {", ".join(constant)}')
@@ -395,8 +395,11 @@ def _without_copies(table: SteadyTable) -> tuple[SteadyTable, int]:
     return table.select(keep), len(keys) - len(keep)
 
 
-def _check_range_of_design(table: SteadyTable) -> None:
-    """Raise where the rows are too few or too alike to tell anything."""
+def _check_range_of_design(table: SteadyTable, remarks: list[str]) -> None:
+    """Raise where the rows are too few or too alike to tell anything.
+
+    A drive (its slip is uncertain) cannot choose its slips, and may still show a wrong radius.
+    """
     if len(table) < MINIMUM_ROWS:
         raise UserError(
             f'{table.name}: {len(table)} different rows; at least {MINIMUM_ROWS} are needed, best '
@@ -405,6 +408,12 @@ def _check_range_of_design(table: SteadyTable) -> None:
     slip, load = table.columns['slip'], table.columns['normal_load']
     span, ratio = np.ptp(slip), load.max() / load.min()
     if span < MINIMUM_SLIP_SPAN and ratio < MINIMUM_LOAD_RATIO:
+        if (table.slip_std > 0).all():
+            remarks.append(
+                f'narrow: slip only from {slip.min():.3g} to {slip.max():.3g} at one load; little '
+                'but a wrong radius can be told from it'
+            )
+            return
         raise UserError(
             f'{table.name}: slip only from {slip.min():.3g} to {slip.max():.3g} and load only from '
             f'{load.min():.3g} to {load.max():.3g} N: too narrow to tell anything; add rows with '
