@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 
 from wheel_terra_estimator.errors import UserError
 
@@ -13,8 +14,70 @@ SUMMARY = 'score the estimator against ground truth and baselines'
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
+    from wheel_terra_estimator.evaluation.kinds import KINDS
+    from wheel_terra_estimator.evaluation.runner import MODES
+
+    parser.add_argument(
+        '--kinds',
+        nargs='+',
+        metavar='KIND',
+        default=list(KINDS),
+        help=f'kinds of simulated drives: {", ".join(KINDS)}, firm (default: all but firm)',
+    )
+    parser.add_argument(
+        '--seeds', type=int, default=20, metavar='N', help='drives of each kind (default 20)'
+    )
+    parser.add_argument(
+        '--tuning', action='store_true', help='tuning seeds; the default are the test seeds'
+    )
+    parser.add_argument(
+        '--modes',
+        nargs='+',
+        metavar='MODE',
+        default=['reference', 'no_reference'],
+        help=f'what the estimator gets: {", ".join(MODES)}',
+    )
+    parser.add_argument('--processes', type=int, default=1, metavar='N', help='in parallel')
+    parser.add_argument(
+        '--measured',
+        type=Path,
+        metavar='DIR',
+        help='folder of the measured data: score the real drives in place of simulated ones',
+    )
+    parser.add_argument('-o', dest='output', type=Path, metavar='F.md', help='write the tables')
+    parser.add_argument('--overwrite', action='store_true', help='replace an earlier output')
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the command."""
-    raise UserError('this command is not in this version yet')
+    from wheel_terra_estimator.evaluation import bench, kinds, real_drives, runner, tables
+
+    if arguments.output and arguments.output.exists() and not arguments.overwrite:
+        raise UserError(f'{arguments.output} exists; choose another name or give --overwrite')
+    if arguments.measured:
+        text = real_drives.report(arguments.measured)
+    else:
+        for given, known, what in (
+            (arguments.kinds, [*kinds.KINDS, 'firm'], 'kind'),
+            (arguments.modes, runner.MODES, 'mode'),
+        ):
+            unknown = [name for name in given if name not in known]
+            if unknown:
+                raise UserError(f'no {what} {unknown[0]!r}; there are {", ".join(known)}')
+        first = (kinds.TUNING_SEEDS if arguments.tuning else kinds.TEST_SEEDS).start
+        from tqdm import tqdm
+
+        total = len(arguments.kinds) * arguments.seeds
+        with tqdm(total=total, unit='drive') as bar:
+            results = bench.run(
+                arguments.kinds,
+                range(first, first + arguments.seeds),
+                arguments.modes,
+                arguments.processes,
+                lambda _: bar.update(),
+            )
+        text = tables.report(results, arguments.modes)
+    print(text)
+    if arguments.output:
+        arguments.output.write_text(text + '\n', encoding='utf-8')
+    return 0

@@ -5,8 +5,8 @@
 Four signs, each with a hold time of its own, any of which raises the warning:
 
 * *digging in*: the median slip is above 0.8 with a probability above one half;
-* *look ahead*: the median slip is above one half and, at the rate at which it grew over the last
-  seconds, passes 0.9 within the horizon;
+* *look ahead*: at the rate at which the median slip grew over the last seconds it passes 0.9
+  soon; the higher it stands, the farther this looks;
 * *held wheels*: the rover makes little of what its fastest wheel offers while at least half of its
   wheels slip heavily or stand (torque-limited wheels stall as often as they spin);
 * *bogging down*: wheels pull near their limit while the rover loses speed against its fastest
@@ -31,6 +31,7 @@ from wheel_terra_estimator.estimation.speed_process import median
 _ENTRAPPED_SLIP = 0.9
 _DIGGING_SLIP = 0.8
 _TREND_WINDOW = 5.0  # [s]
+_SHORTEST_TREND = 2.5  # [s]
 _BOG_WINDOW = 1.5  # [s] over which the loss of speed is taken
 _LONGEST_TIME = 600.0  # [s] said where no entrapment is in sight
 
@@ -45,17 +46,19 @@ class StuckTuning:
     clear_time: float = 3.0
     dig_hold: float = 1.5
     look_ahead: float = 10.0
-    look_ahead_slip: float = 0.5
+    look_ahead_slip: float = 0.65
+    sudden_ahead: float = 4.0
+    sudden_slip: float = 0.45
     look_ahead_hold: float = 1.0
     held_slip: float = 0.6
-    held_hold: float = 0.5
+    held_hold: float = 0.4
     bog_slip: float = 0.35
     bog_time: float = 6.0  # [s] to a stand
     bog_torque: float = 0.5  # of the torque limit, second strongest wheel
     bog_hold: float = 0.2
     stall_ratio: float = 0.6
     stall_torque: float = 0.7  # of the torque limit
-    stall_hold: float = 0.5
+    stall_hold: float = 0.4
 
 
 @dataclass(frozen=True)
@@ -126,7 +129,12 @@ class StuckMonitor:
         self._memory = self.snapshot()
 
     def update(
-        self, time: float, speed: float, speed_known: bool, wheels: Sequence[WheelMotionState]
+        self,
+        time: float,
+        speed: float,
+        speed_known: bool,
+        wheels: Sequence[WheelMotionState],
+        turning: bool = False,
     ) -> StuckAssessment:
         """Judge the state at `time` [s].
 
@@ -141,6 +149,8 @@ class StuckMonitor:
             wheels need it.
         wheels : sequence of WheelMotionState
             One per wheel.
+        turning : bool
+            The rover turns sharply: slip that comes from turning says nothing of what is ahead.
         """
         memory, tuning = self._memory, self._tuning
         dt = 0.0 if memory.last_time is None else max(time - memory.last_time, 0.0)
@@ -156,7 +166,7 @@ class StuckMonitor:
         typical = median(effective) if effective else 0.0
         typical_std = median([w.slip_std for w in moving]) if moving else 1.0
         memory.rim_travel += fastest * dt
-        slope = self._trend(time, typical, bool(moving))
+        slope = self._trend(time, typical, bool(moving) and not turning)
 
         probability = exceedance_probability(typical, typical_std, _DIGGING_SLIP)
         signs: dict[str, str] = {}
@@ -165,8 +175,13 @@ class StuckMonitor:
                 signs['dig'] = f'median slip {typical:.2f}: digging in'
         else:
             memory.since.pop('dig', None)
-        ahead = typical + tuning.look_ahead * slope
-        if typical > tuning.look_ahead_slip and ahead > _ENTRAPPED_SLIP and typical_std < 0.2:
+        soon = typical > tuning.look_ahead_slip and (
+            typical + tuning.look_ahead * slope > _ENTRAPPED_SLIP
+        )
+        at_once = typical > tuning.sudden_slip and (
+            typical + tuning.sudden_ahead * slope > _ENTRAPPED_SLIP
+        )
+        if (soon or at_once) and typical_std < 0.2:
             if self._held('ahead', time, tuning.look_ahead_hold):
                 signs['ahead'] = f'median slip {typical:.2f} grows by {slope:.3f} per second'
         else:
@@ -239,7 +254,7 @@ class StuckMonitor:
             trend.append((time, typical))
         while trend and time - trend[0][0] > _TREND_WINDOW:
             trend.popleft()
-        if len(trend) < 5 or trend[-1][0] - trend[0][0] < 1.0:
+        if len(trend) < 5 or trend[-1][0] - trend[0][0] < _SHORTEST_TREND:
             return 0.0
         return _slope(trend)
 

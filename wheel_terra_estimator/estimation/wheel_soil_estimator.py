@@ -640,8 +640,9 @@ class WheelSoilEstimator:
             trust = min(max((0.95 - slip) / 0.15, 0.0), 1.0)
             target = z_floor * math.exp(growth)
             mean[zi] = z + trust * alpha * (target - z)
-            if slip > 0.8:
-                mean[zi] += 0.02 * (slip - 0.8) * rim * dt
+            if trust < 1.0:
+                # It digs at its own pace: carry on with the rate seen last.
+                mean[zi] += 0.9 * (1.0 - trust) * max(run.sinkage_rate[i], 0.0) * dt
             sensitivity = trust * alpha * target / power
             F[zi, zi] = max(1.0 - trust * alpha * 0.9, 0.05)
             F[zi, ki] = -sensitivity
@@ -1064,7 +1065,9 @@ class WheelSoilEstimator:
                 )
             )
         known = run.reference_time is not None and time - run.reference_time < 10.0
-        run.assessment = self._monitor.update(time, speed, known, motion)
+        run.assessment = self._monitor.update(
+            time, speed, known, motion, turning=run.side_motion > 0.3
+        )
         if time - run.margin_time >= 1.0:
             run.margin_time = time
             self._margins()

@@ -136,13 +136,14 @@ def score_snow_event(event: SnowEvent, reference_rate: float) -> tuple[EventScor
     late, runs = _late_classes(event, kept)
     return (
         EventScore(
-            event.name,
-            warned,
-            *(float((event.stamp[i] - _START) * 1e-9) for i in (event.author, event.start)),
-            float((event.stamp[event.stop] - _START) * 1e-9),
-            tuple(float(time[r]) for r in rises),
-            late,
-            runs,
+            name=event.name,
+            warned=warned,
+            author=(event.stamp[event.author] - _START) * 1e-9,
+            start=(event.stamp[event.start] - _START) * 1e-9,
+            stop=(event.stamp[event.stop] - _START) * 1e-9,
+            all_warnings=tuple(float(time[r]) for r in rises),
+            late_classes=late,
+            high_slip_runs=runs,
         ),
         kept,
     )
@@ -189,3 +190,47 @@ def pathfinder_record(bag: Path, reference_rate: float) -> Record:
         if reference_rate > 0.0 or not isinstance(m, ReferenceVelocity)
     )
     return record(*run_estimator(configuration, given))
+
+
+def report(measured: Path) -> str:
+    """Return the tables of the real drives in a folder of measured data."""
+    from wheel_terra_estimator.evaluation.tables import table
+
+    parts = []
+    for rate, title in ((1.0, 'reference at 1 Hz'), (0.0, 'without any speed')):
+        rows, leads, late, runs = [], [], 0, 0
+        for event in snow_events(measured / 'frostyboy_snow'):
+            score, kept = score_snow_event(event, rate)
+            error = kept.speed - event.speed[: len(kept.speed)]
+            late, runs = late + score.late_classes, runs + score.high_slip_runs
+            if score.lead is not None:
+                leads.append(score.lead)
+            rows.append(
+                (
+                    event.name,
+                    f'{score.start:.1f} to {score.stop:.1f}',
+                    f'{score.author:.1f}',
+                    '-' if score.warned is None else f'{score.warned:.1f}',
+                    '-' if score.lead is None else f'{score.lead:+.1f}',
+                    ', '.join(f'{t:.1f}' for t in score.all_warnings) or '-',
+                    f'{np.sqrt(np.mean(error**2)):.2f}',
+                )
+            )
+        parts.append(f'## FrostyBoy, {title}\n')
+        head = ('event', 'interval [s]', 'author', 'warned', 'lead [s]', 'all', 'speed RMSE [m/s]')
+        parts.append(table(head, rows))
+        parts.append(
+            f'\nWarned: {len(leads)} of {len(rows)}; mean lead {np.mean(leads):+.2f} s. Stretches '
+            f'of truth slip above 0.9 for 0.5 s: {runs}, of which {late} not in class 3 within '
+            '1 s.\n'
+        )
+    bag = measured / 'bags' / 'wvu_pathfinder_test17_mcap'
+    for rate, title in ((1.0, 'reference at 1 Hz'), (0.0, 'without reference')):
+        kept = pathfinder_record(bag, rate)
+        moving = np.abs(kept.speed) > 0.1
+        median = float(np.median(kept.slip[moving])) if moving.any() else 0.0
+        parts.append(
+            f'Pathfinder, {title}: {"a" if kept.stuck.any() else "no"} stuck warning, median slip '
+            f'{median:+.3f}.\n'
+        )
+    return '\n'.join(parts)

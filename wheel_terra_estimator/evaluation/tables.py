@@ -1,0 +1,171 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Tables of the bench as Markdown."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from wheel_terra_estimator.evaluation import scores
+from wheel_terra_estimator.evaluation.bench import DriveScore, Results
+from wheel_terra_estimator.evaluation.kinds import ENTRAPMENTS
+from wheel_terra_estimator.evaluation.scores import Samples
+
+_CLASSES = ('low', 'moderate', 'high', 'stuck')
+_MODES = {
+    'reference': 'with reference at 1 Hz',
+    'no_reference': 'without reference',
+    'no_torque': 'without torque',
+    'no_sinkage': 'without sinkage',
+    'no_orientation': 'without orientation',
+}
+
+
+def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """Return a Markdown table."""
+    lines = ['| ' + ' | '.join(head) + ' |', '|' + '---|' * len(head)]
+    lines += ['| ' + ' | '.join(row) + ' |' for row in rows]
+    return '\n'.join(lines)
+
+
+def report(results: Results, modes: Sequence[str]) -> str:
+    """Return all tables of a run."""
+    parts = []
+    for mode in modes:
+        by_kind = results.of_mode(mode)
+        if not by_kind:
+            continue
+        joined = {k: Samples.joined(d.samples for d in drives) for k, drives in by_kind.items()}
+        pooled = Samples.joined(joined.values())
+        high = float((np.abs(pooled.true_slip) > 0.6).mean())
+        count = sum(len(d) for d in by_kind.values())
+        parts.append(f'## {_MODES[mode].capitalize()}\n')
+        parts.append(
+            f'{count} drives, {len(pooled)} scored wheel samples, {high:.0%} of them above '
+            '|s| = 0.6.\n'
+        )
+        parts.append(_errors({**joined, '**pooled**': pooled}))
+        parts.append('\nBy true slip:\n')
+        parts.append(_errors(_by_slip(pooled)))
+        parts.append('\nClasses (rows: truth, columns: estimate; share of the row):\n')
+        parts.append(_confusion(pooled))
+        parts.append('\nStuck warnings:\n')
+        parts.append(_warnings(by_kind))
+        parts.append('\nFilter, mean over the drives (NIS of a consistent filter: 1):\n')
+        parts.append(_health(by_kind))
+        parts.append('')
+    return '\n'.join(parts)
+
+
+def _by_slip(pooled: Samples) -> dict[str, Samples]:
+    edges = ((-1.01, -0.02), (-0.02, 0.3), (0.3, 0.6), (0.6, 0.9), (0.9, 1.01))
+    names = ('braking', 'low', 'moderate', 'high', 'stuck')
+    parts = {
+        name: pooled.where((pooled.true_slip > low) & (pooled.true_slip <= high))
+        for name, (low, high) in zip(names, edges, strict=True)
+    }
+    return {name: part for name, part in parts.items() if len(part)}
+
+
+def _errors(rows: dict[str, Samples]) -> str:
+    head = (
+        'drives',
+        'slip RMSE',
+        'bias',
+        'coverage',
+        'held fix',
+        'dead reckoning',
+        'sinkage RMSE [mm]',
+        'coverage',
+        'pull RMSE [% load]',
+        'coverage',
+        'shared by load [%]',
+        '3 classes',
+        '2 classes',
+        '3 near border',
+    )
+    return table(head, (_error_row(name, data) for name, data in rows.items()))
+
+
+def _error_row(name: str, data: Samples) -> tuple[str, ...]:
+    return (
+        name,
+        f'{scores.rms(data.slip_error):.3f}',
+        f'{np.nanmean(data.slip_error):+.3f}',
+        f'{scores.coverage(data.slip_error, data.slip_std):.1%}',
+        f'{scores.rms(data.held_error):.3f}',
+        f'{scores.rms(data.dead_reckoned_error):.3f}',
+        f'{1e3 * scores.rms(data.sinkage_error):.2f}',
+        f'{scores.coverage(data.sinkage_error, data.sinkage_std):.1%}',
+        f'{100 * scores.rms(data.pull_error):.2f}',
+        f'{scores.coverage(data.pull_error, data.pull_std):.1%}',
+        f'{100 * scores.rms(data.shared_pull_error):.2f}',
+        _share(scores.three_class_accuracy(data)),
+        _share(scores.two_class_accuracy(data)),
+        _share(scores.three_class_accuracy(data, near_border=True)),
+    )
+
+
+def _share(value: float) -> str:
+    return '-' if np.isnan(value) else f'{value:.2%}'
+
+
+def _confusion(pooled: Samples) -> str:
+    counts = scores.confusion(pooled)
+    rows = []
+    for name, row in zip(_CLASSES, counts, strict=True):
+        total = row.sum()
+        rows.append((name, *(f'{v / total:.3f}' if total else '-' for v in row), str(total)))
+    return table(('truth', *_CLASSES, 'unknown', 'samples'), rows)
+
+
+def _warnings(by_kind: dict[str, list[DriveScore]]) -> str:
+    rows = []
+    for kind, drives in by_kind.items():
+        found = [d.warnings for d in drives]
+        trapped = [w for w in found if w.entrapped is not None]
+        warned = [w for w in trapped if w.lead_time is not None]
+        times = [w.lead_time for w in warned if w.lead_time is not None]
+        travels = [w.lead_travel for w in warned if w.lead_travel is not None]
+        hours = sum(w.duration for w in found) / 3600.0
+        kilometres = sum(w.distance for w in found) / 1000.0
+        false = sum(w.false_alarms for w in found)
+        rows.append(
+            (
+                f'{kind}{" (made to entrap)" if kind in ENTRAPMENTS else ""}',
+                f'{len(trapped)} of {len(found)}',
+                f'{len(warned)} of {len(trapped)}' if trapped else '-',
+                f'{np.median(times):.1f} ({min(times):.1f})' if times else '-',
+                f'{np.median(travels):.2f} ({min(travels):.2f})' if travels else '-',
+                str(false),
+                f'{false / hours:.2f}',
+                f'{false / max(kilometres, 1e-9):.1f}',
+            )
+        )
+    return table(
+        (
+            'drives',
+            'entrapped',
+            'warned before',
+            'lead [s], median (least)',
+            'lead [m of rim travel]',
+            'false alarms',
+            'per hour',
+            'per km',
+        ),
+        rows,
+    )
+
+
+def _health(by_kind: dict[str, list[DriveScore]]) -> str:
+    keys = ('nis_reference', 'nis_sinkage', 'nis_torque', 'nis_balance', 'filter_restarts')
+    rows = []
+    for kind, drives in by_kind.items():
+        values = []
+        for key in keys:
+            known = [float(d.health[key]) for d in drives if key in d.health]
+            values.append(f'{np.mean(known):.2f}' if known else '-')
+        rows.append((kind, *values))
+    return table(('drives', 'NIS reference', 'sinkage', 'torque', 'balance', 'restarts'), rows)
