@@ -22,6 +22,8 @@ from wheel_terra_estimator.bags.history import EstimateHistory, read_estimates
 from wheel_terra_estimator.bags.storage import open_bag
 from wheel_terra_estimator.bags.truth import Truth, read_truth
 from wheel_terra_estimator.configuration import reader
+from wheel_terra_estimator.reporting.drive_pictures import overview
+from wheel_terra_estimator.reporting.style import picture_style
 from wheel_terra_estimator.simulation.truth import entrapped
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -116,6 +118,8 @@ def _key_numbers(drive: DemoDrive) -> None:
         truth = read_truth(bag, {}, configuration)
     with open_bag(OUTPUT / drive.name) as bag:
         history = read_estimates(bag)
+    with picture_style():
+        overview(history, truth).savefig(OUTPUT / f'{drive.name}.png', dpi=110)
     if truth is None or truth.slip is None:
         return
     moving = _seconds(truth, truth.slip.stamp) > 10.0
