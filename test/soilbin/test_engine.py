@@ -126,8 +126,11 @@ def test_engine_grows_beyond_the_largest_time_step(tmp_path, factor, stable, rat
     assert (off < 0.05) if stable else (off > 0.5)
 
 
-SMALL = ['-p', 'bed.length:=0.45', '-p', 'bed.grain_scale:=2.5', '-p', 'operation.start:=0.2', '-p', 'numerics.frames:=4',
-         '-p', 'bed.settling_time:=0.8', '-p', 'operation.speed_factor:=8.0']  # fmt: skip
+SMALL = [
+    '-p', 'bed.length:=0.45', '-p', 'bed.grain_scale:=2.5', '-p', 'operation.start:=0.2',
+    '-p', 'bed.settling_time:=0.8', '-p', 'operation.speed_factor:=8.0',
+    '-p', 'numerics.frames:=4',
+]  # fmt: skip
 
 
 @pytest.fixture(scope='module')

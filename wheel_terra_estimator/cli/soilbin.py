@@ -67,7 +67,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         if name == 'calibrate':
             study.add_argument(
                 '--stage', choices=('screen', 'seeds', 'all'), default='all',
-                help='screen: one seed per setting; seeds: the best ones on several beds',
+                help='screen: one bed per setting; seeds: the final one on several beds',
             )  # fmt: skip
         _common(study, studies=True)
 

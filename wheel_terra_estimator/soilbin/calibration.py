@@ -3,7 +3,8 @@
 """Calibration on wheel 2 alone: what the paper does not state, and what each of it decides.
 
 Wheel 2 under 19.6 N on four slopes gives the five numbers of the fit; the other eight wheels judge
-(``wheel-terra soilbin reproduce``). Coarse grains, so that one setting takes two minutes.
+(``wheel-terra soilbin reproduce``). Coarse grains screen the assumptions; the last ones are at
+full scale, which is weaker than coarse grains at the same setting.
 """
 
 from __future__ import annotations
@@ -20,30 +21,54 @@ from wheel_terra_estimator.soilbin.study import Job
 
 TABLE = 'calibration.csv'
 SLOPES = (0.0, 7.1, 15.0, 25.0)
-CENTRE = {'grains__rolling_friction': 0.8, 'grains__rolling_stiffness': 2000.0}
-# One assumption changed at a time about the centre, and the grid of the two fitted ones.
+FINAL = 'full scale, mu_r 1.5, k_r 3000, at once'
+# Load and pull put on at once, and the speed of the final setting.
+AT_ONCE: dict[str, object] = {
+    'operation__loading_time': 0.02,
+    'operation__pull_ramp': 0.001,
+    'operation__speed_factor': 8.0,
+    'operation__duration': 40.0,
+}
+FULL_SCALE: dict[str, object] = {'bed__grain_scale': 1.0, 'bed__length': 1.0}
+DENSE: dict[str, object] = {'bed__preparation_friction': 0.05}
+
+
+def rolling(friction: float, stiffness: float) -> dict[str, object]:
+    """Return the two fitted parameters: rolling friction [-] and rolling stiffness [N/m]."""
+    return {'grains__rolling_friction': friction, 'grains__rolling_stiffness': stiffness}
+
+
+# Every line says what it changes against the published list with damping ratio 0.15, grains x2,
+# load raised over 1 s and pull over 6 cm of rim travel, rim speed x4.
 SETTINGS: dict[str, dict[str, object]] = {
-    'centre': {},
-    'published list alone': {'grains__rolling_friction': 0.0},
-    'rolling friction 0.4': {'grains__rolling_friction': 0.4},
-    'rolling friction 0.6': {'grains__rolling_friction': 0.6},
-    'rolling friction 1.0': {'grains__rolling_friction': 1.0},
-    'rolling friction 0.6, k_r 5000': {
-        'grains__rolling_friction': 0.6,
-        'grains__rolling_stiffness': 5000.0,
-    },
-    'rolling friction 1.0, k_r 10000': {
-        'grains__rolling_friction': 1.0,
-        'grains__rolling_stiffness': 10_000.0,
-    },
-    'grains that do not turn': {'grains__rotation': 'locked', 'grains__rolling_friction': 0.0},
-    'tangential stiffness x10': {'grains__tangential_stiffness': 5000.0},
-    'critical damping': {'grains__damping_ratio': 1.0},
-    'random bed': {'bed__arrangement': 'random'},
-    'dense bed (settled with friction 0.05)': {'bed__preparation_friction': 0.05},
-    'load dropped at once': {'operation__loading_time': 0.02},
-    'half the speed': {'operation__speed_factor': 2.0},
-    'twice the speed': {'operation__speed_factor': 8.0},
+    'published list alone': {},
+    'mu_r 0.6, k_r 2000': rolling(0.6, 2000.0),
+    'mu_r 0.8, k_r 2000': rolling(0.8, 2000.0),
+    'mu_r 1.0, k_r 2000': rolling(1.0, 2000.0),
+    'mu_r 0.6, k_r 5000': rolling(0.6, 5000.0),
+    'mu_r 1.0, k_r 10000': rolling(1.0, 10_000.0),
+    'grains that do not turn': {'grains__rotation': 'locked'},
+    'mu_r 0.8, k_r 2000, K_t x10': rolling(0.8, 2000.0) | {'grains__tangential_stiffness': 5000.0},
+    'mu_r 0.8, k_r 2000, random bed': rolling(0.8, 2000.0) | {'bed__arrangement': 'random'},
+    'mu_r 1.0, k_r 2000, dense bed': rolling(1.0, 2000.0) | DENSE,
+    'mu_r 1.0, k_r 2000, critical damping': rolling(1.0, 2000.0) | {'grains__damping_ratio': 1.0},
+    'mu_r 1.0, k_r 2000, rim speed x2': rolling(1.0, 2000.0) | {'operation__speed_factor': 2.0},
+    'mu_r 1.0, k_r 2000, rim speed x8': rolling(1.0, 2000.0) | {'operation__speed_factor': 8.0},
+    'mu_r 0.8, k_r 2000, load at once': rolling(0.8, 2000.0) | {'operation__loading_time': 0.02},
+    'mu_r 1.0, k_r 2000, load and pull at once': rolling(1.0, 2000.0) | AT_ONCE,
+    'mu_r 1.5, k_r 2000, load and pull at once': rolling(1.5, 2000.0) | AT_ONCE,
+    'mu_r 1.0, k_r 5000, load and pull at once': rolling(1.0, 5000.0) | AT_ONCE,
+    'mu_r 1.0, k_r 10000, load and pull at once': rolling(1.0, 10_000.0) | AT_ONCE,
+    'mu_r 0.6, k_r 10000, dense, at once': rolling(0.6, 10_000.0) | AT_ONCE | DENSE,
+    'mu_r 1.0, k_r 5000, dense, at once': rolling(1.0, 5000.0) | AT_ONCE | DENSE,
+    'full scale, mu_r 0.8, k_r 2000': rolling(0.8, 2000.0)
+    | FULL_SCALE
+    | {'operation__duration': 40.0},
+    'full scale, mu_r 1.0, k_r 10000, at once': rolling(1.0, 10_000.0) | FULL_SCALE | AT_ONCE,
+    FINAL: rolling(1.5, 3000.0)
+    | FULL_SCALE
+    | AT_ONCE
+    | {'operation__resting_time': 0.98, 'numerics__frames': 0},
 }
 TARGETS = {  # figure: (published, tolerance of the fit)
     'slope_at_20_percent_deg': (7.10, 2.0),
@@ -55,7 +80,7 @@ TARGETS = {  # figure: (published, tolerance of the fit)
 
 
 def base_case(grain_scale: float) -> Case:
-    """Return wheel 2 on the coarse bed with the setting at the centre of the screen."""
+    """Return wheel 2 on the bed that the settings change."""
     case = files.load(['published', 'wheel_2'])
     return case.replace(
         grains__damping_ratio=0.15,
@@ -65,23 +90,19 @@ def base_case(grain_scale: float) -> Case:
         operation__duration=30.0,
         numerics__samples=400,
         numerics__frames=1,
-        **CENTRE,
     )
 
 
 def jobs(arguments: argparse.Namespace) -> list[Job]:
-    """Return settings x slopes over one bed, or the three best settings over several."""
+    """Return all settings over one bed, then the final one over several; the full scale last."""
     base = base_case(arguments.grain_scale or 2.0)
-    seeds = arguments.seeds or 3
     found = []
     if arguments.stage != 'seeds':
         found += [_job(base, setting, slope, 1) for setting in SETTINGS for slope in SLOPES]
     if arguments.stage != 'screen':
-        fitted = [name for name in SETTINGS if name == 'centre' or name.startswith('rolling')]
         found += [
-            _job(base, setting, slope, seed)
-            for seed in range(1, seeds + 1)
-            for setting in fitted
+            _job(base, FINAL, slope, seed)
+            for seed in range(1, 1 + (arguments.seeds or 3))
             for slope in SLOPES
         ]
     return found
@@ -124,7 +145,7 @@ def report(arguments: argparse.Namespace, rows: Sequence[Row], folder: Path) -> 
     scored: list[tuple[float, str]] = []
     for setting in SETTINGS:
         part = [row for row in rows if row['setting'] == setting]
-        if not part:
+        if not any(row.get('slip') or row.get('stopped') for row in part):
             continue
         beds = metrics.per_seed(part)
         found = figures(part)
@@ -148,9 +169,10 @@ def report(arguments: argparse.Namespace, rows: Sequence[Row], folder: Path) -> 
                      value(100 * mean('sinkage_average')), value(score)])  # fmt: skip
     lines = ['# Calibration on wheel 2', '', *table(head, body), '']
     lines.append(
-        'Misfit: root mean square of the five deviations in units of 2 deg, 8 points and 25 %. '
-        'The centre has rolling friction 0.8 and rolling stiffness 2000 N/m; every other line '
-        'changes what it names. Written by `wheel-terra soilbin calibrate`.'
+        'Misfit: root mean square of the five deviations in units of 2 deg, 8 points and 25 %, '
+        'where all five are there (- where slopes are still to be run: --resume). Not named: '
+        'damping ratio 0.15, grains x2 in a bin of 0.9 m, load raised over 1 s, pull over 6 cm of '
+        'rim travel, rim speed x4, 30 s. Written by `wheel-terra soilbin calibrate`.'
     )
     if scored:
         lines += ['', f'Best: {min(scored)[1]} (misfit {min(scored)[0]:.2f}).']

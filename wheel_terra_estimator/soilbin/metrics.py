@@ -20,6 +20,7 @@ TABLE6 = (
     'power_number_20_percent',
 )
 TABLE7 = ('slip', 'gross_traction', 'motion_resistance', 'sinkage_average')
+WIDEST = 10.0  # [deg] between two slopes that a figure may be interpolated from
 Row = Mapping[str, str]
 
 
@@ -50,14 +51,18 @@ def by_slope(rows: Iterable[Row], name: str) -> tuple[np.ndarray, np.ndarray]:
 
 
 def crossing(x: np.ndarray, y: np.ndarray, level: float) -> float:
-    """Return where y first rises through the level, linear between points.
+    """Return the slope [deg] where y first rises through the level, linear between points.
 
-    Below the first point the first two points are prolonged; nan where it is not reached.
+    Points more than ``WIDEST`` apart are not joined. Below the level ground the first two points
+    are prolonged, so that a wheel that slips more there still has a (negative) slope. nan where
+    the level is not reached between points that were run.
     """
     if x.size < 2:
         return math.nan
     for k in range(1, x.size):
-        if y[k] >= level > y[k - 1] or (k == 1 and y[0] >= level):
+        if x[k] - x[k - 1] > WIDEST:
+            continue
+        if y[k] >= level > y[k - 1] or (k == 1 and x[0] == 0 and y[0] >= level):
             rise = y[k] - y[k - 1]
             if rise <= 0:
                 continue
@@ -72,8 +77,14 @@ def table6_metrics(rows: Sequence[Row]) -> dict[str, float]:
     at_20 = crossing(slopes, slip, 0.2)
 
     def power_at(slope: float) -> float:
-        inside = number_slopes.size and number_slopes[0] <= slope <= number_slopes[-1]
-        return float(np.interp(slope, number_slopes, power)) if inside else math.nan
+        above = int(np.searchsorted(number_slopes, slope))
+        if above < number_slopes.size and number_slopes[above] == slope:
+            return float(power[above])
+        if above in (0, number_slopes.size):
+            return math.nan
+        if number_slopes[above] - number_slopes[above - 1] > WIDEST:
+            return math.nan
+        return float(np.interp(slope, number_slopes, power))
 
     return {
         'slope_at_20_percent_deg': at_20,

@@ -15,7 +15,7 @@ from pathlib import Path
 from wheel_terra_estimator.soilbin.case import Case
 
 ROOM = 100_000_000  # [bytes] free on the disk, or nothing is kept: the engine does not say
-FORMAT = 1  # raise when the stages change what a bed is
+FORMAT = 2  # raise when the stages change what a bed is
 
 
 def default_cache() -> Path:

@@ -65,12 +65,13 @@ def run_study(
 ) -> list[dict[str, str]]:
     """Run the jobs that the table does not hold yet; return the rows of all jobs.
 
-    `dask`: address of a scheduler, or 'local' for a cluster of processes on this machine.
+    ``workers``: engine processes at a time; 0 runs nothing and returns the finished rows.
+    ``dask``: address of a scheduler, or 'local' for a cluster of processes on this machine.
     """
     done = {row['key'] for row in read_rows(table)}
     unique = {job.key: job for job in jobs}
     waiting = [job for key, job in unique.items() if key not in done]
-    if waiting:
+    if waiting and workers:
         tell(f'{len(waiting)} of {len(unique)} cases to run, {workers} at a time')
         table.parent.mkdir(parents=True, exist_ok=True)
         runner = _on_dask if dask else _on_this_machine
