@@ -1,0 +1,257 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""The reference model against a second model, limit cases, symmetry and scaling."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from terra_tools import EFFECTS, SAND, WHEEL, points, random_cases, second_model, state
+
+from wheel_terra_estimator.terramechanics import stresses
+from wheel_terra_estimator.terramechanics.model import (
+    OUTSIDE_VALIDITY,
+    OVERLOADED,
+    WheelSoilModel,
+)
+from wheel_terra_estimator.terramechanics.soil import Soil
+from wheel_terra_estimator.terramechanics.wheel import Wheel
+
+
+@pytest.mark.parametrize('slip', [-0.6, -0.05, 0.0, 0.05, 0.3, 0.6, 0.9])
+def test_agrees_with_a_second_model(slip: float) -> None:
+    effects = {
+        'slip_sinkage_exponent': {'n1': 0.3},
+        'stress_peak_shift': {'c2': 0.15},
+        'lug_shear_radius': {'lam': 0.5},
+    }
+    ours = state([slip], effects=effects).outputs()[0]
+    truth = second_model(slip, 80.0, SAND, WHEEL, n1=0.3, c2=0.15, lam=0.5)
+    assert ours == pytest.approx(truth, rel=3e-4, abs=1e-5)
+
+
+def test_without_effects_it_is_the_contract_s_base_model() -> None:
+    answer = state([0.4])
+    assert answer.outputs()[0] == pytest.approx(second_model(0.4, 80.0, SAND, WHEEL), rel=1e-4)
+    t1 = answer.entrance_angle
+    assert answer.peak_stress_angle == pytest.approx(SAND.peak_stress_ratio * t1)
+    assert answer.leaving_angle == pytest.approx(SAND.leaving_angle_ratio * t1)
+    assert answer.sinkage == pytest.approx(WHEEL.radius * (1.0 - np.cos(t1)))
+
+
+def test_error_of_the_nodes_is_below_a_thousandth() -> None:
+    for soil, effects, row in random_cases(40, 3):
+        coarse = WheelSoilModel(soil, effects).steady_state(row)
+        fine = WheelSoilModel(soil, effects, nodes=40).steady_state(row)
+        assert coarse.sinkage == pytest.approx(fine.sinkage, rel=1e-3)
+        assert coarse.drawbar_pull == pytest.approx(
+            fine.drawbar_pull, abs=1e-3 * row.normal_load[0]
+        )
+
+
+def test_frictionless_soil_gives_minus_the_compaction_resistance() -> None:
+    # c1 = c3 = 0: stress at the bottom only rises towards it, and pull is the work of the rut.
+    soil = replace(
+        SAND, cohesion=0.0, friction_angle=0.0, peak_stress_ratio=0.0, leaving_angle_ratio=0.0
+    )
+    answer = state([0.3], soil=soil)
+    modulus = stresses.bekker_modulus(soil.cohesive_modulus, soil.frictional_modulus, WHEEL.width)
+    resistance = stresses.compaction_resistance(
+        WHEEL.width, modulus, soil.sinkage_exponent, answer.sinkage
+    )
+    assert answer.torque == pytest.approx(0.0, abs=1e-12)
+    assert answer.drawbar_pull == pytest.approx(-resistance, rel=2e-3)
+
+
+def test_static_sinkage_is_bekker_s() -> None:
+    # A large stiff wheel: small sinkage, where Bekker's expansion of the circle holds.
+    soil = Soil(0.0, 5e7, 1.0, 0.0, 0.0, 0.01, 0.0, 0.0)
+    wheel = Wheel(0.5, 0.2)
+    answer = state([0.0], 100.0, soil=soil, wheel=wheel)
+    assert answer.sinkage == pytest.approx(
+        stresses.bekker_wheel_sinkage(100.0, wheel, 5e7, 1.0), rel=0.01
+    )
+
+
+def test_plate_is_the_limit_without_curvature() -> None:
+    assert stresses.static_sinkage(200.0, 0.01, 2e6, 1.0) == pytest.approx(0.01)
+
+
+def test_forces_scale_with_size() -> None:
+    # All lengths times 2 at the same pressures: forces times 4, torque times 8.
+    big = replace(
+        SAND,
+        cohesive_modulus=0.0,
+        frictional_modulus=SAND.frictional_modulus * 2.0**-SAND.sinkage_exponent,
+        shear_modulus=2.0 * SAND.shear_modulus,
+    )
+    small = replace(SAND, cohesive_modulus=0.0)
+    twice = Wheel(2 * WHEEL.radius, 2 * WHEEL.width, 2 * WHEEL.lug_height, 30)
+    slip = np.linspace(-0.5, 0.9, 7)
+    a, b = state(slip, 80.0, soil=small), state(slip, 320.0, soil=big, wheel=twice)
+    assert b.sinkage == pytest.approx(2 * a.sinkage, rel=1e-9)
+    assert b.drawbar_pull == pytest.approx(4 * a.drawbar_pull, rel=1e-8, abs=1e-8)
+    assert b.torque == pytest.approx(8 * a.torque, rel=1e-8, abs=1e-8)
+
+
+def test_reverse_mirrors_pull_and_torque() -> None:
+    forward = state([0.3, -0.2], effects={'bulldozing': {}, 'drivetrain_friction': {}},
+                    angular_velocity=1.0)  # fmt: skip
+    back = state([0.3, -0.2], effects={'bulldozing': {}, 'drivetrain_friction': {}},
+                 angular_velocity=-1.0)  # fmt: skip
+    assert back.sinkage == pytest.approx(forward.sinkage)
+    assert back.drawbar_pull == pytest.approx(-forward.drawbar_pull)
+    assert back.torque == pytest.approx(-forward.torque)
+
+
+def test_seed_1_s_printed_shear_is_the_shear_slip_radius() -> None:
+    # With R = r + h/2 and slip referred to R, v/w = (1 - s) R: equation 14 as printed.
+    effects = {'lug_shear_radius': {'lam': 0.5}}
+    printed = state([0.2], effects=effects, slip_radius='shear')
+    lug_tip_slip = 1.0 - (1.0 - 0.2) * (WHEEL.radius + 0.005) / WHEEL.tip_radius
+    contract = state([lug_tip_slip], effects=effects)
+    assert printed.outputs() == pytest.approx(contract.outputs(), rel=1e-9)
+
+
+def test_pull_and_torque_at_the_ends_of_slip() -> None:
+    answer = state([-1.0, 0.0, 1.0], wheel=Wheel(0.1574, 0.165))
+    assert np.isfinite(answer.outputs()).all()
+    # Rolling: hardly any shear; spinning: all of it; locked: all of it, backwards.
+    assert abs(answer.torque[1]) < 0.2 * answer.torque[2]
+    assert answer.torque[0] < 0.0 < answer.torque[2]
+    assert answer.drawbar_pull[0] < answer.drawbar_pull[1] < 0.0 < answer.drawbar_pull[2]
+
+
+@pytest.mark.parametrize('count', [8, 15, 24, 30])
+def test_number_of_lugs_has_no_effect(count: int) -> None:
+    # Ding et al. 2010, figure 3.
+    wheel = replace(WHEEL, lug_count=count)
+    assert state([0.4], effects=EFFECTS, wheel=wheel).outputs() == pytest.approx(
+        state([0.4], effects=EFFECTS).outputs()
+    )
+
+
+def test_narrow_and_small_wheels_sink_more() -> None:
+    # Ding et al. 2010, figure 5: Wh2 (narrow), Wh1 (small), Wh3.
+    slip = np.array([0.0, 0.3, 0.6])
+    wide, narrow, large = (
+        state(slip, effects=EFFECTS, wheel=Wheel(r, b, 0.01, 30)).sinkage
+        for r, b in ((0.135, 0.165), (0.135, 0.110), (0.1574, 0.165))
+    )
+    assert (narrow > wide).all() and (wide > large).all()
+
+
+def test_lug_height_sets_the_slope_of_the_sinkage() -> None:
+    # Ding et al. 2010, figures 4 and 5: the higher the lugs, the steeper the curve.
+    slopes = []
+    for height in (0.005, 0.010, 0.015):
+        z = state([0.0, 0.6], effects=EFFECTS, wheel=Wheel(0.1574, 0.165, height, 30)).sinkage
+        slopes.append(z[1] - z[0])
+    assert slopes[0] < slopes[1] < slopes[2]
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    slip=st.floats(-0.9, 0.95),
+    pressure=st.floats(500.0, 6000.0),
+    radius=st.floats(0.05, 0.3),
+    modulus=st.floats(4e5, 5e6),
+    exponent=st.floats(0.6, 1.3),
+    friction=st.floats(0.2, 0.8),
+)
+def test_sinkage_grows_with_load_and_everything_is_finite(
+    slip: float, pressure: float, radius: float, modulus: float, exponent: float, friction: float
+) -> None:
+    soil = Soil(0.0, modulus, exponent, 300.0, friction, 0.012, 0.45, -0.2)
+    wheel = Wheel(radius, radius, 0.05 * radius, 20)
+    loads = pressure * radius * radius * np.array([0.5, 1.0])
+    model = WheelSoilModel(soil, {'lug_shear_radius': {}}, strict=False)
+    answer = model.steady_state(points(slip, loads, wheel))
+    assert np.isfinite(answer.outputs()).all()
+    if not (answer.flags & OVERLOADED).any():
+        assert answer.sinkage[1] > answer.sinkage[0] > 0.0
+
+
+def test_reece_law_equals_bekker_s_at_one_width_and_gravity() -> None:
+    # (c kc' + rho g b kphi') (z/b)^n = k z^n with k = (...) b^-n.
+    reece = replace(SAND, pressure_law='reece', cohesive_modulus=30.0, frictional_modulus=600.0)
+    b = WHEEL.width
+    pressure = 250.0 * 30.0 + 1605.0 * 9.80665 * b * 600.0
+    bekker = replace(SAND, cohesive_modulus=0.0, frictional_modulus=pressure * b**-1.1)
+    assert state([0.3], soil=reece).outputs() == pytest.approx(
+        state([0.3], soil=bekker).outputs(), rel=1e-9
+    )
+    low_gravity = state([0.3], soil=reece, gravity=1.62)
+    assert low_gravity.sinkage > 1.5 * state([0.3], soil=reece).sinkage
+
+
+@pytest.mark.parametrize('method', ['quadrature', 'closed_form'])
+def test_jacobian_against_central_differences(method: str) -> None:
+    effects = {**EFFECTS, 'soil_mound': {'kappa': 1.0, 'onset': 0.3}, 'bulldozing': {'kb': 0.3}}
+    row = points(np.array([-0.3, 0.1, 0.5, 0.8]), np.array([40.0, 80.0, 80.0, 120.0]))
+    model = WheelSoilModel(SAND, effects, method)
+    names = {
+        'soil.frictional_modulus': 1e3,
+        'soil.sinkage_exponent': 1e-4,
+        'soil.cohesion': 0.1,
+        'soil.friction_angle': 1e-5,
+        'soil.shear_modulus': 1e-6,
+        'soil.peak_stress_ratio': 1e-5,
+        'soil.leaving_angle_ratio': 1e-5,
+        'effects.slip_sinkage_exponent.n1': 1e-4,
+        'effects.soil_mound.kappa': 1e-4,
+        'effects.soil_mound.onset': 1e-5,
+        'effects.bulldozing.kb': 1e-4,
+    }
+    _, jacobian = model.jacobian(row, list(names))
+    for column, (name, step) in enumerate(names.items()):
+        ends = []
+        for sign in (1.0, -1.0):
+            kind, _, rest = name.partition('.')
+            soil, changed = SAND, {k: dict(v) for k, v in model.effects.items()}
+            if kind == 'soil':
+                soil = replace(SAND, **{rest: getattr(SAND, rest) + sign * step})
+            else:
+                effect, parameter = rest.split('.')
+                changed[effect][parameter] += sign * step
+            ends.append(WheelSoilModel(soil, changed, method).steady_state(row).outputs())
+        truth = (ends[0] - ends[1]) / (2.0 * step)
+        scale = np.abs(truth).max(axis=0)
+        assert np.abs(jacobian[..., column] - truth) == pytest.approx(0.0, abs=1e-4 * scale.max()), name
+
+
+def test_jacobian_by_slip_and_load_and_of_effects_that_are_off() -> None:
+    row = points(np.array([0.2, 0.6]))
+    model = WheelSoilModel(SAND)
+    _, jacobian = model.jacobian(row, ['slip', 'normal_load', 'effects.lug_digging.kd'])
+    more = (model.steady_state(points(row.slip + 1e-5)).outputs()
+            - model.steady_state(points(row.slip - 1e-5)).outputs()) / 2e-5  # fmt: skip
+    assert jacobian[..., 0] == pytest.approx(more, rel=1e-4)
+    heavier = (model.steady_state(points(row.slip, 80.01)).outputs()
+               - model.steady_state(points(row.slip, 79.99)).outputs()) / 0.02  # fmt: skip
+    assert jacobian[..., 1] == pytest.approx(heavier, rel=1e-4)
+    assert jacobian[:, 0, 2] == pytest.approx(WHEEL.lug_height * row.slip)
+    assert jacobian[:, 1:, 2] == pytest.approx(0.0)
+    with pytest.raises(ValueError, match=r'effects\.no_such\.kd'):
+        model.jacobian(row, ['effects.no_such.kd'])
+
+
+def test_load_that_the_soil_cannot_carry() -> None:
+    with pytest.raises(ValueError, match=r'normal load is 1e\+06 N .* carries at most'):
+        state([0.1], 1e6)
+    clamped = WheelSoilModel(SAND, strict=False).steady_state(points([0.1, 0.97], [1e6, 80.0]))
+    assert clamped.flags.tolist() == [OVERLOADED, OUTSIDE_VALIDITY]
+    assert np.isfinite(clamped.outputs()).all()
+    assert clamped.sinkage[0] == pytest.approx(WHEEL.radius)
+
+
+def test_measured_leaving_angle_overrides_the_law() -> None:
+    answer = state([0.8, 0.8], effects={'soil_mound': {}}, leaving_angle=[math.nan, -0.35])
+    assert answer.leaving_angle[1] == pytest.approx(-0.35)
+    assert answer.leaving_angle[0] != pytest.approx(-0.35)
+    assert answer.drawbar_pull[0] != pytest.approx(answer.drawbar_pull[1])
