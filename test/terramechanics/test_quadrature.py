@@ -222,7 +222,9 @@ def test_jacobian_against_central_differences(method: str) -> None:
             ends.append(WheelSoilModel(soil, changed, method).steady_state(row).outputs())
         truth = (ends[0] - ends[1]) / (2.0 * step)
         scale = np.abs(truth).max(axis=0)
-        assert np.abs(jacobian[..., column] - truth) == pytest.approx(0.0, abs=1e-4 * scale.max()), name
+        assert np.abs(jacobian[..., column] - truth) == pytest.approx(
+            0.0, abs=1e-4 * scale.max()
+        ), name
 
 
 def test_jacobian_by_slip_and_load_and_of_effects_that_are_off() -> None:

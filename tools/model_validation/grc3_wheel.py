@@ -39,15 +39,21 @@ def points_at(slip: FloatArray) -> OperatingPoints:
     return OperatingPoints(slip, LOAD, WHEEL, slip_radius='shear')
 
 
-def section(shared: Path, figures: Path) -> str:
-    """Return the section and draw its picture."""
+def read(shared: Path) -> tuple[FloatArray, FloatArray]:
+    """Return slip (N,) and measured rows (N, 3), pull only."""
     path = shared / 'reference' / 'measured_viper_slip_slope.csv'
     with path.open(encoding='utf-8') as stream:
         rows = [row for row in csv.DictReader(stream) if row['series'] == 'TREC_single_wheel']
     slip = np.array([float(row['slip']) for row in rows])
-    pull = LOAD * np.array([float(row['equivalent_DP_over_W']) for row in rows])
     measured = np.full((len(rows), 3), np.nan)
-    measured[:, 1] = pull
+    measured[:, 1] = [LOAD * float(row['equivalent_DP_over_W']) for row in rows]
+    return slip, measured
+
+
+def section(shared: Path, figures: Path) -> str:
+    """Return the section and draw its picture."""
+    slip, measured = read(shared)
+    pull = measured[:, 1]
     span = np.ptp(pull)
     lines = [
         '| fitted on | mound | fitted | held-out pull rms, of its range '

@@ -169,7 +169,7 @@ def equivalent_soil(
     sigma, tau = stresses.normal[good], stresses.shear[good]
     moduli = np.geomspace(1e-3, 0.06, 200) if shear_moduli is None else np.asarray(shear_moduli)
     j = shear_displacement(tm, t1, R, ratio)
-    share = np.sign(j) * -np.expm1(-np.abs(j)[:, None] / moduli)  # (N, K)
+    share = np.sign(j)[:, None] * -np.expm1(-np.abs(j)[:, None] / moduli)  # (N, K)
     separable = bool(np.ptp(sigma) > 0.2 * np.mean(sigma) and sigma.size > 2)
     best: tuple[float, float, float, float] | None = None
     for k, modulus in enumerate(moduli):

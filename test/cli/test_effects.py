@@ -1,0 +1,71 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""wheel-terra effects: the catalogue for people, for programs and for the documentation."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from wheel_terra_estimator.cli.effects import as_markdown
+from wheel_terra_estimator.cli.main import main
+from wheel_terra_estimator.terramechanics import effects as catalogue_module
+from wheel_terra_estimator.terramechanics.effects import catalogue
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.fixture(autouse=True)
+def _forget_registered():
+    yield
+    catalogue_module._registered.clear()
+
+
+def test_text_names_every_effect_and_parameter(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(['effects']) == 0
+    text = capsys.readouterr().out
+    for name, effect in catalogue().items():
+        assert f'\n{name}\n' in f'\n{text}'
+        for parameter in effect.parameters:
+            assert f'{parameter.name} [{parameter.unit}]' in text
+    assert max(map(len, text.splitlines())) <= 100
+
+
+def test_json_holds_what_a_program_needs(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(['effects', '--format', 'json']) == 0
+    records = {record['name']: record for record in json.loads(capsys.readouterr().out)}
+    assert records.keys() == catalogue().keys()
+    digging = records['lug_digging']
+    assert digging['touches'] == ['sinkage'] and digging['parameters'][0]['name'] == 'kd'
+
+
+def test_one_effect_and_a_misspelt_one(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(['effects', 'soil_mound']) == 0
+    text = capsys.readouterr().out
+    assert text.startswith('soil_mound') and 'lug_digging' not in text
+    assert main(['effects', 'soil_mund']) == 2
+    assert "did you mean 'soil_mound'?" in capsys.readouterr().err
+
+
+def test_a_user_s_file_is_listed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / 'own.py'
+    path.write_text(
+        'from wheel_terra_estimator.terramechanics.effects import Effect, EffectParameter\n'
+        'def term(contact, p, maths):\n    contact.torque = contact.torque + p.a\n'
+        "E = Effect('gears', 'worn gears', 'T += a',\n"
+        "    (EffectParameter('a', 'N m', 0.1, 0.0, 1.0, 0.1, 'half_normal', 'loss'),),\n"
+        "    frozenset({'torque'}), 'any', 'test', on_outputs=term)\n"
+    )
+    assert main(['effects', '--load', str(path)]) == 0
+    assert 'worn gears' in capsys.readouterr().out
+    assert main(['effects', '--load', str(tmp_path / 'none.py')]) == 2
+
+
+def test_the_page_and_its_pictures_are_up_to_date() -> None:
+    page = (ROOT / 'docs' / 'effects.md').read_text(encoding='utf-8')
+    assert page == as_markdown(catalogue()), 'run python tools/document_effects.py'
+    for name in catalogue():
+        picture = ROOT / 'docs' / 'models' / 'effects' / f'{name}.svg'
+        assert picture.is_file() and picture.stat().st_size < 60_000

@@ -1,0 +1,127 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""wheel-terra predict: tables and pictures of the model, and what it refuses."""
+
+from __future__ import annotations
+
+import csv
+import io
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from wheel_terra_estimator.cli.main import main
+from wheel_terra_estimator.configuration import reader
+from wheel_terra_estimator.terramechanics.model import WheelSoilModel
+from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
+from wheel_terra_estimator.terramechanics.wheel import Wheel
+
+BASE = ('predict', '--config', 'hit_wh3_lug10', '--config', 'hit_lss1')
+
+
+def table(text: str) -> dict[str, np.ndarray]:
+    rows = list(csv.DictReader(io.StringIO(text)))
+    return {k: np.array([float(r[k] or 'nan') for r in rows]) for k in rows[0]}
+
+
+def test_the_table_is_the_model(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([*BASE, '--slip', '-0.4:0.9:14', '--load', '40,80', '--slope', '0,0.1']) == 0
+    got = table(capsys.readouterr().out)
+    assert got['slip'].size == 14 * 4
+    configuration = reader.load(['hit_wh3_lug10', 'hit_lss1'])
+    model = WheelSoilModel(configuration.soil, configuration.effects)
+    points = OperatingPoints(
+        got['slip'], got['normal_load'], Wheel(0.1574, 0.165, 0.010, 30),
+        slope=got['slope'], slip_radius=configuration.slip_radius,
+    )  # fmt: skip
+    answer = model.steady_state(points)
+    for name in ('sinkage', 'drawbar_pull', 'torque'):
+        assert got[name] == pytest.approx(getattr(answer, name), rel=1e-7, abs=1e-9)
+
+
+def test_an_effect_of_the_command_line_acts(capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = [*BASE, '--slip', '0.5', '--load', '80']
+    assert main(arguments) == 0
+    without = table(capsys.readouterr().out)
+    assert main([*arguments, '-p', 'effects.sinkage_offset.enabled:=true',
+                 '-p', 'effects.sinkage_offset.offset:=0.004']) == 0  # fmt: skip
+    offset = table(capsys.readouterr().out)
+    assert offset['sinkage'] - without['sinkage'] == pytest.approx(0.004)
+
+
+def test_text_angles_and_closed_form(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([*BASE, '--slip', '0.2,0.6', '--table', 'text', '--angles']) == 0
+    text = capsys.readouterr().out
+    assert 'sinkage [m]' in text and 'entrance_angle [rad]' in text
+    assert len(text.splitlines()) == 3
+    assert main([*BASE, '--slip', '0.2,0.6']) == 0
+    exact = table(capsys.readouterr().out)
+    assert main([*BASE, '--slip', '0.2,0.6', '--method', 'closed_form']) == 0
+    close = table(capsys.readouterr().out)
+    assert close['drawbar_pull'] == pytest.approx(exact['drawbar_pull'], abs=0.03 * 80)
+    assert (close['drawbar_pull'] != exact['drawbar_pull']).all()
+
+
+def test_points_of_a_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / 'rows.csv'
+    path.write_text(
+        'slip,normal_load,sinkage,drawbar_pull,lug_height,leaving_angle\n'
+        '0.2,80,0.01,20,0.01,\n0.2,80,0.01,20,0.0,\n0.2,80,0.01,20,0.01,-0.4\n'
+    )
+    assert main([*BASE, '--points', str(path)]) == 0
+    got = table(capsys.readouterr().out)
+    assert got['lug_height'].tolist() == [0.01, 0.0, 0.01]
+    assert len(set(got['drawbar_pull'].tolist())) == 3
+    path.write_text('slip,load\n0.2,80\n')
+    assert main([*BASE, '--points', str(path)]) == 2
+    assert 'no column normal_load' in capsys.readouterr().err
+    path.write_text('slip,normal_load\n0.2,80\n0.3,heavy\n')
+    assert main([*BASE, '--points', str(path)]) == 2
+    assert "row 3: normal_load is 'heavy'" in capsys.readouterr().err
+
+
+def test_picture_and_the_refusal_to_overwrite(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    picture = tmp_path / 'curves.png'
+    assert main([*BASE, '--load', '40,80', '-o', str(picture)]) == 0
+    assert picture.read_bytes().startswith(b'\x89PNG') and picture.stat().st_size > 10_000
+    before = picture.read_bytes()
+    assert main([*BASE, '-o', str(picture)]) == 2
+    assert 'exists already; choose another name or add --overwrite' in capsys.readouterr().err
+    assert picture.read_bytes() == before
+    assert main([*BASE, '--load', '20', '-o', str(picture), '--overwrite']) == 0
+    assert picture.read_bytes() != before
+    sheet = tmp_path / 'curves.csv'
+    assert main([*BASE, '--slip', '0:0.9:4', '-o', str(sheet)]) == 0
+    assert len(table(sheet.read_text())['slip']) == 4
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'words'),
+    [
+        (['--slip', '0:1'], 'must be A:B:N'),
+        (['--slip', 'high'], 'must be A:B:N'),
+        (['--slip', '1.5'], 'slip is 1.5; allowed is [-1, 1]'),
+        (['--load', '-3'], 'normal load is -3 N'),
+        (['--load', '1e6'], 'this soil cannot carry 1e+06 N'),
+        (['--wheel', 'spare'], 'there are wheel'),
+        (['-o', 'curves.doc'], 'end it in .png'),
+        (['-o', 'no_such_folder/curves.png'], 'there is no folder no_such_folder'),
+        (['-p', 'effects.grouser_thrust.enabled:=true'], 'cannot be on together'),
+        (['-p', 'soil.cohesion:=-1.0'], 'soil.cohesion'),
+    ],
+)
+def test_refusals(arguments: list[str], words: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([*BASE, *arguments]) == 2
+    error = capsys.readouterr().err
+    assert words in error and len(error.splitlines()) == 1
+
+
+def test_rows_that_the_soil_cannot_carry_stay_empty(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([*BASE, '--slip', '0.2', '--load', '80,1e6']) == 0
+    captured = capsys.readouterr()
+    got = table(captured.out)
+    assert np.isfinite(got['sinkage']).tolist() == [True, False]
+    assert '1 of 2 points left empty' in captured.err

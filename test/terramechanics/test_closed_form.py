@@ -1,0 +1,230 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Closed forms: against integrals, the quadrature and finite differences; safe at the edges."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from terra_tools import EFFECTS, SAND, WHEEL, points, random_cases
+
+from wheel_terra_estimator.terramechanics import closed_form
+from wheel_terra_estimator.terramechanics.conditioned import INPUTS, ConditionedForces
+from wheel_terra_estimator.terramechanics.maths import ScalarMaths
+from wheel_terra_estimator.terramechanics.model import WheelSoilModel
+from wheel_terra_estimator.terramechanics.steady_sinkage import INPUTS as SINKAGE_INPUTS
+from wheel_terra_estimator.terramechanics.steady_sinkage import SteadySinkage
+from wheel_terra_estimator.terramechanics.terms import Terms, build_contact, set_angles
+from wheel_terra_estimator.terramechanics.wheel import Wheel
+
+MOUND = {**EFFECTS, 'soil_mound': {'kappa': 1.5, 'onset': 0.2}}
+
+
+@pytest.mark.parametrize('angles', [(0.5, 0.25, -0.1), (0.9, 0.3, -0.6), (0.3, 0.15, 0.0)])
+def test_coefficients_are_the_integrals_of_a_triangle(angles: tuple[float, float, float]) -> None:
+    t1, tm, t2 = angles
+
+    def triangle(t: float) -> float:
+        return (t1 - t) / (t1 - tm) if t >= tm else (t - t2) / (tm - t2)
+
+    for ours, weight in zip(
+        closed_form.coefficients(t1, tm, t2), (math.cos, math.sin, lambda t: 1.0), strict=True
+    ):
+        truth = quad(lambda t, w=weight: triangle(t) * w(t), t2, t1, points=[tm])[0]
+        assert ours == pytest.approx(truth, abs=1e-11)
+    scalar = closed_form.coefficients(t1, tm, t2, ScalarMaths)
+    assert scalar == pytest.approx(closed_form.coefficients(*map(np.array, angles)))
+
+
+@pytest.mark.parametrize('exponent', [0.5, 0.8, 1.0, 1.3, 2.0])
+def test_branch_moments_are_the_moments_of_the_stress(exponent: float) -> None:
+    for skew in (0.0, 0.3, 0.6):
+
+        def stress(v: float, q: float = skew) -> float:
+            return (v * (1.0 + q * (1.0 - v))) ** exponent
+
+        area = quad(stress, 0.0, 1.0)[0]
+        centroid = quad(lambda v: v * stress(v), 0.0, 1.0)[0] / area
+        ours = closed_form.branch_moments(exponent, skew)
+        assert ours == pytest.approx((area, centroid), rel=0.01 if exponent != 1.0 else 1e-9)
+
+
+def test_decoupled_pull_is_exact_for_triangles() -> None:
+    for soil, effects, row in random_cases(20, 5):
+        answer = WheelSoilModel(soil, effects, 'triangles', strict=False).steady_state(row)
+        good = answer.flags == 0
+        R = row.wheel.radius + effects['lug_shear_radius']['lam'] * row.wheel.lug_height
+        pull = closed_form.decoupled_pull(
+            answer.torque,
+            row.normal_load,
+            answer.entrance_angle,
+            answer.peak_stress_angle,
+            answer.leaving_angle,
+            R,
+        )
+        assert pull[good] == pytest.approx(answer.drawbar_pull[good], rel=1e-8, abs=1e-6)
+
+
+def family_errors(method: str, seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Errors of pull and sinkage, and of the pull from torque, over slip 0 to 0.9."""
+    pull, depth, decoupled = [], [], []
+    for soil, effects, row in random_cases(150, seed):
+        driving = replace(row, slip=np.abs(row.slip))
+        truth = WheelSoilModel(soil, effects, strict=False).steady_state(driving)
+        other = WheelSoilModel(soil, effects, method, strict=False).steady_state(driving)
+        good = (truth.flags == 0) & (other.flags == 0)
+        pull += list(((other.drawbar_pull - truth.drawbar_pull) / row.normal_load)[good])
+        depth += list((other.sinkage / truth.sinkage - 1.0)[good])
+        model = WheelSoilModel(soil, effects)
+        terms = Terms(model.effects)
+        contact = build_contact(driving, model._soil, 'bekker', terms)
+        set_angles(contact, truth.entrance_angle, None, terms)
+        shaped = closed_form.decoupled_pull_shaped(truth.torque, contact)
+        decoupled += list(((shaped - truth.drawbar_pull) / row.normal_load)[good])
+    return np.abs(pull), np.abs(depth), np.abs(decoupled)
+
+
+def test_accuracy_over_random_contacts() -> None:
+    pull, depth, decoupled = family_errors('closed_form', 11)
+    assert pull.size > 500
+    assert np.mean((pull < 0.05) & (depth < 0.1)) > 0.98
+    assert np.mean(decoupled < 0.02) > 0.98
+    # The triangles of the literature, for comparison: far off, which is why they are not used.
+    triangle_pull, _, _ = family_errors('triangles', 11)
+    assert np.quantile(triangle_pull, 0.95) > 4.0 * np.quantile(pull, 0.95)
+
+
+def test_pull_from_torque_hardly_asks_for_the_soil() -> None:
+    row = points(np.array([0.1, 0.3, 0.6, 0.9]))
+    model = WheelSoilModel(SAND, MOUND)
+    truth = model.steady_state(row)
+    terms = Terms(model.effects)
+    contact = build_contact(row, model._soil, 'bekker', terms)
+    set_angles(contact, truth.entrance_angle, None, terms)
+    right = closed_form.decoupled_pull_shaped(truth.torque, contact)
+    contact.cohesion, contact.tan_friction = 2.0 * contact.cohesion, 0.5 * contact.tan_friction
+    contact.shear_modulus = 2.0 * contact.shear_modulus
+    wrong = closed_form.decoupled_pull_shaped(truth.torque, contact)
+    assert right == pytest.approx(truth.drawbar_pull, abs=0.01 * 80.0)
+    assert wrong == pytest.approx(right, abs=0.01 * 80.0)
+
+
+def conditioned(effects: dict, wheel: Wheel = WHEEL) -> ConditionedForces:
+    return ConditionedForces(wheel, SAND, effects)
+
+
+def answer(model: ConditionedForces, ratio: float, sinkage: float, load: float = 80.0, **others):
+    return model.forces(
+        0, ratio, sinkage, load, 250.0, math.tan(SAND.friction_angle), 0.0114, **others
+    )
+
+
+@pytest.mark.parametrize('slip', [-0.4, 0.0, 0.2, 0.5, 0.9])
+def test_conditioned_forces_are_the_closed_form_at_its_own_sinkage(slip: float) -> None:
+    # The load balance that gave the sinkage and the one that eliminates the stress are the same.
+    steady = WheelSoilModel(SAND, MOUND, 'closed_form').steady_state(points([slip]))
+    ratio = 1.0 - slip if slip >= 0.0 else 1.0 / (1.0 + slip)
+    got = answer(conditioned(MOUND), ratio, float(steady.sinkage[0]))
+    assert got.torque == pytest.approx(steady.torque[0], rel=1e-6, abs=1e-6)
+    assert got.drawbar_pull == pytest.approx(steady.drawbar_pull[0], rel=1e-6, abs=1e-6)
+
+
+def test_conditioned_forces_are_close_to_the_quadrature() -> None:
+    slip = np.linspace(0.0, 0.9, 10)
+    truth = WheelSoilModel(SAND, MOUND).steady_state(points(slip))
+    model = conditioned(MOUND)
+    for k in range(slip.size):
+        got = answer(model, 1.0 - slip[k], float(truth.sinkage[k]))
+        assert got.drawbar_pull == pytest.approx(truth.drawbar_pull[k], abs=0.02 * 80.0)
+        assert got.torque == pytest.approx(truth.torque[k], abs=0.02 * 80.0 * 0.16)
+
+
+@pytest.mark.parametrize(
+    'effects',
+    [
+        {},
+        {**MOUND, 'rate_dependence': {'shear': 0.1}, 'wheel_radius_bias': {}, 'cohesion': {}},
+        {**MOUND, 'bulldozing': {}, 'pitch_bias': {}, 'drivetrain_friction': {}},
+    ],
+)
+@pytest.mark.parametrize('ratio', [0.1, 0.7, 0.99, 1.4])
+@pytest.mark.parametrize('direction', [1.0, -1.0])
+def test_derivatives_of_the_conditioned_forces(
+    effects: dict, ratio: float, direction: float
+) -> None:
+    model = conditioned(effects)
+    base = [ratio, 0.02, 80.0, 300.0, 0.6, 0.012, 0.02]
+    got = model.forces(0, *base, rim_speed=0.2, direction=direction)
+    for k, name in enumerate(INPUTS):
+        step = 1e-5 * max(abs(base[k]), 1e-3)
+        ends = []
+        for sign in (1.0, -1.0):
+            moved = list(base)
+            moved[k] += sign * step
+            ends.append(model.forces(0, *moved, rim_speed=0.2, direction=direction))
+        torque = (ends[0].torque - ends[1].torque) / (2 * step)
+        pull = (ends[0].drawbar_pull - ends[1].drawbar_pull) / (2 * step)
+        scale = 1e-4 / max(abs(base[k]), 1e-3)
+        assert got.d_torque[k] == pytest.approx(torque, rel=2e-3, abs=10 * scale), name
+        assert got.d_pull[k] == pytest.approx(pull, rel=2e-3, abs=80 * scale), name
+
+
+@pytest.mark.parametrize('ratio', [-0.5, 0.0, 1e-9, 1.0, 1e6, math.inf])
+@pytest.mark.parametrize('sinkage', [-0.01, 0.0, 1e-6, 0.05, 0.3])
+def test_edges_are_clamped_and_flagged(ratio: float, sinkage: float) -> None:
+    if ratio == math.inf:
+        ratio = 1e12
+    got = answer(conditioned(MOUND), ratio, sinkage)
+    numbers = [got.torque, got.drawbar_pull, *got.d_torque, *got.d_pull]
+    assert np.isfinite(numbers).all()
+    if sinkage < -0.001 or sinkage > WHEEL.radius + 0.02:
+        assert got.clamped
+    if sinkage == 0.05:
+        assert not got.clamped
+
+
+def test_six_wheels_and_a_measured_leaving_angle() -> None:
+    model = ConditionedForces(Wheel(np.full(6, 0.15), 0.15, 0.01, 20), SAND, MOUND)
+    assert len(model) == 6
+    low = model.forces(5, 0.2, 0.02, 80.0, 250.0, 0.6, 0.012)
+    raised = model.forces(5, 0.2, 0.02, 80.0, 250.0, 0.6, 0.012, leaving_angle=-0.5)
+    flat = model.forces(5, 0.2, 0.02, 80.0, 250.0, 0.6, 0.012, leaving_angle=0.0)
+    # Contact further back pushes the wheel forward.
+    assert raised.drawbar_pull > low.drawbar_pull > flat.drawbar_pull
+
+
+def test_steady_sinkage_solves_the_closed_form_balance() -> None:
+    for soil, effects, row in random_cases(60, 8):
+        steady = WheelSoilModel(soil, effects, 'closed_form', strict=False).steady_state(row)
+        if steady.flags.any():
+            continue
+        model = SteadySinkage(row.wheel, soil, effects)
+        for k, slip in enumerate(row.slip):
+            ratio = 1.0 - slip if slip >= 0.0 else 1.0 / (1.0 + slip)
+            depth, _, carried = model.sinkage(0, ratio, float(row.normal_load[k]))
+            assert carried
+            assert depth == pytest.approx(steady.sinkage[k], rel=0.03)
+            state = model.state(0, ratio, float(row.normal_load[k]))
+            assert state[1] == pytest.approx(steady.drawbar_pull[k], abs=0.02 * row.normal_load[k])
+
+
+def test_derivatives_of_the_steady_sinkage() -> None:
+    model = SteadySinkage(WHEEL, SAND, {**EFFECTS, 'hard_layer': {}})
+    base = [0.6, 80.0, 0.1, 0.1, 0.6, 300.0, 0.01]
+    _, derivatives, _ = model.sinkage(0, *base)
+    for k, name in enumerate(SINKAGE_INPUTS):
+        step = 1e-4 * max(abs(base[k]), 1e-2)
+        up, down = list(base), list(base)
+        up[k] += step
+        down[k] -= step
+        truth = (model.sinkage(0, *up)[0] - model.sinkage(0, *down)[0]) / (2 * step)
+        assert derivatives[k] == pytest.approx(truth, rel=0.02), name
+
+
+def test_soil_that_cannot_carry_is_said_not_raised() -> None:
+    depth, derivatives, carried = SteadySinkage(WHEEL, SAND).sinkage(0, 0.9, 1e6)
+    assert not carried and depth <= WHEEL.radius and derivatives == (0.0,) * 7

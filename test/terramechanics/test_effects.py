@@ -1,0 +1,219 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""The catalogue: each effect does what it says, vanishes when neutral, is refused by name."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from terra_tools import SAND, WHEEL, points, state
+
+from wheel_terra_estimator.terramechanics import effects as catalogue_module
+from wheel_terra_estimator.terramechanics.conditioned import ConditionedForces
+from wheel_terra_estimator.terramechanics.effects import (
+    OUTPUTS,
+    Effect,
+    EffectParameter,
+    catalogue,
+    check_settings,
+    load_file,
+    register,
+)
+from wheel_terra_estimator.terramechanics.model import WheelSoilModel
+from wheel_terra_estimator.terramechanics.wheel import Wheel
+
+CONTRACT = (
+    'slip_sinkage_exponent', 'lug_digging', 'lug_support', 'lug_shear_radius', 'soil_mound',
+    'stress_peak_shift', 'slope_gravity', 'bulldozing', 'cohesion', 'multipass',
+    'rate_dependence', 'hard_layer', 'drivetrain_friction', 'wheel_radius_bias',
+    'sinkage_offset', 'pitch_bias',
+)  # fmt: skip
+# Rows on which every effect can show: slips of both signs, a slope, second pass, fast, deep.
+ROW = {
+    'slip': np.array([-0.4, 0.1, 0.4, 0.8]),
+    'load': np.array([60.0, 80.0, 160.0, 240.0]),
+    'slope': np.array([0.1, 0.0, 0.2, -0.1]),
+    'pass_number': np.array([1, 2, 3, 2]),
+    'angular_velocity': np.array([1.0, 0.2, 3.0, 0.5]),
+}
+
+
+@pytest.fixture(autouse=True)
+def _forget_registered():
+    yield
+    catalogue_module._registered.clear()
+
+
+def outputs(settings: dict, method: str = 'quadrature') -> np.ndarray:
+    return state(**ROW, effects=settings, method=method).outputs()
+
+
+def test_all_names_of_the_contract_are_there_and_complete() -> None:
+    known = catalogue()
+    assert set(CONTRACT) <= set(known)
+    assert {name for name, effect in known.items() if effect.candidate} == set(CONTRACT)
+    for effect in known.values():
+        assert effect.parameters and effect.claim and effect.symbol and effect.source
+        assert effect.validity
+        assert set(effect.confounded_with) <= set(known)
+        assert effect.incompatible_with <= set(known)
+        for p in effect.parameters:
+            assert p.lower <= p.default <= p.upper and p.prior_scale > 0.0 and p.unit
+    assert known['lug_digging'].parameters[0].name == 'kd'
+
+
+@pytest.mark.parametrize('name', catalogue())
+@pytest.mark.parametrize('method', ['quadrature', 'closed_form'])
+def test_neutral_values_change_nothing_and_defaults_what_is_said(name: str, method: str) -> None:
+    effect = catalogue()[name]
+    off = outputs({}, method)
+    assert outputs({name: effect.neutral()}, method) == pytest.approx(off, rel=1e-9, abs=1e-12)
+    smooth_rim = name == 'rim_friction'
+    wheel = Wheel(WHEEL.radius, WHEEL.width) if smooth_rim else WHEEL
+    off = state(**ROW, wheel=wheel, method=method).outputs()
+    on = state(**ROW, wheel=wheel, effects={name: {}}, method=method).outputs()
+    changed = {
+        output for output, column in zip(OUTPUTS, (np.abs(on - off) > 1e-9).T, strict=True)
+        if column.any()
+    }  # fmt: skip
+    assert changed == set(effect.touches)
+
+
+@pytest.mark.parametrize('name', catalogue())
+def test_closed_form_and_quadrature_tell_the_same_change(name: str) -> None:
+    change = [outputs({name: {}}, m) - outputs({}, m) for m in ('quadrature', 'closed_form')]
+    for ours, truth, scale in zip(change[1].T, change[0].T, (0.02, 100.0, 10.0), strict=True):
+        assert ours == pytest.approx(truth, rel=0.25, abs=0.02 * scale)
+
+
+def test_signs_of_the_contract() -> None:
+    base = state(0.3, slope=0.2)
+    tilted = state(0.3, slope=0.2, effects={'pitch_bias': {'bias': 0.05}})
+    assert tilted.drawbar_pull - base.drawbar_pull == pytest.approx(80.0 * math.sin(0.05))
+    deep = state(0.3, slope=0.2, effects={'sinkage_offset': {'offset': 0.003}})
+    assert deep.sinkage - base.sinkage == pytest.approx(0.003)
+    # The soil carries W cos(slope); the hitch gets what the soil gives less W sin(slope).
+    weight = state(0.3, slope=0.2, effects={'slope_gravity': {}})
+    soil = state(0.3, 80.0 * math.cos(0.2))
+    assert weight.sinkage == pytest.approx(soil.sinkage)
+    assert weight.torque == pytest.approx(soil.torque)
+    assert weight.drawbar_pull == pytest.approx(soil.drawbar_pull - 80.0 * math.sin(0.2))
+    # A wheel larger than configured goes faster than its encoder says: less slip was recorded.
+    assert state(0.3, effects={'wheel_radius_bias': {'bias': 0.1}}).drawbar_pull > base.drawbar_pull
+    friction = state(0.3, effects={'drivetrain_friction': {'torque': 0.4}})
+    assert friction.torque - base.torque == pytest.approx(0.4)
+
+
+def test_radius_bias_is_a_change_of_recorded_slip() -> None:
+    rim = Wheel(0.15, 0.15)
+    biased = state(0.3, wheel=rim, effects={'wheel_radius_bias': {'bias': -0.06}})
+    true_slip = 1.0 - (1.0 - 0.3) / 0.94
+    assert biased.outputs() == pytest.approx(state(true_slip, wheel=rim).outputs(), rel=1e-9)
+
+
+def test_digging_and_support_are_the_seed_s_terms() -> None:
+    z = state([0.0, 0.5], effects={}).sinkage
+    dug = state([0.0, 0.5], effects={'lug_digging': {'kd': 1.0}}).sinkage
+    assert dug - z == pytest.approx([0.0, 0.5 * WHEEL.lug_height])
+    reworked = state([0.5], effects={'lug_digging': {'kd': 1.0, 'rework': 1.0}}).sinkage
+    assert reworked - z[1] == pytest.approx(WHEEL.lug_height * 0.5 / (1 - 0.5))
+    assert z - state([0.0, 0.5], effects={'lug_support': {}}).sinkage == pytest.approx(0.0015)
+    smooth = Wheel(0.1574, 0.165)
+    assert state(0.5, wheel=smooth, effects={'lug_support': {}}).sinkage == pytest.approx(
+        state(0.5, wheel=smooth).sinkage
+    )
+
+
+def test_mound_raises_the_pull_at_high_slip_only() -> None:
+    slip = np.array([0.1, 0.3, 0.7, 0.9])
+    off, on = state(slip), state(slip, effects={'soil_mound': {'kappa': 1.5, 'onset': 0.4}})
+    assert on.outputs()[:2] == pytest.approx(off.outputs()[:2])
+    assert (on.drawbar_pull[2:] > off.drawbar_pull[2:] + 1.0).all()
+    assert (on.sinkage[2:] < off.sinkage[2:]).all()
+    # Higher than the free surface behind the wheel: leaving angle beyond the entrance angle.
+    high = state([0.9], effects={'soil_mound': {'kappa': 3.0, 'onset': 0.3}})
+    assert -high.leaving_angle > high.entrance_angle
+
+
+def test_effects_without_their_column_do_nothing() -> None:
+    base = state(0.3).outputs()
+    for name in ('multipass', 'rate_dependence', 'slope_gravity'):
+        assert state(0.3, effects={name: {}}).outputs() == pytest.approx(base), name
+
+
+@pytest.mark.parametrize(
+    ('settings', 'words'),
+    [
+        ({'bulldozer': {}}, 'effect bulldozer is not in the catalogue'),
+        ({'lug_digging': {'k': 1.0}}, 'effect lug_digging has no parameter k; it has kd'),
+        ({'lug_digging': {'kd': 9.0}}, r'effects.lug_digging.kd is 9; allowed is \[0, 4\]'),
+        (
+            {'grouser_thrust': {}, 'lug_shear_radius': {}},
+            'effects grouser_thrust and lug_shear_radius exclude each other',
+        ),
+    ],
+)
+def test_settings_that_are_refused(settings: dict, words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        check_settings(settings)
+
+
+OWN = """
+from wheel_terra_estimator.terramechanics.effects import Effect, EffectParameter
+
+def term(contact, p, maths):
+    contact.normal_stress = contact.normal_stress * (1.0 + p.gain * maths.cos(contact.angle))
+
+def drag(contact, p, maths):
+    contact.drawbar_pull = contact.drawbar_pull - 10.0 * p.gain
+
+SPRING = Effect(
+    name='spring', claim='a test', symbol='s', validity='none', source='none',
+    parameters=(EffectParameter('gain', '-', 0.3, 0.0, 2.0, 0.3, 'half_normal', 'gain'),),
+    touches=frozenset({'sinkage', 'drawbar_pull', 'torque'}),
+    on_normal_stress=term, on_outputs=drag,
+)
+"""
+
+
+def test_a_user_s_effect_takes_part_everywhere(tmp_path: Path) -> None:
+    path = tmp_path / 'own.py'
+    path.write_text(OWN)
+    load_file(path)
+    load_file(path)  # the same file again is fine
+    settings = {'spring': {'gain': 0.3}}
+    exact = outputs(settings)
+    assert (exact[:, 0] < outputs({})[:, 0]).all()
+    assert outputs(settings, 'closed_form') == pytest.approx(exact, rel=0.1, abs=2.0)
+    _, jacobian = WheelSoilModel(SAND, settings).jacobian(points(0.3), ['effects.spring.gain'])
+    step = [WheelSoilModel(SAND, {'spring': {'gain': g}}).steady_state(points(0.3)).outputs()
+            for g in (0.301, 0.299)]  # fmt: skip
+    assert jacobian[..., 0] == pytest.approx((step[0] - step[1]) / 0.002, rel=1e-4)
+    with_effect = ConditionedForces(WHEEL, SAND, settings).forces(
+        0, 0.7, 0.01, 80.0, 250.0, 0.6, 0.01
+    )
+    without = ConditionedForces(WHEEL, SAND).forces(0, 0.7, 0.01, 80.0, 250.0, 0.6, 0.01)
+    assert with_effect.drawbar_pull == pytest.approx(without.drawbar_pull - 3.0)
+
+
+def test_registering_refuses_taken_names_and_empty_effects(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match='cohesion is in the catalogue already'):
+        register(catalogue()['cohesion'])
+    with pytest.raises(ValueError, match='has no term'):
+        Effect(
+            'empty', 'c', 's',
+            (EffectParameter('a', '-', 0.0, 0.0, 1.0, 1.0, 'normal', 'm'),),
+            frozenset({'torque'}), 'v', 's',
+        )  # fmt: skip
+    broken = tmp_path / 'broken.py'
+    broken.write_text('1/0\n')
+    with pytest.raises(ValueError, match='ZeroDivisionError'):
+        load_file(broken)
+    broken.write_text('x = 1\n')
+    with pytest.raises(ValueError, match='defines no Effect'):
+        load_file(broken)
+    with pytest.raises(ValueError, match='not a Python file'):
+        load_file(tmp_path / 'missing.py')

@@ -1,0 +1,80 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Slip ratio of the contract and the shear displacement that follows from it."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from wheel_terra_estimator.terramechanics.kinematics import (
+    change_of_radius,
+    lug_passage_period,
+    shear_displacement,
+    slip_of_speed_ratio,
+    slip_ratio,
+    speed_ratio,
+)
+from wheel_terra_estimator.terramechanics.maths import ScalarMaths
+from wheel_terra_estimator.terramechanics.wheel import Wheel
+
+
+@pytest.mark.parametrize(
+    ('speed', 'rim', 'slip'),
+    [
+        (0.10, 0.10, 0.0),
+        (0.07, 0.10, 0.3),
+        (0.0, 0.10, 1.0),
+        (0.10, 0.05, -0.5),
+        (-0.07, -0.10, 0.3),  # reverse is symmetric
+        (-0.10, -0.05, -0.5),
+        (-0.02, 0.10, 1.0),  # slides back while driving
+        (0.10, 0.0, -1.0),  # held still, dragged along
+        (0.10, -0.001, -1.0),  # below rest speed counts as held
+        (-0.001, 0.10, 1.0),
+    ],
+)
+def test_slip_ratio_of_the_contract(speed: float, rim: float, slip: float) -> None:
+    assert slip_ratio(speed, rim) == pytest.approx(slip)
+
+
+def test_slip_is_not_known_at_rest_and_always_in_range() -> None:
+    assert np.isnan(slip_ratio(0.001, -0.001))
+    speeds = np.linspace(-0.3, 0.3, 61)
+    grid = slip_ratio(speeds[:, None], speeds[None, :])
+    known = grid[np.isfinite(grid)]
+    assert known.min() >= -1.0 and known.max() <= 1.0
+
+
+def test_speed_ratio_is_the_inverse() -> None:
+    slip = np.linspace(-0.99, 1.0, 50)
+    assert slip_of_speed_ratio(speed_ratio(slip)) == pytest.approx(slip)
+    for value in (-0.7, 0.0, 0.4, 1.0):
+        assert speed_ratio(value, ScalarMaths) == pytest.approx(float(speed_ratio(np.array(value))))
+
+
+def test_change_of_radius() -> None:
+    # EQUATIONS.md section 1: r = 157 mm, h = 10 mm, rolling at the rim is 0.060 at the tip.
+    assert change_of_radius(0.0, 0.157, 0.167) == pytest.approx(0.0599, abs=1e-4)
+
+
+def test_shear_displacement_starts_at_zero_and_has_its_slope() -> None:
+    assert shear_displacement(0.5, 0.5, 0.16, 0.1) == 0.0
+    # d j/dt = -(R - (v/w) cos t), from the rim's speed against the soil.
+    t, step = 0.2, 1e-6
+    slope = (
+        shear_displacement(t + step, 0.5, 0.16, 0.1) - shear_displacement(t - step, 0.5, 0.16, 0.1)
+    ) / (2 * step)
+    assert slope == pytest.approx(-(0.16 - 0.1 * math.cos(t)))
+
+
+def test_lug_period() -> None:
+    # Seed 1 equation 2: 2 pi r (1 - s)/(n v); falls with slip at constant carriage speed.
+    wheel = Wheel(0.1574, 0.165, 0.01, 30)
+    for slip in (0.0, 0.4):
+        rate = 0.010 / (0.1574 * (1.0 - slip))
+        expected = 2 * math.pi * 0.1574 * (1.0 - slip) / (30 * 0.010)
+        assert lug_passage_period(wheel, rate) == pytest.approx(expected)
+    assert lug_passage_period(Wheel(0.1, 0.1), 1.0) == math.inf

@@ -1,0 +1,66 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Published measurements: what the validation page claims, held to its targets."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / 'tools'))
+
+from model_validation import cmu_wheel, ding_statements, grc3_wheel, hit_wheels
+from model_validation.fitting import Misfit, fit
+
+pytestmark = pytest.mark.shared
+
+
+def test_hit_lugged_wheel_from_the_smooth_one(shared: Path) -> None:
+    table = shared.parent / 'reference' / 'measured_single_wheel.csv'
+    smooth = hit_wheels.read(table, 'HIT_Wh34_smooth')
+    lugged = hit_wheels.read(table, 'HIT_Wh32_lug10')
+    model, _ = fit(hit_wheels.BASE, [smooth], hit_wheels.SIGMA, hit_wheels.SMOOTH_PARAMETERS)
+    start = model.with_values({**hit_wheels.PUBLISHED_LUGS, 'effects.lug_digging.rework': 1.0})
+    lugs, values = fit(start, [lugged], hit_wheels.SIGMA, hit_wheels.FITTED_LUGS)
+    assert len(values) == 2
+    misfit = Misfit.of(lugs.predict(lugged[0]), lugged[1])
+    assert misfit.pull_rms < 0.10 * misfit.pull_range
+    assert misfit.sinkage_rms < 0.0015
+
+
+def test_plates_predict_the_rolling_cmu_wheel(shared: Path) -> None:
+    folder = shared / 'cmu_single_wheel'
+    soil, rms, _ = cmu_wheel.plates(folder / 'pressure_sinkage.csv')
+    assert rms < 0.15
+    model = cmu_wheel.Model(soil, {})
+    depth = model.predict(cmu_wheel.OperatingPoints(0.0, 24.5, cmu_wheel.WHEEL))[0, 0]
+    assert depth == pytest.approx(0.0144, rel=0.15)  # mean of the measured rolling rows
+
+
+def test_mound_predicts_the_rows_it_did_not_see_on_grc3(shared: Path) -> None:
+    slip, measured = grc3_wheel.read(shared.parent)
+    even = np.arange(slip.size) % 2 == 0
+    data = [(grc3_wheel.points_at(slip[even]), measured[even])]
+    errors = []
+    for free in ((*grc3_wheel.SOIL, *grc3_wheel.MOUND), grc3_wheel.SOIL):
+        model, _ = fit(grc3_wheel.BASE, data, grc3_wheel.SIGMA, free)
+        error = model.predict(grc3_wheel.points_at(slip[~even])) - measured[~even]
+        errors.append(np.sqrt(np.mean(error[:, 1] ** 2)) / np.ptp(measured[:, 1]))
+    assert errors[0] < 0.10
+    assert errors[0] < 0.8 * errors[1]
+
+
+def test_statements_of_ding_2010_hold_together_where_they_can(shared: Path) -> None:
+    text = ding_statements.section(shared.parent, Path())
+    rows = {
+        cells[1].strip(): cells[3].strip()
+        for cells in (line.split('|') for line in text.splitlines() if line.startswith('| '))
+    }
+    assert float(rows['sinkage of Wh3 at s = 0 [mm]']) == pytest.approx(5.0, abs=0.5)
+    assert float(rows['sinkage of Wh3 at s = 0.6 [mm]']) == pytest.approx(30.0, abs=1.0)
+    assert 3.0 <= float(rows['z(0.6)/z(0), Wh3, h = 10 mm']) <= 7.0
+    assert 3.0 <= float(rows['z(0.6)/z(0), Wh2 with n0 = 0.93, n1 = 0.54, h = 10 mm']) <= 7.0
+    assert float(rows['Wong-Reece alone, z(0.6) - z(0) [mm]']) < 5.0
