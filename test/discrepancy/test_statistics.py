@@ -16,6 +16,7 @@ from wheel_terra_estimator.discrepancy.fitting import Fit, fit
 from wheel_terra_estimator.discrepancy.forward import Forward
 from wheel_terra_estimator.discrepancy.parameters import (
     EFFECT_SCALES,
+    EFFECT_SHARES,
     WIDENING,
     WORSE_SHARE,
     Coordinate,
@@ -121,7 +122,7 @@ def test_evidence_is_the_integral_over_parameters(setting):
     density = multivariate_normal(np.zeros(problem.size), np.diag(problem.std**2) + smooth)
     total = 0.0
     for width, share in ((1 / WIDENING, 1 - WORSE_SHARE), (1.0, WORSE_SHARE)):
-        for size in EFFECT_SCALES:
+        for size, part in zip(EFFECT_SCALES, EFFECT_SHARES, strict=True):
             a = np.linspace(-6, 6, 121) * width
             b = (np.arange(300) + 0.5) / 100.0
             mesh = np.array([(x, y) for x in a for y in b])
@@ -129,7 +130,7 @@ def test_evidence_is_the_integral_over_parameters(setting):
             prior_a = np.exp(-0.5 * (mesh[:, 0] / width) ** 2)
             prior_b = np.exp(-0.5 * (mesh[:, 1] / size) ** 2)
             prior = prior_a * prior_b / (prior_a * prior_b).sum()
-            total += share / len(EFFECT_SCALES) * float(likelihood @ prior)
+            total += share * part * float(likelihood @ prior)
     assert got == pytest.approx(np.log(total), abs=0.02)
 
 

@@ -82,7 +82,7 @@ class Setting:
         starts: Sequence[FloatArray],
         angle: FloatArray | None = None,
         variance: FloatArray | None = None,
-        iterations: int = 8,
+        iterations: int = 10,
     ) -> list[Fit]:
         """Fit sets of effects; all rows start at the entrance angles `angle` (N,)."""
         if not sets:

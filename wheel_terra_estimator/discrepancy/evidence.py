@@ -16,7 +16,12 @@ from numpy.typing import NDArray
 from scipy.special import log_ndtr, logsumexp
 
 from wheel_terra_estimator.discrepancy.fitting import Fit
-from wheel_terra_estimator.discrepancy.parameters import EFFECT_SCALES, WIDENING, WORSE_SHARE
+from wheel_terra_estimator.discrepancy.parameters import (
+    EFFECT_SCALES,
+    EFFECT_SHARES,
+    WIDENING,
+    WORSE_SHARE,
+)
 from wheel_terra_estimator.discrepancy.problem import Problem
 
 FloatArray = NDArray[np.float64]
@@ -124,13 +129,13 @@ def _prior_precisions(fitted: Fit) -> tuple[FloatArray, FloatArray]:
     """(S, P) prior precisions of u for all combinations of scales; (S,) their shares."""
     soil = np.array([c.role == 'soil' for c in fitted.coordinates])
     strength = np.array([c.role == 'strength' for c in fitted.coordinates])
-    sizes = EFFECT_SCALES if strength.any() else (1.0,)
+    sizes = list(zip(EFFECT_SCALES, EFFECT_SHARES, strict=True)) if strength.any() else [(1.0, 1.0)]
     combinations, weights = [], []
     for width, share in ((1.0 / WIDENING, 1.0 - WORSE_SHARE), (1.0, WORSE_SHARE)):
-        for size in sizes:
+        for size, part in sizes:
             scale = np.where(soil, width, np.where(strength, size, 1.0))
             combinations.append(scale**-2)
-            weights.append(share / len(sizes))
+            weights.append(share * part)
     return np.array(combinations), np.array(weights)
 
 

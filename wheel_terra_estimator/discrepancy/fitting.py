@@ -85,7 +85,7 @@ def fit(
     starts: Sequence[FloatArray],
     variances: Sequence[FloatArray],
     angles: FloatArray | None = None,
-    iterations: int = 8,
+    iterations: int = 10,
 ) -> list[Fit]:
     """Fit all hypotheses; each has its own start and its own variance of the rotated axes.
 
@@ -178,9 +178,9 @@ def _step(
         fixed = ~free
         right = gradient[free] - damped[np.ix_(free, fixed)] @ step[fixed]
         step[free] = np.linalg.solve(damped[np.ix_(free, free)], right)
-        longest = np.abs(step).max(initial=0.0)
-        if longest > _LONGEST_STEP:
-            step *= _LONGEST_STEP / longest
+        # A strength may double, so that an effect of many prior deviations is reached.
+        longest = np.maximum(_LONGEST_STEP, np.where(current.prior < 1.0, np.abs(current.u), 0.0))
+        step /= max(1.0, float((np.abs(step) / longest).max(initial=0.0)))
         new = current.u + step
         outside = free & ((new < lower) | (new > upper))
         if not outside.any():

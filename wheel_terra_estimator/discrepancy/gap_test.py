@@ -21,17 +21,18 @@ _SEED = 20261121  # the same table gives the same report
 def chi_square_p_value(fitted: Fit, variance: FloatArray) -> float:
     """P-value of the whole misfit, parameters and their priors integrated out.
 
-    Under the hypothesis, residual and prior pull together are chi-square with one degree of freedom
-    per cell, however many parameters were fitted.
+    Under the hypothesis, residual and the soil's prior pull together are chi-square with one degree
+    of freedom per cell, however many soil parameters were fitted; an effect's strength takes one.
     """
     from scipy.stats import chi2
 
     target = fitted.residual + fitted.jacobian @ fitted.u
     weighted = fitted.jacobian / variance[:, None]
-    precision = weighted.T @ fitted.jacobian + np.eye(len(fitted.u))
+    strength = np.array([c.role == 'strength' for c in fitted.coordinates])
+    precision = weighted.T @ fitted.jacobian + np.diag(np.where(strength, 1e-9, 1.0))
     right = weighted.T @ target
     square = float(target @ (target / variance) - right @ np.linalg.solve(precision, right))
-    return float(chi2.sf(square, len(target)))
+    return float(chi2.sf(square, len(target) - strength.sum()))
 
 
 def scan_p_value(

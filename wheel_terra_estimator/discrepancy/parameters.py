@@ -33,10 +33,12 @@ LEAVING_RATIO_STD = 0.03
 # evidence weighs both widths.
 WIDENING = 2.5
 WORSE_SHARE = 0.15  # prior probability of the wider one
-# The same for the strength of an effect: small and large ones are weighed against each other.
-EFFECT_SCALES = (0.3, 2.0)
+# The same for the strength of an effect: small, large and very large ones (the catalogue cannot
+# know the size of the machine) are weighed against each other, with these shares.
+EFFECT_SCALES = (0.3, 2.0, 10.0)
+EFFECT_SHARES = (0.45, 0.45, 0.10)
 # During fits the strength is held loosely, so that a strong effect is not pulled back.
-LOOSE = 3.0
+LOOSE = 6.0
 
 
 @dataclass(frozen=True)

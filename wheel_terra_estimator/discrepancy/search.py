@@ -33,7 +33,7 @@ FloatArray = NDArray[np.float64]
 
 _FLEXIBLE = 0.25  # floor of the first robust pass: wide enough for any effect [share of range]
 _ROBUST_FLOOR = 0.02  # floor of the later ones
-_PASSES = 3
+_PASSES = 5
 _LATENT_FLOOR = 0.03  # structural error allowed while slips are moved [share of range]
 _FARTHEST = 2.0  # a slip is moved by at most so many of its deviations
 
@@ -108,7 +108,7 @@ def search(
         rim = forward.points.wheel.radius * (1.0 - np.cos(nothing.angle))
         deepest = float(np.max(rim))
         found = signatures(builder.forward, problem, nothing, possible, deepest)
-        visible = {name: possible[name] for name, s in found.items() if s.distance >= SEEN}
+        visible = {name: possible[name] for name, s in found.items() if s.greatest >= SEEN}
         freedom = np.array([noise.degrees_of_freedom.get(q, np.inf) for q in QUANTITIES])
         setting = Setting(
             builder.forward,
@@ -131,7 +131,7 @@ def search(
                 **{
                     name: 'even a large one would stay below the noise on these rows'
                     for name in possible
-                    if name not in visible
+                    if found[name].distance < SEEN and name not in selection.explanations[0].names
                 },
             },
             noise,

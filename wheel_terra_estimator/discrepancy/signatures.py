@@ -21,6 +21,7 @@ FloatArray = NDArray[np.float64]
 
 LARGE = 4.0  # prior deviations: no effect is expected to be larger
 SEEN = 2.0  # d' from which an effect counts as visible
+HUGE = 30.0  # prior deviations, bounds permitting: smaller effects are tried
 CLEAR = 5.0  # d' from which it would have been named
 _ONSETS = (-1.0, 0.0, 1.0)  # of parameters that only shape an effect, in prior deviations
 _DEPTHS = (0.4, 0.65, 0.85)  # of those that are a depth: share of the deepest row
@@ -38,11 +39,14 @@ class Signature:
         d' of that size beyond the soil: noise and prior deviations that a soil refit would need.
     size : float
         The size [unit of the first parameter], from neutral.
+    greatest : float
+        d' of the greatest size that is tried (in proportion).
     """
 
     change: FloatArray
     distance: float
     size: float
+    greatest: float
 
 
 def against_soil(fitted: Fit, variance: FloatArray, vectors: FloatArray) -> FloatArray:
@@ -117,7 +121,10 @@ def signatures(
         far = distance(nothing, nothing.variance, change)
         size = float(own[0].value(shape[0])) - own[0].neutral
         if name not in found or far > found[name].distance:
-            found[name] = Signature(change, far, size)
+            limit = max(abs(own[0].lower), abs(own[0].upper))
+            used = abs(shape[0] - own[0].coordinate(own[0].neutral))
+            greatest = far * max(1.0, min(HUGE, limit) / max(used, 1e-9))
+            found[name] = Signature(change, far, size, greatest)
     return found
 
 

@@ -32,6 +32,9 @@ TEMPERATURE = 1.5
 
 # A named set that leaves something must at least have removed this share of the excess misfit.
 MOST = 0.9
+# Odds, against all hypotheses with an unexplained misfit, from which named sets without one are
+# looked at alone.
+CLEAN_SHARE = 0.25
 
 
 @dataclass(frozen=True)
@@ -77,7 +80,11 @@ def decide(selection: Selection, variance_of: Variance) -> Verdict:
         return Verdict(word, nothing, (), left)
     if not named or rest > effects:
         return Verdict('unexplained', nothing, (), left)
-    best = max(named, key=lambda h: total[h])
+    # An effect beside a mere floor goes before one beside a misfit that asks for another name.
+    quiet = np.array([log_mass(row[~unexplained]) for row in joint])
+    misfit = log_mass(joint[:, unexplained].ravel())
+    clean = log_mass(quiet[named]) > misfit + np.log(CLEAN_SHARE)
+    best = max(named, key=lambda h: quiet[h] if clean else total[h])
     after = remainder(selection, best, variance_of)
     if after.significant and _explained(selection, nothing, best) < MOST:
         return Verdict('unexplained', nothing, (), left)
