@@ -147,6 +147,8 @@ class WheelModels:
         high = max(0.6 - ratio, 0.0) / 0.6
         depth = min(max(sinkage, 1e-4), self._radius[wheel])
         angle = math.acos(1.0 - depth / self._radius[wheel])
+        shift = centroid - mound * high * high
+        by_depth = shift / (self._radius[wheel] * math.sin(angle)) if depth == sinkage else 0.0
         # Beyond three times the rim speed the shear is saturated long since.
         torque, pull, d_torque, d_pull, _ = self._forces.forces(
             wheel,
@@ -156,7 +158,7 @@ class WheelModels:
             cohesion,
             friction,
             shear_modulus,
-            (centroid - mound * high * high) * angle,
+            shift * angle,
             leaving_angle=leaving_angle,
             rim_speed=rim_speed,
             pass_number=self._passes[wheel],
@@ -165,7 +167,7 @@ class WheelModels:
         t, f = (
             (
                 d[0] + d[6] * by_ratio,
-                d[1],
+                d[1] + d[6] * by_depth,
                 d[3] * cohesion + d[4] * friction,
                 d[5] * shear_modulus,
                 d[6] * angle,

@@ -32,6 +32,7 @@ _ENTRAPPED_SLIP = 0.9
 _DIGGING_SLIP = 0.8
 _TREND_WINDOW = 5.0  # [s]
 _SHORTEST_TREND = 2.5  # [s]
+_SETTLING_TRAVEL = 0.25  # [m] of rim travel after a start
 _BOG_WINDOW = 1.5  # [s] over which the loss of speed is taken
 _LONGEST_TIME = 600.0  # [s] said where no entrapment is in sight
 
@@ -165,8 +166,10 @@ class StuckMonitor:
         ]
         typical = median(effective) if effective else 0.0
         typical_std = median([w.slip_std for w in moving]) if moving else 1.0
-        memory.rim_travel += fastest * dt
-        slope = self._trend(time, typical, bool(moving) and not turning)
+        # Slip settles over the first travel after a start: its growth there says nothing.
+        memory.rim_travel = memory.rim_travel + fastest * dt if moving else 0.0
+        settled = memory.rim_travel > _SETTLING_TRAVEL
+        slope = self._trend(time, typical, settled and not turning)
 
         probability = exceedance_probability(typical, typical_std, _DIGGING_SLIP)
         signs: dict[str, str] = {}

@@ -1,0 +1,102 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Wheel loads against statics done by hand and against the simulator's own suspension."""
+
+import numpy as np
+import pytest
+
+from wheel_terra_estimator.configuration import reader
+from wheel_terra_estimator.estimation.filter_settings import FilterSettings
+from wheel_terra_estimator.estimation.load_distribution import load_distribution
+from wheel_terra_estimator.simulation.suspension import suspension_of
+
+THREE = np.array([[1.0, 0.5], [1.0, -0.5], [-1.0, 0.0]])
+
+
+def test_three_wheels_uphill_by_hand():
+    loads = load_distribution(
+        mass=10.0,
+        position=THREE,
+        centre_of_gravity=[0.0, 0.0, 0.4],
+        contact_height=-0.1,
+        suspension='rigid',
+    ).loads([2.0, 0.0, 9.0])
+    # Moment about the rear contact: 2 W_front * 2 = m (f_z * 1 - f_x * 0.5).
+    front = 10.0 * (9.0 * 1.0 - 2.0 * 0.5) / 2.0 / 2.0
+    assert loads == pytest.approx([front, front, 90.0 - 2 * front])
+
+
+def test_side_slope_loads_the_lower_side():
+    four = np.array([[1.0, 0.5], [1.0, -0.5], [-1.0, 0.5], [-1.0, -0.5]])
+    loads = load_distribution(
+        mass=10.0,
+        position=four,
+        centre_of_gravity=[0.0, 0.0, 0.5],
+        contact_height=0.0,
+        suspension='rigid',
+    ).loads([0.0, 1.0, 9.0])  # left up: the right wheels carry more
+    assert loads.sum() == pytest.approx(90.0)
+    assert loads[1] - loads[0] == pytest.approx(10.0 * 1.0 * 0.5 / 1.0)
+
+
+def test_lifted_wheel_never_pulls_on_the_ground():
+    model = load_distribution(
+        mass=10.0,
+        position=THREE,
+        centre_of_gravity=[0.0, 0.0, 1.0],
+        contact_height=0.0,
+        suspension='rigid',
+    )
+    loads = model.loads([-12.0, 0.0, 9.0])
+    assert loads.min() == 0.0
+    assert loads.sum() == pytest.approx(90.0)
+
+
+def test_shares_are_kept_and_checked():
+    model = load_distribution(
+        mass=10.0,
+        position=THREE,
+        centre_of_gravity=[0.0, 0.0, 1.0],
+        contact_height=0.0,
+        suspension='shares',
+        shares=[1.0, 1.0, 2.0],
+    )
+    assert model.loads([5.0, 0.0, 9.0]) == pytest.approx([22.5, 22.5, 45.0])
+    with pytest.raises(ValueError, match='shares'):
+        load_distribution(
+            mass=1.0,
+            position=THREE,
+            centre_of_gravity=[0, 0, 0],
+            contact_height=0.0,
+            suspension='shares',
+            shares=[1.0],
+        )
+
+
+def test_rocker_bogie_agrees_with_the_simulators_statics():
+    configuration = reader.load(['generic_six_wheel'])
+    ours = FilterSettings.from_configuration(configuration).load
+    theirs = suspension_of(configuration)
+    rng = np.random.default_rng(0)
+    mass = configuration.rover.mass
+    for _ in range(50):
+        force = np.array([rng.uniform(-2, 2), rng.uniform(-1, 1), 9.6])
+        pull = rng.uniform(-30, 60, 6)
+        # The balance of forces holds: the sum of pulls is m f_x.
+        pull += (mass * force[0] - pull.sum()) / 6
+        moment = rng.uniform(0, 20, 6)
+        expected = theirs.normal_loads(mass, force, pull, moment)
+        assert ours.loads(force, pull, moment) == pytest.approx(expected, rel=1e-6)
+
+
+def test_rocker_bogie_needs_three_wheels_a_side():
+    with pytest.raises(ValueError, match='three wheels'):
+        load_distribution(
+            mass=1.0,
+            position=THREE,
+            centre_of_gravity=[0, 0, 0],
+            contact_height=0.0,
+            suspension='rocker_bogie',
+            rocker_pivot=[0.0, 0.3],
+            bogie_pivot=[0.0, 0.2],
+        )

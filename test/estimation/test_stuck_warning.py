@@ -1,0 +1,127 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Stuck warning on made-up courses of slip: early where it digs, silent where it does not."""
+
+import math
+
+from wheel_terra_estimator.estimation.stuck_warning import (
+    StuckMonitor,
+    StuckTuning,
+    WheelMotionState,
+)
+
+
+def wheel(slip, rim=0.05, known=True, torque=math.nan):
+    return WheelMotionState(
+        slip=slip,
+        slip_std=0.03,
+        rim_speed=rim,
+        known=known,
+        torque_share=torque,
+        sinkage=0.02,
+        radius=0.12,
+    )
+
+
+def course(rows, dt=0.1, monitor=None, start=0.0):
+    """Run rows of wheels; return the assessments."""
+    monitor = monitor or StuckMonitor(StuckTuning())
+    found = []
+    for i, wheels in enumerate(rows):
+        moving = [w for w in wheels if w.known]
+        speed = sum((1.0 - w.slip) * w.rim_speed for w in moving) / max(len(moving), 1)
+        found.append(monitor.update(start + i * dt, speed, True, wheels))
+    return found
+
+
+def first(found, dt=0.1):
+    return next((i * dt for i, a in enumerate(found) if a.stuck), None)
+
+
+def test_gradual_entrapment_is_announced_seconds_before():
+    slips = [min(0.2 + 0.02 * 0.1 * i * (1 + 0.02 * i * 0.1), 1.0) for i in range(400)]
+    when = first(course([[wheel(s)] * 6 for s in slips]))
+    entrapped = next(i for i, s in enumerate(slips) if s > 0.9) * 0.1 + 1.0
+    assert when is not None
+    assert entrapped - when >= 3.0
+
+
+def test_sudden_entrapment_is_announced_before_it_lasts_a_second():
+    slips = [0.3] * 100 + [min(0.3 + 0.15 * 0.1 * i, 1.0) for i in range(200)]
+    when = first(course([[wheel(s)] * 6 for s in slips]))
+    entrapped = next(i for i, s in enumerate(slips) if s > 0.9) * 0.1 + 1.0
+    assert when < entrapped
+
+
+def test_steep_climb_that_holds_raises_nothing():
+    slips = [min(0.1 + 0.01 * 0.1 * i, 0.6) for i in range(1500)]
+    assert first(course([[wheel(s)] * 6 for s in slips])) is None
+
+
+def test_one_spinning_wheel_raises_nothing():
+    rows = [[wheel(0.1)] * 5 + [wheel(0.95, rim=0.2)] for _ in range(600)]
+    assert first(course(rows)) is None
+
+
+def test_braking_and_locked_wheels_raise_nothing():
+    rows = [[wheel(-0.95, rim=0.005)] * 6 for _ in range(300)]
+    assert first(course(rows)) is None
+
+
+def test_spin_in_place_slip_raises_nothing_by_its_trend():
+    monitor = StuckMonitor(StuckTuning())
+    found = [
+        monitor.update(0.1 * i, 0.0, True, [wheel(min(0.01 * i, 0.7))] * 6, turning=True)
+        for i in range(200)
+    ]
+    assert first(found) is None
+
+
+def test_clears_after_three_seconds_below():
+    monitor = StuckMonitor(StuckTuning())
+    stuck = course([[wheel(0.97)] * 6] * 40, monitor=monitor)
+    assert stuck[-1].stuck
+    out = course([[wheel(0.3)] * 6] * 60, monitor=monitor, start=4.0)
+    cleared = next(i for i, a in enumerate(out) if not a.stuck) * 0.1
+    assert 3.0 <= cleared <= 3.3
+
+
+def test_two_stalled_wheels_of_four_raise_it_without_any_speed():
+    monitor = StuckMonitor(StuckTuning())
+    rolling = [wheel(0.2, rim=1.0, torque=0.4)] * 4
+    stalled = [wheel(0.0, rim=0.0, known=False, torque=0.95)] * 2 + [
+        wheel(0.2, rim=1.5, torque=0.1)
+    ] * 2
+    found = [monitor.update(0.1 * i, 0.0, False, rolling) for i in range(30)]
+    assert not found[-1].stuck
+    found = [monitor.update(3.0 + 0.1 * i, 0.0, False, stalled) for i in range(15)]
+    assert 0.3 <= first(found) <= 0.7
+    assert found[-1].stalled == [True, True, False, False]
+    assert 'stalled' in found[-1].reason
+
+
+def test_pulling_away_from_rest_is_no_stall():
+    monitor = StuckMonitor(StuckTuning())
+    rows = [[wheel(0.1, rim=0.1 * i, torque=0.95)] * 2 + [wheel(0.1, rim=0.2 * i)] * 2 for i in range(9)]
+    assert not any(
+        monitor.update(0.1 * i, 0.1 * i, False, w).stuck for i, w in enumerate(rows)
+    )
+
+
+def test_travel_left_shrinks_to_nothing():
+    slips = [min(0.3 + 0.03 * 0.1 * i, 0.97) for i in range(300)]
+    left = [a.rim_travel_left[0] for a in course([[wheel(s)] * 6 for s in slips])]
+    assert left[0] == 10.0
+    middle = left[100]
+    assert 0.0 < middle < 2.0
+    assert left[-1] == 0.0
+
+
+def test_memory_comes_back():
+    monitor = StuckMonitor(StuckTuning())
+    course([[wheel(0.97)] * 6] * 10, monitor=monitor)
+    memory = monitor.snapshot()
+    one = course([[wheel(0.97)] * 6] * 20, monitor=monitor, start=1.0)
+    monitor.restore(memory)
+    two = course([[wheel(0.97)] * 6] * 20, monitor=monitor, start=1.0)
+    assert [a.stuck for a in one] == [a.stuck for a in two]

@@ -1,0 +1,230 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""The whole estimator on short simulated drives: signs, situations, missing inputs."""
+
+from dataclasses import fields
+
+import numpy as np
+import pytest
+
+from wheel_terra_estimator.estimation.estimates import SlipClass
+from wheel_terra_estimator.estimation.measurements import (
+    InertialReading,
+    ReferenceVelocity,
+    SinkageReading,
+    StepInputs,
+    WheelOdometry,
+)
+from wheel_terra_estimator.estimation.wheel_soil_estimator import WheelSoilEstimator
+from wheel_terra_estimator.evaluation.runner import without
+from wheel_terra_estimator.simulation.drive import simulate
+from wheel_terra_estimator.simulation.scenario import load
+
+NAMES = {
+    WheelOdometry: 'wheel_odometry',
+    InertialReading: 'inertial',
+    SinkageReading: 'sinkage',
+    ReferenceVelocity: 'reference',
+}
+SAND = ['generic_six_wheel', 'dry_sand_ding2015']
+
+
+def merged(measurements):
+    by_stamp = {}
+    for m in measurements:
+        by_stamp.setdefault(m.stamp, {})[NAMES[type(m)]] = m
+    return [(stamp, StepInputs(**by_stamp[stamp])) for stamp in sorted(by_stamp)]
+
+
+def estimate(drive, mode='reference', estimator=None):
+    estimator = estimator or WheelSoilEstimator(drive.configuration)
+    sets = []
+    for stamp, inputs in merged(without((a.measurement for a in drive.arrivals), mode)):
+        estimator.step(stamp, inputs)
+        if inputs.wheel_odometry is not None:
+            sets.append(estimator.estimates())
+    return sets
+
+
+def drive(duration=16.0, seed=3, **keys):
+    base = {
+        'configuration': SAND,
+        'duration': duration,
+        'sensors.jitter': 0.0,
+        'sensors.sinkage_outliers': 0.0,
+    }
+    return simulate(load({**base, **keys}), seed)
+
+
+@pytest.fixture(scope='module')
+def climb():
+    return drive(**{'slope.angle_deg': [8.0]})
+
+
+def last(values, seconds=5):
+    return np.mean(values[-10 * seconds :], axis=0)
+
+
+@pytest.mark.parametrize('slope', [4.0, -4.0])
+@pytest.mark.parametrize('speed', [0.05, -0.05])
+def test_each_quadrant_has_the_right_signs(slope, speed):
+    run = drive(**{'slope.angle_deg': [slope], 'drive.forward': [speed]})
+    sets, truth = estimate(run), run.truth
+    pull = last([s.drawbar_pull for s in sets])
+    slip = last([s.slip for s in sets])
+    assert slip == pytest.approx(last(truth.slip), abs=0.06)
+    load = truth.normal_load.mean()
+    assert pull == pytest.approx(last(truth.drawbar_pull), abs=0.05 * load)
+    assert np.sign(pull.sum()) == np.sign(slope)
+    assert last([s.forward_velocity for s in sets]) * speed > 0.0
+    assert last([s.slip_velocity for s in sets]) == pytest.approx(
+        last(truth.slip_velocity), abs=0.003
+    )
+    assert not any(s.stuck for s in sets)
+
+
+def test_every_output_is_finite_from_the_first_step(climb):
+    for mode in ('reference', 'no_reference', 'no_torque', 'no_sinkage', 'no_orientation'):
+        for s in estimate(climb, mode)[::5]:
+            for entry in fields(s):
+                value = getattr(s, entry.name)
+                if isinstance(value, np.ndarray):
+                    assert np.isfinite(value).all(), (mode, entry.name)
+                    if entry.name.endswith('_std'):
+                        assert (value >= 0.0).all()
+
+
+def test_missing_inputs_widen_the_deviations_and_are_said(climb):
+    full = estimate(climb)[-1]
+    for mode, key, field in (
+        ('no_reference', 'reference', 'slip_std'),
+        ('no_torque', 'torque', 'drawbar_pull_std'),
+        ('no_sinkage', 'sinkage', 'sinkage_std'),
+    ):
+        poor = estimate(climb, mode)[-1]
+        assert key in poor.faults
+        assert key not in full.faults
+        assert getattr(poor, field).mean() > getattr(full, field).mean()
+    assert 'orientation' in estimate(climb, 'no_orientation')[-1].faults
+
+
+def test_snapshot_comes_back_to_the_bit(climb):
+    inputs = merged(a.measurement for a in climb.arrivals)
+    estimator = WheelSoilEstimator(climb.configuration)
+    for stamp, given in inputs[:500]:
+        estimator.step(stamp, given)
+    memory = estimator.snapshot()
+    ends = []
+    for _ in range(2):
+        for stamp, given in inputs[500:700]:
+            estimator.step(stamp, given)
+        ends.append(estimator.estimates())
+        estimator.restore(memory)
+    for entry in fields(ends[0]):
+        assert np.array_equal(getattr(ends[0], entry.name), getattr(ends[1], entry.name))
+
+
+def test_new_run_keeps_the_soil_only_when_asked(climb):
+    estimator = WheelSoilEstimator(climb.configuration)
+    start = estimator.estimates().soil
+    estimate(climb, estimator=estimator)
+    learned = estimator.estimates()
+    estimator.begin_run(learned.stamp + 10**9, keep_soil=True)
+    kept = estimator.estimates()
+    assert kept.soil == pytest.approx(learned.soil)
+    assert (kept.soil_std >= learned.soil_std).all()
+    assert (kept.slip_class == SlipClass.UNKNOWN).all()
+    estimator.begin_run(learned.stamp + 2 * 10**9, keep_soil=False)
+    assert estimator.estimates().soil == pytest.approx(start)
+
+
+def test_rest_holds_slip_and_says_unknown():
+    run = drive(
+        duration=14.0, **{'drive.time': [0.0, 8.0, 8.1], 'drive.forward': [0.05, 0.05, 0.0]}
+    )
+    sets = estimate(run)
+    at_rest = sets[-30:]
+    assert all((s.slip_class == SlipClass.UNKNOWN).all() for s in at_rest)
+    assert all(np.array_equal(s.slip, at_rest[0].slip) for s in at_rest)
+    assert abs(at_rest[-1].forward_velocity) < 1e-3
+
+
+def test_spin_in_place_is_known_from_the_gyro():
+    run = drive(
+        duration=12.0,
+        **{'drive.forward': [0.0], 'drive.turn_rate': [0.06]},
+    )
+    sets = estimate(run)
+    assert last([s.slip for s in sets], 5) == pytest.approx(last(run.truth.slip, 5), abs=0.1)
+    assert not any(s.stuck for s in sets)
+
+
+def test_locked_wheels_that_slide_have_slip_minus_one():
+    configuration = load({'configuration': SAND}).configuration
+    estimator = WheelSoilEstimator(configuration)
+    zero = np.zeros(6)
+    for i in range(100):
+        stamp = 10**12 + i * 10**8
+        estimator.step(
+            stamp,
+            StepInputs(
+                wheel_odometry=WheelOdometry(stamp, zero, zero),
+                inertial=InertialReading(
+                    stamp, np.array([-1.7, 0.0, 9.6]), np.zeros(3), None
+                ),
+                reference=ReferenceVelocity(stamp, 0.03, 1e-6) if i % 5 == 0 else None,
+            ),
+        )
+    s = estimator.estimates()
+    assert s.slip == pytest.approx(-np.ones(6))
+    assert (s.slip_class == SlipClass.STUCK).all()
+    assert not s.stuck
+    assert s.forward_velocity == pytest.approx(0.03, abs=0.005)
+
+
+def test_sliding_back_is_class_stuck():
+    run = load({'configuration': SAND}).configuration
+    estimator = WheelSoilEstimator(run)
+    for i in range(100):
+        stamp = 10**12 + i * 10**8
+        estimator.step(
+            stamp,
+            StepInputs(
+                wheel_odometry=WheelOdometry(stamp, np.full(6, 0.4), np.full(6, 20.0)),
+                inertial=InertialReading(stamp, np.array([3.0, 0.0, 9.3]), np.zeros(3), None),
+                reference=ReferenceVelocity(stamp, -0.01, 1e-6) if i % 5 == 0 else None,
+            ),
+        )
+    s = estimator.estimates()
+    assert s.slip == pytest.approx(np.ones(6))
+    assert (s.slip_class == SlipClass.STUCK).all()
+    assert s.stuck
+
+
+def test_one_wild_fix_in_ten_costs_little(climb):
+    wild = [a.measurement for a in climb.arrivals]
+    fixes = [i for i, m in enumerate(wild) if isinstance(m, ReferenceVelocity)]
+    i = fixes[len(fixes) // 2]
+    wild[i] = ReferenceVelocity(wild[i].stamp, 0.5, wild[i].variance)
+    estimator = WheelSoilEstimator(climb.configuration)
+    speeds = []
+    for stamp, inputs in merged(wild):
+        estimator.step(stamp, inputs)
+        speeds.append(estimator.estimates().forward_velocity)
+    assert max(speeds[100:]) < 0.06
+    assert estimator.health()['rejected_reference'] >= 1
+
+
+def test_parts_of_the_wheels_and_nan_are_taken():
+    configuration = load({'configuration': SAND}).configuration
+    estimator = WheelSoilEstimator(configuration)
+    for i in range(60):
+        stamp = 10**12 + i * 10**8
+        rate = np.full(6, 0.4)
+        rate[3:] = np.nan
+        torque = np.full(6, np.nan)
+        estimator.step(stamp, StepInputs(wheel_odometry=WheelOdometry(stamp, rate, torque)))
+    s = estimator.estimates()
+    assert (s.slip_class[3:] == SlipClass.UNKNOWN).all()
+    assert (s.slip_class[:3] != SlipClass.UNKNOWN).all()
+    assert np.isfinite(s.slip).all()
