@@ -99,7 +99,7 @@ class Numerics:
     """Time step and bookkeeping."""
 
     time_step: float = 0.0  # [s]; 0: 0.85 of the largest stable one
-    samples: int = 800  # contact-wise samples over the travel
+    samples: int = 400  # contact-wise samples over the travel
     frames: int = 40  # pictures kept for the film
 
 

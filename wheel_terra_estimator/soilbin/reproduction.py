@@ -219,7 +219,9 @@ def table6_lines(rows: Sequence[Row]) -> list[str]:
     ours = {w: metrics.table6_spread(table6_rows(rows, w)) for w in WHEELS if of(rows, 'table6', w)}
     if not ours:
         return ['## Table 6', '', 'Not computed yet.']
-    sums = metrics.rank_sums({w: {k: v[0] for k, v in ours[w].items()} for w in ours})
+    sums: dict[int, int] = {}
+    if len(ours) == len(WHEELS):  # ranks among fewer wheels are not the paper's
+        sums = metrics.rank_sums({w: {k: v[0] for k, v in ours[w].items()} for w in ours})
     names = ('slope at 20 % [deg]', 'PN level', 'PN 15 deg', 'PN 20 %')
     head = ['wheel', *(f'{name} {who}' for name in names for who in ('paper', 'ours'))]
     head += ['ranks paper', 'ranks ours']
@@ -228,10 +230,10 @@ def table6_lines(rows: Sequence[Row]) -> list[str]:
         cells = [str(wheel)]
         for key in metrics.TABLE6:
             cells += [f'{paper[wheel][key]:.3g}', value(*values[key])]
-        body.append([*cells, f'{paper[wheel]["sum_of_ranks"]:.0f}', str(sums[wheel])])
-    best = min(sums, key=lambda w: sums[w])
+        body.append([*cells, f'{paper[wheel]["sum_of_ranks"]:.0f}', str(sums.get(wheel, '-'))])
     lines = ['## Table 6: W 19.6 N', '', *table(head, body), '']
-    if len(sums) > 2:
+    if sums:
+        best = min(sums, key=lambda w: sums[w])
         agreement = metrics.rank_correlation(
             [sums[w] for w in sums], [paper[w]['sum_of_ranks'] for w in sums]
         )
