@@ -53,10 +53,11 @@ def balanced_forces(
     sin_1, cos_1 = math.sin(t1), math.cos(t1)
     sin_d, cos_d = (math.sin(shift), math.cos(shift)) if shift else (0.0, 1.0)
 
-    # Per branch: mobilised share of the strength at its centroid, then the sums for unit peak
-    # stress (normal and friction) and for the cohesion.
+    # Sums over the branches per unit of peak normal stress (n), of that times tan(phi) (f) and of
+    # cohesion (c); k: what f and c lose per unit of K.
+    n_lift = n_push = f_lift = f_push = f_torque = c_lift = c_push = c_torque = 0.0
+    kf_lift = kf_push = kf_torque = kc_lift = kc_push = kc_torque = 0.0
     grip, drag = mu * R, cohesion * R
-    lift = fixed_lift = push = fixed_push = torque_unit = fixed_torque = 0.0
     branches = []
     for span, angle, middle, scale, doublings in (
         (front, t1 - front * centroid, 0.5 * (t1 + tm), 0.125, 3),
@@ -72,30 +73,39 @@ def balanced_forces(
         if doublings == 4:
             power *= power
         share = 1.0 - power if x >= 0.0 else power - 1.0
-        slope = power * base  # d share/dx
+        slope = power * base / modulus  # d share/d j
         pace = R - ratio * cosine  # -dj/dt
         sin_middle, cos_middle = math.sin(middle + shift), math.cos(middle + shift)
         if shift:
             sine, cosine = sine * cos_d + cosine * sin_d, cosine * cos_d - sine * sin_d
         # A branch is an arc: its resultant is a little smaller than the sum of its stresses.
-        cut, arc = spread * span * span, 1.0 - span * span / 24.0
+        square = span * span
+        cut, arc = spread * square, R * (1.0 - square / 24.0)
         whole = area * span
         weight = whole * (1.0 - cut)
-        normal, friction = r * weight, grip * weight * share
-        whole_sticking = drag * span * share
-        sticking = whole_sticking * arc
-        lift += normal * cosine + friction * sine
-        push += friction * cosine - normal * sine
-        torque_unit += grip * whole * share
-        fixed_lift += sticking * sin_middle
-        fixed_push += sticking * cos_middle
-        fixed_torque += whole_sticking
+        n_lift += weight * cosine
+        n_push += weight * sine
+        rub, cling, fading = R * weight, arc * span, -slope * x
+        f_lift += rub * share * sine
+        f_push += rub * share * cosine
+        f_torque += whole * share
+        c_lift += cling * share * sin_middle
+        c_push += cling * share * cos_middle
+        c_torque += span * share
+        kf_lift += rub * fading * sine
+        kf_push += rub * fading * cosine
+        kf_torque += whole * fading
+        kc_lift += cling * fading * sin_middle
+        kc_push += cling * fading * cos_middle
+        kc_torque += span * fading
         branches.append(
-            (span, weight, cut, normal, friction, sticking, share, slope, x, pace, climb, sine,
-             cosine, sin_middle, cos_middle)
+            (span, square, whole, weight, cut, share, slope, pace, climb, sine, cosine,
+             drag * span * share * (1.0 - square / 24.0), sin_middle, cos_middle)
         )  # fmt: skip
-    sigma = (contact.normal_load / width - fixed_lift) / lift
-    torque, pull = torque_unit * sigma + fixed_torque, push * sigma + fixed_push
+    lift, push, twist = r * n_lift + mu * f_lift, mu * f_push - r * n_push, mu * R * f_torque
+    unit_load = contact.normal_load / width
+    sigma = (unit_load - cohesion * c_lift) / lift
+    thrust = push * sigma + cohesion * c_push
     arm = width * R
 
     derivatives: list[Pair] = []
@@ -113,78 +123,60 @@ def balanced_forces(
         entering = (R - ratio * cos_1) * d_t1
         d_lift = d_push = d_torque = 0.0
         for (
-            span, weight, cut, normal, friction, sticking, share, slope, _, pace, climb, sine,
-            cosine, sin_middle, cos_middle,
+            span, square, whole, weight, cut, share, slope, pace, climb, sine, cosine, sticking,
+            sin_middle, cos_middle,
         ) in branches:  # fmt: skip
-            d_share = slope * (entering - pace * d_angle - climb * d_ratio) / modulus
+            d_share = slope * (entering - pace * d_angle - climb * d_ratio)
             d_whole = d_area * span + area * d_span
-            d_weight = d_whole * (1.0 - cut) - area * span * span * (
+            d_weight = d_whole * (1.0 - cut) - area * square * (
                 d_spread * span + 2.0 * spread * d_span
             )
-            d_normal = sigma * r * d_weight
-            d_friction = sigma * grip * (d_weight * share + weight * d_share)
-            square = span * span
             d_sticking = drag * (
                 d_span * (1.0 - 0.125 * square) * share + span * (1.0 - square / 24.0) * d_share
             )
-            normal_now, friction_now = sigma * normal, sigma * friction
+            d_normal = r * d_weight
+            d_friction = grip * (d_weight * share + weight * d_share)
+            normal, friction = r * weight, grip * weight * share
             d_lift += (
-                d_normal * cosine
-                + d_friction * sine
+                sigma
+                * (
+                    d_normal * cosine
+                    + d_friction * sine
+                    + (friction * cosine - normal * sine) * d_angle
+                )
                 + d_sticking * sin_middle
-                + (friction_now * cosine - normal_now * sine) * d_angle
                 + sticking * cos_middle * d_middle
             )
             d_push += (
-                d_friction * cosine
-                - d_normal * sine
+                sigma
+                * (
+                    d_friction * cosine
+                    - d_normal * sine
+                    - (friction * sine + normal * cosine) * d_angle
+                )
                 + d_sticking * cos_middle
-                - (friction_now * sine + normal_now * cosine) * d_angle
                 - sticking * sin_middle * d_middle
             )
-            d_torque += sigma * grip * (d_whole * share + area * span * d_share)
+            d_torque += sigma * grip * (d_whole * share + whole * d_share)
             d_torque += drag * (d_span * share + span * d_share)
             # The rear branch comes second.
             d_span, d_middle = d_tm - d_t2, 0.5 * (d_tm + d_t2)
             d_angle = d_t2 + d_span * centroid + rear * d_centroid
         d_sigma = -d_lift / lift
-        derivatives.append(
-            (arm * (d_torque + torque_unit * d_sigma), width * (d_push + push * d_sigma))
-        )
-    # Load, cohesion and tan(phi): the contact stays as it is.
+        derivatives.append((arm * (d_torque + twist * d_sigma), width * (d_push + push * d_sigma)))
+    # Load, cohesion, tan(phi) and K act on the sums; a rotation turns lift into push.
     by_load = 1.0 / (width * lift)
-    derivatives.append((arm * torque_unit * by_load, width * push * by_load))
-    k_lift = k_push = k_torque = c_lift = c_push = c_torque = m_lift = m_push = m_torque = 0.0
-    s_lift = s_push = 0.0
-    for (
-        span, weight, _, normal, friction, sticking, share, slope, x, _, _, sine, cosine,
-        sin_middle, cos_middle,
-    ) in branches:  # fmt: skip
-        arc = 1.0 - span * span / 24.0
-        unit = R * span * share
-        c_lift += unit * arc * sin_middle
-        c_push += unit * arc * cos_middle
-        c_torque += unit
-        unit = R * weight * share * sigma
-        m_lift += unit * sine
-        m_push += unit * cosine
-        m_torque += R * area * span * share * sigma
-        fading = -slope * x / modulus
-        rubbing, clinging = sigma * grip * weight * fading, drag * span * fading
-        k_lift += rubbing * sine + clinging * arc * sin_middle
-        k_push += rubbing * cosine + clinging * arc * cos_middle
-        k_torque += sigma * grip * area * span * fading + clinging
-        friction, normal = sigma * friction, sigma * normal
-        s_lift += friction * cosine - normal * sine + sticking * cos_middle
-        s_push -= friction * sine + normal * cosine + sticking * sin_middle
+    derivatives.append((arm * twist * by_load, width * push * by_load))
     for d_lift, d_push, d_torque in (
-        (c_lift, c_push, c_torque),
-        (m_lift, m_push, m_torque),
-        (k_lift, k_push, k_torque),
-        (s_lift, s_push, 0.0),
+        (c_lift, c_push, R * c_torque),
+        (sigma * f_lift, sigma * f_push, sigma * R * f_torque),
+        (
+            sigma * mu * kf_lift + cohesion * kc_lift,
+            sigma * mu * kf_push + cohesion * kc_push,
+            R * (sigma * mu * kf_torque + cohesion * kc_torque),
+        ),
+        (thrust, -unit_load, 0.0),
     ):
         d_sigma = -d_lift / lift
-        derivatives.append(
-            (arm * (d_torque + torque_unit * d_sigma), width * (d_push + push * d_sigma))
-        )
-    return (arm * torque, width * pull), derivatives
+        derivatives.append((arm * (d_torque + twist * d_sigma), width * (d_push + push * d_sigma)))
+    return (arm * (twist * sigma + drag * c_torque), width * thrust), derivatives
