@@ -29,8 +29,6 @@ FEATURES = (
     'remainder',  # something is left beyond the floor
     'floor',  # probability of a structural error
     'two',  # two effects are named
-    'open',  # number of rivals
-    'noise_unknown',
 )
 
 
@@ -43,7 +41,7 @@ class Confidence:
 
 
 def features(
-    selection: Selection, verdict: Verdict, place: int, left: Remainder, noise_known: bool
+    selection: Selection, verdict: Verdict, place: int, left: Remainder
 ) -> dict[str, float]:
     """Return the features of the name at ``place`` in the named set."""
     total = np.array([logsumexp(row) for row in selection.log_joint])
@@ -67,8 +65,6 @@ def features(
         'remainder': float(left.significant),
         'floor': left.probability_of_any,
         'two': float(len(selection.explanations[verdict.index].names) - 1),
-        'open': float(len(verdict.open_sets[place])),
-        'noise_unknown': float(not noise_known),
     }
 
 

@@ -19,6 +19,7 @@ ENOUGH_REPEATS = 6  # degrees of freedom from which repeats alone set the noise
 # effects included, must not be counted as noise.
 _SMOOTH = (0.01, 0.03, 0.1, 0.3, 1.0)
 _FIRST_GUESS = 0.01  # of the range
+_USUAL, _SPREAD = 1.5, 1.2  # weak prior of the factor on the guess: centre, width of its log
 _LEAST = 1e-4  # of the range: noise below it is a matter of rounding
 
 
@@ -116,6 +117,7 @@ def _white_part(
         power = (vectors.T @ target) ** 2
         variance = np.maximum(values, 0.0)[None] + factors[:, None] ** 2
         score = -0.5 * (np.log(variance) + power / variance).sum(axis=1)
+        score -= 0.5 * (np.log(factors / _USUAL) / _SPREAD) ** 2
         top = int(np.argmax(score))
         if score[top] > best:
             share = factors[top] ** 2 / variance[top]

@@ -321,10 +321,9 @@ def _named(
     fitted = explanation.fitted
     covariance = explanation.posterior.covariance[floor_index]
     parameters = _parameters(fitted, covariance)
-    noise_known = all(np.isfinite(f) for f in findings.noise.degrees_of_freedom.values())
     found = []
     for place, name in enumerate(fitted.names):
-        values = confidences.features(findings.selection, verdict, place, left, noise_known)
+        values = confidences.features(findings.selection, verdict, place, left)
         sure = confidences.confidence(values)
         rivals = verdict.open_sets[place]
         own = {
