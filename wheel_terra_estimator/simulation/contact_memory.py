@@ -24,6 +24,8 @@ FloatArray = NDArray[np.float64]
 
 SHEAR_TRAVEL = 0.25
 """Travel over which the shear follows the slip, as a share of the contact length."""
+SHEAR_DAMPING = 0.2
+"""Share of the rate of shear that adds to the stress [s]: viscous soil, the rover does not rock."""
 SENSE_TRAVEL = 0.5
 """Travel over which the front of the contact changes sides, as a share of the contact length."""
 SINKING_TRAVEL = 0.5
@@ -78,15 +80,29 @@ class ContactMemory:
 
     def trial_shear(
         self, forward: FloatArray, lateral: FloatArray, rate: FloatArray, dt: float
-    ) -> Shear:
-        """Return the shear after a step with these hub speeds [m/s] and wheel rates [rad/s]."""
+    ) -> tuple[Shear, Shear]:
+        """Return the shear after a step with these hub speeds [m/s] and wheel rates [rad/s].
+
+        Returns
+        -------
+        Shear
+            The state.
+        Shear
+            What the stress follows: the state and a part of its rate, at most the slip itself.
+        """
         rim = rate * self._slip_radius
         speed = np.maximum(np.abs(rim), np.sqrt(forward * forward + lateral * lateral))
         speed = np.maximum(speed, LEAST_SPEED)
-        part = dt / (SHEAR_TRAVEL * self._contact_length)
-        weight = 1.0 + part * speed
-        slip = np.clip((self.shear.slip + part * (rim - forward)) / weight, -1.0, 1.0)
-        return Shear(slip, (self.shear.side_slip - part * lateral) / weight)
+        length = SHEAR_TRAVEL * self._contact_length
+        weight = 1.0 + dt * speed / length
+        slip = np.clip((self.shear.slip + dt / length * (rim - forward)) / weight, -1.0, 1.0)
+        side_slip = (self.shear.side_slip - dt / length * lateral) / weight
+        damping = np.minimum(SHEAR_DAMPING, length / speed) / dt
+        stressed = Shear(
+            np.clip(slip + damping * (slip - self.shear.slip), -1.0, 1.0),
+            side_slip + damping * (side_slip - self.shear.side_slip),
+        )
+        return Shear(slip, side_slip), stressed
 
     def settle(self, soil: SoilForces) -> float:
         """Let the wheels sink at rest until the soil carries them; return the largest move [m]."""

@@ -53,6 +53,19 @@ class Drives:
         torque = np.clip(wanted, -limit, limit)
         return torque, np.where(np.abs(wanted) < limit, -self._gain, 0.0)
 
+    def next_trial(self, rate: FloatArray, proposed: FloatArray) -> FloatArray:
+        """Return where Newton's method is to go on from ``rate``: not past a border of the limits.
+
+        The torque has a kink there; a step across it was computed with the wrong slope.
+        """
+        limit = self._limit * self._strength
+        for border in (-limit, limit):
+            kink = self._target + (self._integral - border) / self._gain
+            beyond = np.sign(proposed - kink)
+            crossing = (rate - kink) * beyond < 0.0
+            proposed = np.where(crossing, kink + 1e-9 * beyond, proposed)
+        return proposed
+
     def finish(self, rate: FloatArray, dt: float) -> None:
         """Take the integral part over a step that ended at ``rate``; it stops at the limit."""
         limit = self._limit * self._strength

@@ -30,7 +30,7 @@ LONGEST_STEP = 0.05  # [s]
 LOAD_TIME = 0.1  # [s]; the suspension settles
 TINY = 1e-6  # [m/s]; step of the numerical derivatives
 TOLERANCE = 1e-4  # [m/s]; a smaller step of Newton's method is the last: the model is linear there
-MOST_ITERATIONS = 6
+MOST_ITERATIONS = 12
 
 
 @dataclass
@@ -200,7 +200,7 @@ class RoverPlant:
 
     def _wheel_forces(self, hub_speed: FloatArray, rate: FloatArray, dt: float) -> WheelForces:
         """Return the forces at trial speeds of the hubs (2, ..., n) and wheel rates (..., n)."""
-        shear = self._memory.trial_shear(hub_speed[0], hub_speed[1], rate, dt)
+        _, shear = self._memory.trial_shear(hub_speed[0], hub_speed[1], rate, dt)
         sense = self._memory.sense
         if (np.abs(sense) > 0.99).all():
             sign = np.sign(sense)
@@ -251,7 +251,7 @@ class RoverPlant:
         self._forces = forces
         hub_speed = np.einsum('ijn,j->in', self._lever, speeds)
         forward, lateral = hub_speed
-        shear = self._memory.trial_shear(forward, lateral, rate, dt)
+        shear, _ = self._memory.trial_shear(forward, lateral, rate, dt)
         self._drives.finish(rate, dt)
         self._memory.advance(forward, lateral, rate, shear, forces.soil, dt)
         self._speeds, self._rate = speeds, rate
@@ -302,14 +302,15 @@ class RoverPlant:
         largest = max(float(np.abs(hub_change).max()), float(np.abs(rate_change * radius).max()))
         # Far from the solution the linear model is poor: bound the move.
         part = min(1.0, 0.1 * max(1.0, abs(float(forward))) / max(largest, 1e-12))
-        moved = part * np.concatenate([hub_change, rate_change[None]])
+        next_rate = self._drives.next_trial(rate, rate + part * rate_change)
+        moved = np.concatenate([part * hub_change, (next_rate - rate)[None]])
         end = WheelForces(
             pull=force[0, 0] + (by_hub[0] * moved[:2]).sum(axis=0) + by_rate[0] * moved[2],
             side_force=force[1, 0] + (by_hub[1] * moved[:2]).sum(axis=0) + by_rate[1] * moved[2],
             torque=torque + (torque_by_hub * moved[:2]).sum(axis=0) + torque_by_rate * moved[2],
             soil=forces.soil.first(),
         )
-        return speeds + part * change, rate + part * rate_change, end, largest
+        return speeds + part * change, next_rate, end, largest
 
     def _move(self, dt: float) -> None:
         forward, lateral, turning = self._speeds
