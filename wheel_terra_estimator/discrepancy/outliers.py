@@ -62,7 +62,9 @@ def find_outliers(
     plain = np.linalg.inv(chosen)
     for quantity, amplitude in itertools.product(np.flatnonzero(counts >= 2), NARROW):
         shared = _shared_features(problem, narrow, amplitude, int(quantity))
-        score, cells = _set_apart(problem, np.linalg.inv(plain + shared), target)
+        score, cells = _set_apart(
+            problem, np.asarray(np.linalg.inv(plain + shared), dtype=float), target
+        )
         if score > best:
             best, found = score, cells
     return found
