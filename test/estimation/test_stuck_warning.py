@@ -102,10 +102,9 @@ def test_two_stalled_wheels_of_four_raise_it_without_any_speed():
 
 def test_pulling_away_from_rest_is_no_stall():
     monitor = StuckMonitor(StuckTuning())
-    rows = [[wheel(0.1, rim=0.1 * i, torque=0.95)] * 2 + [wheel(0.1, rim=0.2 * i)] * 2 for i in range(9)]
-    assert not any(
-        monitor.update(0.1 * i, 0.1 * i, False, w).stuck for i, w in enumerate(rows)
-    )
+    slow, quick = ([wheel(0.1, rim=k * i, torque=0.95) for i in range(9)] for k in (0.1, 0.2))
+    rows = [[a] * 2 + [b] * 2 for a, b in zip(slow, quick, strict=True)]
+    assert not any(monitor.update(0.1 * i, 0.1 * i, False, w).stuck for i, w in enumerate(rows))
 
 
 def test_travel_left_shrinks_to_nothing():

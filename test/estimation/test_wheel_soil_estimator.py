@@ -169,9 +169,7 @@ def test_locked_wheels_that_slide_have_slip_minus_one():
             stamp,
             StepInputs(
                 wheel_odometry=WheelOdometry(stamp, zero, zero),
-                inertial=InertialReading(
-                    stamp, np.array([-1.7, 0.0, 9.6]), np.zeros(3), None
-                ),
+                inertial=InertialReading(stamp, np.array([-1.7, 0.0, 9.6]), np.zeros(3), None),
                 reference=ReferenceVelocity(stamp, 0.03, 1e-6) if i % 5 == 0 else None,
             ),
         )

@@ -56,6 +56,7 @@ FloatArray = NDArray[np.float64]
 _NAN = math.nan
 _SLOPE_KEEP = 0.9  # per cycle
 _LEAST_SLIP_STD = 0.012
+_TURNING_SLIP_STD = 0.05
 # Slip of a rover in loose soil on level ground, its spread, and the rim travel of its changes [m].
 _USUAL_SLIP, _USUAL_STD, _USUAL_LENGTH = 0.12, 0.2, 1.0
 
@@ -483,7 +484,9 @@ class WheelSoilEstimator:
         if fastest <= self._low_rim:
             return
         side = min(abs(run.yaw_rate) * self._curvature_length / fastest, 1.0)
-        self._filter.widen(SHEAR_STRENGTH, (0.3 * (side - run.side_motion)) ** 2)
+        change = side - run.side_motion
+        self._filter.widen(SHEAR_STRENGTH, (0.4 * change) ** 2)
+        self._filter.widen(SPEED, (0.5 * change * fastest) ** 2)
         run.side_motion = side
 
     def _yaw_std(self) -> float:
@@ -517,7 +520,7 @@ class WheelSoilEstimator:
         if run.starting:
             # The contact forms anew, and with it what the shear model gets wrong.
             run.starting = False
-            self._filter.widen(SHEAR_STRENGTH, 0.1**2)
+            self._filter.widen(SHEAR_STRENGTH, 0.3**2)
         direction = 1.0 if rim > 0.0 else -1.0
         if direction != run.drive_direction:
             if run.drive_direction != 0.0:
@@ -1100,6 +1103,8 @@ class WheelSoilEstimator:
         else:
             slip = rim / v - 1.0
             slip_std = math.hypot(v_std * rim / (v * v), rate_std * s.slip_radius[i] / v)
+        # Turning scrubs the soil sideways, which no model here knows.
+        slip_std = math.hypot(slip_std, _TURNING_SLIP_STD * run.side_motion)
         run.slip[i], run.slip_std[i] = slip, min(max(slip_std, 1e-3), 1.0)
         run.wheel_class[i] = self._classifier.update(i, time, slip, slip_std, sliding_back)
 
