@@ -153,12 +153,9 @@ class ConditionedForces:
             max(tan_friction, 0.0),
             max(shear_modulus, 1e-6),
         )
-        rates, angle_rate, leaving = self._rates(
-            contact, given, slip_radius, sinkage, leaving_angle
-        )
-        t1, clamped = self._inputs(contact, given, slip_radius, sinkage)
-        set_angles(contact, t1, leaving, self._terms, ScalarMaths)
-        sink_rate = 0.0 if clamped else 1.0 / (contact.radius * math.sin(t1))
+        leaving = None if math.isnan(leaving_angle) else leaving_angle
+        rates, angle_rate, clamped = self._set(contact, given, slip_radius, sinkage, leaving)
+        sink_rate = 0.0 if clamped else 1.0 / (contact.radius * math.sin(contact.entrance_angle))
         by_ratio, by_load, by_cohesion, by_friction, by_modulus, by_angle, by_exponent = rates
         (torque, pull), rows = balanced_forces(
             contact,
@@ -176,58 +173,49 @@ class ConditionedForces:
             d_torque, d_pull = tuple(-d for d in d_torque), tuple(-d for d in d_pull)
         if self._on_forces:
             return self._with_force_terms(
-                contact, torque, pull, (d_torque, d_pull), given, slip_radius, sinkage, clamped
+                contact,
+                Forces(torque, pull, d_torque, d_pull, clamped),
+                given,
+                slip_radius,
+                sinkage,
+                leaving,
             )
         return Forces(torque, pull, d_torque, d_pull, clamped)
 
-    def _rates(
+    def _set(
         self,
         contact: Contact,
         given: tuple[float, ...],
         slip_radius: float,
         sinkage: float,
-        leaving_angle: float,
-    ) -> tuple[tuple, tuple[float, float], float | None]:
-        """Derivatives through the effects' terms, by one small step in all inputs at once.
+        leaving: float | None,
+    ) -> tuple[tuple, tuple[float, float], bool]:
+        """Set the contact, and take the derivatives through the effects' terms.
 
-        Load, c, tan(phi) and K each depend on themselves alone, the angles and the exponent on
-        speed ratio and sinkage.
+        One small step in all inputs at once: load, c, tan(phi) and K each depend on themselves
+        alone, the angles and the exponent on speed ratio and sinkage.
         """
-        leaving = None if math.isnan(leaving_angle) else leaving_angle
         if self._plain and leaving is None:
+            t1, clamped = self._inputs(contact, given, slip_radius, sinkage)
+            set_angles(contact, t1, None, self._terms, ScalarMaths)
             rates = (slip_radius, 1.0, 1.0, 1.0, 1.0, (0.0, 0.0, 0.0), 0.0)
-            return rates, (self._peak_ratio, self._leaving_ratio), None
+            return rates, (self._peak_ratio, self._leaving_ratio), clamped
         moved = tuple(
-            value + _STEP * max(value, floor) for value, floor in zip(given, _FLOORS, strict=True)
+            [value + _STEP * max(value, floor) for value, floor in zip(given, _FLOORS, strict=True)]
         )
-        before: list[float] = []
-        after: list[float] = []
-        for inputs, into in ((moved, after), (given, before)):
-            t1, _ = self._inputs(contact, inputs, slip_radius, sinkage)
-            set_angles(contact, t1, leaving, self._terms, ScalarMaths)
-            into.extend(
-                (
-                    contact.velocity_ratio,
-                    contact.normal_load,
-                    contact.cohesion,
-                    contact.tan_friction,
-                    contact.shear_modulus,
-                    contact.entrance_angle,
-                    contact.peak_angle,
-                    contact.leaving_angle,
-                    contact.sinkage_exponent,
-                )
-            )
+        t1, _ = self._inputs(contact, moved, slip_radius, sinkage)
+        set_angles(contact, t1, leaving, self._terms, ScalarMaths)
+        after = _chain(contact)
+        t1, clamped = self._inputs(contact, given, slip_radius, sinkage)
+        set_angles(contact, t1 + _STEP, leaving, self._terms, ScalarMaths)
+        peak, left = contact.peak_angle, contact.leaving_angle
+        set_angles(contact, t1, leaving, self._terms, ScalarMaths)
+        before = _chain(contact)
+        angle_rate = ((peak - contact.peak_angle) / _STEP, (left - contact.leaving_angle) / _STEP)
         steps = [m - g for m, g in zip(moved, given, strict=True)]
         steps += [steps[0]] * 4
         rate = [(a - b) / s for a, b, s in zip(after, before, steps, strict=True)]
-        peak, left = contact.peak_angle, contact.leaving_angle
-        set_angles(contact, contact.entrance_angle + _STEP, leaving, self._terms, ScalarMaths)
-        angle_rate = (
-            (contact.peak_angle - peak) / _STEP,
-            (contact.leaving_angle - left) / _STEP,
-        )
-        return (*rate[:5], tuple(rate[5:8]), rate[8]), angle_rate, leaving
+        return (*rate[:5], tuple(rate[5:8]), rate[8]), angle_rate, clamped
 
     def _inputs(
         self, contact: Contact, given: tuple[float, ...], slip_radius: float, sinkage: float
@@ -255,35 +243,55 @@ class ConditionedForces:
     def _with_force_terms(
         self,
         contact: Contact,
-        torque: float,
-        pull: float,
-        derivatives: tuple[tuple[float, ...], tuple[float, ...]],
+        forces: Forces,
         given: tuple[float, ...],
         slip_radius: float,
         sinkage: float,
-        clamped: bool,
+        leaving: float | None,
     ) -> Forces:
         """Add the terms that act on torque and pull, and their derivatives (finite steps)."""
 
         def added(inputs: tuple[float, ...], depth: float) -> tuple[float, float]:
-            contact.entrance_angle, _ = self._inputs(contact, inputs, slip_radius, depth)
+            t1, _ = self._inputs(contact, inputs, slip_radius, depth)
+            set_angles(contact, t1, leaving, self._terms, ScalarMaths)
             contact.torque = contact.drawbar_pull = 0.0
             for term, parameters in self._on_forces:
                 term(contact, parameters, ScalarMaths)
             return contact.torque, contact.drawbar_pull
 
         base = added(given, sinkage)
-        rows: list[list[float]] = [list(row) for row in derivatives]
-        # Positions of the five inputs and of the sinkage among INPUTS.
-        for column, position in ((0, 0), (2, 1), (3, 2), (4, 3), (5, 4), (1, None)):
+        rows = (list(forces.d_torque), list(forces.d_pull))
+        # Columns of INPUTS; the last is the sinkage, the others the entries of ``given``.
+        for position, column in enumerate((0, 2, 3, 4, 5, 1)):
             inputs, depth = list(given), sinkage
-            if position is None:
+            if column == 1:
                 step = _STEP * contact.radius
                 depth += step
             else:
-                step = _STEP * (abs(given[position]) + _STEP)
+                step = _STEP * max(given[position], _FLOORS[position])
                 inputs[position] += step
             moved = added(tuple(inputs), depth)
             for k in (0, 1):
                 rows[k][column] += (moved[k] - base[k]) / step
-        return Forces(torque + base[0], pull + base[1], tuple(rows[0]), tuple(rows[1]), clamped)
+        return Forces(
+            forces.torque + base[0],
+            forces.drawbar_pull + base[1],
+            tuple(rows[0]),
+            tuple(rows[1]),
+            forces.clamped,
+        )
+
+
+def _chain(contact: Contact) -> tuple[float, ...]:
+    """Return what the inputs became: v/w, load, c, tan(phi), K, the three angles, exponent."""
+    return (
+        contact.velocity_ratio,
+        contact.normal_load,
+        contact.cohesion,
+        contact.tan_friction,
+        contact.shear_modulus,
+        contact.entrance_angle,
+        contact.peak_angle,
+        contact.leaving_angle,
+        contact.sinkage_exponent,
+    )
