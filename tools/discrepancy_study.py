@@ -19,7 +19,6 @@ from __future__ import annotations
 
 import argparse
 import csv
-import itertools
 import os
 import sys
 from collections.abc import Iterator
@@ -86,10 +85,7 @@ def _results(todo: list[Task], processes: int) -> Iterator[dict[str, object]]:
         yield from map(one, todo)
         return
     with ProcessPoolExecutor(processes) as pool:
-        # In small batches, so that an interrupt loses little.
-        todo_left = iter(todo)
-        while batch := list(itertools.islice(todo_left, 8 * processes)):
-            yield from pool.map(one, batch)
+        yield from pool.map(one, todo)
 
 
 def show(arguments: argparse.Namespace) -> None:

@@ -52,10 +52,9 @@ FIELDS = (
 
 def diagnose(campaign: Campaign) -> Any:
     """Return the package's diagnosis of the campaign's table."""
-    from wheel_terra_estimator.discrepancy.workflow import diagnose as run
-
     from wheel_terra_estimator.configuration import reader
     from wheel_terra_estimator.discrepancy.table import check_table
+    from wheel_terra_estimator.discrepancy.workflow import diagnose as run
 
     configuration = reader.from_parameters(campaign.settings(), complete=False)
     table = check_table(f'campaign {campaign.seed}', campaign.table)
@@ -119,8 +118,8 @@ def _held_out(campaign: Campaign, diagnosis: Any) -> Record:
     The truth is known here, so no noise has to be subtracted: what is counted is what is left of
     the effect (and of structural error) after the soil refit and after the effect was added.
     ``measured_*`` are the same figures as a user can have them: from the measured cells, with the
-    squares of noise and floor subtracted. ``worse_z`` asks the same of the measured cells: standard errors by which adding the effect made
-    the held-out squared error smaller (negative: larger).
+    squares of noise and floor subtracted. ``worse_z``: standard errors by which adding the effect
+    made the held-out squared error of the measured cells smaller (negative: larger).
     """
     kept = diagnosis.table.lines - 2  # the header is line 1
     truth = np.stack([campaign.noise_free[key] for key in OUTPUTS], 1)[kept]

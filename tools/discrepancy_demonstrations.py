@@ -1,0 +1,329 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""The discrepancy workflow on measurements of other people: one command, a report per case.
+
+    python tools/discrepancy_demonstrations.py -o demonstrations [--only hit kls1 ...]
+    python tools/discrepancy_demonstrations.py -o demonstrations --only \
+        --table bin=bed.csv --config bin=bed.yaml
+
+Measured data are looked for in ``../shared`` (``--shared`` says where else); a case whose data are
+not there is skipped, visibly. ``--table NAME=FILE`` adds a table of one's own, such as the rows of
+the virtual soil bin, with ``--config NAME=FILE`` and ``--reference NAME=FILE`` for its model and
+for a table without the effect. Each case writes ``report.json``, ``report.html``, ``model.yaml`` and
+pictures into a folder of its name; the verdicts are listed on the terminal and in ``summary.md``.
+What they mean is discussed in ``docs/discrepancy/demonstrations.md``.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import math
+import sys
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from wheel_terra_estimator.configuration import reader
+from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.discrepancy.model_file import write_model
+from wheel_terra_estimator.discrepancy.report import write_report
+from wheel_terra_estimator.discrepancy.result import Diagnosis
+from wheel_terra_estimator.discrepancy.table import (
+    SteadyTable,
+    check_table,
+    read_table,
+)
+from wheel_terra_estimator.discrepancy.workflow import diagnose
+from wheel_terra_estimator.errors import UserError
+
+Rows = dict[str, list[float]]
+
+
+@dataclass(frozen=True)
+class Case:
+    """A table, the model believed in, and what one would expect beforehand."""
+
+    question: str
+    table: SteadyTable
+    configuration: Configuration
+    reference: SteadyTable | None = None
+    notes: tuple[str, ...] = field(default_factory=tuple)
+
+
+def _published(shared: Path, prefix: str, std: Mapping[str, float]) -> Rows:
+    """Return digitised single-wheel rows of one series, with a reading error per cell."""
+    path = shared / 'measured' / 'published_single_wheel' / 'single_wheel_experiments.csv'
+    columns = {
+        'slip': 'slip', 'normal_load': 'vertical_load_n', 'wheel_radius': 'wheel_radius_m',
+        'wheel_width': 'wheel_width_m', 'lug_height': 'grouser_height_m',
+        'lug_count': 'grouser_count', 'drawbar_pull': 'meas_drawbar_pull_n',
+        'sinkage': 'meas_sinkage_m', 'torque': 'meas_torque_nm',
+    }  # fmt: skip
+    rows: Rows = {key: [] for key in (*columns, *(f'{key}_std' for key in std))}
+    with path.open(encoding='utf-8') as stream:
+        for row in csv.DictReader(stream):
+            if not row['case_id'].startswith(prefix):
+                continue
+            for key, name in columns.items():
+                rows[key].append(float(row[name] or 'nan'))
+            for key, size in std.items():
+                # Read off a figure: a fixed part, and 5 % of the value.
+                rows[f'{key}_std'].append(math.hypot(size, 0.05 * rows[key][-1]))
+    # A torque listed as exactly 0 at slip 0 is a convention of the figure, not a reading.
+    rows['torque'] = [math.nan if t == 0.0 else t for t in rows['torque']]
+    return rows
+
+
+# Reading errors of the published figures: +-0.5 mm, +-1 N, +-0.2 N m at best.
+_READING = {'sinkage': 0.5e-3, 'drawbar_pull': 1.0, 'torque': 0.2}
+# What the soil files assume without a source is free within wide bounds.
+_ASSUMED = (
+    'soil.peak_stress_ratio_std:=0.1',
+    'soil.leaving_angle_ratio:=-0.2',
+    'soil.leaving_angle_ratio_std:=0.15',
+)
+
+
+def hit(shared: Path) -> Case:
+    """HIT wheel with 10 mm lugs against the model fitted to its smooth twin."""
+    return Case(
+        'What do 10 mm lugs add to the smooth wheel of the same size, in the same sand?',
+        check_table('HIT wheel, 10 mm lugs', _published(shared, 'ding2011_lug10', _READING)),
+        # The share of rim friction that lugs take away was fitted to this very wheel: put back.
+        reader.load(
+            ['hit_fit'],
+            ['slip_radius:=rim', 'effects.rim_friction.ring_height:=0.03'],
+            complete=False,
+        ),
+    )
+
+
+def hit_paired(shared: Path) -> Case:
+    """The same question with the smooth rows as the table in which the effect is absent."""
+    return Case(
+        'The same, from the soil as measured, the smooth wheel being the reference table.',
+        check_table('HIT wheel, 10 mm lugs', _published(shared, 'ding2011_lug10', _READING)),
+        reader.load(
+            ['hit_lss1'], ['slip_radius:=rim', 'soil.relative_std:=0.3', *_ASSUMED], complete=False
+        ),
+        check_table('HIT wheel, smooth', _published(shared, 'ding2011_smooth', _READING)),
+    )
+
+
+def hit_static(shared: Path) -> Case:
+    """HIT lugged wheel alone against the measured soil, no effect on."""
+    return Case(
+        'Lugged HIT wheel against the soil as measured, no effect switched on.',
+        check_table('HIT wheel, 10 mm lugs', _published(shared, 'ding2011_lug10', _READING)),
+        reader.load(
+            ['hit_lss1'], ['slip_radius:=rim', 'soil.relative_std:=0.3', *_ASSUMED], complete=False
+        ),
+    )
+
+
+def kls1(shared: Path) -> Case:
+    """KLS-1 wheel, smooth and with lugs: nearly constant torque excess."""
+    return Case(
+        'Why is the torque of the KLS-1 wheels so high?',
+        check_table('KLS-1 wheels', _published(shared, 'kls1', _READING)),
+        reader.load(
+            ['kls1_proxy'],
+            ['slip_radius:=rim', 'soil.relative_std:=0.3', *_ASSUMED],
+            complete=False,
+        ),
+        notes=('moduli of the soil are proxies: all soil parameters stated to 30 %',),
+    )
+
+
+def cmu(shared: Path) -> Case:
+    """CMU smooth wheel against static Bekker from plates of the same rig."""
+    from model_validation.cmu_wheel import plates
+
+    folder = shared / 'measured' / 'cmu_single_wheel'
+    soil, scatter, _ = plates(folder / 'pressure_sinkage.csv')
+    names = ('slip', 'normal_load', 'sinkage', 'drawbar_pull')
+    rows: Rows = {name: [] for name in (*names, 'sinkage_std', 'drawbar_pull_std')}
+    with (folder / 'steady_state.csv').open(encoding='utf-8') as stream:
+        for row in csv.DictReader(stream):
+            if row['wheel'] != 'smooth' or abs(float(row['slip_angle_deg'])) > 5:
+                continue
+            slip = float(row['slip_ratio'])
+            if not 0.0 <= slip <= 0.9:
+                continue
+            rows['slip'].append(slip)
+            rows['normal_load'].append(float(row['vertical_load_N']))
+            rows['sinkage'].append(1e-3 * float(row['sinkage_mm']))
+            rows['drawbar_pull'].append(float(row['drawbar_pull_N']))
+            rows['sinkage_std'].append(1e-3)  # repeated tests scatter by about this much
+            rows['drawbar_pull_std'].append(0.5)
+    count = len(rows['slip'])
+    rows['wheel_radius'], rows['wheel_width'] = [0.058] * count, [0.050] * count
+    settings = {
+        'cohesive_modulus': soil.cohesive_modulus,
+        'frictional_modulus': soil.frictional_modulus,
+        'sinkage_exponent': soil.sinkage_exponent,
+        'sinkage_exponent_std': 0.05,
+        'cohesion': 50.0,
+        'cohesion_std': 50.0,
+        'friction_angle_deg': 30.0,
+        'friction_angle_std_deg': 3.0,
+        'shear_modulus': 0.008,
+        'shear_modulus_std': 0.004,
+        'peak_stress_ratio': 0.4,
+        'peak_stress_ratio_std': 0.1,
+        'leaving_angle_ratio': -0.2,
+        'leaving_angle_ratio_std': 0.15,
+    }
+    return Case(
+        'Is a static pressure-sinkage law, fitted to plates, enough for the wheel at high slip?',
+        check_table('CMU smooth wheel', rows),
+        reader.load([], [f'soil.{k}:={float(v)!r}' for k, v in settings.items()], complete=False),
+        notes=(f'plates fitted to {100 * scatter:.0f} % in pressure; no torque was measured',),
+    )
+
+
+def pathfinder(shared: Path) -> Case:
+    """Pathfinder rover on firm ground: the stated radius is 6 % too small."""
+    from wheel_terra_estimator.bags.reader import parse_remaps
+    from wheel_terra_estimator.discrepancy.drive_windows import rows_from_bag
+
+    bag = shared / 'measured' / 'bags' / 'wvu_pathfinder_test17_mcap'
+    configuration = reader.load(['pathfinder'])
+    rows = rows_from_bag(bag, configuration, parse_remaps(['reference_odom:=/truth/odometry']))
+    return Case(
+        'Why does a rover that rolls freely seem to skid by 5 %?',
+        rows.table(),
+        configuration,
+        notes=rows.notes,
+    )
+
+
+def grc3(shared: Path) -> Case:
+    """Single wheel on GRC-3: pull that goes on rising to a slip of 0.8."""
+    path = shared / 'reference' / 'measured_viper_slip_slope.csv'
+    load = 17.5 * 9.80665
+    rows: Rows = {'slip': [], 'normal_load': [], 'drawbar_pull': []}
+    with path.open(encoding='utf-8') as stream:
+        for row in csv.DictReader(stream):
+            if row['series'] == 'TREC_single_wheel':
+                rows['slip'].append(float(row['slip']))
+                rows['normal_load'].append(load)
+                rows['drawbar_pull'].append(load * float(row['equivalent_DP_over_W']))
+    count = len(rows['slip'])
+    # Not in the data: size of the wheel as commonly given.
+    for key, value in (
+        ('wheel_radius', 0.25), ('wheel_width', 0.2), ('lug_height', 0.025), ('lug_count', 24.0)
+    ):  # fmt: skip
+        rows[key] = [value] * count
+    return Case(
+        'Why does pull still rise at a slip of 0.8?',
+        check_table('wheel on GRC-3', rows),
+        reader.load(
+            ['grc3'], ['slip_radius:=rim', 'soil.relative_std:=0.2', *_ASSUMED], complete=False
+        ),
+        notes=('pull only; size of the wheel is not in the data; noise not stated',),
+    )
+
+
+CASES: dict[str, Callable[[Path], Case]] = {
+    'hit': hit,
+    'hit_paired': hit_paired,
+    'hit_static': hit_static,
+    'kls1': kls1,
+    'cmu': cmu,
+    'pathfinder': pathfinder,
+    'grc3': grc3,
+}
+
+
+def from_table(name: str, arguments: argparse.Namespace) -> Case:
+    """Return the case of a table of one's own (``--table``, ``--config``, ``--reference``)."""
+    tables, configs, references = (
+        dict(text.partition('=')[::2] for text in texts)
+        for texts in (arguments.table, arguments.config, arguments.reference)
+    )
+    return Case(
+        f'Table {tables[name]}.',
+        read_table(tables[name]),
+        reader.load([configs[name]] if name in configs else [], complete=False),
+        read_table(references[name]) if name in references else None,
+    )
+
+
+def write(folder: Path, diagnosis: Diagnosis) -> None:
+    """Write what the command ``wheel-terra diagnose`` writes."""
+    folder.mkdir(parents=True, exist_ok=True)
+    diagnosis.write_json(folder / 'report.json')
+    write_model(diagnosis, folder / 'model.yaml')
+    write_report(diagnosis, folder)
+
+
+def summary(name: str, case: Case, diagnosis: Diagnosis) -> str:
+    """Return the verdict as Markdown."""
+    lines = [f'## {name}', '', case.question, '', f'**{diagnosis.verdict}**: {diagnosis.sentence}']
+    lines += [
+        '',
+        '| | as configured | soil refitted | in the end | noise |',
+        '|---|---|---|---|---|',
+    ]
+    for quantity, gap in diagnosis.gap.items():
+        noise = '-' if gap.noise is None else f'{gap.noise:.2g}'
+        lines.append(
+            f'| {quantity} | {gap.before:.3g} | {gap.refit:.3g} | {gap.after:.3g} | {noise} |'
+        )
+    best = [
+        f'{c.label} {c.log_evidence:+.1f}' for c in diagnosis.candidates[:6] if c.why_not or c.names
+    ]
+    lines += ['', f'ln evidence: {", ".join(best)}. {diagnosis.where.sentence}.']
+    pulls = [f'{s.name} {s.pull:+.1f}' for s in diagnosis.soil if abs(s.pull) > 1.5]
+    if pulls:
+        lines.append(f'Soil pulled by more than 1.5 stated deviations: {", ".join(pulls)}.')
+    if diagnosis.next_measurement:
+        lines.append(f'Next: {diagnosis.next_measurement[0].what}.')
+    lines += [f'({note})' for note in case.notes]
+    return '\n'.join(lines) + '\n'
+
+
+def main() -> None:
+    """Run the command."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    default = Path(__file__).resolve().parents[2] / 'shared'
+    parser.add_argument('-o', '--output', type=Path, required=True)
+    parser.add_argument('--shared', type=Path, default=default, help='folder of measured data')
+    parser.add_argument('--only', nargs='*', default=list(CASES), choices=list(CASES))
+    parser.add_argument('--table', action='append', default=[], metavar='NAME=FILE')
+    parser.add_argument('--config', action='append', default=[], metavar='NAME=FILE')
+    parser.add_argument('--reference', action='append', default=[], metavar='NAME=FILE')
+    arguments = parser.parse_args()
+    cases: dict[str, Callable[[], Case]] = {
+        name: lambda name=name: CASES[name](arguments.shared)  # type: ignore[misc]
+        for name in arguments.only
+    }
+    for text in arguments.table:
+        name = text.partition('=')[0]
+        cases[name] = lambda name=name: from_table(name, arguments)  # type: ignore[misc]
+    parts: list[str] = []
+    for name, make in cases.items():
+        try:
+            case: Any = make()
+        except FileNotFoundError as missing:
+            parts.append(f'## {name}\n\nskipped: {missing.filename} is not here\n')
+        except UserError as error:
+            parts.append(f'## {name}\n\nno verdict: {error}\n')
+        else:
+            diagnosis = diagnose(case.table, case.configuration, case.reference)
+            write(arguments.output / name, diagnosis)
+            parts.append(summary(name, case, diagnosis))
+        print(parts[-1], flush=True)
+    arguments.output.mkdir(parents=True, exist_ok=True)
+    (arguments.output / 'summary.md').write_text('\n'.join(parts), encoding='utf-8')
+
+
+if __name__ == '__main__':
+    main()
