@@ -50,7 +50,8 @@ def draw(effect: Effect, path: Path) -> None:
                 continue
             settings = {} if value is None else {effect.name: {parameter.name: value}}
             outputs = WheelSoilModel(SOIL, settings, strict=False).steady_state(points).outputs()
-            label = 'off' if value is None else f'{parameter.name} = {value:g} {parameter.unit}'
+            unit = '' if parameter.unit == '-' else f' {parameter.unit}'
+            label = 'off' if value is None else f'{parameter.name} = {value:g}{unit}'
             for axis, column, scale in zip(axes, outputs.T, (1e3, 1.0, 1.0), strict=True):
                 axis.plot(SLIP, scale * column, color=colour, label=label)
         for axis, text in zip(
