@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -29,15 +29,16 @@ WHEEL = Wheel(0.15735, 0.165, 0.01, 30)
 LOAD, SLIP, BATCH = 80.0, 0.3, 6000
 
 
-def best(call: Callable[[], object], repeats: int, rounds: int = 15) -> float:
-    """Return the shortest time of a call [us]."""
-    shortest = math.inf
+def shortest(calls: Sequence[tuple[Callable[[], object], int]], rounds: int = 12) -> list[float]:
+    """Return the shortest processor time of each call [us], all taken in turn, round by round."""
+    times = [math.inf] * len(calls)
     for _ in range(rounds):
-        start = time.perf_counter()
-        for _ in range(repeats):
-            call()
-        shortest = min(shortest, (time.perf_counter() - start) / repeats)
-    return 1e6 * shortest
+        for k, (call, repeats) in enumerate(calls):
+            start = time.process_time()
+            for _ in range(repeats):
+                call()
+            times[k] = min(times[k], (time.process_time() - start) / repeats)
+    return [1e6 * value for value in times]
 
 
 def adaptive(relative: float = 1.49e-8) -> tuple[float, float, float]:
@@ -94,78 +95,85 @@ def section(shared: Path, figures: Path) -> str:
         for wheel in range(6):
             rover.forces(wheel, 1.0 - SLIP, depth, LOAD, 250.0, friction, 0.0114)
 
-    slow = best(adaptive, 1, 8)
-    rows = [
-        ('adaptive quad with brentq', slow, 1, ''),
-        (
-            'closed form, floats: load to pull and torque at a given sinkage, with Jacobian',
-            best(lambda: rover.forces(0, 1.0 - SLIP, depth, LOAD, 250.0, friction, 0.0114), 200),
-            1,
-            '1000',
-        ),
+    def closed_balance() -> object:
+        return WheelSoilModel(SOIL, method='closed_form').steady_state(many)
+
+    names = ['soil.sinkage_exponent', 'soil.cohesion', 'soil.friction_angle', 'soil.shear_modulus']
+    methods: list[tuple[str, Callable[[], object], int, int, str]] = [
+        ('adaptive quad with brentq', adaptive, 2, 1, ''),
         (
             'closed form, floats: three forces at given angles',
-            best(lambda: closed_form.forces(scalar, terms, ScalarMaths), 500),
+            lambda: closed_form.forces(scalar, terms, ScalarMaths),
+            200,
             1,
             '1000',
         ),
         (
             'closed form, floats: soil and load to sinkage, pull, torque',
-            best(lambda: steady.state(0, 1.0 - SLIP, LOAD), 200),
+            lambda: steady.state(0, 1.0 - SLIP, LOAD),
+            100,
             1,
             '1000',
         ),
         (
+            'closed form, floats: torque and pull at a given sinkage, seven derivatives each',
+            lambda: rover.forces(0, 1.0 - SLIP, depth, LOAD, 250.0, friction, 0.0114),
+            100,
+            1,
+            '',
+        ),
+        (
             f'closed form, arrays of {BATCH}: three forces at given angles',
-            best(lambda: closed_form.forces(contact, terms), 3),
+            lambda: closed_form.forces(contact, terms),
+            3,
             BATCH,
             '15,000',
         ),
+        (f'closed form, arrays of {BATCH}: with the load balance', closed_balance, 1, BATCH, ''),
         (
-            f'closed form, arrays of {BATCH}: with the load balance',
-            best(lambda: WheelSoilModel(SOIL, method='closed_form').steady_state(many), 2, 6),
+            f'quadrature, arrays of {BATCH}: three forces at given angles',
+            lambda: quadrature.forces(contact, terms),
+            1,
             BATCH,
             '',
         ),
         (
-            f'quadrature, arrays of {BATCH}, error {100 * error:.4f} %: three forces',
-            best(lambda: quadrature.forces(contact, terms), 2, 6),
-            BATCH,
-            '',
-        ),
-        (
-            f'quadrature, arrays of {BATCH}: with the load balance',
-            best(lambda: model.steady_state(many), 1, 5),
+            f'quadrature, arrays of {BATCH}: with the load balance (error {100 * error:.4f} %)',
+            lambda: model.steady_state(many),
+            1,
             BATCH,
             '100',
         ),
+        ('quadrature, 16 rows: with the load balance', lambda: model.steady_state(few), 10, 16, ''),
         (
-            'quadrature, 16 rows: with the load balance',
-            best(lambda: model.steady_state(few), 20),
+            'quadrature, 16 rows: with the load balance and a Jacobian by 4 parameters',
+            lambda: model.jacobian(few, names),
+            5,
             16,
             '',
         ),
+        ('', six_wheels, 30, 1, ''),
     ]
+    times = shortest([(call, repeats) for _, call, repeats, _, _ in methods])
+    slow, six = times[0], times[-1]
     lines = [
         f'| {label} | {spent / count:.3g} | {slow * count / spent:,.0f} | {target} |'
-        for label, spent, count, target in rows
+        for (label, _, _, count, target), spent in zip(methods[:-1], times[:-1], strict=True)
     ]
-    names = ['soil.sinkage_exponent', 'soil.cohesion', 'soil.friction_angle', 'soil.shear_modulus']
-    jacobian = best(lambda: model.jacobian(few, names), 10)
     return '\n'.join(
         [
             '## Speed',
             '',
-            'One core, shortest of several rounds, all in one run; absolute times depend on the '
-            'machine and its load, the ratios hardly.',
+            'Processor time of one core, all methods in turn, shortest of several rounds. Absolute '
+            'times depend on the machine, the ratios much less. Adaptive: scipy quad at its '
+            'default tolerance inside brentq, as one would write it.',
             '',
             '| method | us per wheel | times faster than adaptive | target |',
             '|---|---|---|---|',
             *lines,
             '',
             f'Six wheels as the filter needs them (torque, pull and seven derivatives each): '
-            f'{best(six_wheels, 50):.0f} us a call (target 100 us on the machine of the '
-            f'performance notes, where adaptive quad with brentq takes 6980 us; here {slow:.0f}). '
-            f'Steady state and Jacobian of 16 rows by 4 parameters: {1e-3 * jacobian:.2f} ms.',
+            f'{six:.0f} us a call, 1/{slow / six:.0f} of one adaptive solve. The target of 100 us '
+            'was set on a machine where that solve takes 6980 us, a ratio of 1/70.',
         ]
     )

@@ -110,6 +110,25 @@ def balanced_forces(
 
     derivatives: list[Pair] = []
     for d_t1, d_tm, d_t2, d_ratio, d_exponent in directions:
+        if not (d_t1 or d_tm or d_t2 or d_exponent):
+            # Only the shear displacement moves: the common case of speed without effects.
+            d_lift = d_push = d_torque = 0.0
+            for (
+                span, square, whole, weight, _, _, slope, _, climb, sine, cosine, _,
+                sin_middle, cos_middle,
+            ) in branches:  # fmt: skip
+                d_share = -slope * climb * d_ratio
+                d_friction = sigma * grip * weight * d_share
+                d_whole_sticking = drag * span * d_share
+                d_sticking = d_whole_sticking * (1.0 - square / 24.0)
+                d_lift += d_friction * sine + d_sticking * sin_middle
+                d_push += d_friction * cosine + d_sticking * cos_middle
+                d_torque += sigma * grip * whole * d_share + d_whole_sticking
+            d_sigma = -d_lift / lift
+            derivatives.append(
+                (arm * (d_torque + twist * d_sigma), width * (d_push + push * d_sigma))
+            )
+            continue
         d_front = d_t1 - d_tm
         d_skew = (d_front - skew * (d_t1 + d_tm)) / total
         d_area = d_centroid = d_spread = 0.0

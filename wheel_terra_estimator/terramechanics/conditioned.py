@@ -165,9 +165,10 @@ class ConditionedForces:
                 (sink_rate, sink_rate * angle_rate[0], sink_rate * angle_rate[1], 0.0, 0.0),
             ),
         )
-        scales = (1.0, 1.0, by_load, by_cohesion, by_friction, by_modulus, 1.0)
-        d_torque = tuple([row[0] * scale for row, scale in zip(rows, scales, strict=True)])
-        d_pull = tuple([row[1] * scale for row, scale in zip(rows, scales, strict=True)])
+        if not self._plain:
+            scales = (1.0, 1.0, by_load, by_cohesion, by_friction, by_modulus, 1.0)
+            rows = [(a * scale, b * scale) for (a, b), scale in zip(rows, scales, strict=True)]
+        d_torque, d_pull = zip(*rows, strict=True)
         if direction < 0.0:
             torque, pull = -torque, -pull
             d_torque, d_pull = tuple(-d for d in d_torque), tuple(-d for d in d_pull)
