@@ -1,0 +1,189 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""The node as other nodes see it."""
+
+import signal
+
+import pytest
+
+ROVER = ['--ros-args', '--params-file']
+NODE = '/wheel_terra_estimator'
+
+
+@pytest.fixture
+def parameters(tmp_path):
+    from wheel_terra_estimator.configuration import reader
+
+    path = tmp_path / 'rover.yaml'
+    reader.load(['pathfinder']).write(path)
+    return str(path)
+
+
+def latched():
+    from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+
+    return QoSProfile(
+        depth=1,
+        reliability=ReliabilityPolicy.RELIABLE,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL,
+    )
+
+
+def wheel_message(names, seconds, rate=1.0):
+    from sensor_msgs.msg import JointState
+
+    message = JointState(name=list(names), velocity=[rate] * len(names))
+    message.header.stamp.sec = int(seconds)
+    message.header.stamp.nanosec = round((seconds % 1.0) * 1e9)
+    return message
+
+
+def hear(node, kind, topic, profile=10):
+    heard = []
+    node.create_subscription(kind, topic, heard.append, profile)
+    return heard
+
+
+def test_topics_types_and_stuck_for_those_who_come_late(start, parameters, listener):
+    from std_msgs.msg import Bool
+
+    node, until = listener
+    start('estimator_node', *ROVER, parameters)
+    expected = {
+        'slip': 'sensor_msgs/msg/JointState',
+        'sinkage': 'sensor_msgs/msg/JointState',
+        'slip_stddev': 'sensor_msgs/msg/JointState',
+        'sinkage_stddev': 'sensor_msgs/msg/JointState',
+        'mobility': 'sensor_msgs/msg/JointState',
+        'soil': 'sensor_msgs/msg/JointState',
+        'slip_class': 'std_msgs/msg/UInt8MultiArray',
+        'twist': 'geometry_msgs/msg/TwistWithCovarianceStamped',
+        'stuck': 'std_msgs/msg/Bool',
+    }
+
+    def offered():
+        return {name: types[0] for name, types in node.get_topic_names_and_types()}
+
+    until(lambda: all(f'{NODE}/{t}' in offered() for t in expected))
+    for topic, kind in expected.items():
+        assert offered()[f'{NODE}/{topic}'] == kind
+        (info,) = node.get_publishers_info_by_topic(f'{NODE}/{topic}')
+        assert info.qos_profile.reliability.name == 'RELIABLE'
+    for topic in ('joint_states', 'odom', 'imu/data', 'sinkage', 'leaving_angle', 'reference_odom'):
+        if subscribers := node.get_subscriptions_info_by_topic(f'/{topic}'):
+            assert subscribers[0].qos_profile.reliability.name == 'BEST_EFFORT', topic
+    stuck = hear(node, Bool, f'{NODE}/stuck', latched())
+    until(lambda: stuck)
+    assert [m.data for m in stuck] == [False]
+
+
+def test_set_of_a_message_reset_and_a_clean_end(start, parameters, listener):
+    from sensor_msgs.msg import JointState
+    from std_msgs.msg import UInt8MultiArray
+    from std_srvs.srv import Trigger
+
+    from wheel_terra_estimator.configuration import reader
+
+    names = reader.load(['pathfinder']).wheels.names
+    node, until = listener
+    process = start('estimator_node', *ROVER, parameters)
+    slip = hear(node, JointState, f'{NODE}/slip')
+    classes = hear(node, UInt8MultiArray, f'{NODE}/slip_class')
+    wheels = node.create_publisher(JointState, 'joint_states', 10)
+    client = node.create_client(Trigger, f'{NODE}/reset')
+    until(lambda: wheels.get_subscription_count() and client.service_is_ready())
+    until(
+        lambda: (
+            node.count_publishers(f'{NODE}/slip_class') and node.count_publishers(f'{NODE}/slip')
+        )
+    )
+    sent = 0
+
+    def send_and_hear(count):
+        nonlocal sent
+        while len(slip) < count or len(classes) < count:
+            wheels.publish(wheel_message(names[::-1], 100.0 + 0.1 * sent))
+            sent += 1
+            seen = len(slip)
+            until(lambda seen=seen: len(slip) > seen)
+            until(lambda: len(classes) >= len(slip))
+
+    send_and_hear(12)
+    last, kinds = slip[-1], classes[-1]
+    assert list(last.name) == list(names), "always in the configuration's order"
+    assert last.header.frame_id == 'base_link'
+    assert len(last.position) == len(last.velocity) == len(last.effort) == len(names)
+    layout = kinds.layout
+    assert (layout.dim[0].label, layout.dim[0].size, layout.dim[0].stride, layout.data_offset) == (
+        'wheel',
+        len(names),
+        len(names),
+        0,
+    )
+    future = client.call_async(Trigger.Request())
+    until(future.done)
+    assert future.result().success
+    send_and_hear(len(slip) + 3)
+    status, said = process.stop(signal.SIGINT)
+    assert status == 0, said
+    assert 'Traceback' not in said
+
+
+def test_silence_is_said_in_diagnostics(start, parameters, listener):
+    from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+
+    node, until = listener
+    diagnostics = hear(node, DiagnosticArray, '/diagnostics')
+    start('estimator_node', *ROVER, parameters)
+    until(lambda: diagnostics)
+    statuses = diagnostics[-1].status
+    assert len(statuses) == 5, 'one per wheel and one for the node'
+    assert all(s.level == DiagnosticStatus.STALE for s in statuses)
+    assert any('never heard' in s.message for s in statuses)
+
+
+def test_parameters_are_described_and_read_only(start, parameters, listener):
+    from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
+    from rcl_interfaces.srv import DescribeParameters, SetParameters
+
+    node, until = listener
+    start('estimator_node', *ROVER, parameters)
+    describe = node.create_client(DescribeParameters, f'{NODE}/describe_parameters')
+    change = node.create_client(SetParameters, f'{NODE}/set_parameters')
+    until(lambda: describe.service_is_ready() and change.service_is_ready())
+    future = describe.call_async(DescribeParameters.Request(names=['rover.mass']))
+    until(future.done)
+    (descriptor,) = future.result().descriptors
+    assert '[kg]' in descriptor.description
+    value = ParameterValue(type=ParameterType.PARAMETER_DOUBLE, double_value=1.0)
+    request = SetParameters.Request(parameters=[Parameter(name='rover.mass', value=value)])
+    future = change.call_async(request)
+    until(future.done)
+    (result,) = future.result().results
+    assert not result.successful
+    assert 'read-only' in result.reason
+
+
+@pytest.mark.parametrize(
+    ('override', 'words'),
+    [
+        ('rover.mas:=20.0', 'rover.mass'),
+        ('rover.mass:=-1.0', 'rover.mass'),
+        ('wheels.radius:=[0.1, 0.1]', 'wheels.radius'),
+        ('slip_radius:=tip', 'lug_tip'),
+    ],
+)
+def test_wrong_parameters_end_the_node_with_one_line(start, parameters, override, words):
+    status, said = start('estimator_node', *ROVER, parameters, '-p', override).end()
+    assert status == 2
+    assert words in said
+    assert 'Traceback' not in said
+
+
+def test_integer_where_a_number_is_wanted(start, parameters, listener):
+    from std_msgs.msg import Bool
+
+    node, until = listener
+    start('estimator_node', *ROVER, parameters, '-p', 'rover.mass:=20', '-p', 'use_sim_time:=true')
+    stuck = hear(node, Bool, f'{NODE}/stuck', latched())
+    until(lambda: stuck)
