@@ -56,7 +56,7 @@ class Coordinate:
     lower, upper : float
         Bounds of u.
     role : str
-        ``soil``, ``strength`` (vanishes at the centre of its prior) or ``shape``.
+        ``soil``, ``strength`` (first of an effect, or without effect at its centre) or ``shape``.
     logarithmic : bool
         The transform is the exponential.
     neutral : float
@@ -200,7 +200,7 @@ def _of_parameter(effect: Effect, p: EffectParameter) -> Coordinate:
         p.prior_scale,
         lower,
         upper,
-        role='strength' if p.neutral == p.prior_mean else 'shape',
+        role='strength' if p.neutral == p.prior_mean or p is effect.parameters[0] else 'shape',
         neutral=p.neutral,
         unit=p.unit,
         meaning=p.meaning,

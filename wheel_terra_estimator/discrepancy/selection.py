@@ -24,7 +24,7 @@ from wheel_terra_estimator.discrepancy.fitting import Fit, fit
 FloatArray = NDArray[np.float64]
 
 # Prior probabilities: nothing missing, one effect, two effects.
-PRIOR_NOTHING, PRIOR_ONE, PRIOR_TWO = 0.50, 0.47, 0.03
+PRIOR_NOTHING, PRIOR_ONE, PRIOR_TWO = 0.50, 0.45, 0.05
 # Prior of the structural error: floors that a good model may have ...
 _FLOORS = ((0.0, 0.60), (0.007, 0.10), (0.015, 0.12), (0.025, 0.10), (0.04, 0.04))
 # ... and smooth misfits that ask for a name, in all quantities or in one of them.

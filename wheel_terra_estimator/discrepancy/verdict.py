@@ -24,7 +24,7 @@ from wheel_terra_estimator.discrepancy.selection import Selection, log_mass
 FloatArray = NDArray[np.float64]
 
 # "Something is missing" must beat "nothing is missing" by these odds.
-ODDS_TO_SPEAK = 4.0
+ODDS_TO_SPEAK = 3.0
 # Members of the open set: tempered weights are added up to this mass.
 SET_MASS = 0.97
 TEMPERATURE = 1.5
@@ -98,7 +98,9 @@ def _explained(selection: Selection, nothing: int, best: int) -> float:
     before = selection.explanations[nothing].fitted.residual
     after = selection.explanations[best].fitted.residual
     excess = float(before @ before) - len(before)
-    return (float(before @ before) - float(after @ after)) / max(excess, 1e-9)
+    if excess <= 0.0:
+        return 1.0  # there was none
+    return (float(before @ before) - float(after @ after)) / excess
 
 
 def _rivals(
