@@ -149,7 +149,9 @@ def _in_order_of(arrival: Path, reader: MeasurementReader) -> Iterator[tuple[int
                 f'{arrival}: line {number}: no message "{line}" in {reader.bag.path}; '
                 'the log belongs to another bag'
             )
-        log_time, message = stored[name, int(stamp)].popleft()
+        logged, message = stored[name, int(stamp)].popleft()
+        # Time of arrival does not go back, so the estimates lie in the order of their publication.
+        log_time = max(log_time, logged)
         yield log_time, name, message
 
 
