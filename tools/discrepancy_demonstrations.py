@@ -10,8 +10,8 @@ Measured data are looked for in ``../shared`` (``--shared`` says where else); a 
 not there is skipped, visibly. ``--table NAME=FILE`` adds a table of one's own, such as the rows of
 the virtual soil bin, with ``--config NAME=FILE`` and ``--reference NAME=FILE`` for its model and
 for a table without the effect. Each case writes ``report.json``, ``report.html``, ``model.yaml``
-and pictures into a folder of its name; the verdicts are listed on the terminal and in ``summary.md``.
-What they mean is discussed in ``docs/discrepancy/demonstrations.md``.
+and pictures into a folder of its name; the verdicts are listed on the terminal and in
+``summary.md``. What they mean is discussed in ``docs/discrepancy/demonstrations.md``.
 """
 
 from __future__ import annotations
