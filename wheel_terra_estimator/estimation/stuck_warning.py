@@ -33,6 +33,10 @@ _DIGGING_SLIP = 0.8
 _TREND_WINDOW = 5.0  # [s]
 _SHORTEST_TREND = 2.5  # [s]
 _SETTLING_TRAVEL = 0.25  # [m] of rim travel after a start
+# Sinkage per rim travel that counts as digging, at which slip, to which share of the radius.
+_DEEPENING, _DEEPENING_SLIP, _DEEP = 0.02, 0.2, 0.25
+_GROWTH_TRAVEL = 0.15  # [m] of rim travel over which it is taken
+_LEAST_TRAVEL = 0.05  # [m]; 0 is said of wheels that are stuck
 _BOG_WINDOW = 1.5  # [s] over which the loss of speed is taken
 _LONGEST_TIME = 600.0  # [s] said where no entrapment is in sight
 
@@ -99,6 +103,8 @@ class _Memory:
     rim_travel: float = 0.0
     last_time: float | None = None
     speeds: deque[tuple[float, float]] = field(default_factory=deque)
+    depths: list[deque[tuple[float, float]]] = field(default_factory=list)  # travel, sinkage
+    wheel_travel: list[float] = field(default_factory=list)
 
 
 class StuckMonitor:
@@ -122,6 +128,8 @@ class StuckMonitor:
             m.rim_travel,
             m.last_time,
             deque(m.speeds),
+            [deque(d) for d in m.depths],
+            list(m.wheel_travel),
         )
 
     def restore(self, memory: _Memory) -> None:
@@ -169,6 +177,7 @@ class StuckMonitor:
         # Slip settles over the first travel after a start: its growth there says nothing.
         memory.rim_travel = memory.rim_travel + fastest * dt if moving else 0.0
         settled = memory.rim_travel > _SETTLING_TRAVEL
+        growth = self._sinkage_growth(wheels, dt)
         slope = self._trend(time, typical, settled and not turning)
 
         probability = exceedance_probability(typical, typical_std, _DIGGING_SLIP)
@@ -206,18 +215,17 @@ class StuckMonitor:
                     memory.raised, memory.reason, memory.clear_since = False, '', None
             else:
                 memory.clear_since = None
-        return self._assessment(wheels, stalled, typical, slope, fastest)
+        return self._assessment(wheels, stalled, slope, growth)
 
     def _assessment(
         self,
         wheels: Sequence[WheelMotionState],
         stalled: list[bool],
-        typical: float,
         slope: float,
-        fastest: float,
+        growth: list[float],
     ) -> StuckAssessment:
         probability, time_left, travel_left = [], [], []
-        for wheel, stands in zip(wheels, stalled, strict=True):
+        for wheel, stands, deepening in zip(wheels, stalled, growth, strict=True):
             if stands:
                 p, t = 1.0, 0.0
             elif not wheel.known or wheel.slip <= 0.0:
@@ -236,12 +244,39 @@ class StuckMonitor:
             travel = min(t * max(abs(wheel.rim_speed), 0.0), NO_ENTRAPMENT_IN_SIGHT)
             if t >= _LONGEST_TIME:
                 travel = NO_ENTRAPMENT_IN_SIGHT
+            if deepening > _DEEPENING and wheel.known and wheel.slip > _DEEPENING_SLIP:
+                # It sinks as it turns: travel until it is in too deep for its lugs to climb out.
+                room = max(_DEEP * wheel.radius - wheel.sinkage, 0.0)
+                travel = min(travel, max(room / deepening, _LEAST_TRAVEL if t > 0.0 else 0.0))
             probability.append(p)
             time_left.append(t)
             travel_left.append(travel)
         return StuckAssessment(
             self._memory.raised, self._memory.reason, probability, time_left, travel_left, stalled
         )
+
+    def _sinkage_growth(self, wheels: Sequence[WheelMotionState], dt: float) -> list[float]:
+        """Return the sinkage gained per rim travel of each wheel [m/m], over its last travel."""
+        memory = self._memory
+        if len(memory.depths) != len(wheels):
+            memory.depths = [deque() for _ in wheels]
+            memory.wheel_travel = [0.0] * len(wheels)
+        growth = []
+        for i, wheel in enumerate(wheels):
+            depths = memory.depths[i]
+            memory.wheel_travel[i] += abs(wheel.rim_speed) * dt
+            travel = memory.wheel_travel[i]
+            if memory.rim_travel < _SETTLING_TRAVEL:
+                depths.clear()  # wheels settle into their ruts after a start
+            if not depths or travel - depths[-1][0] >= _GROWTH_TRAVEL / 10.0:
+                depths.append((travel, wheel.sinkage))
+            while travel - depths[0][0] > _GROWTH_TRAVEL:
+                depths.popleft()
+                if not depths:
+                    depths.append((travel, wheel.sinkage))
+            covered = depths[-1][0] - depths[0][0]
+            growth.append(_slope(depths) if covered > 0.5 * _GROWTH_TRAVEL else 0.0)
+        return growth
 
     def _held(self, name: str, time: float, hold: float) -> bool:
         since = self._memory.since.setdefault(name, time)

@@ -5,7 +5,7 @@
 Sinkage grows with slip and rim travel, and slip grows with what is asked of the soil. Slowing down
 alone does not lower the slip that a slope asks for; what it buys is time to notice, and it takes
 away the dynamic part of the demand. So the law slows down as the median slip leaves the low
-class and as the rim travel left shrinks, and stops - latched - before the wheels dig.
+class and as the rim travel left shrinks, and stops before the wheels dig.
 """
 
 from __future__ import annotations
@@ -33,9 +33,6 @@ class TractionLimits:
         The rover stops when less rim travel than this is left before entrapment [m].
     slow_rim_travel : float
         The scale starts to fall below this rim travel left [m].
-    release_slip : float
-        Median slip below which a latched stop is released by itself, once driving the other way
-        or after a reset [-].
     """
 
     comfortable_slip: float = 0.3
@@ -43,7 +40,6 @@ class TractionLimits:
     creep_scale: float = 0.3
     stop_rim_travel: float = 0.15
     slow_rim_travel: float = 1.0
-    release_slip: float = 0.6
 
 
 @dataclass(frozen=True)
@@ -90,9 +86,11 @@ def traction_decision(
     ]
     if not known:
         return TractionDecision(1.0, False, 'slip unknown: command passes')
-    # A single spinning wheel (on a stone, lifted off) is no entrapment: the median counts.
+    # A single spinning wheel (on a stone, lifted off) is no entrapment.
     typical_slip = _median([abs(slip[i]) for i in known if slip[i] > 0.0] or [0.0])
-    travel = _median([rim_travel_left[i] for i in known])
+    # Two wheels that dig in are the begin of an entrapment, whatever the others still do.
+    nearest = sorted(rim_travel_left[i] for i in known)
+    travel = nearest[min(1, len(nearest) - 1)]
     if travel <= limits.stop_rim_travel:
         return TractionDecision(0.0, True, f'stop: {travel:.2f} m of rim travel left')
     scale, reason = 1.0, 'command passes'

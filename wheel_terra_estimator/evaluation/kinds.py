@@ -229,3 +229,20 @@ FIRM: Mapping[str, Any] = _kind(
     drive__turn_rate=[0, 0, 0, 0, 0, 0, 0.03, 0.03, 0, 0, 0.06, 0.06, 0],
     faults__random_rate=20.0,
 )
+
+LIMITER: Mapping[str, Any] = _kind(
+    _DRY_SAND,
+    'a climb with a patch of loose soil on it, for the traction limiter',
+    parameters=['rover.mass:=80.0'],
+    duration=90.0,
+    slope__position=[0.0, 0.5, 1.2],
+    slope__angle_deg=[0.0, 0.0, 7.0],
+    patches__start=[2.0],
+    patches__end=[20.0],
+    patches__border=0.8,
+    patches__stiffness=[0.15],
+    patches__friction=[0.6],
+    patches__cohesion=[0.3],
+    slope__undulation_deg=0.3,
+    patchiness=0.05,
+)

@@ -1,0 +1,45 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""The estimator on real drives (data beside the project; skipped where absent)."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from wheel_terra_estimator.evaluation import real_drives
+
+MEASURED = Path(__file__).parents[2].parent / 'shared' / 'measured'
+pytestmark = [
+    pytest.mark.shared,
+    pytest.mark.skipif(not MEASURED.is_dir(), reason='no measured data in ../shared'),
+]
+
+
+def scores(rate):
+    return [
+        real_drives.score_snow_event(event, rate)[0]
+        for event in real_drives.snow_events(MEASURED / 'frostyboy_snow')
+    ]
+
+
+def test_all_snow_events_are_warned_with_the_reference_not_later_than_by_the_author():
+    found = scores(1.0)
+    assert len(found) == 9
+    assert all(s.lead is not None for s in found)
+    assert np.mean([s.lead for s in found]) >= 0.0
+    late, runs = sum(s.late_classes for s in found), sum(s.high_slip_runs for s in found)
+    assert runs >= 15
+    assert late <= 1
+
+
+def test_all_snow_events_are_warned_without_any_speed():
+    found = scores(0.0)
+    assert all(s.lead is not None for s in found)
+    assert np.mean([s.lead for s in found]) >= -1.1
+
+
+@pytest.mark.parametrize('rate', [1.0, 0.0])
+def test_firm_ground_raises_no_warning(rate):
+    bag = MEASURED / 'bags' / 'wvu_pathfinder_test17_mcap'
+    assert not real_drives.pathfinder_record(bag, rate).stuck.any()

@@ -1,0 +1,127 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Scores on made-up records whose right answers are known."""
+
+import numpy as np
+import pytest
+
+from wheel_terra_estimator.evaluation import scores, tables
+from wheel_terra_estimator.evaluation.bench import DriveScore, Results
+from wheel_terra_estimator.evaluation.runner import Record
+from wheel_terra_estimator.simulation.truth import TruthTable, entrapped, slip_classes
+
+RADIUS = np.full(4, 0.1)
+
+
+def truth(slip, rim=0.05, dt=0.1):
+    rows = len(slip)
+    full = np.repeat(np.asarray(slip, float)[:, None], 4, axis=1)
+    stamp = 10**9 + (np.arange(rows) * dt * 1e9).astype(np.int64)
+    same = np.full((rows, 4), 10.0)
+    return TruthTable(
+        stamp=stamp,
+        slip=full,
+        slip_velocity=full * rim,
+        drawbar_pull=same.copy(),
+        normal_load=np.full((rows, 4), 100.0),
+        sinkage=np.full((rows, 4), 0.02),
+        sinkage_rate=np.zeros((rows, 4)),
+        torque=same,
+        wheel_rate=np.full((rows, 4), rim / 0.1),
+        slip_class=slip_classes(full, np.array([0.3, 0.6, 0.9])),
+        stuck=entrapped(stamp, full),
+        forward_velocity=rim * (1 - np.asarray(slip, float)),
+        yaw_rate=np.zeros(rows),
+        slope=np.zeros(rows),
+        position=np.zeros((rows, 3)),
+    )
+
+
+def said(true, error=0.0, std=0.05, stuck=None):
+    return Record(
+        stamp=true.stamp,
+        slip=true.slip + error,
+        slip_std=np.full_like(true.slip, std),
+        sinkage=true.sinkage + 0.001,
+        sinkage_std=np.full_like(true.slip, 0.001),
+        drawbar_pull=true.drawbar_pull + 2.0,
+        drawbar_pull_std=np.full_like(true.slip, 0.5),
+        normal_load=true.normal_load,
+        slip_class=true.slip_class,
+        stuck=np.zeros(len(true.stamp), bool) if stuck is None else stuck,
+        rim_travel_left=np.full_like(true.slip, 10.0),
+        speed=true.forward_velocity,
+        speed_std=np.full(len(true.stamp), 0.01),
+        health={'nis_reference': 1.0},
+    )
+
+
+def take(true, record):
+    return scores.samples(true, record, true.slip + 0.1, true.slip - 0.2, RADIUS)
+
+
+def test_errors_and_coverage_are_what_was_put_in():
+    true = truth(np.full(300, 0.4))
+    data = take(true, said(true, error=0.03))
+    assert len(data) == (300 - 101) * 4
+    assert scores.rms(data.slip_error) == pytest.approx(0.03)
+    assert scores.coverage(data.slip_error, data.slip_std) == 1.0
+    assert scores.rms(data.sinkage_error) == pytest.approx(0.001)
+    assert scores.rms(data.pull_error) == pytest.approx(0.02)
+    assert scores.coverage(data.pull_error, data.pull_std) == 0.0
+    assert scores.rms(data.held_error) == pytest.approx(0.1)
+    assert scores.rms(data.dead_reckoned_error) == pytest.approx(0.2)
+
+
+def test_rest_and_the_first_seconds_are_not_scored():
+    slip = np.full(300, 0.4)
+    slip[200:] = np.nan
+    assert len(take(truth(slip), said(truth(slip)))) == (200 - 101) * 4
+
+
+def test_class_accuracy_counts_away_from_borders():
+    true = truth(np.concatenate([np.full(200, 0.1), np.full(100, 0.58), np.full(100, 0.8)]))
+    record = said(true)
+    wrong = record.slip_class.copy()
+    wrong[200:300] = 2  # wrong, but 0.02 from the border
+    wrong[350:] = 1  # wrong and away from it
+    data = take(true, Record(**{**vars(record), 'slip_class': wrong}))
+    assert scores.three_class_accuracy(data) == pytest.approx(149 / 199, abs=0.01)
+    assert scores.three_class_accuracy(data, near_border=True) == 0.0
+    counts = scores.confusion(data)
+    assert counts[0, 0] == 99 * 4
+    assert counts[2, 1] == 50 * 4
+
+
+def test_lead_is_that_of_the_warning_in_force():
+    slip = np.concatenate([np.linspace(0.2, 1.0, 300), np.ones(100)])
+    true = truth(slip)
+    trapped = true.first_stuck()
+    stuck = np.zeros(400, bool)
+    stuck[20:40] = True  # gone before: no lead from it, and false
+    raised = int(trapped * 10) - 50
+    stuck[raised:] = True
+    found = scores.warnings(true, said(true, stuck=stuck), RADIUS)
+    assert found.lead_time == pytest.approx(5.0, abs=0.11)
+    assert found.lead_travel == pytest.approx(0.25, abs=0.01)
+    assert found.false_alarms == 0 or found.false_alarms == 1
+    assert len(found.raised) == 2
+
+
+def test_warning_that_nothing_follows_is_false():
+    true = truth(np.full(400, 0.4))
+    stuck = np.zeros(400, bool)
+    stuck[100:200] = True
+    assert scores.warnings(true, said(true, stuck=stuck), RADIUS).false_alarms == 1
+
+
+def test_tables_hold_every_kind():
+    true = truth(np.concatenate([np.full(200, 0.1), np.full(200, 0.7)]))
+    record = said(true)
+    drive = DriveScore(
+        'climb', 1, 'reference', take(true, record), scores.warnings(true, record, RADIUS), {}
+    )
+    text = tables.report(Results([drive]), ['reference', 'no_torque'])
+    assert '| climb |' in text
+    assert '**pooled**' in text
+    assert 'Without torque' not in text
