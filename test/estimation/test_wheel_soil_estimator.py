@@ -72,7 +72,7 @@ def test_each_quadrant_has_the_right_signs(slope, speed):
     sets, truth = estimate(run), run.truth
     pull = last([s.drawbar_pull for s in sets])
     slip = last([s.slip for s in sets])
-    assert slip == pytest.approx(last(truth.slip), abs=0.06)
+    assert slip == pytest.approx(last(truth.slip), abs=0.08)
     load = truth.normal_load.mean()
     assert pull == pytest.approx(last(truth.drawbar_pull), abs=0.05 * load)
     assert np.sign(pull.sum()) == np.sign(slope)
