@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from wheel_terra_estimator.bags.history import EstimateHistory
 from wheel_terra_estimator.bags.truth import Truth, WheelTruth
 from wheel_terra_estimator.estimation.estimates import SlipClass
+from wheel_terra_estimator.reporting.drive_summary import short_names
 from wheel_terra_estimator.reporting.style import (
     CLASS_COLOURS,
     LINE_COLOURS,
@@ -36,7 +37,7 @@ def overview(history: EstimateHistory, truth: Truth | None) -> Figure:
     """Draw body velocity, slip, class, sinkage and pull of all wheels under one another."""
     from matplotlib.figure import Figure
 
-    wheels = len(history.names)
+    wheels, names = len(history.names), short_names(history.names)
     with picture_style():
         figure = Figure(figsize=(10.5, 8.6 + 0.12 * wheels))
         axes = figure.subplots(
@@ -51,7 +52,7 @@ def overview(history: EstimateHistory, truth: Truth | None) -> Figure:
             scale = 1e3 if quantity == 'sinkage' else 1.0
             for i in range(wheels):
                 x, y = thin(history.seconds, scale * history.values[quantity][:, i])
-                axis.plot(x, y, color=_colour(i), label=history.names[i])
+                axis.plot(x, y, color=_colour(i), label=names[i])
             axis.set_ylabel(label)
         axes[1].set_ylim(-1.05, 1.05)
         axes[1].legend(ncols=min(wheels, 6), loc='lower left', bbox_to_anchor=(0, 1.0))
@@ -98,7 +99,7 @@ def _by_wheel(
     with picture_style():
         figure = Figure(figsize=(10.5, 1.1 + 1.9 * rows))
         axes = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
-        for i, name in enumerate(history.names):
+        for i, name in enumerate(short_names(history.names)):
             axis = axes.flat[i]
             _band(axis, history.seconds, values[:, i], deviation[:, i], _colour(i))
             if truth is not None:
@@ -178,7 +179,7 @@ def _class_strips(axis: Axes, history: EstimateHistory) -> None:
     for i in range(count):
         _spans(axis, history, i, count - 1 - i - 0.42, 0.84)
     axis.set_ylim(-0.5, count - 0.5)
-    axis.set_yticks(range(count), history.names[::-1], fontsize=7.5)
+    axis.set_yticks(range(count), short_names(history.names)[::-1], fontsize=7.5)
     axis.grid(False)
     axis.legend(
         handles=[Patch(color=CLASS_COLOURS[c], label=c.name.lower()) for c in SlipClass],

@@ -125,13 +125,21 @@ def summarise(
     )
 
 
+def short_names(names: Sequence[str]) -> list[str]:
+    """Return wheel names without what they all end in (``front_left_wheel_joint``: front_left)."""
+    parts = [name.split('_') for name in names]
+    while len(parts) > 1 and all(len(p) > 1 and p[-1] == parts[0][-1] for p in parts):
+        parts = [p[:-1] for p in parts]
+    return ['_'.join(p) for p in parts]
+
+
 def _wheels(history: EstimateHistory) -> tuple[WheelSummary, ...]:
     times = history.time_in_class()
     total = np.maximum(sum(times.values()), 1e-9)
     values = history.values
     known = history.slip_class != SlipClass.UNKNOWN
     result = []
-    for i, name in enumerate(history.names):
+    for i, name in enumerate(short_names(history.names)):
         seconds = {c.name.lower(): float(times[c][i]) for c in SlipClass}
         deepest = int(np.argmax(values['sinkage'][:, i]))
         slips = np.abs(values['slip'][known[:, i], i])
@@ -168,7 +176,7 @@ def as_text(summary: DriveSummary) -> str:
         end = 'the end' if warning.end is None else f'{warning.end:.1f} s'
         lines.append(f'  STUCK from {warning.start:.1f} s to {end}: {warning.reason or "-"}')
     if summary.wheels:
-        width = max(len(wheel.name) for wheel in summary.wheels)
+        width = max(len('time in class [s]'), *(len(wheel.name) for wheel in summary.wheels))
         classes = [c.name.lower() for c in SlipClass]
         lines += [
             '',
@@ -183,9 +191,13 @@ def as_text(summary: DriveSummary) -> str:
                 + f'{wheel.max_slip:13.2f}'
                 + f'{1000 * wheel.max_sinkage:12.0f} +- {1000 * wheel.max_sinkage_std:.0f}'
             )
-    lines += ['', f'  {"messages":24}{"used":>8}   rejected']
-    for row in summary.messages:
-        heard = f'{row.name} ({row.topic})' if row.topic != f'/{row.name}' else row.name
-        lines.append(f'  {heard:24}{row.count:8}   {row.rejected or "none"}')
+    heard = [
+        row.name if row.topic == f'/{row.name}' else f'{row.name} ({row.topic})'
+        for row in summary.messages
+    ]
+    width = max((len(name) for name in heard), default=0)
+    lines += ['', f'  {"messages":{width}}{"used":>8}   rejected']
+    for name, row in zip(heard, summary.messages, strict=True):
+        lines.append(f'  {name:{width}}{row.count:8}   {row.rejected or "none"}')
     lines += [f'  note: {note}' for note in summary.notes]
     return '\n'.join(lines)
