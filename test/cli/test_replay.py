@@ -1,0 +1,201 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""``wheel-terra replay`` from the command line."""
+
+from __future__ import annotations
+
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from wheel_terra_estimator.bags.history import read_estimates
+from wheel_terra_estimator.bags.storage import open_bag
+from wheel_terra_estimator.cli.main import main
+from wheel_terra_estimator.estimation.estimates import SlipClass
+
+REAL = ('--remap', 'odom:=/wheel/odometry', '--remap', 'reference_odom:=/truth/odometry')
+THINNED = ('-p', 'reference_odom_max_rate:=1.0')
+
+
+@pytest.fixture
+def config(tmp_path: Path, rover: Any) -> list[str]:
+    rover.write(tmp_path / 'rover.yaml')
+    return ['--config', str(tmp_path / 'rover.yaml')]
+
+
+def test_drive_gives_a_bag_a_report_and_a_summary(
+    make_bag: Any, config: list[str], tmp_path: Path, capsys: Any
+) -> None:
+    out, report = tmp_path / 'out', tmp_path / 'report.html'
+    arguments = ['replay', str(make_bag()), *config, '-o', str(out), '--report', str(report)]
+    assert main(arguments) == 0
+    said = capsys.readouterr().out
+    assert '40 estimate sets' in said
+    assert re.search(r'joint_states +40 +none', said)
+    assert 'not in the bag: sinkage, leaving_angle' in said
+    with open_bag(out) as bag:
+        history = read_estimates(bag)
+    # Rim speed 0.42 m/s, reference 0.36 m/s: slip 1/7 on both wheels, class low.
+    np.testing.assert_allclose(history.values['slip'][-10:], 1 / 7, atol=0.03)
+    assert (history.slip_class[-10:] == SlipClass.LOW).all()
+    page = report.read_text()
+    assert page.count('data:image/svg+xml;base64,') == 4
+    # Nothing is loaded from elsewhere.
+    assert not re.search(r'(?:src|href)="(?!data:)', page)
+
+
+def test_same_input_gives_the_same_bytes(make_bag: Any, config: list[str], tmp_path: Path) -> None:
+    bag = str(make_bag())
+    found = []
+    for name in ('one', 'two'):
+        assert main(['replay', bag, *config, '-o', str(tmp_path / name / 'out')]) == 0
+        (file,) = (tmp_path / name / 'out').glob('*.mcap')
+        found.append(file.read_bytes())
+    assert found[0] == found[1]
+
+
+def test_existing_output_is_refused_unless_overwrite(
+    make_bag: Any, config: list[str], tmp_path: Path, capsys: Any
+) -> None:
+    out = tmp_path / 'out'
+    arguments = ['replay', str(make_bag()), *config, '-o', str(out)]
+    assert main(arguments) == 0
+    assert main(arguments) == 2
+    assert 'exists already' in capsys.readouterr().err
+    assert main([*arguments, '--overwrite']) == 0
+    report = tmp_path / 'r.html'
+    report.write_text('mine')
+    assert main(['replay', str(make_bag(name='b')), *config, '--report', str(report)]) == 2
+    assert report.read_text() == 'mine'
+
+
+def test_the_bag_that_is_read_is_never_overwritten(
+    make_bag: Any, config: list[str], capsys: Any
+) -> None:
+    bag = make_bag()
+    assert main(['replay', str(bag), *config, '-o', str(bag), '--overwrite']) == 2
+    assert 'the bag that is read' in capsys.readouterr().err
+    with open_bag(bag) as opened:
+        assert opened.message_count == 84
+
+
+@pytest.mark.parametrize(
+    ('extra', 'words'),
+    [
+        (['-p', 'wheels.names:=[a, b]'], 'no wheel of wheels.names (a, b)'),
+        (['--remap', 'odm:=/x'], 'does not listen to odm'),
+        (['-p', 'rover.mas:=1'], 'rover.mass'),
+        (['--remap', 'sinkage:=/laser'], '/laser is not in the bag'),
+    ],
+)
+def test_what_cannot_be_used_is_one_line_and_status_2(
+    make_bag: Any, config: list[str], extra: list[str], words: str, tmp_path: Path, capsys: Any
+) -> None:
+    out = tmp_path / 'out'
+    assert main(['replay', str(make_bag()), *config, *extra, '-o', str(out)]) == 2
+    said = capsys.readouterr().err
+    assert words in said
+    assert said.count('\n') == 1
+    assert not out.exists()
+
+
+def test_bad_values_are_counted_and_the_good_data_is_used(
+    make_bag: Any, config: list[str], drive: Any, factory: Any, tmp_path: Path, capsys: Any
+) -> None:
+    """NaN rates, infinite forces, zero stamps, a negative variance among a good drive."""
+    rows = []
+    for number, (topic, message, log_time) in enumerate(drive):
+        rows.append((topic, message, log_time))
+        if number % 10 == 5:
+            header = factory.header(message.header.stamp.sec * 10**9 + 1 + number)
+            nan = factory.joint_state(header, ('left', 'right'), velocity=(np.nan, np.inf))
+            rows.append(('/joint_states', nan, log_time + 1))
+            force = factory.imu(header, (np.inf, 0.0, 9.8), (0.0, np.nan, 0.0), None)
+            rows.append(('/imu/data', force, log_time + 2))
+            unstamped = factory.joint_state(factory.header(0), ('left',), velocity=(2.0,))
+            rows.append(('/joint_states', unstamped, log_time + 3))
+            twist = factory.twist_with_covariance(np.nan, 0.0, [-1.0] + [0.0] * 35)
+            rows.append(('/reference_odom', factory.odometry(header, twist), log_time + 4))
+    out = tmp_path / 'out'
+    assert main(['replay', str(make_bag(messages=rows)), *config, '-o', str(out)]) == 0
+    with open_bag(out) as bag:
+        history = read_estimates(bag)
+    assert history.stamp.size >= 40
+    assert all(np.isfinite(values).all() for values in history.values.values())
+    np.testing.assert_allclose(history.values['slip'][-5:], 1 / 7, atol=0.05)
+    said = capsys.readouterr().out
+    assert re.search(r'joint_states +\d+ +\d+ x ', said), said
+
+
+def test_interrupted_replay_leaves_a_readable_bag(
+    make_bag: Any, config: list[str], factory: Any, tmp_path: Path
+) -> None:
+    """Ctrl-C in the midst of a drive of an hour."""
+    from conftest import drive_messages
+
+    bag = make_bag(messages=drive_messages(factory, 36_000), name='long')
+    out = tmp_path / 'out'
+    process = subprocess.Popen(
+        [sys.executable, '-m', 'wheel_terra_estimator.cli.main']
+        + ['replay', str(bag), *config, '-o', str(out)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    deadline = time.monotonic() + 60.0
+    file = out / 'out.mcap'
+    while time.monotonic() < deadline and not (file.exists() and file.stat().st_size > 2**20):
+        time.sleep(0.1)
+    process.send_signal(signal.SIGINT)
+    said, _ = process.communicate(timeout=60.0)
+    assert process.returncode == 130
+    assert 'interrupted' in said
+    with open_bag(out) as opened:
+        assert not opened.notes
+        history = read_estimates(opened)
+    assert 0 < history.stamp.size < 36_000
+
+
+@pytest.mark.shared
+@pytest.mark.parametrize(
+    ('name', 'rover_name'),
+    [
+        ('frostyboy_event_1_4_mcap', 'frostyboy'),
+        ('frostyboy_event_1_6_mcap', 'frostyboy'),
+        ('frostyboy_event_1_6_db3', 'frostyboy'),
+        ('wvu_pathfinder_test17_mcap', 'pathfinder'),
+    ],
+)
+def test_measured_recordings_with_a_rover_file_and_remaps(
+    shared: Path, tmp_path: Path, name: str, rover_name: str
+) -> None:
+    out = tmp_path / 'out'
+    bag = str(shared / 'bags' / name)
+    command = ['replay', bag, '--config', rover_name, *REAL, *THINNED, '-o', str(out)]
+    assert main(command) == 0
+    with open_bag(out) as opened, open_bag(bag) as source:
+        history = read_estimates(opened)
+        assert history.stamp.size == source.topics['/joint_states'].message_count
+    assert (np.diff(history.stamp) > 0).all()
+    assert all(np.isfinite(values).all() for values in history.values.values())
+    # Each FrostyBoy event ends immobilised; the Pathfinder drive is on firm ground.
+    assert bool(history.warnings) == (rover_name == 'frostyboy')
+
+
+@pytest.mark.shared
+def test_measured_recording_with_odometry_in_place_of_joint_states(
+    shared: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / 'out'
+    bag = str(shared / 'bags' / 'frostyboy_event_1_4_mcap')
+    command = ['replay', bag, '--config', 'frostyboy', *REAL, '-p', 'wheel_odometry:=odom']
+    assert main([*command, '-o', str(out)]) == 0
+    with open_bag(out) as opened:
+        assert read_estimates(opened).stamp.size == 252
