@@ -1,0 +1,111 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""The simulator as the plant of the traction limiter: the same drive with it and without it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wheel_terra_estimator.estimation.core import EstimatorCore
+from wheel_terra_estimator.estimation.traction_law import (
+    TractionDecision,
+    TractionLimits,
+    traction_decision,
+)
+from wheel_terra_estimator.simulation.commands import Command
+from wheel_terra_estimator.simulation.drive import Drive
+from wheel_terra_estimator.simulation.scenario import Scenario
+from wheel_terra_estimator.simulation.sensors import START, Arrival
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class ClosedLoopDrive:
+    """Course of a drive, one row per step of the plant."""
+
+    time: FloatArray
+    position: FloatArray  # along the path [m]
+    sinkage: FloatArray  # (k, n) truth [m]
+    slip: FloatArray  # (k, n) truth, nan at rest
+    scale: FloatArray  # of the command
+    stopped: float | None  # when the limiter stopped the rover [s]
+    reason: str
+
+
+def closed_loop(
+    scenario: Scenario, seed: int, *, limited: bool, limits: TractionLimits | None = None
+) -> ClosedLoopDrive:
+    """Drive the scenario's profile, the command scaled by the traction law or not.
+
+    A stop is latched, as the node does it until a reset: what was about to entrap the rover is
+    still below its wheels.
+    """
+    drive = Drive(scenario, seed)
+    core = EstimatorCore(drive.configuration)
+    limits = limits or TractionLimits()
+    decision = TractionDecision(1.0, False, 'command passes')
+    pending: list[Arrival] = []
+    rows: list[tuple[float, float, FloatArray, FloatArray, float]] = []
+    stopped: float | None = None
+    while drive.plant.time < scenario.duration - 1e-9:
+        wanted = scenario.profile.at(drive.plant.time)
+        scale = decision.scale if limited else 1.0
+        pending += drive.step(Command(scale * wanted.forward, scale * wanted.turn_rate))
+        truth = drive.last_truth
+        now = START + round(truth.time * 1e9)
+        due = sorted((a for a in pending if a.arrival <= now), key=lambda a: a.arrival)
+        pending = [a for a in pending if a.arrival > now]
+        for arrival in due:
+            for s in core.add(arrival.measurement):
+                if stopped is None:
+                    decision = traction_decision(
+                        s.slip.tolist(),
+                        s.slip_class.tolist(),
+                        s.rim_travel_left.tolist(),
+                        s.stuck,
+                        limits,
+                    )
+                    if limited and decision.stop:
+                        stopped = truth.time
+        rows.append(
+            (truth.time, float(truth.position[0]), truth.sinkage.copy(), truth.slip.copy(), scale)
+        )
+    columns = list(zip(*rows, strict=True))
+    return ClosedLoopDrive(
+        time=np.array(columns[0]),
+        position=np.array(columns[1]),
+        sinkage=np.array(columns[2]),
+        slip=np.array(columns[3]),
+        scale=np.array(columns[4]),
+        stopped=stopped,
+        reason=decision.reason,
+    )
+
+
+def picture(free: ClosedLoopDrive, limited: ClosedLoopDrive, radius: float, path: Path) -> None:
+    """Draw both drives: way, slip, sinkage."""
+    import matplotlib
+
+    matplotlib.use('Agg')
+    from matplotlib import pyplot as plt
+
+    figure, axes = plt.subplots(3, 1, figsize=(8, 7), sharex=True, layout='constrained')
+    for run, name in ((free, 'without limiter'), (limited, 'with limiter')):
+        slip = np.nan_to_num(run.slip)
+        axes[0].plot(run.time, run.position, label=name)
+        axes[1].plot(run.time, np.median(slip, axis=1), label=name)
+        axes[2].plot(run.time, 1e3 * run.sinkage.max(axis=1), label=name)
+    axes[2].axhline(250.0 * radius, color='grey', linestyle='--', label='a quarter of the radius')
+    for axis, label in zip(axes, ('way [m]', 'median slip [-]', 'deepest wheel [mm]'), strict=True):
+        axis.set_ylabel(label)
+        axis.grid(alpha=0.3)
+    axes[0].legend()
+    axes[2].legend()
+    axes[2].set_xlabel('time [s]')
+    figure.savefig(path, dpi=110)
+    plt.close(figure)
