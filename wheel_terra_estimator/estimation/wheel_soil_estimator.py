@@ -57,6 +57,7 @@ _NAN = math.nan
 _SLOPE_KEEP = 0.9  # per cycle
 _LEAST_SLIP_STD = 0.012
 _TURNING_SLIP_STD = 0.05
+_BALANCE_STD = 0.005  # of the weight: what curvature, ruts and mass leave open
 # Slip of a rover in loose soil on level ground, its spread, and the rim travel of its changes [m].
 _USUAL_SLIP, _USUAL_STD, _USUAL_LENGTH = 0.12, 0.2, 1.0
 
@@ -762,7 +763,6 @@ class WheelSoilEstimator:
             residual = reading - float(x[zi])
             total = float(P[zi, zi]) + variance
             nis = residual * residual / total
-            self._note_nis('sinkage', nis)
             if not run.sinkage_seen[i]:
                 run.sinkage_seen[i] = True
             elif nis > gate:
@@ -773,6 +773,7 @@ class WheelSoilEstimator:
                 # So many in a row are no spikes: the wheel is somewhere else.
                 self._filter.widen(zi, residual * residual)
             run.sinkage_rejected[i] = 0
+            self._note_nis('sinkage', min(nis, gate))
             run.sinkage_time = run.time
             row = np.zeros(size)
             row[zi] = 1.0
@@ -874,7 +875,7 @@ class WheelSoilEstimator:
             noise = float(s.sensors.specific_force_std) ** 2 / run.window.count
             variance = (
                 s.mass**2 * (noise + float(s.sensors.specific_force_bias_std) ** 2)
-                + (0.01 * weight) ** 2
+                + (_BALANCE_STD * weight) ** 2
                 + open_variance
             )
             total = float(balance @ P @ balance) + variance
