@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import argparse
 import importlib
+import os
 import sys
 from collections.abc import Sequence
 
@@ -35,6 +36,10 @@ def build_parser() -> argparse.ArgumentParser:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run ``wheel-terra`` and return the exit status (2 for input that cannot be used)."""
+    # Our matrices are small: threads of the linear algebra only get into each other's way. It has
+    # to be said before numpy is imported; what the user has set stays.
+    for library in ('OMP', 'OPENBLAS'):
+        os.environ.setdefault(f'{library}_NUM_THREADS', '1')
     arguments = build_parser().parse_args(argv)
     try:
         return int(arguments.run(arguments) or 0)
