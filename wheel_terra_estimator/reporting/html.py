@@ -57,6 +57,9 @@ def write_page(path: Path, page: str) -> None:
 
 def picture(figure: Figure) -> str:
     """Return a figure as the address of an image that lies in the page itself (SVG)."""
+    from wheel_terra_estimator.reporting.style import picture_style
+
     buffer = BytesIO()
-    figure.savefig(buffer, format='svg', metadata={'Date': None})
+    with picture_style():  # text as text, and the same bytes for the same picture
+        figure.savefig(buffer, format='svg', metadata={'Date': None})
     return 'data:image/svg+xml;base64,' + base64.b64encode(buffer.getvalue()).decode()
