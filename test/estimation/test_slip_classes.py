@@ -15,9 +15,7 @@ BORDERS = (0.3, 0.6, 0.9)
 
 def run(slips, std=0.01, dt=0.1, sliding_back=False):
     classifier = SlipClassifier(1, BORDERS, 0.02, 0.3)
-    return [
-        classifier.update(0, i * dt, slip, std, sliding_back) for i, slip in enumerate(slips)
-    ]
+    return [classifier.update(0, i * dt, slip, std, sliding_back) for i, slip in enumerate(slips)]
 
 
 @pytest.mark.parametrize(

@@ -110,7 +110,7 @@ class _Run:
     ratio_std: float = 0.3
     ratio_walk: float = 0.25  # of v / rim speed [1/sqrt(m)]
     drive_direction: float = 0.0
-    starting: bool = False
+    starting: bool = True
     fresh_travel: float = 0.0  # [m] since the start or the last change of direction
     load: list[float] = field(default_factory=list)
     torque_slope: list[float] = field(default_factory=list)  # by v/(r w), smoothed; nan = none
@@ -936,7 +936,8 @@ class WheelSoilEstimator:
             (run.pull_slope, forces.d_pull[0]),
         ):
             old = smoothed[i]
-            smoothed[i] = new if old != old else keep * old + (1.0 - keep) * new
+            # The first slopes after a start are taken where the slip is known least: begin flat.
+            smoothed[i] = 0.2 * new if old != old else keep * old + (1.0 - keep) * new
         return run.torque_slope[i], run.pull_slope[i]
 
     def _forces(self, i: int, rim: float, direction: float) -> WheelForces:
