@@ -385,15 +385,16 @@ def pictures(records: Sequence[Record], folder: Path) -> list[Path]:
     from matplotlib import pyplot as plt
 
     good = [r for r in records if not r['error']]
-    edges = np.array((1.0, *BINS, 150.0))
-    centres = np.sqrt(edges[:-1] * edges[1:])
 
     def curve(axes, chosen: list[Record], label: str) -> None:
+        # Few cases, wide bins.
+        edges = np.array((1.0, *(BINS if len(chosen) >= 150 else (3.0, 5.0, 10.0, 25.0)), 150.0))
+        centres = np.sqrt(edges[:-1] * edges[1:])
         shares = [
             share((r for r in chosen if a < r['distance'] <= b), first)
             for a, b in itertools.pairwise(edges)
         ]
-        keep = [i for i, s in enumerate(shares) if s.cases >= 5]
+        keep = [i for i, s in enumerate(shares) if s.cases >= 3]
         axes.plot(centres[keep], [shares[i].value for i in keep], 'o-', ms=3, label=label)
 
     figure, (left, middle, right) = plt.subplots(1, 3, figsize=(13, 4), layout='constrained')
@@ -404,6 +405,8 @@ def pictures(records: Sequence[Record], folder: Path) -> list[Path]:
     for axes, title in ((left, 'by kind of campaign'), (middle, 'same physics, by design')):
         axes.set(xscale='log', ylim=(0, 1.03), xlabel="d' of the hidden effect", title=title)
         axes.set_ylabel('named first')
+        axes.set_xticks([2, 5, 10, 20, 50, 100], ['2', '5', '10', '20', '50', '100'])
+        axes.minorticks_off()
         axes.grid(alpha=0.3)
         axes.legend(fontsize=8)
     named = [r for r in good if r['verdict'] == 'named']
