@@ -15,11 +15,11 @@ from wheel_terra_estimator.evaluation.scores import Samples
 
 _CLASSES = ('low', 'moderate', 'high', 'stuck')
 _MODES = {
-    'reference': 'with reference at 1 Hz',
-    'no_reference': 'without reference',
-    'no_torque': 'without torque',
-    'no_sinkage': 'without sinkage',
-    'no_orientation': 'without orientation',
+    'reference': 'With reference at 1 Hz',
+    'no_reference': 'Without reference',
+    'no_torque': 'Without torque',
+    'no_sinkage': 'Without sinkage',
+    'no_orientation': 'Without orientation',
 }
 
 
@@ -41,7 +41,7 @@ def report(results: Results, modes: Sequence[str]) -> str:
         pooled = Samples.joined(joined.values())
         high = float((np.abs(pooled.true_slip) > 0.6).mean())
         count = sum(len(d) for d in by_kind.values())
-        parts.append(f'## {_MODES[mode].capitalize()}\n')
+        parts.append(f'## {_MODES[mode]}\n')
         parts.append(
             f'{count} drives, {len(pooled)} scored wheel samples, {high:.0%} of them above '
             '|s| = 0.6.\n'
