@@ -1022,8 +1022,11 @@ class WheelSoilEstimator:
                 run.pull[i] = load * slope_share
                 run.pull_std[i] = 0.1 * load + 1e-3
                 continue
-            run.pull[i], run.torque_now[i] = float(pulls[i]), float(torques[i])
+            # First order from far away overshoots: no soil gives more than the load.
             radius = s.shear_radius[i]
+            run.pull[i] = min(max(float(pulls[i]), -load), load)
+            most = 1.2 * load * radius
+            run.torque_now[i] = min(max(float(torques[i]), -most), most)
             run.pull_std[i] = math.sqrt(
                 max(float(spread[i]), 0.0)
                 + (s.load_std * run.pull[i]) ** 2
