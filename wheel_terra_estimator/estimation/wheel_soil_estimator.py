@@ -477,6 +477,11 @@ class WheelSoilEstimator:
         run = self._run
         return run.reference_time is not None and run.time - run.reference_time < 20.0
 
+    def _open_shear(self, std: float) -> None:
+        """Widen the shear strength, where fixes will settle it again."""
+        if self._reference_known():
+            self._filter.widen(SHEAR_STRENGTH, std * std)
+
     def _note_turning(self) -> None:
         """Open the shear strength where turning begins or ends: the contacts form anew."""
         run = self._run
@@ -486,7 +491,7 @@ class WheelSoilEstimator:
             return
         side = min(abs(run.yaw_rate) * self._curvature_length / fastest, 1.0)
         change = side - run.side_motion
-        self._filter.widen(SHEAR_STRENGTH, (0.4 * change) ** 2)
+        self._open_shear(0.4 * change)
         self._filter.widen(SPEED, (0.5 * change * fastest) ** 2)
         run.side_motion = side
 
@@ -521,7 +526,7 @@ class WheelSoilEstimator:
         if run.starting:
             # The contact forms anew, and with it what the shear model gets wrong.
             run.starting = False
-            self._filter.widen(SHEAR_STRENGTH, 0.3**2)
+            self._open_shear(0.3)
         direction = 1.0 if rim > 0.0 else -1.0
         if direction != run.drive_direction:
             if run.drive_direction != 0.0:
