@@ -58,6 +58,12 @@ def drive(factory: MessageFactory) -> list[tuple[str, Any, int]]:
     return list(drive_messages(factory))
 
 
+@pytest.fixture(scope='session')
+def make_drive(factory: MessageFactory) -> Callable[[int], Iterator[tuple[str, Any, int]]]:
+    """Make such a drive of any length, in steps of the wheel odometry."""
+    return lambda steps: drive_messages(factory, steps)
+
+
 def drive_messages(factory: MessageFactory, steps: int = 40) -> Iterator[tuple[str, Any, int]]:
     for step in range(steps):
         stamp = START + step * STEP

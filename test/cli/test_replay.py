@@ -142,12 +142,10 @@ def test_bad_values_are_counted_and_the_good_data_is_used(
 
 
 def test_interrupted_replay_leaves_a_readable_bag(
-    make_bag: Any, config: list[str], factory: Any, tmp_path: Path
+    make_bag: Any, make_drive: Any, config: list[str], tmp_path: Path
 ) -> None:
     """Ctrl-C in the midst of a drive of an hour."""
-    from conftest import drive_messages
-
-    bag = make_bag(messages=drive_messages(factory, 36_000), name='long')
+    bag = make_bag(messages=make_drive(36_000), name='long')
     out = tmp_path / 'out'
     module = 'wheel_terra_estimator.cli.main'
     process = subprocess.Popen(

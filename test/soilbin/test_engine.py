@@ -188,8 +188,9 @@ def test_output_folder_is_complete(coarse_run):
 def test_interrupted_run_goes_on_and_leaves_no_half_result(coarse_run, tmp_path, capsys):
     _, cache = coarse_run
     output = tmp_path / 'out'
+    # Eight times slower, so that the interrupt comes before the end on a fast machine too.
     command = ['soilbin', 'run', 'quick', '--wheel', '2', '-o', str(output), '--cache', str(cache),
-               *SMALL]  # fmt: skip
+               *SMALL, '-p', 'operation.speed_factor:=1.0', '--duration', '10']  # fmt: skip
     process = subprocess.Popen(
         [sys.executable, '-m', 'wheel_terra_estimator.cli.main', *command],
         stderr=subprocess.PIPE, text=True,
