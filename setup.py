@@ -43,7 +43,7 @@ setup(
         'scipy>=1.11',
         'filterpy>=1.4.5',
         'PyYAML>=6.0',
-        'rosbags>=0.10',
+        'rosbags>=0.11',
         'matplotlib>=3.6',
         'jinja2>=3.1',
         'tqdm>=4.64',
