@@ -5,11 +5,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
-from conftest import drives, ground, rover
+from simulated_ground import drives, ground, rover
 
+from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.simulation import plant as plant_module
 from wheel_terra_estimator.simulation.commands import Command
 from wheel_terra_estimator.simulation.plant import RoverPlant
@@ -19,6 +21,15 @@ from wheel_terra_estimator.terramechanics.operating_points import OperatingPoint
 
 G = 9.80665
 MakePlant = Callable[..., RoverPlant]
+
+
+@pytest.fixture
+def plant() -> Callable[..., RoverPlant]:
+    def make(configuration: Configuration | None = None, **terrain: Any) -> RoverPlant:
+        configuration = configuration or rover()
+        return RoverPlant(configuration, ground(**terrain), drives(configuration))
+
+    return make
 
 
 def drive(plant: RoverPlant, seconds: float, forward: float = 0.05, turn: float = 0.0) -> Truth:

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from conftest import rover
+from simulated_ground import rover
 
 from wheel_terra_estimator.simulation.suspension import LEAST_LOAD_SHARE, suspension_of
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from conftest import ground
+from simulated_ground import ground
 
 from wheel_terra_estimator.simulation.terrain import GRID, Patch, smooth_noise
 

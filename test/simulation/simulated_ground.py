@@ -4,16 +4,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-import pytest
 
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.simulation.drives import Drives
-from wheel_terra_estimator.simulation.plant import RoverPlant
 from wheel_terra_estimator.simulation.terrain import Terrain
 
 EFFECTS = [
@@ -61,12 +59,3 @@ def ground(slope_deg: float = 0.0, side_deg: float = 0.0, **changes: Any) -> Ter
 def drives(configuration: Configuration, speed: float = 0.05) -> Drives:
     radius = configuration.wheels.slip_radius
     return Drives(configuration.wheels.torque_limit, speed / radius, 0.1 / radius)
-
-
-@pytest.fixture
-def plant() -> Callable[..., RoverPlant]:
-    def make(configuration: Configuration | None = None, **terrain: Any) -> RoverPlant:
-        configuration = configuration or rover()
-        return RoverPlant(configuration, ground(**terrain), drives(configuration))
-
-    return make
