@@ -194,6 +194,8 @@ def test_interrupted_run_goes_on_and_leaves_no_half_result(coarse_run, tmp_path,
     process = subprocess.Popen(
         [sys.executable, '-m', 'wheel_terra_estimator.cli.main', *command],
         stderr=subprocess.PIPE, text=True,
+        # Runs started in the background may come with the interrupt ignored.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )  # fmt: skip
     while b'travel' not in (line := process.stderr.buffer.read1(200)):
         assert line, 'ended before the travel'
