@@ -213,6 +213,10 @@ def run_node(make: Callable[[], Node], args: list[str] | None = None) -> int:
     except UserError as error:
         get_logger(NODE).fatal(str(error))
         return 2
+    except Exception:
+        # Told to stop while the wait set was being made, rclpy finds its context gone.
+        if rclpy.ok():
+            raise
     finally:
         if node is not None:
             node.destroy_node()
