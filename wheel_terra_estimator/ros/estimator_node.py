@@ -213,8 +213,8 @@ def run_node(make: Callable[[], Node], args: list[str] | None = None) -> int:
     except UserError as error:
         get_logger(NODE).fatal(str(error))
         return 2
-    except Exception:
-        # Told to stop while the wait set was being made, rclpy finds its context gone.
+    except RuntimeError:
+        # Told to stop while the wait set was being made, rclpy finds its context gone (RCLError).
         if rclpy.ok():
             raise
     finally:
