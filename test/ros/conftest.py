@@ -2,12 +2,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """The real rclpy over loopback, in a domain of its own; skipped visibly where there is none."""
 
+import fcntl
 import importlib.util
 import os
 import random
 import subprocess
 import sys
+import tempfile
 import time
+from pathlib import Path
 
 import pytest
 
@@ -26,7 +29,18 @@ def pytest_collection_modifyitems(items):
 def own_domain():
     """Keep apart from other robots and from other test runs on this machine."""
     os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
-    os.environ['ROS_DOMAIN_ID'] = str(random.SystemRandom().randint(1, 100))
+    domains = random.SystemRandom().sample(range(1, 101), 100)
+    for domain in domains:  # a lock keeps parallel workers and runs out of each other's domain
+        path = Path(tempfile.gettempdir()) / f'wheel_terra_test_domain_{domain}.lock'
+        with path.open('w') as lock:
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError:
+                continue
+            os.environ['ROS_DOMAIN_ID'] = str(domain)
+            yield
+            return
+    pytest.fail('all 100 ROS domains are taken by other test runs')
 
 
 class NodeProcess:
