@@ -161,6 +161,22 @@ def test_forces_balance_and_bed_is_plausible(coarse_run):
     assert found['entrance_angle'] > 0.3 > -0.1 > found['leaving_angle']
 
 
+def test_wheel_stands_under_its_whole_weight_before_it_turns(coarse_run, tmp_path):
+    output, cache = coarse_run
+    standing = json.loads((output / 'summary.json').read_text())['summary']
+    assert 0.001 < standing['slid_before'] < 0.1  # it slid until the soil held it
+    held = tmp_path / 'held'
+    command = ['soilbin', 'run', 'quick', '--wheel', '2', '-o', str(held), '--cache', str(cache)]
+    assert main([*command, *SMALL, '-p', 'operation.free_sinkage:=held', '--duration', '2']) == 0
+    found = json.loads((held / 'summary.json').read_text())['summary']
+    assert found['slid_before'] == pytest.approx(0.0, abs=1e-9)
+    # Released under its weight at once, the held wheel slides back only now, the other does not.
+    lowest = [np.loadtxt(folder / 'time_series.csv', delimiter=',', skiprows=1)[:, 1].min()
+              for folder in (output, held)]  # fmt: skip
+    assert lowest[1] < 0.2 - 1e-4
+    assert lowest[0] > 0.2 - standing['slid_before']
+
+
 def test_contact_sums_agree_with_the_engines_own_body(coarse_run):
     series = np.loadtxt(coarse_run[0] / 'time_series.csv', delimiter=',', skiprows=1)
     torque = series[:, SERIES.index('torque')]

@@ -3,6 +3,8 @@
 """Case files, kept beds and resumable studies, without the engine."""
 
 import argparse
+import hashlib
+import json
 import math
 
 import pytest
@@ -116,6 +118,21 @@ def test_a_changed_case_is_run_again():
     assert one.key == renamed.key
 
 
+def test_rows_from_before_a_field_was_added_stay_valid():
+    case = Case().replace(operation__slope=0.3)
+    data = to_dict(case) | {'name': ''}
+    for name in ('free_sinkage', 'drop_height'):
+        del data['operation'][name]
+    old = hashlib.sha256(json.dumps(data, sort_keys=True).encode()).hexdigest()[:12]
+    assert Job(case, {}).key == old
+    standing = case.replace(operation__free_sinkage='standing')
+    assert Job(standing, {}).key != old
+    assert Job(case.replace(operation__drop_height=0.01), {}).key != old
+    # On the level a standing wheel carries nothing along the bin: the same case.
+    level = [c.replace(operation__slope=0.0) for c in (case, standing)]
+    assert Job(level[0], {}).key == Job(level[1], {}).key
+
+
 def test_reproduction_covers_the_papers_tables():
     arguments = argparse.Namespace(part=None, seeds=3, grain_scale=0.0)
     found = reproduction.jobs(arguments)
@@ -220,3 +237,30 @@ def test_dask_absent_gives_one_line(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, 'dask.distributed', None)
     with pytest.raises(UserError, match=r"pip install 'wheel_terra_estimator\[cluster\]'"):
         study.run_study(jobs(1), tmp_path / 'a.csv', tmp_path, None, 1, dask='local')
+
+
+@pytest.mark.parametrize(
+    ('override', 'words'),
+    [
+        ('bed.seed:=-3', 'soilbin.bed.seed = -3 must not be below 0'),
+        ('wheel.lug_count:=-2', 'must not be below 0'),
+        ('wheel.lug_count:=200', 'do not fit around the rim'),
+        ('wheel.rim_diameter:=1.7', 'does not fit the bin'),
+        ('bed.rows:=0', 'must be above 0'),
+        ('bed.grain_scale:=40', 'fewer than 20 grains'),
+        ('grains.soil_friction:=-1', 'must not be below 0'),
+        ('numerics.samples:=0', 'must be above 0'),
+        ('operation.imposed_slip:=2', 'within -1 and 1'),
+        ('operation.pull_ramp:=-1', 'must not be below 0'),
+        ('operation.free_sinkage:=loose', 'must be held or standing'),
+    ],
+)
+def test_case_that_cannot_run_is_refused_before_anything_is_written(
+    tmp_path, capsys, override, words
+):
+    output = tmp_path / 'out'
+    assert main(['soilbin', 'run', 'quick', '-o', str(output), '-p', override]) == 2
+    said = capsys.readouterr().err
+    assert words in said
+    assert len(said.strip().splitlines()) == 1
+    assert not output.exists()

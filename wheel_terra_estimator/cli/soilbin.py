@@ -45,6 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     for name, text in (
         ('calibrate', 'fit what the paper does not state on wheel 2 alone'),
         ('reproduce', "the paper's tables 6 and 7, its figures' trends and its section 6"),
+        ('sensitivity', 'which assumption decides: the calibrated case, one thing changed'),
         ('convergence', 'grain size, time step, speed factor and bin: what they change'),
         ('rows', 'virtual measurements for diagnose: pull sweep or slip sweep'),
     ):
@@ -63,6 +64,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
             study.add_argument(
                 '--part', action='append', choices=('table7', 'table6', 'loads', 'moon'),
                 help='only this part (may be given several times)',
+            )  # fmt: skip
+        if name == 'sensitivity':
+            study.add_argument(
+                '--part', action='append', choices=('slopes', 'moon'),
+                help='only this part (may be given twice)',
             )  # fmt: skip
         if name == 'calibrate':
             study.add_argument(
@@ -96,9 +102,11 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _run_one(arguments: argparse.Namespace, cache: Path | None) -> int:
     from wheel_terra_estimator.soilbin import output, progress
+    from wheel_terra_estimator.soilbin.case import check
     from wheel_terra_estimator.soilbin.launch import StoppedByUserError, run_case
 
     case = case_of(arguments)
+    check(case)
     folder: Path = arguments.output
     work = folder / '.work'
     prepare_folder(folder, arguments.overwrite, arguments.resume)

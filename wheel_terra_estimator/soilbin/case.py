@@ -7,6 +7,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -92,6 +93,10 @@ class Operation:
     resting_time: float = 0.5  # [s] free sinkage under full load
     pull_ramp: float = 0.06  # [m] of rim travel over which the pull is raised
     start: float = 0.26  # [m] axle from the low end
+    # While it sinks before it turns, the locked wheel is 'held' along the slope, or 'standing':
+    # it carries the share of its weight along the slope as well and may slide until it holds.
+    free_sinkage: str = 'held'
+    drop_height: float = 0.0  # [m] above its first contact from which the wheel falls
 
 
 @dataclass(frozen=True)
@@ -163,43 +168,77 @@ def from_dict(data: dict) -> Case:
     )
 
 
+# Fields that must be above 0, and those that may be 0; all are finite.
+POSITIVE = (
+    'wheel.rim_diameter', 'wheel.width', 'wheel.mass', 'grains.normal_stiffness',
+    'grains.tangential_stiffness', 'grains.rolling_stiffness', 'grains.damping_density',
+    'bed.length', 'bed.rows', 'bed.pitch', 'bed.grain_scale', 'bed.settling_time',
+    'bed.settled_speed', 'operation.gravity', 'operation.vertical_load', 'operation.tip_speed',
+    'operation.speed_factor', 'operation.duration', 'operation.loading_time', 'numerics.samples',
+)  # fmt: skip
+NOT_NEGATIVE = (
+    'wheel.lug_height', 'wheel.lug_thickness', 'wheel.lug_count', 'grains.soil_friction',
+    'grains.wall_friction', 'grains.wheel_friction', 'grains.damping_ratio', 'grains.density',
+    'grains.rolling_friction', 'bed.seed', 'operation.turning_time', 'operation.resting_time',
+    'operation.pull_ramp', 'operation.start', 'operation.drop_height', 'numerics.time_step',
+    'numerics.frames',
+)  # fmt: skip
+WORDS = {
+    'grains.rotation': ('free', 'locked'),
+    'bed.arrangement': ('staggered', 'random'),
+    'operation.free_sinkage': ('held', 'standing'),
+}
+FEWEST_GRAINS = 20  # across the bin: fewer are no soil
+
+
 def check(case: Case) -> None:
     """Raise `UserError` where the case cannot be run."""
+
+    def refuse(name: str, words: str) -> None:
+        raise UserError(f'{case.name}: soilbin.{name} = {_field(case, name)} {words}')
+
+    for name in (*POSITIVE, *NOT_NEGATIVE):
+        value = _field(case, name)
+        if not (math.isfinite(value) and (value > 0 or (value == 0 and name in NOT_NEGATIVE))):
+            refuse(name, 'must be above 0' if name in POSITIVE else 'must not be below 0')
+    for name, words in WORDS.items():
+        if _field(case, name) not in words:
+            refuse(name, f'must be {" or ".join(words)}')
     wheel, bed, operation, grains = case.wheel, case.bed, case.operation, case.grains
-    positive = {
-        'wheel.rim_diameter': wheel.rim_diameter,
-        'wheel.width': wheel.width,
-        'wheel.mass': wheel.mass,
-        'grains.normal_stiffness': grains.normal_stiffness,
-        'grains.tangential_stiffness': grains.tangential_stiffness,
-        'bed.length': bed.length,
-        'bed.pitch': bed.pitch,
-        'bed.grain_scale': bed.grain_scale,
-        'operation.gravity': operation.gravity,
-        'operation.vertical_load': operation.vertical_load,
-        'operation.tip_speed': operation.tip_speed,
-        'operation.speed_factor': operation.speed_factor,
-        'operation.duration': operation.duration,
-        'operation.loading_time': operation.loading_time,
-    }
-    for name, value in positive.items():
-        if not (math.isfinite(value) and value > 0):
-            raise UserError(f'{case.name}: soilbin.{name} = {value} must be above 0')
     if not 0 <= math.degrees(operation.slope) <= 60:
         raise UserError(f'{case.name}: soilbin.operation.slope_deg must be within 0 and 60')
-    if grains.rotation not in ('free', 'locked'):
-        raise UserError(f'{case.name}: soilbin.grains.rotation must be free or locked')
-    if bed.arrangement not in ('staggered', 'random'):
-        raise UserError(f'{case.name}: soilbin.bed.arrangement must be staggered or random')
+    if operation.imposed_slip < -1 or operation.imposed_slip > 1:  # nan: free travel
+        refuse('operation.imposed_slip', 'must be within -1 and 1')
+    if not math.isfinite(operation.hitch_pull):
+        refuse('operation.hitch_pull', 'must be a finite number')
+    if not grains.diameters or min(grains.diameters) <= 0:
+        refuse('grains.diameters', 'must all be above 0')
     if max(grains.diameters) > bed.pitch * (1 + 1e-9):
         raise UserError(
             f'{case.name}: soilbin.grains.diameters reach {max(grains.diameters)} m, more than '
             f'soilbin.bed.pitch {bed.pitch} m: raise the pitch'
         )
+    if bed.length < FEWEST_GRAINS * bed.pitch * bed.grain_scale:
+        raise UserError(
+            f'{case.name}: a bin of {bed.length} m holds fewer than {FEWEST_GRAINS} grains side by '
+            'side: lower soilbin.bed.grain_scale or raise soilbin.bed.length'
+        )
+    if wheel.lug_count * wheel.lug_thickness > 2 * math.pi * wheel.rim_radius:
+        refuse('wheel.lug_count', 'lugs of this thickness do not fit around the rim')
     reach = wheel.tip_radius
+    if 2 * reach > bed.length:
+        raise UserError(
+            f'{case.name}: a wheel of {2 * reach:.3f} m does not fit the bin of {bed.length} m: '
+            'raise soilbin.bed.length'
+        )
     if operation.start - reach < 0 or operation.start + reach > bed.length:
         raise UserError(
             f'{case.name}: a wheel of {2 * reach:.3f} m with its axle at soilbin.operation.start '
             f'{operation.start} m does not fit the bin of {bed.length} m: choose a start between '
             f'{reach:.3f} and {bed.length - reach:.3f} m or a longer soilbin.bed.length'
         )
+
+
+def _field(case: Case, name: str) -> Any:
+    group, _, field_name = name.partition('.')
+    return getattr(getattr(case, group), field_name)

@@ -69,6 +69,7 @@ def summary(case: Case, series: np.ndarray, facts: dict, stopped: str) -> dict[s
         'power_number_body': power_number(body_torque),
         'sinkage_average': float(np.mean((facts['start_y'] - column['height'])[window])),
         'sinkage_static': float(static),
+        'slid_before': float(operation.start - facts['start_x']),
         'sinkage': float(np.mean(sunk[window])),
         'entrance_angle': mean('entrance_angle'),
         'leaving_angle': mean('leaving_angle'),

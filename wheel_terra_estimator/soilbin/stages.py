@@ -56,14 +56,16 @@ class Run:
         """Return the number of steps of a duration [s]."""
         return max(1, round(duration / self.engine.time_step))
 
-    def advance(self, stage: str, total: int) -> None:
-        """Run the steps of an untravelled stage in chunks."""
+    def advance(self, stage: str, total: int, look: Callable[[], None] | None = None) -> None:
+        """Run the steps of an untravelled stage in chunks; `look` may raise after each."""
         done = 0
         while done < total:
             chunk = min(CHUNK, total - done)
             self.engine.run(chunk)
             done += chunk
             self.report(stage, done / total)
+            if look:
+                look()
             if self.stop_asked():
                 raise InterruptedRunError
 
@@ -138,7 +140,11 @@ class Run:
     # -- wheel ----------------------------------------------------------------------------------
 
     def sink(self) -> None:
-        """Stage (iii): the locked wheel sinks freely while its load grows."""
+        """Stage (iii): the locked wheel sinks freely while its load grows.
+
+        A standing wheel carries its weight's share along the slope as well, as a braked rover's
+        does, and slides until the soil holds it. The paper does not say which of the two it did.
+        """
         operation, wheel, engine = self.case.operation, self.case.wheel, self.engine
         _, centres, radii, _ = engine.grains()
         self.facts['surface'] = geometry.surface_height(
@@ -152,15 +158,23 @@ class Run:
             phase += random.uniform(0, 2 * math.pi / wheel.lug_count)
         lugs = geometry.lug_discs(wheel, phase)
         height = geometry.touching_height(operation.start, wheel.rim_radius, lugs, centres, radii)
-        engine.place_wheel((operation.start, height + 1e-5), phase)
-        engine.hold_wheel(self.folder / 'wheel.body', free=(False, True))
+        height += 1e-5 + operation.drop_height
+        engine.place_wheel((operation.start, height), phase)
+        standing = operation.free_sinkage == 'standing' and operation.slope > 0
+        engine.hold_wheel(self.folder / 'wheel.body', free=(standing, True))
         load = operation.vertical_load * math.cos(operation.slope)
+        along = operation.vertical_load * math.sin(operation.slope) if standing else 0.0
         steps = self.steps(operation.loading_time)
         ramp = f'((step-{engine.step})/{steps})'
-        engine.load_wheel('0.0', f'-{load}*{ramp}')
-        self.advance('free sinkage', steps)
-        engine.load_wheel('0.0', f'-{load}')
-        self.advance('free sinkage', self.steps(operation.resting_time))
+        engine.load_wheel(f'-{along}*{ramp}', f'-{load}*{ramp}')
+        self.advance('free sinkage', steps, self._look_for_trouble)
+        engine.load_wheel(f'-{along}', f'-{load}')
+        self.advance('free sinkage', self.steps(operation.resting_time), self._look_for_trouble)
+
+    def _look_for_trouble(self) -> None:
+        trouble = self._trouble()
+        if trouble:
+            raise NotSettledError(f'before it turned, {trouble}')
 
     def travel(self, resumed: dict | None, series: list[list[float]]) -> str:
         """Stage (iv): the wheel turns at a constant rate; return why it stopped early, or ''."""
@@ -183,10 +197,12 @@ class Run:
             first = int(self.facts['first_step'])
         weight = operation.vertical_load
         along = weight * math.sin(operation.slope) + operation.hitch_pull
+        borne = weight * math.sin(operation.slope) * (operation.free_sinkage == 'standing')
+        added = along - borne  # what the soil did not carry yet while the wheel stood
         ramp_time = operation.pull_ramp / (operation.speed_factor * operation.tip_speed)
         ramp = self.steps(ramp_time)
         engine.load_wheel(
-            f'-{along}*((step-{first})<{ramp})*(step-{first})/{ramp}-{along}*((step-{first})>={ramp})',
+            f'-{along}+{added}*((step-{first})<{ramp})*(1-(step-{first})/{ramp})',
             f'-{weight * math.cos(operation.slope)}',
         )
         saved = self.clock()

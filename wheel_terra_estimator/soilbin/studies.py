@@ -9,12 +9,19 @@ import os
 from pathlib import Path
 
 from wheel_terra_estimator.errors import UserError
-from wheel_terra_estimator.soilbin import calibration, convergence, measurements, reproduction
+from wheel_terra_estimator.soilbin import (
+    calibration,
+    convergence,
+    measurements,
+    reproduction,
+    sensitivity,
+)
 from wheel_terra_estimator.soilbin.study import Job, run_study
 
 STUDIES = {
     'calibrate': calibration,
     'reproduce': reproduction,
+    'sensitivity': sensitivity,
     'convergence': convergence,
     'rows': measurements,
 }

@@ -18,6 +18,9 @@ from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.soilbin.case import Case, to_dict
 from wheel_terra_estimator.soilbin.launch import CaseFailedError, run_case
 
+# Fields that were added after rows had been published: at these values a case is the old one.
+ADDED_LATER = {'operation': {'free_sinkage': 'held', 'drop_height': 0.0}}
+
 
 @dataclass(frozen=True)
 class Job:
@@ -30,6 +33,12 @@ class Job:
     def key(self) -> str:
         """Hash of the case: a row is valid for exactly this case."""
         data = to_dict(self.case) | {'name': ''}
+        if data['operation']['slope'] == 0:  # nothing pulls along the bin: one and the same
+            data['operation']['free_sinkage'] = 'held'
+        for group, defaults in ADDED_LATER.items():
+            for name, default in defaults.items():
+                if data[group][name] == default:
+                    del data[group][name]
         return hashlib.sha256(json.dumps(data, sort_keys=True).encode()).hexdigest()[:12]
 
 
@@ -40,10 +49,18 @@ def run_job(
     folder = Path(work) / job.key
     try:
         row = run_case(job.case, folder, Path(cache) if cache else None, stop=stop)
+        _keep_series(folder / 'series.npy', Path(work).parent / 'series' / f'{job.key}.npy')
     except CaseFailedError as error:
         row = {'stopped': str(error)}
     shutil.rmtree(folder, ignore_errors=True)
     return dict(job.labels) | {'key': job.key} | row
+
+
+def _keep_series(series: Path, kept: Path) -> None:
+    """Keep the time series (columns: `bookkeeping.SERIES`) beside the table of the study."""
+    if series.exists():
+        kept.parent.mkdir(exist_ok=True)
+        shutil.move(series, kept)
 
 
 def read_rows(table: Path) -> list[dict[str, str]]:
