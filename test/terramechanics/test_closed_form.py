@@ -10,9 +10,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.integrate import quad
-from terra_tools import EFFECTS, SAND, WHEEL, points, random_cases
+from terra_tools import EFFECTS, SAND, WHEEL, points, random_cases, state
 
-from wheel_terra_estimator.terramechanics import closed_form
+from wheel_terra_estimator.terramechanics import branch_moments, closed_form
 from wheel_terra_estimator.terramechanics.conditioned import INPUTS, ConditionedForces
 from wheel_terra_estimator.terramechanics.maths import ScalarMaths
 from wheel_terra_estimator.terramechanics.model import WheelSoilModel
@@ -49,7 +49,7 @@ def test_branch_moments_are_the_moments_of_the_stress(exponent: float) -> None:
 
         area = quad(stress, 0.0, 1.0)[0]
         centroid = quad(lambda v: v * stress(v), 0.0, 1.0)[0] / area
-        ours = closed_form.branch_moments(exponent, skew)
+        ours = branch_moments.branch_moments(exponent, skew)
         assert ours == pytest.approx((area, centroid), rel=0.01 if exponent != 1.0 else 1e-9)
 
 
@@ -207,9 +207,38 @@ def test_steady_sinkage_solves_the_closed_form_balance() -> None:
             ratio = 1.0 - slip if slip >= 0.0 else 1.0 / (1.0 + slip)
             depth, _, carried = model.sinkage(0, ratio, float(row.normal_load[k]))
             assert carried
-            assert depth == pytest.approx(steady.sinkage[k], rel=0.03)
-            state = model.state(0, ratio, float(row.normal_load[k]))
-            assert state[1] == pytest.approx(steady.drawbar_pull[k], abs=0.02 * row.normal_load[k])
+            assert depth == pytest.approx(steady.sinkage[k], rel=1e-4)
+            scalar = model.state(0, ratio, float(row.normal_load[k]))
+            assert scalar == pytest.approx(steady.outputs()[k], rel=1e-4, abs=1e-4)
+
+
+def test_plain_soil_is_prepared_once_and_answers_the_same() -> None:
+    model = SteadySinkage(Wheel(np.array([0.1, 0.2]), 0.1, 0.01, 20), SAND)
+    for slip in (-0.5, 0.0, 0.3, 0.95):
+        ratio = 1.0 - slip if slip >= 0.0 else 1.0 / (1.0 + slip)
+        for wheel, radius in enumerate((0.1, 0.2)):
+            truth = state(slip, 60.0, wheel=Wheel(radius, 0.1, 0.01, 20), method='closed_form')
+            assert model.state(wheel, ratio, 60.0) == pytest.approx(truth.outputs()[0], rel=1e-5)
+
+
+def test_balance_without_iteration_agrees_with_the_bracketed_solver() -> None:
+    random, count = np.random.default_rng(12), 500
+    wheel = Wheel(random.uniform(0.05, 0.3, count), random.uniform(0.05, 0.3, count), 0.01, 20)
+    # One in ten is more than the soil carries.
+    load = 10.0 ** random.uniform(2.0, 5.0, count) * wheel.radius * wheel.width
+    slip = random.uniform(-1.0, 1.0, count)
+    ours = WheelSoilModel(SAND, method='closed_form', strict=False).steady_state(
+        points(slip, load, wheel)
+    )
+    # A mound of no height takes the general way.
+    general = WheelSoilModel(
+        SAND, {'soil_mound': {'kappa': 0.0}}, 'closed_form', strict=False
+    ).steady_state(points(slip, load, wheel))
+    assert 0 < (ours.flags & 1).sum() < count
+    np.testing.assert_array_equal(ours.flags, general.flags)
+    for name in ('sinkage', 'drawbar_pull', 'torque', 'leaving_angle', 'peak_stress_angle'):
+        a, b = getattr(ours, name), getattr(general, name)
+        np.testing.assert_allclose(a, b, rtol=1e-8, atol=1e-9 * np.abs(b).max(), err_msg=name)
 
 
 def test_derivatives_of_the_steady_sinkage() -> None:

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from wheel_terra_estimator.terramechanics.closed_form import branch_moments, moment_spread
+from wheel_terra_estimator.terramechanics.branch_moments import branch_moments, moment_spread
 from wheel_terra_estimator.terramechanics.contact import Contact
 
 # Rates of (t1, tm, t2, v/w, N) per unit of the direction's variable.

@@ -22,9 +22,16 @@ from typing import Any
 import numpy as np
 
 from wheel_terra_estimator.terramechanics import stresses
+from wheel_terra_estimator.terramechanics.branch_moments import (
+    BranchForces,
+    branch_moments,
+    mean_share_front,
+    mean_share_rear,
+    moment_spread,
+)
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.kinematics import shear_displacement
-from wheel_terra_estimator.terramechanics.terms import Terms
+from wheel_terra_estimator.terramechanics.terms import PEAK_MARGIN, Terms
 
 # Stress that effects add (a hard layer) is integrated with Gauss's four points per side.
 _POINTS, _WEIGHTS = (
@@ -143,91 +150,28 @@ def triangle_forces(contact: Contact, terms: Terms, maths: Any = np) -> tuple[An
     return load, pull, width * R * R * c * tau
 
 
-def branch_moments(exponent: Any, skew: Any) -> tuple[Any, Any]:
-    """Area and centroid of the stress on one side of its peak, both as shares.
-
-    For small angles the stress is [v (1 + q (1 - v))]^N of its peak, with v = 0 at the edge of
-    the contact, 1 at the peak, and q = (t1 - tm)/(t1 + tm); its moments, as a series in q
-    (exact for N = 1).
-
-    Parameters
-    ----------
-    exponent, skew : float or array_like
-        N and q.
-
-    Returns
-    -------
-    area : float or numpy.ndarray
-        Integral over v.
-    centroid : float or numpy.ndarray
-        Mean v; 2/3 for a triangle.
-    """
-    n, q = exponent, skew
-    area = (1.0 + n * q / (n + 2.0) * (1.0 + (n - 1.0) * q / (n + 3.0))) / (n + 1.0)
-    first = (1.0 + n * q / (n + 3.0) * (1.0 + (n - 1.0) * q / (n + 4.0))) / (n + 2.0)
-    return area, first / area
-
-
-def moment_spread(exponent: Any) -> Any:
-    """Variance of v under the stress v^N: (N + 1)/((N + 2)^2 (N + 3))."""
-    return (exponent + 1.0) / ((exponent + 2.0) ** 2 * (exponent + 3.0))
-
-
-def mean_share_front(displacement: Any, maths: Any = np) -> Any:
-    """Mobilised share of shear strength in front of the peak; argument j/K at its centroid.
-
-    The mean of exp(-j/K) over the branch, where j spreads from 0: (1 + x/8)^-8 (the mean over a
-    gamma distribution whose variance is that of the stress-weighted j) instead of exp(-x).
-    """
-    base = 1.0 / (1.0 + 0.125 * maths.abs(displacement))
-    base = base * base
-    base = base * base
-    share = 1.0 - base * base
-    return maths.where(displacement >= 0.0, share, -share)
-
-
-def mean_share_rear(displacement: Any, maths: Any = np) -> Any:
-    """Return the same behind the peak, where j spreads less around its mean: (1 + x/16)^-16."""
-    base = 1.0 / (1.0 + 0.0625 * maths.abs(displacement))
-    base = base * base
-    base = base * base
-    base = base * base
-    share = 1.0 - base * base
-    return maths.where(displacement >= 0.0, share, -share)
-
-
 def forces(contact: Contact, terms: Terms, maths: Any = np) -> tuple[Any, Any, Any]:
     """Load [N], pull [N] and torque [N m] from branch moments, angles given."""
-    t1, tm, t2 = contact.entrance_angle, contact.peak_angle, contact.leaving_angle
-    front, rear = t1 - tm, tm - t2
-    exponent, R, ratio = contact.sinkage_exponent, contact.shear_radius, contact.velocity_ratio
-    area, centroid = branch_moments(exponent, front / (t1 + tm))
-    spread = 0.5 * moment_spread(exponent)
-    peak = stresses.front_stress(contact, tm, maths) * area
-    load = pull = torque = 0.0
-    for span, angle, middle, mean_share in (
-        (front, t1 - front * centroid, t1 - 0.5 * front, mean_share_front),
-        (rear, t2 + rear * centroid, tm - 0.5 * rear, mean_share_rear),
-    ):
-        displacement = shear_displacement(angle, t1, R, ratio, maths)
-        share = mean_share(displacement / contact.shear_modulus, maths)
-        # A branch is an arc: its resultant is a little smaller than the sum of its stresses.
-        arc, even_arc = 1.0 - spread * span * span, 1.0 - span * span / 24.0
-        whole_friction = peak * span * contact.tan_friction * share * R
-        whole_cohesion = contact.cohesion * span * share * R
-        normal = peak * span * arc * contact.radius
-        friction, cohesion = whole_friction * arc, whole_cohesion * even_arc
-        cosine, sine = maths.cos(angle), maths.sin(angle)
-        cos_middle, sin_middle = maths.cos(middle), maths.sin(middle)
-        load = load + normal * cosine + friction * sine + cohesion * sin_middle
-        pull = pull + friction * cosine + cohesion * cos_middle - normal * sine
-        torque = torque + whole_friction + whole_cohesion
-    width = contact.width
-    result = width * load, width * pull, width * R * torque
+    t1 = contact.entrance_angle
+    form = BranchForces(contact, contact.peak_angle / t1, contact.leaving_angle / t1, maths)
+    result = form.forces(t1)
     if terms.stages['on_normal_stress']:
         added = _added_stress_forces(contact, terms, maths)
         result = tuple(a + b for a, b in zip(result, added, strict=True))
     return result
+
+
+def angles_in_proportion(terms: Terms) -> bool:
+    """Return whether no effect moves the angles or adds stress: ``proportional_forces`` holds."""
+    return not (terms.stages['on_contact'] or terms.stages['on_normal_stress'])
+
+
+def proportional_forces(contact: Contact, maths: Any = np) -> BranchForces:
+    """Forces for all entrance angles at once, peak and leaving angle in proportion to them."""
+    leaving = contact.leaving_ratio
+    margin = PEAK_MARGIN * (1.0 - leaving)
+    peak = maths.minimum(maths.maximum(contact.peak_ratio, leaving + margin), 1.0 - margin)
+    return BranchForces(contact, peak, leaving, maths)
 
 
 def _added_stress_forces(contact: Contact, terms: Terms, maths: Any) -> tuple[Any, Any, Any]:

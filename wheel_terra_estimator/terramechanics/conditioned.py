@@ -14,17 +14,10 @@ from typing import NamedTuple
 
 from wheel_terra_estimator.terramechanics.balanced_branches import balanced_forces
 from wheel_terra_estimator.terramechanics.contact import Contact
-from wheel_terra_estimator.terramechanics.effects import (
-    EffectSettings,
-    catalogue,
-    check_settings,
-)
+from wheel_terra_estimator.terramechanics.effects import catalogue
 from wheel_terra_estimator.terramechanics.maths import ScalarMaths
-from wheel_terra_estimator.terramechanics.operating_points import STANDARD_GRAVITY
-from wheel_terra_estimator.terramechanics.scalar_wheels import scalar_contacts
-from wheel_terra_estimator.terramechanics.soil import Soil
+from wheel_terra_estimator.terramechanics.scalar_wheels import ScalarWheels
 from wheel_terra_estimator.terramechanics.terms import Terms, set_angles
-from wheel_terra_estimator.terramechanics.wheel import Wheel
 
 # Columns of the derivatives that ``ConditionedForces`` returns.
 INPUTS = (
@@ -64,36 +57,17 @@ class Forces(NamedTuple):
     clamped: bool
 
 
-class ConditionedForces:
+class ConditionedForces(ScalarWheels):
     """Torque and pull given slip, sinkage and load, with analytic derivatives.
 
-    Parameters
-    ----------
-    wheel : Wheel
-        Floats, or (n,) arrays for n wheels.
-    soil : Soil
-        Floats; cohesion, friction and shear modulus are given anew with each call.
-    effects : mapping
-        Switched-on effects.
-    slip_radius : str
-        ``lug_tip`` or ``rim``: radius of the rim speed in ``speed_ratio``.
-    gravity : float
-        [m/s^2].
+    Parameters are those of ``ScalarWheels``; cohesion, friction and shear modulus of the soil are
+    given anew with each call.
     """
 
-    def __init__(
-        self,
-        wheel: Wheel,
-        soil: Soil,
-        effects: EffectSettings | None = None,
-        slip_radius: str = 'lug_tip',
-        gravity: float = STANDARD_GRAVITY,
-    ) -> None:
-        settings = check_settings(effects or {})
+    def _prepare(self) -> None:
         known = catalogue()
-        self._terms = Terms(settings)
         self._on_inputs = self._terms.stages['on_inputs']
-        outputs = {name: values for name, values in settings.items() if known[name].on_outputs}
+        outputs = {n: values for n, values in self._settings.items() if known[n].on_outputs}
         self._on_sinkage = Terms(
             {n: v for n, v in outputs.items() if 'sinkage' in known[n].touches}
         ).stages['on_outputs']
@@ -101,13 +75,10 @@ class ConditionedForces:
             {n: v for n, v in outputs.items() if known[n].touches - {'sinkage'}}
         ).stages['on_outputs']
         self._plain = not (self._on_inputs or self._on_sinkage or self._terms.stages['on_contact'])
+        soil = self._soil
         self._exponent = float(soil.sinkage_exponent)
         self._peak_ratio = float(soil.peak_stress_ratio)
         self._leaving_ratio = float(soil.leaving_angle_ratio)
-        self._wheels = scalar_contacts(wheel, soil, slip_radius, gravity)
-
-    def __len__(self) -> int:
-        return len(self._wheels)
 
     def forces(
         self,

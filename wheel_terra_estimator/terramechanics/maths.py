@@ -27,6 +27,7 @@ class ScalarMaths:
     log = staticmethod(math.log)
     sqrt = staticmethod(math.sqrt)
     abs = staticmethod(math.fabs)
+    copysign = staticmethod(math.copysign)
     isnan = staticmethod(math.isnan)
 
     @staticmethod

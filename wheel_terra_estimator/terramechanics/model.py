@@ -17,6 +17,7 @@ from wheel_terra_estimator.terramechanics.checks import check_range
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects import EffectSettings, catalogue, check_settings
 from wheel_terra_estimator.terramechanics.load_balance import (
+    balance,
     explicit_entrance_angle,
     solve_entrance_angle,
 )
@@ -118,7 +119,17 @@ class WheelSoilModel:
             check_range(
                 'bearing modulus kc/b + kphi', contact.bearing_modulus, 0.0, open_lower=True
             )
-        angle, carries = self._entrance_angle(contact, points, terms)
+        load = np.broadcast_to(contact.normal_load, (len(points),))
+        explicit = (
+            self.method == 'closed_form'
+            and closed_form.angles_in_proportion(terms)
+            and bool(np.isnan(points.leaving_angle).all())
+        )
+        if explicit:
+            form = closed_form.proportional_forces(contact)
+            angle, pull, torque, carries = balance(form, load)
+        else:
+            angle, carries = self._entrance_angle(contact, load, points, terms)
         if self.strict and not carries.all():
             worst = int(np.flatnonzero(~carries)[0])
             limit = np.broadcast_to(
@@ -126,12 +137,16 @@ class WheelSoilModel:
                 + contact.normal_load,
                 angle.shape,
             )[worst]
-            load = np.broadcast_to(contact.normal_load, angle.shape)[worst]
             raise ValueError(
-                f'normal load is {load:g} N (entry {worst}); this soil carries at most about '
-                f'{limit:.3g} N at a sinkage of one radius'
+                f'normal load is {load[worst]:g} N (entry {worst}); this soil carries at most '
+                f'about {limit:.3g} N at a sinkage of one radius'
             )
-        _, *outputs = self._response(contact, angle, points, terms)
+        outputs: Sequence[Any]
+        if explicit:
+            set_angles(contact, angle, None, terms)
+            outputs = self._outputs(contact, angle, pull, torque, terms)
+        else:
+            _, *outputs = self._response(contact, angle, points, terms)
         return self._pack(contact, points, angle, carries, outputs)
 
     def jacobian(
@@ -180,9 +195,8 @@ class WheelSoilModel:
         return state, np.moveaxis(total, 0, -1)
 
     def _entrance_angle(
-        self, contact: Contact, points: OperatingPoints, terms: Terms
+        self, contact: Contact, load: FloatArray, points: OperatingPoints, terms: Terms
     ) -> tuple[FloatArray, NDArray[np.bool_]]:
-        load = np.broadcast_to(contact.normal_load, (len(points),))
         start = explicit_entrance_angle(contact)
 
         def carried(angle: FloatArray) -> FloatArray:
@@ -204,12 +218,18 @@ class WheelSoilModel:
         """Balance W(t1) - load, and the three outputs, at given entrance angles."""
         set_angles(contact, angle, points.leaving_angle, terms)
         load, pull, torque = self._forces(contact, terms)
+        return load - contact.normal_load, *self._outputs(contact, angle, pull, torque, terms)
+
+    @staticmethod
+    def _outputs(
+        contact: Contact, angle: FloatArray, pull: Any, torque: Any, terms: Terms
+    ) -> tuple[Any, Any, Any]:
+        """Sinkage, pull and torque as the instruments read them."""
         contact.sinkage = contact.radius * (1.0 - np.cos(angle))
         contact.drawbar_pull = contact.direction * pull
         contact.torque = contact.direction * torque
         terms.apply('on_outputs', contact)
-        balance = load - contact.normal_load
-        return balance, contact.sinkage, contact.drawbar_pull, contact.torque
+        return contact.sinkage, contact.drawbar_pull, contact.torque
 
     @staticmethod
     def _pack(

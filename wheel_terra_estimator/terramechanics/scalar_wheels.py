@@ -1,14 +1,55 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Contacts of plain floats, one per wheel of a rover, for the on-board closed forms."""
+"""Wheels of a rover as contacts of plain floats: common part of the on-board closed forms."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from wheel_terra_estimator.terramechanics.contact import Contact
+from wheel_terra_estimator.terramechanics.effects import EffectSettings, check_settings
+from wheel_terra_estimator.terramechanics.operating_points import STANDARD_GRAVITY
 from wheel_terra_estimator.terramechanics.soil import Soil
+from wheel_terra_estimator.terramechanics.terms import Terms
 from wheel_terra_estimator.terramechanics.wheel import Wheel
+
+
+class ScalarWheels:
+    """Wheels on one soil with a set of effects.
+
+    Parameters
+    ----------
+    wheel : Wheel
+        Floats, or (n,) arrays for n wheels.
+    soil : Soil
+        Floats.
+    effects : mapping
+        Switched-on effects.
+    slip_radius : str
+        ``lug_tip`` or ``rim``: radius of the rim speed in speed ratios.
+    gravity : float
+        [m/s^2].
+    """
+
+    def __init__(
+        self,
+        wheel: Wheel,
+        soil: Soil,
+        effects: EffectSettings | None = None,
+        slip_radius: str = 'lug_tip',
+        gravity: float = STANDARD_GRAVITY,
+    ) -> None:
+        self._settings = check_settings(effects or {})
+        self._terms = Terms(self._settings)
+        self._soil = soil
+        self._wheels = scalar_contacts(wheel, soil, slip_radius, gravity)
+        self._prepare()
+
+    def _prepare(self) -> None:
+        """Derive what does not change from call to call."""
+
+    def __len__(self) -> int:
+        return len(self._wheels)
 
 
 def scalar_contacts(

@@ -5,16 +5,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from typing import TypeAlias
 
 from wheel_terra_estimator.terramechanics import closed_form, stresses
+from wheel_terra_estimator.terramechanics.branch_moments import BranchForces
 from wheel_terra_estimator.terramechanics.contact import Contact
-from wheel_terra_estimator.terramechanics.effects import EffectSettings, check_settings
+from wheel_terra_estimator.terramechanics.kinematics import slip_of_speed_ratio
 from wheel_terra_estimator.terramechanics.maths import ScalarMaths
-from wheel_terra_estimator.terramechanics.operating_points import STANDARD_GRAVITY
-from wheel_terra_estimator.terramechanics.scalar_wheels import scalar_contacts
-from wheel_terra_estimator.terramechanics.soil import Soil
-from wheel_terra_estimator.terramechanics.terms import Terms, set_angles
-from wheel_terra_estimator.terramechanics.wheel import Wheel
+from wheel_terra_estimator.terramechanics.scalar_wheels import ScalarWheels
+from wheel_terra_estimator.terramechanics.terms import set_angles
 
 # Columns of the derivatives that ``SteadySinkage`` returns.
 INPUTS = (
@@ -26,45 +26,31 @@ INPUTS = (
     'cohesion',
     'shear_modulus',
 )
-# Newton steps on logarithms after the explicit start: one leaves an error of some 0.1 % in depth.
-_STEPS = 1
 _LARGEST = 1.5
 _SMALLEST = 2e-3
+# Most steps of the load balance (two do), and where it ends: the product of two errors in a row,
+# which is some ten times the next one.
+_STEPS = 30
+_ENOUGH = 1e-6
+
+Load: TypeAlias = Callable[[float], float]
+ThreeForces: TypeAlias = Callable[[float], tuple[float, float, float]]
 _STEP = 1e-6
 _SIZES = (1.0, 1.0, 1.0, 1.0, 0.1, 100.0, 0.01)
 
 
-class SteadySinkage:
-    """Sinkage at which a wheel comes to rest vertically, given slip, load and soil.
+class SteadySinkage(ScalarWheels):
+    """Sinkage at which a wheel comes to rest vertically, given slip, load and soil."""
 
-    Parameters
-    ----------
-    wheel : Wheel
-        Floats, or (n,) arrays for n wheels.
-    soil : Soil
-        Floats.
-    effects : mapping
-        Switched-on effects.
-    slip_radius : str
-        ``lug_tip`` or ``rim``.
-    gravity : float
-        [m/s^2].
-    """
-
-    def __init__(
-        self,
-        wheel: Wheel,
-        soil: Soil,
-        effects: EffectSettings | None = None,
-        slip_radius: str = 'lug_tip',
-        gravity: float = STANDARD_GRAVITY,
-    ) -> None:
-        self._terms = Terms(check_settings(effects or {}))
-        self._soil = soil
-        self._wheels = scalar_contacts(wheel, soil, slip_radius, gravity)
-
-    def __len__(self) -> int:
-        return len(self._wheels)
+    def _prepare(self) -> None:
+        soil = self._soil
+        self._given = (math.tan(soil.friction_angle), float(soil.cohesion), soil.shear_modulus)
+        # Without effects, slip moves one number of the closed form only.
+        self._prepared: list[BranchForces] = []
+        if not self._settings:
+            for index in range(len(self)):
+                contact = self._inputs(index, (1.0, 1.0, 0.0, 0.0, *self._given))
+                self._prepared.append(closed_form.proportional_forces(contact, ScalarMaths))
 
     def sinkage(
         self,
@@ -105,31 +91,36 @@ class SteadySinkage:
             False where the soil cannot carry the load; the sinkage is then held below the radius
             and the derivatives are 0.
         """
-        soil = self._soil
+        friction, strength, modulus = self._given
         given = (
             max(speed_ratio, 0.0),
             max(normal_load, 1e-3),
             log_stiffness,
             exponent_slope,
-            max(math.tan(soil.friction_angle) if tan_friction is None else tan_friction, 0.0),
-            max(soil.cohesion if cohesion is None else cohesion, 0.0),
-            max(soil.shear_modulus if shear_modulus is None else shear_modulus, 1e-6),
+            max(friction if tan_friction is None else tan_friction, 0.0),
+            max(strength if cohesion is None else cohesion, 0.0),
+            max(modulus if shear_modulus is None else shear_modulus, 1e-6),
         )
-        contact, angle = self._balanced(index, given, rim_speed, pass_number)
-        balance = self._balance(contact, angle)
+        contact = self._wheels[index][0]
+        contact.rim_speed, contact.pass_number = rim_speed, pass_number
+        form = closed_form.proportional_forces(self._inputs(index, given), ScalarMaths)
+        functions = load, _ = self._functions(contact, form)
+        angle, _, _, carried = _balanced(form, functions, contact.normal_load)
         depth, lift = self._depth(contact, angle)
-        if angle >= _LARGEST or abs(balance) > 0.05 * contact.normal_load:
+        if not carried:
             return depth, (0.0,) * len(INPUTS), False
+        balance = load(angle) - contact.normal_load
         step = _STEP * angle
-        slope = (self._balance(contact, angle + step) - balance) / step
+        slope = (load(angle + step) - contact.normal_load - balance) / step
         deepening = contact.radius * math.sin(angle)
         derivatives = []
         for position, value in enumerate(given):
-            moved_inputs = list(given)
+            moved = list(given)
             change = _STEP * max(abs(value), _SIZES[position])
-            moved_inputs[position] += change
-            self._inputs(index, tuple(moved_inputs))
-            rise = (self._balance(contact, angle) - balance) / change
+            moved[position] += change
+            form = closed_form.proportional_forces(self._inputs(index, tuple(moved)), ScalarMaths)
+            load, _ = self._functions(contact, form)
+            rise = (load(angle) - contact.normal_load - balance) / change
             lifted = (self._depth(contact, angle)[1] - lift) / change
             derivatives.append(-rise / slope * deepening + lifted)
         return depth, tuple(derivatives), True
@@ -144,50 +135,43 @@ class SteadySinkage:
         pass_number: float = 1.0,
     ) -> tuple[float, float, float]:
         """Steady sinkage [m], drawbar pull [N] and torque [N m] in the configured soil."""
-        soil = self._soil
-        given = (
-            max(speed_ratio, 0.0),
-            max(normal_load, 1e-3),
-            0.0,
-            0.0,
-            math.tan(soil.friction_angle),
-            soil.cohesion,
-            soil.shear_modulus,
+        contact, slip_radius = self._wheels[index]
+        ratio = speed_ratio if speed_ratio > 0.0 else 0.0
+        weight = normal_load if normal_load > 1e-3 else 1e-3
+        if self._prepared:
+            form = self._prepared[index]
+            form.set_speed(ratio * slip_radius)
+            angle, pull, torque, _ = _balanced(form, (form.load, form.forces), weight)
+            return contact.radius * (1.0 - math.cos(angle)), pull, torque
+        contact.rim_speed, contact.pass_number = rim_speed, pass_number
+        self._inputs(index, (ratio, weight, 0.0, 0.0, *self._given))
+        form = closed_form.proportional_forces(contact, ScalarMaths)
+        angle, contact.drawbar_pull, contact.torque, _ = _balanced(
+            form, self._functions(contact, form), contact.normal_load
         )
-        contact, angle = self._balanced(index, given, rim_speed, pass_number)
-        set_angles(contact, angle, None, self._terms, ScalarMaths)
-        _, contact.drawbar_pull, contact.torque = closed_form.forces(
-            contact, self._terms, ScalarMaths
-        )
+        contact.entrance_angle = angle
         contact.sinkage = contact.radius * (1.0 - math.cos(angle))
         self._terms.apply('on_outputs', contact, ScalarMaths)
         return contact.sinkage, contact.drawbar_pull, contact.torque
 
-    def _balanced(
-        self, index: int, given: tuple[float, ...], rim_speed: float, pass_number: float
-    ) -> tuple[Contact, float]:
-        """Set the contact of a wheel and find its entrance angle."""
-        contact = self._wheels[index][0]
-        contact.rim_speed, contact.pass_number = rim_speed, pass_number
-        contact.slope, contact.direction = 0.0, 1.0
-        self._inputs(index, given)
-        angle = self._explicit_angle(contact)
-        for _ in range(_STEPS):
-            force, moved = self._carried(contact, angle), self._carried(contact, angle * 1.001)
-            if force <= 0.0 or moved <= force:
-                angle = min(1.5 * angle, _LARGEST)
-                continue
-            power = 0.001 / math.log(moved / force)
-            ratio = (contact.normal_load / force) ** min(power, 1.0)
-            angle = min(max(angle * ratio, _SMALLEST), _LARGEST)
-        return contact, angle
+    def _functions(self, contact: Contact, form: BranchForces) -> tuple[Load, ThreeForces]:
+        """Load, and all three forces, as functions of the entrance angle."""
+        if closed_form.angles_in_proportion(self._terms):
+            return form.load, form.forces
 
-    def _inputs(self, index: int, given: tuple[float, ...]) -> None:
-        """Set the contact of a wheel to the inputs, stage ``on_inputs`` done."""
+        def forces(angle: float) -> tuple[float, float, float]:
+            set_angles(contact, angle, None, self._terms, ScalarMaths)
+            return closed_form.forces(contact, self._terms, ScalarMaths)
+
+        return lambda angle: forces(angle)[0], forces
+
+    def _inputs(self, index: int, given: tuple[float, ...]) -> Contact:
+        """Set the contact of a wheel to the inputs, stage ``on_inputs`` done, and return it."""
         contact, slip_radius = self._wheels[index]
         soil = self._soil
         ratio, load, log_stiffness, slope, friction, cohesion, shear_modulus = given
-        contact.slip = 1.0 - ratio if ratio <= 1.0 else 1.0 / ratio - 1.0
+        contact.slip = slip_of_speed_ratio(ratio, ScalarMaths)
+        contact.slope, contact.direction = 0.0, 1.0
         contact.velocity_ratio = ratio * slip_radius
         contact.normal_load = contact.stated_load = load
         contact.cohesion, contact.tan_friction, contact.shear_modulus = (
@@ -215,26 +199,7 @@ class SteadySinkage:
             )
         contact.bearing_modulus = modulus * math.exp(log_stiffness)
         self._terms.apply('on_inputs', contact, ScalarMaths)
-
-    def _explicit_angle(self, contact: Contact) -> float:
-        """Entrance angle by small angles, the shear counted with half its share."""
-        n, q = contact.sinkage_exponent, contact.peak_ratio
-        area = closed_form.branch_moments(n, (1.0 - q) / (1.0 + q))[0]
-        span = 1.0 - contact.leaving_ratio
-        rise = 0.5 * contact.radius * max(1.0 - q * q, 0.05) / contact.reference_depth
-        unit = contact.width * contact.radius * area * span * contact.bearing_modulus * rise**n
-        angle = (contact.normal_load / unit) ** (1.0 / (2.0 * n + 1.0))
-        lean = (1.0 + q + contact.leaving_ratio) / 3.0 * angle
-        share = max(contact.slip, 0.0) ** 0.5
-        helped = 1.0 + share * contact.tan_friction * lean
-        return min(max(angle * helped ** (-1.0 / (2.0 * n + 1.0)), _SMALLEST), 1.2)
-
-    def _carried(self, contact: Contact, angle: float) -> float:
-        set_angles(contact, angle, None, self._terms, ScalarMaths)
-        return closed_form.forces(contact, self._terms, ScalarMaths)[0]
-
-    def _balance(self, contact: Contact, angle: float) -> float:
-        return self._carried(contact, angle) - contact.normal_load
+        return contact
 
     def _depth(self, contact: Contact, angle: float) -> tuple[float, float]:
         """Sinkage as read, and the part of it that the effects add."""
@@ -242,3 +207,49 @@ class SteadySinkage:
         contact.sinkage = contact.torque = contact.drawbar_pull = 0.0
         self._terms.apply('on_outputs', contact, ScalarMaths)
         return contact.radius * (1.0 - math.cos(angle)) + contact.sinkage, contact.sinkage
+
+
+def _balanced(
+    form: BranchForces, functions: tuple[Load, ThreeForces], load: float
+) -> tuple[float, float, float, bool]:
+    """Entrance angle that carries a load, pull and torque there, and whether there is one.
+
+    (force/load)^(1/(2 N + 1)) is nearly proportional to the angle: secants on it, from the
+    small-angle start, and one more for all three results without another evaluation.
+    """
+    carried, forces = functions
+    power = 1.0 / (2.0 * form.exponent + 1.0)
+    last = form.small_angle(load)
+    if not last < 1.2:
+        last = 1.2
+    force = carried(last)
+    last_size = (force / load) ** power if force > 0.0 else 0.7
+    angle = last / last_size
+    if not _SMALLEST < angle < _LARGEST:
+        angle = _SMALLEST if angle <= _SMALLEST else _LARGEST
+    force, pull, torque = forces(angle)
+    size = (force / load) ** power if force > 0.0 else 0.7
+    for _ in range(_STEPS):
+        change = size - last_size
+        slope = (angle - last) / change if change else angle / size
+        if not 0.2 < slope * size / angle < 5.0:
+            slope = angle / size
+        moved = angle + (1.0 - size) * slope
+        if not _SMALLEST < moved < _LARGEST:
+            moved = _SMALLEST if moved <= _SMALLEST else _LARGEST
+            if moved == angle:
+                return angle, pull, torque, moved == _SMALLEST
+        last, last_size, last_pull, last_torque = angle, size, pull, torque
+        angle = moved
+        force, pull, torque = forces(angle)
+        size = (force / load) ** power if force > 0.0 else 0.7
+        missing = 1.0 - size
+        if -_ENOUGH < missing * (1.0 - last_size) < _ENOUGH:
+            share = missing / (size - last_size) if size != last_size else 0.0
+            return (
+                angle + share * (angle - last),
+                pull + share * (pull - last_pull),
+                torque + share * (torque - last_torque),
+                True,
+            )
+    return angle, pull, torque, False

@@ -1,0 +1,230 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""The closed form of the contact: each side of the peak stress as one force at its centroid.
+
+Area and centroid of the normal stress follow from its exponent, the mobilised share of the shear
+strength from the shear displacement at that centroid (docs/models). Nothing is fitted.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wheel_terra_estimator.terramechanics.contact import Contact
+
+
+def branch_moments(exponent: Any, skew: Any) -> tuple[Any, Any]:
+    """Area and centroid of the stress on one side of its peak, both as shares.
+
+    For small angles the stress is [v (1 + q (1 - v))]^N of its peak, with v = 0 at the edge of
+    the contact, 1 at the peak, and q = (t1 - tm)/(t1 + tm); its moments, as a series in q
+    (exact for N = 1).
+
+    Parameters
+    ----------
+    exponent, skew : float or array_like
+        N and q.
+
+    Returns
+    -------
+    area : float or numpy.ndarray
+        Integral over v.
+    centroid : float or numpy.ndarray
+        Mean v; 2/3 for a triangle.
+    """
+    n, q = exponent, skew
+    area = (1.0 + n * q / (n + 2.0) * (1.0 + (n - 1.0) * q / (n + 3.0))) / (n + 1.0)
+    first = (1.0 + n * q / (n + 3.0) * (1.0 + (n - 1.0) * q / (n + 4.0))) / (n + 2.0)
+    return area, first / area
+
+
+def moment_spread(exponent: Any) -> Any:
+    """Variance of v under the stress v^N: (N + 1)/((N + 2)^2 (N + 3))."""
+    second = exponent + 2.0
+    return (exponent + 1.0) / (second * second * (exponent + 3.0))
+
+
+def mean_share_front(displacement: Any, maths: Any = np) -> Any:
+    """Mobilised share of shear strength in front of the peak; argument j/K at its centroid.
+
+    The mean of exp(-j/K) over the branch, where j spreads from 0: (1 + x/8)^-8 (the mean over a
+    gamma distribution whose variance is that of the stress-weighted j) instead of exp(-x).
+    """
+    base = 1.0 / (1.0 + 0.125 * maths.abs(displacement))
+    base = base * base
+    base = base * base
+    return maths.copysign(1.0 - base * base, displacement)
+
+
+def mean_share_rear(displacement: Any, maths: Any = np) -> Any:
+    """Return the same behind the peak, where j spreads less around its mean: (1 + x/16)^-16."""
+    base = 1.0 / (1.0 + 0.0625 * maths.abs(displacement))
+    base = base * base
+    base = base * base
+    base = base * base
+    return maths.copysign(1.0 - base * base, displacement)
+
+
+class BranchForces:
+    """Forces of a contact whose peak and leaving angle are fixed shares of the entrance angle.
+
+    All that does not depend on the entrance angle is prepared once, so that a load balance costs
+    little more than sines. Angles below half a turn's quarter are assumed: cosines come from
+    sines, cos tm - cos t1 = 2 sin((t1 + tm)/2) sin((t1 - tm)/2).
+
+    Parameters
+    ----------
+    contact : Contact
+        Floats, or arrays of one shape (or shapes that broadcast); its angles are not read.
+    peak_share, leaving_share : float or numpy.ndarray
+        tm/t1 and t2/t1 [-].
+    maths : module or class
+        numpy, or ``ScalarMaths`` for floats.
+    """
+
+    __slots__ = (
+        '_abs', '_arc_front', '_arc_rear', '_cohesion_front', '_cohesion_rear', '_copysign',
+        '_edge_front', '_edge_rear', '_exponent', '_friction_front', '_friction_rear', '_half',
+        '_middle_front', '_middle_rear', '_modulus', '_normal_front', '_normal_rear', '_peak',
+        '_place_front', '_place_rear', '_rim_front', '_rim_rear', '_roll', '_shear_radius',
+        '_sin', '_sqrt', '_width',
+    )  # fmt: skip
+
+    def __init__(
+        self, contact: Contact, peak_share: Any, leaving_share: Any, maths: Any = np
+    ) -> None:
+        self._sin, self._sqrt = maths.sin, maths.sqrt
+        self._abs, self._copysign = maths.abs, maths.copysign
+        self._exponent = n = contact.sinkage_exponent
+        front, rear = 1.0 - peak_share, peak_share - leaving_share
+        area, centroid = branch_moments(n, front / (1.0 + peak_share))
+        spread = 0.5 * moment_spread(n)
+        self._place_front = place_front = 1.0 - front * centroid
+        self._place_rear = place_rear = leaving_share + rear * centroid
+        self._middle_front = 0.5 * (1.0 + peak_share)
+        self._middle_rear = 0.5 * (peak_share + leaving_share)
+        self._half = 0.5 * front
+        r, R = contact.radius, contact.shear_radius
+        self._modulus = contact.shear_modulus
+        self.set_speed(contact.velocity_ratio)
+        turn = R / self._modulus
+        self._rim_front, self._rim_rear = turn * (1.0 - place_front), turn * (1.0 - place_rear)
+        square_front, square_rear = front * front, rear * rear
+        # A branch is an arc: its resultant is a little smaller than the sum of its stresses.
+        self._arc_front, self._arc_rear = spread * square_front, spread * square_rear
+        self._edge_front, self._edge_rear = square_front / 24.0, square_rear / 24.0
+        self._peak = contact.bearing_modulus * area * (2.0 * r / contact.reference_depth) ** n
+        self._normal_front, self._normal_rear = r * front, r * rear
+        grip, cling = R * contact.tan_friction, R * contact.cohesion
+        self._friction_front, self._friction_rear = grip * front, grip * rear
+        self._cohesion_front, self._cohesion_rear = cling * front, cling * rear
+        self._shear_radius, self._width = R, contact.width
+
+    def set_speed(self, velocity_ratio: Any) -> None:
+        """Change v/w [m]; all else stays as it is."""
+        self._roll = velocity_ratio / self._modulus
+
+    @property
+    def exponent(self) -> Any:
+        """Exponent N of the normal stress [-]; the load grows with about 2 N + 1."""
+        return self._exponent
+
+    def take(self, rows: NDArray[np.bool_]) -> BranchForces:
+        """Return the form of some of the points (arrays only)."""
+
+        def chosen(value: Any) -> Any:
+            return value[rows] if isinstance(value, np.ndarray) and value.size > 1 else value
+
+        part = object.__new__(BranchForces)
+        for name in self.__slots__:
+            setattr(part, name, chosen(getattr(self, name)))
+        return part
+
+    def load(self, angle: Any) -> Any:
+        """Vertical force at an entrance angle [N]: as ``forces``, half as long."""
+        sin, sqrt, roll, square = self._sin, self._sqrt, self._roll, angle * angle
+        top, front, rear = sin(angle), sin(self._place_front * angle), sin(self._place_rear * angle)
+        x = self._rim_front * angle - roll * (top - front)
+        base = 1.0 / (1.0 + 0.125 * self._abs(x))
+        base = base * base
+        base = base * base
+        share_front = self._copysign(1.0 - base * base, x)
+        x = self._rim_rear * angle - roll * (top - rear)
+        base = 1.0 / (1.0 + 0.0625 * self._abs(x))
+        base = base * base
+        base = base * base
+        base = base * base
+        share_rear = self._copysign(1.0 - base * base, x)
+        middle = sin(self._middle_front * angle)
+        peak = self._peak * (middle * sin(self._half * angle)) ** self._exponent
+        stressed = (1.0 - self._arc_front * square) * (
+            self._normal_front * sqrt(1.0 - front * front)
+            + self._friction_front * share_front * front
+        ) + (1.0 - self._arc_rear * square) * (
+            self._normal_rear * sqrt(1.0 - rear * rear) + self._friction_rear * share_rear * rear
+        )
+        sticking = self._cohesion_front * share_front * (1.0 - self._edge_front * square) * middle
+        sticking = sticking + self._cohesion_rear * share_rear * (
+            1.0 - self._edge_rear * square
+        ) * sin(self._middle_rear * angle)
+        return self._width * angle * (peak * stressed + sticking)
+
+    def forces(self, angle: Any) -> tuple[Any, Any, Any]:
+        """Load [N], pull [N] and torque [N m] at an entrance angle."""
+        sin, sqrt, roll, square = self._sin, self._sqrt, self._roll, angle * angle
+        top, front, rear = sin(angle), sin(self._place_front * angle), sin(self._place_rear * angle)
+        # The shares are mean_share_front and _rear, written out: floats spend a third on calls.
+        x = self._rim_front * angle - roll * (top - front)
+        base = 1.0 / (1.0 + 0.125 * self._abs(x))
+        base = base * base
+        base = base * base
+        share_front = self._copysign(1.0 - base * base, x)
+        x = self._rim_rear * angle - roll * (top - rear)
+        base = 1.0 / (1.0 + 0.0625 * self._abs(x))
+        base = base * base
+        base = base * base
+        base = base * base
+        share_rear = self._copysign(1.0 - base * base, x)
+        middle, mean = sin(self._middle_front * angle), sin(self._middle_rear * angle)
+        peak = self._peak * (middle * sin(self._half * angle)) ** self._exponent
+        arc_front, arc_rear = 1.0 - self._arc_front * square, 1.0 - self._arc_rear * square
+        normal_front = self._normal_front * peak * arc_front
+        normal_rear = self._normal_rear * peak * arc_rear
+        rub_front = self._friction_front * peak * share_front
+        rub_rear = self._friction_rear * peak * share_rear
+        friction_front, friction_rear = rub_front * arc_front, rub_rear * arc_rear
+        stick_front = self._cohesion_front * share_front
+        stick_rear = self._cohesion_rear * share_rear
+        cohesion_front = stick_front * (1.0 - self._edge_front * square)
+        cohesion_rear = stick_rear * (1.0 - self._edge_rear * square)
+        size = self._width * angle
+        load = size * (
+            normal_front * (cos_front := sqrt(1.0 - front * front))
+            + normal_rear * (cos_rear := sqrt(1.0 - rear * rear))
+            + friction_front * front
+            + friction_rear * rear
+            + cohesion_front * middle
+            + cohesion_rear * mean
+        )
+        pull = size * (
+            friction_front * cos_front
+            + friction_rear * cos_rear
+            - normal_front * front
+            - normal_rear * rear
+            + cohesion_front * sqrt(1.0 - middle * middle)
+            + cohesion_rear * sqrt(1.0 - mean * mean)
+        )
+        torque = size * self._shear_radius * (rub_front + rub_rear + stick_front + stick_rear)
+        return load, pull, torque
+
+    def small_angle(self, load: Any) -> Any:
+        """Entrance angle at which the normal stress alone carries a load, for small angles.
+
+        1 to 5 % from the balance: a start, not an answer.
+        """
+        n, span = self._exponent, self._normal_front + self._normal_rear
+        unit = self._width * span * self._peak * (self._middle_front * self._half) ** n
+        return (load / unit) ** (1.0 / (2.0 * n + 1.0))
