@@ -90,6 +90,27 @@ def test_effort_of_another_length_costs_the_torque_only(
     assert converter.rejected == {('joint_states', 'effort and name differ in length'): 1}
 
 
+def test_unknown_rate_of_a_named_wheel_is_counted(converter: InputConverter, factory: Any) -> None:
+    header = factory.header(STAMP)
+    message = factory.joint_state(header, ('left', 'mast'), velocity=(1.0, math.nan))
+    converter.convert('joint_states', message)
+    assert not converter.rejected
+    message = factory.joint_state(header, ('left', 'right'), velocity=(1.0, math.nan))
+    measured = converter.convert('joint_states', message)
+    assert measured.rate[0] == 1.0
+    assert math.isnan(measured.rate[1])
+    assert sum(converter.rejected.values()) == 1
+
+
+def test_publisher_that_invents_names_does_no_harm(converter: InputConverter, factory: Any) -> None:
+    for count in range(150):
+        names = ('left', f'invented_{count}')
+        message = factory.joint_state(
+            factory.header(STAMP), names, velocity=(1.0, 2.0), effort=(3.0, 4.0)
+        )
+        assert converter.convert('joint_states', message).torque[0] == 3.0
+
+
 def test_odometry_gives_each_wheel_its_own_rim_speed(rover: Any, factory: Any) -> None:
     converter = InputConverter(input_layout(rover.replace({'wheel_odometry': 'odom'})))
     twist = factory.twist_with_covariance(1.0, 0.5, np.zeros(36))
@@ -108,6 +129,18 @@ def test_imu_without_orientation(converter: InputConverter, factory: Any) -> Non
     zero = factory.imu(factory.header(STAMP), (0, 0, 9.8), (0, 0, 0), (0.0, 0.0, 0.0, 0.0))
     assert converter.convert('imu/data', zero).orientation is None
     assert sum(converter.rejected.values()) == 1
+
+
+@pytest.mark.parametrize('field', ['linear_acceleration', 'angular_velocity'])
+def test_imu_that_says_it_lacks_a_field_is_refused_in_words(
+    converter: InputConverter, factory: Any, field: str
+) -> None:
+    message = factory.imu(factory.header(STAMP), (0.0, 0.0, 9.8), (0.0, 0.0, 0.0), None)
+    getattr(message, f'{field}_covariance')[0] = -1.0
+    assert converter.convert('imu/data', message) is None
+    ((topic, reason),) = converter.rejected
+    assert topic == 'imu/data'
+    assert field.replace('_', ' ') in reason
 
 
 def test_mounting_turns_the_imu_into_base_link(rover: Any, factory: Any) -> None:

@@ -57,6 +57,12 @@ UNKNOWN_VARIANCE = 1e6
 """Variance of the twist components that are not estimated (finite, so that no filter chokes)."""
 
 
+_INERTIAL_FIELDS = {
+    'linear_acceleration_covariance': 'linear acceleration',
+    'angular_velocity_covariance': 'angular velocity',
+}
+
+
 @dataclass(frozen=True)
 class InputLayout:
     """What of the configuration is needed to read messages; arrays are (n,), one per wheel."""
@@ -127,10 +133,12 @@ class InputConverter:
         torque = np.full(len(self.layout.names), math.nan)
         if len(message.effort):
             if len(message.effort) == len(message.name):
-                source, target = self._columns[tuple(message.name)]
+                source, target = self._columns_of(message.name)
                 torque[target] = np.asarray(message.effort)[source]
             else:
                 self.rejected['joint_states', 'effort and name differ in length'] += 1
+        if np.isnan(np.asarray(message.velocity)[self._columns_of(message.name)[0]]).any():
+            self.rejected['joint_states', 'velocity of a wheel is nan (taken as unknown)'] += 1
         directions = self.layout.directions
         return WheelOdometry(stamp_of(message), values * directions, torque * directions)
 
@@ -144,8 +152,12 @@ class InputConverter:
             np.full_like(rim_speed, math.nan),
         )
 
-    def imu(self, message: Any) -> InertialReading:
+    def imu(self, message: Any) -> InertialReading | None:
         """Specific force, angular rate and attitude, turned into ``base_link``."""
+        for field, words in _INERTIAL_FIELDS.items():
+            if getattr(message, field)[0] == -1.0:  # REP 145
+                self.rejected['imu/data', f'says that it has no {words} (covariance -1)'] += 1
+                return None
         force = _vector(message.linear_acceleration)
         rate = _vector(message.angular_velocity)
         orientation = None
@@ -179,6 +191,16 @@ class InputConverter:
         if len(values) != len(names):
             self.rejected[topic, f'{label} and name differ in length'] += 1
             return None
+        source, target = self._columns_of(names)
+        if not source:
+            self.rejected[topic, 'none of the configured wheels in it'] += 1
+            return None
+        result = np.full(len(self.layout.names), math.nan)
+        result[target] = np.asarray(values, dtype=np.float64)[source]
+        return result
+
+    def _columns_of(self, names: Sequence[str]) -> tuple[list[int], list[int]]:
+        """Return where the wheels stand in a message, and where they belong."""
         key = tuple(names)
         columns = self._columns.get(key)
         if columns is None:
@@ -186,13 +208,7 @@ class InputConverter:
             columns = source, [self._index[key[i]] for i in source]
             if len(self._columns) < 100:  # a publisher that invents names must not fill the memory
                 self._columns[key] = columns
-        source, target = columns
-        if not source:
-            self.rejected[topic, 'none of the configured wheels in it'] += 1
-            return None
-        result = np.full(len(self.layout.names), math.nan)
-        result[target] = np.asarray(values, dtype=np.float64)[source]
-        return result
+        return columns
 
     def _orientation(self, quaternion: Any) -> FloatArray | None:
         sensor = np.array([quaternion.x, quaternion.y, quaternion.z, quaternion.w])

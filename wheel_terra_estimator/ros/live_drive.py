@@ -51,7 +51,9 @@ from wheel_terra_estimator.reporting.replay_report import refuse_existing, write
 from wheel_terra_estimator.ros.estimator_node import MESSAGE_TYPES
 
 QUEUE = 5000
-AHEAD = 20  # wheel odometry messages that the player may be ahead of the node
+# Sets that the player may be ahead of the node. The node takes its topics in turn, so a long queue
+# lets the wheel odometry run ahead of the more frequent IMU, whose messages then come too late.
+AHEAD = 2
 DISCOVERY_TIMEOUT = 60.0  # [s]
 QUIET = 3.0  # [s] without an output after the last input: the node is done
 
@@ -108,7 +110,7 @@ def drive(
             try:
                 player.wait_for_partners(process)
                 names = {topic: name for name, topic in topics.items()}
-                player.play(bag.messages(tuple(names)), names, rate)
+                player.play(bag.messages(tuple(names)), names, rate, process)
                 player.wait_for_end()
             finally:
                 player.destroy_node()
@@ -185,8 +187,7 @@ class _Player(Node):
         """Wait until every topic has its partner, by counting endpoints."""
 
         def ready() -> bool:
-            if process.poll() is not None:
-                raise UserError('the node ended by itself; its message stands above')
+            _must_run(process)
             return all(p.get_subscription_count() for p in self._inputs.values()) and all(
                 self.count_publishers(topic) for topic in OUTPUT_MESSAGES
             )
@@ -194,10 +195,17 @@ class _Player(Node):
         if not self._spin_until(ready, DISCOVERY_TIMEOUT):
             raise UserError(f'the node was not found within {DISCOVERY_TIMEOUT:.0f} s')
 
-    def play(self, messages: Iterator[RawMessage], names: Mapping[str, str], rate: float) -> None:
+    def play(
+        self,
+        messages: Iterator[RawMessage],
+        names: Mapping[str, str],
+        rate: float,
+        process: subprocess.Popen[bytes],
+    ) -> None:
         """Publish messages at their pace; in between take what the node publishes."""
         begin = None
         for message in messages:
+            _must_run(process)
             if begin is None:
                 begin = message.log_time, time.monotonic()
             if rate > 0.0:
@@ -207,8 +215,8 @@ class _Player(Node):
             self._inputs[name].publish(message.data)
             if name in ('joint_states', 'odom'):
                 self._sent += 1
-                # As many sets as wheel odometry is the rule; where it is not, go on after a while.
-                self._spin_until(lambda: self._sent - self._sets < AHEAD, 0.5)
+                if not self._spin_until(lambda: self._sent - self._sets < AHEAD, 0.5):
+                    self._sent = self._sets  # this message gave no set: it was refused
 
     def wait_for_end(self) -> None:
         """Wait until the node says nothing new."""
@@ -235,6 +243,11 @@ class _Player(Node):
                 return False
             self._executor.spin_once(timeout_sec=min(left, 0.05))
         return True
+
+
+def _must_run(process: subprocess.Popen[bytes]) -> None:
+    if process.poll() is not None:
+        raise UserError('the node ended by itself; its message stands above')
 
 
 def _past(due: float) -> bool:
