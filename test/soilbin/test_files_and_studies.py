@@ -11,7 +11,14 @@ import pytest
 
 from wheel_terra_estimator.cli.main import main
 from wheel_terra_estimator.errors import UserError
-from wheel_terra_estimator.soilbin import calibration, files, reproduction, snapshots, study
+from wheel_terra_estimator.soilbin import (
+    calibration,
+    files,
+    reproduction,
+    sensitivity,
+    snapshots,
+    study,
+)
 from wheel_terra_estimator.soilbin.case import Case, from_dict, to_dict
 from wheel_terra_estimator.soilbin.launch import CaseFailedError, StoppedByUserError
 from wheel_terra_estimator.soilbin.study import Job
@@ -264,3 +271,24 @@ def test_case_that_cannot_run_is_refused_before_anything_is_written(
     assert words in said
     assert len(said.strip().splitlines()) == 1
     assert not output.exists()
+
+
+def test_sensitivity_page_shows_changes_and_beds_that_slide(tmp_path):
+    arguments = argparse.Namespace(part=None, seeds=2, grain_scale=0.0)
+    found = sensitivity.jobs(arguments)
+    assert len({job.key for job in found}) == len(found)
+    rows = []
+    for job in found:
+        row = {k: str(v) for k, v in job.labels.items()} | {'slip': '0.5', 'stopped': ''}
+        if job.labels['setting'] == 'no resistance to rolling' and job.labels['slope_deg'] == 25:
+            row |= {'slip': '', 'stopped': 'the bed itself slides on a slope of 25 deg'}
+        elif job.labels['seed'] == 2:
+            row['slip'] = '0.6'
+        rows.append(row)
+    sensitivity.report(arguments, rows, tmp_path)
+    page = (tmp_path / 'sensitivity_table.md').read_text()
+    assert '| no resistance to rolling | 2 | 55 (7.1) | the bed slides | - |' in page
+    assert '| random bed | 2 | 55 (7.1) | 55 (7.1) | - |' in page
+    assert '| the same on Earth (1 g) | 2 | 55 (7.1) |' in page
+    # Every line changes one thing: the case differs from the calibrated one.
+    assert all(job.key != found[0].key for job in found[1:])

@@ -109,7 +109,11 @@ def film(files: Sequence[Path], case: Case, summary: Mapping[str, object], targe
         figure.set_dpi(80)
         figure.canvas.draw()
         pictures.append(np.asarray(figure.canvas.buffer_rgba())[..., :3].copy())
-    imageio.imwrite(target, np.stack(pictures), duration=120, loop=0)
+    # Encoded in memory: a full disk is then an error of our own write and leaves no half film.
+    encoded = imageio.imwrite('<bytes>', np.stack(pictures), extension='.gif', duration=120, loop=0)
+    part = target.with_suffix('.part')
+    part.write_bytes(encoded)
+    part.replace(target)
 
 
 def draw_series(series: np.ndarray, case: Case, target: Path) -> None:

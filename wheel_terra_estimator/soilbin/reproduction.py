@@ -82,7 +82,10 @@ def jobs(arguments: argparse.Namespace) -> list[Job]:
                 for slope in SLOPES_TABLE6
                 for w in WHEELS
             ]
-            found.append(_job(wheel_case(2, 20.0, seed, scale), 'table6', 2, 20.0))
+            # Wheel 2 also where the paper's slips 20 %, and between its two steep slopes.
+            found += [
+                _job(wheel_case(2, slope, seed, scale), 'table6', 2, slope) for slope in (7.1, 20.0)
+            ]
         if 'loads' in parts:
             for load in (9.8, 14.7):
                 for slope in (0.0, 15.0, 25.0):

@@ -33,6 +33,7 @@ SLOPE_SETTINGS: dict[str, dict[str, object]] = {
     'dense bed (settled with friction 0.05)': {'bed__preparation_friction': 0.05},
     'wheel held along the slope until it turns': {'operation__free_sinkage': 'held'},
     'wheel falls from 2 cm': {'operation__drop_height': 0.02},
+    'axle starts 40 cm from the low end': {'operation__start': 0.4},
     'friction on the wheel 0.75': {'grains__wheel_friction': 0.75},
     'critical damping': {'grains__damping_ratio': 1.0},
 }
@@ -132,13 +133,16 @@ def _figure(part: Sequence[Row], name: str, unit: float) -> str:
     if math.isnan(mean):
         if any('slides' in row.get('stopped', '') for row in part):
             return 'the bed slides'
-        return 'stopped' if part else '-'
+        return 'stopped' if any(row.get('stopped') for row in part) else '-'
     return value(unit * mean, unit * deviation)
 
 
 def _figures(part: Sequence[Row]) -> list[str]:
-    return [
+    slip = _figure(part, 'slip', 100)
+    if not any(row.get('slip') for row in part):
+        return [slip, *['-'] * 4]
+    return [slip] + [
         _figure(part, name, unit)
-        for name, unit in (('slip', 100), ('gross_traction', 1), ('motion_resistance', 1),
+        for name, unit in (('gross_traction', 1), ('motion_resistance', 1),
                            ('sinkage_average', 100), ('sinkage_static', 100))
     ]  # fmt: skip
