@@ -38,7 +38,7 @@ def sets(count: int = 25) -> list[Any]:
 def bag(tmp_path: Path) -> Path:
     path = tmp_path / 'estimates'
     with EstimateBagWriter(path, NAMES) as writer:
-        writer.start(STAMP)
+        writer.clear_stuck(STAMP)
         for i, estimates in enumerate(sets()):
             writer.add(estimates, STAMP + i * SECOND // 10 + 7)
     return path
@@ -141,7 +141,7 @@ def test_estimates_come_back_as_they_went(bag: Path) -> None:
 def test_bag_is_closed_and_readable_after_a_failure(tmp_path: Path) -> None:
     path = tmp_path / 'broken_off'
     with pytest.raises(KeyboardInterrupt), EstimateBagWriter(path, NAMES) as writer:
-        writer.start(STAMP)
+        writer.clear_stuck(STAMP)
         writer.add(sets()[0], STAMP)
         raise KeyboardInterrupt
     assert (path / 'metadata.yaml').exists()
@@ -153,7 +153,7 @@ def test_existing_path_is_refused_unless_overwrite(bag: Path, tmp_path: Path) ->
         EstimateBagWriter(bag, NAMES)
     assert len(messages(bag)) > 100
     with EstimateBagWriter(bag, NAMES, overwrite=True) as writer:
-        writer.start(STAMP)
+        writer.clear_stuck(STAMP)
     assert len(messages(bag)) == 1
 
 
@@ -166,3 +166,15 @@ def test_overwrite_never_deletes_what_is_no_bag(tmp_path: Path) -> None:
     with pytest.raises(UserError, match='is not a folder'):
         EstimateBagWriter(home / 'thesis.tex', NAMES, overwrite=True)
     assert (home / 'thesis.tex').read_text() == 'years of work'
+
+
+def test_a_reset_clears_the_stuck_warning(tmp_path: Path) -> None:
+    path = tmp_path / 'reset'
+    stuck = next(estimates for estimates in sets() if estimates.stuck)
+    with EstimateBagWriter(path, NAMES) as writer:
+        for estimates in (stuck, stuck):
+            writer.clear_stuck(STAMP)
+            writer.add(estimates, STAMP)
+        writer.clear_stuck(STAMP)
+    said = [message.data for _, topic, message in messages(path) if topic.endswith('/stuck')]
+    assert said == [False, True, False, True, False]

@@ -94,3 +94,14 @@ def test_silence_is_stale_for_all() -> None:
     found = stale_statuses(NAMES, 'nothing heard', {'resets': 0})
     assert levels(found) == [STALE] * 3
     assert found[0].message == 'nothing heard'
+
+
+def test_silence_holds_the_values_but_not_the_class() -> None:
+    for latest in (None, at(0.0)):
+        for status in stale_statuses(NAMES, 'nothing heard', {}, latest)[1:]:
+            values = dict(status.values)
+            assert {'stuck_probability', 'time_to_stuck_s', 'reason'} <= values.keys()
+            assert values['reason'] == status.message == 'nothing heard'
+            assert float(values['time_to_stuck_s']) >= 0.0
+    assert values['slip_class'] == 'unknown'
+    assert float(values['drawbar_pull_N']) > 0.0

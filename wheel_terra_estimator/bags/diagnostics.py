@@ -5,7 +5,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
+
+import numpy as np
 
 from wheel_terra_estimator.estimation.estimates import EstimateSet, SlipClass
 
@@ -14,6 +17,9 @@ OK, WARN, ERROR, STALE = range(4)
 NODE = 'wheel_terra_estimator'
 PERIOD = 1_000_000_000
 """Time between two messages when no level changes [ns]."""
+
+NO_TIME_TO_STUCK = 600.0
+"""Time to an entrapment [s] that is said where none is in sight."""
 
 _NEEDED = frozenset({'wheel_odometry', 'imu', 'outputs'})  # that no rover does without
 
@@ -35,12 +41,25 @@ class Status(NamedTuple):
     values: list[tuple[str, str]]
 
 
-def stale_statuses(names: Sequence[str], words: str, counters: Mapping[str, Any]) -> list[Status]:
-    """Return the statuses of a node that hears nothing."""
-    return [
-        Status(STALE, f'{NODE}: estimator', words, NODE, _values(counters)),
-        *(Status(STALE, f'{NODE}: {name}', words, name, []) for name in names),
-    ]
+def stale_statuses(
+    names: Sequence[str],
+    words: str,
+    counters: Mapping[str, Any],
+    latest: EstimateSet | None = None,
+) -> list[Status]:
+    """Return the statuses of a node that hears nothing; values are held as in the latest set."""
+    node = Status(STALE, f'{NODE}: estimator', words, NODE, _values(counters))
+    if latest is None:
+        values = _values({'stuck_probability': 0.0, 'time_to_stuck_s': NO_TIME_TO_STUCK})
+        values.append(('reason', words))
+        return [node, *(Status(STALE, f'{NODE}: {n}', words, n, values) for n in names)]
+    unknown = replace(
+        latest,
+        slip_class=np.full(len(names), SlipClass.UNKNOWN, dtype=np.uint8),
+        reasons=(words,) * len(names),
+    )
+    wheels = (_wheel_status(unknown, i, name) for i, name in enumerate(names))
+    return [node, *(status._replace(level=STALE) for status in wheels)]
 
 
 class Diagnostics:

@@ -90,9 +90,11 @@ def replay(
         log_time = 0
         for count, (log_time, name, message) in enumerate(_progress(messages, reader)):
             if writer is not None and count == 0:
-                writer.start(log_time)
+                writer.clear_stuck(log_time)
             if name == RESET:
                 pipeline.reset()
+                if writer is not None:
+                    writer.clear_stuck(log_time)
                 continue
             for estimates in pipeline.hear(name, message):
                 recorder.add(estimates)

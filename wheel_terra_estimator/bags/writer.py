@@ -70,8 +70,8 @@ class EstimateBagWriter:
     ) -> None:
         self.file.__exit__(kind, error, trace)
 
-    def start(self, log_time: int) -> None:
-        """Write what the node sends at its start: no stuck warning."""
+    def clear_stuck(self, log_time: int) -> None:
+        """Write what the node sends at its start and after a reset: no stuck warning."""
         self._write_stuck(False, log_time)
 
     def add(self, estimates: EstimateSet, log_time: int) -> None:

@@ -111,24 +111,17 @@ def _load_effects(files: list[str]) -> None:
 
 def _read(data: str, remaps: list[str], configuration: Configuration) -> SteadyTable:
     """Read a table, or extract the steady windows of a drive."""
+    from wheel_terra_estimator.bags.storage import STORAGE_SUFFIXES
+
     path = Path(data)
-    if path.is_dir() or path.suffix in ('.mcap', '.db3'):
+    if path.is_dir() or path.name.endswith(STORAGE_SUFFIXES):
+        from wheel_terra_estimator.bags.reader import parse_remaps
         from wheel_terra_estimator.discrepancy.drive_windows import rows_from_bag
 
-        return rows_from_bag(path, configuration, _remap(remaps)).table()
+        return rows_from_bag(path, configuration, parse_remaps(remaps)).table()
     from wheel_terra_estimator.discrepancy.table import read_table
 
     return read_table(path)
-
-
-def _remap(remaps: list[str]) -> dict[str, str]:
-    pairs = {}
-    for text in remaps:
-        name, separator, topic = text.partition(':=')
-        if not separator or not name or not topic:
-            raise UserError(f'--remap {text}: must be FROM:=TO')
-        pairs[name] = topic
-    return pairs
 
 
 def _write(diagnosis: Diagnosis, output: Path, *, pictures: bool) -> None:

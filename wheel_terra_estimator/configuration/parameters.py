@@ -239,6 +239,19 @@ DECLARED: tuple[Parameter, ...] = (
         at_most=60.0,
         aliases=('filter.history',),
     ),
+    # The node's process; the commands accept them, so that they take the very same files
+    text(
+        'record_arrival',
+        '',
+        'file in which the node notes each input in the order of arrival, for `wheel-terra replay '
+        '--arrival`; empty = none',
+    ),
+    text(
+        'executor',
+        'single_threaded',
+        "executor of the node; events is rclpy's experimental one, less CPU",
+        choices=('single_threaded', 'events'),
+    ),
     # Wheels
     text(
         'wheels.names',

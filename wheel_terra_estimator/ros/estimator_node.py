@@ -117,6 +117,7 @@ class EstimatorNode(Node):
         if self._arrival is not None:
             self._arrival.write('reset\n')
         self.pipeline.reset()
+        self._latest = None
         self._publisher.publish_stuck(False)
         response.success = True
         response.message = 'state forgotten, parameters kept'
@@ -134,7 +135,10 @@ class EstimatorNode(Node):
         stamp = self.get_clock().now().to_msg()
         if silent or self._latest is None:
             statuses = stale_statuses(
-                self.pipeline.names, self._silence_in_words(now), self.pipeline.counters()
+                self.pipeline.names,
+                self._silence_in_words(now),
+                self.pipeline.counters(),
+                self._latest,
             )
         else:
             statuses = self.pipeline.diagnostics.now(self._latest)

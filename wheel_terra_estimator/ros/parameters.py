@@ -13,19 +13,6 @@ from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.configuration.parameters import Parameter, declared
 
-OWN_PARAMETERS = {
-    'record_arrival': (
-        '',
-        'file that gets one line (topic, stamp in ns) for each input in the order of arrival, for '
-        '`wheel-terra replay --arrival`; empty = none',
-    ),
-    'executor': (
-        'single_threaded',
-        "single_threaded, or events: rclpy's experimental executor, less CPU",
-    ),
-}
-"""Parameters of the process rather than of the estimator: default and meaning."""
-
 
 def take_overrides(node: Node) -> dict[str, Any]:
     """Return what the user gave a node, and clear the way to declare it properly.
@@ -50,12 +37,7 @@ def declare_parameters(node: Node) -> Configuration:
     UserError
         If a parameter is unknown or its value cannot be used.
     """
-    given = take_overrides(node)
-    for name, (default, meaning) in OWN_PARAMETERS.items():
-        value = str(given.pop(name, default))
-        descriptor = ParameterDescriptor(description=meaning, read_only=True)
-        node.declare_parameter(name, value, descriptor, ignore_override=True)
-    configuration = reader.from_parameters(given, source='parameters')
+    configuration = reader.from_parameters(take_overrides(node), source='parameters')
     values = configuration.flat()
     for key, parameter in declared().items():
         node.declare_parameter(key, values[key], _descriptor(parameter), ignore_override=True)

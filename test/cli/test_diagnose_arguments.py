@@ -1,0 +1,41 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""``wheel-terra diagnose``: what is asked of a recording is checked as ``replay`` checks it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from wheel_terra_estimator.cli.main import main
+
+
+@pytest.mark.parametrize(
+    ('remap', 'words'),
+    [
+        ('referenc_odom:=/odom', 'nearest: reference_odom'),
+        ('reference_odom=/odom', 'FROM:=TO'),
+        ('reference_odom:=visual', 'topic /visual is not in the bag'),
+    ],
+)
+def test_remaps_are_checked(
+    make_bag: Any, rover: Any, tmp_path: Path, capsys: Any, remap: str, words: str
+) -> None:
+    rover.write(tmp_path / 'rover.yaml')
+    arguments = ['diagnose', str(make_bag()), '-o', str(tmp_path / 'out')]
+    arguments += ['--config', str(tmp_path / 'rover.yaml'), '--remap', remap]
+    assert main(arguments) == 2
+    said = capsys.readouterr().err
+    assert words in said
+    assert said.count('\n') == 1
+    assert not (tmp_path / 'out').exists()
+
+
+def test_packed_recording_is_a_recording(tmp_path: Path, capsys: Any) -> None:
+    packed = tmp_path / 'drive.mcap.zstd'
+    packed.write_bytes(b'no recording')
+    arguments = ['diagnose', str(packed), '-o', str(tmp_path / 'out'), '--config', 'pathfinder']
+    assert main(arguments) == 2
+    assert 'cannot be unpacked' in capsys.readouterr().err
