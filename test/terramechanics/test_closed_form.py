@@ -184,7 +184,21 @@ def test_edges_are_clamped_and_flagged(ratio: float, sinkage: float) -> None:
     if sinkage < -0.001 or sinkage > WHEEL.radius + 0.02:
         assert got.clamped
     if sinkage == 0.05:
-        assert not got.clamped
+        assert got.clamped == (ratio < 0.0)
+
+
+@pytest.mark.parametrize('value', [-1.0, math.nan, math.inf, -math.inf])
+@pytest.mark.parametrize('entry', range(7))
+def test_no_input_ends_in_an_exception_or_in_nan(entry: int, value: float) -> None:
+    for effects in ({}, MOUND):
+        inputs = [0.7, 0.012, 80.0, 250.0, 0.6, 0.0114, 0.01]
+        assert not conditioned(effects).forces(0, *inputs).clamped
+        inputs[entry] = value
+        got = conditioned(effects).forces(0, *inputs)
+        assert np.isfinite([got.torque, got.drawbar_pull, *got.d_torque, *got.d_pull]).all()
+        assert got.clamped == (not (INPUTS[entry] == 'centroid_shift' and value == -1.0))
+        depth, derivatives, _ = SteadySinkage(WHEEL, SAND, effects).sinkage(0, *inputs[:1], 80.0)
+        assert np.isfinite([depth, *derivatives]).all()
 
 
 def test_six_wheels_and_a_measured_leaving_angle() -> None:

@@ -2,28 +2,25 @@
 # SPDX-License-Identifier: Apache-2.0
 """Torque and pull of a balanced contact with derivatives: the inner loop of the filter.
 
-The algebra of ``closed_form.forces`` for plain floats, with the peak stress eliminated by the load
+The algebra of ``branch_moments`` for plain floats, with the peak stress eliminated by the load
 balance and the derivatives written out (forward mode), at a few microseconds a wheel.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 from wheel_terra_estimator.terramechanics.branch_moments import branch_moments, moment_spread
 from wheel_terra_estimator.terramechanics.contact import Contact
 
 # Rates of (t1, tm, t2, v/w, N) per unit of the direction's variable.
 Direction = tuple[float, float, float, float, float]
-# Torque [N m] and pull [N], or their derivatives.
-Pair = tuple[float, float]
 _STEP = 1e-6
 
 
 def balanced_forces(
-    contact: Contact, shift: float, directions: Sequence[Direction]
-) -> tuple[Pair, list[Pair]]:
+    contact: Contact, shift: float, by_speed: Direction, by_depth: Direction
+) -> tuple[float, float, tuple[float, ...], tuple[float, ...]]:
     """Torque and pull whose normal stress carries ``contact.normal_load``, angles given.
 
     Parameters
@@ -32,15 +29,15 @@ def balanced_forces(
         Floats, angles set.
     shift : float
         Rotation of the stresses towards the front [rad].
-    directions : sequence of tuple
+    by_speed, by_depth : tuple
         Directions in which derivatives are wanted.
 
     Returns
     -------
-    tuple
-        Torque and pull.
-    list of tuple
-        Their derivatives along the directions, then by load, cohesion, tan(phi), K and shift.
+    torque, pull : float
+        [N m], [N].
+    d_torque, d_pull : tuple of float
+        Their derivatives along the two directions, then by load, cohesion, tan(phi), K and shift.
     """
     r, R, width = contact.radius, contact.shear_radius, contact.width
     t1, tm, t2 = contact.entrance_angle, contact.peak_angle, contact.leaving_angle
@@ -50,152 +47,152 @@ def balanced_forces(
     skew = front / total
     area, centroid = branch_moments(exponent, skew)
     spread = 0.5 * moment_spread(exponent)
-    sin_1, cos_1 = math.sin(t1), math.cos(t1)
-    sin_d, cos_d = (math.sin(shift), math.cos(shift)) if shift else (0.0, 1.0)
+    sin, cos = math.sin, math.cos
+    sin_1 = sin(t1)
+    if shift:
+        sin_shift, cos_shift = sin(shift), cos(shift)
 
     # Sums over the branches per unit of peak normal stress (n), of that times tan(phi) (f) and of
-    # cohesion (c); k: what f and c lose per unit of K.
+    # cohesion (c).
     n_lift = n_push = f_lift = f_push = f_torque = c_lift = c_push = c_torque = 0.0
-    kf_lift = kf_push = kf_torque = kc_lift = kc_push = kc_torque = 0.0
-    grip, drag = mu * R, cohesion * R
     branches = []
-    for span, angle, middle, scale, doublings in (
-        (front, t1 - front * centroid, 0.5 * (t1 + tm), 0.125, 3),
-        (rear, t2 + rear * centroid, 0.5 * (tm + t2), 0.0625, 4),
+    for span, angle, middle, scale in (
+        (front, t1 - front * centroid, 0.5 * (t1 + tm) + shift, 0.125),
+        (rear, t2 + rear * centroid, 0.5 * (tm + t2) + shift, 0.0625),
     ):
-        sine, cosine = math.sin(angle), math.cos(angle)
-        climb = sin_1 - sine
+        sine, cosine = sin(angle), cos(angle)
+        climb, pace = sin_1 - sine, R - ratio * cosine  # pace: -dj/dt
         x = (R * (t1 - angle) - ratio * climb) / modulus
-        base = 1.0 / (1.0 + scale * abs(x))
+        base = 1.0 / (1.0 + scale * (x if x >= 0.0 else -x))
         power = base * base
         power *= power
         power *= power
-        if doublings == 4:
+        if scale < 0.1:  # behind the peak: the 16th power
             power *= power
         share = 1.0 - power if x >= 0.0 else power - 1.0
-        slope = power * base / modulus  # d share/d j
-        pace = R - ratio * cosine  # -dj/dt
-        sin_middle, cos_middle = math.sin(middle + shift), math.cos(middle + shift)
         if shift:
-            sine, cosine = sine * cos_d + cosine * sin_d, cosine * cos_d - sine * sin_d
+            sine, cosine = (
+                sine * cos_shift + cosine * sin_shift,
+                cosine * cos_shift - sine * sin_shift,
+            )
+        sin_middle, cos_middle = sin(middle), cos(middle)
         # A branch is an arc: its resultant is a little smaller than the sum of its stresses.
         square = span * span
-        cut, arc = spread * square, R * (1.0 - square / 24.0)
-        whole = area * span
-        weight = whole * (1.0 - cut)
+        weight = area * span * (1.0 - spread * square)
+        rub, cling = R * weight, R * span * (1.0 - square / 24.0)
         n_lift += weight * cosine
         n_push += weight * sine
-        rub, cling, fading = R * weight, arc * span, -slope * x
         f_lift += rub * share * sine
         f_push += rub * share * cosine
-        f_torque += whole * share
+        f_torque += area * span * share
         c_lift += cling * share * sin_middle
         c_push += cling * share * cos_middle
         c_torque += span * share
-        kf_lift += rub * fading * sine
-        kf_push += rub * fading * cosine
-        kf_torque += whole * fading
-        kc_lift += cling * fading * sin_middle
-        kc_push += cling * fading * cos_middle
-        kc_torque += span * fading
+        # Last: d share/d j.
         branches.append(
-            (span, square, whole, weight, cut, share, slope, pace, climb, sine, cosine,
-             drag * span * share * (1.0 - square / 24.0), sin_middle, cos_middle)
+            (span, square, weight, rub, cling, share, climb, pace, x, sine, cosine, sin_middle,
+             cos_middle, power * base / modulus)
         )  # fmt: skip
-    lift, push, twist = r * n_lift + mu * f_lift, mu * f_push - r * n_push, mu * R * f_torque
+    lift, push, twist = r * n_lift + mu * f_lift, mu * f_push - r * n_push, mu * f_torque
     unit_load = contact.normal_load / width
     sigma = (unit_load - cohesion * c_lift) / lift
     thrust = push * sigma + cohesion * c_push
-    arm = width * R
+    arm = width * R * R
+    # What more lift takes from the peak stress, and so from pull and torque.
+    push_lost, twist_lost = push / lift, twist / lift
+    sheared = sigma * mu
 
-    derivatives: list[Pair] = []
-    for d_t1, d_tm, d_t2, d_ratio, d_exponent in directions:
-        if not (d_t1 or d_tm or d_t2 or d_exponent):
-            # Only the shear displacement moves: the common case of speed without effects.
-            d_lift = d_push = d_torque = 0.0
+    # By v/w and K: only the mobilised shares move.
+    v_lift = v_push = v_torque = k_lift = k_push = k_torque = 0.0
+    scaled = []
+    for (
+        span, _, weight, rub, cling, share, climb, _, x, sine, cosine, sin_middle, cos_middle,
+        slope,
+    ) in branches:  # fmt: skip
+        rubbing, clinging = sheared * rub, cohesion * cling
+        by_lift = rubbing * sine + clinging * sin_middle
+        by_push = rubbing * cosine + clinging * cos_middle
+        by_torque = (sheared * area + cohesion) * span
+        faster, softer = slope * climb, slope * x
+        v_lift -= faster * by_lift
+        v_push -= faster * by_push
+        v_torque -= faster * by_torque
+        k_lift -= softer * by_lift
+        k_push -= softer * by_push
+        k_torque -= softer * by_torque
+        normal, friction = sigma * r * weight, rubbing * share
+        scaled.append(
+            (normal * cosine + friction * sine, friction * cosine - normal * sine,
+             clinging * share, by_lift, by_push, by_torque)
+        )  # fmt: skip
+
+    d_torques, d_pulls = [], []
+    for d_t1, d_tm, d_t2, d_ratio, d_exponent in (by_speed, by_depth):
+        d_lift, d_push, d_torque = d_ratio * v_lift, d_ratio * v_push, d_ratio * v_torque
+        if d_t1 or d_tm or d_t2 or d_exponent:
+            d_front, d_rear = d_t1 - d_tm, d_tm - d_t2
+            d_skew = (d_front - skew * (d_t1 + d_tm)) / total
+            d_area = d_centroid = d_spread = 0.0
+            if d_exponent or not -1e-9 < d_skew < 1e-9:
+                moved = exponent + _STEP * d_exponent
+                moved_area, moved_centroid = branch_moments(moved, skew + _STEP * d_skew)
+                d_area = (moved_area - area) / _STEP
+                d_centroid = (moved_centroid - centroid) / _STEP
+                d_spread = (0.5 * moment_spread(moved) - spread) / _STEP
+            entering = (R - ratio * cos(t1)) * d_t1
+            d_span, d_middle = d_front, 0.5 * (d_t1 + d_tm)
+            d_angle = d_t1 - d_front * centroid - front * d_centroid
             for (
-                span, square, whole, weight, _, _, slope, _, climb, sine, cosine, _,
-                sin_middle, cos_middle,
-            ) in branches:  # fmt: skip
-                d_share = -slope * climb * d_ratio
-                d_friction = sigma * grip * weight * d_share
-                d_whole_sticking = drag * span * d_share
-                d_sticking = d_whole_sticking * (1.0 - square / 24.0)
-                d_lift += d_friction * sine + d_sticking * sin_middle
-                d_push += d_friction * cosine + d_sticking * cos_middle
-                d_torque += sigma * grip * whole * d_share + d_whole_sticking
-            d_sigma = -d_lift / lift
-            derivatives.append(
-                (arm * (d_torque + twist * d_sigma), width * (d_push + push * d_sigma))
-            )
-            continue
-        d_front = d_t1 - d_tm
-        d_skew = (d_front - skew * (d_t1 + d_tm)) / total
-        d_area = d_centroid = d_spread = 0.0
-        if d_exponent or abs(d_skew) > 1e-9:
-            moved = exponent + _STEP * d_exponent
-            moved_area, moved_centroid = branch_moments(moved, skew + _STEP * d_skew)
-            d_area, d_centroid = (moved_area - area) / _STEP, (moved_centroid - centroid) / _STEP
-            d_spread = (0.5 * moment_spread(moved) - spread) / _STEP
-        d_angle = d_t1 - d_front * centroid - front * d_centroid
-        d_span, d_middle = d_front, 0.5 * (d_t1 + d_tm)
-        entering = (R - ratio * cos_1) * d_t1
-        d_lift = d_push = d_torque = 0.0
-        for (
-            span, square, whole, weight, cut, share, slope, pace, climb, sine, cosine, sticking,
-            sin_middle, cos_middle,
-        ) in branches:  # fmt: skip
-            d_share = slope * (entering - pace * d_angle - climb * d_ratio)
-            d_whole = d_area * span + area * d_span
-            d_weight = d_whole * (1.0 - cut) - area * square * (
-                d_spread * span + 2.0 * spread * d_span
-            )
-            d_sticking = drag * (
-                d_span * (1.0 - 0.125 * square) * share + span * (1.0 - square / 24.0) * d_share
-            )
-            d_normal = r * d_weight
-            d_friction = grip * (d_weight * share + weight * d_share)
-            normal, friction = r * weight, grip * weight * share
-            d_lift += (
-                sigma
-                * (
-                    d_normal * cosine
-                    + d_friction * sine
-                    + (friction * cosine - normal * sine) * d_angle
+                (span, square, _, _, _, share, _, pace, _, _, _, sin_middle, cos_middle, slope),
+                (down, along, sticking, by_lift, by_push, by_torque),
+            ) in zip(branches, scaled, strict=True):
+                d_share = slope * (entering - pace * d_angle)
+                arc = spread * square
+                growth = d_area / area + ((1.0 - 3.0 * arc) * d_span / span - d_spread * square) / (
+                    1.0 - arc
                 )
-                + d_sticking * sin_middle
-                + sticking * cos_middle * d_middle
-            )
-            d_push += (
-                sigma
-                * (
-                    d_friction * cosine
-                    - d_normal * sine
-                    - (friction * sine + normal * cosine) * d_angle
+                turned = sticking * d_middle
+                stretch = cohesion * R * share * d_span * (1.0 - 0.125 * square)
+                d_lift += (
+                    growth * down
+                    + along * d_angle
+                    + d_share * by_lift
+                    + turned * cos_middle
+                    + stretch * sin_middle
                 )
-                + d_sticking * cos_middle
-                - sticking * sin_middle * d_middle
-            )
-            d_torque += sigma * grip * (d_whole * share + whole * d_share)
-            d_torque += drag * (d_span * share + span * d_share)
-            # The rear branch comes second.
-            d_span, d_middle = d_tm - d_t2, 0.5 * (d_tm + d_t2)
-            d_angle = d_t2 + d_span * centroid + rear * d_centroid
-        d_sigma = -d_lift / lift
-        derivatives.append((arm * (d_torque + twist * d_sigma), width * (d_push + push * d_sigma)))
+                d_push += (
+                    growth * along
+                    - down * d_angle
+                    + d_share * by_push
+                    - turned * sin_middle
+                    + stretch * cos_middle
+                )
+                d_torque += d_share * by_torque + share * (
+                    sheared * (d_area * span + area * d_span) + cohesion * d_span
+                )
+                # The rear branch comes second.
+                d_span, d_middle = d_rear, 0.5 * (d_tm + d_t2)
+                d_angle = d_t2 + d_rear * centroid + rear * d_centroid
+        d_torques.append(arm * (d_torque - twist_lost * d_lift))
+        d_pulls.append(width * (d_push - push_lost * d_lift))
     # Load, cohesion, tan(phi) and K act on the sums; a rotation turns lift into push.
-    by_load = 1.0 / (width * lift)
-    derivatives.append((arm * twist * by_load, width * push * by_load))
-    for d_lift, d_push, d_torque in (
-        (c_lift, c_push, R * c_torque),
-        (sigma * f_lift, sigma * f_push, sigma * R * f_torque),
+    return (
+        arm * (twist * sigma + cohesion * c_torque),
+        width * thrust,
         (
-            sigma * mu * kf_lift + cohesion * kc_lift,
-            sigma * mu * kf_push + cohesion * kc_push,
-            R * (sigma * mu * kf_torque + cohesion * kc_torque),
+            *d_torques,
+            R * R * twist_lost,
+            arm * (c_torque - twist_lost * c_lift),
+            arm * sigma * (f_torque - twist_lost * f_lift),
+            arm * (k_torque - twist_lost * k_lift),
+            -arm * twist_lost * thrust,
         ),
-        (thrust, -unit_load, 0.0),
-    ):
-        d_sigma = -d_lift / lift
-        derivatives.append((arm * (d_torque + twist * d_sigma), width * (d_push + push * d_sigma)))
-    return (arm * (twist * sigma + drag * c_torque), width * thrust), derivatives
+        (
+            *d_pulls,
+            push_lost,
+            width * (c_push - push_lost * c_lift),
+            width * sigma * (f_push - push_lost * f_lift),
+            width * (k_push - push_lost * k_lift),
+            -width * (unit_load + push_lost * thrust),
+        ),
+    )

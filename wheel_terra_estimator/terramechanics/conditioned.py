@@ -12,12 +12,12 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from wheel_terra_estimator.terramechanics.balanced_branches import balanced_forces
+from wheel_terra_estimator.terramechanics.balanced_branches import Direction, balanced_forces
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects import catalogue
 from wheel_terra_estimator.terramechanics.maths import ScalarMaths
 from wheel_terra_estimator.terramechanics.scalar_wheels import ScalarWheels
-from wheel_terra_estimator.terramechanics.terms import Terms, set_angles
+from wheel_terra_estimator.terramechanics.terms import PEAK_MARGIN, Terms, set_angles
 
 # Columns of the derivatives that ``ConditionedForces`` returns.
 INPUTS = (
@@ -31,6 +31,8 @@ INPUTS = (
 )
 SMALLEST_ANGLE = 2e-3  # [rad]; below, the wheel hardly touches and angles lose their meaning
 _STEP = 1e-6
+# Least speed ratio, load [N], c [Pa], tan(phi), K [m].
+_LEAST = (0.0, 1e-3, 0.0, 0.0, 1e-6)
 # Smallest size of speed ratio, load, c, tan(phi), K for the finite steps through the effects.
 _FLOORS = (1.0, 1.0, 100.0, 0.1, 0.01)
 _LARGEST_COSINE = math.cos(SMALLEST_ANGLE)
@@ -46,8 +48,8 @@ class Forces(NamedTuple):
     d_torque, d_pull : tuple of float
         Derivatives by ``INPUTS``.
     clamped : bool
-        True where an input was outside the model (sinkage below zero or above the radius) and
-        was clamped.
+        True where an input was outside the model (sinkage below zero or above the radius, a
+        negative load, speed ratio or strength, or nan) and was clamped.
     """
 
     torque: float
@@ -74,7 +76,8 @@ class ConditionedForces(ScalarWheels):
         self._on_forces = Terms(
             {n: v for n, v in outputs.items() if known[n].touches - {'sinkage'}}
         ).stages['on_outputs']
-        self._plain = not (self._on_inputs or self._on_sinkage or self._terms.stages['on_contact'])
+        self._proportional = not self._terms.stages['on_contact']
+        self._plain = self._proportional and not (self._on_inputs or self._on_sinkage)
         soil = self._soil
         self._exponent = float(soil.sinkage_exponent)
         self._peak_ratio = float(soil.peak_stress_ratio)
@@ -117,84 +120,120 @@ class ConditionedForces(ScalarWheels):
         contact, slip_radius = self._wheels[index]
         contact.rim_speed, contact.pass_number = rim_speed, pass_number
         contact.slope, contact.direction = slope, direction
-        given = (
-            max(speed_ratio, 0.0),
-            max(normal_load, 1e-3),
-            max(cohesion, 0.0),
-            max(tan_friction, 0.0),
-            max(shear_modulus, 1e-6),
+        given: tuple[float, ...] = (
+            speed_ratio, normal_load, cohesion, tan_friction, shear_modulus
+        )  # fmt: skip
+        clamped = not (
+            speed_ratio >= 0.0
+            and normal_load >= 1e-3
+            and cohesion >= 0.0
+            and tan_friction >= 0.0
+            and shear_modulus >= 1e-6
+            and math.isfinite(sum(given) + sinkage + centroid_shift)
         )
+        if clamped:
+            given = tuple(
+                [
+                    max(v, low) if math.isfinite(v) else low
+                    for v, low in zip(given, _LEAST, strict=True)
+                ]
+            )
+            sinkage = sinkage if math.isfinite(sinkage) else 0.0
+            centroid_shift = centroid_shift if math.isfinite(centroid_shift) else 0.0
         leaving = None if math.isnan(leaving_angle) else leaving_angle
-        rates, angle_rate, clamped = self._set(contact, given, slip_radius, sinkage, leaving)
-        sink_rate = 0.0 if clamped else 1.0 / (contact.radius * math.sin(contact.entrance_angle))
-        by_ratio, by_load, by_cohesion, by_friction, by_modulus, by_angle, by_exponent = rates
-        (torque, pull), rows = balanced_forces(
+        if self._plain and leaving is None:
+            angle, outside = self._inputs(contact, given, slip_radius, sinkage)
+            by_angle = _set_shares(contact, angle)
+            by_speed, scales = (0.0, 0.0, 0.0, slip_radius, 0.0), None
+        else:
+            by_speed, by_angle, scales, outside = self._chain(
+                contact, given, slip_radius, sinkage, leaving
+            )
+        rate = 0.0 if outside else 1.0 / (contact.radius * math.sin(contact.entrance_angle))
+        torque, pull, d_torque, d_pull = balanced_forces(
             contact,
             centroid_shift,
-            (
-                (*by_angle, by_ratio, by_exponent),
-                (sink_rate, sink_rate * angle_rate[0], sink_rate * angle_rate[1], 0.0, 0.0),
-            ),
+            by_speed,
+            (rate, rate * by_angle[0], rate * by_angle[1], 0.0, 0.0),
         )
-        if not self._plain:
-            scales = (1.0, 1.0, by_load, by_cohesion, by_friction, by_modulus, 1.0)
-            rows = [(a * scale, b * scale) for (a, b), scale in zip(rows, scales, strict=True)]
-        d_torque, d_pull = zip(*rows, strict=True)
+        if scales is not None:
+            d_torque, d_pull = _scaled(d_torque, scales), _scaled(d_pull, scales)
         if direction < 0.0:
             torque, pull = -torque, -pull
-            d_torque, d_pull = tuple(-d for d in d_torque), tuple(-d for d in d_pull)
+            d_torque, d_pull = tuple([-d for d in d_torque]), tuple([-d for d in d_pull])
+        answer = Forces(torque, pull, d_torque, d_pull, clamped or outside)
         if self._on_forces:
-            return self._with_force_terms(
-                contact,
-                Forces(torque, pull, d_torque, d_pull, clamped),
-                given,
-                slip_radius,
-                sinkage,
-                leaving,
-            )
-        return Forces(torque, pull, d_torque, d_pull, clamped)
+            return self._with_force_terms(contact, answer, given, slip_radius, sinkage, leaving)
+        return answer
 
-    def _set(
+    def _chain(
         self,
         contact: Contact,
         given: tuple[float, ...],
         slip_radius: float,
         sinkage: float,
         leaving: float | None,
-    ) -> tuple[tuple, tuple[float, float], bool]:
+    ) -> tuple[Direction, tuple[float, float], tuple[float, ...], bool]:
         """Set the contact, and take the derivatives through the effects' terms.
 
         One small step in all inputs at once: load, c, tan(phi) and K each depend on themselves
         alone, the angles and the exponent on speed ratio and sinkage.
+
+        Returns
+        -------
+        tuple
+            Rates by the speed ratio; rates of peak and leaving angle by the entrance angle; rates
+            of load, c, tan(phi) and K by themselves; whether the sinkage is outside the model.
         """
-        if self._plain and leaving is None:
-            t1, clamped = self._inputs(contact, given, slip_radius, sinkage)
-            set_angles(contact, t1, None, self._terms, ScalarMaths)
-            rates = (slip_radius, 1.0, 1.0, 1.0, 1.0, (0.0, 0.0, 0.0), 0.0)
-            return rates, (self._peak_ratio, self._leaving_ratio), clamped
-        moved = tuple(
-            [value + _STEP * max(value, floor) for value, floor in zip(given, _FLOORS, strict=True)]
+        u, load, cohesion, friction, modulus = given
+        du, d_load, d_cohesion, d_friction, d_modulus = [
+            _STEP * (value if value > floor else floor)
+            for value, floor in zip(given, _FLOORS, strict=True)
+        ]  # fmt: skip
+        moved = (
+            u + du, load + d_load, cohesion + d_cohesion, friction + d_friction, modulus + d_modulus
+        )  # fmt: skip
+        angle, _ = self._inputs(contact, moved, slip_radius, sinkage)
+        self._set_angles(contact, angle, leaving)
+        ratio_after, load_after = contact.velocity_ratio, contact.normal_load
+        cohesion_after, friction_after = contact.cohesion, contact.tan_friction
+        modulus_after, exponent_after = contact.shear_modulus, contact.sinkage_exponent
+        peak_after, leaving_after = contact.peak_angle, contact.leaving_angle
+        angle_after = angle
+        angle, outside = self._inputs(contact, given, slip_radius, sinkage)
+        by_angle = self._set_angles(contact, angle, leaving)
+        by_speed = (
+            (angle_after - angle) / du,
+            (peak_after - contact.peak_angle) / du,
+            (leaving_after - contact.leaving_angle) / du,
+            (ratio_after - contact.velocity_ratio) / du,
+            (exponent_after - contact.sinkage_exponent) / du,
         )
-        t1, _ = self._inputs(contact, moved, slip_radius, sinkage)
-        set_angles(contact, t1, leaving, self._terms, ScalarMaths)
-        after = _chain(contact)
-        t1, clamped = self._inputs(contact, given, slip_radius, sinkage)
-        set_angles(contact, t1 + _STEP, leaving, self._terms, ScalarMaths)
+        scales = (
+            (load_after - contact.normal_load) / d_load,
+            (cohesion_after - contact.cohesion) / d_cohesion,
+            (friction_after - contact.tan_friction) / d_friction,
+            (modulus_after - contact.shear_modulus) / d_modulus,
+        )
+        return by_speed, by_angle, scales, outside
+
+    def _set_angles(
+        self, contact: Contact, angle: float, leaving: float | None
+    ) -> tuple[float, float]:
+        """Set the angles; return the rates of peak and leaving angle by the entrance angle."""
+        if self._proportional and leaving is None:
+            return _set_shares(contact, angle)
+        set_angles(contact, angle + _STEP, leaving, self._terms, ScalarMaths)
         peak, left = contact.peak_angle, contact.leaving_angle
-        set_angles(contact, t1, leaving, self._terms, ScalarMaths)
-        before = _chain(contact)
-        angle_rate = ((peak - contact.peak_angle) / _STEP, (left - contact.leaving_angle) / _STEP)
-        steps = [m - g for m, g in zip(moved, given, strict=True)]
-        steps += [steps[0]] * 4
-        rate = [(a - b) / s for a, b, s in zip(after, before, steps, strict=True)]
-        return (*rate[:5], tuple(rate[5:8]), rate[8]), angle_rate, clamped
+        set_angles(contact, angle, leaving, self._terms, ScalarMaths)
+        return (peak - contact.peak_angle) / _STEP, (left - contact.leaving_angle) / _STEP
 
     def _inputs(
         self, contact: Contact, given: tuple[float, ...], slip_radius: float, sinkage: float
     ) -> tuple[float, bool]:
         """Set the contact to the inputs, effects done; return entrance angle and clamp flag."""
         ratio = given[0]
-        contact.slip = 1.0 - ratio if ratio <= 1.0 else 1.0 / ratio - 1.0
+        contact.slip = 1.0 - ratio if ratio <= 1.0 else 1.0 / ratio - 1.0  # slip_of_speed_ratio
         contact.velocity_ratio = ratio * slip_radius
         contact.normal_load = contact.stated_load = given[1]
         contact.cohesion, contact.tan_friction, contact.shear_modulus = given[2:]
@@ -206,7 +245,7 @@ class ConditionedForces(ScalarWheels):
         for term, parameters in self._on_sinkage:
             term(contact, parameters, ScalarMaths)
         cosine = 1.0 - (sinkage - contact.sinkage) / contact.radius
-        if cosine > _LARGEST_COSINE:
+        if not cosine <= _LARGEST_COSINE:  # nan as well
             return SMALLEST_ANGLE, True
         if cosine < 0.0:
             return 0.5 * math.pi, True
@@ -254,16 +293,29 @@ class ConditionedForces(ScalarWheels):
         )
 
 
-def _chain(contact: Contact) -> tuple[float, ...]:
-    """Return what the inputs became: v/w, load, c, tan(phi), K, the three angles, exponent."""
+def _set_shares(contact: Contact, angle: float) -> tuple[float, float]:
+    """Set peak and leaving angle in proportion to the entrance angle; return the two shares."""
+    leaving = contact.leaving_ratio
+    margin = PEAK_MARGIN * (1.0 - leaving)
+    peak = contact.peak_ratio
+    if peak < leaving + margin:
+        peak = leaving + margin
+    elif peak > 1.0 - margin:
+        peak = 1.0 - margin
+    contact.entrance_angle = angle
+    contact.peak_angle, contact.leaving_angle = peak * angle, leaving * angle
+    return peak, leaving
+
+
+def _scaled(rates: tuple[float, ...], scales: tuple[float, ...]) -> tuple[float, ...]:
+    """Rates by ``INPUTS``, those by load, c, tan(phi) and K times their scales."""
+    by_load, by_cohesion, by_friction, by_modulus = scales
     return (
-        contact.velocity_ratio,
-        contact.normal_load,
-        contact.cohesion,
-        contact.tan_friction,
-        contact.shear_modulus,
-        contact.entrance_angle,
-        contact.peak_angle,
-        contact.leaving_angle,
-        contact.sinkage_exponent,
+        rates[0],
+        rates[1],
+        rates[2] * by_load,
+        rates[3] * by_cohesion,
+        rates[4] * by_friction,
+        rates[5] * by_modulus,
+        rates[6],
     )
