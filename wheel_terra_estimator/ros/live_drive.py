@@ -23,7 +23,7 @@ from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, NamedTuple
+from typing import Any, BinaryIO, NamedTuple
 
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
@@ -51,9 +51,7 @@ from wheel_terra_estimator.reporting.replay_report import refuse_existing, write
 from wheel_terra_estimator.ros.estimator_node import MESSAGE_TYPES
 
 QUEUE = 5000
-# Sets that the player may be ahead of the node. The node takes its topics in turn, so a long queue
-# lets the wheel odometry run ahead of the more frequent IMU, whose messages then come too late.
-AHEAD = 2
+PATIENCE = 5.0  # [s] until the next message is sent though the node has not heard the last one
 DISCOVERY_TIMEOUT = 60.0  # [s]
 QUIET = 3.0  # [s] without an output after the last input: the node is done
 
@@ -94,7 +92,8 @@ def drive(
     rate : float
         Speed, 1 = as recorded, 0 = as fast as the node takes it.
     arrival : Path, optional
-        Where the node logs its order of arrival.
+        Where the node logs its order of arrival. At speed 0 that is the order of the bag: the node
+        takes its topics in turn, so a queue would let rare messages overtake frequent ones.
 
     Raises
     ------
@@ -105,21 +104,26 @@ def drive(
     with TemporaryDirectory() as folder, _context():
         parameters = Path(folder) / 'parameters.yaml'
         configuration.write(parameters)
+        arrival = arrival or Path(folder) / 'arrival.txt'
         with _running_node(_node_arguments(parameters, topics, arrival)) as process:
             player = _Player(topics)
             try:
                 player.wait_for_partners(process)
                 names = {topic: name for name, topic in topics.items()}
-                player.play(bag.messages(tuple(names)), names, rate, process)
+                with arrival.open('rb') as log:
+                    messages = bag.messages(tuple(names))
+                    player.play(messages, names, rate, _Arrivals(log, process))
                 player.wait_for_end()
+                _must_run(process)
             finally:
                 player.destroy_node()
         # The executor goes by topics; the order of publication is that of the node.
         return sorted(player.heard, key=lambda heard: heard.published)
 
 
-def _node_arguments(parameters: Path, topics: Mapping[str, str], arrival: Path | None) -> list[str]:
-    settings = {
+def _node_arguments(parameters: Path, topics: Mapping[str, str], arrival: Path) -> list[str]:
+    settings: dict[str, Any] = {'record_arrival': str(arrival)}
+    settings |= {
         f'qos_overrides./{name}.subscription.{policy}': value
         for name in topics
         for policy, value in (('reliability', 'reliable'), ('depth', QUEUE))
@@ -129,8 +133,6 @@ def _node_arguments(parameters: Path, topics: Mapping[str, str], arrival: Path |
         for topic in OUTPUT_MESSAGES
         if topic != STUCK
     )
-    if arrival is not None:
-        settings['record_arrival'] = str(arrival)
     arguments = ['--ros-args', '--params-file', str(parameters)]
     for name, value in settings.items():
         arguments += ['-p', f'{name}:={value}']
@@ -170,7 +172,6 @@ class _Player(Node):
     def __init__(self, topics: Mapping[str, str]) -> None:
         super().__init__('wheel_terra_drive_player')
         self.heard: list[Heard] = []
-        self._sent = self._sets = 0
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(self)
         self._inputs = {
@@ -200,23 +201,21 @@ class _Player(Node):
         messages: Iterator[RawMessage],
         names: Mapping[str, str],
         rate: float,
-        process: subprocess.Popen[bytes],
+        arrivals: _Arrivals,
     ) -> None:
         """Publish messages at their pace; in between take what the node publishes."""
         begin = None
         for message in messages:
-            _must_run(process)
             if begin is None:
                 begin = message.log_time, time.monotonic()
             if rate > 0.0:
                 due = begin[1] + (message.log_time - begin[0]) * 1e-9 / rate
                 self._spin_until(partial(_past, due), max(due - time.monotonic(), 0.0))
-            name = names[message.topic]
-            self._inputs[name].publish(message.data)
-            if name in ('joint_states', 'odom'):
-                self._sent += 1
-                if not self._spin_until(lambda: self._sent - self._sets < AHEAD, 0.5):
-                    self._sent = self._sets  # this message gave no set: it was refused
+            self._inputs[names[message.topic]].publish(message.data)
+            arrivals.expect()
+            if rate <= 0.0:
+                self._spin_until(arrivals.complete, PATIENCE, pause=0.001)
+                arrivals.forgive()
 
     def wait_for_end(self) -> None:
         """Wait until the node says nothing new."""
@@ -231,18 +230,42 @@ class _Player(Node):
     def _keeper(self, topic: str) -> Any:
         def keep(data: bytes, info: Mapping[str, int]) -> None:
             self.heard.append(Heard(info['source_timestamp'], topic, bytes(data)))
-            self._sets += topic == f'{NAMESPACE}/slip'
 
         return keep
 
-    def _spin_until(self, condition: Callable[[], bool], seconds: float) -> bool:
+    def _spin_until(
+        self, condition: Callable[[], bool], seconds: float, pause: float = 0.05
+    ) -> bool:
         end = time.monotonic() + seconds
         while not condition():
             left = end - time.monotonic()
             if left <= 0.0:
                 return False
-            self._executor.spin_once(timeout_sec=min(left, 0.05))
+            self._executor.spin_once(timeout_sec=min(left, pause))
         return True
+
+
+class _Arrivals:
+    """What the node has heard of what was sent, by its log of arrivals."""
+
+    def __init__(self, log: BinaryIO, process: subprocess.Popen[bytes]) -> None:
+        self._log = log
+        self._process = process
+        self._missing = 0
+
+    def expect(self) -> None:
+        """Count a message that was sent."""
+        self._missing += 1
+
+    def complete(self) -> bool:
+        """Whether the node has heard all that was sent."""
+        _must_run(self._process)
+        self._missing -= self._log.read().count(b'\n')
+        return self._missing <= 0
+
+    def forgive(self) -> None:
+        """Wait no longer for what has not come."""
+        self._missing = 0
 
 
 def _must_run(process: subprocess.Popen[bytes]) -> None:
