@@ -31,11 +31,14 @@ ARGUMENTS = {
     'output': ('', 'folder for a bag of the estimates; empty: none'),
 }
 
+DELAY = '4.0'  # [s] until the node listens
+
 
 def start(context):
     """Make the processes, once the arguments are known."""
     values = {name: LaunchConfiguration(name).perform(context) for name in ARGUMENTS}
     play = ['ros2', 'bag', 'play', values['bag'], '--clock', '100', '--rate', values['rate']]
+    play += ['--delay', DELAY]
     if values['remap']:
         play += ['--remap', *values['remap'].split()]
     player = ExecuteProcess(cmd=play, output='screen')
