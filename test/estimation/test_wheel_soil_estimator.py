@@ -16,7 +16,7 @@ from wheel_terra_estimator.estimation.measurements import (
     WheelOdometry,
 )
 from wheel_terra_estimator.estimation.wheel_soil_estimator import WheelSoilEstimator
-from wheel_terra_estimator.evaluation.runner import without
+from wheel_terra_estimator.evaluation.runner import inputs_of_mode
 from wheel_terra_estimator.simulation.drive import simulate
 from wheel_terra_estimator.simulation.scenario import load
 
@@ -39,7 +39,7 @@ def merged(measurements):
 def estimate(drive, mode='reference', estimator=None):
     estimator = estimator or WheelSoilEstimator(drive.configuration)
     sets = []
-    for stamp, inputs in merged(without((a.measurement for a in drive.arrivals), mode)):
+    for stamp, inputs in merged(inputs_of_mode(drive.arrivals, mode)):
         estimator.step(stamp, inputs)
         if inputs.wheel_odometry is not None:
             sets.append(estimator.estimates())

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Kinds of drives load; seeds are apart; baselines do what they are called."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -13,7 +15,9 @@ from wheel_terra_estimator.estimation.measurements import (
     WheelOdometry,
 )
 from wheel_terra_estimator.evaluation import baselines, kinds
+from wheel_terra_estimator.evaluation.runner import inputs_of_mode
 from wheel_terra_estimator.simulation.scenario import load
+from wheel_terra_estimator.simulation.sensors import Arrival
 
 
 @pytest.mark.parametrize('name', [*kinds.KINDS, 'firm', 'limiter'])
@@ -55,3 +59,23 @@ def test_command_names_what_it_does_not_know(capsys, tmp_path):
     there = tmp_path / 'there.md'
     there.write_text('x', encoding='utf-8')
     assert main(['evaluate', '-o', str(there)]) == 2
+
+
+def test_modes_change_what_the_estimator_gets():
+    wheels = WheelOdometry(10**9, np.array([1.0]), np.array([2.0]))
+    fix = ReferenceVelocity(10**9, 0.05, 1e-6)
+    inertial = InertialReading(10**9, np.zeros(3), np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0]))
+    arrivals = [
+        Arrival(10**9, wheels),
+        Arrival(int(1.1e9), inertial),
+        Arrival(int(1.4e9), fix),
+        Arrival(int(2.9e9), replace(wheels, stamp=int(2.9e9))),
+    ]
+    assert list(inputs_of_mode(arrivals, 'reference')) == [a.measurement for a in arrivals]
+    assert fix not in list(inputs_of_mode(arrivals, 'no_reference'))
+    assert [type(m) for m in inputs_of_mode(arrivals, 'fixes_at_once')] == [
+        *(WheelOdometry, ReferenceVelocity, InertialReading, WheelOdometry)
+    ]
+    assert list(inputs_of_mode(arrivals, 'fixes_2s_late'))[-1] is fix
+    assert np.isnan(next(inputs_of_mode(arrivals, 'no_torque')).torque).all()
+    assert list(inputs_of_mode(arrivals, 'no_orientation'))[1].orientation is None

@@ -125,3 +125,6 @@ def test_tables_hold_every_kind():
     assert '| climb |' in text
     assert '**pooled**' in text
     assert 'Without torque' not in text
+    pooled = tables.pooled_report(Results([drive]), ['reference', 'no_torque'])
+    assert '| With reference at 1 Hz (1 drives) |' in pooled
+    assert 'climb' not in pooled

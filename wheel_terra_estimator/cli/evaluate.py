@@ -37,6 +37,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=['reference', 'no_reference'],
         help=f'what the estimator gets: {", ".join(MODES)}',
     )
+    parser.add_argument(
+        '--pooled', action='store_true', help='one row per mode in place of one per kind'
+    )
     parser.add_argument('--processes', type=int, default=1, metavar='N', help='in parallel')
     parser.add_argument(
         '--measured',
@@ -76,7 +79,8 @@ def run(arguments: argparse.Namespace) -> int:
                 arguments.processes,
                 lambda _: bar.update(),
             )
-        text = tables.report(results, arguments.modes)
+        write = tables.pooled_report if arguments.pooled else tables.report
+        text = write(results, arguments.modes)
     print(text)
     if arguments.output:
         arguments.output.write_text(text + '\n', encoding='utf-8')

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from wheel_terra_estimator.evaluation import baselines, kinds, scores
-from wheel_terra_estimator.evaluation.runner import record, run_estimator, without
+from wheel_terra_estimator.evaluation.runner import inputs_of_mode, record, run_estimator
 
 
 @dataclass(frozen=True)
@@ -49,17 +49,16 @@ def score_drive(kind: str, seed: int, modes: Sequence[str]) -> list[DriveScore]:
     scenario = load(dict(kinds.FIRM if kind == 'firm' else kinds.KINDS[kind]))
     drive = simulate(scenario, seed)
     configuration, truth = drive.configuration, drive.truth
-    measurements = [a.measurement for a in drive.arrivals]
     wheels = configuration.wheels
     rim = truth.wheel_rate * wheels.slip_radius
     found = []
     for mode in modes:
-        given = list(without(measurements, mode))
-        sets, health = run_estimator(configuration, given)
+        measurements = list(inputs_of_mode(drive.arrivals, mode))
+        sets, health = run_estimator(configuration, measurements)
         kept = record(sets, health)
         held, reckoned = (
             baselines.slip_of(
-                speed(configuration, given, truth.stamp), truth.yaw_rate, rim, wheels.y
+                speed(configuration, measurements, truth.stamp), truth.yaw_rate, rim, wheels.y
             )
             for speed in (baselines.held_speed, baselines.dead_reckoned_speed)
         )

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -20,11 +20,22 @@ from wheel_terra_estimator.estimation.measurements import (
     SinkageReading,
     WheelOdometry,
 )
+from wheel_terra_estimator.simulation.sensors import Arrival
 
 FloatArray = NDArray[np.float64]
 
-MODES = ('reference', 'no_reference', 'no_torque', 'no_sinkage', 'no_orientation')
-"""What the estimator gets: everything, or everything but one input."""
+FIX_DELAYS = {'fixes_at_once': 0.0, 'fixes_2s_late': 2.0}
+"""Modes in which the reference arrives at another time than the sensor file says: delay [s]."""
+
+MODES = (
+    'reference',
+    'no_reference',
+    'no_torque',
+    'no_sinkage',
+    'no_orientation',
+    *FIX_DELAYS,
+)
+"""What the estimator gets: everything, everything but one input, or fixes sooner or later."""
 
 
 @dataclass(frozen=True)
@@ -47,9 +58,21 @@ class Record:
     health: dict[str, Any]
 
 
-def without(measurements: Iterable[Measurement], mode: str) -> Iterable[Measurement]:
-    """Take out of a drive what a mode does not get."""
-    for measurement in measurements:
+def inputs_of_mode(arrivals: Iterable[Arrival], mode: str) -> Iterator[Measurement]:
+    """Yield what a mode gets of a drive, in the order of arrival."""
+    if mode in FIX_DELAYS:
+        delay = round(FIX_DELAYS[mode] * 1e9)
+        arrivals = sorted(
+            (
+                a._replace(arrival=a.measurement.stamp + delay)
+                if isinstance(a.measurement, ReferenceVelocity)
+                else a
+                for a in arrivals
+            ),
+            key=lambda a: a.arrival,
+        )
+    for arrival in arrivals:
+        measurement = arrival.measurement
         if mode == 'no_reference' and isinstance(measurement, ReferenceVelocity):
             continue
         if mode == 'no_sinkage' and isinstance(measurement, SinkageReading):

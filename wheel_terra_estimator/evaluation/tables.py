@@ -20,6 +20,8 @@ _MODES = {
     'no_torque': 'Without torque',
     'no_sinkage': 'Without sinkage',
     'no_orientation': 'Without orientation',
+    'fixes_at_once': 'Fixes at once',
+    'fixes_2s_late': 'Fixes 2 s late',
 }
 
 
@@ -57,6 +59,19 @@ def report(results: Results, modes: Sequence[str]) -> str:
         parts.append(_health(by_kind))
         parts.append('')
     return '\n'.join(parts)
+
+
+def pooled_report(results: Results, modes: Sequence[str]) -> str:
+    """Return one table with a row per mode, pooled over all drives."""
+    rows, warnings = {}, {}
+    for mode in modes:
+        drives = [d for found in results.of_mode(mode).values() for d in found]
+        if drives:
+            rows[f'{_MODES[mode]} ({len(drives)} drives)'] = Samples.joined(
+                d.samples for d in drives
+            )
+            warnings[_MODES[mode]] = drives
+    return f'{_errors(rows)}\n\nStuck warnings:\n\n{_warnings(warnings)}\n'
 
 
 def _by_slip(pooled: Samples) -> dict[str, Samples]:
