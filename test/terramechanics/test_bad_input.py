@@ -4,13 +4,24 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from terra_tools import SAND, WHEEL, points
 
-from wheel_terra_estimator.terramechanics.inverse import entrance_angle
+from wheel_terra_estimator.terramechanics.conditioned import ConditionedForces
+from wheel_terra_estimator.terramechanics.entrapment import rim_travel_to_depth, sinkage_growth
+from wheel_terra_estimator.terramechanics.inverse import (
+    centroid_angle,
+    entrance_angle,
+    peak_stresses,
+)
+from wheel_terra_estimator.terramechanics.longitudinal_sinkage import longitudinal_slip_sinkage
 from wheel_terra_estimator.terramechanics.model import WheelSoilModel
+from wheel_terra_estimator.terramechanics.slope_locomotion import SlopeLocomotion
+from wheel_terra_estimator.terramechanics.steady_sinkage import SteadySinkage
 from wheel_terra_estimator.terramechanics.wheel import Wheel
 
 
@@ -31,6 +42,65 @@ from wheel_terra_estimator.terramechanics.wheel import Wheel
         (lambda: replace(SAND, leaving_angle_ratio=0.3), r'leaving angle ratio is 0\.3'),
         (lambda: replace(SAND, pressure_law='clay'), r"pressure law is 'clay'"),
         (lambda: WheelSoilModel(SAND, method='guess'), r"method is 'guess'"),
+        (lambda: WheelSoilModel(SAND, nodes=0), r'nodes is 0; allowed is 2 or more'),
+        (lambda: Wheel('wide', 0.1), r"wheel radius is 'wide'; allowed is a number"),
+        (lambda: points(1.0000001), r'slip is 1\.0000001; allowed is \[-1, 1\]'),
+        (lambda: points([0.1, 0.2], [1.0, 2.0, 3.0]), r'normal load has 3 entries, slip has 2'),
+        (lambda: points([[0.1, 0.2]]), r'slip has shape \(1, 2\); allowed is a number or one axis'),
+        (
+            lambda: points([0.1, 0.2, 0.3], wheel=Wheel([0.1, 0.2], 0.1)),
+            r'radius has 2 entries, slip has 3',
+        ),
+        (
+            lambda: WheelSoilModel(replace(SAND, cohesion=np.ones(3))).steady_state(
+                points([0.1, 0.2])
+            ),
+            r'slip has 2 entries, soil cohesion has 3',
+        ),
+        (lambda: WheelSoilModel(SAND, {'cohesion': None}), r'effects\.cohesion is None; allowed'),
+        (
+            lambda: WheelSoilModel(SAND, {'cohesion': {'delta': 'much'}}),
+            r"effects\.cohesion\.delta is 'much'; allowed is a number",
+        ),
+        (
+            lambda: WheelSoilModel(SAND, {'cohesion': {'delta': -3000.0}}).steady_state(
+                points(0.1)
+            ),
+            r'cohesion with the effects on is -2750 Pa; allowed is \[0, inf\) Pa',
+        ),
+        (lambda: entrance_angle(-0.01, 0.1), r'sinkage is -0\.01 m; allowed is \[0, 0\.1\] m'),
+        (
+            lambda: peak_stresses(3.0, -80.0, (0.4, 0.2, -0.1), 0.1, 0.1, 0.1),
+            r'normal load is -80 N',
+        ),
+        (
+            lambda: peak_stresses(3.0, 80.0, (0.1, 0.2, -0.1), 0.1, 0.1, 0.1),
+            r'entrance minus peak angle is -0\.1 rad; allowed is \(0, inf\) rad',
+        ),
+        (lambda: centroid_angle(3.0, 80.0, 5.0, 0.0), r'shear radius is 0 m'),
+        (lambda: SlopeLocomotion(WheelSoilModel(SAND), WHEEL, math.nan), r'weight is nan N'),
+        (
+            lambda: SlopeLocomotion(WheelSoilModel(SAND), WHEEL, 80.0).climb([0.1, 2.0]),
+            r'slope is 2 rad \(entry 1\); allowed is \[-1\.5708, 1\.5708\] rad',
+        ),
+        (lambda: sinkage_growth(0.95, WHEEL, 0.0), r'contact length is 0 m'),
+        (lambda: sinkage_growth(2.0, WHEEL, 0.1), r'slip is 2; allowed is \[-1, 1\]'),
+        (lambda: rim_travel_to_depth(0.01, 0.3, 0.95, WHEEL), r'depth is 0\.3 m; allowed is \[0'),
+        (
+            lambda: longitudinal_slip_sinkage(0.5, -0.1, 0.1, -0.05, 0.5),
+            r'radius is -0\.1 m; allowed is \(0, inf\) m',
+        ),
+        (lambda: ConditionedForces(WHEEL, SAND, gravity=-1.0), r'gravity is -1 m/s\^2'),
+        (
+            lambda: ConditionedForces(WHEEL, replace(SAND, cohesion=np.ones(2))),
+            r'soil cohesion has shape \(2,\); allowed is one number',
+        ),
+        (lambda: SteadySinkage(WHEEL, SAND).state(0, 0.5, -80.0), r'normal load is -80 N'),
+        (lambda: SteadySinkage(WHEEL, SAND).state(0, math.nan, 80.0), r'speed ratio is nan'),
+        (
+            lambda: SteadySinkage(WHEEL, SAND).state(0, 0.5, 1e6),
+            r'normal load is 1e\+06 N; this soil carries about',
+        ),
         (lambda: entrance_angle(0.2, 0.1), r'sinkage is 0\.2 m; allowed is \[0, 0\.1\] m'),
         (
             lambda: WheelSoilModel(replace(SAND, cohesive_modulus=-1e6)).steady_state(points(0.1)),
@@ -46,3 +116,16 @@ def test_the_complaint_names_quantity_value_and_range(make, words: str) -> None:
 def test_a_wheel_may_be_smooth() -> None:
     assert Wheel(0.1, 0.1).tip_radius == 0.1
     assert WHEEL.tip_radius == pytest.approx(0.1674)
+
+
+def test_what_effects_leave_of_the_soil_is_flagged_where_nothing_may_be_raised() -> None:
+    model = WheelSoilModel(SAND, {'cohesion': {'delta': -3000.0}}, strict=False)
+    assert model.steady_state(points([0.1, 0.2])).flags.tolist() == [2, 2]
+    assert WheelSoilModel(SAND).steady_state(points(np.zeros(0))).sinkage.shape == (0,)
+
+
+def test_a_great_many_points_at_once() -> None:
+    state = WheelSoilModel(SAND, method='closed_form').steady_state(
+        points(np.linspace(-1.0, 1.0, 200_001))
+    )
+    assert np.isfinite(state.outputs()).all()

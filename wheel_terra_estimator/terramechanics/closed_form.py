@@ -6,11 +6,12 @@ Two of them:
 
 * ``triangle_forces``: the field's linearised stresses. Both stresses are triangles with their
   peak at the peak angle, which gives the coefficients A, B, C, and from them the drawbar pull
-  without soil parameters (``decoupled_pull``).
+  without soil parameters (``decoupled_pull``): for a soil of which nothing is known.
 * ``forces``: one representative angle per side of the peak, placed and weighted by the exact
   moments of the pressure-sinkage curve, so that the shape of the normal stress (its exponent)
   and the growth of shear along the contact are kept. Nothing in it is fitted; over the
-  validation family its error is some ten times smaller than that of the triangles.
+  validation family its error is some ten times smaller than that of the triangles. Its pull
+  from torque and load is ``decoupled_pull_shaped``, the form to use where anything is known.
 
 With ``maths = ScalarMaths`` everything runs on floats.
 """
@@ -55,6 +56,29 @@ def coefficients(
     return a, b, 0.5 * (entrance_angle - leaving_angle)
 
 
+def coefficient_rates(
+    entrance_angle: Any, peak_angle: Any, leaving_angle: Any, maths: Any = np
+) -> tuple[tuple[Any, Any, Any], ...]:
+    """Derivatives of (A, B, C) by entrance, peak and leaving angle, one triple each."""
+    front, rear = entrance_angle - peak_angle, peak_angle - leaving_angle
+    (sin_1, cos_1), (sin_m, cos_m), (sin_2, cos_2) = (
+        (maths.sin(angle), maths.cos(angle))
+        for angle in (entrance_angle, peak_angle, leaving_angle)
+    )
+    # Mean slopes of cosine and sine over either side.
+    cos_front, cos_rear = (cos_m - cos_1) / front, (cos_m - cos_2) / rear
+    sin_front, sin_rear = (sin_m - sin_1) / front, (sin_m - sin_2) / rear
+    return (
+        ((sin_1 - cos_front) / front, (-cos_1 - sin_front) / front, 0.5),
+        (
+            (cos_front - sin_m) / front - (sin_m + cos_rear) / rear,
+            (cos_m + sin_front) / front + (cos_m - sin_rear) / rear,
+            0.0,
+        ),
+        ((sin_2 + cos_rear) / rear, (sin_rear - cos_2) / rear, -0.5),
+    )
+
+
 def decoupled_pull(
     torque: Any,
     normal_load: Any,
@@ -70,6 +94,27 @@ def decoupled_pull(
     """
     a, b, c = coefficients(entrance_angle, peak_angle, leaving_angle, maths)
     return (a * a + b * b) / (a * c) * torque / shear_radius - b / a * normal_load
+
+
+def decoupled_pull_jacobian(
+    torque: Any,
+    normal_load: Any,
+    entrance_angle: Any,
+    peak_angle: Any,
+    leaving_angle: Any,
+    shear_radius: Any,
+    maths: Any = np,
+) -> tuple[Any, Any, Any, Any, Any]:
+    """Derivatives of ``decoupled_pull`` by torque, load, entrance, peak and leaving angle."""
+    angles = entrance_angle, peak_angle, leaving_angle
+    a, b, c = coefficients(*angles, maths)
+    gain, lean = (a * a + b * b) / (a * c), b / a
+    by_angle = []
+    for d_a, d_b, d_c in coefficient_rates(*angles, maths):
+        d_gain = 2.0 * (a * d_a + b * d_b) / (a * c) - gain * (d_a / a + d_c / c)
+        d_lean = (d_b - lean * d_a) / a
+        by_angle.append(d_gain * torque / shear_radius - d_lean * normal_load)
+    return gain / shear_radius, -lean, by_angle[0], by_angle[1], by_angle[2]
 
 
 def decoupled_pull_shaped(torque: Any, contact: Contact, maths: Any = np) -> Any:

@@ -35,6 +35,7 @@ _STEP = 1e-6
 _LEAST = (0.0, 1e-3, 0.0, 0.0, 1e-6)
 # Smallest size of speed ratio, load, c, tan(phi), K for the finite steps through the effects.
 _FLOORS = (1.0, 1.0, 100.0, 0.1, 0.01)
+_BEHIND, _AHEAD = -0.5 * math.pi, 0.25 * math.pi  # of a measured leaving angle [rad]
 _LARGEST_COSINE = math.cos(SMALLEST_ANGLE)
 
 
@@ -140,7 +141,11 @@ class ConditionedForces(ScalarWheels):
             )
             sinkage = sinkage if math.isfinite(sinkage) else 0.0
             centroid_shift = centroid_shift if math.isfinite(centroid_shift) else 0.0
-        leaving = None if math.isnan(leaving_angle) else leaving_angle
+        leaving: float | None = leaving_angle
+        if math.isnan(leaving_angle):
+            leaving = None
+        elif not _BEHIND <= leaving_angle <= _AHEAD:
+            leaving, clamped = min(max(leaving_angle, _BEHIND), _AHEAD), True
         if self._plain and leaving is None:
             angle, outside = self._inputs(contact, given, slip_radius, sinkage)
             by_angle = _set_shares(contact, angle)

@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from wheel_terra_estimator.terramechanics.checks import check_range
+
 # Below the first slip nothing is dug beyond the steady sinkage, above the second all of it.
 DIGGING_STARTS, DIGGING_FULL = 0.85, 0.95
 # Share of the conveyed layer that does not fall back under the wheel; no measurement found, the
@@ -45,8 +47,10 @@ def sinkage_growth(
     contact_length : float or array_like
         L = r (t1 - t2) [m], positive.
     """
-    if np.any(np.asarray(contact_length) <= 0.0):
-        raise ValueError(f'contact length is {np.min(contact_length):g} m; allowed is (0, inf) m')
+    check_range('slip', slip, -1.0, 1.0)
+    check_range('contact length', contact_length, 0.0, unit='m', open_lower=True)
+    check_range('efficiency', efficiency, 0.0, 1.0)
+    check_range('entrained layer', entrained_layer, 0.0, unit='m')
     conveyed = wheel.lug_height + entrained_layer
     driving = np.where(np.asarray(slip) > 0.0, digging_share(slip), 0.0)
     return efficiency * driving * conveyed / contact_length
@@ -61,6 +65,8 @@ def rim_travel_to_depth(
     integral of L dz over the conveyed layer, from the geometry of the circle.
     """
     radius = wheel.radius
+    for name, value in (('sinkage', sinkage), ('depth', depth)):
+        check_range(name, value, 0.0, float(np.min(radius)), 'm')
     rate = sinkage_growth(slip, wheel, 1.0, efficiency)  # times L: layer per rim travel
 
     def integral(z: Any) -> Any:

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from wheel_terra_estimator.terramechanics.checks import check_range
 from wheel_terra_estimator.terramechanics.closed_form import coefficients
 from wheel_terra_estimator.terramechanics.kinematics import shear_displacement
 
@@ -73,12 +74,13 @@ def entrance_angle(sinkage: Any, radius: Any, lug_sinkage: Any = 0.0) -> FloatAr
     Raises
     ------
     ValueError
-        If the sinkage is above the radius; depths below zero count as a touch.
+        If the sinkage is negative or above the radius (nan stays nan: not measured). What is left
+        below zero after the lugs' part counts as a touch.
     """
+    check_range('radius', radius, 0.0, unit='m', open_lower=True)
+    check_range('sinkage', sinkage, 0.0, float(np.min(radius)), 'm', allow_nan=True)
     depth = np.asarray(sinkage, float) - lug_sinkage
-    if np.any(depth > radius):
-        worst = float(np.max(depth))
-        raise ValueError(f'sinkage is {worst:g} m; allowed is [0, {np.min(radius):g}] m (radius)')
+    check_range('sinkage less lugs', depth, upper=float(np.min(radius)), unit='m', allow_nan=True)
     return np.arccos(1.0 - np.maximum(depth, 1e-6 * np.asarray(radius)) / radius)
 
 
@@ -103,6 +105,13 @@ def peak_stresses(
     radius, shear_radius, width : float or array_like
         [m].
     """
+    check_range('torque', torque, unit='N m', allow_nan=True)
+    check_range('normal load', normal_load, 0.0, unit='N', open_lower=True, allow_nan=True)
+    for name, length in (('radius', radius), ('shear radius', shear_radius), ('width', width)):
+        check_range(name, length, 0.0, unit='m', open_lower=True)
+    entrance, peak, leaving = (np.asarray(angle, float) for angle in angles)
+    check_range('entrance minus peak angle', entrance - peak, 0.0, unit='rad', open_lower=True)
+    check_range('peak minus leaving angle', peak - leaving, 0.0, unit='rad', open_lower=True)
     torque, load = np.asarray(torque, float), np.asarray(normal_load, float)
     a, b, c = coefficients(*angles)
     shear_by_torque = 1.0 / (width * shear_radius**2 * c)
@@ -132,6 +141,8 @@ def centroid_angle(
     F cos psi + W sin psi = rho T/R; `spread` is rho = sqrt(A^2 + B^2)/C, slightly below 1. Then
     peak plus leaving angle is 3 psi - t1: the cleanest probe for missing physics.
     """
+    check_range('normal load', normal_load, 0.0, unit='N', open_lower=True, allow_nan=True)
+    check_range('shear radius', shear_radius, 0.0, unit='m', open_lower=True)
     load, pull = np.asarray(normal_load, float), np.asarray(drawbar_pull, float)
     share = spread * np.asarray(torque, float) / shear_radius / np.hypot(load, pull)
     return np.arcsin(np.clip(share, -1.0, 1.0)) - np.arctan2(pull, load)
@@ -168,6 +179,9 @@ def equivalent_soil(
     r = np.broadcast_to(np.asarray(radius, float), good.shape)[good]
     sigma, tau = stresses.normal[good], stresses.shear[good]
     moduli = np.geomspace(1e-3, 0.06, 200) if shear_moduli is None else np.asarray(shear_moduli)
+    if moduli.size == 0:
+        raise ValueError('shear moduli are none; allowed is 1 or more')
+    check_range('shear moduli', moduli, 0.0, unit='m', open_lower=True)
     j = shear_displacement(tm, t1, R, ratio)
     share = np.sign(j)[:, None] * -np.expm1(-np.abs(j)[:, None] / moduli)  # (N, K)
     separable = bool(np.ptp(sigma) > 0.2 * np.mean(sigma) and sigma.size > 2)

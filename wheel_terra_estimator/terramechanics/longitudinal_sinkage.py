@@ -11,6 +11,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from wheel_terra_estimator.terramechanics.checks import check_range
+
 
 @dataclass(frozen=True)
 class SlipSurface:
@@ -56,6 +58,10 @@ def slip_surface(
     radius, peak_angle, leaving_angle, friction_angle : float
         r [m], tm, t2, phi [rad].
     """
+    check_range('radius', radius, 0.0, unit='m', open_lower=True)
+    check_range('peak angle', peak_angle, 0.0, math.pi / 2, 'rad', open_lower=True)
+    check_range('leaving angle', leaving_angle, -math.pi / 2, 0.0, 'rad')
+    check_range('friction angle', friction_angle, 0.0, math.pi / 3, 'rad')
     passive = math.pi / 4 - friction_angle / 2
     first = math.pi / 4 + friction_angle / 2 - peak_angle
     x_a, y_a = radius * math.sin(peak_angle), radius * (1.0 - math.cos(peak_angle))

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wheel_terra_estimator.terramechanics import closed_form, quadrature
-from wheel_terra_estimator.terramechanics.checks import check_range
+from wheel_terra_estimator.terramechanics.checks import check_range, common_length
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects import EffectSettings, catalogue, check_settings
 from wheel_terra_estimator.terramechanics.load_balance import (
@@ -37,7 +37,8 @@ METHODS = ('quadrature', 'closed_form', 'triangles')
 _SMALLEST_SCALE = {'cohesion': 100.0, 'cohesive_modulus': 1e3, 'friction_angle': 0.1}
 
 OVERLOADED = 1  # the soil cannot carry the load: values belong to a sinkage of one radius
-OUTSIDE_VALIDITY = 2  # |slip| above 0.95: no steady state is known there
+# |slip| above 0.95, where no steady state is known; or effects made the strength negative.
+OUTSIDE_VALIDITY = 2
 
 
 @dataclass(frozen=True)
@@ -98,6 +99,8 @@ class WheelSoilModel:
     ) -> None:
         if method not in METHODS:
             raise ValueError(f'method is {method!r}; allowed is one of {METHODS}')
+        if nodes < 2:
+            raise ValueError(f'nodes is {nodes}; allowed is 2 or more')
         self.soil = soil
         self.effects = check_settings(effects or {})
         self.method = method
@@ -111,14 +114,17 @@ class WheelSoilModel:
         Raises
         ------
         ValueError
-            If `strict` and the soil cannot carry the load of a point.
+            If `strict` and the soil cannot carry the load of a point, or the effects leave no
+            strength; if an array of the soil has another length than the points.
         """
         terms = Terms(self.effects)
+        length = common_length(
+            {**{f'soil {name}': v for name, v in self._soil.items()}, 'slip': points.slip}
+        )
+        if length != len(points):
+            raise ValueError(f'the soil has {length} entries, the points {len(points)}')
         contact = build_contact(points, self._soil, self.soil.pressure_law, terms)
-        if not np.all(np.asarray(contact.bearing_modulus) > 0.0):
-            check_range(
-                'bearing modulus kc/b + kphi', contact.bearing_modulus, 0.0, open_lower=True
-            )
+        self._check(contact)
         load = np.broadcast_to(contact.normal_load, (len(points),))
         explicit = (
             self.method == 'closed_form'
@@ -148,6 +154,22 @@ class WheelSoilModel:
         else:
             _, *outputs = self._response(contact, angle, points, terms)
         return self._pack(contact, points, angle, carries, outputs)
+
+    def _check(self, contact: Contact) -> None:
+        """Complain of what effects, or the width, made of the soil."""
+        law = 'kc/b + kphi' if self.soil.pressure_law == 'bekker' else "c kc' + rho g b kphi'"
+        check_range(f'bearing modulus {law}', contact.bearing_modulus, 0.0, open_lower=True)
+        if self.strict and self.effects:
+            for quantity, unit, positive in (
+                ('cohesion', 'Pa', False),
+                ('tan_friction', '-', False),
+                ('shear_modulus', 'm', True),
+                ('sinkage_exponent', '-', True),
+            ):
+                name, value = quantity.replace('_', ' '), getattr(contact, quantity)
+                check_range(
+                    f'{name} with the effects on', value, 0.0, np.inf, unit, open_lower=positive
+                )
 
     def jacobian(
         self, points: OperatingPoints, names: Sequence[str]
@@ -240,7 +262,9 @@ class WheelSoilModel:
         outputs: Sequence[Any],
     ) -> SteadyState:
         flags = np.where(carries, 0, OVERLOADED)
-        flags = flags + np.where(np.abs(points.slip) > 0.95, OUTSIDE_VALIDITY, 0)
+        weakened = (np.asarray(contact.cohesion) < 0.0) | (np.asarray(contact.tan_friction) < 0.0)
+        weakened |= np.asarray(contact.sinkage_exponent) <= 0.0
+        flags = flags + np.where((np.abs(points.slip) > 0.95) | weakened, OUTSIDE_VALIDITY, 0)
         shape = angle.shape
         columns = (*outputs, angle, contact.peak_angle, contact.leaving_angle)
         sinkage, pull, torque, entrance, peak, leaving = (

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from wheel_terra_estimator.terramechanics.checks import check_range
+from wheel_terra_estimator.terramechanics.checks import check_range, common_length, numbers
 from wheel_terra_estimator.terramechanics.wheel import Wheel
 
 STANDARD_GRAVITY = 9.80665  # [m/s^2]
@@ -58,11 +58,17 @@ class OperatingPoints:
             raise ValueError(f'slip radius is {self.slip_radius!r}; allowed is one of {SLIP_RADII}')
         wheel = self.wheel
         names = ('slip', 'normal_load', 'slope', 'gravity', 'angular_velocity', 'pass_number')
-        columns = [np.asarray(getattr(self, name), float) for name in (*names, 'leaving_angle')]
-        wheel_shapes = [np.shape(v) for v in (wheel.radius, wheel.width, wheel.lug_height)]
-        shape = np.broadcast_shapes((1,), *(c.shape for c in columns), *wheel_shapes)
-        for name, column in zip((*names, 'leaving_angle'), columns, strict=True):
-            object.__setattr__(self, name, np.broadcast_to(column, shape))
+        columns = {
+            name.replace('_', ' '): numbers(name.replace('_', ' '), getattr(self, name))
+            for name in (*names, 'leaving_angle')
+        }
+        wheels = {
+            name.replace('_', ' '): getattr(wheel, name)
+            for name in ('radius', 'width', 'lug_height', 'lug_count', 'lug_thickness')
+        }
+        count = common_length({**columns, **wheels})
+        for name, column in columns.items():
+            object.__setattr__(self, name.replace(' ', '_'), np.broadcast_to(column, (count,)))
         check_range('slip', self.slip, -1.0, 1.0)
         check_range('normal load', self.normal_load, 0.0, unit='N', open_lower=True)
         check_range('slope', self.slope, -np.pi / 2, np.pi / 2, unit='rad')

@@ -6,11 +6,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from wheel_terra_estimator.terramechanics.checks import check_range
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects import EffectSettings, check_settings
 from wheel_terra_estimator.terramechanics.operating_points import STANDARD_GRAVITY
 from wheel_terra_estimator.terramechanics.soil import Soil
-from wheel_terra_estimator.terramechanics.terms import Terms
+from wheel_terra_estimator.terramechanics.terms import SOIL_NUMBERS, Terms
 from wheel_terra_estimator.terramechanics.wheel import Wheel
 
 
@@ -39,6 +40,12 @@ class ScalarWheels:
         slip_radius: str = 'lug_tip',
         gravity: float = STANDARD_GRAVITY,
     ) -> None:
+        for name in SOIL_NUMBERS:
+            if np.ndim(getattr(soil, name)):
+                raise ValueError(
+                    f'soil {name} has shape {np.shape(getattr(soil, name))}; allowed is one number'
+                )
+        check_range('gravity', gravity, 0.0, unit='m/s^2', open_lower=True)
         self._settings = check_settings(effects or {})
         self._terms = Terms(self._settings)
         self._soil = soil

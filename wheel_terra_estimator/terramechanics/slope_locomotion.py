@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from wheel_terra_estimator.terramechanics.checks import check_range
 from wheel_terra_estimator.terramechanics.model import OVERLOADED, WheelSoilModel
 from wheel_terra_estimator.terramechanics.operating_points import (
     STANDARD_GRAVITY,
@@ -85,8 +86,7 @@ class SlopeLocomotion:
     ) -> None:
         if load not in LOAD_CONVENTIONS:
             raise ValueError(f'load is {load!r}; allowed is one of {LOAD_CONVENTIONS}')
-        if weight <= 0.0:
-            raise ValueError(f'weight is {weight:g} N; allowed is (0, inf) N')
+        check_range('weight', weight, 0.0, unit='N', open_lower=True)
         if 'slope_gravity' in model.effects:
             raise ValueError(
                 'slope_gravity is on in the model; the balance is made here: leave off'
@@ -111,6 +111,7 @@ class SlopeLocomotion:
         slopes : array_like
             (N,) positive uphill [rad].
         """
+        check_range('slope', slopes, -0.5 * np.pi, 0.5 * np.pi, 'rad')
         slopes = np.atleast_1d(np.asarray(slopes, float))
         need = self.weight * np.sin(slopes)
         grid = np.concatenate([np.linspace(-0.9, 0.9, 73), np.linspace(0.9, LARGEST_SLIP, 9)[1:]])
@@ -140,6 +141,7 @@ class SlopeLocomotion:
         Solves F(s, load(a)) = W sin a for the slope a by fixed-point steps (the load moves with
         the cosine only).
         """
+        check_range('slip', slip, -1.0, 1.0)
         slip = np.atleast_1d(np.asarray(slip, float))
         slope = np.zeros_like(slip)
         for _ in range(60):

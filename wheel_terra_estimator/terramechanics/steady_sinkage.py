@@ -26,6 +26,7 @@ INPUTS = (
     'cohesion',
     'shear_modulus',
 )
+_FACTOR = 20.0  # of a logarithm; beyond, the stiffness is no soil's
 _LARGEST = 1.5
 _SMALLEST = 2e-3
 # Most steps of the load balance (two do), and where it ends: the product of two errors in a row,
@@ -95,7 +96,7 @@ class SteadySinkage(ScalarWheels):
         given = (
             max(speed_ratio, 0.0),
             max(normal_load, 1e-3),
-            log_stiffness,
+            min(max(log_stiffness, -_FACTOR), _FACTOR),
             exponent_slope,
             max(friction if tan_friction is None else tan_friction, 0.0),
             max(strength if cohesion is None else cohesion, 0.0),
@@ -134,21 +135,35 @@ class SteadySinkage(ScalarWheels):
         rim_speed: float = math.nan,
         pass_number: float = 1.0,
     ) -> tuple[float, float, float]:
-        """Steady sinkage [m], drawbar pull [N] and torque [N m] in the configured soil."""
+        """Steady sinkage [m], drawbar pull [N] and torque [N m] in the configured soil.
+
+        Raises
+        ------
+        ValueError
+            For a negative speed ratio, a load that is not positive, and a load that the soil
+            cannot carry.
+        """
         contact, slip_radius = self._wheels[index]
-        ratio = speed_ratio if speed_ratio > 0.0 else 0.0
-        weight = normal_load if normal_load > 1e-3 else 1e-3
+        if not 0.0 <= speed_ratio < math.inf:
+            raise ValueError(f'speed ratio is {speed_ratio:g}; allowed is [0, inf)')
+        if not 0.0 < normal_load < math.inf:
+            raise ValueError(f'normal load is {normal_load:g} N; allowed is (0, inf) N')
         if self._prepared:
             form = self._prepared[index]
-            form.set_speed(ratio * slip_radius)
-            angle, pull, torque, _ = _balanced(form, (form.load, form.forces), weight)
+            form.set_speed(speed_ratio * slip_radius)
+            angle, pull, torque, carried = _balanced(form, (form.load, form.forces), normal_load)
+            if not carried:
+                raise _overload(normal_load, angle, form.load)
             return contact.radius * (1.0 - math.cos(angle)), pull, torque
         contact.rim_speed, contact.pass_number = rim_speed, pass_number
-        self._inputs(index, (ratio, weight, 0.0, 0.0, *self._given))
+        self._inputs(index, (speed_ratio, normal_load, 0.0, 0.0, *self._given))
         form = closed_form.proportional_forces(contact, ScalarMaths)
-        angle, contact.drawbar_pull, contact.torque, _ = _balanced(
-            form, self._functions(contact, form), contact.normal_load
+        functions = self._functions(contact, form)
+        angle, contact.drawbar_pull, contact.torque, carried = _balanced(
+            form, functions, contact.normal_load
         )
+        if not carried:
+            raise _overload(contact.normal_load, angle, functions[0])
         contact.entrance_angle = angle
         contact.sinkage = contact.radius * (1.0 - math.cos(angle))
         self._terms.apply('on_outputs', contact, ScalarMaths)
@@ -253,3 +268,11 @@ def _balanced(
                 True,
             )
     return angle, pull, torque, False
+
+
+def _overload(load: float, angle: float, carried: Load) -> ValueError:
+    """Return the complaint of a soil that cannot carry the load."""
+    return ValueError(
+        f'normal load is {load:g} N; this soil carries about {carried(angle):.3g} N at an entrance '
+        f'angle of {angle:.2g} rad'
+    )

@@ -13,6 +13,7 @@ import importlib.util
 import pkgutil
 from collections.abc import Mapping
 from functools import lru_cache
+from numbers import Real
 from pathlib import Path
 from types import MappingProxyType
 
@@ -106,12 +107,16 @@ def check_settings(settings: EffectSettings) -> dict[str, dict[str, float]]:
             raise ValueError(f'effect {name} is not in the catalogue: {", ".join(known)}')
         effect = known[name]
         full[name] = effect.defaults()
+        if not isinstance(values, Mapping):
+            raise ValueError(f'effects.{name} is {values!r}; allowed is a mapping of parameters')
         for key, value in values.items():
             if key not in full[name]:
                 raise ValueError(
                     f'effect {name} has no parameter {key}; it has {", ".join(full[name])}'
                 )
             parameter = effect.parameter(key)
+            if not isinstance(value, Real):
+                raise ValueError(f'effects.{name}.{key} is {value!r}; allowed is a number')
             if not parameter.lower <= value <= parameter.upper:
                 raise ValueError(
                     f'effects.{name}.{key} is {value:g}; allowed is '
