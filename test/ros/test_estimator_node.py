@@ -148,6 +148,27 @@ def test_silence_is_said_in_diagnostics(start, parameters, listener):
     assert any('never heard' in s.message for s in statuses)
 
 
+def test_publisher_of_another_type_or_quality_is_named(start, parameters, listener):
+    from diagnostic_msgs.msg import DiagnosticArray
+    from geometry_msgs.msg import Twist
+    from nav_msgs.msg import Odometry
+    from rclpy.qos import QoSProfile, ReliabilityPolicy
+
+    node, until = listener
+    diagnostics = hear(node, DiagnosticArray, '/diagnostics')
+    node.create_publisher(Twist, 'joint_states', 10)
+    offered = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
+    node.create_publisher(Odometry, 'reference_odom', offered)
+    wanted = 'qos_overrides./reference_odom.subscription.reliability:=reliable'
+    start('estimator_node', *ROVER, parameters, '-p', wanted)
+
+    def said(words):
+        return any(words in message.status[0].message for message in diagnostics)
+
+    until(lambda: said('geometry_msgs/msg/Twist comes there, needed is sensor_msgs/msg/JointState'))
+    until(lambda: said('/reference_odom: a publisher offers another RELIABILITY'))
+
+
 def test_parameters_are_described_and_read_only(start, parameters, listener):
     from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
     from rcl_interfaces.srv import DescribeParameters, SetParameters

@@ -29,7 +29,7 @@ from rclpy.utilities import try_shutdown
 from sensor_msgs.msg import Imu, JointState
 from std_srvs.srv import Trigger
 
-from wheel_terra_estimator.bags.convert import stamp_of
+from wheel_terra_estimator.bags.convert import INPUT_TYPES, stamp_of
 from wheel_terra_estimator.bags.diagnostics import NODE, stale_statuses
 from wheel_terra_estimator.bags.pipeline import Pipeline
 from wheel_terra_estimator.errors import UserError
@@ -96,6 +96,7 @@ class EstimatorNode(Node):
                 event_callbacks=SubscriptionEventCallbacks(
                     incompatible_qos=partial(self._on_incompatible_qos, topic),
                     message_lost=partial(self._on_message_lost, topic),
+                    use_default_callbacks=False,
                 ),
                 qos_overriding_options=OVERRIDABLE,
             )
@@ -151,13 +152,19 @@ class EstimatorNode(Node):
             if topic in self.pipeline.transport_faults:
                 words.append(f'{name}: {self.pipeline.transport_faults[topic]}')
             elif topic not in self._heard_at:
-                count = self.count_publishers(topic)
-                words.append(f'{name}: never heard ({count or "no"} publishers)')
+                words.append(f'{name}: never heard ({self._publishers_in_words(topic)})')
             elif now - self._heard_at[topic] > SILENCE:
                 words.append(f'{name}: silent for {now - self._heard_at[topic]:.0f} s')
         return f'no estimates for {now - max(self._set_at, self._started):.0f} s; ' + '; '.join(
             words
         )
+
+    def _publishers_in_words(self, topic: str) -> str:
+        types = [p.topic_type for p in self.get_publishers_info_by_topic(topic)]
+        others = sorted(set(types) - {INPUT_TYPES[topic]})
+        if others:
+            return f'{", ".join(others)} comes there, needed is {INPUT_TYPES[topic]}'
+        return f'{len(types) or "no"} publishers'
 
     def _on_incompatible_qos(self, topic: str, event: Any) -> None:
         policy = qos_policy_name_from_kind(event.last_policy_kind)

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import TwistWithCovarianceStamped
+from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, MultiArrayDimension, UInt8MultiArray
@@ -23,6 +24,10 @@ from wheel_terra_estimator.bags.convert import (
 from wheel_terra_estimator.bags.diagnostics import Status
 from wheel_terra_estimator.estimation.estimates import EstimateSet
 from wheel_terra_estimator.ros.qos import OVERRIDABLE, output_profile
+
+# rclpy looks at every event handler whenever anything happens, which costs more than a message.
+# A subscriber whose quality of service does not fit is told so by its own node.
+NO_EVENTS = PublisherEventCallbacks(use_default_callbacks=False)
 
 
 class EstimatePublisher:
@@ -42,7 +47,11 @@ class EstimatePublisher:
 
         def publisher(kind: type, topic: str, latched: bool = False):  # type: ignore[no-untyped-def]
             return node.create_publisher(
-                kind, topic, output_profile(latched), qos_overriding_options=OVERRIDABLE
+                kind,
+                topic,
+                output_profile(latched),
+                event_callbacks=NO_EVENTS,
+                qos_overriding_options=OVERRIDABLE,
             )
 
         self._joint_publishers = {t: publisher(JointState, f'~/{t}') for t in JOINT_OUTPUTS}
