@@ -41,7 +41,7 @@ def check_range(
         return
     first = float(np.atleast_1d(array)[~np.atleast_1d(good)][0])
     shown = f'{first:g}'
-    if lower <= float(shown) <= upper and math.isfinite(first):
+    if first != float(shown) and lower <= float(shown) <= upper and math.isfinite(first):
         shown = repr(first)  # rounding would hide what is wrong
     where = ''
     if array.ndim and array.size > 1:
