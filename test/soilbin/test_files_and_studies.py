@@ -292,3 +292,17 @@ def test_sensitivity_page_shows_changes_and_beds_that_slide(tmp_path):
     assert '| the same on Earth (1 g) | 2 | 55 (7.1) |' in page
     # Every line changes one thing: the case differs from the calibrated one.
     assert all(job.key != found[0].key for job in found[1:])
+
+
+def test_ranks_wait_for_the_slopes_of_every_wheel(tmp_path):
+    arguments = argparse.Namespace(part=['table6'], seeds=1, grain_scale=0.0)
+    rows = []
+    for job in reproduction.jobs(arguments):
+        row = {k: str(v) for k, v in job.labels.items()}
+        slip = 0.1 + 0.002 * job.labels['wheel'] * job.labels['slope_deg']
+        rows.append(row | {'slip': str(slip), 'power_number': str(slip), 'stopped': ''})
+    whole = '\n'.join(reproduction.table6_lines(rows))
+    assert 'Smallest sum of ranks: wheel 1' in whole  # slips least on every slope but the level
+    short = [row for row in rows if (row['wheel'], row['slope_deg']) != ('4', '5.0')]
+    assert len(short) == len(rows) - 1
+    assert 'Smallest sum' not in '\n'.join(reproduction.table6_lines(short))

@@ -223,7 +223,9 @@ def table6_lines(rows: Sequence[Row]) -> list[str]:
     if not ours:
         return ['## Table 6', '', 'Not computed yet.']
     sums: dict[int, int] = {}
-    if len(ours) == len(WHEELS):  # ranks among fewer wheels are not the paper's
+    # Ranks among fewer wheels, or before their slopes are run, are not the paper's.
+    needed = {0.0, 5.0, 15.0}
+    if all(needed <= set(metrics.by_slope(table6_rows(rows, w), 'slip')[0]) for w in WHEELS):
         sums = metrics.rank_sums({w: {k: v[0] for k, v in ours[w].items()} for w in ours})
     names = ('slope at 20 % [deg]', 'PN level', 'PN 15 deg', 'PN 20 %')
     head = ['wheel', *(f'{name} {who}' for name in names for who in ('paper', 'ours'))]
