@@ -131,6 +131,22 @@ def test_imu_without_orientation(converter: InputConverter, factory: Any) -> Non
     assert sum(converter.rejected.values()) == 1
 
 
+@pytest.mark.filterwarnings('error')
+@pytest.mark.parametrize('absurd', [math.nan, math.inf, -math.inf, 1.7e308])
+def test_absurd_values_pass_without_a_warning_on_the_terminal(
+    rover: Any, factory: Any, absurd: float
+) -> None:
+    turned = rover.replace({'wheel_odometry': 'odom', 'sensors.imu_mounting_yaw_deg': 30.0})
+    converter = InputConverter(input_layout(turned))
+    header = factory.header(STAMP)
+    imu = factory.imu(header, (absurd,) * 3, (absurd,) * 3, (absurd,) * 4)
+    assert converter.convert('imu/data', imu).orientation is None
+    twist = factory.twist_with_covariance(absurd, absurd, np.zeros(36))
+    assert converter.convert('odom', factory.odometry(header, twist)) is not None
+    counted = {topic for topic, _ in converter.rejected}
+    assert ('odom' in counted) != math.isfinite(absurd)
+
+
 @pytest.mark.parametrize('field', ['linear_acceleration', 'angular_velocity'])
 def test_imu_that_says_it_lacks_a_field_is_refused_in_words(
     converter: InputConverter, factory: Any, field: str

@@ -123,7 +123,8 @@ class InputConverter:
 
     def convert(self, topic: str, message: Any) -> Measurement | None:
         """Return the measurement in a message of an input topic; None when it does not fit."""
-        return self._methods[topic](message)
+        with np.errstate(all='ignore'):  # absurd values are judged later, number by number
+            return self._methods[topic](message)
 
     def joint_states(self, message: Any) -> WheelOdometry | None:
         """Wheel rates and torques; wheels that the message does not hold are nan."""
@@ -146,6 +147,8 @@ class InputConverter:
         """Wheel rates of a rover that publishes no joint states, from its wheel odometry."""
         twist = message.twist.twist
         rim_speed = twist.linear.x - twist.angular.z * self.layout.lateral_positions
+        if np.isnan(rim_speed).any():
+            self.rejected['odom', 'velocity is nan (taken as unknown)'] += 1
         return WheelOdometry(
             stamp_of(message),
             rim_speed / self.layout.slip_radius,
@@ -212,7 +215,7 @@ class InputConverter:
 
     def _orientation(self, quaternion: Any) -> FloatArray | None:
         sensor = np.array([quaternion.x, quaternion.y, quaternion.z, quaternion.w])
-        norm = math.sqrt(float(sensor @ sensor))
+        norm = math.hypot(*sensor.tolist())
         if not 0.5 < norm < 2.0:  # all zero is what many drivers send when there is none
             self.rejected['imu/data', 'orientation is not a unit quaternion (left out)'] += 1
             return None
