@@ -52,47 +52,63 @@ def balanced_forces(
     if shift:
         sin_shift, cos_shift = sin(shift), cos(shift)
 
-    # Sums over the branches per unit of peak normal stress (n), of that times tan(phi) (f) and of
-    # cohesion (c).
-    n_lift = n_push = f_lift = f_push = f_torque = c_lift = c_push = c_torque = 0.0
-    branches = []
-    for span, angle, middle, scale in (
-        (front, t1 - front * centroid, 0.5 * (t1 + tm) + shift, 0.125),
-        (rear, t2 + rear * centroid, 0.5 * (tm + t2) + shift, 0.0625),
-    ):
-        sine, cosine = sin(angle), cos(angle)
-        climb, pace = sin_1 - sine, R - ratio * cosine  # pace: -dj/dt
-        x = (R * (t1 - angle) - ratio * climb) / modulus
-        base = 1.0 / (1.0 + scale * (x if x >= 0.0 else -x))
-        power = base * base
-        power *= power
-        power *= power
-        if scale < 0.1:  # behind the peak: the 16th power
-            power *= power
-        share = 1.0 - power if x >= 0.0 else power - 1.0
-        if shift:
-            sine, cosine = (
-                sine * cos_shift + cosine * sin_shift,
-                cosine * cos_shift - sine * sin_shift,
-            )
-        sin_middle, cos_middle = sin(middle), cos(middle)
-        # A branch is an arc: its resultant is a little smaller than the sum of its stresses.
-        square = span * span
-        weight = area * span * (1.0 - spread * square)
-        rub, cling = R * weight, R * span * (1.0 - square / 24.0)
-        n_lift += weight * cosine
-        n_push += weight * sine
-        f_lift += rub * share * sine
-        f_push += rub * share * cosine
-        f_torque += area * span * share
-        c_lift += cling * share * sin_middle
-        c_push += cling * share * cos_middle
-        c_torque += span * share
-        # Last: d share/d j.
-        branches.append(
-            (span, square, weight, rub, cling, share, climb, pace, x, sine, cosine, sin_middle,
-             cos_middle, power * base / modulus)
-        )  # fmt: skip
+    # Both sides are written out, in front of the peak (_f) and behind it (_r): a loop over tuples
+    # takes a third longer.
+    angle_f = t1 - front * centroid
+    sine_f, cosine_f = sin(angle_f), cos(angle_f)
+    climb_f, pace_f = sin_1 - sine_f, R - ratio * cosine_f  # pace: -dj/dt
+    x_f = (R * (t1 - angle_f) - ratio * climb_f) / modulus
+    base = 1.0 / (1.0 + 0.125 * (x_f if x_f >= 0.0 else -x_f))
+    power = base * base
+    power *= power
+    power *= power
+    share_f = 1.0 - power if x_f >= 0.0 else power - 1.0
+    slope_f = power * base / modulus  # d share/d j
+    if shift:
+        sine_f, cosine_f = (
+            sine_f * cos_shift + cosine_f * sin_shift,
+            cosine_f * cos_shift - sine_f * sin_shift,
+        )
+    middle_f = 0.5 * (t1 + tm) + shift
+    sin_middle_f, cos_middle_f = sin(middle_f), cos(middle_f)
+    # A branch is an arc: its resultant is a little smaller than the sum of its stresses.
+    square_f = front * front
+    weight_f = area * front * (1.0 - spread * square_f)
+    rub_f, cling_f = R * weight_f, R * front * (1.0 - square_f / 24.0)
+    rubbed_f, clung_f = rub_f * share_f, cling_f * share_f
+
+    angle_r = t2 + rear * centroid
+    sine_r, cosine_r = sin(angle_r), cos(angle_r)
+    climb_r, pace_r = sin_1 - sine_r, R - ratio * cosine_r  # pace: -dj/dt
+    x_r = (R * (t1 - angle_r) - ratio * climb_r) / modulus
+    base = 1.0 / (1.0 + 0.0625 * (x_r if x_r >= 0.0 else -x_r))
+    power = base * base
+    power *= power
+    power *= power
+    power *= power
+    share_r = 1.0 - power if x_r >= 0.0 else power - 1.0
+    slope_r = power * base / modulus  # d share/d j
+    if shift:
+        sine_r, cosine_r = (
+            sine_r * cos_shift + cosine_r * sin_shift,
+            cosine_r * cos_shift - sine_r * sin_shift,
+        )
+    middle_r = 0.5 * (tm + t2) + shift
+    sin_middle_r, cos_middle_r = sin(middle_r), cos(middle_r)
+    square_r = rear * rear
+    weight_r = area * rear * (1.0 - spread * square_r)
+    rub_r, cling_r = R * weight_r, R * rear * (1.0 - square_r / 24.0)
+    rubbed_r, clung_r = rub_r * share_r, cling_r * share_r
+
+    # Sums per unit of peak normal stress (n), of that times tan(phi) (f) and of cohesion (c).
+    n_lift = weight_f * cosine_f + weight_r * cosine_r
+    n_push = weight_f * sine_f + weight_r * sine_r
+    f_lift = rubbed_f * sine_f + rubbed_r * sine_r
+    f_push = rubbed_f * cosine_f + rubbed_r * cosine_r
+    c_lift = clung_f * sin_middle_f + clung_r * sin_middle_r
+    c_push = clung_f * cos_middle_f + clung_r * cos_middle_r
+    c_torque = front * share_f + rear * share_r
+    f_torque = area * c_torque
     lift, push, twist = r * n_lift + mu * f_lift, mu * f_push - r * n_push, mu * f_torque
     unit_load = contact.normal_load / width
     sigma = (unit_load - cohesion * c_lift) / lift
@@ -101,30 +117,34 @@ def balanced_forces(
     # What more lift takes from the peak stress, and so from pull and torque.
     push_lost, twist_lost = push / lift, twist / lift
     sheared = sigma * mu
+    twisting = sheared * area + cohesion
 
+    # Lift, push and torque per unit of mobilised share; lift and push of all but cohesion.
+    rubbing, clinging = sheared * rub_f, cohesion * cling_f
+    by_lift_f = rubbing * sine_f + clinging * sin_middle_f
+    by_push_f = rubbing * cosine_f + clinging * cos_middle_f
+    by_torque_f = twisting * front
+    normal, friction = sigma * r * weight_f, rubbing * share_f
+    down_f = normal * cosine_f + friction * sine_f
+    along_f = friction * cosine_f - normal * sine_f
+    sticking_f = clinging * share_f
+    rubbing, clinging = sheared * rub_r, cohesion * cling_r
+    by_lift_r = rubbing * sine_r + clinging * sin_middle_r
+    by_push_r = rubbing * cosine_r + clinging * cos_middle_r
+    by_torque_r = twisting * rear
+    normal, friction = sigma * r * weight_r, rubbing * share_r
+    down_r = normal * cosine_r + friction * sine_r
+    along_r = friction * cosine_r - normal * sine_r
+    sticking_r = clinging * share_r
     # By v/w and K: only the mobilised shares move.
-    v_lift = v_push = v_torque = k_lift = k_push = k_torque = 0.0
-    scaled = []
-    for (
-        span, _, weight, rub, cling, share, climb, _, x, sine, cosine, sin_middle, cos_middle,
-        slope,
-    ) in branches:  # fmt: skip
-        rubbing, clinging = sheared * rub, cohesion * cling
-        by_lift = rubbing * sine + clinging * sin_middle
-        by_push = rubbing * cosine + clinging * cos_middle
-        by_torque = (sheared * area + cohesion) * span
-        faster, softer = slope * climb, slope * x
-        v_lift -= faster * by_lift
-        v_push -= faster * by_push
-        v_torque -= faster * by_torque
-        k_lift -= softer * by_lift
-        k_push -= softer * by_push
-        k_torque -= softer * by_torque
-        normal, friction = sigma * r * weight, rubbing * share
-        scaled.append(
-            (normal * cosine + friction * sine, friction * cosine - normal * sine,
-             clinging * share, by_lift, by_push, by_torque)
-        )  # fmt: skip
+    faster_f, faster_r = slope_f * climb_f, slope_r * climb_r
+    v_lift = -faster_f * by_lift_f - faster_r * by_lift_r
+    v_push = -faster_f * by_push_f - faster_r * by_push_r
+    v_torque = -faster_f * by_torque_f - faster_r * by_torque_r
+    softer_f, softer_r = slope_f * x_f, slope_r * x_r
+    k_lift = -softer_f * by_lift_f - softer_r * by_lift_r
+    k_push = -softer_f * by_push_f - softer_r * by_push_r
+    k_torque = -softer_f * by_torque_f - softer_r * by_torque_r
 
     d_torques, d_pulls = [], []
     for d_t1, d_tm, d_t2, d_ratio, d_exponent in (by_speed, by_depth):
@@ -140,39 +160,34 @@ def balanced_forces(
                 d_centroid = (moved_centroid - centroid) / _STEP
                 d_spread = (0.5 * moment_spread(moved) - spread) / _STEP
             entering = (R - ratio * cos(t1)) * d_t1
-            d_span, d_middle = d_front, 0.5 * (d_t1 + d_tm)
+            grown, cohering, shearing = d_area / area, cohesion * R, sheared * d_area
+
             d_angle = d_t1 - d_front * centroid - front * d_centroid
-            for (
-                (span, square, _, _, _, share, _, pace, _, _, _, sin_middle, cos_middle, slope),
-                (down, along, sticking, by_lift, by_push, by_torque),
-            ) in zip(branches, scaled, strict=True):
-                d_share = slope * (entering - pace * d_angle)
-                arc = spread * square
-                growth = d_area / area + ((1.0 - 3.0 * arc) * d_span / span - d_spread * square) / (
-                    1.0 - arc
-                )
-                turned = sticking * d_middle
-                stretch = cohesion * R * share * d_span * (1.0 - 0.125 * square)
-                d_lift += (
-                    growth * down
-                    + along * d_angle
-                    + d_share * by_lift
-                    + turned * cos_middle
-                    + stretch * sin_middle
-                )
-                d_push += (
-                    growth * along
-                    - down * d_angle
-                    + d_share * by_push
-                    - turned * sin_middle
-                    + stretch * cos_middle
-                )
-                d_torque += d_share * by_torque + share * (
-                    sheared * (d_area * span + area * d_span) + cohesion * d_span
-                )
-                # The rear branch comes second.
-                d_span, d_middle = d_rear, 0.5 * (d_tm + d_t2)
-                d_angle = d_t2 + d_rear * centroid + rear * d_centroid
+            d_share = slope_f * (entering - pace_f * d_angle)
+            arc = spread * square_f
+            growth = grown + ((1.0 - 3.0 * arc) * d_front / front - d_spread * square_f) / (
+                1.0 - arc
+            )
+            turned = sticking_f * 0.5 * (d_t1 + d_tm)
+            stretch = cohering * share_f * d_front * (1.0 - 0.125 * square_f)
+            d_lift += growth * down_f + along_f * d_angle + d_share * by_lift_f
+            d_lift += turned * cos_middle_f + stretch * sin_middle_f
+            d_push += growth * along_f - down_f * d_angle + d_share * by_push_f
+            d_push += stretch * cos_middle_f - turned * sin_middle_f
+            d_torque += d_share * by_torque_f + share_f * (shearing * front + twisting * d_front)
+
+            d_angle = d_t2 + d_rear * centroid + rear * d_centroid
+            d_share = slope_r * (entering - pace_r * d_angle)
+            arc = spread * square_r
+            growth = grown + ((1.0 - 3.0 * arc) * d_rear / rear - d_spread * square_r) / (1.0 - arc)
+            turned = sticking_r * 0.5 * (d_tm + d_t2)
+            stretch = cohering * share_r * d_rear * (1.0 - 0.125 * square_r)
+            d_lift += growth * down_r + along_r * d_angle + d_share * by_lift_r
+            d_lift += turned * cos_middle_r + stretch * sin_middle_r
+            d_push += growth * along_r - down_r * d_angle + d_share * by_push_r
+            d_push += stretch * cos_middle_r - turned * sin_middle_r
+            d_torque += d_share * by_torque_r + share_r * (shearing * rear + twisting * d_rear)
+
         d_torques.append(arm * (d_torque - twist_lost * d_lift))
         d_pulls.append(width * (d_push - push_lost * d_lift))
     # Load, cohesion, tan(phi) and K act on the sums; a rotation turns lift into push.
