@@ -8,6 +8,7 @@ import csv
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from model_validation.fitting import FloatArray, Free, Model, fit, listed
 from model_validation.pictures import compare
@@ -56,28 +57,41 @@ def section(shared: Path, figures: Path) -> str:
     pull = measured[:, 1]
     span = np.ptp(pull)
     lines = [
-        '| fitted on | mound | fitted | held-out pull rms, of its range '
+        '| fitted on | mound | fitted | held-out pull rms, of its range | worst row '
         '| held out above s = 0.55 |',
-        '|---|---|---|---|---|',
+        '|---|---|---|---|---|---|',
     ]
     curves = []
     dense = np.linspace(0.0, 0.85, 60)
     even = np.arange(slip.size) % 2 == 0
+    low = slip < 0.45
+
+    def line(label: str, mound: str, values: str, model: Model, judged: NDArray[np.bool_]) -> str:
+        error = (model.predict(points_at(slip[judged]))[:, 1] - pull[judged]) / span
+        high = error[slip[judged] > 0.55]
+        return (
+            f'| {label} | {mound} | {values} | {100 * np.sqrt(np.mean(error**2)):.1f} % '
+            f'| {100 * np.abs(error).max():.1f} % '
+            f'| {100 * np.sqrt(np.mean(high**2)):.1f} % (mean {100 * high.mean():+.1f} %) |'
+        )
+
     for name, chosen in (('even rows', even), ('odd rows', ~even)):
         for mound in (False, True):
             free = (*SOIL, *(MOUND if mound else ()))
             data = [(points_at(slip[chosen]), measured[chosen])]
             model, values = fit(BASE, data, SIGMA, free)
-            error = (model.predict(points_at(slip[~chosen]))[:, 1] - pull[~chosen]) / span
-            high = error[slip[~chosen] > 0.55]
-            lines.append(
-                f'| {name} | {"yes" if mound else "no"} | {listed(values)} '
-                f'| {100 * np.sqrt(np.mean(error**2)):.1f} % '
-                f'| {100 * np.sqrt(np.mean(high**2)):.1f} % (mean {100 * high.mean():+.1f} %) |'
-            )
+            lines.append(line(name, 'yes' if mound else 'no', listed(values), model, ~chosen))
             if name == 'even rows':
                 label = 'with mound' if mound else 'without'
                 curves.append((label, dense, model.predict(points_at(dense)), int(mound) + 1))
+    for name, chosen in (('even rows', even), ('odd rows', ~even)):
+        below = chosen & low
+        soil, values = fit(BASE, [(points_at(slip[below]), measured[below])], SIGMA, SOIL)
+        lines.append(line(f'{name} below 0.45', 'no', listed(values), soil, ~chosen))
+        data = [(points_at(slip[chosen]), measured[chosen])]
+        model, values = fit(soil, data, SIGMA, MOUND)
+        label = f'{name}; soil kept from below 0.45'
+        lines.append(line(label, 'yes', listed(values), model, ~chosen))
     compare(figures / 'grc3.svg', {'measured': (slip, measured)}, curves, columns=(1,))
     repeat = _scatter(slip, pull) / span
     return '\n'.join(
@@ -86,13 +100,17 @@ def section(shared: Path, figures: Path) -> str:
             '',
             'Traction slopes of a single wheel (18 rows, slip 0 to 0.8, plotted as experimental in '
             'a public study of the VIPER wheel); pull only, the wheel is assumed. Every second row '
-            'is fitted, the others judge. Friction angle, K and leaving angle are free in both '
-            'columns, the mound adds its two parameters.',
+            'is fitted, the others judge. In the first four lines friction angle, K and leaving '
+            'angle are fitted to all slips, with the mound (two more parameters) and without; in '
+            'the last four to the rows below a slip of 0.45, after which the mound is the only '
+            'thing that may change. Target: within 10 % of the range; met in the root mean square '
+            'with the mound over all slips (above 0.55 alone 7 to 12 %, against 13 to 16 % '
+            'without). '
+            'Row by row nothing can meet it: '
+            f'rows at the same slip differ among themselves by {100 * repeat:.1f} % of the range '
+            '(rms around their mean), the floor for any model.',
             '',
             *lines,
-            '',
-            f'Rows at the same slip differ among themselves by {100 * repeat:.1f} % of the range '
-            '(rms around their mean): the floor for any model.',
             '',
             '![GRC-3](figures/grc3.svg)',
         ]

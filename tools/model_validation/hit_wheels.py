@@ -67,6 +67,32 @@ def read(path: Path, series: str) -> tuple[OperatingPoints, FloatArray]:
     return points, measured
 
 
+def _rows(
+    data: tuple[OperatingPoints, FloatArray], chosen: FloatArray
+) -> tuple[OperatingPoints, FloatArray]:
+    """Return some of the rows."""
+    points, measured = data
+    wheel = Wheel(
+        *(
+            np.asarray(getattr(points.wheel, name))[chosen]
+            for name in ('radius', 'width', 'lug_height', 'lug_count')
+        )
+    )
+    load = points.normal_load[chosen]
+    part = OperatingPoints(points.slip[chosen], load, wheel, slip_radius=points.slip_radius)
+    return part, measured[chosen]
+
+
+def _held_out(model: Model, data: tuple[OperatingPoints, FloatArray]) -> FloatArray:
+    """Predict each row with lug parameters fitted on every second row, the others."""
+    predicted = np.empty_like(data[1])
+    even = np.arange(len(data[1])) % 2 == 0
+    for fitted_on in (even, ~even):
+        fitted, _ = fit(model, [_rows(data, fitted_on)], SIGMA, FITTED_LUGS)
+        predicted[~fitted_on] = fitted.predict(_rows(data, ~fitted_on)[0])
+    return predicted
+
+
 def section(shared: Path, figures: Path) -> str:
     """Return the section and draw its picture."""
     table = shared / 'reference' / 'measured_single_wheel.csv'
@@ -106,10 +132,20 @@ def section(shared: Path, figures: Path) -> str:
             Misfit.of(model.predict(smooth[0]), smooth[1]).row('smooth, fitted'),
             Misfit.of(published.predict(lugged[0]), lugged[1]).row('lugs, nothing fitted'),
             Misfit.of(fitted.predict(lugged[0]), lugged[1]).row('lugs, two lug parameters'),
+            Misfit.of(_held_out(with_lugs, lugged), lugged[1]).row(
+                'the same, each row by a fit to every second row without it'
+            ),
             '',
             '![HIT wheel](figures/hit.svg)',
             '',
-            'Targets: pull within 10 % of its range, sinkage within 1.5 mm rms. What the printed '
+            'Targets: pull within 10 % of its range, sinkage within 1.5 mm rms. With the printed '
+            'lug terms the pull misses its target, whatever reading. With two fitted lug '
+            'parameters both are met in the root mean square, on rows that the fit did not see as '
+            'well; row by row the pull is not: the last row, s = 0.6, lies outside 10 %, fitted or '
+            'held out, by 3 to 4 N, where the '
+            'digitising itself is good for 1 N. Six rows and two parameters are no independent '
+            'prediction: only the held-out line is one. A third one (lambda) brings the worst row '
+            'to 9.6 % where it is fitted, but not where it is held out (13.7 %). What the printed '
             'lug terms lack: the measured sinkage of the lugged wheel leaves that of the smooth '
             'one only above s = 0.4 and then by a whole lug height, which a term linear in slip '
             'cannot follow; and the gain of traction over the smooth rim grows with slip, where '
