@@ -148,6 +148,24 @@ def test_silence_is_said_in_diagnostics(start, parameters, listener):
     assert any('never heard' in s.message for s in statuses)
 
 
+def test_messages_that_give_no_estimate_are_explained(start, parameters, listener):
+    from diagnostic_msgs.msg import DiagnosticArray
+    from sensor_msgs.msg import JointState
+
+    node, until = listener
+    diagnostics = hear(node, DiagnosticArray, '/diagnostics')
+    wheels = node.create_publisher(JointState, 'joint_states', 10)
+    start('estimator_node', *ROVER, parameters)
+
+    def said_after(message, *words):
+        wheels.publish(message)
+        return any(all(w in m.status[0].message for w in words) for m in diagnostics)
+
+    mast = wheel_message(['mast'], 100.0)
+    until(lambda: said_after(mast, 'it but mast; wheels.names: front_left_wheel_joint'))
+    until(lambda: said_after(wheel_message(['front_left_wheel_joint'], 0.0), 'stamp is zero'))
+
+
 def test_publisher_of_another_type_or_quality_is_named(start, parameters, listener):
     from diagnostic_msgs.msg import DiagnosticArray
     from geometry_msgs.msg import Twist

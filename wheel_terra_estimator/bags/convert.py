@@ -57,6 +57,7 @@ UNKNOWN_VARIANCE = 1e6
 """Variance of the twist components that are not estimated (finite, so that no filter chokes)."""
 
 
+_NO_WHEEL = 'none of the configured wheels in it'
 _INERTIAL_FIELDS = {
     'linear_acceleration_covariance': 'linear acceleration',
     'angular_velocity_covariance': 'angular velocity',
@@ -108,6 +109,7 @@ class InputConverter:
     def __init__(self, layout: InputLayout) -> None:
         self.layout = layout
         self.rejected: Counter[tuple[str, str]] = Counter()
+        self._strangers: dict[str, Sequence[str]] = {}  # topic -> names of a message without wheels
         self._columns: dict[tuple[str, ...], tuple[list[int], list[int]]] = {}
         self._index = {name: i for i, name in enumerate(layout.names)}
         self._mounted = not np.allclose(layout.imu_mounting, (0.0, 0.0, 0.0, 1.0), atol=0.0)
@@ -125,6 +127,13 @@ class InputConverter:
         """Return the measurement in a message of an input topic; None when it does not fit."""
         with np.errstate(all='ignore'):  # absurd values are judged later, number by number
             return self._methods[topic](message)
+
+    def in_words(self, topic: str, reason: str) -> str:
+        """Return a reason for a rejection, with the names where these are the reason."""
+        if reason != _NO_WHEEL:
+            return reason
+        there = ', '.join(self._strangers[topic]) or 'no name'
+        return f'{reason} but {there}; wheels.names: {", ".join(self.layout.names)}'
 
     def joint_states(self, message: Any) -> WheelOdometry | None:
         """Wheel rates and torques; wheels that the message does not hold are nan."""
@@ -196,7 +205,8 @@ class InputConverter:
             return None
         source, target = self._columns_of(names)
         if not source:
-            self.rejected[topic, 'none of the configured wheels in it'] += 1
+            self.rejected[topic, _NO_WHEEL] += 1
+            self._strangers[topic] = names
             return None
         result = np.full(len(self.layout.names), math.nan)
         result[target] = np.asarray(values, dtype=np.float64)[source]

@@ -99,7 +99,7 @@ class Pipeline:
             if count != self._refused.get(key, (0, 0))[0]:
                 self._refused[key] = count, stamp
         refused = {
-            topic: f'{reason} ({count} messages)'
+            topic: f'{self.converter.in_words(topic, reason)} ({count} messages)'
             for (topic, reason), (count, since) in self._refused.items()
             if 0 <= stamp - since < FAULT_MEMORY
         }

@@ -155,9 +155,11 @@ class EstimatorNode(Node):
                 words.append(f'{name}: never heard ({self._publishers_in_words(topic)})')
             elif now - self._heard_at[topic] > SILENCE:
                 words.append(f'{name}: silent for {now - self._heard_at[topic]:.0f} s')
-        return f'no estimates for {now - max(self._set_at, self._started):.0f} s; ' + '; '.join(
-            words
-        )
+        for (topic, reason), count in self.pipeline.rejected.items():
+            reason = self.pipeline.converter.in_words(topic, reason)
+            words.append(f'{self.resolve_topic_name(topic)}: {reason} ({count} messages)')
+        seconds = now - max(self._set_at, self._started)
+        return '; '.join([f'no estimates for {seconds:.0f} s', *words])
 
     def _publishers_in_words(self, topic: str) -> str:
         types = [p.topic_type for p in self.get_publishers_info_by_topic(topic)]
