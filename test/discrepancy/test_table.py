@@ -73,6 +73,11 @@ def test_columns_misspelt_or_missing(tmp_path, header, parts):
     assert all(part in message for part in parts), message
 
 
+def test_column_names_alone_are_no_table(tmp_path):
+    with pytest.raises(UserError, match=r'bin.csv, line 2: no rows below'):
+        read_table(write(tmp_path, HEADER + '\n'))
+
+
 @pytest.mark.parametrize(
     ('cell', 'parts'),
     [

@@ -300,6 +300,8 @@ def _check_ranges(name: str, arrays: Mapping[str, FloatArray], lines: NDArray[np
                 f'{name}, line {lines[row]}, column {column}: {arrays[column][row]:g} {why}'
             )
 
+    if not arrays['slip'].size:
+        raise UserError(f'{name}, line 2: no rows below the column names; add one per steady point')
     for column in ('slip', 'normal_load'):
         refuse(np.isnan(arrays[column]), column, 'is missing; every row needs it')
     for column, values in arrays.items():
