@@ -1,3 +1,14 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Wheel-soil physics: pure functions of numpy arrays and floats, no ROS, no files."""
+"""Wheel-soil physics: pure functions of numpy arrays and floats, no ROS, no files.
+
+- What is given: ``wheel``, ``soil``, ``operating_points``; ``effects`` is the catalogue.
+- Laws: ``kinematics`` (slip, shear displacement), ``stresses`` (pressure, shear), ``contact`` and
+  ``terms`` (one contact with its effects).
+- Forces at given angles: ``quadrature`` (reference), ``branch_moments`` (closed form),
+  ``closed_form`` (its use with effects, the triangles A, B, C, pull from torque).
+- Load to sinkage, pull, torque: ``model`` (arrays, by ``load_balance``), ``steady_sinkage``
+  (floats); sinkage to torque and pull: ``conditioned`` by ``balanced_branches`` (floats, for the
+  filter). ``scalar_wheels`` is what both have in common.
+- Questions: ``inverse``, ``slope_locomotion``, ``entrapment``, ``longitudinal_sinkage``.
+"""

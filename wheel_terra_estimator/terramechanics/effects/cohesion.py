@@ -32,7 +32,11 @@ EFFECT = Effect(
         ),
     ),
     touches=frozenset({'sinkage', 'drawbar_pull', 'torque'}),
-    confounded_with={'bulldozing': 'load series: cohesion scales with contact area'},
+    confounded_with={
+        'bulldozing': 'load series: cohesion scales with contact area',
+        'grouser_thrust': 'rows with other lugs or none, and a load series',
+        'rim_friction': 'load series; rows with lugs high enough to hold a ring of soil',
+    },
     validity='c + delta not below zero',
     source='Mohr-Coulomb strength in Janosi and Hanamoto 1961; Ding et al. 2010 eq. 18',
     on_inputs=_cohesion,

@@ -41,7 +41,10 @@ EFFECT = Effect(
     ),
     touches=frozenset({'drawbar_pull', 'torque'}),
     needs=('slip', 'lug_height'),
-    confounded_with={'cohesion': 'lug height and load series (cohesion acts at h = 0 too)'},
+    confounded_with={
+        'lug_shear_radius': 'torque over pull: the longer arm gains twice as much torque',
+        'cohesion': 'lug height and load series (cohesion acts at h = 0 too)',
+    },
     incompatible_with=frozenset({'lug_shear_radius'}),
     validity='lugs far apart; counts the same thrust as a larger shear radius, hence not with it',
     source='passive earth pressure on grousers (Bekker 1969), n_e lugs in the contact; after '

@@ -35,6 +35,7 @@ EFFECT = Effect(
     touches=frozenset({'sinkage', 'drawbar_pull', 'torque'}),
     needs=('sinkage',),
     confounded_with={
+        'multipass': 'virgin soil beside the rut',
         'sinkage_offset': 'a load series',
         'slip_sinkage_exponent': 'a load series; a penetrometer',
     },

@@ -29,6 +29,10 @@ EFFECT = Effect(
     ),
     touches=frozenset({'sinkage', 'drawbar_pull', 'torque'}),
     needs=('pass_number',),
+    confounded_with={
+        'rate_dependence': 'the same pass at another speed',
+        'hard_layer': 'a load series on virgin soil',
+    },
     validity='the same rut; passes that do not dig',
     source='form after Holm 1969 (saturating gain of stiffness), own reconstruction',
     on_inputs=_compacted,

@@ -22,7 +22,10 @@ EFFECT = Effect(
     parameters=(EffectParameter('bias', 'rad', 0.02, -0.3, 0.3, 0.03, 'normal', 'attitude error'),),
     touches=frozenset({'drawbar_pull'}),
     instrument=True,
-    confounded_with={'bulldozing': 'three times the load or another wheel; a level check'},
+    confounded_with={
+        'slope_gravity': 'level rows, or the same slope driven both ways',
+        'bulldozing': 'three times the load or another wheel; a level check',
+    },
     validity='constant over the table; does not change sign in reverse',
     source='statics',
     on_outputs=_tilt,

@@ -41,6 +41,7 @@ EFFECT = Effect(
     ),
     touches=frozenset({'sinkage', 'drawbar_pull', 'torque'}),
     needs=('slope',),
+    confounded_with={'pitch_bias': 'level rows, or the same slope driven both ways'},
     validity='any slope that the soil holds',
     source='statics; Nakashima et al. 2010 (slope runs with Px/W = sin a)',
     on_inputs=_load,

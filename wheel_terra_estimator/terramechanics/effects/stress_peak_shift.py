@@ -23,7 +23,8 @@ EFFECT = Effect(
     touches=frozenset({'sinkage', 'drawbar_pull', 'torque'}),
     needs=('slip',),
     confounded_with={
-        'slip_sinkage_exponent': 'high load, braking rows, slip near 0.9; pressure cells in the rim'
+        'soil_mound': 'a rear camera: measured leaving angle',
+        'slip_sinkage_exponent': 'high load, braking rows, slip near 0.9; stress cells in the rim',
     },
     validity='c1 + c2 s between 0 and 1; clamped inside the contact',
     source='Wong and Reece 1967; Ding et al. 2010 section 3.1.1 (doi 10.1007/s11771-010-0021-7)',
