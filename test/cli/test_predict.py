@@ -76,6 +76,9 @@ def test_points_of_a_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -
     path.write_text('slip,load\n0.2,80\n')
     assert main([*BASE, '--points', str(path)]) == 2
     assert 'no column normal_load' in capsys.readouterr().err
+    path.write_text('slip,normal_load\n')
+    assert main([*BASE, '--points', str(path)]) == 2
+    assert 'no rows below the column names' in capsys.readouterr().err
     path.write_text('slip,normal_load\n0.2,80\n0.3,heavy\n')
     assert main([*BASE, '--points', str(path)]) == 2
     assert "row 3: normal_load is 'heavy'" in capsys.readouterr().err

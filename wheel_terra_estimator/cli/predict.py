@@ -234,15 +234,19 @@ def _read_points(path: Path) -> dict[str, FloatArray]:
     """Read the input columns of a table; others are left alone."""
     try:
         with path.open(encoding='utf-8-sig', newline='') as stream:
-            rows = list(csv.DictReader(stream))
+            table = csv.DictReader(stream)
+            rows, header = list(table), list(table.fieldnames or ())
     except OSError as error:
         raise UserError(f'{path}: {error.strerror}; give the path of a CSV table') from None
     except (UnicodeDecodeError, csv.Error) as error:
         raise UserError(f'{path}: not a CSV text in UTF-8 ({error})') from None
-    header = [name for name in (rows[0] if rows else {}) if name is not None]
     for needed in ('slip', 'normal_load'):
         if needed not in header:
-            raise UserError(f'{path}: row 1: no column {needed}; the columns are {header}')
+            raise UserError(
+                f'{path}: row 1: no column {needed} among {", ".join(header) or "none"}'
+            )
+    if not rows:
+        raise UserError(f'{path}: no rows below the column names; add one per operating point')
     columns = {name: np.full(len(rows), np.nan) for name in INPUTS if name in header}
     for index, row in enumerate(rows):
         for name, values in columns.items():
