@@ -9,11 +9,13 @@ from collections import Counter
 from collections.abc import Collection, Mapping
 from pathlib import Path
 from types import TracebackType
-from typing import Any
+from typing import Any, TypeVar
 
 from wheel_terra_estimator.bags.messages import MessageFactory
 from wheel_terra_estimator.bags.storage import STORAGE_SUFFIXES
 from wheel_terra_estimator.errors import UserError
+
+Self = TypeVar('Self', bound='BagFile')
 
 
 class BagFile:
@@ -61,7 +63,7 @@ class BagFile:
         self._storage = storage
         make_room(path, overwrite)
 
-    def __enter__(self) -> BagFile:
+    def __enter__(self: Self) -> Self:
         from rosbags.rosbag2 import StoragePlugin, Writer
 
         self._writer = Writer(

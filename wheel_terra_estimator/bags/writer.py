@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from types import TracebackType
 
 from wheel_terra_estimator.bags import diagnostics
 from wheel_terra_estimator.bags.bag_file import BagFile
@@ -26,7 +25,7 @@ TOPICS = {
 """Full default name of every output and its type."""
 
 
-class EstimateBagWriter:
+class EstimateBagWriter(BagFile):
     """Writes estimates as the node would publish them; a context manager that always closes.
 
     Parameters
@@ -53,22 +52,10 @@ class EstimateBagWriter:
         overwrite: bool = False,
         statuses: diagnostics.Diagnostics | None = None,
     ) -> None:
+        super().__init__(path, TOPICS, latched=(STUCK,), overwrite=overwrite)
         self.names = names
-        self.file = BagFile(path, TOPICS, latched=(STUCK,), overwrite=overwrite)
         self._diagnostics = statuses or diagnostics.Diagnostics(names)
         self._stuck: bool | None = None
-
-    def __enter__(self) -> EstimateBagWriter:
-        self.file.__enter__()
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.file.__exit__(kind, error, trace)
 
     def clear_stuck(self, log_time: int) -> None:
         """Write what the node sends at its start and after a reset: no stuck warning."""
@@ -76,25 +63,25 @@ class EstimateBagWriter:
 
     def add(self, estimates: EstimateSet, log_time: int) -> None:
         """Write all messages of a set at the log time [ns] of the input that completed it."""
-        make = self.file.messages
+        make = self.messages
         header = make.header(estimates.stamp)
         for topic, fields in joint_fields(estimates, self.names).items():
-            self.file.write(f'{NAMESPACE}/{topic}', make.joint_state(header, *fields), log_time)
+            self.write(f'{NAMESPACE}/{topic}', make.joint_state(header, *fields), log_time)
             if topic == 'slip':
                 classes = make.slip_class(estimates.slip_class)
-                self.file.write(f'{NAMESPACE}/slip_class', classes, log_time)
+                self.write(f'{NAMESPACE}/slip_class', classes, log_time)
         twist = make.twist_stamped(
             header,
             estimates.forward_velocity,
             estimates.yaw_rate,
             twist_covariance(estimates),
         )
-        self.file.write(f'{NAMESPACE}/twist', twist, log_time)
+        self.write(f'{NAMESPACE}/twist', twist, log_time)
         self._write_stuck(estimates.stuck, log_time)
         if found := self._diagnostics.due(estimates):
-            self.file.write(DIAGNOSTICS, make.diagnostic_array(header, found), log_time)
+            self.write(DIAGNOSTICS, make.diagnostic_array(header, found), log_time)
 
     def _write_stuck(self, stuck: bool, log_time: int) -> None:
         if stuck != self._stuck:
             self._stuck = stuck
-            self.file.write(STUCK, self.file.messages.bool(stuck), log_time)
+            self.write(STUCK, self.messages.bool(stuck), log_time)

@@ -180,8 +180,6 @@ def text(
     )
 
 
-_NOT_STATED = '; 0 = soil.relative_std of the value'
-
 DECLARED: tuple[Parameter, ...] = (
     # General
     text('provenance', '', 'where this configuration comes from, in words'),
@@ -448,63 +446,25 @@ DECLARED: tuple[Parameter, ...] = (
         at_least=0.0,
         at_most=10.0,
     ),
-    number(
-        'soil.cohesive_modulus_std',
-        0.0,
-        'N/m^(n+1)',
-        f'standard deviation of kc{_NOT_STATED}',
-        at_least=0.0,
-    ),
-    number(
-        'soil.frictional_modulus_std',
-        0.0,
-        'N/m^(n+2)',
-        f'standard deviation of kphi{_NOT_STATED}',
-        at_least=0.0,
-    ),
-    number(
-        'soil.sinkage_exponent_std',
-        0.0,
-        '-',
-        f'standard deviation of n0{_NOT_STATED}',
-        at_least=0.0,
-    ),
-    number('soil.cohesion_std', 0.0, 'Pa', f'standard deviation of c{_NOT_STATED}', at_least=0.0),
-    number(
-        'soil.friction_angle_std_deg',
-        0.0,
-        'deg',
-        f'standard deviation of phi{_NOT_STATED}',
-        at_least=0.0,
-        at_most=90.0,
-    ),
-    number(
-        'soil.shear_modulus_std',
-        0.0,
-        'm',
-        f'standard deviation of K{_NOT_STATED}',
-        at_least=0.0,
-    ),
-    number(
-        'soil.peak_stress_ratio_std',
-        0.0,
-        '-',
-        f'standard deviation of c1{_NOT_STATED}',
-        at_least=0.0,
-    ),
-    number(
-        'soil.leaving_angle_ratio_std',
-        0.0,
-        '-',
-        f'standard deviation of c3{_NOT_STATED}',
-        at_least=0.0,
-    ),
-    number(
-        'soil.density_std',
-        0.0,
-        'kg/m^3',
-        f'standard deviation of the density{_NOT_STATED}',
-        at_least=0.0,
+    *(
+        number(
+            f'soil.{field}',
+            0.0,
+            unit,
+            f'standard deviation of {symbol}; 0 = soil.relative_std of the value',
+            at_least=0.0,
+        )
+        for field, unit, symbol in (
+            ('cohesive_modulus_std', 'N/m^(n+1)', 'kc'),
+            ('frictional_modulus_std', 'N/m^(n+2)', 'kphi'),
+            ('sinkage_exponent_std', '-', 'n0'),
+            ('cohesion_std', 'Pa', 'c'),
+            ('friction_angle_std_deg', 'deg', 'phi'),
+            ('shear_modulus_std', 'm', 'K'),
+            ('peak_stress_ratio_std', '-', 'c1'),
+            ('leaving_angle_ratio_std', '-', 'c3'),
+            ('density_std', 'kg/m^3', 'the density'),
+        )
     ),
     # Sensors: what the estimator assumes and the simulator makes
     number('sensors.wheel_odometry_rate', 10.0, 'Hz', 'rate of the wheel odometry', above=0.0),
@@ -572,29 +532,16 @@ DECLARED: tuple[Parameter, ...] = (
         'error of the roll and pitch of the orientation, one standard deviation',
         at_least=0.0,
     ),
-    number(
-        'sensors.imu_mounting_roll_deg',
-        0.0,
-        'deg',
-        'roll of the IMU frame in base_link (fixed axes x, then y, then z, as in URDF)',
-        at_least=-360.0,
-        at_most=360.0,
-    ),
-    number(
-        'sensors.imu_mounting_pitch_deg',
-        0.0,
-        'deg',
-        'pitch of the IMU frame in base_link',
-        at_least=-360.0,
-        at_most=360.0,
-    ),
-    number(
-        'sensors.imu_mounting_yaw_deg',
-        0.0,
-        'deg',
-        'yaw of the IMU frame in base_link',
-        at_least=-360.0,
-        at_most=360.0,
+    *(
+        number(
+            f'sensors.imu_mounting_{angle}_deg',
+            0.0,
+            'deg',
+            f'{angle} of the IMU frame in base_link (fixed axes x, then y, then z, as in URDF)',
+            at_least=-360.0,
+            at_most=360.0,
+        )
+        for angle in ('roll', 'pitch', 'yaw')
     ),
     number('sensors.sinkage_rate', 10.0, 'Hz', 'rate of the sinkage sensor', above=0.0),
     number(
