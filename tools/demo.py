@@ -28,8 +28,6 @@ from wheel_terra_estimator.simulation.truth import entrapped
 
 ROOT = Path(__file__).resolve().parents[1]
 OUTPUT = ROOT / 'demo_output'
-RATE = 2.0
-"""How much faster than it was recorded a drive is played to the node."""
 
 
 class DemoDrive(NamedTuple):
@@ -60,7 +58,7 @@ def main() -> int:
     """Run the demonstration."""
     live = importlib.util.find_spec('rclpy') is not None
     if live:
-        print(f'The drives go over DDS to estimator_node, {RATE:g} times as fast as recorded.')
+        print('The drives go over DDS to estimator_node, as fast as it takes them.')
     else:
         print(
             'There is no rclpy here (no wheels for this platform, no sourced Jazzy): the same '
@@ -86,8 +84,6 @@ def _command(drive: DemoDrive, live: bool) -> list[str]:
     if not live:
         program = ['wheel_terra_estimator.cli.main', 'replay']
     command = [sys.executable, '-m', *program, str(_recording(drive))]
-    if live:
-        command += ['--rate', f'{RATE:g}']
     command += ['-o', str(OUTPUT / drive.name), '--report', str(OUTPUT / f'{drive.name}.html')]
     for name in drive.configuration:
         command += ['--config', name]
