@@ -54,17 +54,17 @@ def mean_share_front(displacement: Any, maths: Any = np) -> Any:
     gamma distribution whose variance is that of the stress-weighted j) instead of exp(-x).
     """
     base = 1.0 / (1.0 + 0.125 * maths.abs(displacement))
-    base = base * base
-    base = base * base
+    base *= base
+    base *= base
     return maths.copysign(1.0 - base * base, displacement)
 
 
 def mean_share_rear(displacement: Any, maths: Any = np) -> Any:
     """Return the same behind the peak, where j spreads less around its mean: (1 + x/16)^-16."""
     base = 1.0 / (1.0 + 0.0625 * maths.abs(displacement))
-    base = base * base
-    base = base * base
-    base = base * base
+    base *= base
+    base *= base
+    base *= base
     return maths.copysign(1.0 - base * base, displacement)
 
 
@@ -149,14 +149,14 @@ class BranchForces:
         top, front, rear = sin(angle), sin(self._place_front * angle), sin(self._place_rear * angle)
         x = self._rim_front * angle - roll * (top - front)
         base = 1.0 / (1.0 + 0.125 * self._abs(x))
-        base = base * base
-        base = base * base
+        base *= base
+        base *= base
         share_front = self._copysign(1.0 - base * base, x)
         x = self._rim_rear * angle - roll * (top - rear)
         base = 1.0 / (1.0 + 0.0625 * self._abs(x))
-        base = base * base
-        base = base * base
-        base = base * base
+        base *= base
+        base *= base
+        base *= base
         share_rear = self._copysign(1.0 - base * base, x)
         middle = sin(self._middle_front * angle)
         peak = self._peak * (middle * sin(self._half * angle)) ** self._exponent
@@ -179,14 +179,14 @@ class BranchForces:
         # The shares are mean_share_front and _rear, written out: floats spend a third on calls.
         x = self._rim_front * angle - roll * (top - front)
         base = 1.0 / (1.0 + 0.125 * self._abs(x))
-        base = base * base
-        base = base * base
+        base *= base
+        base *= base
         share_front = self._copysign(1.0 - base * base, x)
         x = self._rim_rear * angle - roll * (top - rear)
         base = 1.0 / (1.0 + 0.0625 * self._abs(x))
-        base = base * base
-        base = base * base
-        base = base * base
+        base *= base
+        base *= base
+        base *= base
         share_rear = self._copysign(1.0 - base * base, x)
         middle, mean = sin(self._middle_front * angle), sin(self._middle_rear * angle)
         peak = self._peak * (middle * sin(self._half * angle)) ** self._exponent
