@@ -220,7 +220,7 @@ def section(shared: Path, figures: Path) -> str:
             'quarter of the six wheels). Tried and left out: single precision for the first '
             'steps (its rounding spoils finite differences), an analytic slope in the Newton step '
             '(as dear as the evaluation that it saves), smaller chunks of the arrays and steps in '
-            'place (no gain). Arrays lose more than floats where all cores of the machine are busy: '
+            'place (no gain). Arrays lose more than floats where all cores are busy: '
             '12,000 to 15,000 were seen then, 16,000 to 20,000 on a quieter one.',
         ]
     )
