@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import functools
 import json
 
 import campaign_tools  # noqa: F401
@@ -44,7 +45,14 @@ def settings(soil: TrueSoil, rows, **changes):
     return {**numbers, **changes}
 
 
-def make(design='sweep40', names=(), factor=1.0, seed=4, structure=0.0, stds=True):
+def make(*arguments, **options):
+    """Return the same as :func:`_made`; the quadrature behind it runs once for each table."""
+    table, values, soil, rows = _made(*arguments, **options)
+    return dict(table), dict(values), soil, rows
+
+
+@functools.cache
+def _made(design='sweep40', names=(), factor=1.0, seed=4, structure=0.0, stds=True):
     """Return table columns and settings; ``names`` hidden at their typical sizes times factor."""
     rng = np.random.default_rng(seed)
     soil = random_soil(rng)
@@ -107,6 +115,35 @@ def test_agrees_where_only_the_soil_is_off():
         assert gap.refit < 1.4 * gap.noise
         assert gap.before > gap.refit
     assert diagnosis.smallest_visible['bulldozing'][1] > 0.0
+
+
+@pytest.mark.parametrize('key', ['soil.relative_std', 'soil.frictional_modulus_std'])
+def test_soil_that_is_said_to_be_uncertain_is_no_finding(key):
+    """Bearing moduli 2.5 times too high: far off for a known soil, nothing for an unknown one."""
+    table, _, soil, rows = make('lugs48')
+    wrong = settings(soil, rows)
+    for name in ('frictional_modulus', 'cohesive_modulus'):
+        wrong[f'soil.{name}'] = 2.5 * getattr(soil, name)
+    std = 0.6 if key.endswith('relative_std') else 0.6 * wrong['soil.frictional_modulus']
+
+    def pull(values):
+        (shift,) = (s for s in run(table, values).soil if s.name == 'stiffness')
+        return abs(shift.pull)
+
+    assert pull({**wrong, key: std}) < 0.5 * pull(wrong)
+
+
+def test_words_of_a_misfit_of_both_signs():
+    table, values, *_ = make('lugs48', ('soil_mound',), 2.0)
+    where = run(table, values).where
+    assert np.sign(where.mean) == np.sign(where.mean_in_noise_std)
+    noisy = dict(table)
+    for key in OUTPUTS:
+        turn = np.where(np.arange(len(table[key])) % 2, 1.0, -1.0)
+        noisy[key] = table[key] + 12.0 * table[f'{key}_std'] * turn
+    found = run(noisy, values)
+    assert 'of both signs' in found.where.sentence
+    assert 'too scattered' in found.sentence or found.verdict != 'agrees'
 
 
 def test_what_the_columns_cannot_show_is_not_visible():

@@ -19,6 +19,7 @@ FloatArray = NDArray[np.float64]
 _DRAWS = 1000
 _SEED = 5
 _STRONG_PULL = 2.0  # prior deviations
+_COARSE = 0.05  # model-error floor above which agreement says little
 
 
 def gaps(
@@ -134,6 +135,11 @@ def sentence(
 ) -> str:
     """Return the verdict in words."""
     within = f', within a model-error floor of {100 * floor:.1f} % of the range' if floor else ''
+    if verdict.word == 'agrees' and floor > _COARSE:
+        return (
+            'These rows are too scattered to judge the model: it agrees with them, but only within '
+            f'{100 * floor:.0f} % of the range (p = {gap_p_value:.2g}).'
+        )
     if verdict.word == 'agrees':
         agreed = 'Model and measurement agree once the soil is refitted'
         return f'{agreed}{within} (p = {gap_p_value:.2g}).'

@@ -21,6 +21,7 @@ _LARGEST_SHARE = 0.7  # of the rows in a box; more is "everywhere"
 _DRAWS = 400
 _SEED = 7
 _SURE = 0.05
+_ONE_SIGN = 0.3  # below this share of the size a mean misfit says nothing
 _LABELS = {'sinkage': 'sinkage', 'drawbar_pull': 'drawbar pull', 'torque': 'torque'}
 
 
@@ -64,16 +65,26 @@ def locate(
             box, inside = sides[best], chosen
     if not box:
         share_inside = 1.0
-    physical = values[inside] * _std_of_rows(problem, worst, len(table))[inside]
-    mean, in_std = float(np.mean(physical)), float(np.mean(values[inside]))
+    std = _std_of_rows(problem, worst, len(table))[inside]
+    physical = values[inside] * std
+    mean, size = float(np.mean(physical)), float(np.sqrt(np.mean(physical**2)))
+    noise = float(np.sqrt(np.mean(std**2)))
+    in_std = mean / noise
     trend, correlation = _trend(table, names, residual[:, worst], mine)
     where = ' and '.join(_text(side) for side in box) if box else 'everywhere alike'
     quantity = QUANTITIES[worst]
     if p_value < _SURE or excess[worst] > 3.0 * np.sqrt(2.0 * mine.sum()):
-        sentence = (
-            f'{_LABELS[quantity]} is worst, {where}: measured minus model is on average '
-            f'{_amount(mean, quantity)} there ({in_std:+.1f} noise standard deviations)'
-        )
+        sentence = f'{_LABELS[quantity]} is worst, {where}: measured minus model is '
+        if abs(mean) > _ONE_SIGN * size:
+            sentence += (
+                f'on average {_amount(mean, quantity)} there '
+                f'({in_std:+.1f} noise standard deviations)'
+            )
+        else:
+            sentence += (
+                f'of both signs there, {_amount(size, quantity).lstrip("+")} '
+                f'({size / noise:.1f} noise standard deviations) in size'
+            )
     else:
         sentence = 'no region stands out from the noise'
     return Where(

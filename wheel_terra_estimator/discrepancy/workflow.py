@@ -169,10 +169,12 @@ def nuisance_coordinates(
     configuration: Configuration, known: Mapping[str, Effect]
 ) -> tuple[Coordinate, ...]:
     """Return the soil parameters and the stated uncertain parameters of effects that are on."""
+    general = 'soil.relative_std' in configuration.stated
     stated = {
         field: value
         for field, value in configuration.soil_std.items()
-        if configuration.stated & {f'soil.{field}_std', f'soil.{field}_std_deg'}
+        if value > 0.0
+        and (general or configuration.stated & {f'soil.{field}_std', f'soil.{field}_std_deg'})
     }
     return (
         *soil_coordinates(configuration.soil, stated),
