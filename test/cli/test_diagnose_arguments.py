@@ -39,3 +39,30 @@ def test_packed_recording_is_a_recording(tmp_path: Path, capsys: Any) -> None:
     arguments = ['diagnose', str(packed), '-o', str(tmp_path / 'out'), '--config', 'pathfinder']
     assert main(arguments) == 2
     assert 'cannot be unpacked' in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ('files', 'words'),
+    [
+        (('thesis.tex',), 'thesis.tex'),
+        (('photo.png',), 'photo.png'),
+        (('report.json', 'notes.txt'), 'notes.txt'),
+    ],
+)
+def test_overwrite_never_deletes_what_is_no_diagnosis(
+    tmp_path: Path, capsys: Any, files: tuple[str, ...], words: str
+) -> None:
+    home = tmp_path / 'home'
+    home.mkdir()
+    for name in files:
+        (home / name).write_text('years of work')
+    assert main(['diagnose', 'table.csv', '-o', str(home), '--overwrite']) == 2
+    assert words in capsys.readouterr().err
+    assert sorted(entry.name for entry in home.iterdir()) == sorted(files)
+    # A folder of an earlier diagnosis is no obstacle, so the table is what is complained about.
+    earlier = tmp_path / 'earlier'
+    earlier.mkdir()
+    for name in ('report.json', 'model.yaml', 'report.html', 'gap.png'):
+        (earlier / name).write_text('')
+    assert main(['diagnose', 'table.csv', '-o', str(earlier), '--overwrite']) == 2
+    assert 'table.csv' in capsys.readouterr().err

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from wheel_terra_estimator.discrepancy.result import Diagnosis
     from wheel_terra_estimator.discrepancy.table import SteadyTable
 
+WRITTEN = ('.json', '.yaml', '.html', '.png', '.svg')
 SUMMARY = 'find where model and measurement disagree and name the missing effect'
 
 
@@ -73,8 +74,7 @@ def run(arguments: argparse.Namespace) -> int:
     from wheel_terra_estimator.discrepancy.workflow import Options, diagnose
 
     output = Path(arguments.output)
-    if output.exists() and not arguments.overwrite:
-        raise UserError(f'{output}: exists already; choose another folder or add --overwrite')
+    _make_sure_it_may_be_written(output, arguments.overwrite)
     if arguments.floor is not None and not 0.0 <= arguments.floor <= 0.2:
         raise UserError(f'--floor {arguments.floor:g}: must be a share between 0 and 0.2')
     _load_effects(arguments.effects)
@@ -97,6 +97,23 @@ def run(arguments: argparse.Namespace) -> int:
         print(f'  note: {note}')
     print(f'  written: {output}')
     return 0
+
+
+def _make_sure_it_may_be_written(output: Path, overwrite: bool) -> None:
+    """Refuse a path that is taken; what is replaced must be a folder of this command."""
+    if not output.exists():
+        return
+    if not overwrite:
+        raise UserError(f'{output}: exists already; choose another folder or add --overwrite')
+    if not output.is_dir():
+        raise UserError(f'{output}: is not a folder; choose another path')
+    names = [entry.name for entry in output.iterdir()]
+    strangers = [name for name in names if not name.endswith(WRITTEN)]
+    if names and ('report.json' not in names or strangers):
+        raise UserError(
+            f'{output}: holds more than a diagnosis ({(strangers or names)[0]}), so it is not '
+            'overwritten; choose another folder'
+        )
 
 
 def _load_effects(files: list[str]) -> None:
@@ -139,5 +156,5 @@ def _write(diagnosis: Diagnosis, output: Path, *, pictures: bool) -> None:
 
             write_report(diagnosis, fresh)
         if output.exists():
-            shutil.rmtree(output) if output.is_dir() else output.unlink()
+            shutil.rmtree(output)
         fresh.rename(output)
