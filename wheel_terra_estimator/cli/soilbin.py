@@ -162,7 +162,10 @@ def prepare_folder(folder: Path, overwrite: bool, resume: bool) -> None:
             raise UserError(
                 f'{folder}: exists already; --resume goes on with it, --overwrite replaces it'
             )
-        shutil.rmtree(folder) if folder.is_dir() else folder.unlink()
+        names = {entry.name for entry in folder.iterdir()} if folder.is_dir() else {folder.name}
+        if names and not names & {'summary.json', '.work'}:
+            raise UserError(f'{folder}: is no folder of a run, so it is not overwritten')
+        shutil.rmtree(folder)
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
