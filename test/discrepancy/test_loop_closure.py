@@ -15,6 +15,8 @@ from wheel_terra_estimator.discrepancy.model_file import write_model
 from wheel_terra_estimator.discrepancy.table import check_table
 from wheel_terra_estimator.discrepancy.workflow import diagnose
 from wheel_terra_estimator.estimation.core import EstimatorCore
+from wheel_terra_estimator.estimation.measurements import SinkageReading
+from wheel_terra_estimator.evaluation.runner import inputs_of_mode
 from wheel_terra_estimator.simulation import drive, scenario
 
 FILES = ['generic_six_wheel', 'hit_lss1']
@@ -53,9 +55,8 @@ def rig_table(soil):
     return check_table('rig.csv', rows)
 
 
-@pytest.fixture(scope='module')
-def driven():
-    """Another drive, uphill, in soil with the same effect; its sinkage sensor fails on the way."""
+def drive_uphill(seed):
+    """Another drive, uphill, in soil with the same effect: the soil's numbers are off as well."""
     others = ('slip_sinkage_exponent', 'lug_digging', 'soil_mound', 'stress_peak_shift')
     off = [f'effects.{name}.enabled:=false' for name in (*others, 'multipass', 'bulldozing')]
     on = ['effects.lug_shear_radius.enabled:=true', 'effects.lug_shear_radius.lam:=1.0']
@@ -64,58 +65,63 @@ def driven():
             'configuration': FILES,
             'parameters': [LUGS],
             'truth': [*off, *on],
-            'duration': 60.0,
+            'duration': 70.0,
             'drive.time': [0.0],
             'drive.forward': [0.06],
             'slope.position': [0.0, 0.5, 1.0, 1.6, 2.2],
-            'slope.angle_deg': [0.0, 0.0, 5.0, 5.0, 8.0],
-            'sensors.noise': 0.2,
-            'faults.kind': ['no_sinkage'],
-            'faults.wheel': [''],
-            'faults.start': [25.0],
-            'faults.end': [60.0],
+            'slope.angle_deg': [0.0, 0.0, 7.0, 12.0, 14.0],
+            'sensors.noise': 0.3,
         }
     )
-    return drive.simulate(planned, seed=3)
+    return drive.simulate(planned, seed=seed)
 
 
 def errors(configuration, driven):
-    """Root-mean-square errors of the estimates after the first ten seconds."""
+    """Squared errors of the estimates after the first ten seconds.
+
+    The rover has no torque and no sinkage sensor: what it says of them rests on the model.
+    """
     core = EstimatorCore(configuration)
-    sets = [item for arrival in driven.arrivals for item in core.add(arrival.measurement)]
+    inputs = [
+        m for m in inputs_of_mode(driven.arrivals, 'no_torque') if not isinstance(m, SinkageReading)
+    ]
+    sets = [item for measurement in inputs for item in core.add(measurement)]
     sets += core.flush()
     truth = driven.truth
     row = {int(stamp): i for i, stamp in enumerate(truth.stamp)}
     late = [s for s in sets if s.stamp in row and s.stamp > truth.stamp[0] + 10_000_000_000]
-    assert len(late) > 400
+    assert len(late) > 500
     return {
-        key: float(
-            np.sqrt(
-                np.nanmean(
-                    [(getattr(s, key) - getattr(truth, key)[row[s.stamp]]) ** 2 for s in late]
-                )
-            )
-        )
-        for key in ('sinkage', 'drawbar_pull', 'slip')
+        key: np.array([(getattr(s, key) - getattr(truth, key)[row[s.stamp]]) ** 2 for s in late])
+        for key in ('sinkage', 'drawbar_pull')
     }
 
 
-@pytest.mark.timeout(900)
-@pytest.mark.slow
-@pytest.mark.xfail(
-    reason='sinkage gains, but pull loses since the filter learns shear strength late: 4.0 N '
-    'against 2.9 N with the base model',
-    strict=False,
-)
-def test_a_drive_is_estimated_better_with_the_corrected_model(driven, tmp_path):
+@pytest.fixture(scope='module')
+def corrected(tmp_path_factory):
+    """The base model, and what a rig's table made of it."""
     base = reader.load(FILES, [LUGS])
     diagnosis = diagnose(rig_table(base.soil), base)
     assert [effect.name for effect in diagnosis.effects] == ['lug_shear_radius']
-    write_model(diagnosis, tmp_path / 'model.yaml')
-    corrected = reader.load([*FILES, tmp_path / 'model.yaml'], [LUGS])
-    assert corrected.effects['lug_shear_radius']['lam'] == pytest.approx(1.0, abs=0.15)
+    path = tmp_path_factory.mktemp('loop') / 'model.yaml'
+    write_model(diagnosis, path)
+    found = reader.load([*FILES, path], [LUGS])
+    assert found.effects['lug_shear_radius']['lam'] == pytest.approx(1.0, abs=0.15)
+    return base, found
 
-    before, after = errors(base, driven), errors(corrected, driven)
-    # Measured with this seed: sinkage 3.7 -> 1.6 mm, pull 2.9 -> 2.7 N.
-    assert after['sinkage'] < 0.75 * before['sinkage'], (before, after)
-    assert after['drawbar_pull'] < before['drawbar_pull'], (before, after)
+
+@pytest.mark.timeout(1800)
+@pytest.mark.parametrize('seeds', [(3,), pytest.param(range(4, 8), marks=pytest.mark.slow)])
+def test_a_drive_is_estimated_better_with_the_corrected_model(corrected, seeds):
+    base, better = corrected
+    drives = [drive_uphill(seed) for seed in seeds]
+    before, after = (
+        {
+            key: float(np.sqrt(np.nanmean(np.concatenate([found[key] for found in squares]))))
+            for key in ('sinkage', 'drawbar_pull')
+        }
+        for squares in ([errors(model, driven) for driven in drives] for model in (base, better))
+    )
+    print(f'{seeds}: {before} -> {after}')
+    assert after['sinkage'] < 0.85 * before['sinkage'], (before, after)
+    assert after['drawbar_pull'] < 0.85 * before['drawbar_pull'], (before, after)
