@@ -88,3 +88,16 @@ def test_covariance_stays_symmetric_and_positive():
 @pytest.mark.slow
 def test_covariance_stays_symmetric_and_positive_for_a_day_at_10_hz():
     assert day(864000) > -1e-15
+
+
+@pytest.mark.filterwarnings('error')
+def test_readings_of_any_size_bring_no_warning_and_no_restart():
+    kalman, _ = make(4)
+    rng = np.random.default_rng(5)
+    for size in 10.0 ** np.arange(-12, 13, 2):
+        H = size * rng.standard_normal((3, 4))
+        H[2] = H[1] * (1.0 + 1e-13)
+        kalman.update(size * rng.standard_normal(3), H, np.array([1e-12, size, 1e-12]) * size)
+    assert np.isfinite(kalman.mean).all()
+    assert (np.linalg.eigvalsh(kalman.covariance) > -1e-9).all()
+    assert kalman.restarts == 0

@@ -25,6 +25,7 @@ def step(speed, **changes):
         'ratio_std': 0.1,
         'low_rim': 0.006,
         'ratio_walk': 0.1,
+        'unrest': 0.0,
         'window': InertialWindow(),
         'acceleration_noise': 0.03,
     } | changes
@@ -44,6 +45,15 @@ def test_fast_rover_follows_its_accelerometer_when_wheels_spin_up():
     window = InertialWindow(speed_change=0.05, duration=0.1)
     fast, _ = step(1.0, rim_before=1.2, rim_now=2.4, window=window)
     assert fast == pytest.approx(1.05, abs=0.02)
+
+
+def test_contacts_under_change_open_the_speed_and_the_accelerometer_bounds_it():
+    calm, _ = step(0.04)
+    mean, variance = step(0.04, unrest=0.02)
+    assert mean == pytest.approx(calm)
+    assert variance == pytest.approx(step(0.04)[1] + 2.0 * 0.02**2 * 0.1)
+    window = InertialWindow(speed_change=0.0, duration=0.1)
+    assert step(0.04, unrest=0.5, window=window)[1] <= 0.03**2 * 0.1
 
 
 def test_slow_rover_does_not_integrate_a_bias():

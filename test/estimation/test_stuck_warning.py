@@ -124,3 +124,45 @@ def test_memory_comes_back():
     monitor.restore(memory)
     two = course([[wheel(0.97)] * 6] * 20, monitor=monitor, start=1.0)
     assert [a.stuck for a in one] == [a.stuck for a in two]
+
+
+def test_wheels_that_are_being_stopped_raise_nothing_by_an_early_reference():
+    monitor = StuckMonitor(StuckTuning())
+    # The reference stands 0.9 s before the wheels do, as in a recorded stop on firm ground.
+    found = []
+    for i in range(120):
+        t = 0.1 * i
+        speed = min(max(0.7 - 0.9 * max(t - 8.0, 0.0), 0.0), 0.7)
+        rim = min(max(0.7 - 1.2 * max(t - 9.3, 0.0), 0.0), 0.7)
+        slip = 1.0 - speed / rim if rim > 0.01 else 0.0
+        rows = [wheel(slip, rim=rim, known=rim > 0.01, torque=0.1)] * 4
+        found.append(monitor.update(t, speed, True, rows))
+    assert first(found) is None
+
+
+def test_drives_that_give_way_near_their_limit_raise_it_without_any_speed():
+    monitor = StuckMonitor(StuckTuning())
+    cruise = [wheel(0.2, rim=1.8, torque=0.4)] * 4
+    hard = [wheel(0.2, rim=1.1, torque=0.75)] * 2 + [wheel(0.2, rim=1.75, torque=0.4)] * 2
+    steep = [wheel(0.2, rim=1.75, torque=0.75)] * 4
+    found = [monitor.update(0.1 * i, 0.0, False, cruise) for i in range(50)]
+    assert not found[-1].stuck
+    # Near the limit at full speed is only a steep climb.
+    found = [monitor.update(5.0 + 0.1 * i, 0.0, False, steep) for i in range(50)]
+    assert not found[-1].stuck
+    found = [monitor.update(10.0 + 0.1 * i, 0.0, False, hard) for i in range(10)]
+    assert 0.3 <= first(found) <= 0.6
+    assert 'torque limit' in found[-1].reason
+
+
+def test_without_a_speed_the_margin_of_the_soil_decides():
+    slips = [min(0.3 + 0.004 * i, 0.78) for i in range(300)]
+    answers = []
+    for margin in (0.1, 0.005):
+        monitor = StuckMonitor(StuckTuning())
+        found = [
+            monitor.update(0.1 * i, 0.01, False, [wheel(s)] * 6, margin=margin)
+            for i, s in enumerate(slips)
+        ]
+        answers.append(found[-1].stuck)
+    assert answers == [False, True]

@@ -180,6 +180,43 @@ def test_locked_wheels_that_slide_have_slip_minus_one():
     assert s.forward_velocity == pytest.approx(0.03, abs=0.005)
 
 
+def test_wheel_without_load_is_found_by_its_torque_and_taken_back():
+    run = drive(
+        duration=24.0,
+        **{
+            'slope.angle_deg': [5.0],
+            'faults.kind': ['lifted'],
+            'faults.wheel': ['front_left'],
+            'faults.start': [10.0],
+            'faults.end': [17.0],
+        },
+    )
+    sets, truth = estimate(run), run.truth
+    lifted, after = slice(125, 165), slice(200, 235)
+    for part in (lifted, after):
+        load = np.mean([s.normal_load for s in sets[part]], axis=0)
+        assert load == pytest.approx(truth.normal_load[part].mean(axis=0), abs=25.0)
+        slip = np.mean([s.slip for s in sets[part]], axis=0)
+        assert slip == pytest.approx(truth.slip[part].mean(axis=0), abs=0.06)
+
+
+def test_locked_wheel_is_dragged_along():
+    run = drive(
+        duration=16.0,
+        **{
+            'faults.kind': ['locked'],
+            'faults.wheel': ['rear_right'],
+            'faults.start': [8.0],
+            'faults.end': [16.0],
+        },
+    )
+    sets, truth = estimate(run), run.truth
+    pull, true_pull = sets[-10].drawbar_pull, truth.drawbar_pull[-10]
+    load = truth.normal_load[-10]
+    assert true_pull[5] < -0.3 * load[5]
+    assert pull == pytest.approx(true_pull, abs=0.12 * load.mean())
+
+
 def test_sliding_back_is_class_stuck():
     run = load({'configuration': SAND}).configuration
     estimator = WheelSoilEstimator(run)

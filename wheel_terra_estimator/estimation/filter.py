@@ -16,6 +16,7 @@ from filterpy.kalman import ExtendedKalmanFilter
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
+_LEAST_VARIANCE, _LEAST_SHARE = 1e-30, 1e-9
 
 
 class _KnownPrediction(ExtendedKalmanFilter):
@@ -70,7 +71,7 @@ class GatedFilter:
 
     def innovation_variance(self, H: FloatArray, noise: FloatArray) -> FloatArray:
         """Return the (m,) diagonal of H P H^T + R."""
-        return np.einsum('ij,jk,ik->i', H, self._ekf.P, H) + noise
+        return ((H @ self._ekf.P) * H).sum(axis=1) + noise
 
     def update(
         self,
@@ -86,7 +87,11 @@ class GatedFilter:
         """
         ekf = self._ekf
         before, P = ekf.x, ekf.P
-        R = np.diag(noise)
+        # In units of its own deviation each innovation has variance 1: whatever the readings, the
+        # inverse of their covariance exists. A share below the floor is lost in rounding.
+        scale = 1.0 / np.sqrt(np.maximum(self.innovation_variance(H, noise), _LEAST_VARIANCE))
+        residual, H = residual * scale, H * scale[:, None]
+        R = np.diag(np.maximum(noise * scale * scale, _LEAST_SHARE))
         ekf.update(residual, lambda _: H, lambda _: 0.0, R=R)
         if considered:
             gain = ekf.K

@@ -124,6 +124,7 @@ def speed_step(
     ratio_std: float,
     low_rim: float,
     ratio_walk: float,
+    unrest: float,
     window: InertialWindow,
     acceleration_noise: float,
 ) -> SpeedStep:
@@ -141,6 +142,8 @@ def speed_step(
         Rim speed below which the present ratio says nothing [m/s].
     ratio_walk : float
         Random walk of v / rim speed [1/sqrt(m of rim travel)].
+    unrest : float
+        Change of speed that contacts under change may bring within half a second [m/s].
     window : InertialWindow
         Accelerometer over the step.
     acceleration_noise : float
@@ -153,6 +156,7 @@ def speed_step(
         change = rim_now - rim_before
         mean = 0.5 * (abs(rim_before) + abs(rim_now))
         variance = mean * mean * ratio_walk**2 * mean * dt + (0.2 * change) ** 2 + 1e-8 * dt
+        variance += 2.0 * unrest * unrest * dt
         if abs(rim_before) > low_rim:
             gain, constant = rim_now / rim_before, 0.0
         else:

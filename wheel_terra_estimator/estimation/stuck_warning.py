@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Stuck warning: entrapment under way, or expected within a time or a rim travel.
 
-Four signs, each with a hold time of its own, any of which raises the warning:
+Signs, each with a hold time of its own, any of which raises the warning:
 
 * *digging in*: the median slip is above 0.8 with a probability above one half;
 * *look ahead*: at the rate at which the median slip grew over the last seconds it passes 0.9
@@ -11,10 +11,13 @@ Four signs, each with a hold time of its own, any of which raises the warning:
   wheels slip heavily or stand (torque-limited wheels stall as often as they spin);
 * *bogging down*: wheels pull near their limit while the rover loses speed against its fastest
   wheel so fast that it would stand within seconds;
+* *labour*: wheels near their torque limit turn slower than they did, and slower than the fastest;
+* *exhausted*: without any speed, the soil gives hardly more pull than is asked, at high slip;
 * *stall*: without any speed, two or more wheels pull near their torque limit while they turn much
   slower than the fastest. Pulling away from rest looks the same: a start mask keeps it out.
 
-Only driving slip counts: braking and skidding are no entrapment. A single wheel never raises it.
+Wheels that are being stopped raise no sign of slip: a late or early reference shows slip then that
+is none. Only driving slip counts: braking and skidding are no entrapment. A single wheel never raises it.
 """
 
 from __future__ import annotations
@@ -32,12 +35,16 @@ _ENTRAPPED_SLIP = 0.9
 _DIGGING_SLIP = 0.8
 _TREND_WINDOW = 5.0  # [s]
 _SHORTEST_TREND = 2.5  # [s]
+# Taken off the slope, over the deviation of the slip: 1.5 / (5 s / sqrt(12) * sqrt(5 fixes)).
+_SLOPE_DOUBT = 0.45  # [1/s]
 _SETTLING_TRAVEL = 0.25  # [m] of rim travel after a start
 # Sinkage per rim travel that counts as digging, at which slip, to which share of the radius.
 _DEEPENING, _DEEPENING_SLIP, _DEEP = 0.02, 0.2, 0.25
 _GROWTH_TRAVEL = 0.15  # [m] of rim travel over which it is taken
 _LEAST_TRAVEL = 0.05  # [m]; 0 is said of wheels that are stuck
 _BOG_WINDOW = 1.5  # [s] over which the loss of speed is taken
+_STOPPING_WINDOW, _STOPPING_SHARE = 1.0, 0.8  # [s], of the fastest rim speed in it
+_CRUISE_WINDOW = 5.0  # [s]
 _LONGEST_TIME = 600.0  # [s] said where no entrapment is in sight
 
 
@@ -61,6 +68,13 @@ class StuckTuning:
     bog_time: float = 6.0  # [s] to a stand
     bog_torque: float = 0.5  # of the torque limit, second strongest wheel
     bog_hold: float = 0.2
+    labour_torque: float = 0.68  # of the torque limit, second strongest wheel
+    labour_ratio: float = 0.87  # of the rim speed of the last seconds
+    labour_hold: float = 0.4
+    spare_margin: float = 0.045  # of the load: more than this and no entrapment is near
+    exhausted_margin: float = 0.015
+    exhausted_slip: float = 0.6
+    exhausted_hold: float = 6.0
     stall_ratio: float = 0.6
     stall_torque: float = 0.7  # of the torque limit
     stall_hold: float = 0.4
@@ -103,6 +117,8 @@ class _Memory:
     rim_travel: float = 0.0
     last_time: float | None = None
     speeds: deque[tuple[float, float]] = field(default_factory=deque)
+    rims: deque[tuple[float, float]] = field(default_factory=deque)
+    cruises: deque[tuple[float, float]] = field(default_factory=deque)
     depths: list[deque[tuple[float, float]]] = field(default_factory=list)  # travel, sinkage
     wheel_travel: list[float] = field(default_factory=list)
 
@@ -128,6 +144,8 @@ class StuckMonitor:
             m.rim_travel,
             m.last_time,
             deque(m.speeds),
+            deque(m.rims),
+            deque(m.cruises),
             [deque(d) for d in m.depths],
             list(m.wheel_travel),
         )
@@ -144,6 +162,7 @@ class StuckMonitor:
         speed_known: bool,
         wheels: Sequence[WheelMotionState],
         turning: bool = False,
+        margin: float = math.nan,
     ) -> StuckAssessment:
         """Judge the state at `time` [s].
 
@@ -160,6 +179,8 @@ class StuckMonitor:
             One per wheel.
         turning : bool
             The rover turns sharply: slip that comes from turning says nothing of what is ahead.
+        margin : float
+            Greatest pull that the soil can give beyond what is asked, over the load; nan: unknown.
         """
         memory, tuning = self._memory, self._tuning
         dt = 0.0 if memory.last_time is None else max(time - memory.last_time, 0.0)
@@ -179,28 +200,41 @@ class StuckMonitor:
         settled = memory.rim_travel > _SETTLING_TRAVEL
         growth = self._sinkage_growth(wheels, dt)
         slope = self._trend(time, typical, settled and not turning)
+        # Growth that is more than the estimate's own wandering.
+        sure_slope = slope - _SLOPE_DOUBT * typical_std
+        slowing = self._slowing(time, fastest, wheels)
 
         probability = exceedance_probability(typical, typical_std, _DIGGING_SLIP)
         signs: dict[str, str] = {}
         if effective and probability > 0.5 and fastest > 0.0:
-            if self._held('dig', time, tuning.dig_hold):
+            if self._held('dig', time, tuning.dig_hold) and not slowing:
                 signs['dig'] = f'median slip {typical:.2f}: digging in'
         else:
             memory.since.pop('dig', None)
         soon = typical > tuning.look_ahead_slip and (
-            typical + tuning.look_ahead * slope > _ENTRAPPED_SLIP
+            typical + tuning.look_ahead * sure_slope > _ENTRAPPED_SLIP
         )
         at_once = typical > tuning.sudden_slip and (
-            typical + tuning.sudden_ahead * slope > _ENTRAPPED_SLIP
+            typical + tuning.sudden_ahead * sure_slope > _ENTRAPPED_SLIP
         )
+        # Without a speed the slip is half a guess: the soil must be near its limit too.
+        unaided = not speed_known and margin == margin
+        if unaided and margin > tuning.spare_margin:
+            soon = at_once = False
+        if unaided and margin < tuning.exhausted_margin and typical > tuning.exhausted_slip:
+            if self._held('exhausted', time, tuning.exhausted_hold) and not slowing:
+                signs['exhausted'] = f'soil gives {margin:.3f} of the load more than is asked'
+        else:
+            memory.since.pop('exhausted', None)
         if (soon or at_once) and typical_std < 0.2:
-            if self._held('ahead', time, tuning.look_ahead_hold):
+            if self._held('ahead', time, tuning.look_ahead_hold) and not slowing:
                 signs['ahead'] = f'median slip {typical:.2f} grows by {slope:.3f} per second'
         else:
             memory.since.pop('ahead', None)
         self._held_wheels_sign(time, speed, speed_known, moving, stalled, fastest, signs)
         self._bog_sign(time, speed, wheels, moving, fastest, signs)
         self._stall_sign(time, moving, stalled, fastest, signs)
+        labouring = self._labour_sign(time, speed if speed_known else None, wheels, moving, signs)
 
         if signs:
             if not memory.raised:
@@ -208,7 +242,7 @@ class StuckMonitor:
             memory.raised, memory.clear_since = True, None
         elif memory.raised:
             magnitude = median([abs(s) for s in driving]) if driving else None
-            if magnitude is not None and magnitude < tuning.clear_slip:
+            if magnitude is not None and magnitude < tuning.clear_slip and not labouring:
                 if memory.clear_since is None:
                     memory.clear_since = time
                 elif time - memory.clear_since >= tuning.clear_time:
@@ -318,6 +352,19 @@ class StuckMonitor:
             for w in wheels
         ]
 
+    def _slowing(self, time: float, fastest: float, wheels: Sequence[WheelMotionState]) -> bool:
+        """Say whether the wheels are being stopped: a rover that is told to stop is not stuck.
+
+        A late or early reference then shows slip that is none. Wheels near their torque limit are
+        held by the soil instead.
+        """
+        rims = self._memory.rims
+        rims.append((time, fastest))
+        while time - rims[0][0] > _STOPPING_WINDOW:
+            rims.popleft()
+        strained = sum(w.torque_share > self._tuning.bog_torque for w in wheels)
+        return strained < 2 and fastest < _STOPPING_SHARE * max(rim for _, rim in rims)
+
     def _held_wheels_sign(
         self,
         time: float,
@@ -376,6 +423,39 @@ class StuckMonitor:
                 )
         else:
             memory.since.pop('bog', None)
+
+    def _labour_sign(
+        self,
+        time: float,
+        speed: float | None,
+        wheels: Sequence[WheelMotionState],
+        moving: Sequence[WheelMotionState],
+        signs: dict[str, str],
+    ) -> bool:
+        """Judge drives that no longer hold their speed; say whether they are near their limit."""
+        tuning, memory = self._tuning, self._memory
+        cruise = memory.cruises
+        rims = [abs(w.rim_speed) for w in moving]
+        typical, fastest = (median(rims), max(rims)) if rims else (0.0, 0.0)
+        cruise.append((time, typical))
+        while time - cruise[0][0] > _CRUISE_WINDOW:
+            cruise.popleft()
+        torques = sorted((w.torque_share for w in wheels if w.torque_share >= 0.0), reverse=True)
+        near_limit = len(torques) > 1 and torques[1] >= tuning.labour_torque
+        labouring = (
+            near_limit
+            and memory.rolling_since is not None
+            and time - memory.rolling_since >= 1.0
+            and typical < tuning.labour_ratio * max(rim for _, rim in cruise)
+            and typical < tuning.labour_ratio * fastest
+            and (speed is None or 1.0 - abs(speed) / fastest > tuning.bog_slip)
+        )
+        if labouring:
+            if self._held('labour', time, tuning.labour_hold):
+                signs['labour'] = f'wheels slowed to {typical:.2f} m/s near their torque limit'
+        else:
+            memory.since.pop('labour', None)
+        return near_limit
 
     def _stall_sign(
         self,

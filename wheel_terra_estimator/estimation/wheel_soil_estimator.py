@@ -55,8 +55,12 @@ from wheel_terra_estimator.estimation.stuck_warning import (
 FloatArray = NDArray[np.float64]
 _NAN = math.nan
 _SLOPE_KEEP = 0.9  # per cycle
-_LEAST_SLIP_STD = 0.012
+_LEAST_SLIP_STD, _LEAST_TURNING_STD = 0.02, 0.04
 _TURNING_SLIP_STD = 0.05
+_UNLOADED_HOLD = 0.3
+_EFFORT_GAIN = 0.5
+_FAIR_NIS = 2.0
+_PILED_STD = 0.05  # of the load, at slip 1
 _BALANCE_STD = 0.005  # of the weight: what curvature, ruts and mass leave open
 # Slip of a rover in loose soil on level ground, its spread, and the rim travel of its changes [m].
 _USUAL_SLIP, _USUAL_STD, _USUAL_LENGTH = 0.12, 0.2, 1.0
@@ -102,6 +106,9 @@ class _Run:
     force_known: bool = False
     yaw_rate: float = 0.0
     turned_up: float = 0.0  # nose-up rotation over the last rover length [rad]
+    side_slow: float = 0.0
+    renewal: float = 0.0  # how far turning has changed while the contacts form anew
+    unrest: float = 0.0  # change of speed that contacts under change may bring [m/s]
     side_motion: float = 0.0  # of the outer wheels over the fastest rim speed
     turned_over: float = 0.0  # and the travel that it took [m]
     yaw_bias: float = 0.0
@@ -123,6 +130,15 @@ class _Run:
     margin_time: float = -10.0
     rejected: dict[str, int] = field(default_factory=dict)
     reference_rejected: int = 0  # in a row
+    reference_doubt: float = 0.0  # residual of the last rejected fix [m/s]
+    effort: list[float] = field(
+        default_factory=lambda: [_NAN, _NAN]
+    )  # torque over load, fast and slow
+    unloaded_since: list[float] = field(default_factory=list)  # nan = carries its load
+    unloaded: list[bool] = field(default_factory=list)
+    steepness: float = 0.0
+    effort_time: float = 0.0
+    stand_pull: list[float] = field(default_factory=list)
     nis: dict[str, float] = field(default_factory=dict)
     assessment: StuckAssessment | None = None
 
@@ -225,6 +241,9 @@ class WheelSoilEstimator:
             leaving_time=[-1e9] * n,
             rest_since=[_NAN] * n,
             resting=[False] * n,
+            unloaded_since=[_NAN] * n,
+            unloaded=[False] * n,
+            stand_pull=[_NAN] * n,
             slip=[0.0] * n,
             slip_std=[1.0] * n,
             wheel_class=[int(SlipClass.UNKNOWN)] * n,
@@ -409,6 +428,7 @@ class WheelSoilEstimator:
             ratio_std=run.ratio_std,
             low_rim=self._low_rim,
             ratio_walk=run.ratio_walk,
+            unrest=run.unrest,
             window=run.window,
             acceleration_noise=self._acceleration_noise,
         )
@@ -442,7 +462,7 @@ class WheelSoilEstimator:
             run.force_known = True
             self._follow_turning(window, dt)
             run.load = self._loads()
-            self._note_turning()
+            self._note_turning(dt)
         rim = self._representative_rim(run.yaw_rate)
         self._follow_direction(rim)
         if run.rim_at_cycle is None and rim is not None:
@@ -464,8 +484,9 @@ class WheelSoilEstimator:
         run, s = self._run, self._settings
         yaw_rate = window.yaw_rate / window.count
         noise = float(s.sensors.angular_rate_std) / math.sqrt(window.count)
-        steady = abs(yaw_rate - run.yaw_rate) < 3.0 * noise
-        run.yaw_rate += (0.25 if steady else 1.0) * (yaw_rate - run.yaw_rate)
+        # Smooth what may be noise; follow what is more.
+        gain = min(max(0.25 * abs(yaw_rate - run.yaw_rate) / max(noise, 1e-6), 0.25), 1.0)
+        run.yaw_rate += gain * (yaw_rate - run.yaw_rate)
         # Nose-up rotation over travel, both forgotten over the length of the rover.
         travel = float(self._filter.mean[SPEED]) * dt
         keep = math.exp(-abs(travel) / max(self._curvature_length, 0.1))
@@ -482,7 +503,7 @@ class WheelSoilEstimator:
         if self._reference_known():
             self._filter.widen(SHEAR_STRENGTH, std * std)
 
-    def _note_turning(self) -> None:
+    def _note_turning(self, dt: float) -> None:
         """Open the shear strength where turning begins or ends: the contacts form anew."""
         run = self._run
         known = [abs(r) for r in run.rim_speed if r == r]
@@ -490,9 +511,12 @@ class WheelSoilEstimator:
         if fastest <= self._low_rim:
             return
         side = min(abs(run.yaw_rate) * self._curvature_length / fastest, 1.0)
-        change = side - run.side_motion
-        self._open_shear(0.4 * change)
-        self._filter.widen(SPEED, (0.5 * change * fastest) ** 2)
+        run.side_slow += -math.expm1(-dt / 1.0) * (side - run.side_slow)
+        change = abs(side - run.side_slow) - 0.05
+        if change > 0.0:
+            run.unrest = max(run.unrest, 1.5 * change * fastest)
+            run.renewal = max(run.renewal, change)
+        run.renewal *= math.exp(-fastest * dt / self._contact_length)
         run.side_motion = side
 
     def _yaw_std(self) -> float:
@@ -516,7 +540,12 @@ class WheelSoilEstimator:
             (torque if torque == torque else 0.0) - pull * r
             for torque, pull, r in zip(run.torque_now, run.pull, s.rim_radius, strict=True)
         ]
-        return [float(w) for w in s.load.loads(run.force, run.pull, moment)]
+        loads = [float(w) for w in s.load.loads(run.force, run.pull, moment)]
+        if any(run.unloaded):
+            total = sum(loads)
+            loads = [0.0 if off else w for w, off in zip(loads, run.unloaded, strict=True)]
+            loads = [w * total / max(sum(loads), 1e-9) for w in loads]
+        return loads
 
     def _follow_direction(self, rim: float | None) -> None:
         """Forget v / rim speed where the drive changes its direction (up becomes down)."""
@@ -696,7 +725,9 @@ class WheelSoilEstimator:
             run.rejected['reference'] += 1
             fastest = max((abs(r) for r in run.rim_speed if r == r), default=0.0)
             beyond = abs(reference.forward) > 1.5 * fastest + 5.0 * math.sqrt(total)
-            if run.reference_rejected >= 2 and not (beyond and run.reference_rejected < 4):
+            same = abs(residual - run.reference_doubt) < 4.0 * math.sqrt(2.0 * variance + total)
+            run.reference_doubt = residual
+            if run.reference_rejected >= 2 and same and not (beyond and run.reference_rejected < 4):
                 # Fixes that keep disagreeing are right: open the state to them.
                 self._filter.widen(SPEED, residual * residual)
                 run.reference_rejected = 0
@@ -704,6 +735,9 @@ class WheelSoilEstimator:
                 variance += chi_square_gate(residual, total, 4.0 if not beyond else 0.01)
         else:
             run.reference_rejected = 0
+            if nis > _FAIR_NIS:
+                # More than chance, less than an outlier: the prediction was too sure of itself.
+                self._filter.widen(SPEED, residual * residual / _FAIR_NIS - total)
         H = np.zeros((1, self._layout.size))
         H[0, SPEED] = 1.0
         self._filter.update(np.array([residual]), H, np.array([variance]))
@@ -717,7 +751,7 @@ class WheelSoilEstimator:
             typical = sum(spread) / len(spread) if spread else 0.0
             if rim is not None and typical > s.rest_speed and abs(rim) < 0.2 * typical:
                 # Spin in place: the body stays where it is, to a share of the rim speed.
-                self._fuse_speed(0.0, max(0.3 * typical, 0.002) ** 2)
+                self._fuse_speed(0.0, max(typical, 0.002) ** 2)
             return
         if run.still_since is None:
             run.still_since = time
@@ -742,6 +776,10 @@ class WheelSoilEstimator:
         H[0, SPEED] = 1.0
         residual = np.array([value - float(self._filter.mean[SPEED])])
         self._filter.update(residual, H, np.array([variance]))
+
+    def _distrusted(self, channel: str, variance: float) -> float:
+        """Return the variance of a channel whose residuals keep being larger than foreseen."""
+        return variance * max(self._run.nis.get(channel, 1.0), 1.0) ** 2
 
     def _note_nis(self, channel: str, nis: float) -> None:
         nis_of = self._run.nis
@@ -794,6 +832,7 @@ class WheelSoilEstimator:
             if run.torque_count[i]:
                 run.torque_held[i] = torque[i]
             run.torque_sum[i], run.torque_count[i] = 0.0, 0
+        self._watch_torques(dt, torque, rims)
         if still:
             run.fresh_travel = 0.0
             run.starting = True
@@ -808,6 +847,54 @@ class WheelSoilEstimator:
                 np.array(residuals), np.array(rows), np.array(variances), considered=held
             )
         run.window = InertialWindow()
+
+    def _watch_torques(self, dt: float, torque: list[float], rims: list[float]) -> None:
+        """Find wheels that carry nothing, and sudden changes of what the wheels must give."""
+        run, s = self._run, self._settings
+        rolling = [
+            i
+            for i, rim in enumerate(rims)
+            if rim == rim and abs(rim) > self._low_rim and torque[i] == torque[i]
+        ]
+        if len(rolling) < 2:
+            if any(value == value for value in torque):
+                run.effort = [_NAN, _NAN]
+                run.unloaded = [False] * s.wheel_count
+            return
+        dt, run.effort_time = run.time - run.effort_time, run.time
+        typical_torque = median([torque[i] for i in rolling])
+        typical_rim = median([rims[i] for i in rolling])
+        fastest = max(abs(rims[i]) for i in rolling)
+        noise = float(s.sensors.torque_std) + float(s.sensors.torque_zero_std)
+        telling = abs(typical_torque) > 5.0 * noise and run.side_motion < 0.1
+        for i in rolling:
+            share = torque[i] / typical_torque if telling else 1.0
+            free = telling and abs(share) < 0.2 and rims[i] / typical_rim > 0.95
+            if run.unloaded[i]:
+                free = not telling or share < 0.4
+            if free == run.unloaded[i]:
+                run.unloaded_since[i] = _NAN
+            elif run.unloaded_since[i] != run.unloaded_since[i]:
+                run.unloaded_since[i] = run.time
+            elif run.time - run.unloaded_since[i] > _UNLOADED_HOLD:
+                run.unloaded[i], run.unloaded_since[i] = free, _NAN
+        carrying = [i for i in rolling if not run.unloaded[i]]
+        weight = sum(run.load[i] * s.shear_radius[i] for i in carrying)
+        if weight <= 0.0:
+            return
+        effort = sum(math.copysign(torque[i], torque[i] * rims[i]) for i in carrying) / weight
+        fast, slow = run.effort
+        if fast != fast or dt <= 0.0:
+            run.effort = [effort, effort]
+            return
+        fast += -math.expm1(-dt / 0.15) * (effort - fast)
+        slow += -math.expm1(-dt / 1.0) * (effort - slow)
+        run.effort = [fast, slow]
+        noise = float(s.sensors.torque_std) * math.sqrt(len(carrying)) / weight
+        excess = abs(fast - slow) - 3.0 * noise * 0.5
+        if excess > 0.0 and run.steepness > 0.0:
+            change = min(_EFFORT_GAIN * excess / max(run.steepness, 0.1), 0.4)
+            run.unrest = max(run.unrest, change * fastest)
 
     def _model_rows(
         self,
@@ -826,8 +913,19 @@ class WheelSoilEstimator:
         jacobian, jacobian_torque = np.zeros((2, s.wheel_count, size))
         pulls, torques = np.zeros((2, s.wheel_count))
         gate = float(s.filter.gate)
+        # After a start the shear builds up over the contact length.
+        fresh = 2.5 * math.exp(-2.0 * (run.fresh_travel / self._contact_length - 1.0))
         for i, rim in enumerate(rims):
             load = run.load[i]
+            run.stand_pull[i] = _NAN
+            if rim == rim and abs(rim) < 2.0 * s.rest_speed and load >= 1e-3:
+                pull = self._dragged_pull(i, torque[i], load)
+                if pull == pull:
+                    run.stand_pull[i] = pull
+                    balance_sum += pull
+                    unsure = 0.1 + float(s.sensors.torque_gain_std)
+                    open_variance += (unsure * load) ** 2
+                    continue
             if rim != rim or abs(rim) < 2.0 * s.rest_speed or load < 1e-3:
                 # Standing, lifted or unknown: it may carry its share of the slope, or nothing.
                 share = load * run.force[0] / max(run.force[2], 0.1)
@@ -840,8 +938,8 @@ class WheelSoilEstimator:
             pulls[i], torques[i] = pull, torque_model
             # Turning shears the soil sideways too, which the model does not know: ten cycles of
             # it are one piece of information.
-            side = abs(run.yaw_rate * s.longitudinal[i]) / abs(rim)
-            scrub = 10.0 * min(side, 1.0) ** 2
+            side = abs(run.yaw_rate) * self._curvature_length / abs(rim)
+            scrub = 10.0 * min(side + run.renewal, 1.0) ** 2 + fresh
             open_variance += scrub * (0.1 * load) ** 2
             balance += row_pull
             balance_sum += pull
@@ -857,6 +955,7 @@ class WheelSoilEstimator:
                 nis = residual * residual / total
                 self._note_nis('torque', nis)
                 # A soil change looks like an outlier: weaken it, do not lock it out.
+                variance = self._distrusted('torque', variance)
                 variance += chi_square_gate(residual, total, gate)
                 residuals.append(residual)
                 variances.append(variance)
@@ -886,10 +985,41 @@ class WheelSoilEstimator:
             total = float(balance @ P @ balance) + variance
             nis = residual * residual / total
             self._note_nis('balance', nis)
+            variance = self._distrusted('balance', variance)
             variance += chi_square_gate(residual, total, gate)
             residuals.append(residual)
             variances.append(variance)
             rows.append(balance)
+
+    def _dragged_pull(self, i: int, torque: float, load: float) -> float:
+        """Return the pull of a wheel that stands while the rover moves, from its torque [N].
+
+        A locked wheel slides: its shear is saturated, and torque gives the pull whatever the
+        strength of the soil. Where its hub stands too, torque and pull balance about the hub.
+        """
+        run, s, layout = self._run, self._settings, self._layout
+        x = self._filter.mean
+        speed = float(x[SPEED]) - run.yaw_rate * s.lateral[i]
+        if torque != torque:
+            return _NAN
+        if abs(speed) < 2.0 * s.rest_speed:
+            return min(max(torque / s.shear_radius[i], -load), load)
+        direction = 1.0 if speed > 0.0 else -1.0
+        forces = self._models.forces(
+            i,
+            3.0,
+            float(x[layout.sinkage.start + i]),
+            load,
+            float(x[SHEAR_STRENGTH]),
+            float(x[SHEAR_MODULUS]),
+            float(x[CENTROID]),
+            0.0,
+            _NAN,
+            _NAN,
+        )
+        gain = forces.d_pull[2] / forces.d_torque[2] if forces.d_torque[2] else 0.0
+        pull = forces.pull + gain * (direction * torque - forces.torque)
+        return direction * min(max(pull, -1.2 * load), load)
 
     def _set_ratio_walk(self, jacobian: FloatArray, rims: list[float]) -> None:
         """Let the slip walk as what the ground asks does, over the slope of the traction curve.
@@ -902,7 +1032,8 @@ class WheelSoilEstimator:
             float(jacobian[i, SPEED]) * abs(rim) for i, rim in enumerate(rims) if rim == rim
         ) / max(sum(run.load), 1e-3)
         least, most = float(s.filter.ratio_walk_least), float(s.filter.ratio_walk)
-        walk = float(s.filter.demand_walk) / max(-steepness, 1e-3)
+        run.steepness = max(-steepness, 1e-3)
+        walk = float(s.filter.demand_walk) / run.steepness
         run.ratio_walk = min(max(walk, least), most)
 
     def _wheel_rows(
@@ -975,6 +1106,7 @@ class WheelSoilEstimator:
         """Keep what the next cycle needs, work out pulls and sinkage rates."""
         run, s, layout = self._run, self._settings, self._layout
         x, P = self._filter.mean, self._filter.covariance
+        run.unrest *= math.exp(-dt / 0.3)
         run.cycle_time = time
         run.rim_at_cycle = rim
         settled = run.fresh_travel > self._contact_length
@@ -994,7 +1126,9 @@ class WheelSoilEstimator:
     def _floor_speed_variance(self, rims: list[float]) -> None:
         """Keep a least slip deviation: no set of soil models is better than that."""
         typical = sum(abs(r) for r in rims if r == r) / len(rims)
-        least = (_LEAST_SLIP_STD * typical) ** 2
+        least = (
+            typical * (_LEAST_SLIP_STD + _LEAST_TURNING_STD * min(self._run.side_motion, 1.0))
+        ) ** 2
         lacking = least - float(self._filter.covariance[SPEED, SPEED])
         if lacking > 0.0:
             self._filter.widen(SPEED, lacking)
@@ -1017,8 +1151,9 @@ class WheelSoilEstimator:
             load = run.load[i]
             turning = rim == rim and abs(rim) >= 2.0 * s.rest_speed and load >= 1e-3
             if not turning:
-                # Static friction carries the slope.
-                run.pull[i] = load * slope_share
+                # Static friction carries the slope, or it is dragged along.
+                pull = run.stand_pull[i]
+                run.pull[i] = pull if pull == pull else load * slope_share
                 run.torque_now[i] = run.pull[i] * s.rim_radius[i]
                 run.pull_std[i] = (0.1 * load if run.force_known else load) + 1e-3
                 continue
@@ -1038,6 +1173,8 @@ class WheelSoilEstimator:
                 + (zero / radius) ** 2
                 + (0.5 * gain * run.torque_now[i] / radius) ** 2
                 + (0.01 * load) ** 2
+                # Soil piled up by a wheel that hardly moves is in no model.
+                + (_PILED_STD * max(run.slip[i] - 0.6, 0.0) / 0.4 * load) ** 2
             )
 
     # ------------------------------------------------------------------ slip, classes, warning
@@ -1079,7 +1216,12 @@ class WheelSoilEstimator:
             )
         known = run.reference_time is not None and time - run.reference_time < 10.0
         run.assessment = self._monitor.update(
-            time, speed, known, motion, turning=run.side_motion > 0.3
+            time,
+            speed,
+            known,
+            motion,
+            turning=run.side_motion > 0.3,
+            margin=self._margin_share(),
         )
         if time - run.margin_time >= 1.0:
             run.margin_time = time
@@ -1117,6 +1259,14 @@ class WheelSoilEstimator:
         slip_std = math.hypot(slip_std, _TURNING_SLIP_STD * run.side_motion)
         run.slip[i], run.slip_std[i] = slip, min(max(slip_std, 1e-3), 1.0)
         run.wheel_class[i] = self._classifier.update(i, time, slip, slip_std, sliding_back)
+
+    def _margin_share(self) -> float:
+        """Return the pull left over, as a share of the load; nan where torque does not tell."""
+        run, s = self._run, self._settings
+        told = run.torque_time is not None and run.time - run.torque_time < 2.0
+        if not told or run.margin_time < 0.0 or float(s.sensors.torque_gain_std) > 0.3:
+            return _NAN
+        return sum(run.pull_margin) / max(sum(run.load), 1e-3)
 
     def _margins(self) -> None:
         """Greatest pull that the present soil gives each wheel minus what the slope asks [N]."""
