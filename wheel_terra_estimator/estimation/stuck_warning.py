@@ -17,7 +17,8 @@ Signs, each with a hold time of its own, any of which raises the warning:
   slower than the fastest. Pulling away from rest looks the same: a start mask keeps it out.
 
 Wheels that are being stopped raise no sign of slip: a late or early reference shows slip then that
-is none. Only driving slip counts: braking and skidding are no entrapment. A single wheel never raises it.
+is none. Only driving slip counts: braking and skidding are no entrapment. A single wheel never
+raises it.
 """
 
 from __future__ import annotations
