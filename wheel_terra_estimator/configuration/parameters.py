@@ -615,7 +615,7 @@ DECLARED: tuple[Parameter, ...] = (
     ),
     number(
         'filter.ratio_walk',
-        0.25,
+        0.13,
         '1/sqrt(m)',
         'random walk of ground speed over rim speed per rim travel, at most',
         above=0.0,

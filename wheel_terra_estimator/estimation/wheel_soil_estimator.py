@@ -59,7 +59,7 @@ _LEAST_SLIP_STD, _LEAST_TURNING_STD = 0.02, 0.04
 _TURNING_SLIP_STD = 0.05
 _UNLOADED_HOLD = 0.3
 _EFFORT_GAIN = 0.5
-_FAIR_NIS = 2.0
+_FAIR_NIS = 3.0
 _PILED_STD = 0.05  # of the load, at slip 1
 _BALANCE_STD = 0.005  # of the weight: what curvature, ruts and mass leave open
 # Slip of a rover in loose soil on level ground, its spread, and the rim travel of its changes [m].
@@ -115,7 +115,7 @@ class _Run:
     yaw_bias_weight: float = 0.0
     ratio: float = 0.95  # remembered v / rim speed
     ratio_std: float = 0.3
-    ratio_walk: float = 0.25  # of v / rim speed [1/sqrt(m)]
+    ratio_walk: float = 0.13  # of v / rim speed [1/sqrt(m)]
     drive_direction: float = 0.0
     starting: bool = True
     fresh_travel: float = 0.0  # [m] since the start or the last change of direction
