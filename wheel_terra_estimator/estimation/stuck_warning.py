@@ -433,7 +433,7 @@ class StuckMonitor:
         moving: Sequence[WheelMotionState],
         signs: dict[str, str],
     ) -> bool:
-        """Judge drives that no longer hold their speed; say whether they are near their limit."""
+        """Judge drives that give way; say whether the soil holds them back now."""
         tuning, memory = self._tuning, self._memory
         cruise = memory.cruises
         rims = [abs(w.rim_speed) for w in moving]
@@ -442,21 +442,21 @@ class StuckMonitor:
         while time - cruise[0][0] > _CRUISE_WINDOW:
             cruise.popleft()
         torques = sorted((w.torque_share for w in wheels if w.torque_share >= 0.0), reverse=True)
-        near_limit = len(torques) > 1 and torques[1] >= tuning.labour_torque
-        labouring = (
-            near_limit
-            and memory.rolling_since is not None
-            and time - memory.rolling_since >= 1.0
-            and typical < tuning.labour_ratio * max(rim for _, rim in cruise)
+        # Two wheels near their limit and slower than the fastest, the rover slower still.
+        held_back = (
+            len(torques) > 1
+            and torques[1] >= tuning.labour_torque
             and typical < tuning.labour_ratio * fastest
             and (speed is None or 1.0 - abs(speed) / fastest > tuning.bog_slip)
         )
-        if labouring:
+        slowed = typical < tuning.labour_ratio * max(rim for _, rim in cruise)
+        started = memory.rolling_since is not None and time - memory.rolling_since >= 1.0
+        if held_back and slowed and started:
             if self._held('labour', time, tuning.labour_hold):
                 signs['labour'] = f'wheels slowed to {typical:.2f} m/s near their torque limit'
         else:
             memory.since.pop('labour', None)
-        return near_limit
+        return held_back
 
     def _stall_sign(
         self,
