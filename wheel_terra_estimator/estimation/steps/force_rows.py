@@ -1,0 +1,235 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Rows of the update from wheel-soil forces: torque of each wheel, balance of the rover."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wheel_terra_estimator.estimation.filter import chi_square_gate
+from wheel_terra_estimator.estimation.filter_state import (
+    CENTROID,
+    MOUND,
+    SHEAR_MODULUS,
+    SHEAR_STRENGTH,
+    SPEED,
+)
+from wheel_terra_estimator.estimation.measurement_models import WheelForces
+from wheel_terra_estimator.estimation.steps.context import (
+    Context,
+    distrusted,
+    leaving_angle_of,
+    note_nis,
+)
+from wheel_terra_estimator.estimation.steps.turning_and_loads import ground_curvature
+
+FloatArray = NDArray[np.float64]
+_NAN = math.nan
+_SLOPE_KEEP = 0.9  # per cycle
+_BALANCE_STD = 0.005  # of the weight: what curvature, ruts and mass leave open
+
+
+def model_rows(
+    c: Context,
+    rims: list[float],
+    torque: list[float],
+    residuals: list[float],
+    variances: list[float],
+    rows: list[FloatArray],
+) -> None:
+    """Append the rows of the torques and of the balance of forces to an update."""
+    run, s, layout = c.run, c.settings, c.layout
+    x, P = c.filter.mean, c.filter.covariance
+    size = layout.size
+    balance = np.zeros(size)
+    balance_sum = 0.0
+    open_variance = 0.0
+    jacobian, jacobian_torque = np.zeros((2, s.wheel_count, size))
+    pulls, torques = np.zeros((2, s.wheel_count))
+    gate = float(s.filter.gate)
+    # After a start the shear builds up over the contact length.
+    fresh = 2.5 * math.exp(-2.0 * (run.fresh_travel / c.contact_length - 1.0))
+    for i, rim in enumerate(rims):
+        load = run.load[i]
+        run.stand_pull[i] = _NAN
+        if rim == rim and abs(rim) < 2.0 * s.rest_speed and load >= 1e-3:
+            pull = dragged_pull(c, i, torque[i], load)
+            if pull == pull:
+                run.stand_pull[i] = pull
+                balance_sum += pull
+                unsure = 0.1 + float(s.sensors.torque_gain_std)
+                open_variance += (unsure * load) ** 2
+                continue
+        if rim != rim or abs(rim) < 2.0 * s.rest_speed or load < 1e-3:
+            # Standing, lifted or unknown: it may carry its share of the slope, or nothing.
+            share = load * run.force[0] / max(run.force[2], 0.1)
+            balance_sum += share
+            open_variance += (0.3 * load) ** 2
+            continue
+        direction = 1.0 if rim > 0.0 else -1.0
+        pull, torque_model, row_pull, row_torque = wheel_rows(c, i, rim, direction)
+        jacobian[i], jacobian_torque[i] = row_pull, row_torque
+        pulls[i], torques[i] = pull, torque_model
+        # Turning shears the soil sideways too, which the model does not know: ten cycles of
+        # it are one piece of information.
+        side = abs(run.yaw_rate) * c.curvature_length / abs(rim)
+        scrub = 10.0 * min(side + run.renewal, 1.0) ** 2 + fresh
+        open_variance += scrub * (0.1 * load) ** 2
+        balance += row_pull
+        balance_sum += pull
+        reading = torque[i]
+        if reading == reading:
+            variance = (
+                float(s.sensors.torque_std) ** 2 + (s.load_std**2 + scrub) * torque_model**2 + 1e-6
+            )
+            residual = reading - torque_model
+            total = float(row_torque @ P @ row_torque) + variance
+            nis = residual * residual / total
+            note_nis(c, 'torque', nis)
+            # A soil change looks like an outlier: weaken it, do not lock it out.
+            variance = distrusted(c, 'torque', variance)
+            variance += chi_square_gate(residual, total, gate)
+            residuals.append(residual)
+            variances.append(variance)
+            rows.append(row_torque)
+    c.pull_jacobian = jacobian
+    c.linear = (x.copy(), pulls, jacobian_torque, torques)
+    set_ratio_walk(c, jacobian, rims)
+    if run.force_known and run.window.count:
+        weight = s.mass * run.force[2]
+        tilt = 0.0
+        for i, gain in enumerate(s.rut_tilt):
+            zi = layout.sinkage.start + i
+            tilt += gain * float(x[zi])
+            # Specific force along the ground: f_x - f_z * tilt (body pitched up by the ruts).
+            balance[zi] += weight * gain
+        # On curved ground the wheels' own slopes differ from the body's.
+        uphill = ground_curvature(c) * sum(
+            w * x_i for w, x_i in zip(run.load, s.longitudinal, strict=True)
+        )
+        residual = s.mass * run.force[0] - (balance_sum + weight * tilt - uphill)
+        noise = float(s.sensors.specific_force_std) ** 2 / run.window.count
+        variance = (
+            s.mass**2 * (noise + float(s.sensors.specific_force_bias_std) ** 2)
+            + (_BALANCE_STD * weight) ** 2
+            + open_variance
+        )
+        total = float(balance @ P @ balance) + variance
+        nis = residual * residual / total
+        note_nis(c, 'balance', nis)
+        variance = distrusted(c, 'balance', variance)
+        variance += chi_square_gate(residual, total, gate)
+        residuals.append(residual)
+        variances.append(variance)
+        rows.append(balance)
+
+
+def dragged_pull(c: Context, i: int, torque: float, load: float) -> float:
+    """Return the pull of a wheel that stands while the rover moves, from its torque [N].
+
+    A locked wheel slides: its shear is saturated, and torque gives the pull whatever the
+    strength of the soil. Where its hub stands too, torque and pull balance about the hub.
+    """
+    run, s, layout = c.run, c.settings, c.layout
+    x = c.filter.mean
+    speed = float(x[SPEED]) - run.yaw_rate * s.lateral[i]
+    if torque != torque:
+        return _NAN
+    if abs(speed) < 2.0 * s.rest_speed:
+        return min(max(torque / s.shear_radius[i], -load), load)
+    direction = 1.0 if speed > 0.0 else -1.0
+    forces = c.models.forces(
+        i,
+        3.0,
+        float(x[layout.sinkage.start + i]),
+        load,
+        float(x[SHEAR_STRENGTH]),
+        float(x[SHEAR_MODULUS]),
+        float(x[CENTROID]),
+        0.0,
+        _NAN,
+        _NAN,
+    )
+    gain = forces.d_pull[2] / forces.d_torque[2] if forces.d_torque[2] else 0.0
+    pull = forces.pull + gain * (direction * torque - forces.torque)
+    return direction * min(max(pull, -1.2 * load), load)
+
+
+def set_ratio_walk(c: Context, jacobian: FloatArray, rims: list[float]) -> None:
+    """Let the slip walk as what the ground asks does, over the slope of the traction curve.
+
+    Where the curve is steep, a change of demand changes the slip little; on the plateau the
+    same change makes the rover dig in.
+    """
+    run, s = c.run, c.settings
+    steepness = sum(
+        float(jacobian[i, SPEED]) * abs(rim) for i, rim in enumerate(rims) if rim == rim
+    ) / max(sum(run.load), 1e-3)
+    least, most = float(s.filter.ratio_walk_least), float(s.filter.ratio_walk)
+    run.steepness = max(-steepness, 1e-3)
+    walk = float(s.filter.demand_walk) / run.steepness
+    run.ratio_walk = min(max(walk, least), most)
+
+
+def wheel_rows(
+    c: Context, i: int, rim: float, direction: float
+) -> tuple[float, float, FloatArray, FloatArray]:
+    """Return pull, torque and their rows of the Jacobian, in the body's signs."""
+    layout = c.layout
+    zi, ei = layout.sinkage.start + i, layout.shear_error.start + i
+    forces = present_forces(c, i, rim, direction)
+    slopes = smooth_slopes(c, i, forces)
+    row_pull, row_torque = np.zeros(layout.size), np.zeros(layout.size)
+    for row, derivatives, by_ratio in (
+        (row_pull, forces.d_pull, slopes[1]),
+        (row_torque, forces.d_torque, slopes[0]),
+    ):
+        _, by_sinkage, by_strength, by_modulus, by_centroid, by_mound = derivatives
+        # The ratio is that of the direction of rolling: the two signs cancel.
+        row[SPEED] = by_ratio / abs(rim)
+        row[zi] = direction * by_sinkage
+        row[SHEAR_STRENGTH] = row[ei] = direction * by_strength
+        row[SHEAR_MODULUS] = direction * by_modulus
+        row[CENTROID] = direction * by_centroid
+        row[MOUND] = direction * by_mound
+    return direction * forces.pull, direction * forces.torque, row_pull, row_torque
+
+
+def smooth_slopes(c: Context, i: int, forces: WheelForces) -> tuple[float, float]:
+    """Return dT and dF by v/(r w), smoothed over about a second.
+
+    The curves bend within the uncertainty of the slip. A slope taken at the noisy estimate is
+    correlated with its error, which pulls the slip to the flat side; a smoothed one is not.
+    """
+    run = c.run
+    keep = _SLOPE_KEEP
+    for smoothed, new in (
+        (run.torque_slope, forces.d_torque[0]),
+        (run.pull_slope, forces.d_pull[0]),
+    ):
+        old = smoothed[i]
+        # The first slopes after a start are taken where the slip is known least: begin flat.
+        smoothed[i] = 0.2 * new if old != old else keep * old + (1.0 - keep) * new
+    return run.torque_slope[i], run.pull_slope[i]
+
+
+def present_forces(c: Context, i: int, rim: float, direction: float) -> WheelForces:
+    """Return the forces of a turning wheel at the present state, in its own direction."""
+    run, s, layout = c.run, c.settings, c.layout
+    x = c.filter.mean
+    v = direction * (float(x[SPEED]) - run.yaw_rate * s.lateral[i])
+    return c.models.forces(
+        i,
+        v / abs(rim),
+        float(x[layout.sinkage.start + i]),
+        run.load[i],
+        float(x[SHEAR_STRENGTH] + x[layout.shear_error.start + i]),
+        float(x[SHEAR_MODULUS]),
+        float(x[CENTROID]),
+        float(x[MOUND]),
+        abs(rim),
+        leaving_angle_of(c, i),
+    )

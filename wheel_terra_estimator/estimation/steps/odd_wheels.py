@@ -1,0 +1,63 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Wheels that carry nothing, and sudden changes of what the wheels must give."""
+
+from __future__ import annotations
+
+import math
+
+from wheel_terra_estimator.estimation.speed_process import median
+from wheel_terra_estimator.estimation.steps.context import Context
+
+_NAN = math.nan
+_UNLOADED_HOLD = 0.3
+_EFFORT_GAIN = 0.5
+
+
+def watch_torques(c: Context, dt: float, torque: list[float], rims: list[float]) -> None:
+    """Find wheels that carry nothing, and sudden changes of what the wheels must give."""
+    run, s = c.run, c.settings
+    rolling = [
+        i
+        for i, rim in enumerate(rims)
+        if rim == rim and abs(rim) > c.low_rim and torque[i] == torque[i]
+    ]
+    if len(rolling) < 2:
+        if any(value == value for value in torque):
+            run.effort = [_NAN, _NAN]
+            run.unloaded = [False] * s.wheel_count
+        return
+    dt, run.effort_time = run.time - run.effort_time, run.time
+    typical_torque = median([torque[i] for i in rolling])
+    typical_rim = median([rims[i] for i in rolling])
+    fastest = max(abs(rims[i]) for i in rolling)
+    noise = float(s.sensors.torque_std) + float(s.sensors.torque_zero_std)
+    telling = abs(typical_torque) > 5.0 * noise and run.side_motion < 0.1
+    for i in rolling:
+        share = torque[i] / typical_torque if telling else 1.0
+        free = telling and abs(share) < 0.2 and rims[i] / typical_rim > 0.95
+        if run.unloaded[i]:
+            free = not telling or share < 0.4
+        if free == run.unloaded[i]:
+            run.unloaded_since[i] = _NAN
+        elif run.unloaded_since[i] != run.unloaded_since[i]:
+            run.unloaded_since[i] = run.time
+        elif run.time - run.unloaded_since[i] > _UNLOADED_HOLD:
+            run.unloaded[i], run.unloaded_since[i] = free, _NAN
+    carrying = [i for i in rolling if not run.unloaded[i]]
+    weight = sum(run.load[i] * s.shear_radius[i] for i in carrying)
+    if weight <= 0.0:
+        return
+    effort = sum(math.copysign(torque[i], torque[i] * rims[i]) for i in carrying) / weight
+    fast, slow = run.effort
+    if fast != fast or dt <= 0.0:
+        run.effort = [effort, effort]
+        return
+    fast += -math.expm1(-dt / 0.15) * (effort - fast)
+    slow += -math.expm1(-dt / 1.0) * (effort - slow)
+    run.effort = [fast, slow]
+    noise = float(s.sensors.torque_std) * math.sqrt(len(carrying)) / weight
+    excess = abs(fast - slow) - 3.0 * noise * 0.5
+    if excess > 0.0 and run.steepness > 0.0:
+        change = min(_EFFORT_GAIN * excess / max(run.steepness, 0.1), 0.4)
+        run.unrest = max(run.unrest, change * fastest)

@@ -1,0 +1,164 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""From the last cycle to this one: speed, sinkage, soil."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wheel_terra_estimator.estimation.filter_state import (
+    CENTROID,
+    GRAVITY_BIAS,
+    MOUND,
+    SHEAR_MODULUS,
+    SHEAR_STRENGTH,
+    SLIP_SINKAGE,
+    SPEED,
+)
+from wheel_terra_estimator.estimation.measurement_models import slip_of_speed_ratio
+from wheel_terra_estimator.estimation.speed_process import SpeedStep
+from wheel_terra_estimator.estimation.steps.context import (
+    Context,
+    leaving_angle_of,
+    reference_known,
+    representative_rim,
+    speed_step_to,
+)
+
+FloatArray = NDArray[np.float64]
+# Slip of a rover in loose soil on level ground, its spread, and the rim travel of its changes [m].
+_USUAL_SLIP, _USUAL_STD, _USUAL_LENGTH = 0.12, 0.2, 1.0
+
+
+def predict(c: Context, time: float, dt: float, rims: list[float], still: bool) -> None:
+    """Predict speed, sinkage, soil and errors of the shear model over `dt` [s]."""
+    run, s, layout = c.run, c.settings, c.layout
+    x = c.filter.mean
+    step = speed_step_to(c, time)
+    size = layout.size
+    mean = x.copy()
+    F = np.eye(size)
+    Q = np.zeros((size, size))
+    if not still and not reference_known(c):
+        step = lean_on_experience(c, step, dt)
+    mean[SPEED] = step.speed_gain * x[SPEED] + step.bias_gain * x[GRAVITY_BIAS] + step.constant
+    F[SPEED, SPEED] = step.speed_gain
+    F[SPEED, GRAVITY_BIAS] = step.bias_gain
+    Q[SPEED, SPEED] = step.variance
+    # The residual of gravity changes as the rover drives over rough ground.
+    leak = s.gravity * float(s.sensors.orientation_std)
+    Q[GRAVITY_BIAS, GRAVITY_BIAS] = (1e-3**2 + (0.3 * leak) ** 2 * 0.1) * dt
+    travel = 0.0
+    if not still and dt > 0.0:
+        travel = predict_wheels(c, x, mean, F, Q, dt, rims)
+    run.fresh_travel += travel
+    if travel > 0.0:
+        walk = float(s.filter.soil_walk) ** 2 * travel
+        learn = walk if reference_known(c) else 0.0
+        forget = math.exp(-travel / 100.0)
+        for index, walk_std in (
+            (SHEAR_STRENGTH, 0.1),
+            (SHEAR_MODULUS, 0.1),
+            (SLIP_SINKAGE, 0.05),
+        ):
+            mean[index] *= forget
+            F[index, index] = forget
+            Q[index, index] = walk_std**2 * learn
+        mean[CENTROID] *= forget
+        F[CENTROID, CENTROID] = forget
+        Q[CENTROID, CENTROID] = 0.05**2 * walk
+        Q[MOUND, MOUND] = 0.05**2 * walk
+        n = s.wheel_count
+        k = layout.stiffness
+        Q[k, k] = (0.15**2 + np.eye(n) * 0.3**2) * walk
+        hold = math.exp(-travel / float(s.filter.shear_error_length))
+        e = layout.shear_error
+        mean[e] *= hold
+        F[e, e] *= hold
+        Q[e, e] = c.shear_error_covariance * (1.0 - hold * hold)
+    c.filter.predict(mean, F, Q)
+
+
+def lean_on_experience(c: Context, step: SpeedStep, dt: float) -> SpeedStep:
+    """Without fixes, let v / rim speed return to what such a slope usually takes.
+
+    On deep or saturated contacts torque and pull hardly change with slip. There the posterior
+    is the prior, and a random walk is no prior: it ends anywhere.
+    """
+    run = c.run
+    rim = representative_rim(c, run.yaw_rate)
+    if rim is None or abs(rim) < c.low_rim:
+        return step
+    demand = run.drive_direction * run.force[0] / max(run.force[2], 0.1)
+    usual = 1.0 - min(max(_USUAL_SLIP + (1.2 if demand > 0.0 else 0.4) * demand, -0.2), 0.8)
+    keep = math.exp(-abs(rim) * dt / _USUAL_LENGTH)
+    return SpeedStep(
+        keep * step.speed_gain,
+        keep * step.bias_gain,
+        keep * step.constant + (1.0 - keep) * usual * rim,
+        keep * keep * step.variance + (1.0 - keep * keep) * (_USUAL_STD * rim) ** 2,
+    )
+
+
+def predict_wheels(
+    c: Context,
+    x: FloatArray,
+    mean: FloatArray,
+    F: FloatArray,
+    Q: FloatArray,
+    dt: float,
+    rims: list[float],
+) -> float:
+    """Let each sinkage relax towards where the bearing law carries the load; return travel."""
+    run, s, layout = c.run, c.settings, c.layout
+    travels = []
+    for i, rim in enumerate(rims):
+        zi, ki = layout.sinkage.start + i, layout.stiffness.start + i
+        if rim != rim or abs(rim) < s.rest_speed:
+            Q[zi, zi] = 1e-10 * dt
+            continue
+        direction = 1.0 if rim > 0.0 else -1.0
+        speed = direction * (float(x[SPEED]) - run.yaw_rate * s.lateral[i])
+        rim = abs(rim)
+        ratio = speed / rim
+        slip = slip_of_speed_ratio(ratio)
+        travels.append(abs(speed) + 0.1 * abs(rim - speed))
+        z, load = float(x[zi]), run.load[i]
+        if load <= 1e-3:
+            Q[zi, zi] = 1e-4 * dt
+            continue
+        contact_length = max(math.sqrt(2.0 * s.rim_radius[i] * max(z, 1e-3)), 0.02)
+        alpha = -math.expm1(-(abs(speed) + 0.3 * abs(rim - speed)) * dt / contact_length)
+        soil = (
+            float(x[SHEAR_STRENGTH]),
+            float(x[SHEAR_MODULUS]),
+            float(x[ki]),
+            float(x[SLIP_SINKAGE]),
+            leaving_angle_of(c, i),
+        )
+        bearing = c.models.bearing(i, ratio, z, load, *soil)
+        slower = c.models.bearing(i, ratio - 0.02, z, load, *soil)
+        # One Newton step on log load over log sinkage, bounded: relaxation does the rest.
+        power = bearing.exponent + 0.5
+        growth = min(max(math.log(load / bearing.load) / power, -0.7), 0.7)
+        z_floor = max(z, 5e-4)
+        # No steady state where the wheel stands and digs: the sensor leads.
+        trust = min(max((0.95 - slip) / 0.15, 0.0), 1.0)
+        target = z_floor * math.exp(growth)
+        mean[zi] = z + trust * alpha * (target - z)
+        if trust < 1.0:
+            # It digs at its own pace: carry on with the rate seen last.
+            mean[zi] += 0.9 * (1.0 - trust) * max(run.sinkage_rate[i], 0.0) * dt
+        sensitivity = trust * alpha * target / power
+        F[zi, zi] = max(1.0 - trust * alpha * 0.9, 0.05)
+        F[zi, ki] = -sensitivity
+        F[zi, SLIP_SINKAGE] = -sensitivity * slip * bearing.log_depth
+        by_ratio = math.log(bearing.load / slower.load) / 0.02
+        F[zi, SPEED] = -sensitivity * by_ratio * direction / rim
+        # What the law does not know: a tenth of the sinkage per contact length, and digging.
+        digging = 0.05 * max(slip, 0.0) ** 2 * rim * dt
+        Q[zi, zi] = (0.1 * z_floor) ** 2 * 2.0 * alpha + digging**2 + 1e-9 * dt
+    return dt * math.fsum(travels) / len(rims) if travels else 0.0

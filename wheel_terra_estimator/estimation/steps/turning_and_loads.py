@@ -1,0 +1,85 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""How the rover turns, how the ground curves, what each wheel carries."""
+
+from __future__ import annotations
+
+import math
+
+from wheel_terra_estimator.estimation.filter_state import SPEED
+from wheel_terra_estimator.estimation.speed_process import InertialWindow
+from wheel_terra_estimator.estimation.steps.context import Context, open_shear
+
+
+def follow_turning(c: Context, window: InertialWindow, dt: float) -> None:
+    """Smooth the yaw rate while it is steady; measure how the ground curves along the path."""
+    run, s = c.run, c.settings
+    yaw_rate = window.yaw_rate / window.count
+    noise = float(s.sensors.angular_rate_std) / math.sqrt(window.count)
+    # Smooth what may be noise; follow what is more.
+    gain = min(max(0.25 * abs(yaw_rate - run.yaw_rate) / max(noise, 1e-6), 0.25), 1.0)
+    run.yaw_rate += gain * (yaw_rate - run.yaw_rate)
+    # Nose-up rotation over travel, both forgotten over the length of the rover.
+    travel = float(c.filter.mean[SPEED]) * dt
+    keep = math.exp(-abs(travel) / max(c.curvature_length, 0.1))
+    run.turned_up = keep * run.turned_up - window.pitch_rate / window.count * dt
+    run.turned_over = keep * run.turned_over + travel
+
+
+def note_turning(c: Context, dt: float) -> None:
+    """Open the shear strength where turning begins or ends: the contacts form anew."""
+    run = c.run
+    known = [abs(r) for r in run.rim_speed if r == r]
+    fastest = max(known, default=0.0)
+    if fastest <= c.low_rim:
+        return
+    side = min(abs(run.yaw_rate) * c.curvature_length / fastest, 1.0)
+    run.side_slow += -math.expm1(-dt / 1.0) * (side - run.side_slow)
+    change = abs(side - run.side_slow) - 0.05
+    if change > 0.0:
+        run.unrest = max(run.unrest, 1.5 * change * fastest)
+        run.renewal = max(run.renewal, change)
+    run.renewal *= math.exp(-fastest * dt / c.contact_length)
+    run.side_motion = side
+
+
+def ground_curvature(c: Context) -> float:
+    """Return slope gained per travel [rad/m]: front wheels may climb steeper ground."""
+    over = c.run.turned_over
+    if abs(over) < 0.1 * c.curvature_length:
+        return 0.0
+    return min(max(c.run.turned_up / over, -0.3), 0.3)
+
+
+def wheel_loads(c: Context) -> list[float]:
+    """Return the wheel loads for the last specific force, pulls and torques [N]."""
+    run, s = c.run, c.settings
+    moment = [
+        (torque if torque == torque else 0.0) - pull * r
+        for torque, pull, r in zip(run.torque_now, run.pull, s.rim_radius, strict=True)
+    ]
+    loads = [float(w) for w in s.load.loads(run.force, run.pull, moment)]
+    if any(run.unloaded):
+        total = sum(loads)
+        loads = [0.0 if off else w for w, off in zip(loads, run.unloaded, strict=True)]
+        loads = [w * total / max(sum(loads), 1e-9) for w in loads]
+    return loads
+
+
+def follow_direction(c: Context, rim: float | None) -> None:
+    """Forget v / rim speed where the drive changes its direction (up becomes down)."""
+    run = c.run
+    if rim is None or abs(rim) < c.low_rim:
+        return
+    if run.starting:
+        # The contact forms anew, and with it what the shear model gets wrong.
+        run.starting = False
+        open_shear(c, 0.3)
+    direction = 1.0 if rim > 0.0 else -1.0
+    if direction != run.drive_direction:
+        if run.drive_direction != 0.0:
+            demand = direction * run.force[0] / max(run.force[2], 0.1)
+            run.ratio = min(max(0.9 - demand, 0.2), 1.1)
+        run.ratio_std = 0.3
+        run.drive_direction = direction
+        run.fresh_travel = 0.0
