@@ -96,6 +96,18 @@ def test_a_failing_filter_is_held_said_and_started_anew(how):
     assert core.health()['filter_restarts'] == 1
 
 
+def test_restarts_of_the_filter_and_of_the_core_add_up():
+    class Both(Failing):
+        def health(self):
+            return {**super().health(), 'filter_restarts': 2}
+
+    config = configuration()
+    core = EstimatorCore(config, Both(config, 'raise'))
+    for time, rate in ((0.0, 1.0), (0.1, 1.0), (0.2, 9.0)):
+        core.add(odometry(time, rate=rate))
+    assert core.health()['filter_restarts'] == 3
+
+
 def test_a_filter_that_fails_at_once_gives_the_blank_set():
     config = configuration()
     core = EstimatorCore(config, Failing(config, 'raise'))

@@ -107,9 +107,10 @@ ReferenceVelocity
         result.update(timeline.counts)
         result['clock_steps_back'] = self._clock_steps
         result['resets'] = self._resets
-        estimator_health = getattr(self._estimator, 'health', dict)
-        result.update(estimator_health())
-        return result
+        own = dict(getattr(self._estimator, 'health', dict)())
+        # The filter starts itself anew, or the core does it: both count.
+        own['filter_restarts'] = own.get('filter_restarts', 0) + result['filter_restarts']
+        return result | own
 
     def _new_watch(self) -> ClockWatch:
         settings = self._settings
