@@ -103,7 +103,8 @@ def speed_step_to(c: Context, time: float) -> SpeedStep:
         ratio_std=run.ratio_std,
         low_rim=c.low_rim,
         ratio_walk=run.ratio_walk,
-        unrest=run.unrest,
+        # Opened without fixes, the speed would follow soil models that are off by as much.
+        unrest=run.unrest if reference_known(c) else 0.0,
         window=run.window,
         acceleration_noise=c.acceleration_noise,
     )
