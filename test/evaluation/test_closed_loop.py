@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The traction limiter in a closed loop with the simulated rover, the same soft patch twice."""
 
-from wheel_terra_estimator.evaluation.closed_loop import closed_loop
+from wheel_terra_estimator.evaluation.closed_loop import Comparison, closed_loop, report
 from wheel_terra_estimator.evaluation.kinds import LIMITER
 from wheel_terra_estimator.simulation.scenario import load
 
@@ -16,3 +16,4 @@ def test_without_it_the_rover_digs_in_with_it_it_stops_in_time():
     assert limited.stopped is not None
     assert limited.sinkage.max() < 0.25 * radius
     assert limited.position[-1] > 1.0  # it did not stop on the good ground before the patch
+    assert '| 0 | 0.' in report([Comparison(0, radius, free, limited)])

@@ -47,18 +47,37 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='DIR',
         help='folder of the measured data: score the real drives in place of simulated ones',
     )
+    parser.add_argument(
+        '--limiter',
+        action='store_true',
+        help='drive the same soft patch with and without the traction limiter (and a picture '
+        'beside the output)',
+    )
     parser.add_argument('-o', dest='output', type=Path, metavar='F.md', help='write the tables')
     parser.add_argument('--overwrite', action='store_true', help='replace an earlier output')
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the command."""
-    from wheel_terra_estimator.evaluation import bench, kinds, real_drives, runner, tables
+    from wheel_terra_estimator.evaluation import (
+        bench,
+        closed_loop,
+        kinds,
+        real_drives,
+        runner,
+        tables,
+    )
 
     if arguments.output and arguments.output.exists() and not arguments.overwrite:
         raise UserError(f'{arguments.output} exists; choose another name or give --overwrite')
     if arguments.measured:
         text = real_drives.report(arguments.measured)
+    elif arguments.limiter:
+        seeds = kinds.TUNING_SEEDS if arguments.tuning else kinds.TEST_SEEDS
+        drives = closed_loop.compare(seeds[: arguments.seeds])
+        text = closed_loop.report(drives)
+        if arguments.output:
+            closed_loop.picture(drives[0], arguments.output.with_suffix('.png'))
     else:
         for given, known, what in (
             (arguments.kinds, [*kinds.KINDS, 'firm'], 'kind'),

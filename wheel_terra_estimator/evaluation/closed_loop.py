@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,12 +17,15 @@ from wheel_terra_estimator.estimation.traction_law import (
     TractionLimits,
     traction_decision,
 )
+from wheel_terra_estimator.evaluation.kinds import LIMITER
+from wheel_terra_estimator.evaluation.tables import table
 from wheel_terra_estimator.simulation.commands import Command
 from wheel_terra_estimator.simulation.drive import Drive
-from wheel_terra_estimator.simulation.scenario import Scenario
+from wheel_terra_estimator.simulation.scenario import Scenario, load
 from wheel_terra_estimator.simulation.sensors import START, Arrival
 
 FloatArray = NDArray[np.float64]
+_FRONT = 0.5  # [m] from the middle of the rover to beyond its front wheels
 
 
 @dataclass(frozen=True)
@@ -87,7 +91,49 @@ def closed_loop(
     )
 
 
-def picture(free: ClosedLoopDrive, limited: ClosedLoopDrive, radius: float, path: Path) -> None:
+@dataclass(frozen=True)
+class Comparison:
+    """The same drive without and with the limiter; `radius` of the wheels [m]."""
+
+    seed: int
+    radius: float
+    free: ClosedLoopDrive
+    limited: ClosedLoopDrive
+
+
+def compare(seeds: Sequence[int]) -> list[Comparison]:
+    """Drive the scenario ``kinds.LIMITER`` twice for each seed."""
+    scenario = load(dict(LIMITER))
+    radius = float(np.min(scenario.configuration.wheels.radius))
+    return [
+        Comparison(
+            seed,
+            radius,
+            closed_loop(scenario, seed, limited=False),
+            closed_loop(scenario, seed, limited=True),
+        )
+        for seed in seeds
+    ]
+
+
+def report(drives: Sequence[Comparison]) -> str:
+    """Return a table of the deepest wheel in shares of the radius, one row per seed."""
+    start = LIMITER['patches.start'][0] - LIMITER['patches.border']
+    rows = []
+    for d in drives:
+        good = d.limited.position < start - _FRONT
+        deepest = [
+            f'{part.max() / d.radius:.2f}'
+            for part in (d.limited.sinkage[good], d.limited.sinkage, d.free.sinkage)
+        ]
+        stopped = 'got through' if d.limited.stopped is None else f'{d.limited.stopped:.1f}'
+        rows.append((str(d.seed), *deepest, stopped, d.limited.reason))
+    return table(
+        ('seed', 'good ground', 'with limiter', 'without', 'stopped at [s]', 'because'), rows
+    )
+
+
+def picture(drive: Comparison, path: Path) -> None:
     """Draw both drives: way, slip, sinkage."""
     import matplotlib
 
@@ -95,12 +141,14 @@ def picture(free: ClosedLoopDrive, limited: ClosedLoopDrive, radius: float, path
     from matplotlib import pyplot as plt
 
     figure, axes = plt.subplots(3, 1, figsize=(8, 7), sharex=True, layout='constrained')
-    for run, name in ((free, 'without limiter'), (limited, 'with limiter')):
+    for run, name in ((drive.free, 'without limiter'), (drive.limited, 'with limiter')):
         slip = np.nan_to_num(run.slip)
         axes[0].plot(run.time, run.position, label=name)
         axes[1].plot(run.time, np.median(slip, axis=1), label=name)
         axes[2].plot(run.time, 1e3 * run.sinkage.max(axis=1), label=name)
-    axes[2].axhline(250.0 * radius, color='grey', linestyle='--', label='a quarter of the radius')
+    axes[2].axhline(
+        250.0 * drive.radius, color='grey', linestyle='--', label='a quarter of the radius'
+    )
     for axis, label in zip(axes, ('way [m]', 'median slip [-]', 'deepest wheel [mm]'), strict=True):
         axis.set_ylabel(label)
         axis.grid(alpha=0.3)

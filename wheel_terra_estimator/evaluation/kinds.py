@@ -216,7 +216,7 @@ FIRM: Mapping[str, Any] = _kind(
 LIMITER: Mapping[str, Any] = _kind(
     _DRY_SAND,
     'a climb with a patch of loose soil on it, for the traction limiter',
-    parameters=['rover.mass:=80.0'],
+    parameters=['rover.mass:=60.0'],
     duration=90.0,
     slope__position=[0.0, 0.5, 1.2],
     slope__angle_deg=[0.0, 0.0, 7.0],
