@@ -169,12 +169,11 @@ def nuisance_coordinates(
     configuration: Configuration, known: Mapping[str, Effect]
 ) -> tuple[Coordinate, ...]:
     """Return the soil parameters and the stated uncertain parameters of effects that are on."""
-    general = 'soil.relative_std' in configuration.stated
+    # soil.relative_std is the estimator's doubt of a soil on its way, not that of a measured soil.
     stated = {
         field: value
         for field, value in configuration.soil_std.items()
-        if value > 0.0
-        and (general or configuration.stated & {f'soil.{field}_std', f'soil.{field}_std_deg'})
+        if configuration.stated & {f'soil.{field}_std', f'soil.{field}_std_deg'}
     }
     return (
         *soil_coordinates(configuration.soil, stated),
