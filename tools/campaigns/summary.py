@@ -416,7 +416,8 @@ def pictures(records: Sequence[Record], folder: Path) -> list[Path]:
         s = share(own, first)
         low, high = s.interval
         x = np.mean([r['confidence'] for r in own])
-        right.errorbar(x, s.value, [[s.value - low], [high - s.value]], fmt='o', color='C0', ms=4)
+        error = [[max(s.value - low, 0.0)], [max(high - s.value, 0.0)]]  # rounding at 0 and 1
+        right.errorbar(x, s.value, error, fmt='o', color='C0', ms=4)
     right.plot([0, 1], [0, 1], color='grey', lw=0.8)
     right.set(
         xlabel='stated confidence', ylabel='right', title='confidence of the name', xlim=(0.3, 1.01)
