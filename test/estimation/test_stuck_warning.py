@@ -166,3 +166,21 @@ def test_without_a_speed_the_margin_of_the_soil_decides():
         ]
         answers.append(found[-1].stuck)
     assert answers == [False, True]
+
+
+def test_spin_in_place_raises_nothing():
+    """The rover is steered into a spin: its speed goes, its wheels turn on against each other."""
+
+    def raised(turning):
+        monitor = StuckMonitor(StuckTuning())
+        found = []
+        for i in range(300):
+            time = 0.1 * i
+            speed = 0.05 * min(max(1.0 - (time - 10.0) / 2.0, 0.0), 1.0)
+            rims = [0.05 + (0.03 if time > 10.0 else 0.0), speed - (0.03 if time > 10.0 else 0.0)]
+            wheels = [wheel(0.4, rim=rim, torque=0.6) for rim in rims * 3]
+            found.append(monitor.update(time, speed, True, wheels, turning=turning and time > 10))
+        return first(found)
+
+    assert raised(turning=False) is not None  # without the turning it would be a rover that bogs
+    assert raised(turning=True) is None

@@ -233,9 +233,16 @@ class StuckMonitor:
         else:
             memory.since.pop('ahead', None)
         self._held_wheels_sign(time, speed, speed_known, moving, stalled, fastest, signs)
-        self._bog_sign(time, speed, wheels, moving, fastest, signs)
+        if turning:
+            # A spin in place has turning wheels and no speed, by command.
+            memory.speeds.clear()
+            memory.since.pop('bog', None)
+        else:
+            self._bog_sign(time, speed, wheels, moving, fastest, signs)
         self._stall_sign(time, moving, stalled, fastest, signs)
-        labouring = self._labour_sign(time, speed if speed_known else None, wheels, moving, signs)
+        labouring = not turning and self._labour_sign(
+            time, speed if speed_known else None, wheels, moving, signs
+        )
 
         if signs:
             if not memory.raised:
