@@ -324,6 +324,10 @@ class StuckMonitor:
         since = self._memory.since.setdefault(name, time)
         return time - since >= hold - 1e-9
 
+    def forget_trend(self) -> None:
+        """Begin the look-ahead anew: the level of the slip was wrong, which is no growth."""
+        self._memory.trend.clear()
+
     def _trend(self, time: float, typical: float, moving: bool) -> float:
         """Return the growth of the typical slip [1/s] over the last seconds, 0 when unknown."""
         trend = self._memory.trend

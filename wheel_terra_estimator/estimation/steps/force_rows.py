@@ -29,11 +29,14 @@ from wheel_terra_estimator.estimation.steps.turning_and_loads import ground_curv
 FloatArray = NDArray[np.float64]
 _NAN = math.nan
 _SLOPE_KEEP = 0.9  # per cycle
+# Errors of the models are the same over about this travel [m].
+_SAME_GROUND, _MOST_REPETITIONS = 0.1, 100.0
 _BALANCE_STD = 0.005  # of the weight: what curvature, ruts and mass leave open
 
 
 def model_rows(
     c: Context,
+    dt: float,
     rims: list[float],
     torque: list[float],
     residuals: list[float],
@@ -44,6 +47,7 @@ def model_rows(
     run, s, layout = c.run, c.settings, c.layout
     x, P = c.filter.mean, c.filter.covariance
     size = layout.size
+    repeats = repetitions(rims, dt)
     balance = np.zeros(size)
     balance_sum = 0.0
     open_variance = 0.0
@@ -82,9 +86,8 @@ def model_rows(
         balance_sum += pull
         reading = torque[i]
         if reading == reading:
-            variance = (
-                float(s.sensors.torque_std) ** 2 + (s.load_std**2 + scrub) * torque_model**2 + 1e-6
-            )
+            noise = float(s.sensors.torque_std) ** 2 + (s.load_std * torque_model) ** 2 + 1e-6
+            variance = repeats * noise + scrub * torque_model**2
             residual = reading - torque_model
             total = float(row_torque @ P @ row_torque) + variance
             nis = residual * residual / total
@@ -112,11 +115,8 @@ def model_rows(
         )
         residual = s.mass * run.force[0] - (balance_sum + weight * tilt - uphill)
         noise = float(s.sensors.specific_force_std) ** 2 / run.window.count
-        variance = (
-            s.mass**2 * (noise + float(s.sensors.specific_force_bias_std) ** 2)
-            + (_BALANCE_STD * weight) ** 2
-            + open_variance
-        )
+        known = s.mass**2 * (noise + float(s.sensors.specific_force_bias_std) ** 2)
+        variance = repeats * (known + (_BALANCE_STD * weight) ** 2) + open_variance
         total = float(balance @ P @ balance) + variance
         nis = residual * residual / total
         note_nis(c, 'balance', nis)
@@ -125,6 +125,16 @@ def model_rows(
         residuals.append(residual)
         variances.append(variance)
         rows.append(balance)
+
+
+def repetitions(rims: list[float], dt: float) -> float:
+    """Return how many cycles see the same ground, and so the same errors of the models.
+
+    Together they are one piece of information. Taken as many, each linearised anew at its own noisy
+    state, they leave T(s) = const no ridge: strength, K and slip run along it to anywhere.
+    """
+    travel = dt * max((abs(rim) for rim in rims if rim == rim), default=0.0)
+    return min(max(_SAME_GROUND / max(travel, 1e-9), 1.0), _MOST_REPETITIONS)
 
 
 def dragged_pull(c: Context, i: int, torque: float, load: float) -> float:

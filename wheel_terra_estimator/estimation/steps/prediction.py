@@ -158,7 +158,7 @@ def predict_wheels(
         F[zi, SLIP_SINKAGE] = -sensitivity * slip * bearing.log_depth
         by_ratio = math.log(bearing.load / slower.load) / 0.02
         F[zi, SPEED] = -sensitivity * by_ratio * direction / rim
-        # What the law does not know: a tenth of the sinkage per contact length, and digging.
+        # What the law does not know: a twentieth of the sinkage per contact length, and digging.
         digging = 0.05 * max(slip, 0.0) ** 2 * rim * dt
-        Q[zi, zi] = (0.1 * z_floor) ** 2 * 2.0 * alpha + digging**2 + 1e-9 * dt
+        Q[zi, zi] = (0.05 * z_floor) ** 2 * 2.0 * alpha + digging**2 + 1e-9 * dt
     return dt * math.fsum(travels) / len(rims) if travels else 0.0

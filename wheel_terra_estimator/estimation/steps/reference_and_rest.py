@@ -49,6 +49,7 @@ def fuse_reference(c: Context, time: float, reference: ReferenceVelocity, still:
         if run.reference_rejected >= 2 and same and not (beyond and run.reference_rejected < 4):
             # Fixes that keep disagreeing are right: open the state to them.
             c.filter.widen(SPEED, residual * residual)
+            c.monitor.forget_trend()
             run.reference_rejected = 0
         else:
             variance += chi_square_gate(residual, total, 4.0 if not beyond else 0.01)

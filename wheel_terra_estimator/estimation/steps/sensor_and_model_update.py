@@ -71,8 +71,9 @@ def fuse_models(c: Context, dt: float, rims: list[float], still: bool) -> None:
         run.starting = True
         run.torque_slope = [_NAN] * n
         run.pull_slope = [_NAN] * n
+        run.stand_pull = [_NAN] * n
     elif run.fresh_travel > c.contact_length:
-        model_rows(c, rims, torque, residuals, variances, rows)
+        model_rows(c, dt, rims, torque, residuals, variances, rows)
     if rows:
         # Without fixes slip and shear strength are not told apart: do not let them drift.
         held = () if reference_known(c) else (SHEAR_STRENGTH, SHEAR_MODULUS)

@@ -148,7 +148,7 @@ def initial_filter(c: Context) -> GatedFilter:
     upper[SLIP_SINKAGE], upper[CENTROID], upper[MOUND] = 0.8, 0.3, 0.6
     upper[layout.stiffness], upper[layout.shear_error] = 3.0, 1.5
     lower = -upper
-    upper[layout.sinkage] = [0.9 * r for r in s.rim_radius]
+    upper[layout.sinkage] = s.rim_radius
     lower[layout.sinkage] = [-0.02 * r for r in s.rim_radius]
     return GatedFilter(mean, P, lower, upper)
 
