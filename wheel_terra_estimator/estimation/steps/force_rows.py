@@ -30,7 +30,7 @@ FloatArray = NDArray[np.float64]
 _NAN = math.nan
 _SLOPE_KEEP = 0.9  # per cycle
 # Errors of the models are the same over about this travel [m].
-_SAME_GROUND, _MOST_REPETITIONS = 0.1, 100.0
+_SAME_GROUND, _MOST_REPETITIONS = 0.15, 100.0
 _BALANCE_STD = 0.005  # of the weight: what curvature, ruts and mass leave open
 
 

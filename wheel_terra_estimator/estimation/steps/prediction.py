@@ -30,7 +30,7 @@ from wheel_terra_estimator.estimation.steps.context import (
 
 FloatArray = NDArray[np.float64]
 # Slip of a rover in loose soil on level ground, its spread, and the rim travel of its changes [m].
-_USUAL_SLIP, _USUAL_STD, _USUAL_LENGTH = 0.12, 0.2, 1.0
+_USUAL_SLIP, _USUAL_STD, _USUAL_LENGTH = 0.12, 0.2, 1.5
 
 
 def predict(c: Context, time: float, dt: float, rims: list[float], still: bool) -> None:
