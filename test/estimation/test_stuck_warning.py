@@ -184,3 +184,18 @@ def test_spin_in_place_raises_nothing():
 
     assert raised(turning=False) is not None  # without the turning it would be a rover that bogs
     assert raised(turning=True) is None
+
+
+def test_a_level_found_to_be_wrong_is_no_growth():
+    """After wild fixes the speed is opened to them: the jump of the slip is not a trend."""
+
+    def warned(forget):
+        monitor = StuckMonitor(StuckTuning())
+        before = course([[wheel(0.3)] * 6] * 100, monitor=monitor)
+        if forget:
+            monitor.forget_trend()
+        after = course([[wheel(0.68)] * 6] * 60, monitor=monitor, start=10.0)
+        return first(before + after) is not None
+
+    assert warned(forget=False)
+    assert not warned(forget=True)

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The whole estimator on short simulated drives: signs, situations, missing inputs."""
 
-from dataclasses import fields
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -16,6 +16,7 @@ from wheel_terra_estimator.estimation.measurements import (
     WheelOdometry,
 )
 from wheel_terra_estimator.estimation.wheel_soil_estimator import WheelSoilEstimator
+from wheel_terra_estimator.evaluation import kinds
 from wheel_terra_estimator.evaluation.runner import inputs_of_mode
 from wheel_terra_estimator.simulation.drive import simulate
 from wheel_terra_estimator.simulation.scenario import load
@@ -263,3 +264,38 @@ def test_parts_of_the_wheels_and_nan_are_taken():
     assert (s.slip_class[3:] == SlipClass.UNKNOWN).all()
     assert (s.slip_class[:3] != SlipClass.UNKNOWN).all()
     assert np.isfinite(s.slip).all()
+
+
+@pytest.mark.parametrize(
+    ('kind', 'mode', 'most'),
+    [(kinds.FIRM, 'reference', 0.03), (kinds.KINDS['cruise'], 'no_reference', 0.05)],
+)
+def test_nothing_drifts_along_the_ridge_of_slip_and_strength(kind, mode, most):
+    """One contact, looked at ten times a second, must not tell slip, strength and K apart."""
+    d = simulate(load({**kind, 'duration': 60.0, 'sensors.jitter': 0.0}), 1000)
+    row = {int(stamp): i for i, stamp in enumerate(d.truth.stamp)}
+    sets = [s for s in estimate(d, mode) if s.stamp in row][100:]
+    error = [np.nanmedian(s.slip - d.truth.slip[row[s.stamp]]) for s in sets]
+    assert np.sqrt(np.mean(np.square(error))) < most
+    found = dict(zip(sets[-1].soil_names, sets[-1].soil, strict=True))
+    nominal = d.configuration.soil
+    # The ground is off by 20 % (one deviation) in each; the drift ended at a factor of 0.37.
+    tangent = np.tan(np.radians(found['soil.friction_angle_deg']))
+    assert abs(np.log(tangent / np.tan(nominal.friction_angle))) < 0.6
+    assert abs(np.log(found['soil.shear_modulus'] / nominal.shear_modulus)) < 0.6
+
+
+def test_a_wheel_sunk_to_its_hub_is_followed():
+    d = drive()
+    sunk = 0.98 * float(d.configuration.wheels.radius[0])
+    half = d.arrivals[0].measurement.stamp + 8_000_000_000
+    estimator = WheelSoilEstimator(d.configuration)
+    for stamp, inputs in merged(inputs_of_mode(d.arrivals, 'reference')):
+        if inputs.sinkage is not None and stamp > half:
+            depth = inputs.sinkage.sinkage.copy()
+            depth[0] = sunk
+            inputs = replace(inputs, sinkage=replace(inputs.sinkage, sinkage=depth))
+        estimator.step(stamp, inputs)
+    found = estimator.estimates()
+    assert found.sinkage[0] == pytest.approx(sunk, abs=0.003)
+    assert found.sinkage[1] < 0.5 * sunk
