@@ -3,6 +3,7 @@
 """Stuck warning on made-up courses of slip: early where it digs, silent where it does not."""
 
 import math
+from dataclasses import replace
 
 from wheel_terra_estimator.estimation.stuck_warning import (
     StuckMonitor,
@@ -199,3 +200,26 @@ def test_a_level_found_to_be_wrong_is_no_growth():
 
     assert warned(forget=False)
     assert not warned(forget=True)
+
+
+def test_fixes_that_disagree_by_chance_are_no_bogging_down():
+    """Slip 0.66 +- 0.07 near the torque limit: each second another fix moves the speed."""
+    monitor = StuckMonitor(StuckTuning())
+    found = []
+    for i in range(300):
+        # 4 mm/s between fixes is what 3 mm/s of noise make of a speed of 17 mm/s.
+        slip = 0.66 + (0.04 if i // 10 % 2 else -0.04)
+        wheels = [replace(wheel(slip, torque=0.6), slip_std=0.07)] * 6
+        found.append(monitor.update(0.1 * i, 0.05 * (1.0 - slip), True, wheels))
+    assert first(found) is None
+
+
+def test_a_fast_loss_of_speed_near_the_torque_limit_is_bogging_down():
+    monitor = StuckMonitor(StuckTuning())
+    found = []
+    for i in range(100):
+        slip = 0.3 if i < 50 else min(0.3 + 0.02 * (i - 50), 0.85)
+        wheels = [wheel(slip, rim=1.0, torque=0.6)] * 4
+        found.append(monitor.update(0.1 * i, 1.0 - slip, True, wheels))
+    assert 5.0 < first(found) < 6.5
+    assert 'bogging down' in next(a.reason for a in found if a.stuck)

@@ -44,6 +44,7 @@ _DEEPENING, _DEEPENING_SLIP, _DEEP = 0.02, 0.2, 0.25
 _GROWTH_TRAVEL = 0.15  # [m] of rim travel over which it is taken
 _LEAST_TRAVEL = 0.05  # [m]; 0 is said of wheels that are stuck
 _BOG_WINDOW = 1.5  # [s] over which the loss of speed is taken
+_LOSS_DOUBT = 1.5  # taken off the loss, in deviations of the speed over that window
 _STOPPING_WINDOW, _STOPPING_SHARE = 1.0, 0.8  # [s], of the fastest rim speed in it
 _CRUISE_WINDOW = 5.0  # [s]
 _LONGEST_TIME = 600.0  # [s] said where no entrapment is in sight
@@ -238,7 +239,7 @@ class StuckMonitor:
             memory.speeds.clear()
             memory.since.pop('bog', None)
         else:
-            self._bog_sign(time, speed, wheels, moving, fastest, signs)
+            self._bog_sign(time, speed, speed_known, wheels, moving, fastest, signs)
         self._stall_sign(time, moving, stalled, fastest, signs)
         labouring = not turning and self._labour_sign(
             time, speed if speed_known else None, wheels, moving, signs
@@ -408,6 +409,7 @@ class StuckMonitor:
         self,
         time: float,
         speed: float,
+        speed_known: bool,
         wheels: Sequence[WheelMotionState],
         moving: Sequence[WheelMotionState],
         fastest: float,
@@ -425,6 +427,10 @@ class StuckMonitor:
             direction = 1.0 if max(moving, key=lambda w: abs(w.rim_speed)).rim_speed > 0 else -1.0
             ahead = direction * speed
             loss = -direction * _slope(speeds)
+            if speed_known:
+                # Less what fixes that disagree by chance make of it.
+                spread = median([w.slip_std for w in moving]) * fastest
+                loss -= _LOSS_DOUBT * spread / _BOG_WINDOW
             left = max(ahead, 0.0) / loss if loss > 1e-6 else math.inf
             bogging = 1.0 - ahead / fastest > tuning.bog_slip and left < tuning.bog_time
             bogging = bogging and memory.rolling_since is not None
