@@ -56,6 +56,16 @@ def test_contacts_under_change_open_the_speed_and_the_accelerometer_bounds_it():
     assert step(0.04, unrest=0.5, window=window)[1] <= 0.03**2 * 0.1
 
 
+def test_wheels_that_disagree_leave_the_speed_to_the_accelerometer():
+    """Two wheels spin up, two stand: the mean rim speed says nothing of the body."""
+    window = InertialWindow(speed_change=0.0, duration=0.1)
+    together, _ = step(0.1, rim_before=0.25, rim_now=0.30, window=window)
+    apart, variance = step(0.1, rim_before=0.25, rim_now=0.30, window=window, discord=0.05)
+    assert together > 0.105
+    assert apart == pytest.approx(0.1, abs=0.001)
+    assert variance <= 0.03**2 * 0.1
+
+
 def test_slow_rover_does_not_integrate_a_bias():
     window = InertialWindow(speed_change=0.02 * 0.1, duration=0.1)
     assert step(0.04, window=window)[0] == pytest.approx(0.04, abs=1e-4)

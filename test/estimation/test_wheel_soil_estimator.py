@@ -7,6 +7,7 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
+from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.estimation.estimates import SlipClass
 from wheel_terra_estimator.estimation.measurements import (
     InertialReading,
@@ -15,6 +16,8 @@ from wheel_terra_estimator.estimation.measurements import (
     StepInputs,
     WheelOdometry,
 )
+from wheel_terra_estimator.estimation.steps.context import rim_discord
+from wheel_terra_estimator.estimation.steps.start import start_context
 from wheel_terra_estimator.estimation.wheel_soil_estimator import WheelSoilEstimator
 from wheel_terra_estimator.evaluation import kinds
 from wheel_terra_estimator.evaluation.runner import inputs_of_mode
@@ -299,3 +302,23 @@ def test_a_wheel_sunk_to_its_hub_is_followed():
     found = estimator.estimates()
     assert found.sinkage[0] == pytest.approx(sunk, abs=0.003)
     assert found.sinkage[1] < 0.5 * sunk
+
+
+@pytest.mark.parametrize(
+    ('changes', 'expected'),
+    [
+        ([0.0, 0.0, 0.0, 0.0, 0.0, 0.3], 0.0),  # one odd wheel
+        ([0.2, 0.0, 0.0, 0.2], 0.1),  # two spin up beside two that stand
+        ([0.1, 0.1, 0.1, 0.1], 0.0),  # a ramp
+        ([np.nan, 0.0, 0.2], 0.0),  # too few to tell
+    ],
+)
+def test_disagreement_of_the_wheels(changes, expected):
+    c = start_context(reader.load(SAND if len(changes) == 6 else ['frostyboy']))
+    n = c.settings.wheel_count
+    changes = [*changes, *[np.nan] * (n - len(changes))]
+    c.run.rims_at_cycle = [0.3] * n
+    c.run.rim_speed = [0.3 + change for change in changes]
+    c.run.rate_time = [c.run.time] * n
+    noise = 3.0 * float(c.settings.sensors.wheel_rate_std) * c.settings.slip_radius[0]
+    assert rim_discord(c) == pytest.approx(max(expected - noise, 0.0))

@@ -127,6 +127,7 @@ def speed_step(
     unrest: float,
     window: InertialWindow,
     acceleration_noise: float,
+    discord: float = 0.0,
 ) -> SpeedStep:
     """Return the combined prediction of body speed over a step.
 
@@ -148,6 +149,8 @@ def speed_step(
         Accelerometer over the step.
     acceleration_noise : float
         Its white noise density [m/s^2 sqrt(s)].
+    discord : float
+        By how much the wheels disagree on the change of rim speed [m/s].
     """
     if rim_before is None or rim_now is None:
         # No wheels: hold the speed, open at the rate at which a rover may brake.
@@ -156,7 +159,7 @@ def speed_step(
         change = rim_now - rim_before
         mean = 0.5 * (abs(rim_before) + abs(rim_now))
         variance = mean * mean * ratio_walk**2 * mean * dt + (0.2 * change) ** 2 + 1e-8 * dt
-        variance += 2.0 * unrest * unrest * dt
+        variance += 2.0 * unrest * unrest * dt + discord * discord
         if abs(rim_before) > low_rim:
             gain, constant = rim_now / rim_before, 0.0
         else:

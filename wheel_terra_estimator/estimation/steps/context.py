@@ -107,7 +107,27 @@ def speed_step_to(c: Context, time: float) -> SpeedStep:
         unrest=run.unrest if reference_known(c) else 0.0,
         window=run.window,
         acceleration_noise=c.acceleration_noise,
+        discord=rim_discord(c),
     )
+
+
+def rim_discord(c: Context) -> float:
+    """Return by how much the wheels disagree on the change of rim speed since the cycle [m/s].
+
+    Median deviation from the median: one odd wheel makes none, two that spin up beside two that
+    stand do. What the noise of the rates makes is taken off.
+    """
+    run, s = c.run, c.settings
+    changes = []
+    for i, before in enumerate(run.rims_at_cycle):
+        now = rim_speed_of(c, i) + run.yaw_rate * s.lateral[i]
+        if now == now and before == before:
+            changes.append(now - before)
+    if len(changes) < 3:
+        return 0.0
+    middle = median(changes)
+    noise = 3.0 * float(s.sensors.wheel_rate_std) * max(s.slip_radius)
+    return max(median([abs(change - middle) for change in changes]) - noise, 0.0)
 
 
 def current_speed(c: Context) -> tuple[float, float]:

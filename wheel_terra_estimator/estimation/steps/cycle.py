@@ -70,6 +70,7 @@ def finish(
     run.unrest *= math.exp(-dt / 0.3)
     run.cycle_time = time
     run.rim_at_cycle = rim
+    run.rims_at_cycle = [r + run.yaw_rate * y for r, y in zip(rims, s.lateral, strict=True)]
     settled = run.fresh_travel > c.contact_length
     if rim is not None and abs(rim) > 2.0 * c.low_rim and settled:
         run.ratio = min(max(float(x[SPEED]) / rim, -0.5), 2.0)

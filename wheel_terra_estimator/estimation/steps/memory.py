@@ -32,6 +32,7 @@ class Memory:
     still_since: float | None = None
     sliding_until: float = -1.0
     rim_at_cycle: float | None = None
+    rims_at_cycle: list[float] = field(default_factory=list)  # without the turning; nan = unknown
     rim_speed: list[float] = field(default_factory=list)  # nan = unknown
     rate_time: list[float] = field(default_factory=list)
     torque_sum: list[float] = field(default_factory=list)
