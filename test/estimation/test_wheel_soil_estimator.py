@@ -16,7 +16,7 @@ from wheel_terra_estimator.estimation.measurements import (
     StepInputs,
     WheelOdometry,
 )
-from wheel_terra_estimator.estimation.steps.context import rim_discord
+from wheel_terra_estimator.estimation.steps.context import rim_discord, rims_without_turning
 from wheel_terra_estimator.estimation.steps.start import start_context
 from wheel_terra_estimator.estimation.wheel_soil_estimator import WheelSoilEstimator
 from wheel_terra_estimator.evaluation import kinds
@@ -321,4 +321,4 @@ def test_disagreement_of_the_wheels(changes, expected):
     c.run.rim_speed = [0.3 + change for change in changes]
     c.run.rate_time = [c.run.time] * n
     noise = 3.0 * float(c.settings.sensors.wheel_rate_std) * c.settings.slip_radius[0]
-    assert rim_discord(c) == pytest.approx(max(expected - noise, 0.0))
+    assert rim_discord(c, rims_without_turning(c)) == pytest.approx(max(expected - noise, 0.0))

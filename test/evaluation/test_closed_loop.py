@@ -16,4 +16,8 @@ def test_without_it_the_rover_digs_in_with_it_it_stops_in_time():
     assert limited.stopped is not None
     assert limited.sinkage.max() < 0.25 * radius
     assert limited.position[-1] > 1.0  # it did not stop on the good ground before the patch
-    assert '| 0 | 0.' in report([Comparison(0, radius, free, limited)])
+    row = report([Comparison(0, radius, free, limited)]).splitlines()[-1].split('|')
+    good, with_limiter, without = (float(cell) for cell in row[2:5])
+    assert good <= with_limiter
+    assert with_limiter == round(float(limited.sinkage.max()) / radius, 2)
+    assert without == round(float(free.sinkage.max()) / radius, 2)

@@ -70,11 +70,12 @@ def run(arguments: argparse.Namespace) -> int:
 
     if arguments.output and arguments.output.exists() and not arguments.overwrite:
         raise UserError(f'{arguments.output} exists; choose another name or give --overwrite')
+    first = (kinds.TUNING_SEEDS if arguments.tuning else kinds.TEST_SEEDS).start
+    seeds = range(first, first + arguments.seeds)
     if arguments.measured:
         text = real_drives.report(arguments.measured)
     elif arguments.limiter:
-        seeds = kinds.TUNING_SEEDS if arguments.tuning else kinds.TEST_SEEDS
-        drives = closed_loop.compare(seeds[: arguments.seeds])
+        drives = closed_loop.compare(seeds)
         text = closed_loop.report(drives)
         if arguments.output:
             closed_loop.picture(drives[0], arguments.output.with_suffix('.png'))
@@ -86,14 +87,13 @@ def run(arguments: argparse.Namespace) -> int:
             unknown = [name for name in given if name not in known]
             if unknown:
                 raise UserError(f'no {what} {unknown[0]!r}; there are {", ".join(known)}')
-        first = (kinds.TUNING_SEEDS if arguments.tuning else kinds.TEST_SEEDS).start
         from tqdm import tqdm
 
         total = len(arguments.kinds) * arguments.seeds
         with tqdm(total=total, unit='drive') as bar:
             results = bench.run(
                 arguments.kinds,
-                range(first, first + arguments.seeds),
+                seeds,
                 arguments.modes,
                 arguments.processes,
                 lambda _: bar.update(),

@@ -421,9 +421,8 @@ class StuckMonitor:
         while time - speeds[0][0] > _BOG_WINDOW + 1e-6:
             speeds.popleft()
         bogging, left = False, 0.0
-        torques = sorted((w.torque_share for w in wheels if w.torque_share >= 0.0), reverse=True)
         # Two wheels or more: one alone may stand against a stone.
-        if len(torques) > 1 and torques[1] > tuning.bog_torque and moving and fastest > 0.0:
+        if _second_strongest(wheels) > tuning.bog_torque and moving and fastest > 0.0:
             direction = 1.0 if max(moving, key=lambda w: abs(w.rim_speed)).rim_speed > 0 else -1.0
             ahead = direction * speed
             loss = -direction * _slope(speeds)
@@ -458,11 +457,9 @@ class StuckMonitor:
         cruise.append((time, typical))
         while time - cruise[0][0] > _CRUISE_WINDOW:
             cruise.popleft()
-        torques = sorted((w.torque_share for w in wheels if w.torque_share >= 0.0), reverse=True)
         # Two wheels near their limit and slower than the fastest, the rover slower still.
         held_back = (
-            len(torques) > 1
-            and torques[1] >= tuning.labour_torque
+            _second_strongest(wheels) >= tuning.labour_torque
             and typical < tuning.labour_ratio * fastest
             and (speed is None or 1.0 - abs(speed) / fastest > tuning.bog_slip)
         )
@@ -489,6 +486,12 @@ class StuckMonitor:
                 signs['stall'] = f'{count} wheels stalled near their torque limit'
         else:
             self._memory.since.pop('stall', None)
+
+
+def _second_strongest(wheels: Sequence[WheelMotionState]) -> float:
+    """Return the second greatest share of the torque limit [-]; 0 where fewer are known."""
+    shares = sorted(w.torque_share for w in wheels if w.torque_share >= 0.0)
+    return shares[-2] if len(shares) > 1 else 0.0
 
 
 def _slope(samples: Sequence[tuple[float, float]] | deque[tuple[float, float]]) -> float:

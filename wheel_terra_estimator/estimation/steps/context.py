@@ -81,24 +81,27 @@ def rim_speed_of(c: Context, wheel: int) -> float:
     return run.rim_speed[wheel]
 
 
-def representative_rim(c: Context, yaw_rate: float) -> float | None:
-    """Rim speed without the turning [m/s]; the median, so that no single wheel decides."""
-    values = []
-    for i in range(c.settings.wheel_count):
-        rim = rim_speed_of(c, i)
-        if rim == rim:
-            values.append(rim + yaw_rate * c.settings.lateral[i])
-    return median(values) if values else None
+def rims_without_turning(c: Context) -> list[float]:
+    """Rim speed of each wheel less its share of the turning [m/s]; nan = unknown."""
+    yaw_rate, lateral = c.run.yaw_rate, c.settings.lateral
+    return [rim_speed_of(c, i) + yaw_rate * y for i, y in enumerate(lateral)]
+
+
+def typical_rim(rims: list[float]) -> float | None:
+    """Median of the known rim speeds, so that no single wheel decides; None = none is known."""
+    known = [rim for rim in rims if rim == rim]
+    return median(known) if known else None
 
 
 def speed_step_to(c: Context, time: float) -> SpeedStep:
     """Return how the speed goes on from the last cycle to a time [s]."""
     run = c.run
     dt = 0.0 if run.cycle_time is None else time - run.cycle_time
+    rims = rims_without_turning(c)
     return speed_step(
         dt=dt,
-        rim_before=run.rim_at_cycle,
-        rim_now=representative_rim(c, run.yaw_rate),
+        rim_before=typical_rim(run.rims_at_cycle),
+        rim_now=typical_rim(rims),
         ratio=run.ratio,
         ratio_std=run.ratio_std,
         low_rim=c.low_rim,
@@ -107,22 +110,24 @@ def speed_step_to(c: Context, time: float) -> SpeedStep:
         unrest=run.unrest if reference_known(c) else 0.0,
         window=run.window,
         acceleration_noise=c.acceleration_noise,
-        discord=rim_discord(c),
+        discord=rim_discord(c, rims),
     )
 
 
-def rim_discord(c: Context) -> float:
+def rim_discord(c: Context, rims: list[float]) -> float:
     """Return by how much the wheels disagree on the change of rim speed since the cycle [m/s].
 
     Median deviation from the median: one odd wheel makes none, two that spin up beside two that
     stand do. What the noise of the rates makes is taken off.
     """
-    run, s = c.run, c.settings
-    changes = []
-    for i, before in enumerate(run.rims_at_cycle):
-        now = rim_speed_of(c, i) + run.yaw_rate * s.lateral[i]
-        if now == now and before == before:
-            changes.append(now - before)
+    s = c.settings
+    changes = [
+        now - before
+        for now, before in zip(
+            rims, c.run.rims_at_cycle, strict=False
+        )  # none is kept before the first cycle
+        if now == now and before == before
+    ]
     if len(changes) < 3:
         return 0.0
     middle = median(changes)
@@ -178,6 +183,17 @@ def note_nis(c: Context, channel: str, nis: float) -> None:
     """Keep the normalised innovation squared of a channel, smoothed."""
     nis_of = c.run.nis
     nis_of[channel] = 0.95 * nis_of.get(channel, 1.0) + 0.05 * min(nis, 100.0)
+
+
+def slope_share(c: Context) -> float:
+    """Return what the ground asks of each wheel along the body, as a share of its load [-]."""
+    force = c.run.force
+    return force[0] / max(force[2], 0.1)
+
+
+def bears_and_turns(c: Context, wheel: int, rim: float) -> bool:
+    """Say whether the contact models hold for a wheel: it turns under a load."""
+    return rim == rim and abs(rim) >= 2.0 * c.settings.rest_speed and c.run.load[wheel] >= 1e-3
 
 
 def distrusted(c: Context, channel: str, variance: float) -> float:

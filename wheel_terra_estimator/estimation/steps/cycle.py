@@ -11,7 +11,12 @@ from numpy.typing import NDArray
 
 from wheel_terra_estimator.estimation.filter_state import SPEED
 from wheel_terra_estimator.estimation.measurements import ReferenceVelocity
-from wheel_terra_estimator.estimation.steps.context import Context, representative_rim, rim_speed_of
+from wheel_terra_estimator.estimation.steps.context import (
+    Context,
+    rim_speed_of,
+    rims_without_turning,
+    typical_rim,
+)
 from wheel_terra_estimator.estimation.steps.prediction import predict
 from wheel_terra_estimator.estimation.steps.pulls import floor_speed_variance, work_out_pulls
 from wheel_terra_estimator.estimation.steps.reference_and_rest import fuse_reference, fuse_rest
@@ -38,9 +43,10 @@ def run_cycle(c: Context, time: float, reference: ReferenceVelocity | None) -> N
         follow_turning(c, window, dt)
         run.load = wheel_loads(c)
         note_turning(c, dt)
-    rim = representative_rim(c, run.yaw_rate)
+    unturned = rims_without_turning(c)
+    rim = typical_rim(unturned)
     follow_direction(c, rim)
-    if run.rim_at_cycle is None and rim is not None:
+    if typical_rim(run.rims_at_cycle) is None and rim is not None:
         # First sight of the wheels: between rolling and spinning, or at rest.
         spread = max(0.3 * abs(rim), s.rest_speed)
         c.filter.set(SPEED, run.ratio * rim, spread * spread)
@@ -52,7 +58,8 @@ def run_cycle(c: Context, time: float, reference: ReferenceVelocity | None) -> N
         fuse_reference(c, time, reference, still)
     fuse_rest(c, time, rims, rim, still)
     fuse_models(c, dt, rims, still)
-    finish(c, time, dt, rim, rims, still, before)
+    run.rims_at_cycle = unturned
+    finish(c, time, dt, rim, rims, before)
 
 
 def finish(
@@ -61,7 +68,6 @@ def finish(
     dt: float,
     rim: float | None,
     rims: list[float],
-    still: bool,
     sinkage_before: FloatArray,
 ) -> None:
     """Keep what the next cycle needs, work out pulls and sinkage rates."""
@@ -69,8 +75,6 @@ def finish(
     x, P = c.filter.mean, c.filter.covariance
     run.unrest *= math.exp(-dt / 0.3)
     run.cycle_time = time
-    run.rim_at_cycle = rim
-    run.rims_at_cycle = [r + run.yaw_rate * y for r, y in zip(rims, s.lateral, strict=True)]
     settled = run.fresh_travel > c.contact_length
     if rim is not None and abs(rim) > 2.0 * c.low_rim and settled:
         run.ratio = min(max(float(x[SPEED]) / rim, -0.5), 2.0)
@@ -81,6 +85,6 @@ def finish(
         for i in range(s.wheel_count):
             run.sinkage_rate[i] += (1.0 - keep) * (float(change[i]) - run.sinkage_rate[i])
             zi = layout.sinkage.start + i
-            run.sinkage_rate_std[i] = math.sqrt(2.0 * float(P[zi, zi])) / 1.0
+            run.sinkage_rate_std[i] = math.sqrt(2.0 * float(P[zi, zi]))
     floor_speed_variance(c, rims)
     work_out_pulls(c, rims)

@@ -20,9 +20,11 @@ from wheel_terra_estimator.estimation.filter_state import (
 from wheel_terra_estimator.estimation.measurement_models import WheelForces
 from wheel_terra_estimator.estimation.steps.context import (
     Context,
+    bears_and_turns,
     distrusted,
     leaving_angle_of,
     note_nis,
+    slope_share,
 )
 from wheel_terra_estimator.estimation.steps.turning_and_loads import ground_curvature
 
@@ -47,31 +49,38 @@ def model_rows(
     run, s, layout = c.run, c.settings, c.layout
     x, P = c.filter.mean, c.filter.covariance
     size = layout.size
+
+    def add(channel: str, residual: float, row: FloatArray, variance: float) -> None:
+        total = float(row @ P @ row) + variance
+        note_nis(c, channel, residual * residual / total)
+        # A soil change looks like an outlier: weaken it, do not lock it out.
+        variance = distrusted(c, channel, variance)
+        residuals.append(residual)
+        variances.append(variance + chi_square_gate(residual, total, float(s.filter.gate)))
+        rows.append(row)
+
     repeats = repetitions(rims, dt)
     balance = np.zeros(size)
     balance_sum = 0.0
     open_variance = 0.0
     jacobian, jacobian_torque = np.zeros((2, s.wheel_count, size))
     pulls, torques = np.zeros((2, s.wheel_count))
-    gate = float(s.filter.gate)
     # After a start the shear builds up over the contact length.
     fresh = 2.5 * math.exp(-2.0 * (run.fresh_travel / c.contact_length - 1.0))
     for i, rim in enumerate(rims):
         load = run.load[i]
         run.stand_pull[i] = _NAN
-        if rim == rim and abs(rim) < 2.0 * s.rest_speed and load >= 1e-3:
-            pull = dragged_pull(c, i, torque[i], load)
+        if not bears_and_turns(c, i, rim):
+            stands = rim == rim and load >= 1e-3
+            pull = dragged_pull(c, i, torque[i], load) if stands else _NAN
             if pull == pull:
                 run.stand_pull[i] = pull
-                balance_sum += pull
                 unsure = 0.1 + float(s.sensors.torque_gain_std)
-                open_variance += (unsure * load) ** 2
-                continue
-        if rim != rim or abs(rim) < 2.0 * s.rest_speed or load < 1e-3:
-            # Standing, lifted or unknown: it may carry its share of the slope, or nothing.
-            share = load * run.force[0] / max(run.force[2], 0.1)
-            balance_sum += share
-            open_variance += (0.3 * load) ** 2
+            else:
+                # Standing, lifted or unknown: it may carry its share of the slope, or nothing.
+                pull, unsure = load * slope_share(c), 0.3
+            balance_sum += pull
+            open_variance += (unsure * load) ** 2
             continue
         direction = 1.0 if rim > 0.0 else -1.0
         pull, torque_model, row_pull, row_torque = wheel_rows(c, i, rim, direction)
@@ -88,16 +97,7 @@ def model_rows(
         if reading == reading:
             noise = float(s.sensors.torque_std) ** 2 + (s.load_std * torque_model) ** 2 + 1e-6
             variance = repeats * noise + scrub * torque_model**2
-            residual = reading - torque_model
-            total = float(row_torque @ P @ row_torque) + variance
-            nis = residual * residual / total
-            note_nis(c, 'torque', nis)
-            # A soil change looks like an outlier: weaken it, do not lock it out.
-            variance = distrusted(c, 'torque', variance)
-            variance += chi_square_gate(residual, total, gate)
-            residuals.append(residual)
-            variances.append(variance)
-            rows.append(row_torque)
+            add('torque', reading - torque_model, row_torque, variance)
     c.pull_jacobian = jacobian
     c.linear = (x.copy(), pulls, jacobian_torque, torques)
     set_ratio_walk(c, jacobian, rims)
@@ -117,14 +117,7 @@ def model_rows(
         noise = float(s.sensors.specific_force_std) ** 2 / run.window.count
         known = s.mass**2 * (noise + float(s.sensors.specific_force_bias_std) ** 2)
         variance = repeats * (known + (_BALANCE_STD * weight) ** 2) + open_variance
-        total = float(balance @ P @ balance) + variance
-        nis = residual * residual / total
-        note_nis(c, 'balance', nis)
-        variance = distrusted(c, 'balance', variance)
-        variance += chi_square_gate(residual, total, gate)
-        residuals.append(residual)
-        variances.append(variance)
-        rows.append(balance)
+        add('balance', residual, balance, variance)
 
 
 def repetitions(rims: list[float], dt: float) -> float:

@@ -31,8 +31,7 @@ class Memory:
     reference_gap: float = 10.0  # [s] between fixes, smoothed
     still_since: float | None = None
     sliding_until: float = -1.0
-    rim_at_cycle: float | None = None
-    rims_at_cycle: list[float] = field(default_factory=list)  # without the turning; nan = unknown
+    rims_at_cycle: list[float] = field(default_factory=list)  # without the turning; [] = no cycle
     rim_speed: list[float] = field(default_factory=list)  # nan = unknown
     rate_time: list[float] = field(default_factory=list)
     torque_sum: list[float] = field(default_factory=list)

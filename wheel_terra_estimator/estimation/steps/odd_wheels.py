@@ -14,7 +14,7 @@ _UNLOADED_HOLD = 0.3
 _EFFORT_GAIN = 0.5
 
 
-def watch_torques(c: Context, dt: float, torque: list[float], rims: list[float]) -> None:
+def watch_torques(c: Context, torque: list[float], rims: list[float]) -> None:
     """Find wheels that carry nothing, and sudden changes of what the wheels must give."""
     run, s = c.run, c.settings
     rolling = [

@@ -24,8 +24,10 @@ from wheel_terra_estimator.estimation.steps.context import (
     Context,
     leaving_angle_of,
     reference_known,
-    representative_rim,
+    rims_without_turning,
+    slope_share,
     speed_step_to,
+    typical_rim,
 )
 
 FloatArray = NDArray[np.float64]
@@ -59,17 +61,15 @@ def predict(c: Context, time: float, dt: float, rims: list[float], still: bool) 
         walk = float(s.filter.soil_walk) ** 2 * travel
         learn = walk if reference_known(c) else 0.0
         forget = math.exp(-travel / 100.0)
-        for index, walk_std in (
-            (SHEAR_STRENGTH, 0.1),
-            (SHEAR_MODULUS, 0.1),
-            (SLIP_SINKAGE, 0.05),
+        for index, walk_std, rate in (
+            (SHEAR_STRENGTH, 0.1, learn),
+            (SHEAR_MODULUS, 0.1, learn),
+            (SLIP_SINKAGE, 0.05, learn),
+            (CENTROID, 0.05, walk),
         ):
             mean[index] *= forget
             F[index, index] = forget
-            Q[index, index] = walk_std**2 * learn
-        mean[CENTROID] *= forget
-        F[CENTROID, CENTROID] = forget
-        Q[CENTROID, CENTROID] = 0.05**2 * walk
+            Q[index, index] = walk_std**2 * rate
         Q[MOUND, MOUND] = 0.05**2 * walk
         n = s.wheel_count
         k = layout.stiffness
@@ -88,11 +88,10 @@ def lean_on_experience(c: Context, step: SpeedStep, dt: float) -> SpeedStep:
     On deep or saturated contacts torque and pull hardly change with slip. There the posterior
     is the prior, and a random walk is no prior: it ends anywhere.
     """
-    run = c.run
-    rim = representative_rim(c, run.yaw_rate)
+    rim = typical_rim(rims_without_turning(c))
     if rim is None or abs(rim) < c.low_rim:
         return step
-    demand = run.drive_direction * run.force[0] / max(run.force[2], 0.1)
+    demand = c.run.drive_direction * slope_share(c)
     usual = 1.0 - min(max(_USUAL_SLIP + (1.2 if demand > 0.0 else 0.4) * demand, -0.2), 0.8)
     keep = math.exp(-abs(rim) * dt / _USUAL_LENGTH)
     return SpeedStep(

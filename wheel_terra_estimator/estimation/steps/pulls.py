@@ -9,7 +9,7 @@ import math
 import numpy as np
 
 from wheel_terra_estimator.estimation.filter_state import SPEED
-from wheel_terra_estimator.estimation.steps.context import Context
+from wheel_terra_estimator.estimation.steps.context import Context, bears_and_turns, slope_share
 
 _LEAST_SLIP_STD, _LEAST_TURNING_STD = 0.02, 0.04
 _PILED_STD = 0.05  # of the load, at slip 1
@@ -28,7 +28,7 @@ def work_out_pulls(c: Context, rims: list[float]) -> None:
     """Work out pulls and torques after the update, to first order from the last pass."""
     run, s = c.run, c.settings
     x, P = c.filter.mean, c.filter.covariance
-    slope_share = run.force[0] / max(run.force[2], 0.1)
+    share = slope_share(c)
     zero = float(s.sensors.torque_zero_std)
     gain = float(s.sensors.torque_gain_std)
     linear, c.linear = c.linear, None
@@ -40,17 +40,16 @@ def work_out_pulls(c: Context, rims: list[float]) -> None:
         spread = np.einsum('ij,jk,ik->i', c.pull_jacobian, P, c.pull_jacobian)
     for i, rim in enumerate(rims):
         load = run.load[i]
-        turning = rim == rim and abs(rim) >= 2.0 * s.rest_speed and load >= 1e-3
-        if not turning:
+        if not bears_and_turns(c, i, rim):
             # Static friction carries the slope, or it is dragged along.
             pull = run.stand_pull[i]
-            run.pull[i] = pull if pull == pull else load * slope_share
+            run.pull[i] = pull if pull == pull else load * share
             run.torque_now[i] = run.pull[i] * s.rim_radius[i]
             run.pull_std[i] = (0.1 * load if run.force_known else load) + 1e-3
             continue
         if linear is None:
             # The contact is fresh after a start: the load's share is the best guess.
-            run.pull[i] = load * slope_share
+            run.pull[i] = load * share
             run.pull_std[i] = 0.1 * load + 1e-3
             continue
         # First order from far away overshoots: no soil gives more than the load.

@@ -65,7 +65,7 @@ def fuse_models(c: Context, dt: float, rims: list[float], still: bool) -> None:
         if run.torque_count[i]:
             run.torque_held[i] = torque[i]
         run.torque_sum[i], run.torque_count[i] = 0.0, 0
-    watch_torques(c, dt, torque, rims)
+    watch_torques(c, torque, rims)
     if still:
         run.fresh_travel = 0.0
         run.starting = True

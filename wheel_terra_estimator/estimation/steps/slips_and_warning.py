@@ -17,6 +17,7 @@ from wheel_terra_estimator.estimation.steps.context import (
     Context,
     current_speed,
     rim_speed_of,
+    slope_share,
     yaw_rate_std,
 )
 from wheel_terra_estimator.estimation.stuck_warning import WheelMotionState
@@ -148,5 +149,5 @@ def work_out_margins(c: Context) -> None:
             for slip in (0.3, 0.6, 0.9)
         )
         direction = run.drive_direction or 1.0
-        demand = direction * load * run.force[0] / max(run.force[2], 0.1)
+        demand = direction * load * slope_share(c)
         run.pull_margin[i] = best - demand

@@ -8,7 +8,7 @@ import math
 
 from wheel_terra_estimator.estimation.filter_state import SPEED
 from wheel_terra_estimator.estimation.speed_process import InertialWindow
-from wheel_terra_estimator.estimation.steps.context import Context, open_shear
+from wheel_terra_estimator.estimation.steps.context import Context, open_shear, slope_share
 
 
 def follow_turning(c: Context, window: InertialWindow, dt: float) -> None:
@@ -27,7 +27,7 @@ def follow_turning(c: Context, window: InertialWindow, dt: float) -> None:
 
 
 def note_turning(c: Context, dt: float) -> None:
-    """Open the shear strength where turning begins or ends: the contacts form anew."""
+    """Note where turning begins or ends: the contacts form anew."""
     run = c.run
     known = [abs(r) for r in run.rim_speed if r == r]
     fastest = max(known, default=0.0)
@@ -78,8 +78,7 @@ def follow_direction(c: Context, rim: float | None) -> None:
     direction = 1.0 if rim > 0.0 else -1.0
     if direction != run.drive_direction:
         if run.drive_direction != 0.0:
-            demand = direction * run.force[0] / max(run.force[2], 0.1)
-            run.ratio = min(max(0.9 - demand, 0.2), 1.1)
+            run.ratio = min(max(0.9 - direction * slope_share(c), 0.2), 1.1)
         run.ratio_std = 0.3
         run.drive_direction = direction
         run.fresh_travel = 0.0
