@@ -7,7 +7,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from wheel_terra_estimator.discrepancy.table import check_table, read_table
+from wheel_terra_estimator.discrepancy.table import (
+    averaged,
+    check_table,
+    check_wheel_of_model,
+    read_table,
+)
 from wheel_terra_estimator.errors import UserError
 
 HEADER = 'slip,normal_load,sinkage,drawbar_pull,torque'
@@ -62,6 +67,13 @@ def test_reads_numbers_gaps_and_extra_columns(tmp_path):
         ('slip,normal_load,a,b,c', ('none of sinkage',)),
         ('0.1,80,0.01,3,4', ('no header',)),
         ('slip,slip,sinkage,drawbar_pull,torque', ('twice',)),
+        ('slip,Fz,sinkage,drawbar_pull,torque', ("rename 'Fz' to 'normal_load' [N]",)),
+        ('slip,normal_load,z,DP,T', ("rename 'z' to 'sinkage' [m]",)),
+        (HEADER.replace(',', ';'), ('line 1', "separated by ';'", 'commas')),
+        (HEADER.replace(',', '\t'), ('separated by tabs',)),
+        ('Rig test 12\n' + HEADER, ('line 1', 'stand in line 2', 'delete')),
+        (HEADER + '\n-,N,m,N,N m', ('line 2', 'no numbers', 'delete')),
+        ('PK\x03\x04', ('not text', 'CSV')),
     ],
 )
 def test_columns_misspelt_or_missing(tmp_path, header, parts):
@@ -83,6 +95,10 @@ def test_column_names_alone_are_no_table(tmp_path):
     [
         ('abc', ('line 5', 'torque', 'abc', 'not a number')),
         ('inf', ('line 5', 'torque', 'not finite')),
+        ('"1,25"', ('line 5', 'torque', 'point as decimal')),
+        ('"1,234.5"', ('line 5', 'between thousands')),
+        ('12 %', ('line 5', 'without a percent sign')),
+        ('\u22124.1', ('line 5', 'plain minus')),
         ('1,2', ('line 5', '6 cells', 'point as decimal')),
     ],
 )
@@ -109,6 +125,17 @@ def test_cells_that_are_no_numbers(tmp_path, cell, parts):
         ({'pass_number': np.zeros(8)}, ('pass_number', 'outside')),
         ({'slip': np.full(8, 0.2) + 1e-3 * np.arange(8)}, ('slip only from', 'add rows with slip')),
         ({'torque': None, 'sinkage': None, 'drawbar_pull': None}, ('none of the columns',)),
+        ({'lug_count': np.full(8, 12.5)}, ('lug_count', 'whole number')),
+        (
+            {'wheel_radius': np.full(8, 0.1), 'lug_height': np.full(8, 0.2)},
+            ('lug_height', 'more than the wheel radius'),
+        ),
+        ({'sinkage_std': np.full(8, 0.5)}, ('sinkage_std', 'ten times', 'both in m')),
+        ({'torque': -2.0 - 4.0 * np.linspace(0.05, 0.8, 8)}, ('line 4', 'torque', 'wrong sign')),
+        ({'slip': -np.linspace(0.05, 0.8, 8), 'drawbar_pull': np.full(8, 9.0)}, ('wrong sign',)),
+        ({'angular_velocity': np.full(8, -0.3)}, ('torque', 'wrong sign', 'reverse')),
+        ({'leaving_angle': np.full(8, 0.2)}, ('leaving_angle', 'behind the hub is negative')),
+        ({'sinkage': np.full(8, 0.004)}, ('sinkage', 'all 8 rows', 'leave the column out')),
         ({'slip': np.r_[np.nan, np.linspace(0.1, 0.8, 7)]}, ('slip', 'missing')),
     ],
 )
@@ -135,3 +162,55 @@ def test_copies_count_once_but_repeats_stay():
     checked = check_table('x.csv', table)
     assert len(checked) == 9
     assert any('copies' in note for note in checked.notes)
+
+
+def test_readings_that_look_odd_are_said_and_used():
+    table = rows()
+    table.update(sinkage=-table['sinkage'], drawbar_pull=-table['drawbar_pull'])
+    notes = check_table('x.csv', table).notes
+    assert any('sinkages are negative' in note for note in notes)
+    assert any('drawbar_pull falls with slip' in note for note in notes)
+    still = check_table('x.csv', rows(sinkage=np.full(8, 0.004), sinkage_std=np.full(8, 1e-3)))
+    assert any('0.004 m in all 8 rows' in note for note in still.notes)
+    narrow = rows(slip=np.full(8, 0.2), normal_load=np.linspace(40, 90, 8))
+    assert any('slip only from 0.2' in note for note in check_table('x.csv', narrow).notes)
+    # A skidding wheel may take torque (friction before it) as long as it does not pull.
+    skid = rows(slip=-np.linspace(0.1, 0.8, 8), drawbar_pull=np.linspace(-5, -30, 8))
+    assert len(check_table('x.csv', skid)) == 8
+
+
+def test_wheel_of_the_table_against_that_of_the_model_file():
+    table = check_table('x.csv', rows(wheel_radius=np.full(8, 0.25)))
+    check_wheel_of_model(table, (), ())
+    check_wheel_of_model(table, (0.11, 0.2), (0.1,))
+    with pytest.raises(UserError, match=r'line 2, column wheel_radius: 0.25 m.*wheels.radius'):
+        check_wheel_of_model(table, (0.125,), ())
+
+
+def test_many_rows_are_averaged_over_neighbouring_inputs():
+    rng = np.random.default_rng(3)
+    count = 3000
+    slip, load = rng.uniform(0.02, 0.8, count), rng.choice([50.0, 80.0, 120.0], count)
+    truth = 3.0 * slip + 0.02 * load
+    torque = truth + rng.normal(0.0, 0.1, count)
+    torque[::97] += 30.0
+    sinkage = np.where(rng.random(count) < 0.1, np.nan, 1e-4 * load * (1 + slip))
+    many = {
+        'slip': slip,
+        'normal_load': load,
+        'sinkage': sinkage,
+        'torque': torque,
+        'torque_std': np.full(count, 0.1),
+    }
+    table = check_table('x.csv', many)
+    assert 200 <= len(table) <= 240
+    assert any('3000 rows were averaged' in note for note in table.notes)
+    assert set(np.unique(table.columns['normal_load'])) == {50.0, 80.0, 120.0}, 'loads not mixed'
+    expected = 3.0 * table.columns['slip'] + 0.02 * table.columns['normal_load']
+    whitened = (table.measured[:, 2] - expected) / table.stated_std[:, 2]
+    # Means scatter as their deviations say, outliers and all.
+    assert 0.85 < np.std(whitened) < 1.2
+    bent = table.measured[:, 0] / (1e-4 * table.columns['normal_load'])
+    full = np.isfinite(table.measured[:, 0])
+    assert np.allclose(bent[full], 1 + table.columns['slip'][full], atol=1e-9)
+    assert len(averaged(table.select(np.arange(10)), 4)) == 4

@@ -6,7 +6,9 @@ from __future__ import annotations
 
 import csv
 import difflib
-from collections.abc import Iterable, Mapping, Sequence
+import heapq
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -37,6 +39,19 @@ COLUMNS = (*INPUT_UNITS, *QUANTITIES, 'leaving_angle', *STD_COLUMNS)
 MINIMUM_ROWS = 6
 MINIMUM_SLIP_SPAN = 0.1
 MINIMUM_LOAD_RATIO = 1.5
+MOST_ROWS = 240  # more are averaged over neighbouring inputs: the time grows with their cube
+CLEAR_SLIP = 0.2  # beyond it a wheel's torque has the sign of its slip
+_FAR = 8.0  # pooled robust deviations from the median of a cell
+LIKE_WHEEL = 1.4  # factor within which a row's wheel may differ from that of the model file
+
+# What other people call the required columns; only for the cure in a message.
+_OTHER_NAMES = {
+    'slip': ('s', 'i', 'slip_ratio', 'sr', 'schlupf'),
+    'normal_load': ('w', 'fz', 'fn', 'load', 'vertical_load', 'weight', 'wheel_load', 'radlast'),
+    'sinkage': ('z', 'depth', 'sinkage_depth', 'einsinkung'),
+    'drawbar_pull': ('dp', 'fx', 'f_dp', 'pull', 'drawbar', 'traction', 'zugkraft'),
+    'torque': ('t', 'm', 'mz', 'moment', 'drive_torque', 'drehmoment'),
+}
 
 
 @dataclass(frozen=True)
@@ -114,20 +129,24 @@ def read_table(path: str | Path) -> SteadyTable:
     path = Path(path)
     try:
         with path.open(encoding='utf-8-sig', newline='') as stream:
-            rows = list(csv.reader(stream))
+            reader = csv.reader(stream)
+            rows = [(reader.line_num, row) for row in reader]
     except FileNotFoundError:
         raise UserError(f'{path}: no such file; give the path of a CSV table') from None
     except IsADirectoryError:
         raise UserError(f'{path}: is a folder; give a CSV table or a rosbag2') from None
+    except OSError as error:
+        raise UserError(f'{path}: cannot be read ({error.strerror}); check its rights') from None
     except (UnicodeDecodeError, csv.Error) as error:
         raise UserError(f'{path}: not a CSV text in UTF-8 ({error}); export it again') from None
     numbered = [
         (line, [cell.strip() for cell in row])
-        for line, row in enumerate(rows, start=1)
+        for line, row in rows
         if any(cell.strip() for cell in row)
     ]
     if not numbered:
         raise UserError(f'{path}: empty; the first line must name the columns ({_known()})')
+    _check_layout(str(path), numbered)
     header = numbered[0][1]
     notes: list[str] = []
     names = _check_header(str(path), header, notes)
@@ -161,6 +180,7 @@ def check_table(
     where = np.arange(2, count + 2) if lines is None else np.asarray(lines, dtype=np.intp)
     remarks = list(notes)
     _check_ranges(name, arrays, where)
+    _check_signs(name, arrays, where, remarks)
     measured = _columns(arrays, QUANTITIES, count)
     empty = ~np.isfinite(measured).any(axis=1)
     if empty.any():
@@ -181,7 +201,14 @@ def check_table(
             f'{copies} rows are exact copies of others and were counted once; '
             'a repeated measurement would scatter'
         )
+    _check_dead_columns(table, remarks)
     _check_range_of_design(table, remarks)
+    if len(table) > MOST_ROWS:
+        before, table = len(table), averaged(table, MOST_ROWS)
+        remarks.append(
+            f'{before} rows were averaged to {len(table)} over neighbouring inputs; '
+            'a line number below is the first of its rows'
+        )
     constant = [key for key in inputs if key in INPUT_UNITS and key not in table.varying()]
     if constant:
         remarks.append(f'constant in this table: {", ".join(constant)}')
@@ -226,19 +253,60 @@ def _check_header(path: str, header: Sequence[str], notes: list[str]) -> list[st
     for name in ('slip', 'normal_load'):
         if name not in known:
             raise UserError(
-                f'{path}, line 1: no column {name!r} among {", ".join(header)}; it is required'
+                f'{path}, line 1: no column {name!r} among {", ".join(header)}; '
+                f'{_renaming(header, (name,)) or "it is required"}'
             )
     if not any(name in QUANTITIES for name in known):
         raise UserError(
             f'{path}, line 1: none of sinkage, drawbar_pull, torque among {", ".join(header)}; '
-            'add at least one'
+            f'{_renaming(header, QUANTITIES) or "add at least one"}'
         )
+    for name in known:
+        if name in STD_COLUMNS and name.removesuffix('_std') not in known:
+            notes.append(f'{name} is not used: there is no column {name.removesuffix("_std")}')
     return known
+
+
+def _check_layout(path: str, rows: Sequence[tuple[int, list[str]]]) -> None:
+    """Raise where the first line is not one of column names between commas."""
+    line, header = rows[0]
+    if header[0].startswith('PK'):
+        raise UserError(f'{path}: a spreadsheet or archive, not text; export the table as CSV')
+    if len(header) == 1:
+        for mark, said in ((';', "';'"), ('\t', 'tabs'), ('|', "'|'"), (' ', 'spaces')):
+            if sum(_nearest(cell) is not None for cell in header[0].split(mark)) > 1:
+                raise UserError(
+                    f'{path}, line {line}: the cells are separated by {said}; export the table '
+                    'with commas between cells and a point as decimal mark'
+                )
+    if not {'slip', 'normal_load'} & set(header):
+        for later, cells in rows[1:20]:
+            if {'slip', 'normal_load'} <= set(cells):
+                raise UserError(
+                    f'{path}, line {line}: not the column names, they stand in line {later}; '
+                    'delete the lines above them'
+                )
+
+
+def _plain(name: str) -> str:
+    plain = name.lower().replace('-', '_').replace(' ', '_').split('[')[0].split('(')[0]
+    return plain.strip('_')
+
+
+def _renaming(header: Sequence[str], wanted: Sequence[str]) -> str:
+    """Return which column may be meant by one of the wanted names; empty = none."""
+    for name in wanted:
+        for column in header:
+            if _plain(column) in _OTHER_NAMES[name] and column not in COLUMNS:
+                unit = INPUT_UNITS.get(name) or UNITS[name]
+                in_unit = '' if unit == '-' else f' [{unit}]'
+                return f'rename {column!r} to {name!r}{in_unit} if that is what it holds'
+    return ''
 
 
 def _nearest(name: str) -> str | None:
     """Return the known column that ``name`` may stand for."""
-    plain = name.lower().replace('-', '_').replace(' ', '_').split('[')[0].split('(')[0].strip('_')
+    plain = _plain(name)
     if plain in COLUMNS:
         return plain
     for unit in ('_mm', '_cm', '_m', '_n', '_nm', '_kn', '_deg', '_rad', '_percent', '_pct'):
@@ -260,6 +328,14 @@ def _read_cells(
     path: str, header: Sequence[str], names: Sequence[str], rows: Sequence[tuple[int, list[str]]]
 ) -> dict[str, FloatArray]:
     position = {name: header.index(name) for name in names}
+    if rows:
+        line, cells = rows[0]
+        filled = [cells[c] for c in position.values() if c < len(cells) and cells[c]]
+        if len(filled) > 1 and not any(_is_number(cell) for cell in filled):
+            raise UserError(
+                f'{path}, line {line}: no numbers below the column names; delete the line '
+                '(units are fixed: m, N, N m, rad, slip as a ratio)'
+            )
     values = {name: np.full(len(rows), np.nan) for name in names}
     for index, (line, cells) in enumerate(rows):
         if len(cells) > len(header) and any(cells[len(header) :]):
@@ -275,8 +351,8 @@ def _read_cells(
                 values[name][index] = float(cell)
             except ValueError:
                 raise UserError(
-                    f'{path}, line {line}, column {name}: {cell!r} is not a number; '
-                    'leave the cell empty where nothing was measured'
+                    f'{path}, line {line}, column {name}: {cell[:40]!r} is not a number; '
+                    + _cure(cell)
                 ) from None
             if not np.isfinite(values[name][index]):
                 raise UserError(
@@ -284,6 +360,19 @@ def _read_cells(
                     'leave the cell empty where nothing was measured'
                 )
     return values
+
+
+def _cure(cell: str) -> str:
+    """Return what to do about a cell that is no number."""
+    if re.fullmatch(r'[-+]?\d*,\d+([eE][-+]?\d+)?', cell):
+        return 'use a point as decimal mark, without marks between thousands'
+    if _is_number(cell.replace(',', '')):
+        return 'take out the marks between thousands'
+    if _is_number(cell.rstrip('% ')):
+        return 'give the ratio, without a percent sign'
+    if _is_number(cell.replace('\u2212', '-').replace('\u2013', '-')):
+        return 'use the plain minus sign'
+    return 'leave the cell empty where nothing was measured'
 
 
 def _columns(arrays: Mapping[str, FloatArray], names: Sequence[str], count: int) -> FloatArray:
@@ -327,6 +416,9 @@ def _check_ranges(name: str, arrays: Mapping[str, FloatArray], lines: NDArray[np
             )
             low = arrays[column] < 0.0 if column == 'lug_height' else arrays[column] <= 0.0
             refuse(low, column, 'is not a positive length in m')
+    if 'wheel_radius' in arrays and 'lug_height' in arrays:
+        high = arrays['lug_height'] > arrays['wheel_radius']
+        refuse(high, 'lug_height', 'is more than the wheel radius; check both, in m')
     for column, least, most in (
         ('lug_count', 0.0, 1000.0),
         ('gravity', 1e-3, 100.0),
@@ -335,15 +427,23 @@ def _check_ranges(name: str, arrays: Mapping[str, FloatArray], lines: NDArray[np
         if column in arrays:
             bad = (arrays[column] < least) | (arrays[column] > most)
             refuse(bad, column, f'is outside {least:g}..{most:g}')
+    for column in ('lug_count', 'pass_number'):
+        if column in arrays:
+            broken = np.abs(arrays[column] - np.round(arrays[column])) > 1e-6
+            refuse(broken, column, 'is no whole number')
     if 'angular_velocity' in arrays:
         fast = abs(arrays['angular_velocity']) > 60.0
         refuse(fast, 'angular_velocity', 'looks like degrees per second; give rad/s')
     if 'sinkage' in arrays:
         deep = abs(arrays['sinkage']) > 1.0
-        refuse(deep, 'sinkage', 'looks like millimetres; divide the column by 1000')
+        refuse(deep, 'sinkage', 'looks like millimetres (or centimetres); give it in m')
     if 'drawbar_pull' in arrays:
         strong = abs(arrays['drawbar_pull']) > 3.0 * load
-        refuse(strong, 'drawbar_pull', 'is over three times the normal load; check both units')
+        refuse(
+            strong,
+            'drawbar_pull',
+            'is over three times the normal load; check both units (N, not kg or kN)',
+        )
         pull = arrays['drawbar_pull'][np.isfinite(arrays['drawbar_pull'])]
         if pull.size > 2 and 0.0 < abs(pull).max() < 2e-3 * load.max():
             refuse(
@@ -355,8 +455,114 @@ def _check_ranges(name: str, arrays: Mapping[str, FloatArray], lines: NDArray[np
         if column in arrays:
             low = arrays[column] < 0.0 if column == 'slip_std' else arrays[column] <= 0.0
             refuse(low, column, 'is not positive; leave it empty where the deviation is unknown')
+            _check_size_of_deviation(refuse, arrays, column)
     if 'slip_std' in arrays:
         refuse(arrays['slip_std'] > 0.5, 'slip_std', 'is over 0.5; it looks like percent')
+
+
+def _check_size_of_deviation(
+    refuse: Callable[[NDArray[np.bool_], str, str], None],
+    arrays: Mapping[str, FloatArray],
+    column: str,
+) -> None:
+    """Refuse a deviation beside which its whole column is nothing: its unit is another one."""
+    quantity = column.removesuffix('_std')
+    if quantity in QUANTITIES and quantity in arrays:
+        values = np.abs(arrays[quantity][np.isfinite(arrays[quantity])])
+        if values.size and np.nanmin(arrays[column], initial=np.inf) > 10.0 * values.max() > 0.0:
+            refuse(
+                np.isfinite(arrays[column]),
+                column,
+                f'is over ten times the largest {quantity}; give both in {UNITS[quantity]}',
+            )
+
+
+def _check_signs(
+    name: str, arrays: Mapping[str, FloatArray], lines: NDArray[np.intp], remarks: list[str]
+) -> None:
+    """Raise where torque works against the slip; say where sinkages are negative."""
+    direction = np.where(arrays.get('angular_velocity', np.ones(len(lines))) < 0.0, -1.0, 1.0)
+    if 'torque' in arrays:
+        slip, torque = arrays['slip'], direction * arrays['torque']
+        pull = direction * arrays.get('drawbar_pull', np.full(len(lines), np.nan))
+        clear = (np.abs(slip) > CLEAR_SLIP) & np.isfinite(torque)
+        # A driven wheel takes torque; a skidding one may too (friction), but it does not pull.
+        wrong = clear & (torque * np.sign(slip) < 0.0) & ((slip > 0.0) | (pull > 0.0))
+        if wrong.sum() >= 3 and wrong.sum() > 0.8 * clear.sum():
+            row = int(np.flatnonzero(wrong)[0])
+            raise UserError(
+                f'{name}, line {lines[row]}, column torque: {arrays["torque"][row]:g} N m at slip '
+                f'{slip[row]:g} has the wrong sign, as in most rows; torque that drives the wheel '
+                'forward and the slip of a driven wheel are positive (angular_velocity < 0: '
+                'reverse)'
+            )
+    angle = arrays.get('leaving_angle', np.full(1, np.nan))
+    angle = angle[np.isfinite(angle)]
+    if angle.size and np.mean(angle > 0.0) > 0.8:
+        raise UserError(
+            f'{name}, line {lines[0]}, column leaving_angle: {angle[0]:g} rad and most others are '
+            'positive; an angle behind the hub is negative'
+        )
+    if 'drawbar_pull' in arrays:
+        driven = np.isfinite(arrays['drawbar_pull']) & (arrays['slip'] >= 0.0)
+        slip, pull = arrays['slip'][driven], (direction * arrays['drawbar_pull'])[driven]
+        if (
+            len(slip) >= MINIMUM_ROWS
+            and min(np.ptp(slip), np.ptp(pull)) > 0.0
+            and np.corrcoef(slip, pull)[0, 1] < -0.6
+        ):
+            remarks.append(
+                'drawbar_pull falls with slip: check its sign, a pull forward is positive'
+            )
+    if 'sinkage' in arrays:
+        depth = arrays['sinkage'][np.isfinite(arrays['sinkage'])]
+        if depth.size and np.mean(depth < 0.0) > 0.8:
+            remarks.append(
+                'nearly all sinkages are negative: sinkage is positive where the rim runs below '
+                'the undisturbed surface'
+            )
+
+
+def _check_dead_columns(table: SteadyTable, remarks: list[str]) -> None:
+    """Raise where a reading never changes although the inputs do: a dead channel, or a default."""
+    for q, quantity in enumerate(QUANTITIES):
+        here = np.isfinite(table.measured[:, q])
+        values = table.measured[here, q]
+        if len(values) < MINIMUM_ROWS or np.ptp(values) > 0.0:
+            continue
+        said = f'{values[0]:g} {UNITS[quantity]} in all {len(values)} rows'
+        if np.isfinite(table.stated_std[here, q]).all():
+            remarks.append(f'{quantity} is {said}: taken as measured, with its stated deviation')
+            continue
+        raise UserError(
+            f'{table.name}, line {table.lines[here][0]}, column {quantity}: {said}; nothing that '
+            f'was measured stands so still: leave the column out, or state its {quantity}_std'
+        )
+
+
+def check_wheel_of_model(
+    table: SteadyTable, radius: Sequence[float], width: Sequence[float]
+) -> None:
+    """Raise where the table names another wheel than the model file.
+
+    Parameters
+    ----------
+    radius, width : sequence of float
+        What the model file states of its wheels [m]; empty = nothing.
+    """
+    for column, stated in (('wheel_radius', radius), ('wheel_width', width)):
+        if column not in table.columns or not len(stated):
+            continue
+        values = table.columns[column]
+        ratio = np.abs(np.log(values[:, None] / np.asarray(stated, dtype=float)[None, :]))
+        if not (ratio < np.log(LIKE_WHEEL)).any() and np.isfinite(values).any():
+            row = int(np.flatnonzero(np.isfinite(values))[0])
+            key = f'wheels.{column.removeprefix("wheel_")}'
+            raise UserError(
+                f'{table.name}, line {table.lines[row]}, column {column}: {values[row]:g} m, but '
+                f'the model file states {stated[0]:g} m ({key}); give the --config of this wheel, '
+                'or mend the column'
+            )
 
 
 def check_against_wheel(table: SteadyTable, radius: FloatArray, width: FloatArray) -> None:
@@ -397,6 +603,77 @@ def _without_copies(table: SteadyTable) -> tuple[SteadyTable, int]:
     return table.select(keep), len(keys) - len(keep)
 
 
+def averaged(table: SteadyTable, most: int) -> SteadyTable:
+    """Return the table averaged over cells of neighbouring inputs, at most ``most`` of them.
+
+    The cells halve the widest input of the fullest cell over and over, between two of its values
+    (k-d tree), so levels of a design stay apart as long as there are cells for them. Rows that
+    lack different columns are not mixed. Readings further from the median of their cell than
+    `_FAR` robust deviations, pooled over the cells, are left out; a deviation is that of the mean.
+    """
+    names = list(table.columns)
+    inputs = np.column_stack([table.columns[name] for name in names])
+    width = np.nanmax(inputs, axis=0) - np.nanmin(inputs, axis=0)
+    scaled = np.nan_to_num(inputs / np.where(width > 0.0, width, 1.0))
+    scaled[:, [i for i, name in enumerate(names) if name not in INPUT_UNITS]] = 0.0
+    known = np.isfinite(np.column_stack([inputs, table.measured, table.stated_std]))
+    _, pattern = np.unique(known, axis=0, return_inverse=True)
+    whole = [np.flatnonzero(np.ravel(pattern) == p) for p in np.unique(pattern)]
+    cells = _halved(scaled, whole, max(most, len(whole)))
+
+    def mean(values: FloatArray) -> FloatArray:
+        centre = np.array([np.median(values[cell]) for cell in cells])
+        off = np.zeros(len(values))
+        for cell, middle in zip(cells, centre, strict=True):
+            off[cell] = np.abs(values[cell] - middle)
+        spread = 1.4826 * np.median(off[off > 0.0]) if (off > 0.0).any() else 0.0
+        kept = ~(off > _FAR * spread)
+        picked = [cell[kept[cell]] if len(cell) > 2 else cell for cell in cells]
+        return np.array([np.mean(values[cell]) if len(cell) else np.nan for cell in picked])
+
+    def of_mean(std: FloatArray) -> FloatArray:
+        return np.array([np.sqrt(np.sum(std[c] ** 2)) / len(c) for c in cells])
+
+    return SteadyTable(
+        table.name,
+        np.array([table.lines[cell].min() for cell in cells], dtype=np.intp),
+        {name: np.array([np.mean(table.columns[name][c]) for c in cells]) for name in names},
+        np.column_stack([mean(table.measured[:, q]) for q in range(3)]),
+        np.column_stack([of_mean(table.stated_std[:, q]) for q in range(3)]),
+        of_mean(table.slip_std),
+        table.notes,
+    )
+
+
+def _halved(scaled: FloatArray, cells: list[NDArray[np.intp]], most: int) -> list[NDArray[np.intp]]:
+    """Split the cell with the most rows times extent until there are ``most``."""
+    done: list[NDArray[np.intp]] = []
+    heap = [(-_weight(scaled[cell]), i, cell) for i, cell in enumerate(cells)]
+    heapq.heapify(heap)
+    label = len(heap)
+    while heap and len(heap) + len(done) < most:
+        weight, _, cell = heapq.heappop(heap)
+        if weight == 0.0:
+            done.append(cell)
+            continue
+        axis = int(np.argmax(np.ptp(scaled[cell], axis=0)))
+        values = scaled[cell, axis]
+        levels = np.unique(values)
+        cut = levels[np.clip(np.searchsorted(levels, np.median(values)), 1, len(levels) - 1)]
+        for half in (cell[values < cut], cell[values >= cut]):
+            heapq.heappush(heap, (-_weight(scaled[half]), label, half))
+            label += 1
+    return [*done, *(cell for _, _, cell in heap)]
+
+
+def _weight(values: FloatArray) -> float:
+    return float(len(values) * np.ptp(values, axis=0).max())
+
+
+def _rows(count: int) -> str:
+    return 'one row' if count == 1 else f'{count} different rows'
+
+
 def _check_range_of_design(table: SteadyTable, remarks: list[str]) -> None:
     """Raise where the rows are too few or too alike to tell anything.
 
@@ -404,10 +681,15 @@ def _check_range_of_design(table: SteadyTable, remarks: list[str]) -> None:
     """
     if len(table) < MINIMUM_ROWS:
         raise UserError(
-            f'{table.name}: {len(table)} different rows; at least {MINIMUM_ROWS} are needed, best '
+            f'{table.name}: {_rows(len(table))}; at least {MINIMUM_ROWS} are needed, best '
             '8 slips from 0.05 to 0.8 at 2 loads'
         )
     slip, load = table.columns['slip'], table.columns['normal_load']
+    if np.ptp(slip) < MINIMUM_SLIP_SPAN:
+        remarks.append(
+            f'slip only from {slip.min():.3g} to {slip.max():.3g}: what grows with slip is hardly '
+            'seen; rows with a slip up to 0.6 would show it'
+        )
     span, ratio = np.ptp(slip), load.max() / load.min()
     if span < MINIMUM_SLIP_SPAN and ratio < MINIMUM_LOAD_RATIO:
         if (table.slip_std > 0).all():

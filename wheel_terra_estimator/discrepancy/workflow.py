@@ -40,6 +40,7 @@ from wheel_terra_estimator.discrepancy.table import (
     QUANTITIES,
     SteadyTable,
     check_against_wheel,
+    check_wheel_of_model,
 )
 from wheel_terra_estimator.discrepancy.verdict import Verdict, decide
 from wheel_terra_estimator.discrepancy.where import locate
@@ -98,6 +99,12 @@ def diagnose(
     chosen = options or Options()
     both, active = (table, None) if reference is None else join(table, reference)
     points = operating_points(both, configuration)
+    wheels, stated = configuration.wheels, configuration.stated
+    check_wheel_of_model(
+        both,
+        wheels.radius if 'wheels.radius' in stated else (),
+        wheels.width if 'wheels.width' in stated else (),
+    )
     check_against_wheel(
         both,
         np.broadcast_to(points.wheel.radius, (len(both),)),
