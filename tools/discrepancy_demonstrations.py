@@ -284,9 +284,9 @@ def summary(name: str, case: Case, diagnosis: Diagnosis) -> str:
         f'{c.label} {c.log_evidence:+.1f}' for c in diagnosis.candidates[:6] if c.why_not or c.names
     ]
     lines += ['', f'ln evidence: {", ".join(best)}. {diagnosis.where.sentence}.']
-    pulls = [f'{s.name} {s.pull:+.1f}' for s in diagnosis.soil if abs(s.pull) > 1.5]
+    pulls = [f'{s.name} {s.pull:+.1f}' for s in diagnosis.soil if abs(s.pull) > 3.0]
     if pulls:
-        lines.append(f'Soil pulled by more than 1.5 stated deviations: {", ".join(pulls)}.')
+        lines.append(f'Soil pulled by more than 3 stated deviations: {", ".join(pulls)}.')
     if diagnosis.next_measurement:
         lines.append(f'Next: {diagnosis.next_measurement[0].what}.')
     lines += [f'({note})' for note in case.notes]

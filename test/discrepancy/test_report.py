@@ -18,7 +18,7 @@ from campaigns import Plan, make_campaign, scoring
 
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.discrepancy.model_file import write_model
-from wheel_terra_estimator.discrepancy.report import number, write_report
+from wheel_terra_estimator.discrepancy.report import SOIL_WORDS, number, write_report
 
 
 class Page(HTMLParser):
@@ -108,6 +108,7 @@ def test_every_picture_is_in_the_page_and_beside_it(page):
     assert set(files.values()) == embedded
     assert {'residuals_by_normal_load.png', 'residuals_by_slope.png', 'where.png'} <= set(files)
     assert {'measured_against_model.png', 'gap.png', 'signature.png'} <= set(files)
+    assert 'curves_over_slip.png' in files, 'two loads on three slopes are six curves'
     for name, content in files.items():
         width, height, levels = grey_levels(content)
         assert width > 600 and height > 250 and levels > 100, f'{name} looks empty'
@@ -115,7 +116,7 @@ def test_every_picture_is_in_the_page_and_beside_it(page):
 
 def test_numbers_are_those_of_the_diagnosis(page, named):
     parsed, _ = page
-    assert named.sentence in re.sub(r'\s+', ' ', parsed.text)
+    assert named.sentence.replace('+-', '±') in re.sub(r'\s+', ' ', parsed.text)
     first = named.effects[0]
     assert f'{100 * first.confidence:.0f} %' in parsed.text
     for name, item in first.parameters.items():
@@ -129,7 +130,7 @@ def test_numbers_are_those_of_the_diagnosis(page, named):
         assert cells[1] == f'{candidate.log_evidence:.1f}'
         assert cells[-1] == candidate.why_not
     for shift in named.soil:
-        cells = parsed.row(shift.name.replace('_', ' '))
+        cells = parsed.row(SOIL_WORDS.get(shift.name, shift.name.replace('_', ' ')))
         assert cells[5] == f'{shift.pull:+.1f}'
     for item in named.next_measurement:
         assert item.what in parsed.text

@@ -125,7 +125,6 @@ def test_cells_that_are_no_numbers(tmp_path, cell, parts):
         ({'pass_number': np.zeros(8)}, ('pass_number', 'outside')),
         ({'slip': np.full(8, 0.2) + 1e-3 * np.arange(8)}, ('slip only from', 'add rows with slip')),
         ({'torque': None, 'sinkage': None, 'drawbar_pull': None}, ('none of the columns',)),
-        ({'lug_count': np.full(8, 12.5)}, ('lug_count', 'whole number')),
         (
             {'wheel_radius': np.full(8, 0.1), 'lug_height': np.full(8, 0.2)},
             ('lug_height', 'more than the wheel radius'),

@@ -71,6 +71,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Run the command."""
     from wheel_terra_estimator.configuration import reader
+    from wheel_terra_estimator.discrepancy.table import UNITS
     from wheel_terra_estimator.discrepancy.workflow import Options, diagnose
 
     output = Path(arguments.output)
@@ -88,11 +89,14 @@ def run(arguments: argparse.Namespace) -> int:
     _write(diagnosis, output, pictures=not arguments.no_pictures)
     print(diagnosis.sentence)
     for quantity, gap in diagnosis.gap.items():
-        noise = '' if gap.noise is None else f', noise {gap.noise:.3g}'
+        scale, unit = (1e3, 'mm') if quantity == 'sinkage' else (1.0, UNITS[quantity])
+        noise = '' if gap.noise is None else f', noise {scale * gap.noise:.3g}'
         print(
-            f'  {quantity}: held-out error {gap.before:.3g} as configured, {gap.refit:.3g} soil '
-            f'refitted, {gap.after:.3g} in the end{noise}'
+            f'  {quantity} [{unit}]: held-out error {scale * gap.before:.3g} as configured, '
+            f'{scale * gap.refit:.3g} soil refitted, {scale * gap.after:.3g} in the end{noise}'
         )
+    if diagnosis.next_measurement:
+        print(f'  next measurement: {diagnosis.next_measurement[0].what}')
     for note in diagnosis.notes:
         print(f'  note: {note}')
     print(f'  written: {output}')

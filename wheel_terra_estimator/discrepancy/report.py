@@ -15,6 +15,7 @@ import numpy as np
 from wheel_terra_estimator.discrepancy import report_pictures as pictures
 from wheel_terra_estimator.discrepancy.model_file import corrected
 from wheel_terra_estimator.discrepancy.result import Diagnosis, FittedParameter, NextMeasurement
+from wheel_terra_estimator.discrepancy.summary import STRONG_PULL
 from wheel_terra_estimator.discrepancy.table import QUANTITIES
 from wheel_terra_estimator.reporting.html import render, write_page
 
@@ -23,6 +24,10 @@ if TYPE_CHECKING:
 
 TEMPLATES = Path(__file__).parent / 'templates'
 _RESOLUTION = 110  # [dots per inch]
+SOIL_WORDS = {
+    'stiffness': 'bearing stiffness (factor on both moduli)',
+    'tan_friction': 'tangent of the friction angle',
+}
 _TONES = {'agrees': 'good', 'named': 'warn', 'unexplained': 'bad'}
 
 
@@ -67,11 +72,13 @@ def write_report(diagnosis: Diagnosis, folder: str | Path) -> Path:
             for name, (parameter, size, unit) in sorted(diagnosis.smallest_visible.items())
         ],
         changes=[
-            (key, shown(old.get(key)), shown(new[key]))
+            (key, _before(diagnosis, key, old.get(key)), shown(new[key]))
             for key in keys
             if key in new and shown(old.get(key)) != shown(new[key])
         ],
         sources=_sources(diagnosis),
+        sentence=diagnosis.sentence.replace('+-', '±'),
+        where=_where(diagnosis),
     )
     path = folder / 'report.html'
     write_page(path, page)
@@ -104,6 +111,20 @@ def shown(value: Any) -> str:
     return str(value)
 
 
+def _before(diagnosis: Diagnosis, key: str, value: Any) -> str:
+    """Return the configured value; a deviation or effect that nobody stated has none."""
+    optional = '_std' in key or (key.startswith('effects.') and not key.endswith('.enabled'))
+    return '-' if optional and key not in diagnosis.configuration.stated else shown(value)
+
+
+def _where(diagnosis: Diagnosis) -> str:
+    """Return the sentence of where the gap is, as one."""
+    text = diagnosis.where.sentence
+    for name in diagnosis.table.columns:
+        text = text.replace(name, pictures.words(name))
+    return text[:1].upper() + text[1:].rstrip('.') + '.'
+
+
 def _unit(unit: str) -> str:
     return '' if unit in ('', '-') else f' {unit}'
 
@@ -112,9 +133,9 @@ def _cards(diagnosis: Diagnosis) -> list[dict[str, str]]:
     cards = []
     if diagnosis.effects:
         first = diagnosis.effects[0]
-        cards.append(
-            {'value': f'{100 * first.confidence:.0f} %', 'label': 'confidence of the name'}
-        )
+        shares = ', '.join(f'{100 * effect.confidence:.0f} %' for effect in diagnosis.effects)
+        names = 'names, in their order' if len(diagnosis.effects) > 1 else 'name'
+        cards.append({'value': shares, 'label': f'confidence of the {names}'})
         if first.confounded_with:
             cards.append(
                 {
@@ -124,7 +145,11 @@ def _cards(diagnosis: Diagnosis) -> list[dict[str, str]]:
             )
     worst = max(
         diagnosis.gap.items(),
-        key=lambda item: item[1].before / (item[1].noise or 1e9),
+        # The greatest gap of the model believed in; where it stays open, what is left of it.
+        key=lambda item: (
+            (item[1].refit if diagnosis.verdict == 'unexplained' else item[1].before)
+            / (item[1].noise or 1e9)
+        ),
         default=None,
     )
     if worst is not None:
@@ -137,10 +162,14 @@ def _cards(diagnosis: Diagnosis) -> list[dict[str, str]]:
                 'label': f'rms error of {pictures.words(name)} on rows the fit did not see',
             }
         )
-    shares = [g.shrink for g in diagnosis.gap.values() if g.shrink is not None]
-    if diagnosis.effects and shares:
+    closed = {name: g.shrink for name, g in diagnosis.gap.items() if g.shrink is not None}
+    if diagnosis.effects and closed:
+        ends = sorted({f'{100 * share:.0f}' for share in closed.values()}, key=float)
         cards.append(
-            {'value': f'{100 * max(shares):.0f} %', 'label': 'of the excess gap closed at best'}
+            {
+                'value': ' to '.join(dict.fromkeys((ends[0], ends[-1]))) + ' %',
+                'label': f'of the excess gap closed ({", ".join(map(pictures.words, closed))})',
+            }
         )
     cards.append({'value': str(len(diagnosis.table)), 'label': 'rows'})
     cards.append({'value': f'{diagnosis.seconds:.2f} s', 'label': 'time of the diagnosis'})
@@ -160,6 +189,7 @@ def _figures(folder: Path, diagnosis: Diagnosis) -> dict[str, Any]:
         (folder / f'{name}.png').write_bytes(buffer.getvalue())
         return 'data:image/png;base64,' + base64.b64encode(buffer.getvalue()).decode()
 
+    drawn['curves'] = keep('curves_over_slip', lambda: pictures.curves_over_slip(diagnosis))
     drawn['parity'] = keep(
         'measured_against_model', lambda: pictures.measured_against_model(diagnosis)
     )
@@ -260,14 +290,14 @@ def _share(value: float) -> str:
 
 def _soil_row(shift: Any) -> dict[str, Any]:
     return {
-        'name': pictures.words(shift.name),
+        'name': SOIL_WORDS.get(shift.name, pictures.words(shift.name)),
         'unit': '' if shift.unit == '-' else shift.unit,
         'before': f'{number(shift.before)} ± {number(shift.prior_std, 2)}',
         'refit': number(shift.refit),
         'after': f'{number(shift.after)} ± {number(shift.after_std, 2)}',
         'pull': f'{shift.pull:+.1f}',
-        'far': abs(shift.pull) > 2.0,
-        'left': f'{50 + 12.5 * float(np.clip(shift.pull, -4, 4)):.1f}',
+        'far': abs(shift.pull) > STRONG_PULL,
+        'left': f'{50 + 25 * float(np.clip(shift.pull / STRONG_PULL, -2, 2)):.1f}',
     }
 
 

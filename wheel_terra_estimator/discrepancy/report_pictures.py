@@ -33,7 +33,11 @@ SHOWN_INPUT = {
 BLUE, RED, GREEN, PURPLE = LINE_COLOURS[0], LINE_COLOURS[1], LINE_COLOURS[2], LINE_COLOURS[6]
 GREY = '#9aa5b1'
 COLOUR_MAP = 'viridis'
-_DISCRETE = ('#E69F00', '#009E73', '#0072B2', '#7B4FA3', '#111111')
+# Levels differ in brightness and in shape as well, for the colour-blind and for grey prints.
+_DISCRETE = ('#E69F00', '#009E73', '#0072B2', '#7B4FA3', '#111111', '#D55E00')
+_SHAPES = 'os^Dv<'
+_MOST_CURVES = 6
+_LEGEND_LINE = 0.28  # [inch]
 
 
 def words(name: str) -> str:
@@ -55,7 +59,7 @@ def measured_against_model(diagnosis: Diagnosis) -> Figure:
     """Draw measured over modelled values, before and after, one panel per quantity."""
     curves, table = diagnosis.curves, diagnosis.table
     with _style():
-        figure, axes = _panels(1, table.quantities, height=2.7)
+        figure, axes = _panels(1, table.quantities, height=2.7, legend=1)
         for axis, name in zip(axes[0], table.quantities, strict=True):
             q, (scale, unit) = QUANTITIES.index(name), SHOWN[name]
             measured = scale * table.measured[:, q]
@@ -76,8 +80,77 @@ def measured_against_model(diagnosis: Diagnosis) -> Figure:
             axis.plot(ends, ends, color='#1f2933', lw=0.8)
             axis.set(xlabel=f'model [{unit}]', title=words(name))
             axis.set_ylabel(f'measured [{unit}]')
-        axes[0][0].legend(loc='upper left')
+        handles, labels = axes[0][0].get_legend_handles_labels()
+        _legend(figure, handles, labels)
     return figure
+
+
+def curves_over_slip(diagnosis: Diagnosis) -> Figure | None:
+    """Draw measurement and model over slip, one curve for each setting of the other inputs.
+
+    None where the table has no sweeps of slip, or too many to be told apart.
+    """
+    table, curves = diagnosis.table, diagnosis.curves
+    groups = _sweeps(diagnosis)
+    if not groups:
+        return None
+    slip = table.columns['slip']
+    with _style():
+        figure, axes = _panels(1, table.quantities, height=3.0, legend=2)
+        for axis, name in zip(axes[0], table.quantities, strict=True):
+            q, (scale, unit) = QUANTITIES.index(name), SHOWN[name]
+            kept = np.isfinite(table.measured[:, q]) & ~_set_apart(diagnosis, q)
+            for (_, rows), colour, shape in zip(groups, _DISCRETE, _SHAPES, strict=False):
+                for values, style in ((curves.before, ':'), (curves.after, '-')):
+                    axis.plot(slip[rows], scale * values[rows, q], style, color=colour, lw=1.2)
+                mine = rows[kept[rows]]
+                axis.errorbar(
+                    slip[mine],
+                    scale * table.measured[mine, q],
+                    2 * scale * diagnosis.noise.std[mine, q],
+                    fmt=shape,
+                    ms=4.5,
+                    color=colour,
+                    elinewidth=0.9,
+                )
+            axis.set(xlabel='slip', title=words(name))
+            axis.set_ylabel(f'[{unit}]')
+        from matplotlib.lines import Line2D
+
+        marks = [
+            Line2D([], [], marker=shape, ms=5, ls='', color=colour)
+            for _, colour, shape in zip(groups, _DISCRETE, _SHAPES, strict=False)
+        ]
+        lines = [Line2D([], [], ls=style, color='#1f2933', lw=1.2) for style in (':', '-')]
+        others = [words(name) for name in table.varying() if name != 'slip']
+        blank = Line2D([], [], ls='')
+        texts = [f'{", ".join(others)}:' if others else '', *(text for text, _ in groups)]
+        _legend(figure, [blank, *marks], texts, lines=1)
+        _legend(figure, lines, ['model as configured', f'model {_last(diagnosis)}'])
+    return figure
+
+
+def _sweeps(diagnosis: Diagnosis) -> list[tuple[str, NDArray[np.intp]]]:
+    """Return values and rows, by slip, of each setting of the inputs other than slip."""
+    table = diagnosis.table
+    others = [name for name in table.varying() if name != 'slip']
+    keys = np.column_stack([table.columns[name] for name in others] or [np.zeros(len(table))])
+    _, group = np.unique(np.round(np.nan_to_num(keys), 6), axis=0, return_inverse=True)
+    group = np.ravel(group)
+    found = []
+    for g in range(group.max() + 1):
+        rows = np.flatnonzero(group == g)
+        if len(np.unique(table.columns['slip'][rows])) < 3:
+            continue
+        text = []
+        for name in others:
+            factor, unit = shown_input(name)
+            shown = f'{factor * table.columns[name][rows[0]]:.3g}'
+            text.append(shown if unit == '-' else f'{shown} {unit}')
+        ordered = rows[np.argsort(table.columns['slip'][rows], kind='stable')]
+        found.append((', '.join(text) or 'measured', ordered))
+    covered = sum(len(rows) for _, rows in found)
+    return found if len(found) <= _MOST_CURVES and 2 * covered > len(table) else []
 
 
 def residuals(diagnosis: Diagnosis, colour_by: str) -> Figure:
@@ -103,7 +176,7 @@ def residuals(diagnosis: Diagnosis, colour_by: str) -> Figure:
             stages,
             height=1.95,
             bar=not discrete,
-            legend=discrete,
+            legend=int(discrete),
             shared=True,
         )
         drawn = None
@@ -115,9 +188,9 @@ def residuals(diagnosis: Diagnosis, colour_by: str) -> Figure:
             for axis, (title, _), residual in zip(row, stages, error, strict=True):
                 _band(axis, slip, 2 * scale * curves.band[:, q])
                 if discrete:
-                    for value, shade in zip(few, _DISCRETE, strict=False):
+                    for value, shade, shape in zip(few, _DISCRETE, _SHAPES, strict=False):
                         chosen = ~outside & np.isclose(colour, value)
-                        axis.plot(slip[chosen], residual[chosen], 'o', ms=4, color=shade)
+                        axis.plot(slip[chosen], residual[chosen], shape, ms=4, color=shade)
                 else:
                     drawn = axis.scatter(
                         slip[~outside],
@@ -138,7 +211,10 @@ def residuals(diagnosis: Diagnosis, colour_by: str) -> Figure:
         if discrete:
             from matplotlib.lines import Line2D
 
-            handles = [Line2D([], [], marker='o', ms=5, ls='', color=c) for c in _DISCRETE]
+            handles = [
+                Line2D([], [], marker=shape, ms=5, ls='', color=c)
+                for c, shape in zip(_DISCRETE, _SHAPES, strict=True)
+            ]
             texts = [f'{words(colour_by)} {value:.3g} {unit}'.removesuffix(' -') for value in few]
             _legend(figure, handles[: len(few)], texts)
         else:
@@ -187,7 +263,7 @@ def signature(diagnosis: Diagnosis) -> Figure | None:
         return None
     slip = table.columns['slip']
     with _style():
-        figure, axes = _panels(1, table.quantities, height=2.5, legend=True)
+        figure, axes = _panels(1, table.quantities, height=2.5, legend=1)
         for axis, name in zip(axes[0], table.quantities, strict=True):
             q, (scale, unit) = QUANTITIES.index(name), SHOWN[name]
             residual = scale * (table.measured[:, q] - curves.refit[:, q])
@@ -270,7 +346,7 @@ def rivals(item: NextMeasurement) -> Figure | None:
     x = factor * np.asarray(item.rows[x_name], dtype=float)
     order = np.argsort(x, kind='stable')
     with _style():
-        figure, axes = _panels(1, QUANTITIES, height=2.2, legend=True)
+        figure, axes = _panels(1, QUANTITIES, height=2.2, legend=1)
         for axis, name in zip(axes[0], QUANTITIES, strict=True):
             q, (scale, quantity_unit) = QUANTITIES.index(name), SHOWN[name]
             for (rival, values), colour, marker in zip(
@@ -320,20 +396,20 @@ def _panels(
     height: float,
     *,
     bar: bool = False,
-    legend: bool = False,
+    legend: int = 0,
     shared: bool = False,
 ) -> tuple[Figure, Any]:
     """Return a figure with a grid of axes, margins in inches.
 
     Fixed margins: a layout engine would draw every figure three times over. ``bar`` leaves room
-    for a colour bar on the right, ``legend`` for a line above; ``shared``: the axes of a row have
-    the same y axis.
+    for a colour bar on the right, ``legend`` for so many lines above; ``shared``: the axes of a row
+    have the same y axis.
     """
     from matplotlib.figure import Figure
 
     count = len(columns)
     left, right = 0.72, 0.95 if bar else 0.12
-    top, bottom = 0.62 if legend else 0.34, 0.5
+    top, bottom = 0.34 + _LEGEND_LINE * legend, 0.5
     between = 0.12 if shared else 0.72
     cell = (2.73 if count > 2 else 3.4) + (0.5 if shared else 0.0)
     width = left + right + count * cell + (count - 1) * between
@@ -366,14 +442,14 @@ def _colour_bar(figure: Figure, drawn: Any, text: str) -> None:
     place.grid(visible=False)
 
 
-def _legend(figure: Figure, handles: Any, labels: Any) -> None:
-    """Put a legend above the panels."""
+def _legend(figure: Figure, handles: Any, labels: Any, lines: int = 0) -> None:
+    """Put a legend above the panels, so many lines below the top."""
     width, height = figure.get_size_inches()
     figure.legend(
         handles,
         labels,
         loc='upper left',
-        bbox_to_anchor=(0.6 / width, 1.0 - 0.02 / height),
+        bbox_to_anchor=(0.6 / width, 1.0 - (0.02 + 0.9 * _LEGEND_LINE * lines) / height),
         ncols=len(labels),
         columnspacing=1.4,
         handletextpad=0.4,

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wheel_terra_estimator.discrepancy.fitting import Fit
+from wheel_terra_estimator.discrepancy.parameters import WIDENING
 from wheel_terra_estimator.discrepancy.remainder import Remainder
 from wheel_terra_estimator.discrepancy.result import Curves, NamedEffect, QuantityGap
 from wheel_terra_estimator.discrepancy.search import Findings
@@ -18,7 +19,11 @@ FloatArray = NDArray[np.float64]
 
 _DRAWS = 1000
 _SEED = 5
-_STRONG_PULL = 2.0  # prior deviations
+STRONG_PULL = 3.0  # stated deviations
+_SOIL_KEYS = {
+    'stiffness': 'the factor on soil.frictional_modulus and soil.cohesive_modulus',
+    'tan_friction': 'the tangent of soil.friction_angle_deg',
+}
 _COARSE = 0.05  # model-error floor above which agreement says little
 
 
@@ -114,12 +119,15 @@ def notes(table: SteadyTable, findings: Findings, after: Fit) -> tuple[str, ...]
             'repeats or *_std columns make every figure sharper'
         )
     if findings.outliers:
-        found.append(f'{len(findings.outliers)} cells were set apart as outliers')
+        count = len(findings.outliers)
+        found.append(f'{count} {"cell was" if count == 1 else "cells were"} set apart as outliers')
     for c, u in zip(after.coordinates, after.u, strict=True):
-        if c.owner == 'soil' and abs(u) > _STRONG_PULL:
+        pull = WIDENING * u
+        if c.owner == 'soil' and abs(pull) > STRONG_PULL:
+            unit = '' if c.unit == '-' else f' {c.unit}'
             found.append(
-                f'soil.{c.name} was pulled {u:+.1f} of its deviations to '
-                f'{float(c.value(u)):.3g} {c.unit}: look at this number before any effect'
+                f'{_SOIL_KEYS.get(c.name, f"soil.{c.name}")} was pulled {pull:+.1f} of its stated '
+                f'deviations to {float(c.value(u)):.3g}{unit}: look at it before any effect'
             )
         if c.owner != 'soil' and (u - c.lower < 1e-3 or c.upper - u < 1e-3):
             found.append(f'{c.key} stands at the end of its range ({float(c.value(u)):.3g})')
@@ -144,9 +152,12 @@ def sentence(
         agreed = 'Model and measurement agree once the soil is refitted'
         return f'{agreed}{within} (p = {gap_p_value:.2g}).'
     if verdict.word == 'unexplained':
+        size = f'a misfit of about {100 * left.amplitude:.0f} % of the range'
+        if left.amplitude < 0.005:
+            size = 'nothing smooth, but more scatter than the noise allows,'
         return (
             'Model and measurement disagree, and none of the known effects explains it '
-            f'(a misfit of about {100 * left.amplitude:.0f} % of the range is left).'
+            f'({size} is left).'
         )
     parts = []
     for effect in effects:

@@ -427,10 +427,6 @@ def _check_ranges(name: str, arrays: Mapping[str, FloatArray], lines: NDArray[np
         if column in arrays:
             bad = (arrays[column] < least) | (arrays[column] > most)
             refuse(bad, column, f'is outside {least:g}..{most:g}')
-    for column in ('lug_count', 'pass_number'):
-        if column in arrays:
-            broken = np.abs(arrays[column] - np.round(arrays[column])) > 1e-6
-            refuse(broken, column, 'is no whole number')
     if 'angular_velocity' in arrays:
         fast = abs(arrays['angular_velocity']) > 60.0
         refuse(fast, 'angular_velocity', 'looks like degrees per second; give rad/s')

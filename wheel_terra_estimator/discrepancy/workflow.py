@@ -18,6 +18,7 @@ from wheel_terra_estimator.discrepancy.fitting import Fit
 from wheel_terra_estimator.discrepancy.forward import Forward
 from wheel_terra_estimator.discrepancy.held_out import hold_out, log_scores, slip_groups
 from wheel_terra_estimator.discrepancy.parameters import (
+    WIDENING,
     Coordinate,
     base_coordinates,
     soil_coordinates,
@@ -514,11 +515,11 @@ def _soil_shifts(findings: Findings, after: Fit, variance: FloatArray) -> tuple[
             SoilShift(
                 c.name,
                 float(c.value(0.0)),
-                c.deviation(0.0, 1.0),
+                c.deviation(0.0, 1.0 / WIDENING),
                 refit[c.key],
                 float(c.value(u)),
                 c.deviation(u, float(np.sqrt(covariance[index, index]))),
-                u,
+                WIDENING * u,
                 c.unit,
             )
         )
