@@ -537,13 +537,13 @@ def _check_dead_columns(table: SteadyTable, remarks: list[str]) -> None:
 
 
 def check_wheel_of_model(
-    table: SteadyTable, radius: Sequence[float], width: Sequence[float]
+    table: SteadyTable, radius: Sequence[float] | FloatArray, width: Sequence[float] | FloatArray
 ) -> None:
     """Raise where the table names another wheel than the model file.
 
     Parameters
     ----------
-    radius, width : sequence of float
+    radius, width : array_like
         What the model file states of its wheels [m]; empty = nothing.
     """
     for column, stated in (('wheel_radius', radius), ('wheel_width', width)):
