@@ -7,6 +7,7 @@ from __future__ import annotations
 import argparse
 import shutil
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -78,7 +79,7 @@ def run(arguments: argparse.Namespace) -> int:
     _make_sure_it_may_be_written(output, arguments.overwrite)
     if arguments.floor is not None and not 0.0 <= arguments.floor <= 0.2:
         raise UserError(f'--floor {arguments.floor:g}: must be a share between 0 and 0.2')
-    _load_effects(arguments.effects)
+    own = _load_effects(arguments.effects)
     configuration = reader.from_arguments(arguments, complete=False)
     table = _read(arguments.data, arguments.remap, configuration)
     reference = None
@@ -86,6 +87,7 @@ def run(arguments: argparse.Namespace) -> int:
         reference = _read(arguments.reference, arguments.remap, configuration)
     options = Options(tuple(arguments.only) or None, arguments.floor)
     diagnosis = diagnose(table, configuration, reference, options)
+    diagnosis = _with_effect_file(diagnosis, own)
     _write(diagnosis, output, pictures=not arguments.no_pictures)
     print(diagnosis.sentence)
     for quantity, gap in diagnosis.gap.items():
@@ -120,14 +122,26 @@ def _make_sure_it_may_be_written(output: Path, overwrite: bool) -> None:
         )
 
 
-def _load_effects(files: list[str]) -> None:
+def _load_effects(files: list[str]) -> dict[str, Path]:
+    """Register the user's own effects; return the file of each."""
     from wheel_terra_estimator.terramechanics.effects import load_file
 
+    found: dict[str, Path] = {}
     for file in files:
         try:
-            load_file(file)
+            found.update({effect.name: Path(file).resolve() for effect in load_file(file)})
         except ValueError as error:
             raise UserError(f'--effects {error}') from None
+    return found
+
+
+def _with_effect_file(diagnosis: Diagnosis, own: dict[str, Path]) -> Diagnosis:
+    """Let the model file name the file of a named effect, so that it is accepted as it is."""
+    files = {own[effect.name] for effect in diagnosis.effects if effect.name in own}
+    if len(files) != 1:
+        return diagnosis  # two files: the user has to put them into one
+    configuration = diagnosis.configuration.replace({'effect_file': str(files.pop())})
+    return replace(diagnosis, configuration=configuration)
 
 
 def _read(data: str, remaps: list[str], configuration: Configuration) -> SteadyTable:
