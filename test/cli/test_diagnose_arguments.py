@@ -66,3 +66,47 @@ def test_overwrite_never_deletes_what_is_no_diagnosis(
         (earlier / name).write_text('')
     assert main(['diagnose', 'table.csv', '-o', str(earlier), '--overwrite']) == 2
     assert 'table.csv' in capsys.readouterr().err
+
+
+def _table(path: Path) -> str:
+    rows = [f'{0.05 + 0.1 * i:.2f},80,{0.01 + 0.001 * i},{5 * i},{1.0 + 0.5 * i}' for i in range(8)]
+    path.write_text('slip,normal_load,sinkage,drawbar_pull,torque\n' + '\n'.join(rows))
+    return str(path)
+
+
+def test_an_output_that_cannot_be_written_is_said_before_any_work(
+    tmp_path: Path, capsys: Any, monkeypatch: Any
+) -> None:
+    from wheel_terra_estimator.discrepancy import workflow
+
+    monkeypatch.setattr(workflow, 'diagnose', lambda *_: pytest.fail('work before the check'))
+    (tmp_path / 'file').write_text('in the way')
+    command = ['diagnose', _table(tmp_path / 'rig.csv'), '--config', 'hit_wh1']
+    assert main([*command, '-o', str(tmp_path / 'file' / 'out')]) == 2
+    said = capsys.readouterr().err
+    assert 'cannot be written' in said and said.count('\n') == 1
+
+
+def test_remap_is_for_bags(tmp_path: Path, capsys: Any) -> None:
+    command = ['diagnose', _table(tmp_path / 'rig.csv'), '-o', str(tmp_path / 'out')]
+    assert main([*command, '--remap', 'odom:=/vo']) == 2
+    assert 'rig.csv is a table' in capsys.readouterr().err
+
+
+def test_wheel_of_another_model_file(tmp_path: Path, capsys: Any) -> None:
+    table = tmp_path / 'rig.csv'
+    _table(table)
+    lines = table.read_text().splitlines()
+    wide = [lines[0] + ',wheel_radius', *(f'{line},0.5' for line in lines[1:])]
+    table.write_text('\n'.join(wide))
+    command = ['diagnose', str(table), '-o', str(tmp_path / 'out'), '--config', 'hit_wh1']
+    assert main(command) == 2
+    said = capsys.readouterr().err
+    assert 'line 2, column wheel_radius: 0.5 m' in said and 'wheels.radius' in said
+    assert not (tmp_path / 'out').exists()
+
+
+def test_a_soil_that_nobody_stated_is_said(tmp_path: Path, capsys: Any) -> None:
+    command = ['diagnose', _table(tmp_path / 'rig.csv'), '-o', str(tmp_path / 'out')]
+    assert main([*command, '--no-pictures', '--config', 'hit_wh1']) == 0
+    assert 'no soil was stated' in capsys.readouterr().out

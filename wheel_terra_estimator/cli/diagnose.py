@@ -79,6 +79,12 @@ def run(arguments: argparse.Namespace) -> int:
     _make_sure_it_may_be_written(output, arguments.overwrite)
     if arguments.floor is not None and not 0.0 <= arguments.floor <= 0.2:
         raise UserError(f'--floor {arguments.floor:g}: must be a share between 0 and 0.2')
+    given = [arguments.data, *([arguments.reference] if arguments.reference else [])]
+    if arguments.remap and not any(_is_bag(Path(path)) for path in given):
+        raise UserError(
+            f'--remap {arguments.remap[0]}: renames topics of a bag, but {given[0]} is a table; '
+            'leave it out'
+        )
     own = _load_effects(arguments.effects)
     configuration = reader.from_arguments(arguments, complete=False)
     table = _read(arguments.data, arguments.remap, configuration)
@@ -88,6 +94,9 @@ def run(arguments: argparse.Namespace) -> int:
     options = Options(tuple(arguments.only) or None, arguments.floor)
     diagnosis = diagnose(table, configuration, reference, options)
     diagnosis = _with_effect_file(diagnosis, own)
+    if not any(key.startswith('soil.') for key in configuration.stated):
+        note = 'no soil was stated (--config): the default sand was taken for the model believed in'
+        diagnosis = replace(diagnosis, notes=(*diagnosis.notes, note))
     _write(diagnosis, output, pictures=not arguments.no_pictures)
     print(diagnosis.sentence)
     for quantity, gap in diagnosis.gap.items():
@@ -107,7 +116,16 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _make_sure_it_may_be_written(output: Path, overwrite: bool) -> None:
     """Refuse a path that is taken; what is replaced must be a folder of this command."""
-    if not output.exists():
+    try:
+        exists = output.exists()
+        output.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=output.parent, prefix='.diagnose-'):
+            pass
+    except OSError as error:
+        raise UserError(
+            f'{output}: cannot be written ({error.strerror}); choose another folder'
+        ) from None
+    if not exists:
         return
     if not overwrite:
         raise UserError(f'{output}: exists already; choose another folder or add --overwrite')
@@ -144,12 +162,16 @@ def _with_effect_file(diagnosis: Diagnosis, own: dict[str, Path]) -> Diagnosis:
     return replace(diagnosis, configuration=configuration)
 
 
-def _read(data: str, remaps: list[str], configuration: Configuration) -> SteadyTable:
-    """Read a table, or extract the steady windows of a drive."""
+def _is_bag(path: Path) -> bool:
     from wheel_terra_estimator.bags.storage import STORAGE_SUFFIXES
 
+    return path.is_dir() or path.name.endswith(STORAGE_SUFFIXES)
+
+
+def _read(data: str, remaps: list[str], configuration: Configuration) -> SteadyTable:
+    """Read a table, or extract the steady windows of a drive."""
     path = Path(data)
-    if path.is_dir() or path.name.endswith(STORAGE_SUFFIXES):
+    if _is_bag(path):
         from wheel_terra_estimator.bags.reader import parse_remaps
         from wheel_terra_estimator.discrepancy.drive_windows import rows_from_bag
 
