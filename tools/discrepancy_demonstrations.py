@@ -7,8 +7,8 @@
         --table bin=bed.csv --config bin=bed.yaml
 
 Measured data are looked for in ``../shared`` (``--shared`` says where else); a case whose data are
-not there is skipped, visibly. ``--table NAME=FILE`` adds a table of one's own, such as the rows of
-the virtual soil bin, with ``--config NAME=FILE`` and ``--reference NAME=FILE`` for its model and
+not there is skipped, visibly. ``--table NAME=FILE`` adds a table of one's own, such as other rows
+of the virtual soil bin, with ``--config NAME=FILE`` and ``--reference NAME=FILE`` for its model and
 for a table without the effect. Each case writes ``report.json``, ``report.html``, ``model.yaml``
 and pictures into a folder of its name; the verdicts are listed on the terminal and in
 ``summary.md``. What they mean is discussed in ``docs/discrepancy/demonstrations.md``.
@@ -33,6 +33,8 @@ from wheel_terra_estimator.discrepancy.model_file import write_model
 from wheel_terra_estimator.discrepancy.report import write_report
 from wheel_terra_estimator.discrepancy.result import Diagnosis
 from wheel_terra_estimator.discrepancy.table import (
+    QUANTITIES,
+    UNITS,
     SteadyTable,
     check_table,
     read_table,
@@ -234,6 +236,31 @@ def grc3(shared: Path) -> Case:
     )
 
 
+def _soilbin(table: str, title: str) -> Case:
+    """Return the rows of a sweep of the discrete elements against the model of their wheel."""
+    path = Path(__file__).resolve().parents[1] / 'docs' / 'soilbin' / table
+    rows = read_table(path)
+    # The rearmost contact of the grains is not the end of the stress: not a leaving angle.
+    columns = {name: values for name, values in rows.columns.items() if name != 'leaving_angle'}
+    measured = dict(zip(QUANTITIES, rows.measured.T, strict=True))
+    return Case(
+        'What does the closed form lack against discrete elements of wheel 2?',
+        check_table(title, {**columns, **measured}),
+        reader.load(['nakashima_wheel_2', 'fjs1_kanamori'], complete=False),
+        notes=('the soil of the model is the simulant, the grains are another soil: see `refit`',),
+    )
+
+
+def soilbin_pull(_: Path) -> Case:
+    """Virtual soil bin, free travel, pull raised in steps."""
+    return _soilbin('pull_sweep.csv', 'soil bin, pull sweep')
+
+
+def soilbin_slip(_: Path) -> Case:
+    """Virtual soil bin, travel speed imposed."""
+    return _soilbin('slip_sweep.csv', 'soil bin, slip sweep')
+
+
 CASES: dict[str, Callable[[Path], Case]] = {
     'hit': hit,
     'hit_paired': hit_paired,
@@ -242,6 +269,8 @@ CASES: dict[str, Callable[[Path], Case]] = {
     'cmu': cmu,
     'pathfinder': pathfinder,
     'grc3': grc3,
+    'soilbin_pull': soilbin_pull,
+    'soilbin_slip': soilbin_slip,
 }
 
 
@@ -293,6 +322,30 @@ def summary(name: str, case: Case, diagnosis: Diagnosis) -> str:
     return '\n'.join(lines) + '\n'
 
 
+def gap_row(name: str, diagnosis: Diagnosis) -> str:
+    """Return a row of the table of gaps: as configured, soil refitted, in the end (noise)."""
+    cells = []
+    for quantity in QUANTITIES:
+        gap, scale = diagnosis.gap.get(quantity), 1e3 if UNITS[quantity] == 'm' else 1.0
+        if gap is None:
+            cells.append('-')
+            continue
+        values = [f'{scale * value:.3g}' for value in (gap.before, gap.refit, gap.after)]
+        noise = '' if gap.noise is None else f' ({scale * gap.noise:.2g})'
+        cells.append(' → '.join(values) + noise)
+    return f'| {name} | {diagnosis.verdict} | {" | ".join(cells)} |'
+
+
+_GAP_HEAD = """## Gap before and after
+
+Root-mean-square error on rows that the fit did not see: as configured → soil refitted → in the end
+(noise).
+
+| case | verdict | sinkage [mm] | pull [N] | torque [N m] |
+|---|---|---|---|---|
+"""
+
+
 def main() -> None:
     """Run the command."""
     parser = argparse.ArgumentParser(
@@ -314,6 +367,7 @@ def main() -> None:
         name = text.partition('=')[0]
         cases[name] = lambda name=name: from_table(name, arguments)  # type: ignore[misc]
     parts: list[str] = []
+    gaps: list[str] = []
     for name, make in cases.items():
         try:
             case: Any = make()
@@ -325,7 +379,10 @@ def main() -> None:
             diagnosis = diagnose(case.table, case.configuration, case.reference)
             write(arguments.output / name, diagnosis)
             parts.append(summary(name, case, diagnosis))
+            gaps.append(gap_row(name, diagnosis))
         print(parts[-1], flush=True)
+    parts.append(_GAP_HEAD + '\n'.join(gaps) + '\n')
+    print(parts[-1])
     arguments.output.mkdir(parents=True, exist_ok=True)
     (arguments.output / 'summary.md').write_text('\n'.join(parts), encoding='utf-8')
 

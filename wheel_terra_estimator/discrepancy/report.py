@@ -145,9 +145,9 @@ def _cards(diagnosis: Diagnosis) -> list[dict[str, str]]:
             )
     worst = max(
         diagnosis.gap.items(),
-        # The greatest gap of the model believed in; where it stays open, what is left of it.
+        # The greatest gap that the soil leaves open; where it closes all, the greatest of all.
         key=lambda item: (
-            (item[1].refit if diagnosis.verdict == 'unexplained' else item[1].before)
+            (item[1].before if diagnosis.verdict == 'agrees' else item[1].refit)
             / (item[1].noise or 1e9)
         ),
         default=None,
@@ -155,11 +155,15 @@ def _cards(diagnosis: Diagnosis) -> list[dict[str, str]]:
     if worst is not None:
         name, item = worst
         scale, unit = pictures.SHOWN[name]
-        last = item.after if diagnosis.effects else item.refit
+        stages = {'as configured': item.before, 'soil refitted': item.refit}
+        if diagnosis.effects:
+            stages['effect added'] = item.after
+        values = ' → '.join(number(scale * value, 2) for value in stages.values())
         cards.append(
             {
-                'value': f'{number(scale * item.before, 2)} → {number(scale * last, 2)} {unit}',
-                'label': f'rms error of {pictures.words(name)} on rows the fit did not see',
+                'value': f'{values} {unit}',
+                'label': f'rms error of {pictures.words(name)} on unseen rows: '
+                + ', '.join(stages),
             }
         )
     closed = {name: g.shrink for name, g in diagnosis.gap.items() if g.shrink is not None}

@@ -123,9 +123,10 @@ def curves_over_slip(diagnosis: Diagnosis) -> Figure | None:
         ]
         lines = [Line2D([], [], ls=style, color='#1f2933', lw=1.2) for style in (':', '-')]
         others = [words(name) for name in table.varying() if name != 'slip']
-        blank = Line2D([], [], ls='')
-        texts = [f'{", ".join(others)}:' if others else '', *(text for text, _ in groups)]
-        _legend(figure, [blank, *marks], texts, lines=1)
+        texts = [text for text, _ in groups]
+        if others:
+            marks, texts = [Line2D([], [], ls=''), *marks], [f'{", ".join(others)}:', *texts]
+        _legend(figure, marks, texts, lines=1)
         _legend(figure, lines, ['model as configured', f'model {_last(diagnosis)}'])
     return figure
 
