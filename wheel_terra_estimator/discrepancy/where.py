@@ -71,11 +71,13 @@ def locate(
     noise = float(np.sqrt(np.mean(std**2)))
     in_std = mean / noise
     trend, correlation = _trend(table, names, residual[:, worst], mine)
-    where = ' and '.join(_text(side) for side in box) if box else 'everywhere alike'
+    one_sign = abs(mean) > _ONE_SIGN * size
+    whole = 'everywhere alike' if one_sign else 'over the whole table'
+    where = ' and '.join(_text(side) for side in box) if box else whole
     quantity = QUANTITIES[worst]
     if p_value < _SURE or excess[worst] > 3.0 * np.sqrt(2.0 * mine.sum()):
         sentence = f'{_LABELS[quantity]} is worst, {where}: measured minus model is '
-        if abs(mean) > _ONE_SIGN * size:
+        if one_sign:
             sentence += (
                 f'on average {_amount(mean, quantity)} there '
                 f'({in_std:+.1f} noise standard deviations)'
