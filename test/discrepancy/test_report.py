@@ -196,3 +196,45 @@ def test_global_picture_settings_stay(named, tmp_path):
 )
 def test_numbers_for_people(value, text):
     assert number(value, 4 if value == 1234.5 else 3) == text
+
+
+def test_soil_pulls_are_in_the_deviations_that_were_stated(named):
+    """The fit's own coordinates are wider; a reader compares with the number in the file."""
+    flat = named.configuration.flat()
+    (shift,) = (s for s in named.soil if s.name == 'sinkage_exponent')
+    stated = flat['soil.sinkage_exponent_std'] or 0.05  # the default where none was stated
+    assert shift.prior_std == pytest.approx(stated)
+    assert shift.pull == pytest.approx((shift.after - shift.before) / stated, rel=1e-6)
+    assert shift.before == pytest.approx(flat['soil.sinkage_exponent'])
+
+
+def test_cards_show_what_the_soil_does_and_what_the_effect_does(page, named):
+    parsed, _ = page
+    name = max(named.gap, key=lambda q: named.gap[q].refit / named.gap[q].noise)
+    gap, scale = named.gap[name], 1e3 if name == 'sinkage' else 1.0
+    three = ' → '.join(number(scale * x, 2) for x in (gap.before, gap.refit, gap.after))
+    assert three in parsed.text
+    closed = [g.shrink for g in named.gap.values() if g.shrink is not None]
+    assert closed, 'an effect of 12 noise deviations leaves a gap to be closed'
+    assert f'{100 * min(closed):.0f}' in re.search(r'([\d to-]+) %of the excess', parsed.text)[1]
+
+
+def test_curves_only_where_slip_was_swept(named, tmp_path):
+    """Scattered inputs make no curves, and the page does without the picture."""
+    scattered = campaign_diagnosis(5, 'full56')
+    write_report(scattered, tmp_path)
+    assert not (tmp_path / 'curves_over_slip.png').exists()
+    assert (tmp_path / 'measured_against_model.png').exists()
+
+
+def test_unexplained_scatter_is_not_called_a_misfit_of_nothing():
+    from types import SimpleNamespace
+
+    from wheel_terra_estimator.discrepancy.summary import sentence
+
+    def said(amplitude):
+        word, left = SimpleNamespace(word='unexplained'), SimpleNamespace(amplitude=amplitude)
+        return sentence(word, (), 1e-6, left, 0.0)
+
+    assert '12 % of the range' in said(0.12)
+    assert '0 %' not in said(0.001) and 'scatter' in said(0.001)
