@@ -238,3 +238,25 @@ def test_unexplained_scatter_is_not_called_a_misfit_of_nothing():
 
     assert '12 % of the range' in said(0.12)
     assert '0 %' not in said(0.001) and 'scatter' in said(0.001)
+
+
+def test_legends_stay_inside_the_picture(named):
+    """Six sweeps in a picture of one panel need several lines of legend."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    from wheel_terra_estimator.discrepancy import report_pictures as pictures
+
+    alone = named.table.measured.copy()
+    alone[:, 1:] = np.nan
+    pull_only = replace(named, table=replace(named.table, measured=alone))
+    for figure in (
+        pictures.curves_over_slip(named),
+        pictures.curves_over_slip(pull_only),
+        pictures.signature(pull_only),
+        pictures.residuals(pull_only, 'slope'),
+    ):
+        canvas = FigureCanvasAgg(figure)
+        canvas.draw()
+        for legend in figure.legends:
+            box = legend.get_window_extent(canvas.get_renderer())
+            assert box.x1 <= figure.bbox.x1 and box.y0 > figure.axes[0].bbox.y1

@@ -37,7 +37,7 @@ COLOUR_MAP = 'viridis'
 _DISCRETE = ('#E69F00', '#009E73', '#0072B2', '#7B4FA3', '#111111', '#D55E00')
 _SHAPES = 'os^Dv<'
 _MOST_CURVES = 6
-_LEGEND_LINE = 0.28  # [inch]
+_LEGEND_LINE, _LEGEND_SIZE = 0.28, 8.5  # [inch], [points]
 
 
 def words(name: str) -> str:
@@ -96,7 +96,10 @@ def curves_over_slip(diagnosis: Diagnosis) -> Figure | None:
         return None
     slip = table.columns['slip']
     with _style():
-        figure, axes = _panels(1, table.quantities, height=3.0, legend=2)
+        entries = len(groups) + bool(len(table.varying()) > 1)
+        abreast = {1: 3, 2: 5}.get(len(table.quantities), 7)
+        lines_of_groups = -(-entries // abreast)
+        figure, axes = _panels(1, table.quantities, height=3.0, legend=1 + lines_of_groups)
         for axis, name in zip(axes[0], table.quantities, strict=True):
             q, (scale, unit) = QUANTITIES.index(name), SHOWN[name]
             kept = np.isfinite(table.measured[:, q]) & ~_set_apart(diagnosis, q)
@@ -126,7 +129,7 @@ def curves_over_slip(diagnosis: Diagnosis) -> Figure | None:
         texts = [text for text, _ in groups]
         if others:
             marks, texts = [Line2D([], [], ls=''), *marks], [f'{", ".join(others)}:', *texts]
-        _legend(figure, marks, texts, lines=1)
+        _legend(figure, marks, texts, below=1, lines=lines_of_groups)
         _legend(figure, lines, ['model as configured', f'model {_last(diagnosis)}'])
     return figure
 
@@ -411,8 +414,10 @@ def _panels(
     count = len(columns)
     left, right = 0.72, 0.95 if bar else 0.12
     top, bottom = 0.34 + _LEGEND_LINE * legend, 0.5
-    between = 0.12 if shared else 0.72
-    cell = (2.73 if count > 2 else 3.4) + (0.5 if shared else 0.0)
+    # Panels that share an axis stand closer, but not so close that the last label of one meets
+    # the first of the next.
+    between = 0.4 if shared else 0.72
+    cell = (2.73 if count > 2 else 3.4 if count == 2 else 5.6) + (0.32 if shared else 0.0)
     width = left + right + count * cell + (count - 1) * between
     gap = 0.28
     total = top + bottom + rows * height + (rows - 1) * gap
@@ -443,15 +448,18 @@ def _colour_bar(figure: Figure, drawn: Any, text: str) -> None:
     place.grid(visible=False)
 
 
-def _legend(figure: Figure, handles: Any, labels: Any, lines: int = 0) -> None:
-    """Put a legend above the panels, so many lines below the top."""
+def _legend(figure: Figure, handles: Any, labels: Any, *, below: int = 0, lines: int = 1) -> None:
+    """Put a legend of so many lines above the panels, ``below`` lines from the top."""
     width, height = figure.get_size_inches()
+    # Width at the usual size [inch].
+    needed = 0.6 + sum(0.45 + 0.072 * len(text) for text in labels) / lines
     figure.legend(
         handles,
         labels,
         loc='upper left',
-        bbox_to_anchor=(0.6 / width, 1.0 - (0.02 + 0.9 * _LEGEND_LINE * lines) / height),
-        ncols=len(labels),
+        bbox_to_anchor=(0.6 / width, 1.0 - (0.02 + 0.9 * _LEGEND_LINE * below) / height),
+        ncols=-(-len(labels) // lines),
+        fontsize=max(_LEGEND_SIZE * min(1.0, width / needed), 6.0),
         columnspacing=1.4,
         handletextpad=0.4,
     )

@@ -681,11 +681,6 @@ def _check_range_of_design(table: SteadyTable, remarks: list[str]) -> None:
             '8 slips from 0.05 to 0.8 at 2 loads'
         )
     slip, load = table.columns['slip'], table.columns['normal_load']
-    if np.ptp(slip) < MINIMUM_SLIP_SPAN:
-        remarks.append(
-            f'slip only from {slip.min():.3g} to {slip.max():.3g}: what grows with slip is hardly '
-            'seen; rows with a slip up to 0.6 would show it'
-        )
     span, ratio = np.ptp(slip), load.max() / load.min()
     if span < MINIMUM_SLIP_SPAN and ratio < MINIMUM_LOAD_RATIO:
         if (table.slip_std > 0).all():
@@ -698,4 +693,9 @@ def _check_range_of_design(table: SteadyTable, remarks: list[str]) -> None:
             f'{table.name}: slip only from {slip.min():.3g} to {slip.max():.3g} and load only from '
             f'{load.min():.3g} to {load.max():.3g} N: too narrow to tell anything; add rows with '
             f'slip between {max(0.02, slip.min() - 0.3):.2g} and {min(0.8, slip.max() + 0.4):.2g}'
+        )
+    if span < MINIMUM_SLIP_SPAN:
+        remarks.append(
+            f'slip only from {slip.min():.3g} to {slip.max():.3g}: what grows with slip is hardly '
+            'seen; rows with a slip up to 0.6 would show it'
         )
