@@ -108,5 +108,5 @@ def test_without_orientation_gyro_and_gravity_give_the_slope():
 
 def test_a_gap_of_the_imu_is_not_integrated_over():
     window, attitude = InertialWindow(), Attitude()
-    take_inertial(window, attitude, reading(force=(1.0, 0.0, 9.7)), 5.0, 9.81, 0.0)
+    take_inertial(window, attitude, reading(force=(1.0, 0.0, 9.7)), 5.0, 9.81, 0.0, 0.0)
     assert window.duration == 0.0

@@ -223,3 +223,9 @@ def test_a_fast_loss_of_speed_near_the_torque_limit_is_bogging_down():
         found.append(monitor.update(0.1 * i, 1.0 - slip, True, wheels))
     assert 5.0 < first(found) < 6.5
     assert 'bogging down' in next(a.reason for a in found if a.stuck)
+
+
+def test_a_slip_that_nobody_knows_is_not_digging():
+    guess = replace(wheel(1.0), slip_std=0.4)
+    assert first(course([[guess] * 6] * 300)) is None
+    assert first(course([[wheel(1.0)] * 6] * 300)) is not None

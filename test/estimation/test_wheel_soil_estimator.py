@@ -9,6 +9,7 @@ import pytest
 
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.estimation.estimates import SlipClass
+from wheel_terra_estimator.estimation.filter_state import SPEED
 from wheel_terra_estimator.estimation.measurements import (
     InertialReading,
     ReferenceVelocity,
@@ -17,6 +18,8 @@ from wheel_terra_estimator.estimation.measurements import (
     WheelOdometry,
 )
 from wheel_terra_estimator.estimation.steps.context import rim_discord, rims_without_turning
+from wheel_terra_estimator.estimation.steps.force_rows import dragged_pull
+from wheel_terra_estimator.estimation.steps.odd_wheels import watch_demand
 from wheel_terra_estimator.estimation.steps.start import start_context
 from wheel_terra_estimator.estimation.wheel_soil_estimator import WheelSoilEstimator
 from wheel_terra_estimator.evaluation import kinds
@@ -322,3 +325,69 @@ def test_disagreement_of_the_wheels(changes, expected):
     c.run.rate_time = [c.run.time] * n
     noise = 3.0 * float(c.settings.sensors.wheel_rate_std) * c.settings.slip_radius[0]
     assert rim_discord(c, rims_without_turning(c)) == pytest.approx(max(expected - noise, 0.0))
+
+
+def test_two_wild_fixes_that_agree_need_a_witness(climb):
+    """Torque, slope and rim speed say that nothing changed: a third fix would have to agree."""
+    wild = [a.measurement for a in climb.arrivals]
+    fixes = [i for i, m in enumerate(wild) if isinstance(m, ReferenceVelocity)]
+    for i in fixes[11:13]:
+        wild[i] = replace(wild[i], forward=wild[i].forward + 0.03)
+    worst = 0.0
+    row = {int(stamp): i for i, stamp in enumerate(climb.truth.stamp)}
+    estimator = WheelSoilEstimator(climb.configuration)
+    for stamp, inputs in merged(wild):
+        estimator.step(stamp, inputs)
+        if stamp > wild[fixes[11]].stamp and stamp in row:
+            error = estimator.estimates().slip - climb.truth.slip[row[stamp]]
+            worst = max(worst, np.abs(np.median(error)))
+    assert worst < 0.25  # of the 0.6 that the fixes say
+
+
+def errors_of(kind, seed, mode, of, truth):
+    """Estimates less truth of a minute of a kind, first ten seconds left out, and deviations."""
+    d = simulate(load({**kinds.KINDS[kind], 'duration': 60.0, 'sensors.jitter': 0.0}), seed)
+    row = {int(stamp): i for i, stamp in enumerate(d.truth.stamp)}
+    sets = [s for s in estimate(d, mode) if s.stamp in row][100:]
+    error = [getattr(s, of) - getattr(d.truth, truth)[row[s.stamp]] for s in sets]
+    return np.array(error), np.array([getattr(s, f'{of}_std') for s in sets]), d.truth
+
+
+def test_sinkage_without_a_sensor_stays_by_its_law():
+    """Torque must not teach the sinkage what the shear model gets wrong."""
+    error, std, _ = errors_of('cruise', 1000, 'no_sinkage', 'sinkage', 'sinkage')
+    assert np.abs(error.mean()) < 0.012
+    assert (np.abs(error) < 1.96 * std).mean() > 0.9
+
+
+def test_pull_in_a_patch_follows_the_torque():
+    """Soil is learned over travel; what torque says of the pull counts at once."""
+    error, _, truth = errors_of(
+        'entrapment_patch', 1000, 'reference', 'drawbar_pull', 'drawbar_pull'
+    )
+    assert np.sqrt(np.nanmean(error**2)) < 0.02 * truth.normal_load.mean()
+
+
+def test_a_change_of_slope_opens_the_speed():
+    c = start_context(reader.load(SAND))
+    run = c.run
+    run.rim_speed, run.fresh_travel, run.steepness = [0.05] * 6, 1.0, 0.5
+    run.window.count = 5
+    steep = float(c.settings.gravity) * 0.1
+    for force, expected in ((0.0, 0.0), (0.0, 0.0), (steep, 0.1 / 0.5 * 0.05)):
+        run.force = (force, 0.0, c.settings.gravity)
+        watch_demand(c, 0.1)
+        assert run.unrest == pytest.approx(expected, rel=0.1)
+    for _ in range(100):
+        watch_demand(c, 0.1)
+    assert run.demand == pytest.approx(0.1, rel=0.01)
+
+
+@pytest.mark.parametrize('torque', [-8.0, 20.0])
+def test_a_dragged_wheel_is_a_drag_whatever_its_jammed_drive_reads(torque):
+    c = start_context(reader.load(SAND))
+    c.filter.mean[SPEED] = 0.05
+    c.run.load[:] = [60.0] * 6
+    assert dragged_pull(c, 0, torque, 60.0) < -0.2 * 60.0
+    c.filter.mean[SPEED] = -0.05
+    assert dragged_pull(c, 0, -torque, 60.0) > 0.2 * 60.0

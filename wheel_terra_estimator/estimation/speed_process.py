@@ -90,6 +90,7 @@ def take_inertial(
     dt: float,
     gravity: float,
     yaw_bias: float,
+    pitch_bias: float,
 ) -> None:
     """Add an IMU reading to the window; `dt` is the time since the reading before it [s]."""
     attitude.update(reading, dt, gravity)
@@ -99,7 +100,7 @@ def take_inertial(
     window.force_y += float(reading.specific_force[1])
     window.force_z += float(reading.specific_force[2])
     window.yaw_rate += float(reading.angular_rate[2]) - yaw_bias
-    window.pitch_rate += float(reading.angular_rate[1])
+    window.pitch_rate += float(reading.angular_rate[1]) - pitch_bias
     if 0.0 < dt <= _LONGEST_GAP:
         window.speed_change += (force_x - gravity * attitude.sine_up) * dt
         window.duration += dt

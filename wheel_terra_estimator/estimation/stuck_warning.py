@@ -34,6 +34,7 @@ from wheel_terra_estimator.estimation.speed_process import median
 
 _ENTRAPPED_SLIP = 0.9
 _DIGGING_SLIP = 0.8
+_SURE_STD = 0.25  # of the slip, to call it digging
 _TREND_WINDOW = 5.0  # [s]
 _SHORTEST_TREND = 2.5  # [s]
 # Taken off the slope, over the deviation of the slip: 1.5 / (5 s / sqrt(12) * sqrt(5 fixes)).
@@ -208,7 +209,8 @@ class StuckMonitor:
 
         probability = exceedance_probability(typical, typical_std, _DIGGING_SLIP)
         signs: dict[str, str] = {}
-        if effective and probability > 0.5 and fastest > 0.0:
+        sure = settled and typical_std < _SURE_STD
+        if effective and probability > 0.5 and fastest > 0.0 and sure:
             if self._held('dig', time, tuning.dig_hold) and not slowing:
                 signs['dig'] = f'median slip {typical:.2f}: digging in'
         else:

@@ -23,7 +23,13 @@ def collect(c: Context, time: float, inputs: StepInputs) -> None:
         dt = 0.0 if run.inertial_time is None else time - run.inertial_time
         run.inertial_time = time
         take_inertial(
-            run.window, run.attitude, inputs.inertial, dt, c.settings.gravity, run.yaw_bias
+            run.window,
+            run.attitude,
+            inputs.inertial,
+            dt,
+            c.settings.gravity,
+            run.yaw_bias,
+            run.pitch_bias,
         )
     if inputs.sinkage is not None:
         _collect_sinkage(c, inputs.sinkage)

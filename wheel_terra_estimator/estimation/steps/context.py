@@ -53,6 +53,9 @@ class Context:
         (n, state) derivatives of the pulls at the last update.
     linear : tuple or None
         State, pulls, derivatives of the torques and torques of the last pass.
+    pull_sum : tuple or None
+        Sum of the pulls [N] by the specific force along the body, the rover's weight [N] that a
+        tilt of the body by its ruts turns into it, and its variance [N^2].
     """
 
     configuration: Configuration
@@ -71,6 +74,7 @@ class Context:
     monitor: StuckMonitor
     pull_jacobian: FloatArray
     linear: tuple[FloatArray, FloatArray, FloatArray, FloatArray] | None = None
+    pull_sum: tuple[float, float, float] | None = None
 
 
 def rim_speed_of(c: Context, wheel: int) -> float:
@@ -157,6 +161,11 @@ def reference_known(c: Context) -> bool:
     """Say whether a fix came within the last travel over which soil is learned."""
     run = c.run
     return run.reference_time is not None and run.time - run.reference_time < 20.0
+
+
+def sinkage_known(c: Context, wheel: int) -> bool:
+    """Say whether a wheel's sinkage was read of late."""
+    return c.run.time - c.run.sinkage_time[wheel] < 2.0
 
 
 def open_shear(c: Context, std: float) -> None:

@@ -17,6 +17,7 @@ from wheel_terra_estimator.estimation.steps.context import (
     rims_without_turning,
     typical_rim,
 )
+from wheel_terra_estimator.estimation.steps.odd_wheels import note_unrest, watch_demand
 from wheel_terra_estimator.estimation.steps.prediction import predict
 from wheel_terra_estimator.estimation.steps.pulls import floor_speed_variance, work_out_pulls
 from wheel_terra_estimator.estimation.steps.reference_and_rest import fuse_reference, fuse_rest
@@ -43,6 +44,7 @@ def run_cycle(c: Context, time: float, reference: ReferenceVelocity | None) -> N
         follow_turning(c, window, dt)
         run.load = wheel_loads(c)
         note_turning(c, dt)
+        watch_demand(c, dt)
     unturned = rims_without_turning(c)
     rim = typical_rim(unturned)
     follow_direction(c, rim)
@@ -53,6 +55,7 @@ def run_cycle(c: Context, time: float, reference: ReferenceVelocity | None) -> N
     rims = [rim_speed_of(c, i) for i in range(s.wheel_count)]
     still = all(r != r or abs(r) < s.rest_speed for r in rims) and any(r == r for r in rims)
     before = c.filter.mean[c.layout.sinkage].copy()
+    note_unrest(c, time, rim)
     predict(c, time, dt, rims, still)
     if reference is not None:
         fuse_reference(c, time, reference, still)

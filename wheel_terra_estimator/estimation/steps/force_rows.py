@@ -75,7 +75,8 @@ def model_rows(
             pull = dragged_pull(c, i, torque[i], load) if stands else _NAN
             if pull == pull:
                 run.stand_pull[i] = pull
-                unsure = 0.1 + float(s.sensors.torque_gain_std)
+                # In turns it is pushed sideways, too.
+                unsure = 0.1 + float(s.sensors.torque_gain_std) + min(run.side_motion, 1.0)
             else:
                 # Standing, lifted or unknown: it may carry its share of the slope, or nothing.
                 pull, unsure = load * slope_share(c), 0.3
@@ -100,6 +101,7 @@ def model_rows(
             add('torque', reading - torque_model, row_torque, variance)
     c.pull_jacobian = jacobian
     c.linear = (x.copy(), pulls, jacobian_torque, torques)
+    c.pull_sum = None
     set_ratio_walk(c, jacobian, rims)
     if run.force_known and run.window.count:
         weight = s.mass * run.force[2]
@@ -116,8 +118,9 @@ def model_rows(
         residual = s.mass * run.force[0] - (balance_sum + weight * tilt - uphill)
         noise = float(s.sensors.specific_force_std) ** 2 / run.window.count
         known = s.mass**2 * (noise + float(s.sensors.specific_force_bias_std) ** 2)
-        variance = repeats * (known + (_BALANCE_STD * weight) ** 2) + open_variance
-        add('balance', residual, balance, variance)
+        known += (_BALANCE_STD * weight) ** 2
+        add('balance', residual, balance, repeats * known + open_variance)
+        c.pull_sum = (s.mass * run.force[0] + uphill, weight, known)
 
 
 def repetitions(rims: list[float], dt: float) -> float:
@@ -134,14 +137,15 @@ def dragged_pull(c: Context, i: int, torque: float, load: float) -> float:
     """Return the pull of a wheel that stands while the rover moves, from its torque [N].
 
     A locked wheel slides: its shear is saturated, and torque gives the pull whatever the
-    strength of the soil. Where its hub stands too, torque and pull balance about the hub.
+    strength of the soil. Where its hub stands too, torque and pull balance about the hub. A torque
+    that drives a wheel which is dragged is not the soil's: its drive is jammed.
     """
     run, s, layout = c.run, c.settings, c.layout
     x = c.filter.mean
     speed = float(x[SPEED]) - run.yaw_rate * s.lateral[i]
     if torque != torque:
         return _NAN
-    if abs(speed) < 2.0 * s.rest_speed:
+    if abs(speed) < s.rest_speed:
         return min(max(torque / s.shear_radius[i], -load), load)
     direction = 1.0 if speed > 0.0 else -1.0
     forces = c.models.forces(
@@ -156,8 +160,11 @@ def dragged_pull(c: Context, i: int, torque: float, load: float) -> float:
         _NAN,
         _NAN,
     )
-    gain = forces.d_pull[2] / forces.d_torque[2] if forces.d_torque[2] else 0.0
-    pull = forces.pull + gain * (direction * torque - forces.torque)
+    pull = forces.pull
+    jammed = direction * torque > 0.0 and run.side_motion < 0.1
+    if forces.d_torque[2] and not jammed:
+        gain = forces.d_pull[2] / forces.d_torque[2]
+        pull += gain * (direction * torque - forces.torque)
     return direction * min(max(pull, -1.2 * load), load)
 
 

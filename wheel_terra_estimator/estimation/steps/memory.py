@@ -26,7 +26,6 @@ class Memory:
     inertial_time: float | None = None
     odometry_time: float | None = None
     torque_time: float | None = None
-    sinkage_time: float | None = None
     reference_time: float | None = None
     reference_gap: float = 10.0  # [s] between fixes, smoothed
     still_since: float | None = None
@@ -41,7 +40,7 @@ class Memory:
     sinkage_sum: list[float] = field(default_factory=list)
     sinkage_count: list[int] = field(default_factory=list)
     sinkage_rejected: list[int] = field(default_factory=list)
-    sinkage_seen: list[bool] = field(default_factory=list)
+    sinkage_time: list[float] = field(default_factory=list)  # [s], -inf = none yet
     leaving_angle: list[float] = field(default_factory=list)
     leaving_time: list[float] = field(default_factory=list)
     rest_since: list[float] = field(default_factory=list)  # nan = not at rest
@@ -60,8 +59,11 @@ class Memory:
     unrest: float = 0.0  # change of speed that contacts under change may bring [m/s]
     side_motion: float = 0.0  # of the outer wheels over the fastest rim speed
     turned_over: float = 0.0  # and the travel that it took [m]
-    yaw_bias: float = 0.0
-    yaw_bias_weight: float = 0.0
+    yaw_bias: float = 0.0  # zeros of the gyro, learned at rest [rad/s]
+    pitch_bias: float = 0.0
+    gyro_bias_weight: float = 0.0
+    demand: float = _NAN  # of the ground, as a share of the load, over the last second
+    unrest_time: float = -math.inf  # when the contacts last changed [s]
     ratio: float = 0.95  # remembered v / rim speed
     ratio_std: float = 0.3
     ratio_walk: float = 0.13  # of v / rim speed [1/sqrt(m)]
@@ -69,9 +71,11 @@ class Memory:
     starting: bool = True
     fresh_travel: float = 0.0  # [m] since the start or the last change of direction
     load: list[float] = field(default_factory=list)
+    torque_excess: list[float] = field(default_factory=list)  # reading less model, smoothed
     torque_slope: list[float] = field(default_factory=list)  # by v/(r w), smoothed; nan = none
     pull_slope: list[float] = field(default_factory=list)
     pull: list[float] = field(default_factory=list)
+    model_pull: list[float] = field(default_factory=list)  # without the sum's correction
     pull_std: list[float] = field(default_factory=list)
     sinkage_rate: list[float] = field(default_factory=list)
     sinkage_rate_std: list[float] = field(default_factory=list)
@@ -114,7 +118,7 @@ class Memory:
             sinkage_sum=[0.0] * n,
             sinkage_count=[0] * n,
             sinkage_rejected=[0] * n,
-            sinkage_seen=[False] * n,
+            sinkage_time=[-math.inf] * n,
             leaving_angle=[_NAN] * n,
             leaving_time=[-1e9] * n,
             rest_since=[_NAN] * n,
@@ -126,6 +130,8 @@ class Memory:
             slip_std=[1.0] * n,
             wheel_class=[int(SlipClass.UNKNOWN)] * n,
             pull=[0.0] * n,
+            model_pull=[0.0] * n,
+            torque_excess=[0.0] * n,
             torque_slope=[_NAN] * n,
             pull_slope=[_NAN] * n,
             sinkage_rate=[0.0] * n,

@@ -7,11 +7,39 @@ from __future__ import annotations
 import math
 
 from wheel_terra_estimator.estimation.speed_process import median
-from wheel_terra_estimator.estimation.steps.context import Context
+from wheel_terra_estimator.estimation.steps.context import Context, slope_share, typical_rim
 
 _NAN = math.nan
 _UNLOADED_HOLD = 0.3
 _EFFORT_GAIN = 0.5
+_RESTLESS_SHARE, _RESTLESS_RIM = 0.05, 0.02  # of the rim speed; its change in a cycle
+
+
+def watch_demand(c: Context, dt: float) -> None:
+    """Note a change of what the ground asks: the slip follows, over the slope of the curve."""
+    run, s = c.run, c.settings
+    demand = slope_share(c)
+    if run.demand != run.demand:
+        run.demand = demand
+    change = demand - run.demand
+    run.demand -= math.expm1(-dt / 1.0) * change
+    noise = float(s.sensors.specific_force_std) / math.sqrt(run.window.count) / s.gravity
+    excess = abs(change) - 1.5 * noise
+    if excess > 0.0 and run.steepness > 0.0 and run.fresh_travel > c.contact_length:
+        fastest = max((abs(r) for r in run.rim_speed if r == r), default=0.0)
+        share = min(excess / max(run.steepness, 0.1), 0.3)
+        run.unrest = max(run.unrest, share * fastest)
+
+
+def note_unrest(c: Context, time: float, rim: float | None) -> None:
+    """Remember when contacts or commands last changed: a witness for fixes that jump."""
+    run = c.run
+    before = typical_rim(run.rims_at_cycle)
+    if rim is None:
+        return
+    changed = before is None or abs(rim - before) > _RESTLESS_RIM * abs(rim)
+    if changed or run.unrest > _RESTLESS_SHARE * abs(rim):
+        run.unrest_time = time
 
 
 def watch_torques(c: Context, torque: list[float], rims: list[float]) -> None:
@@ -29,13 +57,13 @@ def watch_torques(c: Context, torque: list[float], rims: list[float]) -> None:
         return
     dt, run.effort_time = run.time - run.effort_time, run.time
     typical_torque = median([torque[i] for i in rolling])
-    typical_rim = median([rims[i] for i in rolling])
+    middle_rim = median([rims[i] for i in rolling])
     fastest = max(abs(rims[i]) for i in rolling)
     noise = float(s.sensors.torque_std) + float(s.sensors.torque_zero_std)
     telling = abs(typical_torque) > 5.0 * noise and run.side_motion < 0.1
     for i in rolling:
         share = torque[i] / typical_torque if telling else 1.0
-        free = telling and abs(share) < 0.2 and rims[i] / typical_rim > 0.95
+        free = telling and abs(share) < 0.2 and rims[i] / middle_rim > 0.95
         if run.unloaded[i]:
             free = not telling or share < 0.4
         if free == run.unloaded[i]:

@@ -15,6 +15,7 @@ from wheel_terra_estimator.estimation.steps.context import (
     Context,
     current_speed,
     rim_speed_of,
+    sinkage_known,
     yaw_rate_std,
 )
 from wheel_terra_estimator.estimation.stuck_warning import StuckAssessment
@@ -151,7 +152,7 @@ def faults_in_words(c: Context) -> dict[str, str]:
         faults['orientation'] = 'no orientation: slope from gyro and specific force'
     if run.torque_time is None or run.time - run.torque_time > 2.0:
         faults['torque'] = 'no torque: pull from the balance of forces and the soil model'
-    if run.sinkage_time is None or run.time - run.sinkage_time > 2.0:
+    if not any(sinkage_known(c, i) for i in range(s.wheel_count)):
         faults['sinkage'] = 'no sinkage: held by its model'
     if run.reference_time is None or run.time - run.reference_time > 20.0:
         faults['reference'] = 'no reference velocity: slip from forces and soil model'

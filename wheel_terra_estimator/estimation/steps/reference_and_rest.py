@@ -46,7 +46,11 @@ def fuse_reference(c: Context, time: float, reference: ReferenceVelocity, still:
         beyond = abs(reference.forward) > 1.5 * fastest + 5.0 * math.sqrt(total)
         same = abs(residual - run.reference_doubt) < 4.0 * math.sqrt(2.0 * variance + total)
         run.reference_doubt = residual
-        if run.reference_rejected >= 2 and same and not (beyond and run.reference_rejected < 4):
+        if (
+            run.reference_rejected >= fixes_needed(c)
+            and same
+            and not (beyond and run.reference_rejected < 4)
+        ):
             # Fixes that keep disagreeing are right: open the state to them.
             c.filter.widen(SPEED, residual * residual)
             c.monitor.forget_trend()
@@ -62,6 +66,17 @@ def fuse_reference(c: Context, time: float, reference: ReferenceVelocity, still:
     H[0, SPEED] = 1.0
     c.filter.update(np.array([residual]), H, np.array([variance]))
     run.reference_time = time
+
+
+def fixes_needed(c: Context) -> int:
+    """Return how many fixes in a row must disagree by the same amount before they are believed.
+
+    A real change of the slip shows in torque, slope or rim speed, unless the traction curve is
+    flat: two will do with such a witness, or where there is no torque to ask.
+    """
+    run = c.run
+    told = run.torque_time is not None and run.time - run.torque_time < 2.0
+    return 3 if told and run.time - run.unrest_time > 2.5 else 2
 
 
 def fuse_rest(c: Context, time: float, rims: list[float], rim: float | None, still: bool) -> None:
@@ -89,9 +104,10 @@ def fuse_rest(c: Context, time: float, rims: list[float], rim: float | None, sti
         variance += chi_square_gate(float(x[SPEED]), float(P[SPEED, SPEED]) + variance, 9.0)
     fuse_speed(c, 0.0, variance)
     if settled > 0.5 and run.window.count and abs(run.yaw_rate) < 0.05:
-        weight = min(run.yaw_bias_weight + 1.0, 200.0)
+        weight = min(run.gyro_bias_weight + 1.0, 200.0)
         run.yaw_bias += run.yaw_rate / weight
-        run.yaw_bias_weight = weight
+        run.pitch_bias += run.window.pitch_rate / run.window.count / weight
+        run.gyro_bias_weight = weight
 
 
 def fuse_speed(c: Context, value: float, variance: float) -> None:

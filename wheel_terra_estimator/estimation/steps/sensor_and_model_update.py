@@ -9,9 +9,18 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from wheel_terra_estimator.estimation.filter_state import SHEAR_MODULUS, SHEAR_STRENGTH
+from wheel_terra_estimator.estimation.filter_state import (
+    SHEAR_MODULUS,
+    SHEAR_STRENGTH,
+    SLIP_SINKAGE,
+)
 from wheel_terra_estimator.estimation.speed_process import InertialWindow
-from wheel_terra_estimator.estimation.steps.context import Context, note_nis, reference_known
+from wheel_terra_estimator.estimation.steps.context import (
+    Context,
+    note_nis,
+    reference_known,
+    sinkage_known,
+)
 from wheel_terra_estimator.estimation.steps.force_rows import model_rows
 from wheel_terra_estimator.estimation.steps.odd_wheels import watch_torques
 
@@ -40,9 +49,7 @@ def fuse_models(c: Context, dt: float, rims: list[float], still: bool) -> None:
         residual = reading - float(x[zi])
         total = float(P[zi, zi]) + variance
         nis = residual * residual / total
-        if not run.sinkage_seen[i]:
-            run.sinkage_seen[i] = True
-        elif nis > gate:
+        if run.sinkage_time[i] > -math.inf and nis > gate:
             run.rejected['sinkage'] += 1
             run.sinkage_rejected[i] += 1
             if run.sinkage_rejected[i] < 8:
@@ -51,7 +58,7 @@ def fuse_models(c: Context, dt: float, rims: list[float], still: bool) -> None:
             c.filter.widen(zi, residual * residual)
         run.sinkage_rejected[i] = 0
         note_nis(c, 'sinkage', min(nis, gate))
-        run.sinkage_time = run.time
+        run.sinkage_time[i] = run.time
         row = np.zeros(size)
         row[zi] = 1.0
         residuals.append(residual)
@@ -76,6 +83,12 @@ def fuse_models(c: Context, dt: float, rims: list[float], still: bool) -> None:
         model_rows(c, dt, rims, torque, residuals, variances, rows)
     if rows:
         # Without fixes slip and shear strength are not told apart: do not let them drift.
-        held = () if reference_known(c) else (SHEAR_STRENGTH, SHEAR_MODULUS)
+        held = [] if reference_known(c) else [SHEAR_STRENGTH, SHEAR_MODULUS]
+        unread = [i for i in range(n) if not sinkage_known(c, i)]
+        # Nor are sinkage and the errors of the shear model, where no sensor sees the sinkage.
+        for part in (layout.sinkage, layout.stiffness):
+            held += [part.start + i for i in unread]
+        if len(unread) == n:
+            held.append(SLIP_SINKAGE)
         c.filter.update(np.array(residuals), np.array(rows), np.array(variances), considered=held)
     run.window = InertialWindow()

@@ -103,7 +103,8 @@ def begin_with_soil(c: Context, stamp: int) -> None:
     """Start anew at a stamp [ns]; soil and biases are kept, widened."""
     old, covariance, mean = c.run, c.filter.covariance.copy(), c.filter.mean.copy()
     begin_anew(c, stamp)
-    c.run.yaw_bias, c.run.yaw_bias_weight = old.yaw_bias, 0.5 * old.yaw_bias_weight
+    c.run.yaw_bias, c.run.pitch_bias = old.yaw_bias, old.pitch_bias
+    c.run.gyro_bias_weight = 0.5 * old.gyro_bias_weight
     c.run.rejected = dict(old.rejected)
     kept = [GRAVITY_BIAS, SHEAR_STRENGTH, SHEAR_MODULUS, SLIP_SINKAGE, CENTROID, MOUND]
     kept += range(c.layout.size)[c.layout.stiffness]

@@ -10,6 +10,8 @@ from wheel_terra_estimator.estimation.filter_state import SPEED
 from wheel_terra_estimator.estimation.speed_process import InertialWindow
 from wheel_terra_estimator.estimation.steps.context import Context, open_shear, slope_share
 
+_COMMON_CURVATURE = 0.1  # [rad/m]
+
 
 def follow_turning(c: Context, window: InertialWindow, dt: float) -> None:
     """Smooth the yaw rate while it is steady; measure how the ground curves along the path."""
@@ -48,7 +50,11 @@ def ground_curvature(c: Context) -> float:
     over = c.run.turned_over
     if abs(over) < 0.1 * c.curvature_length:
         return 0.0
-    return min(max(c.run.turned_up / over, -0.3), 0.3)
+    curvature = min(max(c.run.turned_up / over, -0.3), 0.3)
+    # What the gyro's zero makes of it, against the curvature of common ground.
+    zero = float(c.settings.sensors.angular_rate_bias_std)
+    doubt = zero / max(abs(float(c.filter.mean[SPEED])), 1e-4)
+    return curvature / (1.0 + (doubt / _COMMON_CURVATURE) ** 2)
 
 
 def wheel_loads(c: Context) -> list[float]:
@@ -56,9 +62,9 @@ def wheel_loads(c: Context) -> list[float]:
     run, s = c.run, c.settings
     moment = [
         (torque if torque == torque else 0.0) - pull * r
-        for torque, pull, r in zip(run.torque_now, run.pull, s.rim_radius, strict=True)
+        for torque, pull, r in zip(run.torque_now, run.model_pull, s.rim_radius, strict=True)
     ]
-    loads = [float(w) for w in s.load.loads(run.force, run.pull, moment)]
+    loads = [float(w) for w in s.load.loads(run.force, run.model_pull, moment)]
     if any(run.unloaded):
         total = sum(loads)
         loads = [0.0 if off else w for w, off in zip(loads, run.unloaded, strict=True)]
