@@ -34,7 +34,9 @@ _UNEXPLAINED_SOME = (0.015, 0.03, 0.06, 0.15, 0.4)
 _SOME = ((1, 0, 0), (0, 1, 0), (0, 0, 1), (0, 1, 1))
 
 _PAIR_SEEDS = 4  # best single effects to which a second one is added
-_PAIRS = 8  # pairs that are fitted
+_PAIRS = 8  # pairs that are fitted, at most
+# A pair must promise so many nats over the best single effect: its prior alone costs it four.
+_PROMISE = 1.5
 
 
 def default_floors(greatest: float | None = None) -> tuple[Floor, ...]:
@@ -175,7 +177,9 @@ def explain_pairs(
             total = score - seed.fitted.objective
             if key not in proposals or proposals[key][0] < total:
                 proposals[key] = (total, names, start, seed.fitted.angle)
-    best = sorted(proposals.values(), key=lambda proposal: -proposal[0])[:_PAIRS]
+    enough = _PROMISE - min(e.fitted.objective for e in singles)
+    worth = [proposal for proposal in proposals.values() if proposal[0] > enough]
+    best = sorted(worth, key=lambda proposal: -proposal[0])[:_PAIRS]
     if not best:
         return []
     variance = ranked[0].fitted.variance

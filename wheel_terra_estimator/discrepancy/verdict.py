@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from scipy.special import logsumexp
 
 from wheel_terra_estimator.discrepancy.remainder import (
-    IMPROBABLE,
     Remainder,
     Variance,
     remainder,
@@ -76,7 +75,7 @@ def decide(selection: Selection, variance_of: Variance) -> Verdict:
     named = [h for h, e in enumerate(selection.explanations) if e.names]
     effects = float(logsumexp(total[named])) if named else -np.inf
     if np.logaddexp(effects, rest) - agrees < np.log(ODDS_TO_SPEAK):
-        word = 'agrees' if left.p_value > IMPROBABLE else 'unexplained'
+        word = 'agrees' if left.accounted_for else 'unexplained'
         return Verdict(word, nothing, (), left)
     if not named or rest > effects:
         return Verdict('unexplained', nothing, (), left)
