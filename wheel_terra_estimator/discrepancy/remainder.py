@@ -19,6 +19,8 @@ Variance: TypeAlias = Callable[[ArrayLike, ArrayLike], NDArray[np.float64]]
 
 # Misfit that even the best floor leaves improbable.
 IMPROBABLE = 1e-3
+# The same for the distance of the soil: its prior is wide already.
+IMPROBABLE_SOIL = 1e-2
 
 
 @dataclass(frozen=True)
@@ -48,7 +50,7 @@ class Remainder:
     @property
     def accounted_for(self) -> bool:
         """True where floor and noise, and a soil that can be believed, are enough."""
-        return min(self.p_value, self.soil_p_value) > IMPROBABLE
+        return self.p_value > IMPROBABLE and self.soil_p_value > IMPROBABLE_SOIL
 
     @property
     def significant(self) -> bool:

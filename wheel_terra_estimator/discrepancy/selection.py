@@ -106,9 +106,16 @@ class Selection:
 
     def find(self, names: Sequence[str]) -> Explanation:
         """Return the explanation with exactly these effects."""
-        for explanation in self.explanations:
+        return self.explanations[self._index(names)]
+
+    def joint_of(self, names: Sequence[str]) -> FloatArray:
+        """(F,) log of prior times evidence of the explanation with exactly these effects."""
+        return self.log_joint[self._index(names)]
+
+    def _index(self, names: Sequence[str]) -> int:
+        for h, explanation in enumerate(self.explanations):
             if set(explanation.names) == set(names):
-                return explanation
+                return h
         raise KeyError(names)
 
     def single_weights(self, temperature: float = 1.0) -> dict[str, float]:
@@ -193,3 +200,19 @@ def explain_pairs(
         np.array([angle for _, _, _, angle in best]),
     )
     return [setting.explain(f) for f in fits]
+
+
+def explain_members(setting: Setting, pair: Explanation) -> list[Explanation]:
+    """Fit each effect of a pair alone, from where the pair has it."""
+    starts = [
+        np.array(
+            [
+                u
+                for c, u in zip(pair.fitted.coordinates, pair.fitted.u, strict=True)
+                if c.owner == name or c.owner not in pair.names
+            ]
+        )
+        for name in pair.names
+    ]
+    sets = [(name,) for name in pair.names]
+    return [setting.explain(f) for f in setting.fit(sets, starts, pair.fitted.angle)]

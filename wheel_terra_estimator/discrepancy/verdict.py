@@ -23,10 +23,10 @@ from wheel_terra_estimator.discrepancy.selection import Selection, log_mass
 FloatArray = NDArray[np.float64]
 
 # "Something is missing" must beat "nothing is missing" by these odds.
-ODDS_TO_SPEAK = 3.0
+ODDS_TO_SPEAK = 4.0
 # Members of the open set: tempered weights are added up to this mass.
 SET_MASS = 0.97
-TEMPERATURE = 1.5
+TEMPERATURE = 1.3
 
 
 # A named set that leaves something must at least have removed this share of the excess misfit.
