@@ -53,6 +53,11 @@ class Remainder:
         return self.p_value > IMPROBABLE and self.soil_p_value > IMPROBABLE_SOIL
 
     @property
+    def only_soil(self) -> bool:
+        """True where everything fits, but with a soil that cannot be believed."""
+        return self.significant and self.probability <= 0.5 and self.p_value > IMPROBABLE
+
+    @property
     def significant(self) -> bool:
         """True where something is left that wants a name."""
         return self.probability > 0.5 or not self.accounted_for
