@@ -213,7 +213,7 @@ def test_a_soil_that_nobody_can_believe_is_no_agreement():
     assert 'too far from the configured one' in diagnosis.sentence
     (friction,) = (s for s in diagnosis.soil if s.name == 'tan_friction')
     assert friction.pull < -2.0
-    assert 'soil.tan_friction' in ' '.join(diagnosis.notes)
+    assert 'friction_angle' in ' '.join(diagnosis.notes)
 
 
 def test_a_sensor_that_saturates_is_no_set_of_outliers():
