@@ -53,8 +53,11 @@ class Page(HTMLParser):
         if self.rows and self.rows[-1] and {'td', 'th'} & set(self.open):
             self.rows[-1][-1] += data.strip() + ' '
 
-    def row(self, first: str) -> list[str]:
-        found = [row for row in self.rows if row and row[0].strip() == first]
+    def row(self, first: str, head: str = '') -> list[str]:
+        """Return the row of this name; two tables may have it: below the heading ``head``."""
+        names = [row[0].strip() if row else '' for row in self.rows]
+        below = names.index(head) if head else 0
+        found = [row for row in self.rows[below:] if row and row[0].strip() == first]
         assert found, f'no row {first!r} among {[row[0] for row in self.rows if row]}'
         return [cell.strip() for cell in found[0]]
 
@@ -130,7 +133,7 @@ def test_numbers_are_those_of_the_diagnosis(page, named):
         assert cells[1] == f'{candidate.log_evidence:.1f}'
         assert cells[-1] == candidate.why_not
     for shift in named.soil:
-        cells = parsed.row(SOIL_WORDS.get(shift.name, shift.name.replace('_', ' ')))
+        cells = parsed.row(SOIL_WORDS.get(shift.name, shift.name.replace('_', ' ')), 'parameter')
         assert cells[5] == f'{shift.pull:+.1f}'
     for item in named.next_measurement:
         assert item.what in parsed.text
@@ -230,11 +233,12 @@ def test_curves_only_where_slip_was_swept(named, tmp_path):
 def test_unexplained_scatter_is_not_called_a_misfit_of_nothing():
     from types import SimpleNamespace
 
+    from wheel_terra_estimator.discrepancy.remainder import Remainder
     from wheel_terra_estimator.discrepancy.summary import sentence
 
     def said(amplitude):
-        word, left = SimpleNamespace(word='unexplained'), SimpleNamespace(amplitude=amplitude)
-        return sentence(word, (), 1e-6, left, 0.0)
+        left = Remainder(1.0, 1.0, amplitude, 1e-6, soil_p_value=0.5)
+        return sentence(SimpleNamespace(word='unexplained'), (), 1e-6, left, 0.0)
 
     assert '12 % of the range' in said(0.12)
     assert '0 %' not in said(0.001) and 'scatter' in said(0.001)

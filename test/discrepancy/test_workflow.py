@@ -10,8 +10,11 @@ import json
 import campaign_tools  # noqa: F401
 import numpy as np
 import pytest
+from campaigns.campaign import make_campaign
 from campaigns.designs import random_rows, random_soil
-from campaigns.hidden import LISTED, SmoothError
+from campaigns.groups import GROUPS
+from campaigns.hidden import LISTED, OUTSIDE, SmoothError
+from campaigns.scoring import diagnose as diagnose_campaign
 from campaigns.truth import OUTPUTS, TrueSoil, solve
 
 from wheel_terra_estimator.cli.main import main
@@ -190,6 +193,53 @@ def test_torn_sheet_is_unexplained():
     diagnosis = run(table, values)
     assert diagnosis.verdict == 'unexplained' or all(e.remainder for e in diagnosis.effects)
     assert diagnosis.where.quantity == 'torque'
+
+
+def test_a_soil_that_nobody_can_believe_is_no_agreement():
+    """Friction that falls to two thirds with slip: a soil far off takes it all, noise is left."""
+    rng = np.random.default_rng(4)
+    soil = random_soil(rng)
+    rows = random_rows('sweep40', rng, soil)
+    strange = OUTSIDE['friction_softening'].make(0.45, 0.5, rows, soil)
+    clean, out = solve(rows, soil), solve(rows, soil, (strange,))
+    table = dict(rows)
+    for key in OUTPUTS:
+        std = SHARE[key] * np.ptp(clean[key])
+        table[key] = out[key] + std * rng.standard_normal(len(out[key]))
+        table[f'{key}_std'] = np.full(len(out[key]), std)
+    diagnosis = run(table, settings(soil, rows))
+    assert diagnosis.verdict == 'unexplained'
+    assert diagnosis.remainder_p_value > 0.01, 'noise is all that is left'
+    assert 'too far from the configured one' in diagnosis.sentence
+    (friction,) = (s for s in diagnosis.soil if s.name == 'tan_friction')
+    assert friction.pull < -2.0
+    assert 'friction_angle' in ' '.join(diagnosis.notes)
+
+
+def test_a_sensor_that_saturates_is_no_set_of_outliers():
+    table, values, *_ = make('sweep40')
+    top = np.sort(table['torque'])[-4]
+    std = table['torque_std'][0]
+    table['torque'] = table['torque'] - 9.0 * std * (table['torque'] >= top)
+    diagnosis = run(table, values)
+    assert diagnosis.verdict == 'unexplained'
+    assert len([cell for cell in diagnosis.outliers if cell[1] == 'torque']) < 2
+    scattered, *_ = make('sweep40')
+    rows = np.argsort(scattered['torque'])[[3, 14, 25, 33]]
+    scattered['torque'] = scattered['torque'].copy()
+    scattered['torque'][rows] -= 9.0 * std
+    other = run(scattered, values)
+    assert other.verdict == 'agrees'
+    assert {row for row, quantity, _ in other.outliers if quantity == 'torque'} == set(rows)
+
+
+def test_a_layer_alone_is_not_named_with_a_patch():
+    """Depths at which the layer alone had been missed, and was patched with a zero of sinkage."""
+    for seed in (40018, 43024):
+        campaign = make_campaign(seed, 'basic16', GROUPS['one'].plan)
+        assert campaign.hidden == ('hard_layer',)
+        names = [effect.name for effect in diagnose_campaign(campaign).effects]
+        assert names == ['hard_layer']
 
 
 def test_noise_and_outliers_need_not_be_stated():

@@ -35,6 +35,19 @@ def chi_square_p_value(fitted: Fit, variance: FloatArray) -> float:
     return float(chi2.sf(square, len(target) - strength.sum()))
 
 
+def soil_p_value(fitted: Fit) -> float:
+    """P-value of a soil as far from the configured one as the fit wants it.
+
+    The prior is the widened one (2.5 times the stated deviations), and a posterior mean lies nearer
+    to its prior than the truth does: a small value says that no believable soil fits. A stranger
+    that works like another soil (friction that softens with slip) is found by nothing else.
+    """
+    from scipy.stats import chi2
+
+    soil = np.array([c.role == 'soil' for c in fitted.coordinates])
+    return float(chi2.sf(float(fitted.u[soil] @ fitted.u[soil]), soil.sum()))
+
+
 def scan_p_value(
     nothing: Fit, variance: FloatArray, signatures: Mapping[str, Signature], one_sided: set[str]
 ) -> float:

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -19,6 +20,9 @@ SHARE = 0.02  # prior share of outliers among the cells
 # Sizes of features narrow in slip that rows may share [share of the range].
 NARROW = (0.05, 0.15)
 GREATEST_SHARE = 0.12  # of the cells of a table
+# Cells on one side at one end of a quantity's range, this improbable by chance, are a misfit there
+# (a sensor that saturates) and no outliers.
+_CHANCE = 1e-5
 
 
 def find_outliers(
@@ -57,7 +61,7 @@ def find_outliers(
             best, found, chosen = score, cells, inverse
     counts = np.bincount([q for _, q, _ in found], minlength=3)
     if chosen is None or not narrow.any():
-        return found
+        return _scattered(problem, found)
     # Several cells of one quantity: outliers, or a feature that they share?
     plain = np.linalg.inv(chosen)
     for quantity, amplitude in itertools.product(np.flatnonzero(counts >= 2), NARROW):
@@ -67,7 +71,38 @@ def find_outliers(
         )
         if score > best:
             best, found = score, cells
-    return found
+    return _scattered(problem, found)
+
+
+def _scattered(
+    problem: Problem, found: list[tuple[int, int, float]]
+) -> list[tuple[int, int, float]]:
+    """Return the cells without those of a quantity that lie together at one end of its range.
+
+    Outliers are few, fall on both sides and anywhere: the chance of the count (binomial), of equal
+    signs, and of all of them among the outermost cells are independent.
+    """
+    from scipy.stats import binom
+
+    kept = []
+    for quantity in range(3):
+        mine = [cell for cell in found if cell[1] == quantity]
+        here = problem.quantity == quantity
+        count, total = len(mine), int(here.sum())
+        signs = {cell[2] > 0.0 for cell in mine}
+        if count > 1 and len(signs) == 1:
+            # An outlier moves its own cell to an end of the range: ranks are of what was due.
+            due, rows, std = problem.observed[here], problem.row[here], problem.std[here]
+            for row, _, deviation in mine:
+                due = np.where(rows == row, due - deviation * std, due)
+            places = np.flatnonzero(np.isin(rows[np.argsort(due)], [cell[0] for cell in mine]))
+            outermost = min(int(places.max()) + 1, total - int(places.min()))
+            chance = float(binom.sf(count - 1, total, SHARE)) * 0.5 ** (count - 1)
+            chance *= 2.0 * math.comb(outermost, count) / math.comb(total, count)
+            if chance < _CHANCE:
+                continue
+        kept += mine
+    return [cell for cell in found if cell in kept]
 
 
 def _set_apart(

@@ -12,13 +12,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import logsumexp
 
-from wheel_terra_estimator.discrepancy.gap_test import chi_square_p_value
+from wheel_terra_estimator.discrepancy.gap_test import chi_square_p_value, soil_p_value
 from wheel_terra_estimator.discrepancy.selection import Selection, log_mass
 
 Variance: TypeAlias = Callable[[ArrayLike, ArrayLike], NDArray[np.float64]]
 
 # Misfit that even the best floor leaves improbable.
 IMPROBABLE = 1e-3
+# The same for the distance of the soil: its prior is wide already.
+IMPROBABLE_SOIL = 1e-2
 
 
 @dataclass(frozen=True)
@@ -35,17 +37,30 @@ class Remainder:
         Most probable amplitude of the structural error, share of the range.
     p_value : float
         Of the whole misfit under the best floor (chi-square).
+    soil_p_value : float
+        Of a soil as far from the configured one as the fit needs it (chi-square, widened prior).
     """
 
     probability: float
     probability_of_any: float
     amplitude: float
     p_value: float
+    soil_p_value: float
+
+    @property
+    def accounted_for(self) -> bool:
+        """True where floor and noise, and a soil that can be believed, are enough."""
+        return self.p_value > IMPROBABLE and self.soil_p_value > IMPROBABLE_SOIL
+
+    @property
+    def only_soil(self) -> bool:
+        """True where everything fits, but with a soil that cannot be believed."""
+        return self.significant and self.probability <= 0.5 and self.p_value > IMPROBABLE
 
     @property
     def significant(self) -> bool:
         """True where something is left that wants a name."""
-        return self.probability > 0.5 or self.p_value < IMPROBABLE
+        return self.probability > 0.5 or not self.accounted_for
 
     @property
     def noticeable(self) -> bool:
@@ -76,4 +91,5 @@ def remainder(selection: Selection, index: int, variance_of: Variance) -> Remain
         any_share,
         selection.floors[top].largest,
         chi_square_p_value(explanation.fitted, variance),
+        soil_p_value(explanation.fitted),
     )

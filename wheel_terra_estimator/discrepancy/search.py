@@ -21,6 +21,7 @@ from wheel_terra_estimator.discrepancy.problem import Problem, build_problem, sl
 from wheel_terra_estimator.discrepancy.result import Noise
 from wheel_terra_estimator.discrepancy.selection import (
     Selection,
+    explain_members,
     explain_pairs,
     explain_singles,
     weigh,
@@ -187,7 +188,18 @@ def _select(setting: Setting, nothing: Fit) -> Selection:
     incompatible = {name: e.incompatible_with for name, e in setting.effects.items()}
     explanations: list[Explanation] = list(singles)
     explanations += explain_pairs(setting, singles, incompatible)
-    return weigh(explanations, setting.floors, len(setting.effects))
+    selection = weigh(explanations, setting.floors, len(setting.effects))
+    if len(selection.explanations[0].names) < 2:
+        return selection
+    # A pair may have found a layer's depth or a mound's onset that its member alone had missed.
+    again = {e.names: e for e in explain_members(setting, selection.explanations[0])}
+    better = [
+        again[e.names]
+        if e.names in again and again[e.names].fitted.objective < e.fitted.objective
+        else e
+        for e in selection.explanations
+    ]
+    return weigh(better, setting.floors, len(setting.effects))
 
 
 def _variances(problem: Problem, amplitude: FloatArray | float) -> list[FloatArray]:

@@ -34,7 +34,9 @@ _UNEXPLAINED_SOME = (0.015, 0.03, 0.06, 0.15, 0.4)
 _SOME = ((1, 0, 0), (0, 1, 0), (0, 0, 1), (0, 1, 1))
 
 _PAIR_SEEDS = 4  # best single effects to which a second one is added
-_PAIRS = 8  # pairs that are fitted
+_PAIRS = 8  # pairs that are fitted, at most
+# A pair must promise so many nats over the best single effect: its prior alone costs it four.
+_PROMISE = 1.5
 
 
 def default_floors(greatest: float | None = None) -> tuple[Floor, ...]:
@@ -104,9 +106,16 @@ class Selection:
 
     def find(self, names: Sequence[str]) -> Explanation:
         """Return the explanation with exactly these effects."""
-        for explanation in self.explanations:
+        return self.explanations[self._index(names)]
+
+    def joint_of(self, names: Sequence[str]) -> FloatArray:
+        """(F,) log of prior times evidence of the explanation with exactly these effects."""
+        return self.log_joint[self._index(names)]
+
+    def _index(self, names: Sequence[str]) -> int:
+        for h, explanation in enumerate(self.explanations):
             if set(explanation.names) == set(names):
-                return explanation
+                return h
         raise KeyError(names)
 
     def single_weights(self, temperature: float = 1.0) -> dict[str, float]:
@@ -175,7 +184,9 @@ def explain_pairs(
             total = score - seed.fitted.objective
             if key not in proposals or proposals[key][0] < total:
                 proposals[key] = (total, names, start, seed.fitted.angle)
-    best = sorted(proposals.values(), key=lambda proposal: -proposal[0])[:_PAIRS]
+    enough = _PROMISE - min(e.fitted.objective for e in singles)
+    worth = [proposal for proposal in proposals.values() if proposal[0] > enough]
+    best = sorted(worth, key=lambda proposal: -proposal[0])[:_PAIRS]
     if not best:
         return []
     variance = ranked[0].fitted.variance
@@ -189,3 +200,19 @@ def explain_pairs(
         np.array([angle for _, _, _, angle in best]),
     )
     return [setting.explain(f) for f in fits]
+
+
+def explain_members(setting: Setting, pair: Explanation) -> list[Explanation]:
+    """Fit each effect of a pair alone, from where the pair has it."""
+    starts = [
+        np.array(
+            [
+                u
+                for c, u in zip(pair.fitted.coordinates, pair.fitted.u, strict=True)
+                if c.owner == name or c.owner not in pair.names
+            ]
+        )
+        for name in pair.names
+    ]
+    sets = [(name,) for name in pair.names]
+    return [setting.explain(f) for f in setting.fit(sets, starts, pair.fitted.angle)]

@@ -151,6 +151,12 @@ def sentence(
     if verdict.word == 'agrees':
         agreed = 'Model and measurement agree once the soil is refitted'
         return f'{agreed}{within} (p = {gap_p_value:.2g}).'
+    if verdict.word == 'unexplained' and left.only_soil:
+        return (
+            'Model and measurement agree only with a soil too far from the configured one to be '
+            f'believed (p = {left.soil_p_value:.1g}): its numbers are wrong, or something is '
+            'missing that acts like another soil and is none of the known effects.'
+        )
     if verdict.word == 'unexplained':
         size = f'a misfit of about {100 * left.amplitude:.0f} % of the range'
         if left.amplitude < 0.005:

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from scipy.special import logsumexp
 
 from wheel_terra_estimator.discrepancy.remainder import (
-    IMPROBABLE,
     Remainder,
     Variance,
     remainder,
@@ -23,11 +22,16 @@ from wheel_terra_estimator.discrepancy.selection import Selection, log_mass
 
 FloatArray = NDArray[np.float64]
 
-# "Something is missing" must beat "nothing is missing" by these odds.
-ODDS_TO_SPEAK = 3.0
+# "Something is missing" must beat "nothing is missing" by these odds, and by more where agreement
+# itself is sure to need a model-error floor: a model with one error can have another.
+ODDS_TO_SPEAK = 3.5
+ODDS_OVER_FLOOR = 10.0
+SURE_OF_FLOOR = 0.95
+# "Unexplained" must beat all names together by these odds.
+ODDS_AGAINST_NAMES = 2.0
 # Members of the open set: tempered weights are added up to this mass.
 SET_MASS = 0.97
-TEMPERATURE = 1.5
+TEMPERATURE = 1.3
 
 
 # A named set that leaves something must at least have removed this share of the excess misfit.
@@ -75,10 +79,13 @@ def decide(selection: Selection, variance_of: Variance) -> Verdict:
     rest = log_mass(joint[nothing][unexplained])
     named = [h for h, e in enumerate(selection.explanations) if e.names]
     effects = float(logsumexp(total[named])) if named else -np.inf
-    if np.logaddexp(effects, rest) - agrees < np.log(ODDS_TO_SPEAK):
-        word = 'agrees' if left.p_value > IMPROBABLE else 'unexplained'
+    exact = np.array([floor.largest == 0.0 for floor in selection.floors])
+    floor_share = 1.0 - np.exp(log_mass(joint[nothing][exact]) - agrees)
+    odds = ODDS_OVER_FLOOR if floor_share > SURE_OF_FLOOR else ODDS_TO_SPEAK
+    if np.logaddexp(effects, rest) - agrees < np.log(odds):
+        word = 'agrees' if left.accounted_for else 'unexplained'
         return Verdict(word, nothing, (), left)
-    if not named or rest > effects:
+    if not named or rest - effects > np.log(ODDS_AGAINST_NAMES):
         return Verdict('unexplained', nothing, (), left)
     # An effect beside a mere floor goes before one beside a misfit that asks for another name.
     quiet = np.array([log_mass(row[~unexplained]) for row in joint])

@@ -36,7 +36,7 @@ from wheel_terra_estimator.discrepancy.result import (
 )
 from wheel_terra_estimator.discrepancy.search import Findings, search
 from wheel_terra_estimator.discrepancy.selection import default_floors, shared_floors
-from wheel_terra_estimator.discrepancy.signatures import CLEAR, distance
+from wheel_terra_estimator.discrepancy.signatures import CLEAR
 from wheel_terra_estimator.discrepancy.table import (
     QUANTITIES,
     SteadyTable,
@@ -325,7 +325,7 @@ def _named(
     known: Mapping[str, Effect],
     floor_index: int,
 ) -> tuple[NamedEffect, ...]:
-    """Return the named effects, strongest first."""
+    """Return the named effects; first the one that alone explains more."""
     explanation = findings.selection.explanations[verdict.index]
     fitted = explanation.fitted
     covariance = explanation.posterior.covariance[floor_index]
@@ -342,7 +342,7 @@ def _named(
         }
         found.append(
             (
-                _strength(findings, fitted, name),
+                float(np.logaddexp.reduce(findings.selection.joint_of((name,)))),
                 NamedEffect(
                     name,
                     own,
@@ -363,19 +363,6 @@ def _named(
         )
     found.sort(key=lambda item: -item[0])
     return tuple(effect for _, effect in found)
-
-
-def _strength(findings: Findings, fitted: Fit, name: str) -> float:
-    """D' of one effect in a fitted set, beyond soil (linear)."""
-    mine = [i for i, c in enumerate(fitted.coordinates) if c.owner == name]
-    away = np.array(
-        [
-            fitted.u[i] - fitted.coordinates[i].coordinate(fitted.coordinates[i].neutral)
-            for i in mine
-        ]
-    )
-    change = fitted.jacobian[:, mine[:1]] @ away[:1]
-    return distance(fitted, fitted.variance, change)
 
 
 def _distance_to_nothing(findings: Findings, fitted: Fit) -> float:
