@@ -418,13 +418,19 @@ def _curves(
         _shared_error(findings, fitted, floor) for fitted in (findings.nothing, after)
     )
     configured = setting.forward.solve([nuisance], [np.zeros(len(nuisance))], jacobian=False)
-    band = np.sqrt(findings.noise.std**2 + (floor * setting.problem.scale) ** 2)
+    # Where slips are latent the model stands at the most probable slip; a curve is compared with
+    # what was read, so that it goes back along the tangent (cells that were not measured stay).
+    problem = setting.problem
+    moved = np.zeros_like(after.outputs)
+    moved[problem.row, problem.quantity] = setting.observed - problem.observed
+    refit_error, after_error = refit_error - moved, after_error - moved
+    band = np.sqrt(findings.noise.std**2 + (floor * problem.scale) ** 2)
     singles = [e.fitted for e in findings.selection.explanations if len(e.names) == 1]
     ordered = ([after] if after.names else []) + [f for f in singles if f.names != after.names]
     shapes = [_signature_shape(findings, f) for f in ordered[:2]]
     labels = [' + '.join(f.names) for f in ordered[:2]]
     return Curves(
-        configured.outputs[0][:rows],
+        (configured.outputs[0] - moved)[:rows],
         (findings.nothing.outputs + refit_error)[:rows],
         (after.outputs + after_error)[:rows],
         (held_refit + refit_error)[:rows],
