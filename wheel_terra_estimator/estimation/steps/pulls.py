@@ -44,18 +44,18 @@ def work_out_pulls(c: Context, rims: list[float]) -> None:
     own = np.zeros(s.wheel_count)  # variances that no other wheel shares
     for i, rim in enumerate(rims):
         load = run.load[i]
-        if linear is None or not bears_and_turns(c, i, rim):
-            if bears_and_turns(c, i, rim):
-                # The contact is fresh after a start: the load's share is the best guess.
-                run.pull[i] = load * share
-                run.pull_std[i] = 0.1 * load + 1e-3
-                continue
+        if not bears_and_turns(c, i, rim):
             # Static friction carries the slope, or it is dragged along.
             pull = run.stand_pull[i]
             run.pull[i] = pull if pull == pull else load * share
             run.torque_now[i] = run.pull[i] * s.rim_radius[i]
             run.pull_std[i] = (0.1 * load if run.force_known else load) + 1e-3
             own[i] = run.pull_std[i] ** 2
+            continue
+        if linear is None:
+            # The contact is fresh after a start: the load's share is the best guess.
+            run.pull[i] = load * share
+            run.pull_std[i] = 0.1 * load + 1e-3
             continue
         radius = s.shear_radius[i]
         excess = believed_excess(c, i, float(torques[i]))

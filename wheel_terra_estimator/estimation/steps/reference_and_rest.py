@@ -46,11 +46,7 @@ def fuse_reference(c: Context, time: float, reference: ReferenceVelocity, still:
         beyond = abs(reference.forward) > 1.5 * fastest + 5.0 * math.sqrt(total)
         same = abs(residual - run.reference_doubt) < 4.0 * math.sqrt(2.0 * variance + total)
         run.reference_doubt = residual
-        if (
-            run.reference_rejected >= fixes_needed(c)
-            and same
-            and not (beyond and run.reference_rejected < 4)
-        ):
+        if same and run.reference_rejected >= (4 if beyond else fixes_needed(c)):
             # Fixes that keep disagreeing are right: open the state to them.
             c.filter.widen(SPEED, residual * residual)
             c.monitor.forget_trend()
