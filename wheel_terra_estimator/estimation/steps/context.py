@@ -85,6 +85,11 @@ def rim_speed_of(c: Context, wheel: int) -> float:
     return run.rim_speed[wheel]
 
 
+def fastest_rim(c: Context) -> float:
+    """Return the greatest known rim speed, whatever its direction [m/s]; 0 = none is known."""
+    return max((abs(rim) for rim in c.run.rim_speed if rim == rim), default=0.0)
+
+
 def rims_without_turning(c: Context) -> list[float]:
     """Rim speed of each wheel less its share of the turning [m/s]; nan = unknown."""
     yaw_rate, lateral = c.run.yaw_rate, c.settings.lateral
@@ -161,6 +166,11 @@ def reference_known(c: Context) -> bool:
     """Say whether a fix came within the last travel over which soil is learned."""
     run = c.run
     return run.reference_time is not None and run.time - run.reference_time < 20.0
+
+
+def torque_known(c: Context) -> bool:
+    """Say whether a torque was read of late."""
+    return c.run.torque_time is not None and c.run.time - c.run.torque_time < 2.0
 
 
 def sinkage_known(c: Context, wheel: int) -> bool:

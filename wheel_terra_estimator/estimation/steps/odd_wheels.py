@@ -7,7 +7,12 @@ from __future__ import annotations
 import math
 
 from wheel_terra_estimator.estimation.speed_process import median
-from wheel_terra_estimator.estimation.steps.context import Context, slope_share, typical_rim
+from wheel_terra_estimator.estimation.steps.context import (
+    Context,
+    fastest_rim,
+    slope_share,
+    typical_rim,
+)
 
 _NAN = math.nan
 _UNLOADED_HOLD = 0.3
@@ -26,9 +31,8 @@ def watch_demand(c: Context, dt: float) -> None:
     noise = float(s.sensors.specific_force_std) / math.sqrt(run.window.count) / s.gravity
     excess = abs(change) - 1.5 * noise
     if excess > 0.0 and run.steepness > 0.0 and run.fresh_travel > c.contact_length:
-        fastest = max((abs(r) for r in run.rim_speed if r == r), default=0.0)
         share = min(excess / max(run.steepness, 0.1), 0.3)
-        run.unrest = max(run.unrest, share * fastest)
+        run.unrest = max(run.unrest, share * fastest_rim(c))
 
 
 def note_unrest(c: Context, time: float, rim: float | None) -> None:

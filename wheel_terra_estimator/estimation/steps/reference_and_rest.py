@@ -11,7 +11,12 @@ import numpy as np
 from wheel_terra_estimator.estimation.filter import chi_square_gate
 from wheel_terra_estimator.estimation.filter_state import SPEED
 from wheel_terra_estimator.estimation.measurements import ReferenceVelocity
-from wheel_terra_estimator.estimation.steps.context import Context, note_nis
+from wheel_terra_estimator.estimation.steps.context import (
+    Context,
+    fastest_rim,
+    note_nis,
+    torque_known,
+)
 
 _FAIR_NIS = 3.0
 
@@ -42,8 +47,7 @@ def fuse_reference(c: Context, time: float, reference: ReferenceVelocity, still:
     if nis > gate:
         run.reference_rejected += 1
         run.rejected['reference'] += 1
-        fastest = max((abs(r) for r in run.rim_speed if r == r), default=0.0)
-        beyond = abs(reference.forward) > 1.5 * fastest + 5.0 * math.sqrt(total)
+        beyond = abs(reference.forward) > 1.5 * fastest_rim(c) + 5.0 * math.sqrt(total)
         same = abs(residual - run.reference_doubt) < 4.0 * math.sqrt(2.0 * variance + total)
         run.reference_doubt = residual
         if same and run.reference_rejected >= (4 if beyond else fixes_needed(c)):
@@ -70,9 +74,7 @@ def fixes_needed(c: Context) -> int:
     A real change of the slip shows in torque, slope or rim speed, unless the traction curve is
     flat: two will do with such a witness, or where there is no torque to ask.
     """
-    run = c.run
-    told = run.torque_time is not None and run.time - run.torque_time < 2.0
-    return 3 if told and run.time - run.unrest_time > 2.5 else 2
+    return 3 if torque_known(c) and c.run.time - c.run.unrest_time > 2.5 else 2
 
 
 def fuse_rest(c: Context, time: float, rims: list[float], rim: float | None, still: bool) -> None:

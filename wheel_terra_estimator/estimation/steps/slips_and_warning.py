@@ -18,6 +18,7 @@ from wheel_terra_estimator.estimation.steps.context import (
     current_speed,
     rim_speed_of,
     slope_share,
+    torque_known,
     yaw_rate_std,
 )
 from wheel_terra_estimator.estimation.stuck_warning import WheelMotionState
@@ -117,8 +118,7 @@ def slip_of_wheel(
 def margin_share(c: Context) -> float:
     """Return the pull left over, as a share of the load; nan where torque does not tell."""
     run, s = c.run, c.settings
-    told = run.torque_time is not None and run.time - run.torque_time < 2.0
-    if not told or run.margin_time < 0.0 or float(s.sensors.torque_gain_std) > 0.3:
+    if not torque_known(c) or run.margin_time < 0.0 or float(s.sensors.torque_gain_std) > 0.3:
         return _NAN
     return sum(run.pull_margin) / max(sum(run.load), 1e-3)
 

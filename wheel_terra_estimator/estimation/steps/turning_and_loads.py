@@ -8,7 +8,12 @@ import math
 
 from wheel_terra_estimator.estimation.filter_state import SPEED
 from wheel_terra_estimator.estimation.speed_process import InertialWindow
-from wheel_terra_estimator.estimation.steps.context import Context, open_shear, slope_share
+from wheel_terra_estimator.estimation.steps.context import (
+    Context,
+    fastest_rim,
+    open_shear,
+    slope_share,
+)
 
 _COMMON_CURVATURE = 0.1  # [rad/m]
 
@@ -31,8 +36,7 @@ def follow_turning(c: Context, window: InertialWindow, dt: float) -> None:
 def note_turning(c: Context, dt: float) -> None:
     """Note where turning begins or ends: the contacts form anew."""
     run = c.run
-    known = [abs(r) for r in run.rim_speed if r == r]
-    fastest = max(known, default=0.0)
+    fastest = fastest_rim(c)
     if fastest <= c.low_rim:
         return
     side = min(abs(run.yaw_rate) * c.curvature_length / fastest, 1.0)
