@@ -27,6 +27,7 @@ from wheel_terra_estimator.estimation.stuck_warning import StuckMonitor, StuckTu
 
 FloatArray = NDArray[np.float64]
 _NAN = math.nan
+_SLOPE_KEEP = 0.9  # per cycle
 
 
 @dataclass
@@ -75,6 +76,13 @@ class Context:
     pull_jacobian: FloatArray
     linear: tuple[FloatArray, FloatArray, FloatArray, FloatArray] | None = None
     pull_sum: tuple[float, float, float] | None = None
+
+
+def smoothed(old: tuple[float, ...] | None, new: tuple[float, ...]) -> tuple[float, ...]:
+    """Return derivatives smoothed over about a second of cycles."""
+    if old is None:
+        return new
+    return tuple(_SLOPE_KEEP * a + (1.0 - _SLOPE_KEEP) * b for a, b in zip(old, new, strict=True))
 
 
 def rim_speed_of(c: Context, wheel: int) -> float:

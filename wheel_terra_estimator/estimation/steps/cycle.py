@@ -13,6 +13,7 @@ from wheel_terra_estimator.estimation.filter_state import SPEED
 from wheel_terra_estimator.estimation.measurements import ReferenceVelocity
 from wheel_terra_estimator.estimation.steps.context import (
     Context,
+    reference_known,
     rim_speed_of,
     rims_without_turning,
     typical_rim,
@@ -57,12 +58,27 @@ def run_cycle(c: Context, time: float, reference: ReferenceVelocity | None) -> N
     before = c.filter.mean[c.layout.sinkage].copy()
     note_unrest(c, time, rim)
     predict(c, time, dt, rims, still)
+    begin_rolling(c, rim)
     if reference is not None:
         fuse_reference(c, time, reference, still)
     fuse_rest(c, time, rims, rim, still)
     fuse_models(c, dt, rims, still)
     run.rims_at_cycle = unturned
     finish(c, time, dt, rim, rims, before)
+
+
+def begin_rolling(c: Context, rim: float | None) -> None:
+    """Let a rover that starts without fixes roll as it did before.
+
+    In the first moments of a start the accelerometer's jolt decides; from a speed of nothing the
+    wheels' prediction, v' = v rim'/rim, would go on with nothing.
+    """
+    run = c.run
+    before = typical_rim(run.rims_at_cycle)
+    if rim is None or before is None or reference_known(c):
+        return
+    if abs(before) <= c.low_rim < abs(rim) and c.filter.mean[SPEED] / rim < 0.5 * run.ratio:
+        c.filter.set(SPEED, run.ratio * rim, (run.ratio_std * rim) ** 2)
 
 
 def finish(

@@ -25,12 +25,13 @@ from wheel_terra_estimator.estimation.steps.context import (
     leaving_angle_of,
     note_nis,
     slope_share,
+    smoothed,
 )
 from wheel_terra_estimator.estimation.steps.turning_and_loads import ground_curvature
 
 FloatArray = NDArray[np.float64]
 _NAN = math.nan
-_SLOPE_KEEP = 0.9  # per cycle
+_NEW_CONTACT = 0.15  # change of a torque, of load times radius, that is no noise of the state
 # Errors of the models are the same over about this travel [m].
 _SAME_GROUND, _MOST_REPETITIONS = 0.15, 100.0
 _BALANCE_STD = 0.005  # of the weight: what curvature, ruts and mass leave open
@@ -191,13 +192,10 @@ def wheel_rows(
     layout = c.layout
     zi, ei = layout.sinkage.start + i, layout.shear_error.start + i
     forces = present_forces(c, i, rim, direction)
-    slopes = smooth_slopes(c, i, forces)
+    by_torque, by_pull = smooth_slopes(c, i, forces)
     row_pull, row_torque = np.zeros(layout.size), np.zeros(layout.size)
-    for row, derivatives, by_ratio in (
-        (row_pull, forces.d_pull, slopes[1]),
-        (row_torque, forces.d_torque, slopes[0]),
-    ):
-        _, by_sinkage, by_strength, by_modulus, by_centroid, by_mound = derivatives
+    for row, derivatives in ((row_pull, by_pull), (row_torque, by_torque)):
+        by_ratio, by_sinkage, by_strength, by_modulus, by_centroid, by_mound = derivatives
         # The ratio is that of the direction of rolling: the two signs cancel.
         row[SPEED] = by_ratio / abs(rim)
         row[zi] = direction * by_sinkage
@@ -208,22 +206,30 @@ def wheel_rows(
     return direction * forces.pull, direction * forces.torque, row_pull, row_torque
 
 
-def smooth_slopes(c: Context, i: int, forces: WheelForces) -> tuple[float, float]:
-    """Return dT and dF by v/(r w), smoothed over about a second.
+def smooth_slopes(
+    c: Context, i: int, forces: WheelForces
+) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Return the derivatives of torque and pull, smoothed over about a second.
 
-    The curves bend within the uncertainty of the slip. A slope taken at the noisy estimate is
-    correlated with its error, which pulls the slip to the flat side; a smoothed one is not.
+    The curves bend within the uncertainty of the state. A slope taken at the noisy estimate is
+    correlated with its error, which pulls the slip to the flat side and lets strength and K run
+    along T(s) = const to their bounds; a smoothed one is not.
     """
     run = c.run
-    keep = _SLOPE_KEEP
-    for smoothed, new in (
-        (run.torque_slope, forces.d_torque[0]),
-        (run.pull_slope, forces.d_pull[0]),
-    ):
-        old = smoothed[i]
+    old_torque, old_pull = run.torque_slopes[i], run.pull_slopes[i]
+    if old_torque is None or old_pull is None:
         # The first slopes after a start are taken where the slip is known least: begin flat.
-        smoothed[i] = 0.2 * new if old != old else keep * old + (1.0 - keep) * new
-    return run.torque_slope[i], run.pull_slope[i]
+        torque: tuple[float, ...] = (0.2 * forces.d_torque[0], *forces.d_torque[1:])
+        pull: tuple[float, ...] = (0.2 * forces.d_pull[0], *forces.d_pull[1:])
+    else:
+        torque = smoothed(old_torque, forces.d_torque)
+        pull = smoothed(old_pull, forces.d_pull)
+        moment = run.load[i] * c.settings.shear_radius[i]
+        if abs(forces.d_torque[2] - old_torque[2]) > _NEW_CONTACT * moment:
+            # A wheel that comes free or locks is another contact at once.
+            torque, pull = (torque[0], *forces.d_torque[1:]), (pull[0], *forces.d_pull[1:])
+    run.torque_slopes[i], run.pull_slopes[i] = torque, pull
+    return torque, pull
 
 
 def present_forces(c: Context, i: int, rim: float, direction: float) -> WheelForces:

@@ -72,8 +72,11 @@ class Memory:
     fresh_travel: float = 0.0  # [m] since the start or the last change of direction
     load: list[float] = field(default_factory=list)
     torque_excess: list[float] = field(default_factory=list)  # reading less model, smoothed
-    torque_slope: list[float] = field(default_factory=list)  # by v/(r w), smoothed; nan = none
-    pull_slope: list[float] = field(default_factory=list)
+    # Smoothed derivatives of each wheel: of torque and pull as in `WheelForces`, of the bearing law
+    # (ln load) by v/(r w) and by n1.
+    torque_slopes: list[tuple[float, ...] | None] = field(default_factory=list)
+    pull_slopes: list[tuple[float, ...] | None] = field(default_factory=list)
+    bearing_slopes: list[tuple[float, ...] | None] = field(default_factory=list)
     pull: list[float] = field(default_factory=list)
     model_pull: list[float] = field(default_factory=list)  # without the sum's correction
     pull_std: list[float] = field(default_factory=list)
@@ -132,8 +135,9 @@ class Memory:
             pull=[0.0] * n,
             model_pull=[0.0] * n,
             torque_excess=[0.0] * n,
-            torque_slope=[_NAN] * n,
-            pull_slope=[_NAN] * n,
+            torque_slopes=[None] * n,
+            pull_slopes=[None] * n,
+            bearing_slopes=[None] * n,
             sinkage_rate=[0.0] * n,
             sinkage_rate_std=[1.0] * n,
             pull_margin=[0.0] * n,

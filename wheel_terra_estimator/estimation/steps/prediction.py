@@ -26,6 +26,7 @@ from wheel_terra_estimator.estimation.steps.context import (
     reference_known,
     rims_without_turning,
     slope_share,
+    smoothed,
     speed_step_to,
     typical_rim,
 )
@@ -33,6 +34,9 @@ from wheel_terra_estimator.estimation.steps.context import (
 FloatArray = NDArray[np.float64]
 # Slip of a rover in loose soil on level ground, its spread, and the rim travel of its changes [m].
 _USUAL_SLIP, _USUAL_STD, _USUAL_LENGTH = 0.12, 0.2, 1.5
+# Of the slip that the bearing law would see in the sinkage, without fixes. Its errors (n0, n1, the
+# zero of the sensor) stay the same all the way: readings do not average them out.
+_LAW_SHARE = 0.5
 
 
 def predict(c: Context, time: float, dt: float, rims: list[float], still: bool) -> None:
@@ -113,6 +117,7 @@ def predict_wheels(
 ) -> float:
     """Let each sinkage relax towards where the bearing law carries the load; return travel."""
     run, s, layout = c.run, c.settings, c.layout
+    share = 1.0 if reference_known(c) else _LAW_SHARE
     travels = []
     for i, rim in enumerate(rims):
         zi, ki = layout.sinkage.start + i, layout.stiffness.start + i
@@ -154,9 +159,10 @@ def predict_wheels(
         sensitivity = trust * alpha * target / power
         F[zi, zi] = max(1.0 - trust * alpha * 0.9, 0.05)
         F[zi, ki] = -sensitivity
-        F[zi, SLIP_SINKAGE] = -sensitivity * slip * bearing.log_depth
-        by_ratio = math.log(bearing.load / slower.load) / 0.02
-        F[zi, SPEED] = -sensitivity * by_ratio * direction / rim
+        slopes = (math.log(bearing.load / slower.load) / 0.02, max(slip, 0.0) * bearing.log_depth)
+        by_ratio, by_slip_sinkage = run.bearing_slopes[i] = smoothed(run.bearing_slopes[i], slopes)
+        F[zi, SLIP_SINKAGE] = -sensitivity * by_slip_sinkage
+        F[zi, SPEED] = -share * sensitivity * by_ratio * direction / rim
         # What the law does not know: a twentieth of the sinkage per contact length, and digging.
         digging = 0.05 * max(slip, 0.0) ** 2 * rim * dt
         Q[zi, zi] = (0.05 * z_floor) ** 2 * 2.0 * alpha + digging**2 + 1e-9 * dt

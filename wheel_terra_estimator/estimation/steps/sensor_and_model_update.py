@@ -13,6 +13,7 @@ from wheel_terra_estimator.estimation.filter_state import (
     SHEAR_MODULUS,
     SHEAR_STRENGTH,
     SLIP_SINKAGE,
+    SPEED,
 )
 from wheel_terra_estimator.estimation.speed_process import InertialWindow
 from wheel_terra_estimator.estimation.steps.context import (
@@ -76,14 +77,17 @@ def fuse_models(c: Context, dt: float, rims: list[float], still: bool) -> None:
     if still:
         run.fresh_travel = 0.0
         run.starting = True
-        run.torque_slope = [_NAN] * n
-        run.pull_slope = [_NAN] * n
+        run.torque_slopes = [None] * n
+        run.pull_slopes = [None] * n
+        run.bearing_slopes = [None] * n
         run.stand_pull = [_NAN] * n
     elif run.fresh_travel > c.contact_length:
         model_rows(c, dt, rims, torque, residuals, variances, rows)
     if rows:
         # Without fixes slip and shear strength are not told apart: do not let them drift.
         held = [] if reference_known(c) else [SHEAR_STRENGTH, SHEAR_MODULUS]
+        if held and run.fresh_travel < c.contact_length:
+            held.append(SPEED)  # the rut of a start is no steady one
         unread = [i for i in range(n) if not sinkage_known(c, i)]
         # Nor are sinkage and the errors of the shear model, where no sensor sees the sinkage.
         for part in (layout.sinkage, layout.stiffness):
