@@ -70,14 +70,13 @@ def run_cycle(c: Context, time: float, reference: ReferenceVelocity | None) -> N
 def begin_rolling(c: Context, rim: float | None) -> None:
     """Let a rover that starts without fixes roll as it did before.
 
-    In the first moments of a start the accelerometer's jolt decides; from a speed of nothing the
-    wheels' prediction, v' = v rim'/rim, would go on with nothing.
+    A jolt of the accelerometer weighs much while the wheels turn slowly, and from a speed of nothing
+    the wheels' prediction, v' = v rim'/rim, goes on with nothing.
     """
     run = c.run
-    before = typical_rim(run.rims_at_cycle)
-    if rim is None or before is None or reference_known(c):
+    if rim is None or reference_known(c) or run.fresh_travel > c.contact_length:
         return
-    if abs(before) <= c.low_rim < abs(rim) and c.filter.mean[SPEED] / rim < 0.5 * run.ratio:
+    if abs(rim) > c.low_rim and c.filter.mean[SPEED] / rim < 0.5 * run.ratio:
         c.filter.set(SPEED, run.ratio * rim, (run.ratio_std * rim) ** 2)
 
 
