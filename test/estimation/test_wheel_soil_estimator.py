@@ -18,8 +18,9 @@ from wheel_terra_estimator.estimation.measurements import (
     WheelOdometry,
 )
 from wheel_terra_estimator.estimation.steps.context import rim_discord, rims_without_turning
-from wheel_terra_estimator.estimation.steps.force_rows import dragged_pull
+from wheel_terra_estimator.estimation.steps.force_rows import dragged_pull, smooth_slopes
 from wheel_terra_estimator.estimation.steps.odd_wheels import watch_demand
+from wheel_terra_estimator.estimation.steps.pulls import share_the_rest
 from wheel_terra_estimator.estimation.steps.start import start_context
 from wheel_terra_estimator.estimation.wheel_soil_estimator import WheelSoilEstimator
 from wheel_terra_estimator.evaluation import kinds
@@ -391,3 +392,75 @@ def test_a_dragged_wheel_is_a_drag_whatever_its_jammed_drive_reads(torque):
     assert dragged_pull(c, 0, torque, 60.0) < -0.2 * 60.0
     c.filter.mean[SPEED] = -0.05
     assert dragged_pull(c, 0, -torque, 60.0) > 0.2 * 60.0
+
+
+def with_inertial(run, change):
+    """Return a drive whose IMU readings went through `change(reading, seconds)`."""
+    start = min(a.measurement.stamp for a in run.arrivals)
+    changed = [
+        a._replace(measurement=change(a.measurement, (a.measurement.stamp - start) * 1e-9))
+        if isinstance(a.measurement, InertialReading)
+        else a
+        for a in run.arrivals
+    ]
+    return replace(run, arrivals=changed)
+
+
+def test_a_jolt_at_the_start_does_not_stop_the_speed_without_fixes():
+    run = drive()
+
+    def jolted(reading, time):
+        jolt = [-0.3 if 0.1 < time < 0.4 else 0.0, 0.0, 0.0]
+        return replace(reading, specific_force=np.asarray(reading.specific_force) + jolt)
+
+    estimated = np.array([s.slip for s in estimate(with_inertial(run, jolted), 'no_reference')])
+    error = estimated[30:] - run.truth.slip[30 : len(estimated)]
+    assert np.abs(error).max() < 0.3
+
+
+def test_the_zero_of_the_pitch_gyro_does_not_reach_the_pulls():
+    # 0.02 rad/s at 2 cm/s would be ground that curves by 1 rad/m.
+    run = drive(**{'drive.time': [0.0, 4.0, 5.0], 'drive.forward': [0.0, 0.0, 0.02]})
+
+    def turned(reading, time):
+        zero = np.array([0.0, 0.02, 0.0])
+        return replace(reading, angular_rate=np.asarray(reading.angular_rate) + zero)
+
+    straight, biased = (estimate(r) for r in (run, with_inertial(run, turned)))
+    pulls = [np.array([s.drawbar_pull for s in sets[80:]]) for sets in (straight, biased)]
+    assert np.ptp(pulls, axis=0).max() < 0.02 * run.truth.normal_load.mean()
+
+
+def test_every_slope_is_smoothed_until_the_contact_changes(climb):
+    context = start_context(climb.configuration)
+    forces = [
+        context.models.forces(0, ratio, 0.02, 200.0, 0.0, 0.0, 0.0, 0.0, 0.05, np.nan)
+        for ratio in (0.95, 0.9)
+    ]
+    context.run.load[0] = 200.0
+    slopes = [smooth_slopes(context, 0, forces[k % 2]) for k in range(80)][40:]
+    for smoothed, raw in zip(np.moveaxis(slopes, 1, 0), ('d_torque', 'd_pull'), strict=True):
+        swing = np.abs(np.subtract(*(getattr(f, raw) for f in forces)))
+        assert (np.ptp(smoothed, axis=0) < 0.12 * swing + 1e-9).all()
+    saturated = context.models.forces(0, 0.1, 0.02, 200.0, 0.0, 0.0, 0.0, 0.0, 0.05, np.nan)
+    torque, pull = smooth_slopes(context, 0, saturated)
+    assert torque[1:] == saturated.d_torque[1:]
+    assert pull[1:] == saturated.d_pull[1:]
+
+
+def test_the_rest_of_the_sum_is_shared_as_least_squares_does(climb):
+    context = start_context(climb.configuration)
+    rng = np.random.default_rng(4)
+    root = rng.normal(size=(6, 6))
+    covariance = root @ root.T
+    pulls = rng.normal(scale=20.0, size=6)
+    total, variance = float(pulls.sum()) + 6.0, 2.0
+    context.run.pull, context.run.load = pulls.tolist(), [300.0] * 6
+    context.filter.mean[context.layout.sinkage] = 0.0
+    context.pull_sum = (total, 1800.0, variance)
+    share_the_rest(context, covariance)
+    # Six priors and one sum, each row in units of its own deviation.
+    whiten = np.linalg.inv(np.linalg.cholesky(covariance))
+    rows = np.vstack([whiten, np.ones(6) / np.sqrt(variance)])
+    values = np.append(whiten @ pulls, total / np.sqrt(variance))
+    assert context.run.pull == pytest.approx(np.linalg.lstsq(rows, values, rcond=None)[0])

@@ -70,8 +70,8 @@ def run_cycle(c: Context, time: float, reference: ReferenceVelocity | None) -> N
 def begin_rolling(c: Context, rim: float | None) -> None:
     """Let a rover that starts without fixes roll as it did before.
 
-    A jolt of the accelerometer weighs much while the wheels turn slowly, and from a speed of nothing
-    the wheels' prediction, v' = v rim'/rim, goes on with nothing.
+    A jolt of the accelerometer weighs much while the wheels turn slowly, and from a speed of
+    nothing the wheels' prediction, v' = v rim'/rim, goes on with nothing.
     """
     run = c.run
     if rim is None or reference_known(c) or run.fresh_travel > c.contact_length:
