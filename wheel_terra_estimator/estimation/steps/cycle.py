@@ -76,8 +76,12 @@ def begin_rolling(c: Context, rim: float | None) -> None:
     run = c.run
     if rim is None or reference_known(c) or run.fresh_travel > c.contact_length:
         return
-    if abs(rim) > c.low_rim and c.filter.mean[SPEED] / rim < 0.5 * run.ratio:
-        c.filter.set(SPEED, run.ratio * rim, (run.ratio_std * rim) ** 2)
+    usual = run.ratio * rim
+    off = abs(float(c.filter.mean[SPEED]) - usual)
+    # A rover that slides, or wheels that spin up at once, differ by more than the accelerometer's
+    # noise over a second.
+    if abs(rim) > c.low_rim and 0.5 * abs(usual) < off < 3.0 * c.acceleration_noise:
+        c.filter.set(SPEED, usual, (run.ratio_std * rim) ** 2)
 
 
 def finish(

@@ -28,6 +28,7 @@ from wheel_terra_estimator.estimation.steps.context import (
     slope_share,
     smoothed,
     speed_step_to,
+    torque_known,
     typical_rim,
 )
 
@@ -37,6 +38,10 @@ _USUAL_SLIP, _USUAL_STD, _USUAL_LENGTH = 0.12, 0.2, 1.5
 # Of the slip that the bearing law would see in the sinkage, without fixes. Its errors (n0, n1, the
 # zero of the sensor) stay the same all the way: readings do not average them out.
 _LAW_SHARE = 0.5
+_OWN_STIFFNESS_WALK = 0.3  # of the logarithm, in units of `filter.soil_walk`
+# Correlation of a wheel's own stiffness and strength, and how much more the strength differs from
+# wheel to wheel than what torque shows as errors of the shear model.
+_SOFT_IS_WEAK, _STRENGTH_SPREAD = 0.7, 2.0
 
 
 def predict(c: Context, time: float, dt: float, rims: list[float], still: bool) -> None:
@@ -77,12 +82,18 @@ def predict(c: Context, time: float, dt: float, rims: list[float], still: bool) 
         Q[MOUND, MOUND] = 0.05**2 * walk
         n = s.wheel_count
         k = layout.stiffness
-        Q[k, k] = (0.15**2 + np.eye(n) * 0.3**2) * walk
+        Q[k, k] = (0.15**2 + np.eye(n) * _OWN_STIFFNESS_WALK**2) * walk
         hold = math.exp(-travel / float(s.filter.shear_error_length))
         e = layout.shear_error
         mean[e] *= hold
         F[e, e] *= hold
         Q[e, e] = c.shear_error_covariance * (1.0 - hold * hold)
+        if not torque_known(c):
+            # Softer ground is weaker ground: where no torque says how weak, the sinkage does.
+            fresh = (1.0 - hold * hold) * s.shear_error_std**2
+            Q[e, e] += (_STRENGTH_SPREAD**2 - 1.0) * fresh * np.eye(n)
+            both = _OWN_STIFFNESS_WALK * math.sqrt(walk * fresh) * _STRENGTH_SPREAD
+            Q[k, e] = Q[e, k] = _SOFT_IS_WEAK * both * np.eye(n)
     c.filter.predict(mean, F, Q)
 
 
