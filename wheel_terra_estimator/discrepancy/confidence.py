@@ -15,8 +15,9 @@ from functools import lru_cache
 from importlib.resources import files
 
 import numpy as np
-from scipy.special import expit, logsumexp
+from scipy.special import expit
 
+from wheel_terra_estimator.discrepancy.evidence import log_sum
 from wheel_terra_estimator.discrepancy.remainder import Remainder
 from wheel_terra_estimator.discrepancy.selection import Selection
 from wheel_terra_estimator.discrepancy.verdict import Verdict
@@ -44,7 +45,7 @@ def features(
     selection: Selection, verdict: Verdict, place: int, left: Remainder
 ) -> dict[str, float]:
     """Return the features of the name at ``place`` in the named set."""
-    total = np.array([logsumexp(row) for row in selection.log_joint])
+    total = np.array([log_sum(row) for row in selection.log_joint])
     name = selection.explanations[verdict.index].names[place]
     has = np.array([name in e.names for e in selection.explanations])
     inside = {name, *verdict.open_sets[place]}
@@ -54,7 +55,7 @@ def features(
         against = total[~mine]
         if not against.size:
             return 20.0
-        return float(logsumexp(total[mine]) - logsumexp(against))
+        return float(log_sum(total[mine]) - log_sum(against))
 
     nothing = next(h for h, e in enumerate(selection.explanations) if not e.names)
     return {

@@ -74,16 +74,15 @@ class Forward:
         measured = np.asarray(points.leaving_angle, dtype=float)
         self._leaving_angle = None if np.isnan(measured).all() else measured
 
-    def at(self, points: OperatingPoints) -> Forward:
-        """Return the same model at other points."""
-        same_rows = len(points) == len(self.points) and self.active is not None
+    def at(self, points: OperatingPoints, other_rows: bool = False) -> Forward:
+        """Return the same model at other points; ``other_rows`` are none of the table's."""
         return Forward(
             points,
             self.soil,
             self.base_effects,
             self.catalogue,
             self.nodes,
-            self.active if same_rows else None,
+            None if other_rows else self.active,
         )
 
     def _contact(
@@ -234,12 +233,13 @@ class Forward:
             for c, x in ((hypothesis[k], values[k]) for k in by[b]):
                 copies.append({**columns[b], c.key: float(c.value(x + self._step(c, x)))})
                 owner.append(b)
-        contact, terms = self._contact(hypotheses, copies)
-        residual, shifted = self._response(contact, terms, angle[owner])
         # Once more the plain copies, for the derivative along the angle.
-        contact, terms = self._contact(hypotheses, columns)
         step = 1e-6
-        beyond, moved = self._response(contact, terms, angle + step)
+        contact, terms = self._contact(hypotheses, [*copies, *columns])
+        residual, shifted = self._response(
+            contact, terms, np.concatenate([angle[owner], angle + step])
+        )
+        beyond, moved = residual[len(copies) :], shifted[len(copies) :]
         jacobians, slopes, at = [], [], 0
         for b, hypothesis in enumerate(hypotheses):
             count = len(by[b])

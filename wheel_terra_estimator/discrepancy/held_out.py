@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from wheel_terra_estimator.discrepancy.candidates import Setting
 from wheel_terra_estimator.discrepancy.fitting import Fit
-from wheel_terra_estimator.discrepancy.outliers import inverse_covariance
 from wheel_terra_estimator.discrepancy.parameters import bounds
+from wheel_terra_estimator.discrepancy.problem import Problem
 from wheel_terra_estimator.discrepancy.table import SteadyTable
 
 FloatArray = NDArray[np.float64]
@@ -37,19 +37,19 @@ def log_scores(
     Around the fit everything is Gaussian, so that blocks of the inverse covariance suffice.
     """
     problem = setting.problem
-    cell_group = groups[problem.row]
+    parts = _parts(problem, groups)
+    plain = _inverse(problem, variance)
+    blocks = [plain[np.ix_(out, out)] for out in parts]
     scores = []
     for fitted in fits:
-        jacobian = fitted.jacobian / np.sqrt(fitted.prior)
-        inverse = problem.rotation.T @ inverse_covariance(variance, jacobian) @ problem.rotation
+        weighted = plain @ fitted.sensitivity
+        precision = fitted.sensitivity.T @ weighted + np.diag(fitted.prior)
+        low_rank = np.linalg.solve(precision, weighted.T)
         target = setting.observed - problem.flat(fitted.outputs) + fitted.sensitivity @ fitted.u
-        pull = inverse @ target
+        pull = plain @ target - weighted @ (low_rank @ target)
         score = 0.0
-        for label in _labels(groups):
-            out = np.flatnonzero(cell_group == label)
-            if not out.size:
-                continue
-            block = inverse[np.ix_(out, out)]
+        for out, noise in zip(parts, blocks, strict=True):
+            block = noise - weighted[out] @ low_rank[:, out]
             square = float(pull[out] @ np.linalg.solve(block, pull[out]))
             log_det = float(np.linalg.slogdet(block)[1])
             score += 0.5 * (log_det - square - out.size * np.log(2.0 * np.pi))
@@ -69,15 +69,14 @@ def hold_out(
     problem = setting.problem
     labels = _labels(groups)
     cell_group = groups[problem.row]
-    unrotate = np.linalg.inv(problem.rotation)
-    covariance = (unrotate * variance) @ unrotate.T
+    inverse = _inverse(problem, variance)
     tasks = []
     for fitted in fits:
         target = setting.observed - problem.flat(fitted.outputs) + fitted.sensitivity @ fitted.u
         limits = bounds(fitted.coordinates)
         for label in labels:
-            kept = cell_group != label
-            tasks.append((fitted, np.clip(_without(fitted, covariance, target, kept), *limits)))
+            out = np.flatnonzero(cell_group == label)
+            tasks.append((fitted, np.clip(_without(fitted, inverse, target, out), *limits)))
     state = setting.forward.solve(
         [fitted.coordinates for fitted, _ in tasks],
         [u for _, u in tasks],
@@ -98,11 +97,28 @@ def _labels(groups: IndexArray) -> IndexArray:
     return np.unique(groups[groups >= 0])
 
 
-def _without(
-    fitted: Fit, covariance: FloatArray, target: FloatArray, kept: NDArray[np.bool_]
-) -> FloatArray:
-    """Return the parameters that the kept cells ask for."""
-    jacobian = fitted.sensitivity[kept]
-    weighted = np.linalg.solve(covariance[np.ix_(kept, kept)], jacobian)
-    precision = jacobian.T @ weighted + np.diag(fitted.prior)
-    return np.asarray(np.linalg.solve(precision, weighted.T @ target[kept]))
+def _parts(problem: Problem, groups: IndexArray) -> list[IndexArray]:
+    """Return the cells of each group that has some."""
+    cell_group = groups[problem.row]
+    parts = [np.flatnonzero(cell_group == label) for label in _labels(groups)]
+    return [out for out in parts if out.size]
+
+
+def _inverse(problem: Problem, variance: FloatArray) -> FloatArray:
+    """(m, m) inverse covariance of the cells around a model without free parameters."""
+    return (problem.rotation.T / variance) @ problem.rotation
+
+
+def _without(fitted: Fit, inverse: FloatArray, target: FloatArray, out: IndexArray) -> FloatArray:
+    """Return the parameters that the cells ask for without those at ``out``.
+
+    The inverse covariance of the kept cells is what is left of the inverse of all when the block of
+    the others is eliminated (Schur), so that no large matrix is decomposed for any group.
+    """
+    both = np.column_stack([fitted.sensitivity, target])
+    both[out] = 0.0
+    weighted = inverse @ both
+    if out.size:
+        weighted -= inverse[:, out] @ np.linalg.solve(inverse[np.ix_(out, out)], weighted[out])
+    products = both[:, :-1].T @ weighted
+    return np.asarray(np.linalg.solve(products[:, :-1] + np.diag(fitted.prior), products[:, -1]))

@@ -4,8 +4,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Callable, Sequence
+from dataclasses import fields, replace
+from operator import attrgetter
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,15 +45,19 @@ def propose(
         (3,) noise of a new row.
     """
     found: list[NextMeasurement] = []
-    for rival in rivals[:2]:
+    rivals = rivals[:2]
+    menu = _menu(setting) if rivals else []
+    predicted = _predicted(setting, [chosen, *rivals], [points for _, points in menu])
+    for place, rival in enumerate(rivals, 1):
         names = (_label(chosen), _label(rival))
         now = _distance(setting, chosen, rival, None, std)
         for name in {*chosen.names, *rival.names}:
             if name in ZERO_CHECKS and (name in chosen.names) != (name in rival.names):
                 found.append(NextMeasurement(ZERO_CHECKS[name], names, now, np.inf))
         blocks = []
-        for what, points in _menu(setting):
-            then, outputs = _with_rows(setting, chosen, rival, points, std)
+        for (what, points), (values, sensitivity) in zip(menu, predicted, strict=True):
+            outputs = values[[0, place]]
+            then = _with_rows(setting, chosen, rival, outputs, sensitivity[place], std)
             depth = outputs[..., 0].max()
             if np.isfinite(then) and depth < _DEEPEST * np.min(points.wheel.radius):
                 blocks.append(
@@ -123,17 +129,50 @@ def _menu(setting: Setting) -> list[tuple[str, OperatingPoints]]:
     return menu
 
 
-def _with_rows(
-    setting: Setting, chosen: Fit, rival: Fit, points: OperatingPoints, std: FloatArray
-) -> tuple[float, FloatArray]:
-    state = setting.forward.at(points).solve(
-        [chosen.coordinates, rival.coordinates], [chosen.u, rival.u]
+def _predicted(
+    setting: Setting, fits: Sequence[Fit], blocks: Sequence[OperatingPoints]
+) -> list[tuple[FloatArray, list[FloatArray]]]:
+    """Return outputs (B, n, 3) and Jacobians of every block of rows, all solved at once."""
+    if not blocks:
+        return []
+    state = setting.forward.at(_joined(blocks), other_rows=True).solve(
+        [f.coordinates for f in fits],
+        [f.u for f in fits],
+        by=[[], *(range(len(f.u)) for f in fits[1:])],
     )
-    difference = ((state.outputs[0] - state.outputs[1]) / std).reshape(-1)
-    jacobian = (state.jacobian[1] / std[None, :, None]).reshape(len(difference), -1)
+    ends = np.cumsum([len(points) for points in blocks])
+    rows = [slice(end - len(points), end) for end, points in zip(ends, blocks, strict=True)]
+    return [(state.outputs[:, part], [j[part] for j in state.jacobian]) for part in rows]
+
+
+def _joined(blocks: Sequence[OperatingPoints]) -> OperatingPoints:
+    """Return the rows of all blocks as one."""
+
+    def stacked(of: Callable[[OperatingPoints], Any]) -> FloatArray:
+        return np.concatenate([np.broadcast_to(of(points), len(points)) for points in blocks])
+
+    wheel = {f.name: stacked(attrgetter(f'wheel.{f.name}')) for f in fields(Wheel)}
+    rest = {
+        f.name: stacked(attrgetter(f.name))
+        for f in fields(OperatingPoints)
+        if f.name not in ('wheel', 'slip_radius')
+    }
+    return OperatingPoints(wheel=Wheel(**wheel), slip_radius=blocks[0].slip_radius, **rest)
+
+
+def _with_rows(
+    setting: Setting,
+    chosen: Fit,
+    rival: Fit,
+    outputs: FloatArray,
+    sensitivity: FloatArray,
+    std: FloatArray,
+) -> float:
+    """Distance d' of chosen and rival with new rows: (2, n, 3) outputs, Jacobian of the rival."""
+    difference = ((outputs[0] - outputs[1]) / std).reshape(-1)
+    jacobian = (sensitivity / std[None, :, None]).reshape(len(difference), -1)
     keep = np.isfinite(difference)
-    new = (difference[keep], jacobian[keep])
-    return _distance(setting, chosen, rival, new, std), state.outputs
+    return _distance(setting, chosen, rival, (difference[keep], jacobian[keep]), std)
 
 
 def _distance(

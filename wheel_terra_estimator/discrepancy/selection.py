@@ -15,10 +15,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import logsumexp
 
 from wheel_terra_estimator.discrepancy.candidates import Explanation, Setting, linear_starts
-from wheel_terra_estimator.discrepancy.evidence import Floor
+from wheel_terra_estimator.discrepancy.evidence import Floor, log_sum
 from wheel_terra_estimator.discrepancy.fitting import Fit, fit
 
 FloatArray = NDArray[np.float64]
@@ -121,20 +120,20 @@ class Selection:
     def single_weights(self, temperature: float = 1.0) -> dict[str, float]:
         """Return effect -> share of the tempered probability among the single effects."""
         singles = [
-            (e.names[0], float(logsumexp(self.log_joint[h])))
+            (e.names[0], float(log_sum(self.log_joint[h])))
             for h, e in enumerate(self.explanations)
             if len(e.names) == 1
         ]
         if not singles:
             return {}
         logs = np.array([value for _, value in singles]) / temperature
-        shares = np.exp(logs - logsumexp(logs))
+        shares = np.exp(logs - log_sum(logs))
         return {name: float(s) for (name, _), s in zip(singles, shares, strict=True)}
 
 
 def log_mass(values: FloatArray) -> float:
     """Return the logarithm of a sum of exponentials; minus infinity for none."""
-    return float(logsumexp(values)) if len(values) else -math.inf
+    return float(log_sum(values)) if len(values) else -math.inf
 
 
 def weigh(
@@ -150,10 +149,10 @@ def weigh(
     joint = np.array(
         [e.posterior.log_evidence + floor_prior + priors[len(e.names)] for e in explanations]
     )
-    order = np.argsort(-logsumexp(joint, axis=1))
+    order = np.argsort(-log_sum(joint, axis=1))
     joint = joint[order]
     return Selection(
-        tuple(explanations[k] for k in order), joint, np.exp(joint - logsumexp(joint)), floors
+        tuple(explanations[k] for k in order), joint, np.exp(joint - log_sum(joint)), floors
     )
 
 

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import logsumexp
 
+from wheel_terra_estimator.discrepancy.evidence import log_sum
 from wheel_terra_estimator.discrepancy.remainder import (
     Remainder,
     Variance,
@@ -72,13 +72,13 @@ def decide(selection: Selection, variance_of: Variance) -> Verdict:
         (amplitude, noise factor) -> (m,) variances of the rotated axes.
     """
     joint, unexplained = selection.log_joint, selection.unexplained
-    total = np.asarray(logsumexp(joint, axis=1))
+    total = np.asarray(log_sum(joint, axis=1))
     nothing = next(h for h, e in enumerate(selection.explanations) if not e.names)
     left = remainder(selection, nothing, variance_of)
-    agrees = float(logsumexp(joint[nothing][~unexplained]))
+    agrees = float(log_sum(joint[nothing][~unexplained]))
     rest = log_mass(joint[nothing][unexplained])
     named = [h for h, e in enumerate(selection.explanations) if e.names]
-    effects = float(logsumexp(total[named])) if named else -np.inf
+    effects = float(log_sum(total[named])) if named else -np.inf
     exact = np.array([floor.largest == 0.0 for floor in selection.floors])
     floor_share = 1.0 - np.exp(log_mass(joint[nothing][exact]) - agrees)
     odds = ODDS_OVER_FLOOR if floor_share > SURE_OF_FLOOR else ODDS_TO_SPEAK
@@ -123,7 +123,7 @@ def _rivals(
             places[own] = float(total[h])
     order = sorted(places, key=lambda key: -places[key])
     logs = np.array([places[key] for key in order]) / TEMPERATURE
-    weights = np.exp(logs - logsumexp(logs))
+    weights = np.exp(logs - log_sum(logs))
     kept: list[str] = []
     mass = 0.0
     for key, weight in zip(order, weights, strict=True):

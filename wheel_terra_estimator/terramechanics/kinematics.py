@@ -64,7 +64,12 @@ def change_of_radius(slip: Any, from_radius: Any, to_radius: Any, maths: Any = n
 
 
 def shear_displacement(
-    angle: Any, entrance_angle: Any, shear_radius: Any, velocity_ratio: Any, maths: Any = np
+    angle: Any,
+    entrance_angle: Any,
+    shear_radius: Any,
+    velocity_ratio: Any,
+    maths: Any = np,
+    sine: Any = None,
 ) -> Any:
     """Shear displacement j = R (t1 - t) - (v/w)(sin t1 - sin t) [m].
 
@@ -77,9 +82,12 @@ def shear_displacement(
         Hub angle t and entrance angle t1 [rad].
     shear_radius, velocity_ratio : float or array_like
         R and v/w [m].
+    sine : float or array_like, optional
+        Of the hub angle, where it is known already.
     """
+    sine = maths.sin(angle) if sine is None else sine
     return shear_radius * (entrance_angle - angle) - velocity_ratio * (
-        maths.sin(entrance_angle) - maths.sin(angle)
+        maths.sin(entrance_angle) - sine
     )
 
 

@@ -42,17 +42,17 @@ def forces(contact: Contact, terms: Terms, nodes: int = NODES) -> tuple[Any, Any
     front, rear = t1 - tm, tm - t2
     x, w = _rule(nodes, max(np.ndim(front), np.ndim(rear), np.ndim(contact.slip)))
     entry_side = t1 - front * x
-    # The rear branch mirrors the front one (Wong and Reece), so both share the same stress.
-    stress = stresses.front_stress(contact, entry_side)
     angle = np.concatenate([entry_side, np.broadcast_to(t2 + rear * x, entry_side.shape)])
+    cosine, sine = np.cos(angle), np.sin(angle)
+    # The rear branch mirrors the front one (Wong and Reece), so both share the same stress.
+    stress = stresses.front_stress(contact, entry_side, cosine=cosine[:nodes])
     weight = np.concatenate([front * w, np.broadcast_to(rear * w, entry_side.shape)])
     contact.angle = angle
     contact.normal_stress = np.concatenate([stress, stress])
     terms.apply('on_normal_stress', contact)
-    shear = stresses.shear_stress(contact, angle, contact.normal_stress)
+    shear = stresses.shear_stress(contact, angle, contact.normal_stress, sine=sine)
     shear *= weight * contact.shear_radius
     normal = contact.normal_stress * (weight * contact.radius)
-    cosine, sine = np.cos(angle), np.sin(angle)
     width = contact.width
     load = width * np.add.reduce(normal * cosine + shear * sine)
     pull = width * np.add.reduce(shear * cosine - normal * sine)

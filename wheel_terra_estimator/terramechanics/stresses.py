@@ -43,9 +43,13 @@ def compaction_resistance(width: Any, modulus: Any, exponent: Any, sinkage: Any)
     return width * modulus * sinkage ** (exponent + 1.0) / (exponent + 1.0)
 
 
-def front_stress(contact: Contact, angle: Any, maths: Any = np) -> Any:
-    """Normal stress ahead of its peak, k [(r/z0)(cos t - cos t1)]^N [Pa] (seed 1 equation 17)."""
-    depth = contact.radius * (maths.cos(angle) - maths.cos(contact.entrance_angle))
+def front_stress(contact: Contact, angle: Any, maths: Any = np, cosine: Any = None) -> Any:
+    """Normal stress ahead of its peak, k [(r/z0)(cos t - cos t1)]^N [Pa] (seed 1 equation 17).
+
+    ``cosine`` of the angle, where it is known already.
+    """
+    cosine = maths.cos(angle) if cosine is None else cosine
+    depth = contact.radius * (cosine - maths.cos(contact.entrance_angle))
     relative = maths.maximum(depth, 0.0) / contact.reference_depth
     return contact.bearing_modulus * relative**contact.sinkage_exponent
 
@@ -56,10 +60,15 @@ def mobilised_share(displacement: Any, shear_modulus: Any, maths: Any = np) -> A
     return maths.where(displacement >= 0.0, share, -share)
 
 
-def shear_stress(contact: Contact, angle: Any, normal_stress: Any, maths: Any = np) -> Any:
-    """Shear stress (c + sigma tan phi) sgn(j) (1 - exp(-|j|/K)) [Pa] (seed 1 equation 18)."""
+def shear_stress(
+    contact: Contact, angle: Any, normal_stress: Any, maths: Any = np, sine: Any = None
+) -> Any:
+    """Shear stress (c + sigma tan phi) sgn(j) (1 - exp(-|j|/K)) [Pa] (seed 1 equation 18).
+
+    ``sine`` of the angle, where it is known already.
+    """
     displacement = shear_displacement(
-        angle, contact.entrance_angle, contact.shear_radius, contact.velocity_ratio, maths
+        angle, contact.entrance_angle, contact.shear_radius, contact.velocity_ratio, maths, sine
     )
     strength = contact.cohesion + normal_stress * contact.tan_friction
     return strength * mobilised_share(displacement, contact.shear_modulus, maths)
