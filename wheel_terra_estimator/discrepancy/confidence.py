@@ -30,6 +30,9 @@ FEATURES = (
     'remainder',  # something is left beyond the floor
     'floor',  # probability of a structural error
     'two',  # two effects are named
+    'margin_floor',  # a margin counts for less beside a structural error,
+    'margin_two',  # and for less in a pair
+    'gain_squared',
 )
 
 
@@ -58,14 +61,20 @@ def features(
         return float(log_sum(total[mine]) - log_sum(against))
 
     nothing = next(h for h, e in enumerate(selection.explanations) if not e.names)
+    alone = _squash(margin(has))
+    gain = float(np.log1p(max(total[verdict.index] - total[nothing], 0.0)))
+    two = float(len(selection.explanations[verdict.index].names) - 1)
     return {
         'one': 1.0,
-        'margin': _squash(margin(has)),
+        'margin': alone,
         'margin_of_set': _squash(margin(covered)),
-        'gain': float(np.log1p(max(total[verdict.index] - total[nothing], 0.0))),
+        'gain': gain,
         'remainder': float(left.significant),
         'floor': left.probability_of_any,
-        'two': float(len(selection.explanations[verdict.index].names) - 1),
+        'two': two,
+        'margin_floor': alone * left.probability_of_any,
+        'margin_two': alone * two,
+        'gain_squared': gain**2,
     }
 
 

@@ -51,7 +51,7 @@ def propose(
     for place, rival in enumerate(rivals, 1):
         names = (_label(chosen), _label(rival))
         now = _distance(setting, chosen, rival, None, std)
-        for name in {*chosen.names, *rival.names}:
+        for name in dict.fromkeys((*chosen.names, *rival.names)):
             if name in ZERO_CHECKS and (name in chosen.names) != (name in rival.names):
                 found.append(NextMeasurement(ZERO_CHECKS[name], names, now, np.inf))
         blocks = []
