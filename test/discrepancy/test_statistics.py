@@ -5,12 +5,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy.stats import kstest, multivariate_normal
 
-from wheel_terra_estimator.discrepancy import gap_test, noise, outliers
+from wheel_terra_estimator.discrepancy import gap_test, held_out, noise, outliers
 from wheel_terra_estimator.discrepancy.evidence import Floor, evidence
 from wheel_terra_estimator.discrepancy.fitting import Fit, fit
 from wheel_terra_estimator.discrepancy.forward import Forward
@@ -179,6 +180,49 @@ def test_gap_tests_are_calibrated(forward, setting):
     digging = problem.rotate(problem.flat(np.outer(0.004 * forward.points.slip, [1.0, 0, 0])))
     real = replace(at_truth, residual=digging)
     assert gap_test.scan_p_value(real, one, found, set(names[:3])) < 1e-3
+
+
+def test_held_out_groups_are_those_of_a_fit_without_them(setting):
+    """Parameters and predictive density of left-out cells against dense algebra."""
+    rng = np.random.default_rng(4)
+    _, truth, std, inputs, scale = setting
+    problem = build_problem(std * rng.standard_normal(truth.shape), std, inputs, scale)
+    coordinates = (Coordinate('soil', 'a', 0.0, 1.0), Coordinate('soil', 'b', 0.0, 1.0))
+    model = linear_fit(rng, problem, 2, coordinates)
+    amplitude, observed = 0.02, problem.observed
+    row, quantity = problem.row, problem.quantity
+    smooth = kernel(inputs)[np.ix_(row, row)] * (quantity[:, None] == quantity[None, :])
+    noise = np.diag(problem.std**2)
+    noise += smooth * np.outer(scale[quantity], scale[quantity]) * amplitude**2
+    groups = np.arange(len(truth)) % 4
+    work = SimpleNamespace(problem=problem, observed=observed)
+    score = held_out.log_scores(work, [model], problem.variance(amplitude), groups)[0]
+    inverse = held_out._inverse(problem, problem.variance(amplitude))
+    total = 0.0
+    for label in range(4):
+        out = groups[row] == label
+        kept = model.sensitivity[~out]
+        weight = np.linalg.inv(noise[np.ix_(~out, ~out)])
+        spread = np.linalg.inv(kept.T @ weight @ kept + np.eye(2))
+        found = held_out._without(model, inverse, observed, np.flatnonzero(out))
+        assert found == pytest.approx(spread @ kept.T @ weight @ observed[~out], rel=1e-6)
+        full = noise + model.sensitivity @ model.sensitivity.T
+        gain = full[np.ix_(out, ~out)] @ np.linalg.inv(full[np.ix_(~out, ~out)])
+        left = full[np.ix_(out, out)] - gain @ full[np.ix_(~out, out)]
+        total += multivariate_normal(gain @ observed[~out], left).logpdf(observed[out])
+    assert score == pytest.approx(total, rel=1e-6)
+
+
+def test_a_cell_that_the_model_takes_whole_is_no_outlier(setting):
+    _, truth, std, inputs, scale = setting
+    problem = build_problem(truth, std, inputs, scale)
+    inverse = np.diag(1.0 / problem.std**2)
+    inverse[7, 7] = -1e-12  # as rounding leaves it
+    target = np.zeros(problem.size)
+    target[3] = 9.0 * problem.std[3]
+    with np.errstate(all='raise'):
+        _, found = outliers._set_apart(problem, inverse, target)
+    assert [cell[:2] for cell in found] == [(problem.row[3], problem.quantity[3])]
 
 
 def test_outliers_are_found_and_a_hump_is_none(forward, setting):

@@ -4,8 +4,10 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import json
+import re
 
 import campaign_tools  # noqa: F401
 import numpy as np
@@ -105,6 +107,27 @@ def test_names_what_is_hidden_and_shrinks_the_gap(name, factor):
     assert after < 3.0 * 1.35  # three quantities at their noise, on rows not seen
     # Cohesion is a soil number: a free soil closes the gap too, at a price in stated deviations.
     assert refit > (1.0 if name == 'cohesion' else 1.3) * after
+
+
+@pytest.mark.parametrize('softer', [0.5, 1.0])
+def test_soil_that_changes_along_the_way_is_said_in_words(softer):
+    table, values, soil, rows = make()
+    rng = np.random.default_rng(1)
+    time = 10.0 * rng.permutation(np.arange(len(rows['slip'])))
+    patch = (time >= 120.0) & (time <= 250.0)
+    there = dataclasses.replace(soil, frictional_modulus=softer * soil.frictional_modulus)
+    here, over = solve(rows, soil), solve(rows, there)
+    for key in OUTPUTS:
+        table[key] = table[key] + np.where(patch, over[key] - here[key], 0.0)
+    found = run({**table, 'time': time}, values)
+    notes = [note for note in found.notes if 'soil changes along the way' in note]
+    if softer == 1.0:
+        assert not notes
+        return
+    start, end, factor = re.search(r'from (\d+) to (\d+) s it is about ([\d.]+)', notes[0]).groups()
+    assert abs(float(start) - 120.0) <= 20.0
+    assert abs(float(end) - 250.0) <= 20.0
+    assert 0.3 < float(factor) < 0.8
 
 
 def test_agrees_where_only_the_soil_is_off():

@@ -477,6 +477,8 @@ def _mean_window(group: list[Window]) -> Window:
         pull=float(mean('pull')),
         slope=float(mean('slope')),
         passages=sum(w.passages for w in group),
+        start=float(mean('start')),
+        end=float(mean('end')),
         std={
             name: np.sqrt(np.mean([w.std[name] ** 2 for w in group], axis=0) / count)
             for name in group[0].std
@@ -496,7 +498,11 @@ def _columns(
     rows: list[dict[str, float]] = []
     left_out = 0
     for window in windows:
-        constant = {'slope': window.slope, 'gravity': float(configuration.rover.gravity)}
+        constant = {
+            'time': 0.5 * (window.start + window.end),
+            'slope': window.slope,
+            'gravity': float(configuration.rover.gravity),
+        }
         for i in range(wheels.count):
             if np.isnan([window.torque[i], window.sinkage[i]]).all() or window.normal_load[i] <= 0:
                 continue

@@ -114,8 +114,10 @@ def _set_apart(
     score = 0.5 * (np.linalg.slogdet(inverse)[1] - float(target @ inverse @ target))
     found: list[tuple[int, int, float]] = []
     apart = np.zeros(problem.size, dtype=bool)
+    # A cell that a free parameter takes whole tells nothing; rounding may then end below zero.
+    least = 1e-9 / problem.std**2
     for _ in range(int(GREATEST_SHARE * problem.size)):
-        own = 1.0 / np.diag(inverse)
+        own = 1.0 / np.maximum(np.diag(inverse), least)
         error = (inverse @ target) * own
         gain = 0.5 * error**2 * (1.0 / own - 1.0 / (own + extra))
         gain -= 0.5 * np.log1p(extra / own)

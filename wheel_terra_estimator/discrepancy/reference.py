@@ -45,6 +45,7 @@ def join(table: SteadyTable, reference: SteadyTable) -> tuple[SteadyTable, NDArr
         {
             name: np.concatenate([values, reference.columns[name]])
             for name, values in table.columns.items()
+            if name != 'time'  # of one drive only
         },
         np.concatenate([table.measured, reference.measured]),
         np.concatenate([table.stated_std, reference.stated_std]),

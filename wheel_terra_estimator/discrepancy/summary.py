@@ -7,6 +7,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from wheel_terra_estimator.discrepancy.along import Stretch
 from wheel_terra_estimator.discrepancy.fitting import Fit
 from wheel_terra_estimator.discrepancy.parameters import WIDENING
 from wheel_terra_estimator.discrepancy.remainder import Remainder
@@ -109,9 +110,13 @@ def _label(names: set[str]) -> str:
     return ' + '.join(sorted(names)) or 'nothing'
 
 
-def notes(table: SteadyTable, findings: Findings, after: Fit) -> tuple[str, ...]:
+def notes(
+    table: SteadyTable, findings: Findings, after: Fit, stretch: Stretch | None
+) -> tuple[str, ...]:
     """Return remarks for people: the reader's, noise, outliers, soil far off, effects at bounds."""
     found = list(table.notes)
+    if stretch:
+        found.append(f'{stretch.text}; diagnose the two apart')
     guessed = [q for q, origin in findings.noise.origin.items() if origin == 'estimated']
     if guessed:
         found.append(
@@ -140,6 +145,7 @@ def sentence(
     gap_p_value: float,
     left: Remainder,
     floor: float,
+    stretch: Stretch | None = None,
 ) -> str:
     """Return the verdict in words."""
     within = f', within a model-error floor of {100 * floor:.1f} % of the range' if floor else ''
@@ -151,6 +157,11 @@ def sentence(
     if verdict.word == 'agrees':
         agreed = 'Model and measurement agree once the soil is refitted'
         return f'{agreed}{within} (p = {gap_p_value:.2g}).'
+    if verdict.word == 'unexplained' and stretch:
+        return (
+            'Model and measurement disagree; none of the known effects alone explains it, but '
+            f'{stretch.text}.'
+        )
     if verdict.word == 'unexplained' and left.only_soil:
         return (
             'Model and measurement agree only with a soil too far from the configured one to be '

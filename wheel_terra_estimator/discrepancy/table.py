@@ -192,8 +192,8 @@ def check_table(
     stated = _columns(arrays, tuple(f'{q}_std' for q in QUANTITIES), count)
     slip_std = np.nan_to_num(arrays.get('slip_std', np.zeros(count)), nan=0.0)
     inputs = {key: arrays[key] for key in INPUT_UNITS if key in arrays}
-    if 'leaving_angle' in arrays:
-        inputs['leaving_angle'] = arrays['leaving_angle']
+    # No inputs of the model: a measured angle, and when the rows of a drive were.
+    inputs.update({key: arrays[key] for key in ('leaving_angle', 'time') if key in arrays})
     table = SteadyTable(name, where, inputs, measured, stated, slip_std)
     table, copies = _without_copies(table)
     if copies:

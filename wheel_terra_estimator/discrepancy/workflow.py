@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.discrepancy import confidence as confidences
 from wheel_terra_estimator.discrepancy import gap_test, next_measurement, summary
+from wheel_terra_estimator.discrepancy.along import changed_stretch
 from wheel_terra_estimator.discrepancy.fitting import Fit
 from wheel_terra_estimator.discrepancy.forward import Forward
 from wheel_terra_estimator.discrepancy.held_out import hold_out, log_scores, slip_groups
@@ -259,9 +260,10 @@ def _report(
     )
     effects = _named(findings, verdict, left, known, floor_index) if after.names else ()
     candidates = _candidates(findings, verdict, shown, gains, floor_index)
+    stretch = changed_stretch(both, setting, after, variance)
     return Diagnosis(
         verdict=verdict.word,
-        sentence=summary.sentence(verdict, effects, gap_p_value, left, floor),
+        sentence=summary.sentence(verdict, effects, gap_p_value, left, floor, stretch),
         table=table,
         configuration=configuration,
         effects=effects,
@@ -281,7 +283,7 @@ def _report(
         remainder_p_value=left.p_value,
         remainder_amplitude=left.amplitude,
         floor=floor,
-        notes=summary.notes(both, findings, after),
+        notes=summary.notes(both, findings, after, stretch),
         base_effects=tuple(configuration.effects),
         seconds=time.perf_counter() - started,
     )
