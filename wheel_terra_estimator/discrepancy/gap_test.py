@@ -8,6 +8,7 @@ from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import chdtrc  # scipy.stats takes longer to load than a diagnosis
 
 from wheel_terra_estimator.discrepancy.fitting import Fit
 from wheel_terra_estimator.discrepancy.signatures import Signature, against_soil
@@ -24,15 +25,13 @@ def chi_square_p_value(fitted: Fit, variance: FloatArray) -> float:
     Under the hypothesis, residual and the soil's prior pull together are chi-square with one degree
     of freedom per cell, however many soil parameters were fitted; an effect's strength takes one.
     """
-    from scipy.stats import chi2
-
     target = fitted.residual + fitted.jacobian @ fitted.u
     weighted = fitted.jacobian / variance[:, None]
     strength = np.array([c.role == 'strength' for c in fitted.coordinates])
     precision = weighted.T @ fitted.jacobian + np.diag(np.where(strength, 1e-9, 1.0))
     right = weighted.T @ target
     square = float(target @ (target / variance) - right @ np.linalg.solve(precision, right))
-    return float(chi2.sf(square, len(target) - strength.sum()))
+    return float(chdtrc(len(target) - strength.sum(), square))
 
 
 def soil_p_value(fitted: Fit) -> float:
@@ -42,10 +41,8 @@ def soil_p_value(fitted: Fit) -> float:
     to its prior than the truth does: a small value says that no believable soil fits. A stranger
     that works like another soil (friction that softens with slip) is found by nothing else.
     """
-    from scipy.stats import chi2
-
     soil = np.array([c.role == 'soil' for c in fitted.coordinates])
-    return float(chi2.sf(float(fitted.u[soil] @ fitted.u[soil]), soil.sum()))
+    return float(chdtrc(soil.sum(), float(fitted.u[soil] @ fitted.u[soil])))
 
 
 def scan_p_value(

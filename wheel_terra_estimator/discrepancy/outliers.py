@@ -10,6 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import bdtrc
 
 from wheel_terra_estimator.discrepancy.fitting import Fit
 from wheel_terra_estimator.discrepancy.problem import OUTLIER_FACTOR, Problem
@@ -82,8 +83,6 @@ def _scattered(
     Outliers are few, fall on both sides and anywhere: the chance of the count (binomial), of equal
     signs, and of all of them among the outermost cells are independent.
     """
-    from scipy.stats import binom
-
     kept = []
     for quantity in range(3):
         mine = [cell for cell in found if cell[1] == quantity]
@@ -97,7 +96,7 @@ def _scattered(
                 due = np.where(rows == row, due - deviation * std, due)
             places = np.flatnonzero(np.isin(rows[np.argsort(due)], [cell[0] for cell in mine]))
             outermost = min(int(places.max()) + 1, total - int(places.min()))
-            chance = float(binom.sf(count - 1, total, SHARE)) * 0.5 ** (count - 1)
+            chance = float(bdtrc(count - 1, total, SHARE)) * 0.5 ** (count - 1)
             chance *= 2.0 * math.comb(outermost, count) / math.comb(total, count)
             if chance < _CHANCE:
                 continue

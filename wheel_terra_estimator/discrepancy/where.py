@@ -168,18 +168,22 @@ def _std_of_rows(problem: Problem, quantity: int, rows: int) -> FloatArray:
 def _trend(
     table: SteadyTable, names: list[str], residual: FloatArray, mine: NDArray[np.bool_]
 ) -> tuple[str, float]:
-    from scipy.stats import rankdata
-
     best, value = '', 0.0
-    ranks = rankdata(residual[mine])
+    ranks = _ranks(residual[mine])
     for name in names:
         column = table.columns[name][mine]
         if np.ptp(column) == 0.0 or len(column) < 4:
             continue
-        correlation = float(np.corrcoef(rankdata(column), ranks)[0, 1])
+        correlation = float(np.corrcoef(_ranks(column), ranks)[0, 1])
         if abs(correlation) > abs(value):
             best, value = name, correlation
     return best, value
+
+
+def _ranks(values: FloatArray) -> FloatArray:
+    """Return ranks, equal values sharing their mean."""
+    _, place, count = np.unique(values, return_inverse=True, return_counts=True)
+    return (np.cumsum(count) - 0.5 * (count - 1))[np.ravel(place)]
 
 
 def _text(side: InputRange) -> str:
