@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy.stats import kstest, multivariate_normal
 
-from wheel_terra_estimator.discrepancy import gap_test, held_out, noise, outliers
+from wheel_terra_estimator.discrepancy import confidence, gap_test, held_out, noise, outliers
 from wheel_terra_estimator.discrepancy.evidence import Floor, evidence
 from wheel_terra_estimator.discrepancy.fitting import Fit, fit
 from wheel_terra_estimator.discrepancy.forward import Forward
@@ -289,3 +289,22 @@ def test_repeats_give_the_noise():
     std, freedom = noise.repeats(table, 2)
     assert freedom == 32
     assert std == pytest.approx(0.05, rel=0.3)
+
+
+def test_confidence_follows_what_speaks_for_a_name():
+    """The fitted map has a weight per feature, and each piece of evidence acts the right way."""
+    sure = dict.fromkeys(confidence.FEATURES, 0.0)
+    sure.update(one=1.0, margin=3.0, margin_of_set=3.5, gain=3.0, gain_squared=9.0)
+
+    def of_name(**changes):
+        values = {**sure, **changes}
+        values['margin_floor'] = values['margin'] * values['floor']
+        values['margin_two'] = values['margin'] * values['two']
+        return confidence.confidence(values).of_name
+
+    assert len(confidence._weights()['name']) == len(confidence.FEATURES)
+    assert of_name() > 0.97
+    assert of_name(margin=-1.0) < 0.6 < of_name(margin=1.0) < of_name()
+    # A structural error, a second effect and a remainder each leave several times the doubt.
+    for change in ({'floor': 1.0}, {'two': 1.0}, {'remainder': 1.0}):
+        assert 1.0 - of_name(**change) > 2.0 * (1.0 - of_name())
