@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from campaigns import DESIGNS, Plan, make_campaign
 from campaigns.designs import random_rows, random_soil
-from campaigns.hidden import LISTED, OTHER, OUTSIDE
+from campaigns.detectability import Ruler
+from campaigns.hidden import LISTED, OTHER, OUTSIDE, SmoothError
 from campaigns.truth import OUTPUTS, TrueSoil, solve
 from scipy.integrate import quad
 from scipy.optimize import brentq
@@ -190,3 +191,28 @@ def test_noise_has_the_stated_size():
             error = campaign.table[key] - campaign.noise_free[key]
             deviations.append(error / campaign.std[key])
     assert np.std(np.concatenate(deviations)) == pytest.approx(1.0, abs=0.06)
+
+
+def test_distance_beside_a_structural_error_is_that_of_its_covariance():
+    """The drawn errors have the covariance that the distance takes for noise."""
+    campaign = make_campaign(7, 'basic16', Plan(other_formula=True, structure=0.02))
+    rng = np.random.default_rng(3)
+    rows, soil = campaign.rows, campaign.soil
+    clean = solve(rows, soil)
+    ruler = Ruler(rows, soil, campaign.std)
+    tiny = SmoothError(1e-9, rows, clean, rng)
+    alone = ruler.distance(campaign.effects)
+    assert ruler.distance_beside(campaign.effects, tiny) == pytest.approx(alone, rel=0.15)
+    draws = []
+    for _ in range(4000):
+        error = SmoothError(0.02, rows, clean, rng)
+        out = {key: np.zeros(len(rows['slip'])) for key in OUTPUTS}
+        error.finish(out, None, rows)
+        draws.append(np.stack([out[key] / campaign.std[key] for key in OUTPUTS], 1).ravel())
+    jacobian = ruler._jacobian
+    change = ruler.whitened(np.zeros(jacobian.shape[1]), campaign.effects) - ruler.base
+    covariance = np.cov(np.transpose(draws)) + np.eye(len(change)) + jacobian @ jacobian.T
+    expected = np.sqrt(change @ np.linalg.solve(covariance, change))
+    found = ruler.distance_beside(campaign.effects, error)
+    assert found == pytest.approx(expected, rel=0.05)
+    assert found == campaign.distance_beside < alone

@@ -83,7 +83,7 @@ class Campaign:
     ``noise_free`` the noise and the true outputs of the same rows, ``believed`` the
     soil in the configuration, ``soil`` the true one, ``hidden`` what was hidden, ``distances`` its
     d' (each beyond the other when two), ``distance_left`` what the best listed effect leaves
-    (strangers only).
+    (strangers only), ``distance_beside`` d' where the structural error counts as noise too.
     """
 
     seed: int
@@ -102,6 +102,7 @@ class Campaign:
     spice: tuple[float, ...] = ()
     noise_free: Rows = field(default_factory=dict)
     soil_deviations_stated: bool = True
+    distance_beside: float = float('nan')
 
     def settings(self) -> dict[str, object]:
         """Return the engineer's configuration of a one-wheel rig, key by key."""
@@ -185,8 +186,12 @@ def _attempt(seed: int, design: str, plan: Plan, rng: np.random.Generator) -> Ca
         raise _UnusableError
 
     structure: tuple[Hidden, ...] = ()
+    beside = float('nan')
     if plan.structure:
-        structure = (SmoothError(plan.structure, rows, base, rng),)
+        error = SmoothError(plan.structure, rows, base, rng)
+        structure = (error,)
+        if effects:
+            beside = ruler.distance_beside(effects, error)
     truth = _outputs(rows, soil, (*effects, *structure), plan)
     if not all(np.all(np.isfinite(truth[key])) for key in OUTPUTS):
         raise _UnusableError
@@ -213,6 +218,7 @@ def _attempt(seed: int, design: str, plan: Plan, rng: np.random.Generator) -> Ca
         spices,
         {key: truth[key][kept] for key in OUTPUTS},
         stated,
+        beside,
     )
 
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .hidden import LISTED, Kind
+from .hidden import LISTED, Kind, SmoothError
 from .truth import OUTPUTS, SOIL_SD, FloatArray, Hidden, Rows, TrueSoil, moved_soil, solve
 
 _STEP = 0.2
@@ -52,6 +52,17 @@ class Ruler:
                 (0.1, 0.5, 0.9) if rival.largest in (20,) or rival.needs == () else (0.5,)
             )
         )
+
+    def distance_beside(self, hidden: tuple[Hidden, ...], structure: SmoothError) -> float:
+        """Distance of ``hidden`` where the structural error counts as noise (soil linear)."""
+        change = self.whitened(np.zeros(len(SOIL_SD)), hidden) - self.base
+        kept = np.isfinite(self._std)
+        row, output = np.nonzero(kept)
+        share = structure.std[output] / self._std[kept]
+        smooth = structure.correlation[np.ix_(row, row)] * np.outer(share, share)
+        smooth[output[:, None] != output[None, :]] = 0.0
+        covariance = np.eye(len(change)) + self._jacobian @ self._jacobian.T + smooth
+        return float(np.sqrt(change @ np.linalg.solve(covariance, change)))
 
     def _refit(self, target: FloatArray, rival: Kind | None, spice: float) -> FloatArray:
         """Damped Gauss-Newton over soil units and, with a rival, its size; returns the residual."""

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .truth import FloatArray, Hidden, Rows, Setup, TrueSoil, solve
+from .truth import OUTPUTS, FloatArray, Hidden, Rows, Setup, TrueSoil, solve
 
 Prepare = Callable[[Setup, Rows], None]
 Finish = Callable[[Rows, Setup, Rows], None]
@@ -508,10 +508,12 @@ class SmoothError(Hidden):
         ]
         x = np.stack(columns, 1)
         distance = ((x[:, None] - x[None]) ** 2).sum(-1)
-        root = np.linalg.cholesky(np.exp(-distance / 2) + 1e-8 * np.eye(len(x)))
+        self.correlation = np.exp(-distance / 2)  # (N, N) between rows
+        self.std = np.array([share * np.ptp(clean[key]) for key in OUTPUTS])
+        root = np.linalg.cholesky(self.correlation + 1e-8 * np.eye(len(x)))
         self._error = {
-            key: share * np.ptp(clean[key]) * (root @ rng.standard_normal(len(x)))
-            for key in ('sinkage', 'drawbar_pull', 'torque')
+            key: std * (root @ rng.standard_normal(len(x)))
+            for key, std in zip(OUTPUTS, self.std, strict=True)
         }
 
     def finish(self, out: Rows, setup: Setup, rows: Rows) -> None:

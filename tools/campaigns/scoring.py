@@ -25,6 +25,7 @@ FIELDS = (
     'distance',
     'distance_second',
     'distance_left',
+    'distance_beside',
     'rows',
     'verdict',
     'effects',
@@ -46,6 +47,7 @@ FIELDS = (
     'floor',
     'gap_p_value',
     'seconds',
+    'processor_seconds',
     'error',
 )
 
@@ -78,6 +80,7 @@ def score(group: str, campaign: Campaign, diagnosis: Any) -> Record:
         'distance': distances[0],
         'distance_second': distances[1],
         'distance_left': campaign.distance_left,
+        'distance_beside': campaign.distance_beside,
         'rows': len(campaign.rows['slip']),
         'verdict': diagnosis.verdict,
         'effects': '+'.join(names),
@@ -94,6 +97,7 @@ def score(group: str, campaign: Campaign, diagnosis: Any) -> Record:
         'floor': diagnosis.floor,
         'gap_p_value': diagnosis.gap_p_value,
         'seconds': diagnosis.seconds,
+        'processor_seconds': math.nan,
         'error': '',
     }
     if best and best.name == '+'.join(hidden):
