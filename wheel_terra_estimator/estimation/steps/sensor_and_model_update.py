@@ -85,9 +85,11 @@ def fuse_models(c: Context, dt: float, rims: list[float], still: bool) -> None:
         model_rows(c, dt, rims, torque, residuals, variances, rows)
     if rows:
         # Without fixes slip and shear strength are not told apart: do not let them drift.
-        held = [] if reference_known(c) else [SHEAR_STRENGTH, SHEAR_MODULUS]
-        if held and run.fresh_travel < c.contact_length:
-            held.append(SPEED)  # the rut of a start is no steady one
+        held = []
+        if not reference_known(c):
+            held = [SHEAR_STRENGTH, SHEAR_MODULUS]
+            if run.fresh_travel < c.contact_length:
+                held.append(SPEED)  # the rut of a start is no steady one
         unread = [i for i in range(n) if not sinkage_known(c, i)]
         # Nor are sinkage and the errors of the shear model, where no sensor sees the sinkage.
         for part in (layout.sinkage, layout.stiffness):
