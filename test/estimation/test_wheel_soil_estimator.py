@@ -369,6 +369,12 @@ def test_pull_in_a_patch_follows_the_torque():
     assert np.sqrt(np.nanmean(error**2)) < 0.02 * truth.normal_load.mean()
 
 
+def test_sinkage_tells_weak_ground_where_no_torque_does():
+    error, std, truth = errors_of('mixed_soil', 1000, 'no_torque', 'drawbar_pull', 'drawbar_pull')
+    assert np.sqrt(np.nanmean(error**2)) < 0.03 * truth.normal_load.mean()
+    assert (np.abs(error) < 1.96 * std).mean() > 0.9
+
+
 def test_a_change_of_slope_opens_the_speed():
     c = start_context(reader.load(SAND))
     run = c.run
