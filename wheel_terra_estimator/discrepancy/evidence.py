@@ -67,7 +67,10 @@ class Posterior:
 
 
 def log_sum(values: FloatArray, axis: int | None = None) -> FloatArray:
-    """Return the logarithm of a sum of exponentials (SciPy's takes many times as long)."""
+    """Return the logarithm of a sum of exponentials, minus infinity for none.
+
+    SciPy's takes many times as long.
+    """
     return np.logaddexp.reduce(values, axis=axis)
 
 

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from wheel_terra_estimator.discrepancy.evidence import log_sum
 from wheel_terra_estimator.discrepancy.gap_test import chi_square_p_value, soil_p_value
-from wheel_terra_estimator.discrepancy.selection import Selection, log_mass
+from wheel_terra_estimator.discrepancy.selection import Selection
 
 Variance: TypeAlias = Callable[[ArrayLike, ArrayLike], NDArray[np.float64]]
 
@@ -78,10 +78,10 @@ def remainder(selection: Selection, index: int, variance_of: Variance) -> Remain
     """
     explanation = selection.explanations[index]
     joint = selection.log_joint[index]
-    share = float(np.exp(log_mass(joint[selection.unexplained]) - log_sum(joint)))
+    share = float(np.exp(log_sum(joint[selection.unexplained]) - log_sum(joint)))
     top = int(np.argmax(joint))
     real = np.array([floor.largest >= 0.01 for floor in selection.floors])
-    any_share = float(np.exp(log_mass(joint[real]) - log_sum(joint)))
+    any_share = float(np.exp(log_sum(joint[real]) - log_sum(joint)))
     quiet = [k for k, floor in enumerate(selection.floors) if not floor.unexplained]
     best = quiet[int(np.argmax(joint[quiet]))]
     floor = selection.floors[best]

@@ -131,11 +131,6 @@ class Selection:
         return {name: float(s) for (name, _), s in zip(singles, shares, strict=True)}
 
 
-def log_mass(values: FloatArray) -> float:
-    """Return the logarithm of a sum of exponentials; minus infinity for none."""
-    return float(log_sum(values)) if len(values) else -math.inf
-
-
 def weigh(
     explanations: Sequence[Explanation], floors: tuple[Floor, ...], visible: int
 ) -> Selection:

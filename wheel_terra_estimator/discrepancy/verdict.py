@@ -18,7 +18,7 @@ from wheel_terra_estimator.discrepancy.remainder import (
     Variance,
     remainder,
 )
-from wheel_terra_estimator.discrepancy.selection import Selection, log_mass
+from wheel_terra_estimator.discrepancy.selection import Selection
 
 FloatArray = NDArray[np.float64]
 
@@ -76,11 +76,11 @@ def decide(selection: Selection, variance_of: Variance) -> Verdict:
     nothing = next(h for h, e in enumerate(selection.explanations) if not e.names)
     left = remainder(selection, nothing, variance_of)
     agrees = float(log_sum(joint[nothing][~unexplained]))
-    rest = log_mass(joint[nothing][unexplained])
+    rest = float(log_sum(joint[nothing][unexplained]))
     named = [h for h, e in enumerate(selection.explanations) if e.names]
     effects = float(log_sum(total[named])) if named else -np.inf
     exact = np.array([floor.largest == 0.0 for floor in selection.floors])
-    floor_share = 1.0 - np.exp(log_mass(joint[nothing][exact]) - agrees)
+    floor_share = 1.0 - np.exp(log_sum(joint[nothing][exact]) - agrees)
     odds = ODDS_OVER_FLOOR if floor_share > SURE_OF_FLOOR else ODDS_TO_SPEAK
     if np.logaddexp(effects, rest) - agrees < np.log(odds):
         word = 'agrees' if left.accounted_for else 'unexplained'
@@ -88,9 +88,9 @@ def decide(selection: Selection, variance_of: Variance) -> Verdict:
     if not named or rest - effects > np.log(ODDS_AGAINST_NAMES):
         return Verdict('unexplained', nothing, (), left)
     # An effect beside a mere floor goes before one beside a misfit that asks for another name.
-    quiet = np.array([log_mass(row[~unexplained]) for row in joint])
-    misfit = log_mass(joint[:, unexplained].ravel())
-    clean = log_mass(quiet[named]) > misfit + np.log(CLEAN_SHARE)
+    quiet = np.array([log_sum(row[~unexplained]) for row in joint])
+    misfit = log_sum(joint[:, unexplained].ravel())
+    clean = log_sum(quiet[named]) > misfit + np.log(CLEAN_SHARE)
     best = max(named, key=lambda h: quiet[h] if clean else total[h])
     after = remainder(selection, best, variance_of)
     if after.significant and _explained(selection, nothing, best) < MOST:

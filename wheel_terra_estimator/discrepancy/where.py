@@ -181,7 +181,7 @@ def _trend(
 
 
 def _ranks(values: FloatArray) -> FloatArray:
-    """Return ranks, equal values sharing their mean."""
+    """Return ranks, equal values sharing their mean (as `scipy.stats`, which loads slowly)."""
     _, place, count = np.unique(values, return_inverse=True, return_counts=True)
     return (np.cumsum(count) - 0.5 * (count - 1))[np.ravel(place)]
 

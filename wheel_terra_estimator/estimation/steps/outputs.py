@@ -14,8 +14,10 @@ from wheel_terra_estimator.estimation.filter_state import SHEAR_MODULUS, SHEAR_S
 from wheel_terra_estimator.estimation.steps.context import (
     Context,
     current_speed,
+    reference_known,
     rim_speed_of,
     sinkage_known,
+    torque_known,
     yaw_rate_std,
 )
 from wheel_terra_estimator.estimation.stuck_warning import StuckAssessment
@@ -150,10 +152,10 @@ def faults_in_words(c: Context) -> dict[str, str]:
         faults['imu'] = 'no IMU: loads of level ground, no balance of forces'
     elif not run.attitude.reported:
         faults['orientation'] = 'no orientation: slope from gyro and specific force'
-    if run.torque_time is None or run.time - run.torque_time > 2.0:
+    if not torque_known(c):
         faults['torque'] = 'no torque: pull from the balance of forces and the soil model'
     if not any(sinkage_known(c, i) for i in range(s.wheel_count)):
         faults['sinkage'] = 'no sinkage: held by its model'
-    if run.reference_time is None or run.time - run.reference_time > 20.0:
+    if not reference_known(c):
         faults['reference'] = 'no reference velocity: slip from forces and soil model'
     return faults
