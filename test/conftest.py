@@ -11,10 +11,10 @@ from typing import Any
 import pytest
 
 from wheel_terra_estimator.bags.bag_file import BagFile
-from wheel_terra_estimator.bags.convert import INPUT_TYPES
-from wheel_terra_estimator.bags.messages import MessageFactory
+from wheel_terra_estimator.bags.message_factory import MessageFactory
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.messages.convert import INPUT_TYPES
 
 NAMES = ('left', 'right')
 RATE = 2.0  # [rad/s]

@@ -23,8 +23,8 @@ from typing import Any
 import numpy as np
 
 from wheel_terra_estimator.bags.bag_file import BagFile
-from wheel_terra_estimator.bags.convert import quaternion_from_roll_pitch_yaw
-from wheel_terra_estimator.bags.messages import MessageFactory
+from wheel_terra_estimator.bags.message_factory import MessageFactory
+from wheel_terra_estimator.messages.convert import quaternion_from_roll_pitch_yaw
 
 WHEELS = {
     'fl': 'front_left_wheel_joint',

@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from wheel_terra_estimator.bags.convert import INPUT_TYPES, stamp_of
 from wheel_terra_estimator.bags.reader import MeasurementReader
 from wheel_terra_estimator.bags.simulated_drive import TRUTH_TOPICS
 from wheel_terra_estimator.bags.storage import open_bag
 from wheel_terra_estimator.bags.truth import read_truth
 from wheel_terra_estimator.cli.main import main
 from wheel_terra_estimator.estimation.measurements import WheelOdometry
+from wheel_terra_estimator.messages.convert import INPUT_TYPES, stamp_of
 from wheel_terra_estimator.simulation.drive import simulate
 from wheel_terra_estimator.simulation.scenario import load
 

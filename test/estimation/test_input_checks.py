@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from fake_estimator import configuration, imu, odometry, reference, sinkage, stamp_at
 
-from wheel_terra_estimator.estimation.input_checks import CHANNELS, InputChecks
 from wheel_terra_estimator.estimation.measurements import (
     InertialReading,
     LeavingAngleReading,
     SinkageReading,
     WheelOdometry,
 )
+from wheel_terra_estimator.estimation.timing.input_checks import CHANNELS, InputChecks
 
 NAN, INF = math.nan, math.inf
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, TypeVar
 
-from wheel_terra_estimator.bags.messages import MessageFactory
+from wheel_terra_estimator.bags.message_factory import MessageFactory
 from wheel_terra_estimator.bags.storage import STORAGE_SUFFIXES
 from wheel_terra_estimator.errors import UserError
 

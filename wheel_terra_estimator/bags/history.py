@@ -15,11 +15,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wheel_terra_estimator.bags.convert import JOINT_STATE, OUTPUT_TYPES, stamp_of
-from wheel_terra_estimator.bags.diagnostics import NODE
 from wheel_terra_estimator.bags.storage import Bag
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.estimation.estimates import EstimateSet, SlipClass
+from wheel_terra_estimator.messages.convert import JOINT_STATE, OUTPUT_TYPES, stamp_of
+from wheel_terra_estimator.messages.diagnostics import NODE
 
 FloatArray = NDArray[np.float64]
 

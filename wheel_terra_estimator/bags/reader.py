@@ -9,12 +9,12 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from wheel_terra_estimator.bags.convert import INPUT_TYPES, InputConverter, input_layout
 from wheel_terra_estimator.bags.storage import Bag, open_bag
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.configuration.parameters import nearest
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.estimation.measurements import Measurement
+from wheel_terra_estimator.messages.convert import INPUT_TYPES, InputConverter, input_layout
 
 
 def read(

@@ -15,14 +15,14 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
-from wheel_terra_estimator.bags.convert import stamp_of
 from wheel_terra_estimator.bags.history import EstimateHistory, HistoryRecorder
-from wheel_terra_estimator.bags.pipeline import Pipeline
 from wheel_terra_estimator.bags.reader import MeasurementReader
 from wheel_terra_estimator.bags.storage import Bag
 from wheel_terra_estimator.bags.writer import EstimateBagWriter
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.messages.convert import stamp_of
+from wheel_terra_estimator.messages.pipeline import Pipeline
 
 LONG_DRIVE = 20_000
 """Number of messages from which a progress bar is shown."""

@@ -10,14 +10,6 @@ from typing import Any
 import numpy as np
 
 from wheel_terra_estimator.bags.bag_file import BagFile
-from wheel_terra_estimator.bags.convert import (
-    BASE_FRAME,
-    INPUT_TYPES,
-    OUTPUT_TYPES,
-    input_layout,
-    quaternion_product,
-    rotation_matrix,
-)
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.measurements import (
     InertialReading,
@@ -26,6 +18,14 @@ from wheel_terra_estimator.estimation.measurements import (
     ReferenceVelocity,
     SinkageReading,
     WheelOdometry,
+)
+from wheel_terra_estimator.messages.convert import (
+    BASE_FRAME,
+    INPUT_TYPES,
+    OUTPUT_TYPES,
+    input_layout,
+    quaternion_product,
+    rotation_matrix,
 )
 from wheel_terra_estimator.simulation.drive import SimulatedDrive
 

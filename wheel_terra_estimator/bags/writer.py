@@ -6,14 +6,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from wheel_terra_estimator.bags import diagnostics
 from wheel_terra_estimator.bags.bag_file import BagFile
-from wheel_terra_estimator.bags.convert import (
+from wheel_terra_estimator.estimation.estimates import EstimateSet
+from wheel_terra_estimator.messages import diagnostics
+from wheel_terra_estimator.messages.convert import (
     OUTPUT_TYPES,
     joint_fields,
     twist_covariance,
 )
-from wheel_terra_estimator.estimation.estimates import EstimateSet
 
 NAMESPACE = f'/{diagnostics.NODE}'
 STUCK = f'{NAMESPACE}/stuck'

@@ -15,12 +15,17 @@ from typing import Any
 import numpy as np
 
 from wheel_terra_estimator.configuration import Configuration
-from wheel_terra_estimator.estimation.clock_watch import Arrival, ClockWatch, Judgement, Suspicion
 from wheel_terra_estimator.estimation.estimates import EstimateSet, SlipClass
-from wheel_terra_estimator.estimation.input_checks import CHANNELS, InputChecks
 from wheel_terra_estimator.estimation.measurements import Measurement
 from wheel_terra_estimator.estimation.output_guard import OutputGuard
-from wheel_terra_estimator.estimation.timeline import Estimator, Fate, Timeline, TimeSettings
+from wheel_terra_estimator.estimation.timing.clock_watch import (
+    Arrival,
+    ClockWatch,
+    Judgement,
+    Suspicion,
+)
+from wheel_terra_estimator.estimation.timing.input_checks import CHANNELS, InputChecks
+from wheel_terra_estimator.estimation.timing.timeline import Estimator, Fate, Timeline, TimeSettings
 
 FAULT_MEMORY = 5_000_000_000
 """How long a rejected input is told of in the sets [ns of stamps]."""

@@ -29,11 +29,11 @@ from rclpy.utilities import try_shutdown
 from sensor_msgs.msg import Imu, JointState
 from std_srvs.srv import Trigger
 
-from wheel_terra_estimator.bags.convert import INPUT_TYPES, stamp_of
-from wheel_terra_estimator.bags.diagnostics import NODE, stale_statuses
-from wheel_terra_estimator.bags.pipeline import Pipeline
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.estimation.estimates import EstimateSet
+from wheel_terra_estimator.messages.convert import INPUT_TYPES, stamp_of
+from wheel_terra_estimator.messages.diagnostics import NODE, stale_statuses
+from wheel_terra_estimator.messages.pipeline import Pipeline
 from wheel_terra_estimator.ros.outputs import EstimatePublisher, time_message
 from wheel_terra_estimator.ros.parameters import declare_parameters
 from wheel_terra_estimator.ros.qos import OVERRIDABLE, input_profile

@@ -37,7 +37,6 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, UInt8MultiArray
 
 from wheel_terra_estimator.bags.bag_file import BagFile
-from wheel_terra_estimator.bags.convert import JOINT_OUTPUTS, stamp_of
 from wheel_terra_estimator.bags.history import read_estimates
 from wheel_terra_estimator.bags.reader import MeasurementReader, parse_remaps
 from wheel_terra_estimator.bags.storage import Bag, RawMessage, open_bag
@@ -46,6 +45,7 @@ from wheel_terra_estimator.bags.writer import DIAGNOSTICS, NAMESPACE, STUCK, TOP
 from wheel_terra_estimator.configuration import reader as configuration_reader
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.messages.convert import JOINT_OUTPUTS, stamp_of
 from wheel_terra_estimator.reporting.drive_summary import as_text, summarise
 from wheel_terra_estimator.reporting.replay_report import refuse_existing, write_replay_report
 from wheel_terra_estimator.ros.estimator_node import MESSAGE_TYPES

@@ -15,14 +15,14 @@ from rclpy.node import Node
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, MultiArrayDimension, UInt8MultiArray
 
-from wheel_terra_estimator.bags.convert import (
+from wheel_terra_estimator.estimation.estimates import EstimateSet
+from wheel_terra_estimator.messages.convert import (
     BASE_FRAME,
     JOINT_OUTPUTS,
     joint_fields,
     twist_covariance,
 )
-from wheel_terra_estimator.bags.diagnostics import Status
-from wheel_terra_estimator.estimation.estimates import EstimateSet
+from wheel_terra_estimator.messages.diagnostics import Status
 from wheel_terra_estimator.ros.qos import OVERRIDABLE, output_profile
 
 # rclpy looks at every event handler whenever anything happens, which costs more than a message.

@@ -25,12 +25,12 @@ from rclpy.qos import QoSProfile
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float64, UInt8MultiArray
 
-from wheel_terra_estimator.bags.diagnostics import NODE
 from wheel_terra_estimator.estimation.traction_law import (
     TractionDecision,
     TractionLimits,
     traction_decision,
 )
+from wheel_terra_estimator.messages.diagnostics import NODE
 from wheel_terra_estimator.ros.estimator_node import run_node
 from wheel_terra_estimator.ros.qos import input_profile, output_profile
 

@@ -13,8 +13,8 @@ from __future__ import annotations
 from enum import Enum
 from typing import NamedTuple
 
-from wheel_terra_estimator.estimation.input_checks import WHEEL_ODOMETRY
 from wheel_terra_estimator.estimation.measurements import Measurement
+from wheel_terra_estimator.estimation.timing.input_checks import WHEEL_ODOMETRY
 
 WITNESSES = 5
 """Messages of wheel odometry that prove a step though other topics stay on the old time line."""

@@ -19,11 +19,6 @@ from typing import Any, Protocol
 import numpy as np
 
 from wheel_terra_estimator.estimation.estimates import EstimateSet
-from wheel_terra_estimator.estimation.input_checks import (
-    INERTIAL,
-    REFERENCE,
-    WHEEL_ODOMETRY,
-)
 from wheel_terra_estimator.estimation.measurements import (
     FloatArray,
     LeavingAngleReading,
@@ -31,6 +26,11 @@ from wheel_terra_estimator.estimation.measurements import (
     SinkageReading,
     StepInputs,
     WheelOdometry,
+)
+from wheel_terra_estimator.estimation.timing.input_checks import (
+    INERTIAL,
+    REFERENCE,
+    WHEEL_ODOMETRY,
 )
 
 KEPT_STATE_SPACING = 50_000_000

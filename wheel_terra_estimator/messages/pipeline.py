@@ -10,11 +10,11 @@ from __future__ import annotations
 from collections import Counter
 from typing import Any
 
-from wheel_terra_estimator.bags.convert import InputConverter, finite, input_layout
-from wheel_terra_estimator.bags.diagnostics import Diagnostics
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.core import EstimatorCore
 from wheel_terra_estimator.estimation.estimates import EstimateSet
+from wheel_terra_estimator.messages.convert import InputConverter, finite, input_layout
+from wheel_terra_estimator.messages.diagnostics import Diagnostics
 
 FAULT_MEMORY = 5_000_000_000
 """How long a refused message is shown as a fault [ns of stamps]."""

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from wheel_terra_estimator.bags.convert import BASE_FRAME, JOINT_STATE
-from wheel_terra_estimator.bags.diagnostics import Status
+from wheel_terra_estimator.messages.convert import BASE_FRAME, JOINT_STATE
+from wheel_terra_estimator.messages.diagnostics import Status
 
 
 class MessageFactory:

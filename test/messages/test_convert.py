@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 from estimate_sets import STAMP, some_estimates
 
-from wheel_terra_estimator.bags.convert import (
+from wheel_terra_estimator.estimation.estimates import EstimateSet
+from wheel_terra_estimator.messages.convert import (
     InputConverter,
     finite,
     input_layout,
@@ -23,7 +24,6 @@ from wheel_terra_estimator.bags.convert import (
     stamp_of,
     twist_covariance,
 )
-from wheel_terra_estimator.estimation.estimates import EstimateSet
 
 
 @pytest.fixture
@@ -222,8 +222,8 @@ def test_messages_of_rclpy_and_of_rosbags_are_the_same_measurements(
     converter: InputConverter, drive: Any
 ) -> None:
     serialization = pytest.importorskip('rclpy.serialization')
-    from wheel_terra_estimator.bags.convert import INPUT_TYPES
-    from wheel_terra_estimator.bags.messages import MessageFactory
+    from wheel_terra_estimator.bags.message_factory import MessageFactory
+    from wheel_terra_estimator.messages.convert import INPUT_TYPES
 
     store = MessageFactory().store
     for topic, message, _ in drive[:6]:

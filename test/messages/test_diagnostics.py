@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from estimate_sets import STAMP, some_estimates
 
-from wheel_terra_estimator.bags.diagnostics import (
+from wheel_terra_estimator.messages.diagnostics import (
     ERROR,
     OK,
     STALE,
