@@ -29,16 +29,12 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.configuration.configuration import Configuration
-from wheel_terra_estimator.discrepancy.model_file import write_model
-from wheel_terra_estimator.discrepancy.report import write_report
+from wheel_terra_estimator.discrepancy.report.model_file import write_model
+from wheel_terra_estimator.discrepancy.report.page import write_report
 from wheel_terra_estimator.discrepancy.result import Diagnosis
-from wheel_terra_estimator.discrepancy.table import (
-    QUANTITIES,
-    UNITS,
-    SteadyTable,
-    check_table,
-    read_table,
-)
+from wheel_terra_estimator.discrepancy.tables.checks import check_table
+from wheel_terra_estimator.discrepancy.tables.parsing import read_table
+from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES, UNITS, SteadyTable
 from wheel_terra_estimator.discrepancy.workflow import diagnose
 from wheel_terra_estimator.errors import UserError
 
@@ -198,7 +194,7 @@ def cmu(shared: Path) -> Case:
 def pathfinder(shared: Path) -> Case:
     """Pathfinder rover on firm ground: the stated radius is 6 % too small."""
     from wheel_terra_estimator.bags.reader import parse_remaps
-    from wheel_terra_estimator.discrepancy.drive_windows import rows_from_bag
+    from wheel_terra_estimator.discrepancy.drives.windows import rows_from_bag
 
     bag = shared / 'measured' / 'bags' / 'wvu_pathfinder_test17_mcap'
     configuration = reader.load(['pathfinder'])

@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Refit the map from posterior weights to confidence (discrepancy/confidence_map.json).
+"""Refit the map from posterior weights to confidence (discrepancy/selection/confidence_map.json).
 
     python tools/fit_confidence.py run names.jsonl --processes 2    # campaigns; resumable
     python tools/fit_confidence.py fit names.jsonl                  # writes the map, prints errors
@@ -27,7 +27,7 @@ import numpy as np  # noqa: E402
 from campaigns import make_campaign, scoring  # noqa: E402
 from campaigns.groups import GROUPS  # noqa: E402
 
-from wheel_terra_estimator.discrepancy import confidence  # noqa: E402
+from wheel_terra_estimator.discrepancy.selection import confidence  # noqa: E402
 
 FIRST_SEED = 50_000  # below 100,000: not for scoring
 RIDGE = 1.0  # prior precision of the coefficients

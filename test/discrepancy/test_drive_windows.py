@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from wheel_terra_estimator.configuration import reader
-from wheel_terra_estimator.discrepancy.drive_windows import (
+from wheel_terra_estimator.discrepancy.drives.windows import (
     GOOD,
     rows_from_bag,
     rows_from_measurements,

@@ -11,8 +11,8 @@ from campaigns.hidden import LISTED
 from campaigns.truth import OUTPUTS, TrueSoil, solve
 
 from wheel_terra_estimator.configuration import reader
-from wheel_terra_estimator.discrepancy.model_file import write_model
-from wheel_terra_estimator.discrepancy.table import check_table
+from wheel_terra_estimator.discrepancy.report.model_file import write_model
+from wheel_terra_estimator.discrepancy.tables.checks import check_table
 from wheel_terra_estimator.discrepancy.workflow import diagnose
 from wheel_terra_estimator.estimation.core import EstimatorCore
 from wheel_terra_estimator.estimation.measurements import SinkageReading

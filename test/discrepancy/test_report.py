@@ -17,8 +17,8 @@ import pytest
 from campaigns import Plan, make_campaign, scoring
 
 from wheel_terra_estimator.configuration import reader
-from wheel_terra_estimator.discrepancy.model_file import write_model
-from wheel_terra_estimator.discrepancy.report import SOIL_WORDS, number, write_report
+from wheel_terra_estimator.discrepancy.report.model_file import write_model
+from wheel_terra_estimator.discrepancy.report.page import SOIL_WORDS, number, write_report
 
 
 class Page(HTMLParser):
@@ -233,8 +233,8 @@ def test_curves_only_where_slip_was_swept(named, tmp_path):
 def test_unexplained_scatter_is_not_called_a_misfit_of_nothing():
     from types import SimpleNamespace
 
-    from wheel_terra_estimator.discrepancy.remainder import Remainder
-    from wheel_terra_estimator.discrepancy.summary import sentence
+    from wheel_terra_estimator.discrepancy.report.words import sentence
+    from wheel_terra_estimator.discrepancy.selection.remainder import Remainder
 
     def said(amplitude):
         left = Remainder(1.0, 1.0, amplitude, 1e-6, soil_p_value=0.5)
@@ -248,7 +248,7 @@ def test_legends_stay_inside_the_picture(named):
     """Six sweeps in a picture of one panel need several lines of legend."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-    from wheel_terra_estimator.discrepancy import report_pictures as pictures
+    from wheel_terra_estimator.discrepancy.report import pictures as pictures
 
     alone = named.table.measured.copy()
     alone[:, 1:] = np.nan

@@ -11,11 +11,9 @@ import numpy as np
 import pytest
 from scipy.stats import kstest, multivariate_normal
 
-from wheel_terra_estimator.discrepancy import confidence, gap_test, held_out, noise, outliers
-from wheel_terra_estimator.discrepancy.evidence import Floor, evidence
-from wheel_terra_estimator.discrepancy.fitting import Fit, fit
-from wheel_terra_estimator.discrepancy.forward import Forward
-from wheel_terra_estimator.discrepancy.parameters import (
+from wheel_terra_estimator.discrepancy.assessment import held_out
+from wheel_terra_estimator.discrepancy.fitting import noise, outliers
+from wheel_terra_estimator.discrepancy.fitting.coordinates import (
     EFFECT_SCALES,
     EFFECT_SHARES,
     WIDENING,
@@ -24,10 +22,15 @@ from wheel_terra_estimator.discrepancy.parameters import (
     effect_coordinates,
     soil_coordinates,
 )
-from wheel_terra_estimator.discrepancy.problem import build_problem, kernel, slip_features
+from wheel_terra_estimator.discrepancy.fitting.evidence import Floor, evidence
+from wheel_terra_estimator.discrepancy.fitting.forward import Forward
+from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit, fit
+from wheel_terra_estimator.discrepancy.fitting.problem import build_problem, kernel, slip_features
 from wheel_terra_estimator.discrepancy.result import Noise
-from wheel_terra_estimator.discrepancy.signatures import signatures
-from wheel_terra_estimator.discrepancy.table import check_table
+from wheel_terra_estimator.discrepancy.selection import confidence
+from wheel_terra_estimator.discrepancy.selection import significance as gap_test
+from wheel_terra_estimator.discrepancy.selection.signatures import signatures
+from wheel_terra_estimator.discrepancy.tables.checks import check_table
 from wheel_terra_estimator.terramechanics.effects import catalogue
 from wheel_terra_estimator.terramechanics.model import WheelSoilModel
 from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints

@@ -7,12 +7,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from wheel_terra_estimator.discrepancy.table import (
-    averaged,
-    check_table,
-    check_wheel_of_model,
-    read_table,
-)
+from wheel_terra_estimator.discrepancy.tables.averaging import averaged
+from wheel_terra_estimator.discrepancy.tables.checks import check_table, check_wheel_of_model
+from wheel_terra_estimator.discrepancy.tables.parsing import read_table
 from wheel_terra_estimator.errors import UserError
 
 HEADER = 'slip,normal_load,sinkage,drawbar_pull,torque'

@@ -21,8 +21,8 @@ from campaigns.truth import OUTPUTS, TrueSoil, solve
 
 from wheel_terra_estimator.cli.main import main
 from wheel_terra_estimator.configuration import reader
-from wheel_terra_estimator.discrepancy.model_file import write_model
-from wheel_terra_estimator.discrepancy.table import check_table
+from wheel_terra_estimator.discrepancy.report.model_file import write_model
+from wheel_terra_estimator.discrepancy.tables.checks import check_table
 from wheel_terra_estimator.discrepancy.workflow import Options, diagnose, operating_points
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.terramechanics.model import WheelSoilModel

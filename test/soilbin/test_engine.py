@@ -192,7 +192,7 @@ def test_output_folder_is_complete(coarse_run):
     }  # fmt: skip
     assert (output / 'film.gif').read_bytes()[:3] == b'GIF'
     assert len(list(cache.glob('settled-*'))) == len(list(cache.glob('turned-*'))) == 1
-    from wheel_terra_estimator.discrepancy import table
+    from wheel_terra_estimator.discrepancy.tables import checks as table
 
     assert table is not None
     header, row = (output / 'rows.csv').read_text().splitlines()

@@ -55,7 +55,7 @@ FIELDS = (
 def diagnose(campaign: Campaign) -> Any:
     """Return the package's diagnosis of the campaign's table."""
     from wheel_terra_estimator.configuration import reader
-    from wheel_terra_estimator.discrepancy.table import check_table
+    from wheel_terra_estimator.discrepancy.tables.checks import check_table
     from wheel_terra_estimator.discrepancy.workflow import diagnose as run
 
     configuration = reader.from_parameters(campaign.settings(), complete=False)

@@ -16,7 +16,7 @@ from wheel_terra_estimator.errors import UserError
 if TYPE_CHECKING:
     from wheel_terra_estimator.configuration.configuration import Configuration
     from wheel_terra_estimator.discrepancy.result import Diagnosis
-    from wheel_terra_estimator.discrepancy.table import SteadyTable
+    from wheel_terra_estimator.discrepancy.tables.steady_table import SteadyTable
 
 WRITTEN = ('.json', '.yaml', '.html', '.png', '.svg')
 SUMMARY = 'find where model and measurement disagree and name the missing effect'
@@ -72,7 +72,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Run the command."""
     from wheel_terra_estimator.configuration import reader
-    from wheel_terra_estimator.discrepancy.table import UNITS
+    from wheel_terra_estimator.discrepancy.tables.steady_table import UNITS
     from wheel_terra_estimator.discrepancy.workflow import Options, diagnose
 
     output = Path(arguments.output)
@@ -173,17 +173,17 @@ def _read(data: str, remaps: list[str], configuration: Configuration) -> SteadyT
     path = Path(data)
     if _is_bag(path):
         from wheel_terra_estimator.bags.reader import parse_remaps
-        from wheel_terra_estimator.discrepancy.drive_windows import rows_from_bag
+        from wheel_terra_estimator.discrepancy.drives.windows import rows_from_bag
 
         return rows_from_bag(path, configuration, parse_remaps(remaps)).table()
-    from wheel_terra_estimator.discrepancy.table import read_table
+    from wheel_terra_estimator.discrepancy.tables.parsing import read_table
 
     return read_table(path)
 
 
 def _write(diagnosis: Diagnosis, output: Path, *, pictures: bool) -> None:
     """Write all files beside the place first, so that an error leaves nothing half-written."""
-    from wheel_terra_estimator.discrepancy.model_file import write_model
+    from wheel_terra_estimator.discrepancy.report.model_file import write_model
 
     output.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=output.parent, prefix='.diagnose-') as folder:
@@ -192,7 +192,7 @@ def _write(diagnosis: Diagnosis, output: Path, *, pictures: bool) -> None:
         diagnosis.write_json(fresh / 'report.json')
         write_model(diagnosis, fresh / 'model.yaml')
         if pictures:
-            from wheel_terra_estimator.discrepancy.report import write_report
+            from wheel_terra_estimator.discrepancy.report.page import write_report
 
             write_report(diagnosis, fresh)
         if output.exists():

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wheel_terra_estimator.discrepancy.table import QUANTITIES, UNITS, SteadyTable
+from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES, UNITS, SteadyTable
 
 if TYPE_CHECKING:
     from wheel_terra_estimator.configuration.reader import Configuration

@@ -12,20 +12,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wheel_terra_estimator.configuration.configuration import Configuration
-from wheel_terra_estimator.discrepancy import confidence as confidences
-from wheel_terra_estimator.discrepancy import gap_test, next_measurement, summary
-from wheel_terra_estimator.discrepancy.along import changed_stretch
-from wheel_terra_estimator.discrepancy.fitting import Fit
-from wheel_terra_estimator.discrepancy.forward import Forward
-from wheel_terra_estimator.discrepancy.held_out import hold_out, log_scores, slip_groups
-from wheel_terra_estimator.discrepancy.parameters import (
+from wheel_terra_estimator.discrepancy.assessment import next_measurement
+from wheel_terra_estimator.discrepancy.assessment.along import changed_stretch
+from wheel_terra_estimator.discrepancy.assessment.held_out import hold_out, log_scores, slip_groups
+from wheel_terra_estimator.discrepancy.assessment.where import locate
+from wheel_terra_estimator.discrepancy.fitting.coordinates import (
     WIDENING,
     Coordinate,
     base_coordinates,
     soil_coordinates,
 )
-from wheel_terra_estimator.discrepancy.reference import join, shared_error
-from wheel_terra_estimator.discrepancy.remainder import Remainder
+from wheel_terra_estimator.discrepancy.fitting.forward import Forward
+from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
+from wheel_terra_estimator.discrepancy.fitting.reference import join, shared_error
+from wheel_terra_estimator.discrepancy.report import words as summary
 from wheel_terra_estimator.discrepancy.result import (
     Candidate,
     Curves,
@@ -35,17 +35,18 @@ from wheel_terra_estimator.discrepancy.result import (
     NextMeasurement,
     SoilShift,
 )
-from wheel_terra_estimator.discrepancy.search import Findings, search
-from wheel_terra_estimator.discrepancy.selection import default_floors, shared_floors
-from wheel_terra_estimator.discrepancy.signatures import CLEAR
-from wheel_terra_estimator.discrepancy.table import (
-    QUANTITIES,
-    SteadyTable,
+from wheel_terra_estimator.discrepancy.selection import confidence as confidences
+from wheel_terra_estimator.discrepancy.selection import significance as gap_test
+from wheel_terra_estimator.discrepancy.selection.remainder import Remainder
+from wheel_terra_estimator.discrepancy.selection.search import Findings, search
+from wheel_terra_estimator.discrepancy.selection.signatures import CLEAR
+from wheel_terra_estimator.discrepancy.selection.verdict import Verdict, decide
+from wheel_terra_estimator.discrepancy.selection.weights import default_floors, shared_floors
+from wheel_terra_estimator.discrepancy.tables.checks import (
     check_against_wheel,
     check_wheel_of_model,
 )
-from wheel_terra_estimator.discrepancy.verdict import Verdict, decide
-from wheel_terra_estimator.discrepancy.where import locate
+from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES, SteadyTable
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.terramechanics.effects import catalogue
 from wheel_terra_estimator.terramechanics.effects.base import Effect

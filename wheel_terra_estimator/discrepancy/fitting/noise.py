@@ -7,10 +7,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from wheel_terra_estimator.discrepancy.fitting import Fit
-from wheel_terra_estimator.discrepancy.problem import Problem
+from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
+from wheel_terra_estimator.discrepancy.fitting.problem import Problem
 from wheel_terra_estimator.discrepancy.result import Noise
-from wheel_terra_estimator.discrepancy.table import INPUT_UNITS, QUANTITIES, SteadyTable
+from wheel_terra_estimator.discrepancy.tables.steady_table import (
+    INPUT_UNITS,
+    QUANTITIES,
+    SteadyTable,
+)
 
 FloatArray = NDArray[np.float64]
 

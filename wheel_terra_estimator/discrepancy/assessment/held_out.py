@@ -9,11 +9,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from wheel_terra_estimator.discrepancy.candidates import Setting
-from wheel_terra_estimator.discrepancy.fitting import Fit
-from wheel_terra_estimator.discrepancy.parameters import bounds
-from wheel_terra_estimator.discrepancy.problem import Problem
-from wheel_terra_estimator.discrepancy.table import SteadyTable
+from wheel_terra_estimator.discrepancy.fitting.coordinates import bounds
+from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
+from wheel_terra_estimator.discrepancy.fitting.problem import Problem
+from wheel_terra_estimator.discrepancy.selection.candidates import Setting
+from wheel_terra_estimator.discrepancy.tables.steady_table import SteadyTable
 
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.intp]

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wheel_terra_estimator.discrepancy.result import Diagnosis, NextMeasurement
-from wheel_terra_estimator.discrepancy.table import INPUT_UNITS, QUANTITIES
+from wheel_terra_estimator.discrepancy.tables.steady_table import INPUT_UNITS, QUANTITIES
 from wheel_terra_estimator.reporting.style import LINE_COLOURS, picture_style
 
 if TYPE_CHECKING:

@@ -10,24 +10,29 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from wheel_terra_estimator.discrepancy import noise as noises
-from wheel_terra_estimator.discrepancy.candidates import FIT_FLOOR, Explanation, Setting
-from wheel_terra_estimator.discrepancy.evidence import Floor
-from wheel_terra_estimator.discrepancy.fitting import Fit, fit
-from wheel_terra_estimator.discrepancy.forward import Forward
-from wheel_terra_estimator.discrepancy.outliers import find_outliers, inverse_covariance
-from wheel_terra_estimator.discrepancy.parameters import Coordinate
-from wheel_terra_estimator.discrepancy.problem import Problem, build_problem, slip_features
+from wheel_terra_estimator.discrepancy.fitting import noise as noises
+from wheel_terra_estimator.discrepancy.fitting.coordinates import Coordinate
+from wheel_terra_estimator.discrepancy.fitting.evidence import Floor
+from wheel_terra_estimator.discrepancy.fitting.forward import Forward
+from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit, fit
+from wheel_terra_estimator.discrepancy.fitting.outliers import find_outliers, inverse_covariance
+from wheel_terra_estimator.discrepancy.fitting.problem import Problem, build_problem, slip_features
 from wheel_terra_estimator.discrepancy.result import Noise
-from wheel_terra_estimator.discrepancy.selection import (
+from wheel_terra_estimator.discrepancy.selection.candidates import FIT_FLOOR, Explanation, Setting
+from wheel_terra_estimator.discrepancy.selection.signatures import (
+    SEEN,
+    Signature,
+    signatures,
+    unavailable,
+)
+from wheel_terra_estimator.discrepancy.selection.weights import (
     Selection,
     explain_members,
     explain_pairs,
     explain_singles,
     weigh,
 )
-from wheel_terra_estimator.discrepancy.signatures import SEEN, Signature, signatures, unavailable
-from wheel_terra_estimator.discrepancy.table import QUANTITIES, SteadyTable
+from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES, SteadyTable
 from wheel_terra_estimator.terramechanics.effects.base import Effect
 
 FloatArray = NDArray[np.float64]

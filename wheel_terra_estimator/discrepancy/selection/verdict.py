@@ -12,13 +12,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from wheel_terra_estimator.discrepancy.evidence import log_sum
-from wheel_terra_estimator.discrepancy.remainder import (
+from wheel_terra_estimator.discrepancy.fitting.evidence import log_sum
+from wheel_terra_estimator.discrepancy.selection.remainder import (
     Remainder,
     Variance,
     remainder,
 )
-from wheel_terra_estimator.discrepancy.selection import Selection
+from wheel_terra_estimator.discrepancy.selection.weights import Selection
 
 FloatArray = NDArray[np.float64]
 

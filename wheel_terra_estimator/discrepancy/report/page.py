@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from wheel_terra_estimator.discrepancy import report_pictures as pictures
-from wheel_terra_estimator.discrepancy.model_file import corrected
+from wheel_terra_estimator.discrepancy.report import pictures as pictures
+from wheel_terra_estimator.discrepancy.report.model_file import corrected
+from wheel_terra_estimator.discrepancy.report.words import STRONG_PULL
 from wheel_terra_estimator.discrepancy.result import Diagnosis, FittedParameter, NextMeasurement
-from wheel_terra_estimator.discrepancy.summary import STRONG_PULL
-from wheel_terra_estimator.discrepancy.table import QUANTITIES
+from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES
 from wheel_terra_estimator.reporting.html import render, write_page
 
 if TYPE_CHECKING:

@@ -10,9 +10,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from wheel_terra_estimator.discrepancy.forward import Forward
-from wheel_terra_estimator.discrepancy.parameters import Coordinate, bounds, loose_precision
-from wheel_terra_estimator.discrepancy.problem import Problem
+from wheel_terra_estimator.discrepancy.fitting.coordinates import (
+    Coordinate,
+    bounds,
+    loose_precision,
+)
+from wheel_terra_estimator.discrepancy.fitting.forward import Forward
+from wheel_terra_estimator.discrepancy.fitting.problem import Problem
 
 FloatArray = NDArray[np.float64]
 

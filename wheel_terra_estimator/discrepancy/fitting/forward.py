@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wheel_terra_estimator.discrepancy.parameters import Coordinate
+from wheel_terra_estimator.discrepancy.fitting.coordinates import Coordinate
 from wheel_terra_estimator.terramechanics import quadrature
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects.base import Effect

@@ -36,8 +36,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wheel_terra_estimator.configuration.configuration import Configuration
-from wheel_terra_estimator.discrepancy.drive_series import Channel, DriveSeries, collect
-from wheel_terra_estimator.discrepancy.table import SteadyTable, check_table
+from wheel_terra_estimator.discrepancy.drives.series import Channel, DriveSeries, collect
+from wheel_terra_estimator.discrepancy.tables.checks import check_table
+from wheel_terra_estimator.discrepancy.tables.steady_table import SteadyTable
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.estimation.filter_settings import FilterSettings
 from wheel_terra_estimator.estimation.measurements import Measurement

@@ -9,10 +9,15 @@ import itertools
 import numpy as np
 from numpy.typing import NDArray
 
-from wheel_terra_estimator.discrepancy.fitting import Fit
-from wheel_terra_estimator.discrepancy.problem import Problem
+from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
+from wheel_terra_estimator.discrepancy.fitting.problem import Problem
 from wheel_terra_estimator.discrepancy.result import InputRange, Where
-from wheel_terra_estimator.discrepancy.table import INPUT_UNITS, QUANTITIES, UNITS, SteadyTable
+from wheel_terra_estimator.discrepancy.tables.steady_table import (
+    INPUT_UNITS,
+    QUANTITIES,
+    UNITS,
+    SteadyTable,
+)
 
 FloatArray = NDArray[np.float64]
 

@@ -7,14 +7,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from wheel_terra_estimator.discrepancy.along import Stretch
-from wheel_terra_estimator.discrepancy.fitting import Fit
-from wheel_terra_estimator.discrepancy.parameters import WIDENING
-from wheel_terra_estimator.discrepancy.remainder import Remainder
+from wheel_terra_estimator.discrepancy.assessment.along import Stretch
+from wheel_terra_estimator.discrepancy.fitting.coordinates import WIDENING
+from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
 from wheel_terra_estimator.discrepancy.result import Curves, NamedEffect, QuantityGap
-from wheel_terra_estimator.discrepancy.search import Findings
-from wheel_terra_estimator.discrepancy.table import QUANTITIES, SteadyTable
-from wheel_terra_estimator.discrepancy.verdict import Verdict
+from wheel_terra_estimator.discrepancy.selection.remainder import Remainder
+from wheel_terra_estimator.discrepancy.selection.search import Findings
+from wheel_terra_estimator.discrepancy.selection.verdict import Verdict
+from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES, SteadyTable
 
 FloatArray = NDArray[np.float64]
 

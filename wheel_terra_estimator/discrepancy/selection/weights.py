@@ -16,9 +16,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from wheel_terra_estimator.discrepancy.candidates import Explanation, Setting, linear_starts
-from wheel_terra_estimator.discrepancy.evidence import Floor, log_sum
-from wheel_terra_estimator.discrepancy.fitting import Fit, fit
+from wheel_terra_estimator.discrepancy.fitting.evidence import Floor, log_sum
+from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit, fit
+from wheel_terra_estimator.discrepancy.selection.candidates import (
+    Explanation,
+    Setting,
+    linear_starts,
+)
 
 FloatArray = NDArray[np.float64]
 

@@ -12,9 +12,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from wheel_terra_estimator.discrepancy.fitting import Fit
-from wheel_terra_estimator.discrepancy.problem import Problem
-from wheel_terra_estimator.discrepancy.table import INPUT_UNITS, SteadyTable
+from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
+from wheel_terra_estimator.discrepancy.fitting.problem import Problem
+from wheel_terra_estimator.discrepancy.tables.steady_table import INPUT_UNITS, SteadyTable
 from wheel_terra_estimator.errors import UserError
 
 FloatArray = NDArray[np.float64]

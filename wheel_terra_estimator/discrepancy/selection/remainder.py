@@ -11,9 +11,12 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from wheel_terra_estimator.discrepancy.evidence import log_sum
-from wheel_terra_estimator.discrepancy.gap_test import chi_square_p_value, soil_p_value
-from wheel_terra_estimator.discrepancy.selection import Selection
+from wheel_terra_estimator.discrepancy.fitting.evidence import log_sum
+from wheel_terra_estimator.discrepancy.selection.significance import (
+    chi_square_p_value,
+    soil_p_value,
+)
+from wheel_terra_estimator.discrepancy.selection.weights import Selection
 
 Variance: TypeAlias = Callable[[ArrayLike, ArrayLike], NDArray[np.float64]]
 

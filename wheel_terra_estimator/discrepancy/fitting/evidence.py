@@ -15,14 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import log_ndtr
 
-from wheel_terra_estimator.discrepancy.fitting import Fit
-from wheel_terra_estimator.discrepancy.parameters import (
+from wheel_terra_estimator.discrepancy.fitting.coordinates import (
     EFFECT_SCALES,
     EFFECT_SHARES,
     WIDENING,
     WORSE_SHARE,
 )
-from wheel_terra_estimator.discrepancy.problem import Problem
+from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
+from wheel_terra_estimator.discrepancy.fitting.problem import Problem
 
 FloatArray = NDArray[np.float64]
 

@@ -17,10 +17,10 @@ from importlib.resources import files
 import numpy as np
 from scipy.special import expit
 
-from wheel_terra_estimator.discrepancy.evidence import log_sum
-from wheel_terra_estimator.discrepancy.remainder import Remainder
-from wheel_terra_estimator.discrepancy.selection import Selection
-from wheel_terra_estimator.discrepancy.verdict import Verdict
+from wheel_terra_estimator.discrepancy.fitting.evidence import log_sum
+from wheel_terra_estimator.discrepancy.selection.remainder import Remainder
+from wheel_terra_estimator.discrepancy.selection.verdict import Verdict
+from wheel_terra_estimator.discrepancy.selection.weights import Selection
 
 FEATURES = (
     'one',
@@ -94,6 +94,6 @@ def confidence(values: dict[str, float]) -> Confidence:
 
 @lru_cache(maxsize=1)
 def _weights() -> dict[str, list[float]]:
-    text = files('wheel_terra_estimator.discrepancy').joinpath('confidence_map.json').read_text()
+    text = files(__package__).joinpath('confidence_map.json').read_text()
     loaded: dict[str, list[float]] = json.loads(text)
     return loaded

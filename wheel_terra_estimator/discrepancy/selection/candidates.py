@@ -13,16 +13,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from wheel_terra_estimator.discrepancy.evidence import Floor, Posterior, evidence, marginal
-from wheel_terra_estimator.discrepancy.fitting import Fit, fit
-from wheel_terra_estimator.discrepancy.forward import Forward
-from wheel_terra_estimator.discrepancy.parameters import (
+from wheel_terra_estimator.discrepancy.fitting.coordinates import (
     Coordinate,
     effect_coordinates,
     loose_precision,
 )
-from wheel_terra_estimator.discrepancy.problem import Problem
-from wheel_terra_estimator.discrepancy.signatures import shapes
+from wheel_terra_estimator.discrepancy.fitting.evidence import Floor, Posterior, evidence, marginal
+from wheel_terra_estimator.discrepancy.fitting.forward import Forward
+from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit, fit
+from wheel_terra_estimator.discrepancy.fitting.problem import Problem
+from wheel_terra_estimator.discrepancy.selection.signatures import shapes
 from wheel_terra_estimator.terramechanics.effects.base import Effect
 
 FloatArray = NDArray[np.float64]

@@ -10,11 +10,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from wheel_terra_estimator.discrepancy.fitting import Fit
-from wheel_terra_estimator.discrepancy.forward import Forward
-from wheel_terra_estimator.discrepancy.parameters import Coordinate, bounds, effect_coordinates
-from wheel_terra_estimator.discrepancy.problem import Problem
-from wheel_terra_estimator.discrepancy.table import QUANTITIES, SteadyTable
+from wheel_terra_estimator.discrepancy.fitting.coordinates import (
+    Coordinate,
+    bounds,
+    effect_coordinates,
+)
+from wheel_terra_estimator.discrepancy.fitting.forward import Forward
+from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
+from wheel_terra_estimator.discrepancy.fitting.problem import Problem
+from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES, SteadyTable
 from wheel_terra_estimator.terramechanics.effects.base import Effect
 
 FloatArray = NDArray[np.float64]

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from wheel_terra_estimator.discrepancy.candidates import Setting
-from wheel_terra_estimator.discrepancy.fitting import Fit
-from wheel_terra_estimator.discrepancy.outliers import inverse_covariance
-from wheel_terra_estimator.discrepancy.table import SteadyTable
+from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
+from wheel_terra_estimator.discrepancy.fitting.outliers import inverse_covariance
+from wheel_terra_estimator.discrepancy.selection.candidates import Setting
+from wheel_terra_estimator.discrepancy.tables.steady_table import SteadyTable
 
 FloatArray = NDArray[np.float64]
 

@@ -1,158 +1,39 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Tables of steady measurements: read, checked, units that look wrong said so."""
+"""Columns of numbers checked: units that look wrong, signs, dead channels, too few rows."""
 
 from __future__ import annotations
 
-import csv
-import difflib
-import heapq
-import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from wheel_terra_estimator.discrepancy.tables.averaging import MOST_ROWS, averaged
+from wheel_terra_estimator.discrepancy.tables.steady_table import (
+    INPUT_UNITS,
+    QUANTITIES,
+    STD_COLUMNS,
+    UNITS,
+    SteadyTable,
+)
 from wheel_terra_estimator.errors import UserError
 
 FloatArray = NDArray[np.float64]
 
-QUANTITIES = ('sinkage', 'drawbar_pull', 'torque')
-UNITS = {'sinkage': 'm', 'drawbar_pull': 'N', 'torque': 'N m'}
-INPUT_UNITS = {
-    'slip': '-',
-    'normal_load': 'N',
-    'slope': 'rad',
-    'wheel_radius': 'm',
-    'wheel_width': 'm',
-    'lug_height': 'm',
-    'lug_count': '-',
-    'gravity': 'm/s^2',
-    'angular_velocity': 'rad/s',
-    'pass_number': '-',
-}
-STD_COLUMNS = ('slip_std', *(f'{quantity}_std' for quantity in QUANTITIES), 'leaving_angle_std')
-COLUMNS = (*INPUT_UNITS, *QUANTITIES, 'leaving_angle', *STD_COLUMNS)
-
 MINIMUM_ROWS = 6
+
+
 MINIMUM_SLIP_SPAN = 0.1
+
+
 MINIMUM_LOAD_RATIO = 1.5
-MOST_ROWS = 240  # more are averaged over neighbouring inputs: the time grows with their cube
+
+
 CLEAR_SLIP = 0.2  # beyond it a wheel's torque has the sign of its slip
-_FAR = 8.0  # pooled robust deviations from the median of a cell
+
+
 LIKE_WHEEL = 1.4  # factor within which a row's wheel may differ from that of the model file
-
-# What other people call the required columns; only for the cure in a message.
-_OTHER_NAMES = {
-    'slip': ('s', 'i', 'slip_ratio', 'sr', 'schlupf'),
-    'normal_load': ('w', 'fz', 'fn', 'load', 'vertical_load', 'weight', 'wheel_load', 'radlast'),
-    'sinkage': ('z', 'depth', 'sinkage_depth', 'einsinkung'),
-    'drawbar_pull': ('dp', 'fx', 'f_dp', 'pull', 'drawbar', 'traction', 'zugkraft'),
-    'torque': ('t', 'm', 'mz', 'moment', 'drive_torque', 'drehmoment'),
-}
-
-
-@dataclass(frozen=True)
-class SteadyTable:
-    """Checked rows of steady operating points.
-
-    Attributes
-    ----------
-    name : str
-        Where the rows came from, for messages.
-    lines : numpy.ndarray
-        (N,) line of each row in the file, the header being line 1.
-    columns : mapping
-        Input column -> (N,) values [SI], only those that the table has; nan = not stated.
-    measured : numpy.ndarray
-        (N, 3) sinkage [m], drawbar pull [N], torque [N m]; nan = not measured.
-    stated_std : numpy.ndarray
-        (N, 3) stated standard deviations; nan = not stated.
-    slip_std : numpy.ndarray
-        (N,) standard deviation of the recorded slip; 0 = exact.
-    notes : tuple of str
-        What the reader found odd but usable.
-    """
-
-    name: str
-    lines: NDArray[np.intp]
-    columns: Mapping[str, FloatArray]
-    measured: FloatArray
-    stated_std: FloatArray
-    slip_std: FloatArray
-    notes: tuple[str, ...] = ()
-
-    def __len__(self) -> int:
-        return len(self.lines)
-
-    @property
-    def quantities(self) -> tuple[str, ...]:
-        """The quantities that at least one row has."""
-        return tuple(
-            quantity
-            for q, quantity in enumerate(QUANTITIES)
-            if np.isfinite(self.measured[:, q]).any()
-        )
-
-    def varying(self) -> tuple[str, ...]:
-        """Return the input columns that hold more than one value."""
-        found = []
-        for name, values in self.columns.items():
-            finite = values[np.isfinite(values)]
-            if name in INPUT_UNITS and finite.size and np.ptp(finite) > 1e-9 * abs(finite).max():
-                found.append(name)
-        return tuple(found)
-
-    def select(self, rows: NDArray[np.intp] | NDArray[np.bool_]) -> SteadyTable:
-        """Return the table of these rows."""
-        return SteadyTable(
-            self.name,
-            self.lines[rows],
-            {name: values[rows] for name, values in self.columns.items()},
-            self.measured[rows],
-            self.stated_std[rows],
-            self.slip_std[rows],
-            self.notes,
-        )
-
-
-def read_table(path: str | Path) -> SteadyTable:
-    """Read and check a CSV file (header row, UTF-8).
-
-    Raises
-    ------
-    UserError
-        One line with file, row and cure for everything that makes the table unusable.
-    """
-    path = Path(path)
-    try:
-        with path.open(encoding='utf-8-sig', newline='') as stream:
-            reader = csv.reader(stream)
-            rows = [(reader.line_num, row) for row in reader]
-    except FileNotFoundError:
-        raise UserError(f'{path}: no such file; give the path of a CSV table') from None
-    except IsADirectoryError:
-        raise UserError(f'{path}: is a folder; give a CSV table or a rosbag2') from None
-    except OSError as error:
-        raise UserError(f'{path}: cannot be read ({error.strerror}); check its rights') from None
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise UserError(f'{path}: not a CSV text in UTF-8 ({error}); export it again') from None
-    numbered = [
-        (line, [cell.strip() for cell in row])
-        for line, row in rows
-        if any(cell.strip() for cell in row)
-    ]
-    if not numbered:
-        raise UserError(f'{path}: empty; the first line must name the columns ({_known()})')
-    _check_layout(str(path), numbered)
-    header = numbered[0][1]
-    notes: list[str] = []
-    names = _check_header(str(path), header, notes)
-    values = _read_cells(str(path), header, names, numbered[1:])
-    lines = np.array([line for line, _ in numbered[1:]], dtype=np.intp)
-    return check_table(str(path), values, lines, notes)
 
 
 def check_table(
@@ -221,158 +102,6 @@ def check_table(
         table.slip_std,
         tuple(remarks),
     )
-
-
-def _known() -> str:
-    return 'slip, normal_load, sinkage, drawbar_pull, torque, ...'
-
-
-def _check_header(path: str, header: Sequence[str], notes: list[str]) -> list[str]:
-    """Return the known columns; raise where a name looks like a slip of the pen."""
-    known = [name for name in header if name in COLUMNS]
-    for name in known:
-        if header.count(name) > 1:
-            raise UserError(f'{path}, line 1: column {name!r} stands there twice; delete one')
-    if not known and any(_is_number(name) for name in header):
-        raise UserError(f'{path}, line 1: no header; the first line must name the columns')
-    ignored = []
-    for name in header:
-        if name in COLUMNS or not name:
-            continue
-        nearest = _nearest(name)
-        if nearest and nearest not in header:
-            unit = INPUT_UNITS.get(nearest) or UNITS.get(nearest)
-            in_unit = f' [{unit}]' if unit and unit != '-' else ''
-            raise UserError(
-                f'{path}, line 1: unknown column {name!r}; rename it to {nearest!r}{in_unit} '
-                'if that is what it holds, else give it another name'
-            )
-        ignored.append(name)
-    if ignored:
-        notes.append(f'columns not used: {", ".join(ignored)}')
-    for name in ('slip', 'normal_load'):
-        if name not in known:
-            raise UserError(
-                f'{path}, line 1: no column {name!r} among {", ".join(header)}; '
-                f'{_renaming(header, (name,)) or "it is required"}'
-            )
-    if not any(name in QUANTITIES for name in known):
-        raise UserError(
-            f'{path}, line 1: none of sinkage, drawbar_pull, torque among {", ".join(header)}; '
-            f'{_renaming(header, QUANTITIES) or "add at least one"}'
-        )
-    for name in known:
-        if name in STD_COLUMNS and name.removesuffix('_std') not in known:
-            notes.append(f'{name} is not used: there is no column {name.removesuffix("_std")}')
-    return known
-
-
-def _check_layout(path: str, rows: Sequence[tuple[int, list[str]]]) -> None:
-    """Raise where the first line is not one of column names between commas."""
-    line, header = rows[0]
-    if header[0].startswith('PK'):
-        raise UserError(f'{path}: a spreadsheet or archive, not text; export the table as CSV')
-    if len(header) == 1:
-        for mark, said in ((';', "';'"), ('\t', 'tabs'), ('|', "'|'"), (' ', 'spaces')):
-            if sum(_nearest(cell) is not None for cell in header[0].split(mark)) > 1:
-                raise UserError(
-                    f'{path}, line {line}: the cells are separated by {said}; export the table '
-                    'with commas between cells and a point as decimal mark'
-                )
-    if not {'slip', 'normal_load'} & set(header):
-        for later, cells in rows[1:20]:
-            if {'slip', 'normal_load'} <= set(cells):
-                raise UserError(
-                    f'{path}, line {line}: not the column names, they stand in line {later}; '
-                    'delete the lines above them'
-                )
-
-
-def _plain(name: str) -> str:
-    plain = name.lower().replace('-', '_').replace(' ', '_').split('[')[0].split('(')[0]
-    return plain.strip('_')
-
-
-def _renaming(header: Sequence[str], wanted: Sequence[str]) -> str:
-    """Return which column may be meant by one of the wanted names; empty = none."""
-    for name in wanted:
-        for column in header:
-            if _plain(column) in _OTHER_NAMES[name] and column not in COLUMNS:
-                unit = INPUT_UNITS.get(name) or UNITS[name]
-                in_unit = '' if unit == '-' else f' [{unit}]'
-                return f'rename {column!r} to {name!r}{in_unit} if that is what it holds'
-    return ''
-
-
-def _nearest(name: str) -> str | None:
-    """Return the known column that ``name`` may stand for."""
-    plain = _plain(name)
-    if plain in COLUMNS:
-        return plain
-    for unit in ('_mm', '_cm', '_m', '_n', '_nm', '_kn', '_deg', '_rad', '_percent', '_pct'):
-        if plain.endswith(unit) and plain[: -len(unit)] in COLUMNS:
-            return plain[: -len(unit)]
-    close = difflib.get_close_matches(plain, COLUMNS, n=1, cutoff=0.78)
-    return close[0] if close else None
-
-
-def _is_number(cell: str) -> bool:
-    try:
-        float(cell)
-    except ValueError:
-        return False
-    return True
-
-
-def _read_cells(
-    path: str, header: Sequence[str], names: Sequence[str], rows: Sequence[tuple[int, list[str]]]
-) -> dict[str, FloatArray]:
-    position = {name: header.index(name) for name in names}
-    if rows:
-        line, cells = rows[0]
-        filled = [cells[c] for c in position.values() if c < len(cells) and cells[c]]
-        if len(filled) > 1 and not any(_is_number(cell) for cell in filled):
-            raise UserError(
-                f'{path}, line {line}: no numbers below the column names; delete the line '
-                '(units are fixed: m, N, N m, rad, slip as a ratio)'
-            )
-    values = {name: np.full(len(rows), np.nan) for name in names}
-    for index, (line, cells) in enumerate(rows):
-        if len(cells) > len(header) and any(cells[len(header) :]):
-            raise UserError(
-                f'{path}, line {line}: {len(cells)} cells but {len(header)} columns; '
-                'use commas between cells and a point as decimal mark'
-            )
-        for name, column in position.items():
-            cell = cells[column] if column < len(cells) else ''
-            if not cell or cell.lower() in ('nan', 'na', 'n/a', '-'):
-                continue
-            try:
-                values[name][index] = float(cell)
-            except ValueError:
-                raise UserError(
-                    f'{path}, line {line}, column {name}: {cell[:40]!r} is not a number; '
-                    + _cure(cell)
-                ) from None
-            if not np.isfinite(values[name][index]):
-                raise UserError(
-                    f'{path}, line {line}, column {name}: {cell} is not finite; '
-                    'leave the cell empty where nothing was measured'
-                )
-    return values
-
-
-def _cure(cell: str) -> str:
-    """Return what to do about a cell that is no number."""
-    if re.fullmatch(r'[-+]?\d*,\d+([eE][-+]?\d+)?', cell):
-        return 'use a point as decimal mark, without marks between thousands'
-    if _is_number(cell.replace(',', '')):
-        return 'take out the marks between thousands'
-    if _is_number(cell.rstrip('% ')):
-        return 'give the ratio, without a percent sign'
-    if _is_number(cell.replace('\u2212', '-').replace('\u2013', '-')):
-        return 'use the plain minus sign'
-    return 'leave the cell empty where nothing was measured'
 
 
 def _columns(arrays: Mapping[str, FloatArray], names: Sequence[str], count: int) -> FloatArray:
@@ -597,73 +326,6 @@ def _without_copies(table: SteadyTable) -> tuple[SteadyTable, int]:
     first = {key: index for index, key in reversed(list(enumerate(keys)))}
     keep = np.array(sorted(first.values()), dtype=np.intp)
     return table.select(keep), len(keys) - len(keep)
-
-
-def averaged(table: SteadyTable, most: int) -> SteadyTable:
-    """Return the table averaged over cells of neighbouring inputs, at most ``most`` of them.
-
-    The cells halve the widest input of the fullest cell over and over, between two of its values
-    (k-d tree), so levels of a design stay apart as long as there are cells for them. Rows that
-    lack different columns are not mixed. Readings further from the median of their cell than
-    `_FAR` robust deviations, pooled over the cells, are left out; a deviation is that of the mean.
-    """
-    names = list(table.columns)
-    inputs = np.column_stack([table.columns[name] for name in names])
-    width = np.nanmax(inputs, axis=0) - np.nanmin(inputs, axis=0)
-    scaled = np.nan_to_num(inputs / np.where(width > 0.0, width, 1.0))
-    scaled[:, [i for i, name in enumerate(names) if name not in INPUT_UNITS]] = 0.0
-    known = np.isfinite(np.column_stack([inputs, table.measured, table.stated_std]))
-    _, pattern = np.unique(known, axis=0, return_inverse=True)
-    whole = [np.flatnonzero(np.ravel(pattern) == p) for p in np.unique(pattern)]
-    cells = _halved(scaled, whole, max(most, len(whole)))
-
-    def mean(values: FloatArray) -> FloatArray:
-        centre = np.array([np.median(values[cell]) for cell in cells])
-        off = np.zeros(len(values))
-        for cell, middle in zip(cells, centre, strict=True):
-            off[cell] = np.abs(values[cell] - middle)
-        spread = 1.4826 * np.median(off[off > 0.0]) if (off > 0.0).any() else 0.0
-        kept = ~(off > _FAR * spread)
-        picked = [cell[kept[cell]] if len(cell) > 2 else cell for cell in cells]
-        return np.array([np.mean(values[cell]) if len(cell) else np.nan for cell in picked])
-
-    def of_mean(std: FloatArray) -> FloatArray:
-        return np.array([np.sqrt(np.sum(std[c] ** 2)) / len(c) for c in cells])
-
-    return SteadyTable(
-        table.name,
-        np.array([table.lines[cell].min() for cell in cells], dtype=np.intp),
-        {name: np.array([np.mean(table.columns[name][c]) for c in cells]) for name in names},
-        np.column_stack([mean(table.measured[:, q]) for q in range(3)]),
-        np.column_stack([of_mean(table.stated_std[:, q]) for q in range(3)]),
-        of_mean(table.slip_std),
-        table.notes,
-    )
-
-
-def _halved(scaled: FloatArray, cells: list[NDArray[np.intp]], most: int) -> list[NDArray[np.intp]]:
-    """Split the cell with the most rows times extent until there are ``most``."""
-    done: list[NDArray[np.intp]] = []
-    heap = [(-_weight(scaled[cell]), i, cell) for i, cell in enumerate(cells)]
-    heapq.heapify(heap)
-    label = len(heap)
-    while heap and len(heap) + len(done) < most:
-        weight, _, cell = heapq.heappop(heap)
-        if weight == 0.0:
-            done.append(cell)
-            continue
-        axis = int(np.argmax(np.ptp(scaled[cell], axis=0)))
-        values = scaled[cell, axis]
-        levels = np.unique(values)
-        cut = levels[np.clip(np.searchsorted(levels, np.median(values)), 1, len(levels) - 1)]
-        for half in (cell[values < cut], cell[values >= cut]):
-            heapq.heappush(heap, (-_weight(scaled[half]), label, half))
-            label += 1
-    return [*done, *(cell for _, _, cell in heap)]
-
-
-def _weight(values: FloatArray) -> float:
-    return float(len(values) * np.ptp(values, axis=0).max())
 
 
 def _rows(count: int) -> str:

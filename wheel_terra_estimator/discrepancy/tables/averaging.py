@@ -1,0 +1,86 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Long tables averaged over neighbouring inputs."""
+
+from __future__ import annotations
+
+import heapq
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wheel_terra_estimator.discrepancy.tables.steady_table import INPUT_UNITS, SteadyTable
+
+FloatArray = NDArray[np.float64]
+
+MOST_ROWS = 240  # more are averaged over neighbouring inputs: the time grows with their cube
+
+
+_FAR = 8.0  # pooled robust deviations from the median of a cell
+
+
+def averaged(table: SteadyTable, most: int) -> SteadyTable:
+    """Return the table averaged over cells of neighbouring inputs, at most ``most`` of them.
+
+    The cells halve the widest input of the fullest cell over and over, between two of its values
+    (k-d tree), so levels of a design stay apart as long as there are cells for them. Rows that
+    lack different columns are not mixed. Readings further from the median of their cell than
+    `_FAR` robust deviations, pooled over the cells, are left out; a deviation is that of the mean.
+    """
+    names = list(table.columns)
+    inputs = np.column_stack([table.columns[name] for name in names])
+    width = np.nanmax(inputs, axis=0) - np.nanmin(inputs, axis=0)
+    scaled = np.nan_to_num(inputs / np.where(width > 0.0, width, 1.0))
+    scaled[:, [i for i, name in enumerate(names) if name not in INPUT_UNITS]] = 0.0
+    known = np.isfinite(np.column_stack([inputs, table.measured, table.stated_std]))
+    _, pattern = np.unique(known, axis=0, return_inverse=True)
+    whole = [np.flatnonzero(np.ravel(pattern) == p) for p in np.unique(pattern)]
+    cells = _halved(scaled, whole, max(most, len(whole)))
+
+    def mean(values: FloatArray) -> FloatArray:
+        centre = np.array([np.median(values[cell]) for cell in cells])
+        off = np.zeros(len(values))
+        for cell, middle in zip(cells, centre, strict=True):
+            off[cell] = np.abs(values[cell] - middle)
+        spread = 1.4826 * np.median(off[off > 0.0]) if (off > 0.0).any() else 0.0
+        kept = ~(off > _FAR * spread)
+        picked = [cell[kept[cell]] if len(cell) > 2 else cell for cell in cells]
+        return np.array([np.mean(values[cell]) if len(cell) else np.nan for cell in picked])
+
+    def of_mean(std: FloatArray) -> FloatArray:
+        return np.array([np.sqrt(np.sum(std[c] ** 2)) / len(c) for c in cells])
+
+    return SteadyTable(
+        table.name,
+        np.array([table.lines[cell].min() for cell in cells], dtype=np.intp),
+        {name: np.array([np.mean(table.columns[name][c]) for c in cells]) for name in names},
+        np.column_stack([mean(table.measured[:, q]) for q in range(3)]),
+        np.column_stack([of_mean(table.stated_std[:, q]) for q in range(3)]),
+        of_mean(table.slip_std),
+        table.notes,
+    )
+
+
+def _halved(scaled: FloatArray, cells: list[NDArray[np.intp]], most: int) -> list[NDArray[np.intp]]:
+    """Split the cell with the most rows times extent until there are ``most``."""
+    done: list[NDArray[np.intp]] = []
+    heap = [(-_weight(scaled[cell]), i, cell) for i, cell in enumerate(cells)]
+    heapq.heapify(heap)
+    label = len(heap)
+    while heap and len(heap) + len(done) < most:
+        weight, _, cell = heapq.heappop(heap)
+        if weight == 0.0:
+            done.append(cell)
+            continue
+        axis = int(np.argmax(np.ptp(scaled[cell], axis=0)))
+        values = scaled[cell, axis]
+        levels = np.unique(values)
+        cut = levels[np.clip(np.searchsorted(levels, np.median(values)), 1, len(levels) - 1)]
+        for half in (cell[values < cut], cell[values >= cut]):
+            heapq.heappush(heap, (-_weight(scaled[half]), label, half))
+            label += 1
+    return [*done, *(cell for _, _, cell in heap)]
+
+
+def _weight(values: FloatArray) -> float:
+    return float(len(values) * np.ptp(values, axis=0).max())
