@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 from wheel_terra_estimator.cli.main import main
+from wheel_terra_estimator.output_folder import new_folder
 
 
 @pytest.mark.parametrize(
@@ -61,9 +62,9 @@ def test_overwrite_never_deletes_what_is_no_diagnosis(
     assert sorted(entry.name for entry in home.iterdir()) == sorted(files)
     # A folder of an earlier diagnosis is no obstacle, so the table is what is complained about.
     earlier = tmp_path / 'earlier'
-    earlier.mkdir()
-    for name in ('report.json', 'model.yaml', 'report.html', 'gap.png'):
-        (earlier / name).write_text('')
+    with new_folder(earlier) as folder:
+        for name in ('report.json', 'model.yaml', 'report.html', 'gap.png'):
+            (folder / name).write_text('')
     assert main(['diagnose', 'table.csv', '-o', str(earlier), '--overwrite']) == 2
     assert 'table.csv' in capsys.readouterr().err
 

@@ -92,7 +92,7 @@ def test_picture_and_the_refusal_to_overwrite(
     assert picture.read_bytes().startswith(b'\x89PNG') and picture.stat().st_size > 10_000
     before = picture.read_bytes()
     assert main([*BASE, '-o', str(picture)]) == 2
-    assert 'exists already; choose another name or add --overwrite' in capsys.readouterr().err
+    assert 'exists already; choose another path or give --overwrite' in capsys.readouterr().err
     assert picture.read_bytes() == before
     assert main([*BASE, '--load', '20', '-o', str(picture), '--overwrite']) == 0
     assert picture.read_bytes() != before

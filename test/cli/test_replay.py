@@ -88,7 +88,7 @@ def test_the_bag_that_is_read_is_never_overwritten(
 ) -> None:
     bag = make_bag()
     assert main(['replay', str(bag), *config, '-o', str(bag), '--overwrite']) == 2
-    assert 'the bag that is read' in capsys.readouterr().err
+    assert 'which the command reads' in capsys.readouterr().err
     with open_bag(bag) as opened:
         assert opened.message_count == 84
 

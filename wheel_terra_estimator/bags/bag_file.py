@@ -4,22 +4,23 @@
 
 from __future__ import annotations
 
-import shutil
 from collections import Counter
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
+from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
 from typing import Any, TypeVar
 
 from wheel_terra_estimator.bags.message_factory import MessageFactory
-from wheel_terra_estimator.bags.storage import STORAGE_SUFFIXES
-from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.output_folder import check_folder, new_folder
 
 Self = TypeVar('Self', bound='BagFile')
 
 
 class BagFile:
     """Writes messages to a new bag; a context manager.
+
+    The bag is written beside its place and renamed when it is closed (see `output_folder`).
 
     Parameters
     ----------
@@ -33,6 +34,8 @@ class BagFile:
         Whether an earlier bag at the same path is replaced.
     storage : str
         ``mcap`` or ``sqlite3``.
+    inputs : iterable of Path
+        What is read meanwhile: the bag is never written into it or over it.
 
     Attributes
     ----------
@@ -54,6 +57,7 @@ class BagFile:
         latched: Collection[str] = (),
         overwrite: bool = False,
         storage: str = 'mcap',
+        inputs: Iterable[Path] = (),
     ) -> None:
         self.path = path
         self.messages = MessageFactory()
@@ -61,18 +65,22 @@ class BagFile:
         self._topics = dict(topics)
         self._latched = latched
         self._storage = storage
-        make_room(path, overwrite)
+        self._overwrite = overwrite
+        self._inputs = tuple(inputs)
+        self._stack = ExitStack()
+        check_folder(path, overwrite, self._inputs)
 
     def __enter__(self: Self) -> Self:
         from rosbags.rosbag2 import StoragePlugin, Writer
 
-        self._writer = Writer(
-            self.path, version=9, storage_plugin=StoragePlugin[self._storage.upper()]
+        folder = self._stack.enter_context(
+            new_folder(self.path, self._overwrite, self._inputs, keep_partial=True)
         )
-        try:
-            self._writer.open()
-        except OSError as error:
-            raise UserError(f'{self.path}: cannot be written ({error.strerror})') from None
+        folder.rmdir()  # the library makes it
+        self._writer = Writer(
+            folder, version=9, storage_plugin=StoragePlugin[self._storage.upper()]
+        )
+        self._writer.open()
         self._connections = {
             topic: self._writer.add_connection(
                 topic,
@@ -91,7 +99,9 @@ class BagFile:
         trace: TracebackType | None,
     ) -> None:
         # Not the library's own exit, which leaves a file without index after an error.
-        self._writer.close()
+        with self._stack:
+            self._writer.close()
+            self._stack.__exit__(kind, error, trace)
 
     def write(self, topic: str, message: Any, log_time: int) -> None:
         """Append a message at a log time [ns]."""
@@ -102,27 +112,6 @@ class BagFile:
         """Append a message that is serialised already (CDR)."""
         self._writer.write(self._connections[topic], log_time, data)
         self.counts[topic] += 1
-
-
-def make_room(path: Path, overwrite: bool) -> None:
-    """Make sure that a bag can be written at ``path``; remove an earlier one if allowed."""
-    if not (path.exists() or path.is_symlink()):
-        return
-    if not overwrite:
-        raise UserError(f'{path}: exists already; choose another path or give --overwrite')
-    if not path.is_dir() or path.is_symlink():
-        raise UserError(f'{path}: is not a folder; choose another path')
-    strangers = [
-        entry.name
-        for entry in path.iterdir()
-        if entry.name != 'metadata.yaml' and not entry.name.endswith(STORAGE_SUFFIXES)
-    ]
-    if strangers:
-        raise UserError(
-            f'{path}: holds more than a bag ({strangers[0]}), so it is not overwritten; '
-            'choose another path'
-        )
-    shutil.rmtree(path)
 
 
 def _qos(latched: bool) -> Any:

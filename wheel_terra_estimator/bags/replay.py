@@ -82,9 +82,9 @@ def replay(
     with ExitStack() as stack:
         writer = None
         if output is not None:
-            _keep_apart(bag.path, output)
+            inputs = (bag.path, *([arrival] if arrival else []))
             writer = stack.enter_context(
-                EstimateBagWriter(output, pipeline.names, overwrite, pipeline.diagnostics)
+                EstimateBagWriter(output, pipeline.names, overwrite, pipeline.diagnostics, inputs)
             )
         interrupted = stack.enter_context(_until_interrupted())
         log_time = 0
@@ -155,13 +155,6 @@ def _in_order_of(arrival: Path, reader: MeasurementReader) -> Iterator[tuple[int
         # Time of arrival does not go back, so the estimates lie in the order of their publication.
         log_time = max(log_time, logged)
         yield log_time, name, message
-
-
-def _keep_apart(bag: Path, output: Path) -> None:
-    """Never write into, or delete, what is being read."""
-    source, target = bag.resolve(), output.resolve()
-    if source == target or target in source.parents or (bag.is_dir() and source in target.parents):
-        raise UserError(f'{output}: is, or lies in, or holds the bag that is read; choose another')
 
 
 def _progress(messages: Iterator[Any], reader: MeasurementReader) -> Iterator[Any]:

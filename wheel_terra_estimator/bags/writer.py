@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 
 from wheel_terra_estimator.bags.bag_file import BagFile
@@ -38,6 +39,8 @@ class EstimateBagWriter(BagFile):
         Whether an earlier bag at the same path is replaced.
     statuses : Diagnostics, optional
         Knows the counters and faults behind the estimates.
+    inputs : iterable of Path
+        See `BagFile`.
 
     Raises
     ------
@@ -51,8 +54,9 @@ class EstimateBagWriter(BagFile):
         names: tuple[str, ...],
         overwrite: bool = False,
         statuses: diagnostics.Diagnostics | None = None,
+        inputs: Iterable[Path] = (),
     ) -> None:
-        super().__init__(path, TOPICS, latched=(STUCK,), overwrite=overwrite)
+        super().__init__(path, TOPICS, latched=(STUCK,), overwrite=overwrite, inputs=inputs)
         self.names = names
         self._diagnostics = statuses or diagnostics.Diagnostics(names)
         self._stuck: bool | None = None

@@ -5,20 +5,18 @@
 from __future__ import annotations
 
 import argparse
-import shutil
-import tempfile
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.output_folder import check_folder, new_folder
 
 if TYPE_CHECKING:
     from wheel_terra_estimator.configuration.configuration import Configuration
     from wheel_terra_estimator.discrepancy.result import Diagnosis
     from wheel_terra_estimator.discrepancy.tables.steady_table import SteadyTable
 
-WRITTEN = ('.json', '.yaml', '.html', '.png', '.svg')
 SUMMARY = 'find where model and measurement disagree and name the missing effect'
 
 
@@ -76,7 +74,8 @@ def run(arguments: argparse.Namespace) -> int:
     from wheel_terra_estimator.discrepancy.workflow import Options, diagnose
 
     output = Path(arguments.output)
-    _make_sure_it_may_be_written(output, arguments.overwrite)
+    inputs = [Path(path) for path in (arguments.data, arguments.reference) if path]
+    check_folder(output, arguments.overwrite, inputs)
     if arguments.floor is not None and not 0.0 <= arguments.floor <= 0.2:
         raise UserError(f'--floor {arguments.floor:g}: must be a share between 0 and 0.2')
     given = [arguments.data, *([arguments.reference] if arguments.reference else [])]
@@ -97,7 +96,8 @@ def run(arguments: argparse.Namespace) -> int:
     if not any(key.startswith('soil.') for key in configuration.stated):
         note = 'no soil was stated (--config): the default sand was taken for the model believed in'
         diagnosis = replace(diagnosis, notes=(*diagnosis.notes, note))
-    _write(diagnosis, output, pictures=not arguments.no_pictures)
+    with new_folder(output, arguments.overwrite, inputs) as folder:
+        _write(diagnosis, folder, pictures=not arguments.no_pictures)
     print(diagnosis.sentence)
     for quantity, gap in diagnosis.gap.items():
         scale, unit = (1e3, 'mm') if quantity == 'sinkage' else (1.0, UNITS[quantity])
@@ -112,32 +112,6 @@ def run(arguments: argparse.Namespace) -> int:
         print(f'  note: {note}')
     print(f'  written: {output}')
     return 0
-
-
-def _make_sure_it_may_be_written(output: Path, overwrite: bool) -> None:
-    """Refuse a path that is taken; what is replaced must be a folder of this command."""
-    try:
-        exists = output.exists()
-        output.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(dir=output.parent, prefix='.diagnose-'):
-            pass
-    except OSError as error:
-        raise UserError(
-            f'{output}: cannot be written ({error.strerror}); choose another folder'
-        ) from None
-    if not exists:
-        return
-    if not overwrite:
-        raise UserError(f'{output}: exists already; choose another folder or add --overwrite')
-    if not output.is_dir():
-        raise UserError(f'{output}: is not a folder; choose another path')
-    names = [entry.name for entry in output.iterdir()]
-    strangers = [name for name in names if not name.endswith(WRITTEN)]
-    if names and ('report.json' not in names or strangers):
-        raise UserError(
-            f'{output}: holds more than a diagnosis ({(strangers or names)[0]}), so it is not '
-            'overwritten; choose another folder'
-        )
 
 
 def _load_effects(files: list[str]) -> dict[str, Path]:
@@ -181,20 +155,13 @@ def _read(data: str, remaps: list[str], configuration: Configuration) -> SteadyT
     return read_table(path)
 
 
-def _write(diagnosis: Diagnosis, output: Path, *, pictures: bool) -> None:
-    """Write all files beside the place first, so that an error leaves nothing half-written."""
+def _write(diagnosis: Diagnosis, folder: Path, *, pictures: bool) -> None:
+    """Write all files of a diagnosis into a folder."""
     from wheel_terra_estimator.discrepancy.report.model_file import write_model
 
-    output.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=output.parent, prefix='.diagnose-') as folder:
-        fresh = Path(folder) / 'out'
-        fresh.mkdir()
-        diagnosis.write_json(fresh / 'report.json')
-        write_model(diagnosis, fresh / 'model.yaml')
-        if pictures:
-            from wheel_terra_estimator.discrepancy.report.page import write_report
+    diagnosis.write_json(folder / 'report.json')
+    write_model(diagnosis, folder / 'model.yaml')
+    if pictures:
+        from wheel_terra_estimator.discrepancy.report.page import write_report
 
-            write_report(diagnosis, fresh)
-        if output.exists():
-            shutil.rmtree(output)
-        fresh.rename(output)
+        write_report(diagnosis, folder)

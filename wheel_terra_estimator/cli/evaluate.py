@@ -67,9 +67,14 @@ def run(arguments: argparse.Namespace) -> int:
         runner,
         tables,
     )
+    from wheel_terra_estimator.output_folder import check_file, new_file
 
-    if arguments.output and arguments.output.exists() and not arguments.overwrite:
-        raise UserError(f'{arguments.output} exists; choose another name or give --overwrite')
+    picture: Path | None = None
+    if arguments.output:
+        check_file(arguments.output, arguments.overwrite)
+        if arguments.limiter:
+            picture = arguments.output.with_suffix('.png')
+            check_file(picture, arguments.overwrite)
     first = (kinds.TUNING_SEEDS if arguments.tuning else kinds.TEST_SEEDS).start
     seeds = range(first, first + arguments.seeds)
     if arguments.measured:
@@ -77,8 +82,9 @@ def run(arguments: argparse.Namespace) -> int:
     elif arguments.limiter:
         drives = closed_loop.compare(seeds)
         text = closed_loop.report(drives)
-        if arguments.output:
-            closed_loop.picture(drives[0], arguments.output.with_suffix('.png'))
+        if picture:
+            with new_file(picture, arguments.overwrite) as fresh:
+                closed_loop.picture(drives[0], fresh)
     else:
         for given, known, what in (
             (arguments.kinds, [*kinds.KINDS, 'firm'], 'kind'),
@@ -102,5 +108,6 @@ def run(arguments: argparse.Namespace) -> int:
         text = write(results, arguments.modes)
     print(text)
     if arguments.output:
-        arguments.output.write_text(text + '\n', encoding='utf-8')
+        with new_file(arguments.output, arguments.overwrite) as fresh:
+            fresh.write_text(text + '\n', encoding='utf-8')
     return 0

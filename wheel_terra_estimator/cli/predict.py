@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from wheel_terra_estimator.configuration import reader as configuration_reader
 from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.output_folder import check_file, new_file
 from wheel_terra_estimator.terramechanics.model import METHODS, OVERLOADED, WheelSoilModel
 from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
 from wheel_terra_estimator.terramechanics.wheel import Wheel
@@ -102,7 +103,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Run the command."""
     output: Path | None = arguments.output
     if output is not None:
-        _check_output(output, arguments.overwrite)
+        _check_output(output, arguments.overwrite, _tables(arguments))
     configuration = configuration_reader.from_arguments(arguments)
     columns = _points(arguments, configuration)
     try:
@@ -151,26 +152,29 @@ def run(arguments: argparse.Namespace) -> int:
         result[name] = np.where(overloaded, np.nan, getattr(state, name))
     if output is None:
         (_write_csv if arguments.table == 'csv' else _write_text)(result, sys.stdout)
-    elif output.suffix.lower() == '.csv':
-        with output.open('w', encoding='utf-8', newline='') as stream:
-            _write_csv(result, stream)
-    else:
-        _draw(result, output, _title(arguments, configuration))
+        return 0
+    with new_file(output, arguments.overwrite, _tables(arguments)) as fresh:
+        if output.suffix.lower() == '.csv':
+            with fresh.open('w', encoding='utf-8', newline='') as stream:
+                _write_csv(result, stream)
+        else:
+            _draw(result, fresh, _title(arguments, configuration))
     return 0
 
 
-def _check_output(output: Path, overwrite: bool) -> None:
+def _tables(arguments: argparse.Namespace) -> list[Path]:
+    return [Path(arguments.points)] if arguments.points else []
+
+
+def _check_output(output: Path, overwrite: bool, inputs: list[Path]) -> None:
     if output.suffix.lower() not in (*PICTURES, '.csv'):
         raise UserError(
             f'{output}: what is wanted cannot be told from the name; end it in '
             f'{", ".join(PICTURES)} or .csv'
         )
-    if output.is_dir():
-        raise UserError(f'{output}: is a folder; name a file')
-    if output.exists() and not overwrite:
-        raise UserError(f'{output}: exists already; choose another name or add --overwrite')
     if not output.parent.is_dir():
         raise UserError(f'{output}: there is no folder {output.parent}; make it first')
+    check_file(output, overwrite, inputs)
 
 
 def _points(arguments: argparse.Namespace, configuration: Configuration) -> dict[str, FloatArray]:

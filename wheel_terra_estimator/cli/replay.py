@@ -52,13 +52,17 @@ def run(arguments: argparse.Namespace) -> int:
     from wheel_terra_estimator.bags.replay import replay
     from wheel_terra_estimator.bags.storage import open_bag
     from wheel_terra_estimator.bags.truth import read_truth
+    from wheel_terra_estimator.output_folder import check_file, check_folder
     from wheel_terra_estimator.reporting.drive_summary import as_text, summarise
-    from wheel_terra_estimator.reporting.replay_report import refuse_existing, write_replay_report
+    from wheel_terra_estimator.reporting.replay_report import write_replay_report
 
     configuration = configuration_reader.from_arguments(arguments)
     remaps = parse_remaps(arguments.remap)
+    inputs = [arguments.bag, *([arguments.arrival] if arguments.arrival else [])]
     if arguments.report:
-        refuse_existing(arguments.report, arguments.overwrite)
+        check_file(arguments.report, arguments.overwrite, inputs)
+    if arguments.output:
+        check_folder(arguments.output, arguments.overwrite, inputs)
     with open_bag(arguments.bag) as bag:
         result = replay(
             bag,
@@ -77,6 +81,13 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.output:
         print(f'estimates: {arguments.output}')
     if arguments.report:
-        write_replay_report(arguments.report, summary, result.history, truth, configuration)
+        write_replay_report(
+            arguments.report,
+            summary,
+            result.history,
+            truth,
+            configuration,
+            overwrite=arguments.overwrite,
+        )
         print(f'report: {arguments.report}')
     return 130 if result.interrupted else 0

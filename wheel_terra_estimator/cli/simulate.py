@@ -58,11 +58,11 @@ def run(arguments: argparse.Namespace) -> int:
 
     from tqdm import tqdm
 
-    from wheel_terra_estimator.bags.bag_file import make_room
     from wheel_terra_estimator.bags.simulated_drive import write_simulated_drive
+    from wheel_terra_estimator.output_folder import check_folder
     from wheel_terra_estimator.simulation.drive import Drive
 
-    make_room(arguments.output, arguments.overwrite)
+    check_folder(arguments.output, arguments.overwrite)
     quiet = not sys.stderr.isatty() or duration < 60.0
     with tqdm(total=round(duration), unit='s', disable=quiet, leave=False) as bar:
         drive = Drive(scenario, arguments.seed).run(duration, bar.update)

@@ -101,6 +101,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _run_one(arguments: argparse.Namespace, cache: Path | None) -> int:
+    from wheel_terra_estimator.output_folder import working_folder
     from wheel_terra_estimator.soilbin import output, progress
     from wheel_terra_estimator.soilbin.case import check
     from wheel_terra_estimator.soilbin.launch import StoppedByUserError, run_case
@@ -109,7 +110,7 @@ def _run_one(arguments: argparse.Namespace, cache: Path | None) -> int:
     check(case)
     folder: Path = arguments.output
     work = folder / '.work'
-    prepare_folder(folder, arguments.overwrite, arguments.resume)
+    working_folder(folder, arguments.overwrite, arguments.resume, output.FILES)
     try:
         with progress.bar() as report:
             summary = run_case(case, work, cache, report)
@@ -151,22 +152,3 @@ def case_of(arguments: argparse.Namespace) -> Case:
         speed = arguments.rate * case.wheel.tip_radius / case.operation.speed_factor
         case = case.replace(operation__tip_speed=speed)
     return case
-
-
-def prepare_folder(folder: Path, overwrite: bool, resume: bool) -> None:
-    """Create the output folder; refuse one that exists unless told otherwise."""
-    import shutil
-
-    if folder.exists() and not resume:
-        if not overwrite:
-            raise UserError(
-                f'{folder}: exists already; --resume goes on with it, --overwrite replaces it'
-            )
-        names = {entry.name for entry in folder.iterdir()} if folder.is_dir() else {folder.name}
-        if names and not names & {'summary.json', '.work'}:
-            raise UserError(f'{folder}: is no folder of a run, so it is not overwritten')
-        shutil.rmtree(folder)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise UserError(f'{folder}: cannot be created: {error}') from error

@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from wheel_terra_estimator import __version__
-from wheel_terra_estimator.errors import UserError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -47,12 +46,8 @@ def render(template: str, folder: Path = TEMPLATES, **context: Any) -> str:
 
 
 def write_page(path: Path, page: str) -> None:
-    """Write a page; the folder is made if it is missing."""
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(page, encoding='utf-8')
-    except OSError as error:
-        raise UserError(f'{path}: cannot be written ({error.strerror})') from None
+    """Write a page."""
+    path.write_text(page, encoding='utf-8')
 
 
 def picture(figure: Figure) -> str:

@@ -9,8 +9,8 @@ from pathlib import Path
 from wheel_terra_estimator.bags.history import EstimateHistory
 from wheel_terra_estimator.bags.truth import Truth
 from wheel_terra_estimator.configuration.configuration import Configuration
-from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.estimation.estimates import SlipClass
+from wheel_terra_estimator.output_folder import new_file
 from wheel_terra_estimator.reporting import drive_pictures
 from wheel_terra_estimator.reporting.drive_summary import DriveSummary
 from wheel_terra_estimator.reporting.html import picture, render, write_page
@@ -23,19 +23,22 @@ def write_replay_report(
     history: EstimateHistory,
     truth: Truth | None,
     configuration: Configuration,
+    overwrite: bool = False,
 ) -> None:
     """Write the report of a drive.
 
     Parameters
     ----------
     path : Path
-        HTML file to be written; an earlier one is replaced (see `refuse_existing`).
+        HTML file to be written.
     summary, history : DriveSummary, EstimateHistory
         What happened.
     truth : Truth or None
         Drawn beside the estimates where it is known.
     configuration : Configuration
         Listed at the end, with the sources of the effects in it.
+    overwrite : bool
+        Whether an earlier report is replaced.
     """
     from wheel_terra_estimator.terramechanics.effects import catalogue
 
@@ -56,14 +59,8 @@ def write_replay_report(
         parameters=[(key, values[key]) for key in values if key in configuration.stated],
         sources=[(name, effects[name].source) for name in configuration.effects],
     )
-    write_page(path, page)
-
-
-def refuse_existing(path: Path, overwrite: bool) -> None:
-    """Make sure that a report can be written at ``path``."""
-    if path.exists() and not (overwrite and path.is_file()):
-        cure = 'choose another path' + ('' if path.is_dir() else ' or give --overwrite')
-        raise UserError(f'{path}: exists already; {cure}')
+    with new_file(path, overwrite) as fresh:
+        write_page(fresh, page)
 
 
 def _tone(summary: DriveSummary) -> str:

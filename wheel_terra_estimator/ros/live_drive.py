@@ -46,8 +46,9 @@ from wheel_terra_estimator.configuration import reader as configuration_reader
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.messages.convert import JOINT_OUTPUTS, stamp_of
+from wheel_terra_estimator.output_folder import check_file, check_folder
 from wheel_terra_estimator.reporting.drive_summary import as_text, summarise
-from wheel_terra_estimator.reporting.replay_report import refuse_existing, write_replay_report
+from wheel_terra_estimator.reporting.replay_report import write_replay_report
 from wheel_terra_estimator.ros.estimator_node import MESSAGE_TYPES
 
 QUEUE = 5000
@@ -325,7 +326,8 @@ def _run(arguments: argparse.Namespace) -> None:
     configuration = configuration_reader.from_arguments(arguments)
     remaps = parse_remaps(arguments.remap)
     if arguments.report:
-        refuse_existing(arguments.report, arguments.overwrite)
+        check_file(arguments.report, arguments.overwrite, [arguments.bag])
+    check_folder(arguments.output, arguments.overwrite, [arguments.bag])
     with open_bag(arguments.bag) as bag:
         reader = MeasurementReader(bag, remaps, configuration)
         heard = drive(bag, configuration, remaps, arguments.rate, arguments.arrival)
@@ -341,7 +343,14 @@ def _run(arguments: argparse.Namespace) -> None:
     print(as_text(summary))
     print(f'estimates: {arguments.output}')
     if arguments.report:
-        write_replay_report(arguments.report, summary, history, truth, configuration)
+        write_replay_report(
+            arguments.report,
+            summary,
+            history,
+            truth,
+            configuration,
+            overwrite=arguments.overwrite,
+        )
         print(f'report: {arguments.report}')
 
 

@@ -20,6 +20,7 @@ from wheel_terra_estimator.soilbin.metrics import Row
 from wheel_terra_estimator.soilbin.study import Job
 
 TABLE = 'calibration.csv'
+PAGES = ('calibration_table.md',)
 SLOPES = (0.0, 7.1, 15.0, 25.0)
 FINAL = 'full scale, mu_r 1.0, k_r 2000, standing'
 # Load and pull put on at once, and the speed of the final setting.

@@ -15,6 +15,7 @@ from wheel_terra_estimator.soilbin.reproduction import wheel_case
 from wheel_terra_estimator.soilbin.study import Job
 
 TABLE = 'convergence.csv'
+PAGES = ('convergence_table.md',)
 SLOPES = (15.0, 25.0)
 VARIANTS: dict[str, dict[str, object]] = {
     'coarse (grains x2)': {},

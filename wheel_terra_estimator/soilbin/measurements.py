@@ -16,6 +16,7 @@ from wheel_terra_estimator.soilbin.reproduction import wheel_case
 from wheel_terra_estimator.soilbin.study import Job
 
 TABLE = 'sweep.csv'
+PAGES = ('pull_sweep.csv', 'slip_sweep.csv', 'slopes.csv')
 PULL_RATIOS = (0.0, 0.04, 0.08, 0.12, 0.16, 0.2, 0.24, 0.28, 0.32, 0.36)
 SLIPS = (0.0, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8)
 SLOPES = (0.0, 5.0, 10.0, 15.0, 20.0, 25.0)

@@ -34,6 +34,19 @@ ROW_COLUMNS = (
 )
 
 
+WORK = '.work/'
+FILES = (
+    'summary.json',
+    'time_series.csv',
+    'rows.csv',
+    'bed.png',
+    'time_series.png',
+    'film.gif',
+    WORK,
+)
+"""What a run may leave in its folder."""
+
+
 def measurement_row(case: Case, summary: Mapping[str, object]) -> dict[str, float]:
     """Return the run as one row of a table of steady measurements.
 

@@ -16,6 +16,7 @@ from wheel_terra_estimator.soilbin.metrics import Row
 from wheel_terra_estimator.soilbin.study import Job
 
 TABLE = 'reproduction.csv'
+PAGES = ('comparison.md',)
 PARTS = ('table7', 'table6', 'loads', 'moon')
 WHEELS = range(1, 10)
 SLOPES_TABLE6 = (0.0, 5.0, 10.0, 15.0)

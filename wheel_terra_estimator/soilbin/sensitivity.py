@@ -19,6 +19,7 @@ from wheel_terra_estimator.soilbin.reproduction import MOON, wheel_case
 from wheel_terra_estimator.soilbin.study import Job
 
 TABLE = 'sensitivity.csv'
+PAGES = ('sensitivity_table.md',)
 SLOPES = (15.0, 25.0)
 NO_ROLLING: dict[str, object] = {'grains__rolling_friction': 0.0}
 CALIBRATED = 'calibrated'

@@ -8,7 +8,7 @@ import argparse
 import os
 from pathlib import Path
 
-from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.output_folder import working_folder
 from wheel_terra_estimator.soilbin import (
     calibration,
     convergence,
@@ -16,6 +16,7 @@ from wheel_terra_estimator.soilbin import (
     reproduction,
     sensitivity,
 )
+from wheel_terra_estimator.soilbin.output import WORK
 from wheel_terra_estimator.soilbin.study import Job, run_study
 
 STUDIES = {
@@ -32,11 +33,12 @@ def run(arguments: argparse.Namespace, cache: Path | None) -> int:
     module = STUDIES[arguments.action]
     folder: Path = arguments.output
     table = folder / module.TABLE
-    if folder.exists() and not (arguments.resume or arguments.report_only):
-        if not arguments.overwrite:
-            raise UserError(f'{folder}: exists already; --resume goes on, --overwrite starts anew')
-        for old in (table, *folder.glob('*.md')):
-            old.unlink(missing_ok=True)
+    working_folder(
+        folder,
+        arguments.overwrite,
+        arguments.resume or arguments.report_only,
+        (module.TABLE, *module.PAGES, 'series/', WORK),
+    )
     jobs: list[Job] = module.jobs(arguments)
     workers = 0 if arguments.report_only else arguments.workers or os.cpu_count() or 1
     rows = run_study(jobs, table, folder / '.work', cache, workers, arguments.dask)

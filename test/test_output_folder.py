@@ -1,0 +1,222 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Output folders are whole or not there, and nobody else's file is ever removed."""
+
+from __future__ import annotations
+
+import errno
+import json
+from pathlib import Path
+
+import pytest
+
+from wheel_terra_estimator.cli.main import main
+from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.output_folder import (
+    MARKER,
+    check_file,
+    check_folder,
+    new_file,
+    new_folder,
+    working_folder,
+)
+
+
+def write(path: Path, overwrite: bool = False, content: str = 'new') -> None:
+    with new_folder(path, overwrite) as folder:
+        (folder / 'report.json').write_text(content)
+        (folder / 'below').mkdir()
+        (folder / 'below' / 'picture.png').write_text(content)
+
+
+def contents(folder: Path) -> dict[str, str]:
+    return {
+        str(p.relative_to(folder)): p.read_text()
+        for p in folder.rglob('*')
+        if p.is_file() and p.name != MARKER
+    }
+
+
+def test_folder_is_there_when_it_is_whole_and_lists_what_it_holds(tmp_path: Path) -> None:
+    out = tmp_path / 'new' / 'out'
+    with new_folder(out) as folder:
+        (folder / 'a.txt').write_text('a')
+        assert not out.exists()
+        assert folder.name == 'out'
+    assert json.loads((out / MARKER).read_text())['files'] == ['a.txt']
+    assert [p.name for p in out.parent.iterdir()] == ['out']
+
+
+def test_overwrite_replaces_what_was_listed_and_nothing_else(tmp_path: Path) -> None:
+    out = tmp_path / 'out'
+    write(out, content='old')
+    with pytest.raises(UserError, match='exists already'):
+        write(out)
+    write(out, overwrite=True)
+    assert contents(out) == {'report.json': 'new', 'below/picture.png': 'new'}
+    (out / 'below' / 'thesis.md').write_text('years of work')
+    with pytest.raises(UserError, match=r'holds below/thesis\.md, which this program'):
+        write(out, overwrite=True)
+    assert len(contents(out)) == 3
+    assert [p.name for p in tmp_path.iterdir()] == ['out']
+
+
+@pytest.mark.parametrize('foreign', ['summary.json', 'report.json', 'x.mcap', 'notes.md', 'deep/'])
+def test_a_folder_without_our_list_is_never_overwritten(tmp_path: Path, foreign: str) -> None:
+    out = tmp_path / 'out'
+    out.mkdir()
+    (out / foreign).mkdir() if foreign.endswith('/') else (out / foreign).write_text('mine')
+    with pytest.raises(UserError, match='not overwritten'):
+        write(out, overwrite=True)
+    with pytest.raises(UserError, match='not overwritten'):
+        working_folder(out, True, False, ['summary.json'])
+    assert (out / foreign).exists()
+
+
+@pytest.mark.parametrize(
+    'marker',
+    [
+        '',
+        '[]',
+        '{"files": 1}',
+        '{"files": ["../../victim"]}',
+        '{"files": ["/etc/passwd"]}',
+        '[' * 10000,
+    ],
+)
+def test_a_forged_marker_removes_nothing(tmp_path: Path, marker: str) -> None:
+    out = tmp_path / 'a' / 'out'
+    out.mkdir(parents=True)
+    (tmp_path / 'victim').write_text('mine')
+    (out / MARKER).write_text(marker)
+    with pytest.raises(UserError, match='is not a list of files'):
+        write(out, overwrite=True)
+    assert (tmp_path / 'victim').exists()
+
+
+def test_places_that_no_command_replaces(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    work, home = tmp_path / 'work', tmp_path / 'users' / 'ann'
+    work.mkdir()
+    home.mkdir(parents=True)
+    monkeypatch.chdir(work)
+    monkeypatch.setenv('HOME', str(home))
+    link, loop = tmp_path / 'link', tmp_path / 'loop'
+    link.symlink_to(work)
+    loop.symlink_to(loop)
+    bag = tmp_path / 'bags' / 'bag'
+    bag.mkdir(parents=True)
+    for path, words in (
+        (Path(), 'working folder'),
+        (Path('..'), 'working folder'),
+        (tmp_path, 'working folder'),
+        (home, 'home'),
+        (home.parent, 'home'),
+        (link, 'is a link'),
+        (loop, 'is a link'),
+        (bag, 'which the command reads'),
+        (bag.parent, 'which the command reads'),
+        (bag / 'out', 'which the command reads'),
+        (loop / 'out', 'cannot be'),
+    ):
+        for overwrite in (False, True):
+            with pytest.raises(UserError, match=words) as caught:
+                check_folder(path, overwrite, [bag])
+            assert '\n' not in str(caught.value)
+
+
+def test_an_error_leaves_the_earlier_output_and_nothing_beside_it(tmp_path: Path) -> None:
+    out = tmp_path / 'out'
+    write(out, content='old')
+    for error, seen in ((OSError(errno.ENOSPC, 'No space left on device'), UserError),
+                        (KeyboardInterrupt(), KeyboardInterrupt)):  # fmt: skip
+        with pytest.raises(seen), new_folder(out, True) as folder:
+            (folder / 'half').write_text('half')
+            raise error
+        assert contents(out) == {'report.json': 'old', 'below/picture.png': 'old'}
+        assert [p.name for p in tmp_path.iterdir()] == ['out']
+
+
+def test_what_was_written_before_an_error_is_kept_where_asked(tmp_path: Path) -> None:
+    out = tmp_path / 'out'
+    with (
+        pytest.raises(UserError, match='free some space'),
+        new_folder(out, keep_partial=True) as folder,
+    ):
+        (folder / 'half').write_text('half')
+        raise OSError(errno.ENOSPC, 'No space left on device')
+    assert contents(out) == {'half': 'half'}
+    write(out, overwrite=True)
+    assert 'half' not in contents(out)
+
+
+def test_a_file_is_replaced_only_when_told_so(tmp_path: Path) -> None:
+    report = tmp_path / 'r.html'
+    report.write_text('old')
+    with pytest.raises(UserError, match='exists already'):
+        check_file(report, False)
+    with pytest.raises(RuntimeError), new_file(report, True) as path:
+        path.write_text('half')
+        raise RuntimeError
+    assert report.read_text() == 'old'
+    with new_file(report, True) as path:
+        path.write_text('new')
+    assert report.read_text() == 'new'
+    link = tmp_path / 'link.html'
+    link.symlink_to(report)
+    for path, words in (
+        (link, 'a link or a device'),
+        (Path('/dev/full'), 'a link or a device'),
+        (tmp_path, 'is a folder'),
+        (report, 'what the command reads'),
+    ):
+        with pytest.raises(UserError, match=words):
+            check_file(path, True, [report])
+    assert [p.name for p in sorted(tmp_path.iterdir())] == ['link.html', 'r.html']
+
+
+def test_a_report_in_an_output_folder_is_listed(tmp_path: Path) -> None:
+    out = tmp_path / 'out'
+    write(out)
+    with new_file(out / 'r.html') as path:
+        path.write_text('page')
+    write(out, overwrite=True)
+    assert set(contents(out)) == {'report.json', 'below/picture.png'}
+
+
+def test_a_working_folder_goes_on_or_starts_anew(tmp_path: Path) -> None:
+    run = tmp_path / 'run'
+    entries = ['summary.json', '.work/']
+    working_folder(run, False, False, entries)
+    (run / '.work' / 'frames').mkdir(parents=True)
+    (run / '.work' / 'frames' / '0.npz').write_text('0')
+    with pytest.raises(UserError, match='--resume goes on with it, --overwrite replaces it'):
+        working_folder(run, False, False, entries)
+    working_folder(run, False, True, entries)
+    assert '.work/frames/0.npz' in contents(run)
+    working_folder(run, True, False, entries)
+    assert contents(run) == {}
+    (run / 'notes.md').write_text('mine')
+    with pytest.raises(UserError, match=r'notes\.md'):
+        working_folder(run, True, False, entries)
+    assert contents(run) == {'notes.md': 'mine'}
+
+
+def test_commands_refuse_folders_of_others(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    """Of every command a folder with files of the kinds that it writes, but not by it."""
+    z = tmp_path / 'z'
+    z.mkdir()
+    for name in ('notes.md', 'summary.json', 'report.json', 'holiday.png', 'x.mcap'):
+        (z / name).write_text('mine')
+    table = tmp_path / 't.csv'
+    table.write_text('slip,normal_load,sinkage\n0.1,100,0.01\n')
+    for command in (
+        ['soilbin', 'rows', '--sweep', 'pull'],
+        ['soilbin', 'run', 'quick'],
+        ['diagnose', str(table)],
+        ['simulate', '--duration', '1'],
+    ):
+        assert main([*command, '-o', str(z), '--overwrite']) == 2
+        said = capsys.readouterr().err
+        assert 'is not overwritten' in said
+        assert said.count('\n') == 1
+    assert len(contents(z)) == 5

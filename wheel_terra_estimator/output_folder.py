@@ -1,0 +1,371 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Where a command writes: folders and files that are whole or not there, and never anybody else's.
+
+Every command with ``-o`` or ``--report`` uses this module. A folder::
+
+    check_folder(arguments.output, arguments.overwrite, inputs=[arguments.bag])  # before computing
+    ...
+    with new_folder(arguments.output, arguments.overwrite, inputs=[arguments.bag]) as folder:
+        (folder / 'report.json').write_text(...)  # `folder` is empty and lies beside the place
+
+When the block ends, everything in ``folder`` is listed in its marker (``.wheel-terra.json``) and
+the folder is renamed to its place; after an error nothing is left and an earlier output stands
+as it was. A file::
+
+    check_file(arguments.report, arguments.overwrite, inputs=[arguments.bag])
+    ...
+    with new_file(arguments.report, arguments.overwrite) as path:
+        path.write_text(...)
+
+A command that can go on with a folder (``--resume``) writes in place, see `working_folder`.
+Errors of the disk inside the blocks become a `UserError` of one line.
+"""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import shutil
+import tempfile
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path, PurePosixPath
+
+from wheel_terra_estimator import __version__
+from wheel_terra_estimator.errors import UserError
+
+MARKER = '.wheel-terra.json'
+"""File in an output folder that lists what the program wrote there; folders end in ``/``."""
+
+LARGEST_MARKER = 16 * 2**20
+"""A marker is a short list: a longer file [byte] is none of ours."""
+
+
+def check_folder(path: Path, overwrite: bool, inputs: Iterable[Path] = ()) -> None:
+    """Make sure, before anything is computed, that a folder can be written at ``path``.
+
+    Parameters
+    ----------
+    path : Path
+        Folder that the command is to write.
+    overwrite : bool
+        Whether an earlier output of this program may be replaced.
+    inputs : iterable of Path
+        What the command reads; the output may neither hold it nor lie in it.
+
+    Raises
+    ------
+    UserError
+        The folder exists (and `overwrite` was not given, or it holds something that no earlier run
+        listed), is the working folder, a home, a link, holds an input, or cannot be written.
+    """
+    try:
+        _refuse_place(path, inputs)
+        if path.exists():
+            if not overwrite:
+                raise UserError(f'{path}: exists already; choose another path or give --overwrite')
+            if not path.is_dir():
+                raise UserError(f'{path}: is not a folder; choose another path')
+            _own_files(path)
+        _try_to_write(path)
+    except OSError as error:
+        raise cannot_write(path, error) from None
+
+
+def check_file(path: Path, overwrite: bool, inputs: Iterable[Path] = ()) -> None:
+    """Make sure that a file can be written at ``path``; see `check_folder`.
+
+    Raises
+    ------
+    UserError
+        The file exists (and `overwrite` was not given), is no regular file, is an input, or its
+        folder cannot be written.
+    """
+    try:
+        if path.is_symlink() or (path.exists() and not path.is_file()):
+            kind = 'a folder' if path.is_dir() else 'a link or a device, no regular file'
+            raise UserError(f'{path}: is {kind}; choose another path')
+        if path.exists():
+            if any(given.exists() and path.samefile(given) for given in inputs):
+                raise UserError(f'{path}: is what the command reads; choose another path')
+            if not overwrite:
+                raise UserError(f'{path}: exists already; choose another path or give --overwrite')
+        _try_to_write(path)
+    except OSError as error:
+        raise cannot_write(path, error) from None
+
+
+@contextmanager
+def new_folder(
+    path: Path, overwrite: bool = False, inputs: Iterable[Path] = (), keep_partial: bool = False
+) -> Iterator[Path]:
+    """Yield an empty folder to be filled; at the end of the block it is at ``path``.
+
+    Parameters
+    ----------
+    path, overwrite, inputs
+        As in `check_folder`.
+    keep_partial : bool
+        Whether what was written before an error is put in its place as well, unless an earlier
+        output stands there.
+
+    Raises
+    ------
+    UserError
+        See `check_folder`; the disk is full or fails.
+    """
+    check_folder(path, overwrite, inputs)
+    path = _absolute(path)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        beside = Path(tempfile.mkdtemp(dir=path.parent, prefix=f'.{path.name}.wheel-terra-'))
+    except OSError as error:
+        raise cannot_write(path, error) from None
+    try:
+        fresh = beside / path.name
+        try:
+            fresh.mkdir()
+            yield fresh
+        except BaseException:
+            if keep_partial and fresh.is_dir() and not path.exists():
+                with suppress(OSError):
+                    mark(fresh)
+                with suppress(OSError):
+                    fresh.rename(path)
+            raise
+        mark(fresh)
+        _put_in_place(fresh, path, beside)
+    except OSError as error:
+        raise cannot_write(path, error) from None
+    finally:
+        shutil.rmtree(beside, ignore_errors=True)
+
+
+@contextmanager
+def new_file(path: Path, overwrite: bool = False, inputs: Iterable[Path] = ()) -> Iterator[Path]:
+    """Yield the path of a file to be written; at the end of the block it is at ``path``.
+
+    Its folder is made if it is missing; in a folder of ours the marker then lists the file.
+
+    Raises
+    ------
+    UserError
+        See `check_file`; the disk is full or fails.
+    """
+    check_file(path, overwrite, inputs)
+    path = _absolute(path)
+    beside: Path | None = None
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        beside = Path(tempfile.mkdtemp(dir=path.parent, prefix=f'.{path.name}.wheel-terra-'))
+        yield beside / path.name
+        (beside / path.name).replace(path)
+        if (path.parent / MARKER).is_file():
+            listed = _listed(path.parent)
+            _write_marker(path.parent, {*listed, path.name})
+    except OSError as error:
+        raise cannot_write(path, error) from None
+    finally:
+        if beside is not None:
+            shutil.rmtree(beside, ignore_errors=True)
+
+
+def working_folder(path: Path, overwrite: bool, resume: bool, entries: Iterable[str]) -> None:
+    """Make a folder that a command fills in place, so that an interrupted run can go on.
+
+    Parameters
+    ----------
+    path, overwrite
+        As in `check_folder`; what an earlier run listed is removed at once.
+    resume : bool
+        Whether to go on with a folder as it is.
+    entries : iterable of str
+        All names that the command may write there, as in `mark`.
+
+    Raises
+    ------
+    UserError
+        See `check_folder`.
+    """
+    if resume and path.exists():
+        _refuse_place(path, ())
+    elif path.exists() and not overwrite:
+        raise UserError(
+            f'{path}: exists already; --resume goes on with it, --overwrite replaces it'
+        )
+    else:
+        check_folder(path, overwrite)
+    try:
+        if path.exists() and not resume:
+            _remove_own_files(path)
+        path.mkdir(parents=True, exist_ok=True)
+        mark(path, entries)
+    except OSError as error:
+        raise cannot_write(path, error) from None
+
+
+def mark(folder: Path, entries: Iterable[str] | None = None) -> None:
+    """List files in the marker of a folder.
+
+    Parameters
+    ----------
+    folder : Path
+        Output folder.
+    entries : iterable of str, optional
+        Names relative to the folder, added to those listed already; a name that ends in ``/``
+        stands for a folder with all that it holds. Default: everything that is there now.
+    """
+    if entries is None:
+        entries = (name for name in _files(folder) if name != MARKER)
+    earlier = _listed(folder) if (folder / MARKER).is_file() else ()
+    _write_marker(folder, {*earlier, *entries})
+
+
+def is_ours(folder: Path) -> bool:
+    """Whether a folder bears the marker of this program."""
+    return (folder / MARKER).is_file()
+
+
+def cannot_write(path: Path, error: OSError) -> UserError:
+    """Return the one line for an error of the disk."""
+    reason = error.strerror or str(error) or type(error).__name__
+    cure = {
+        errno.ENOSPC: '; free some space',
+        errno.EDQUOT: '; free some space',
+        errno.EROFS: '; choose another place',
+        errno.EACCES: '; choose another place',
+    }.get(error.errno or 0, '')
+    return UserError(f'{path}: cannot be written ({reason}){cure}')
+
+
+def _refuse_place(path: Path, inputs: Iterable[Path]) -> None:
+    """Refuse places that no command may replace, whatever they hold."""
+    if path.is_symlink():
+        raise UserError(f'{path}: is a link; name the folder itself, or choose another path')
+    try:
+        target = path.resolve()
+    except (OSError, RuntimeError) as error:  # RuntimeError: a loop of links (Python < 3.13)
+        raise UserError(f'{path}: cannot be followed ({error}); choose another path') from None
+    for place, words in (
+        (Path.cwd(), 'is the working folder or holds it'),
+        (_home(), 'is a home folder or holds one'),
+    ):
+        if place is not None and (target == place or target in place.parents):
+            raise UserError(f'{path}: {words}; name a new folder')
+    for given in inputs:
+        source = given.resolve()
+        inside = source in target.parents and given.is_dir()
+        if source == target or target in source.parents or inside:
+            raise UserError(
+                f'{path}: is, or lies in, or holds {given}, which the command reads; '
+                'choose another path'
+            )
+
+
+def _home() -> Path | None:
+    try:
+        return Path.home().resolve()
+    except (OSError, RuntimeError):
+        return None
+
+
+def _absolute(path: Path) -> Path:
+    """Return the path with its folder resolved, so that a name such as ``a/..`` is plain."""
+    return path.parent.resolve() / path.name if path.name not in ('', '..') else path.resolve()
+
+
+def _try_to_write(path: Path) -> None:
+    """Find out whether the nearest folder that exists takes new entries."""
+    place = _absolute(path).parent
+    while not place.exists() and place != place.parent:
+        place = place.parent
+    with tempfile.TemporaryDirectory(dir=place, prefix='.wheel-terra-'):
+        pass
+
+
+def _listed(folder: Path) -> set[str]:
+    """Return what the marker of a folder lists."""
+    marker = folder / MARKER
+    try:
+        if marker.is_symlink() or marker.stat().st_size > LARGEST_MARKER:
+            raise ValueError
+        names = json.loads(marker.read_text(encoding='utf-8'))['files']
+        if not all(isinstance(name, str) and _stays_inside(name) for name in names):
+            raise ValueError
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+        raise UserError(
+            f'{marker}: is not a list of files of this program, so {folder} is not overwritten; '
+            'choose another path'
+        ) from None
+    return set(names)
+
+
+def _stays_inside(name: str) -> bool:
+    parts = PurePosixPath(name)
+    return bool(parts.parts) and not parts.is_absolute() and '..' not in parts.parts
+
+
+def _files(folder: Path, prefix: str = '') -> Iterator[str]:
+    """Yield what a folder holds: files, links and empty folders (with ``/``), never followed."""
+    for entry in sorted(os.scandir(folder), key=lambda entry: entry.name):
+        name = prefix + entry.name
+        if entry.is_dir(follow_symlinks=False):
+            inner = list(_files(Path(entry.path), f'{name}/'))
+            yield from inner or [f'{name}/']
+        else:
+            yield name
+
+
+def _own_files(folder: Path) -> list[str]:
+    """Return what a folder holds, all of it ours; anything else is an error."""
+    there = [name for name in _files(folder) if name != MARKER]
+    if there and not is_ours(folder):
+        raise UserError(
+            f'{folder}: holds {there[0]} and no list of what this program wrote ({MARKER}), so it '
+            'is not overwritten; choose another path, or remove it yourself'
+        )
+    listed = _listed(folder) if is_ours(folder) else set()
+    whole = tuple(name for name in listed if name.endswith('/'))
+    strangers = [name for name in there if name not in listed and not name.startswith(whole)]
+    if strangers:
+        raise UserError(
+            f'{folder}: holds {strangers[0]}, which this program did not write, so it is not '
+            'overwritten; choose another path, or take that file away'
+        )
+    return there
+
+
+def _remove_own_files(folder: Path) -> None:
+    for name in _own_files(folder):
+        entry = folder / name
+        entry.rmdir() if name.endswith('/') else entry.unlink()
+    (folder / MARKER).unlink(missing_ok=True)
+    for below in sorted(
+        (Path(place) for place, _, _ in os.walk(folder)), key=lambda p: len(p.parts), reverse=True
+    ):
+        below.rmdir()
+
+
+def _put_in_place(fresh: Path, path: Path, beside: Path) -> None:
+    """Rename the new folder to its place; an earlier one, if all of it is ours, goes."""
+    if not path.exists():
+        fresh.rename(path)
+        return
+    _own_files(path)  # somebody may have put a file there in the meantime
+    earlier = beside / 'earlier'
+    path.rename(earlier)
+    try:
+        fresh.rename(path)
+    except OSError:
+        earlier.rename(path)
+        raise
+
+
+def _write_marker(folder: Path, names: Iterable[str]) -> None:
+    marker = folder / MARKER
+    part = folder / f'{MARKER}.part'
+    content = {'program': f'wheel-terra {__version__}', 'files': sorted(names)}
+    part.write_text(json.dumps(content, indent=1) + '\n', encoding='utf-8')
+    part.replace(marker)
