@@ -33,7 +33,7 @@ help:
 	@sed -n 's/^# \(make .*\)/\1/p' Makefile
 
 demo: $(VENV)/.runtime
-	@$(BIN)/python tools/demo.py
+	@$(BIN)/python -m wheel_terra_estimator.cli.main demo --overwrite
 
 test: $(VENV)/.test
 	$(BIN)/python -m pytest -m 'not slow' $(PYTEST_ARGUMENTS)

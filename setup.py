@@ -2,12 +2,43 @@
 # SPDX-License-Identifier: Apache-2.0
 """Build script, used by pip and by colcon (ament_python) alike."""
 
+import re
 from pathlib import Path
 
+import setuptools
 from setuptools import find_packages, setup
 
 PACKAGE = 'wheel_terra_estimator'
 HERE = Path(__file__).resolve().parent
+SHARED = ('config', 'data', 'launch', 'layouts')
+"""Folders of files that are installed as they are; one that is absent is passed over."""
+PACKAGE_DATA = ('html', 'css', 'js', 'json', 'csv', 'npz', 'txt')
+CLASSIFIERS = [
+    'Development Status :: 4 - Beta',
+    'Environment :: Console',
+    'Intended Audience :: Science/Research',
+    'Operating System :: POSIX :: Linux',
+    'Programming Language :: Python :: 3',
+    'Programming Language :: Python :: 3 :: Only',
+    'Programming Language :: Python :: 3.10',
+    'Programming Language :: Python :: 3.11',
+    'Programming Language :: Python :: 3.12',
+    'Topic :: Scientific/Engineering :: Physics',
+    'Typing :: Typed',
+]
+
+
+def version() -> str:
+    """Return the version, which stands in the package alone."""
+    text = (HERE / PACKAGE / '__init__.py').read_text(encoding='utf-8')
+    return re.findall(r"^__version__ = '([\d.]+)'$", text, re.MULTILINE)[0]
+
+
+def licence() -> dict[str, str]:
+    """Return the SPDX expression under the name that this setuptools knows."""
+    if int(setuptools.__version__.split('.')[0]) >= 77:
+        return {'license_expression': 'Apache-2.0'}
+    return {'license': 'Apache-2.0'}
 
 
 def shared_files() -> list[tuple[str, list[str]]]:
@@ -17,13 +48,15 @@ def shared_files() -> list[tuple[str, list[str]]]:
         ('share/ament_index/resource_index/packages', [f'resource/{PACKAGE}']),
         (str(share), ['package.xml']),
     ]
-    for top in ('config', 'launch'):
+    for top in SHARED:
+        if not (HERE / top).is_dir():
+            continue
         folders = [HERE / top, *(p for p in (HERE / top).rglob('*') if p.is_dir())]
         for folder in sorted(folders):
             files = sorted(
                 str(p.relative_to(HERE))
                 for p in folder.iterdir()
-                if p.is_file() and p.suffix != '.pyc'
+                if p.is_file() and p.suffix != '.pyc' and not p.name.startswith('.')
             )
             if files:
                 found.append((str(share / folder.relative_to(HERE)), files))
@@ -32,9 +65,11 @@ def shared_files() -> list[tuple[str, list[str]]]:
 
 setup(
     name=PACKAGE,
-    version='0.1.0',
+    version=version(),
     packages=find_packages(include=[PACKAGE, f'{PACKAGE}.*']),
-    package_data={PACKAGE: ['py.typed', '**/*.html', '**/*.json', '**/*.csv', '**/*.npz']},
+    package_data={
+        PACKAGE: ['py.typed', '**/*.html', '**/*.json', '**/*.csv', '**/*.npz', '**/*.js']
+    },
     data_files=shared_files(),
     zip_safe=False,
     python_requires='>=3.10',
@@ -72,9 +107,14 @@ setup(
     },
     author='wheel_terra_estimator developers',
     maintainer='wheel_terra_estimator developers',
-    maintainer_email='maintainers@wheel-terra.org',
+    maintainer_email='maintainers@example.org',
     description='Slip, sinkage and drawbar pull of rover wheels in loose soil',
-    license='Apache-2.0',
+    long_description=(HERE / 'README.md').read_text(encoding='utf-8'),
+    long_description_content_type='text/markdown',
+    keywords=['terramechanics', 'rover', 'wheel slip', 'sinkage', 'drawbar pull', 'ROS 2'],
+    classifiers=CLASSIFIERS,
+    license_files=['LICENSE', 'data/demo/PATHFINDER_LICENSE.txt'],
+    **licence(),
     entry_points={
         'console_scripts': [
             'wheel-terra = wheel_terra_estimator.cli.main:main',

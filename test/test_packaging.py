@@ -32,6 +32,13 @@ def setup_text() -> str:
     return (ROOT / 'setup.py').read_text()
 
 
+def setup_functions() -> dict:
+    """Return what setup.py defines, without running its setup()."""
+    namespace: dict = {'__file__': str(ROOT / 'setup.py')}
+    exec(compile(setup_text().split('\nsetup(')[0], 'setup.py', 'exec'), namespace)
+    return namespace
+
+
 def entry_points() -> dict[str, tuple[str, str]]:
     found = re.findall(r"'([\w-]+) = ([\w.]+):(\w+)'", setup_text())
     return {name: (module, function) for name, module, function in found}
@@ -62,10 +69,25 @@ def test_rosdep_keys_only(manifest: ElementTree.Element) -> None:
 def test_one_version_everywhere(manifest: ElementTree.Element) -> None:
     versions = {
         manifest.findtext('version'),
-        re.search(r"version='([\d.]+)'", setup_text())[1],
+        setup_functions()['version'](),
         wheel_terra_estimator.__version__,
+        re.search(r'^version: (.+)$', (ROOT / 'CITATION.cff').read_text(), re.MULTILINE)[1],
     }
     assert versions == {'0.1.0'}
+
+
+def test_every_pin_has_a_hash_and_the_version_of_its_source() -> None:
+    for path in sorted((ROOT / 'requirements').glob('*.txt')):
+        pinned = re.split(r'\n(?=\S)', path.read_text())
+        packages = [entry for entry in pinned if not entry.startswith('#')]
+        assert packages, path
+        assert all('--hash=sha256:' in entry for entry in packages), path
+        versions = {re.sub('[-_.]+', '-', e.split()[0]).lower() for e in packages}
+        by_hand = path.with_suffix('.in').read_text().splitlines()
+        for line in by_hand:
+            if line and not line.startswith(('#', '-')):
+                wanted = re.sub('[-_.]+', '-', re.split(r'[;\s]', line)[0]).lower()
+                assert wanted in versions, f'{line}: run requirements/compile'
 
 
 def test_every_source_file_has_its_licence() -> None:
@@ -118,15 +140,12 @@ def test_shipped_files_load(name: str) -> None:
 
 
 def test_every_shipped_folder_is_installed() -> None:
-    # Not run as a whole: only the list of shared files is wanted.
-    namespace: dict = {'__file__': str(ROOT / 'setup.py')}
-    exec(compile(setup_text().split('\nsetup(')[0], 'setup.py', 'exec'), namespace)
-    installed = {file for _, files in namespace['shared_files']() for file in files}
+    installed = {file for _, files in setup_functions()['shared_files']() for file in files}
     on_disk = {
         p.relative_to(ROOT).as_posix()
-        for top in ('config', 'launch')
+        for top in ('config', 'data', 'launch', 'layouts')
         for p in (ROOT / top).rglob('*')
-        if p.is_file() and p.suffix != '.pyc'
+        if p.is_file() and p.suffix != '.pyc' and not p.name.startswith('.')
     }
     assert on_disk <= installed
     assert 'package.xml' in installed

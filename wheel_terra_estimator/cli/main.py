@@ -15,7 +15,7 @@ from wheel_terra_estimator.errors import UserError
 
 # Each module has SUMMARY, add_arguments(parser) and run(arguments) -> exit status; it imports
 # heavy libraries inside run, so that help and the light commands start at once.
-COMMANDS = ('simulate', 'replay', 'predict', 'diagnose', 'effects', 'soilbin', 'evaluate')
+COMMANDS = ('simulate', 'replay', 'predict', 'diagnose', 'effects', 'soilbin', 'evaluate', 'demo')
 
 
 def build_parser() -> argparse.ArgumentParser:

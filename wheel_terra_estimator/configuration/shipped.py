@@ -22,20 +22,29 @@ def configuration_folder() -> Path:
     ``share`` of a prefix above the package, or of another one that the installer's record or
     ``AMENT_PREFIX_PATH`` names.
     """
-    for folder in _candidates():
+    return _shipped_folder('config')
+
+
+def demo_recording(name: str) -> Path:
+    """Return the folder of a recording that is shipped for ``wheel-terra demo``."""
+    return _shipped_folder('data') / 'demo' / name
+
+
+def _shipped_folder(top: str) -> Path:
+    for folder in _candidates(top):
         if folder.is_dir():
             return folder
     raise UserError(
-        f'the shipped files (share/{PACKAGE}/config) were not found; install {PACKAGE} with pip or '
+        f'the shipped files (share/{PACKAGE}/{top}) were not found; install {PACKAGE} with pip or '
         'colcon, or name files by their path'
     )
 
 
-def _candidates() -> Iterator[Path]:
+def _candidates(top: str) -> Iterator[Path]:
     package = Path(__file__).resolve().parents[1]
     if (package.parent / 'package.xml').is_file():
-        yield package.parent / 'config'
-    below = Path('share') / PACKAGE / 'config'
+        yield package.parent / top
+    below = Path('share') / PACKAGE / top
     for prefix in package.parents:
         yield prefix / below
     try:
@@ -46,7 +55,7 @@ def _candidates() -> Iterator[Path]:
     for entry in recorded:
         if marker in entry.as_posix():
             located = Path(str(entry.locate())).resolve()
-            yield next(p for p in located.parents if p.name == 'config')
+            yield next(p for p in located.parents if p.name == top)
             break
     for prefix_text in os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep):
         if prefix_text:

@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""``make demo``: two shipped drives through the real node, with reports and key numbers.
+"""``wheel-terra demo``: two shipped drives through the real node, with reports and key numbers.
 
 The entrapment of a simulated six-wheel rover, whose ground truth is known, and a piece of a real
 drive of the Pathfinder rover. The node hears them over DDS; where there is no rclpy the same drives
@@ -9,25 +9,26 @@ go through ``wheel-terra replay``, which gives the same numbers.
 
 from __future__ import annotations
 
+import argparse
 import importlib.util
 import os
 import subprocess
 import sys
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from wheel_terra_estimator.bags.history import EstimateHistory, read_estimates
-from wheel_terra_estimator.bags.storage import open_bag
-from wheel_terra_estimator.bags.truth import Truth, read_truth
-from wheel_terra_estimator.configuration import reader
-from wheel_terra_estimator.reporting.drive_pictures import overview
-from wheel_terra_estimator.reporting.style import picture_style
-from wheel_terra_estimator.simulation.truth import entrapped
+from wheel_terra_estimator.errors import UserError
 
-ROOT = Path(__file__).resolve().parents[1]
-OUTPUT = ROOT / 'demo_output'
+if TYPE_CHECKING:
+    from wheel_terra_estimator.bags.history import EstimateHistory
+    from wheel_terra_estimator.bags.truth import Truth
+
+SUMMARY = 'run the estimator over two shipped drives and report'
+EXAMPLES = ('wheel-terra demo', 'wheel-terra demo --no-node -o /tmp/demo --overwrite')
+SETTLED = 10.0
+"""Seconds at the start that the figures against the truth leave out [s]."""
 
 
 class DemoDrive(NamedTuple):
@@ -54,37 +55,72 @@ DRIVES = (
 )
 
 
-def main() -> int:
-    """Run the demonstration."""
-    live = importlib.util.find_spec('rclpy') is not None
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of the command."""
+    parser.add_argument(
+        '-o',
+        dest='output',
+        type=Path,
+        default=Path('demo_output'),
+        metavar='DIR',
+        help='folder for estimates, reports and pictures (default demo_output)',
+    )
+    parser.add_argument(
+        '--no-node', action='store_true', help='replay the drives even where rclpy is at hand'
+    )
+    parser.add_argument(
+        '--overwrite', action='store_true', help='replace the output of an earlier demo'
+    )
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Run the command."""
+    output: Path = arguments.output
+    _make_room(output, arguments.overwrite)
+    live = not arguments.no_node and importlib.util.find_spec('rclpy') is not None
     if live:
         print('The drives go over DDS to estimator_node, as fast as it takes them.')
     else:
-        print(
-            'There is no rclpy here (no wheels for this platform, no sourced Jazzy): the same '
-            'drives go through `wheel-terra replay` instead of the node.'
-        )
-    OUTPUT.mkdir(exist_ok=True)
+        why = '' if arguments.no_node else 'There is no rclpy here (no sourced Jazzy): '
+        print(f'{why}the drives go through `wheel-terra replay`; the numbers are the same.')
     reports = []
     for drive in DRIVES:
         print(f'\n=== {drive.name}: {drive.title}\n', flush=True)
-        status = subprocess.run(_command(drive, live), env=_environment(), check=False).returncode
+        status = subprocess.run(
+            _command(drive, output, live), env=_environment(), check=False
+        ).returncode
         if status:
             return status
-        _key_numbers(drive)
-        reports.append(OUTPUT / f'{drive.name}.html')
+        _key_numbers(drive, output)
+        reports.append(output / f'{drive.name}.html')
     print('\nReports with pictures, to be opened in a browser:')
     for report in reports:
-        print(f'  {report}')
+        print(f'  {report.resolve()}')
     return 0
 
 
-def _command(drive: DemoDrive, live: bool) -> list[str]:
+def _make_room(output: Path, overwrite: bool) -> None:
+    """Refuse what is taken; each file of an earlier demo is replaced as it is written anew."""
+    if output.exists() and not output.is_dir():
+        raise UserError(f'{output}: is a file; choose another folder with -o')
+    if output.exists() and any(output.iterdir()) and not overwrite:
+        raise UserError(f'{output}: exists already; choose another with -o or add --overwrite')
+    try:
+        output.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UserError(
+            f'{output}: cannot be made ({error.strerror}); choose another with -o'
+        ) from None
+
+
+def _command(drive: DemoDrive, output: Path, live: bool) -> list[str]:
+    from wheel_terra_estimator.configuration.shipped import demo_recording
+
     program = ['wheel_terra_estimator.ros.live_drive']
     if not live:
         program = ['wheel_terra_estimator.cli.main', 'replay']
-    command = [sys.executable, '-m', *program, str(_recording(drive))]
-    command += ['-o', str(OUTPUT / drive.name), '--report', str(OUTPUT / f'{drive.name}.html')]
+    command = [sys.executable, '-m', *program, str(demo_recording(drive.name))]
+    command += ['-o', str(output / drive.name), '--report', str(output / f'{drive.name}.html')]
     for name in drive.configuration:
         command += ['--config', name]
     for remap in drive.remaps:
@@ -103,23 +139,28 @@ def _environment() -> dict[str, str]:
     return {**own, **os.environ}
 
 
-def _recording(drive: DemoDrive) -> Path:
-    return ROOT / 'data' / 'demo' / drive.name
-
-
-def _key_numbers(drive: DemoDrive) -> None:
+def _key_numbers(drive: DemoDrive, output: Path) -> None:
     """Print how the estimates compare with the truth in the recording."""
+    from wheel_terra_estimator.bags.history import read_estimates
+    from wheel_terra_estimator.bags.storage import open_bag
+    from wheel_terra_estimator.bags.truth import read_truth
+    from wheel_terra_estimator.configuration import reader
+    from wheel_terra_estimator.configuration.shipped import demo_recording
+    from wheel_terra_estimator.reporting.drive_pictures import overview
+    from wheel_terra_estimator.reporting.style import picture_style
+    from wheel_terra_estimator.simulation.truth import entrapped
+
     configuration = reader.load(drive.configuration)
-    with open_bag(_recording(drive)) as bag:
+    with open_bag(demo_recording(drive.name)) as bag:
         truth = read_truth(bag, {}, configuration)
-    with open_bag(OUTPUT / drive.name) as bag:
+    with open_bag(output / drive.name) as bag:
         history = read_estimates(bag)
     with picture_style():
-        overview(history, truth).savefig(OUTPUT / f'{drive.name}.png', dpi=110)
+        overview(history, truth).savefig(output / f'{drive.name}.png', dpi=110)
     if truth is None or truth.slip is None:
         return
-    moving = _seconds(truth, truth.slip.stamp) > 10.0
-    print('\nAgainst the truth in the recording, after the first 10 s:')
+    moving = _seconds(truth, truth.slip.stamp) > SETTLED
+    print(f'\nAgainst the truth in the recording, after the first {SETTLED:g} s:')
     for name, unit, scale, known in (
         ('slip', '', 1.0, truth.slip),
         ('sinkage', ' mm', 1e3, truth.sinkage),
@@ -150,7 +191,3 @@ def _at(history: EstimateHistory, name: str, stamp: np.ndarray) -> np.ndarray:
     """Return the newest estimates at stamps."""
     rows = np.clip(np.searchsorted(history.stamp, stamp, side='right') - 1, 0, None)
     return history.values[name][rows]
-
-
-if __name__ == '__main__':
-    sys.exit(main())
