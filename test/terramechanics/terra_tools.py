@@ -41,7 +41,7 @@ def second_model(slip: float, load: float, soil: Soil, wheel: Wheel, n1=0.0, c2=
     """Sinkage, pull, torque by scipy's quad and brentq, written from the equations alone."""
     r, b, R = wheel.radius, wheel.width, wheel.radius + lam * wheel.lug_height
     k = soil.cohesive_modulus / b + soil.frictional_modulus
-    n = soil.sinkage_exponent + n1 * slip
+    n = soil.sinkage_exponent + n1 * abs(slip)
     tip = wheel.radius + wheel.lug_height
     ratio = tip * (1.0 - slip) if slip >= 0.0 else tip / (1.0 + slip)
 

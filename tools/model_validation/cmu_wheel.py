@@ -29,7 +29,7 @@ FREE = (
     Free('soil.leaving_angle_ratio', -0.2, 0.2, -0.8, -0.001),
 )
 BRAKING = (
-    Free('effects.slip_sinkage_exponent.n2', 1.0, 1.0, -1.0, 3.0),
+    Free('effects.slip_sinkage_exponent.n2', 0.0, 0.5, -2.0, 3.0),
     Free('effects.bulldozing.kb', 0.5, 0.5, 0.0, 5.0),
 )
 

@@ -14,7 +14,13 @@ from pathlib import Path
 from typing import Any
 
 from wheel_terra_estimator.errors import UserError
-from wheel_terra_estimator.terramechanics.effects import OUTPUTS, Effect, catalogue, load_file
+from wheel_terra_estimator.terramechanics.effects import (
+    OUTPUTS,
+    Effect,
+    EffectParameter,
+    catalogue,
+    load_file,
+)
 
 SUMMARY = 'list the physical and instrument effects that can be named'
 
@@ -61,14 +67,14 @@ def as_text(effects: Mapping[str, Effect]) -> str:
     """Return the catalogue for a terminal."""
     blocks = []
     for effect in effects.values():
-        lines = [effect.name, *_wrapped('', effect.claim), *_wrapped('term: ', effect.symbol)]
-        for p in effect.parameters:
-            note = '' if p.free else '; not fitted'
-            lines += _wrapped(
-                f'{p.name} [{p.unit}]: ',
-                f'{p.meaning}; default {p.default:g}, range {p.lower:g} to {p.upper:g}, '
-                f'prior {_prior(p)}{note}',
-            )
+        lines = [effect.name]
+        for form in effect.forms:
+            if len(effect.forms) > 1:
+                lines += _wrapped('form ', form.form)
+            lines += [*_wrapped('', form.claim), *_wrapped('term: ', form.symbol)]
+            lines += [line for p in form.parameters for line in _parameter_text(p)]
+            if form is not effect.forms[0]:
+                lines += [*_wrapped('valid: ', form.validity), *_wrapped('source: ', form.source)]
         kind = 'instrument' if effect.instrument else 'soil'
         lines += _wrapped('touches: ', f'{_touched(effect)} ({kind})')
         if effect.needs:
@@ -85,6 +91,15 @@ def as_text(effects: Mapping[str, Effect]) -> str:
     return '\n'.join(blocks)
 
 
+def _parameter_text(p: EffectParameter) -> list[str]:
+    note = '' if p.free else '; not fitted'
+    return _wrapped(
+        f'{p.name} [{p.unit}]: ',
+        f'{p.meaning}; default {p.default:g}, range {p.lower:g} to {p.upper:g}, '
+        f'prior {_prior(p)}{note}',
+    )
+
+
 def as_json(effects: Mapping[str, Effect]) -> str:
     """Return the catalogue for programs."""
     return json.dumps([_record(effect) for effect in effects.values()], indent=2) + '\n'
@@ -99,7 +114,8 @@ def as_markdown(effects: Mapping[str, Effect]) -> str:
         '',
         'Every physical or instrument effect that the models know. Each is off unless a model file '
         'switches it on (`effects.<name>.enabled: true`); the same terms then run in the reference '
-        'quadrature, in the closed form and in the filter. A figure shows what the first parameter '
+        'quadrature, in the closed form and in the filter. Where an effect has several forms, '
+        '`effects.<name>.form` chooses one. A figure shows what the first parameter '
         'does to a wheel of 157 mm radius with 10 mm lugs under 80 N in HIT-LSS1 sand.',
         '',
         '| effect | stands for | touches |',
@@ -108,37 +124,61 @@ def as_markdown(effects: Mapping[str, Effect]) -> str:
     for effect in effects.values():
         lines.append(f'| [`{effect.name}`](#{effect.name}) | {effect.claim} | {_touched(effect)} |')
     for effect in effects.values():
-        lines += ['', f'## {effect.name}', '', f'{effect.claim[0].upper()}{effect.claim[1:]}.', '']
-        lines += [f'    {effect.symbol}', '']
-        lines += [
-            '| parameter | unit | meaning | default | range | prior |',
-            '|---|---|---|---|---|---|',
-        ]
-        for p in effect.parameters:
-            note = '' if p.free else ' (not fitted)'
-            lines.append(
-                f'| `{p.name}` | {p.unit} | {p.meaning}{note} | {p.default:g} '
-                f'| {p.lower:g} to {p.upper:g} | {_prior(p)} |'
-            )
-        lines += ['', f'- Touches: {_touched(effect)}.']
-        if effect.needs:
-            lines.append(f'- Needs to vary in a table: {", ".join(effect.needs)}.')
+        several = len(effect.forms) > 1
+        lines += ['', f'## {effect.name}', '']
+        for form in effect.forms:
+            if several:
+                first = ' (the first one, without a key)' if form is effect.forms[0] else ''
+                lines += [f'**`form: {form.form}`**{first}', '']
+            lines += [f'{form.claim[0].upper()}{form.claim[1:]}.', '', f'    {form.symbol}', '']
+            lines += _parameter_table(form)
+            lines.append(f'- Touches: {_touched(form)}.')
+            if form.needs:
+                lines.append(f'- Needs to vary in a table: {", ".join(form.needs)}.')
+            lines += [f'- Valid: {form.validity}.', f'- Source: {form.source}.', '']
         for other, separates in effect.confounded_with.items():
             lines.append(f'- Nearly the same as `{other}`; what separates them: {separates}.')
         if effect.incompatible_with:
             lines.append(f'- Not together with: {", ".join(sorted(effect.incompatible_with))}.')
         if not effect.candidate:
             lines.append('- Tried by the discrepancy workflow only when asked for by name.')
-        lines += [f'- Valid: {effect.validity}.', f'- Source: {effect.source}.', '']
+        if lines[-1]:
+            lines.append('')
         lines.append(f'![{effect.name}](models/effects/{effect.name}.svg)')
     return '\n'.join(lines) + '\n'
+
+
+def _parameter_table(form: Effect) -> list[str]:
+    lines = [
+        '| parameter | unit | meaning | default | range | prior |',
+        '|---|---|---|---|---|---|',
+    ]
+    for p in form.parameters:
+        note = '' if p.free else ' (not fitted)'
+        lines.append(
+            f'| `{p.name}` | {p.unit} | {p.meaning}{note} | {p.default:g} '
+            f'| {p.lower:g} to {p.upper:g} | {_prior(p)} |'
+        )
+    return [*lines, '']
 
 
 def _record(effect: Effect) -> dict[str, Any]:
     return {
         'name': effect.name,
-        'claim': effect.claim,
-        'symbol': effect.symbol,
+        **_law(effect),
+        'instrument': effect.instrument,
+        'confounded_with': dict(effect.confounded_with),
+        'incompatible_with': sorted(effect.incompatible_with),
+        'candidate': effect.candidate,
+        'other_forms': [_law(form) for form in effect.forms[1:]],
+    }
+
+
+def _law(form: Effect) -> dict[str, Any]:
+    return {
+        'form': form.form,
+        'claim': form.claim,
+        'symbol': form.symbol,
         'parameters': [
             {
                 'name': p.name,
@@ -153,16 +193,12 @@ def _record(effect: Effect) -> dict[str, Any]:
                 'prior_scale': p.prior_scale,
                 'fitted': p.free,
             }
-            for p in effect.parameters
+            for p in form.parameters
         ],
-        'touches': [name for name in OUTPUTS if name in effect.touches],
-        'instrument': effect.instrument,
-        'needs': list(effect.needs),
-        'confounded_with': dict(effect.confounded_with),
-        'incompatible_with': sorted(effect.incompatible_with),
-        'candidate': effect.candidate,
-        'validity': effect.validity,
-        'source': effect.source,
+        'touches': [name for name in OUTPUTS if name in form.touches],
+        'needs': list(form.needs),
+        'validity': form.validity,
+        'source': form.source,
     }
 
 

@@ -15,11 +15,12 @@ from numpy.typing import NDArray
 
 from wheel_terra_estimator.configuration import ros_yaml
 from wheel_terra_estimator.configuration.ros_yaml import Value
+from wheel_terra_estimator.terramechanics.effects import catalogue
 from wheel_terra_estimator.terramechanics.soil import Soil
 from wheel_terra_estimator.terramechanics.wheel import Wheel
 
 FloatArray: TypeAlias = NDArray[np.float64]
-EffectSettings: TypeAlias = dict[str, dict[str, float]]
+EffectSettings: TypeAlias = dict[str, dict[str, Any]]
 
 SOIL_FIELDS = (
     'cohesive_modulus',
@@ -127,7 +128,8 @@ class Configuration:
     soil, soil_std : Soil, dict
         Nominal soil, and field of ``Soil`` -> standard deviation in internal units.
     effects, effects_std : dict
-        Enabled effect -> parameter -> value or stated standard deviation.
+        Enabled effect -> parameter of its form -> value or stated standard deviation; ``form``
+        is among the values where it is not the first one of the effect.
     sensors, filter : Section
         ``sensors.*`` and ``filter.*`` as attributes.
     slip_radius, wheel_odometry, reference_odom_max_rate, rest_speed, max_lag, history
@@ -256,10 +258,11 @@ def _effects(values: Mapping[str, Value]) -> tuple[EffectSettings, EffectSetting
     settings: EffectSettings = {}
     deviations: EffectSettings = {}
     for name in enabled:
-        below = Section(values, f'effects.{name}.').__dict__
-        stds = {key for key in below if key.removesuffix('_std') in below and key.endswith('_std')}
-        settings[name] = {
-            key: float(value) for key, value in below.items() if key not in stds | {'enabled'}
-        }
-        deviations[name] = {key.removesuffix('_std'): float(below[key]) for key in sorted(stds)}
+        effect, prefix = catalogue()[name], f'effects.{name}'
+        form = str(values.get(f'{prefix}.form', effect.form))
+        chosen = effect.in_form(form).parameters
+        settings[name] = {p.name: _number(values, f'{prefix}.{p.name}') for p in chosen}
+        deviations[name] = {p.name: _number(values, f'{prefix}.{p.name}_std') for p in chosen}
+        if form != effect.form:
+            settings[name]['form'] = form
     return settings, deviations

@@ -10,8 +10,9 @@ accepts and checks the key, the node declares it, ``configuration.filter.gate`` 
 that length. A key that ends in ``_deg`` is in degrees in files and in radians in the code, where
 its name has no suffix.
 
-The keys ``effects.<name>.enabled``, ``effects.<name>.<parameter>`` and
-``effects.<name>.<parameter>_std`` come from the catalogue of effects.
+The keys ``effects.<name>.enabled``, ``effects.<name>.form`` (where there are several),
+``effects.<name>.<parameter>`` and ``effects.<name>.<parameter>_std`` come from the catalogue of
+effects.
 """
 
 from __future__ import annotations
@@ -738,7 +739,11 @@ def declared() -> dict[str, Parameter]:
     for name, effect in catalogue().items():
         prefix = f'effects.{name}'
         table[f'{prefix}.enabled'] = flag(f'{prefix}.enabled', False, effect.claim)
-        for item in effect.parameters:
+        if len(effect.forms) > 1:
+            names = tuple(variant.form for variant in effect.forms)
+            laws = '; '.join(f'{variant.form}: {variant.symbol}' for variant in effect.forms)
+            table[f'{prefix}.form'] = text(f'{prefix}.form', names[0], laws, choices=names)
+        for item in effect.all_parameters:
             key = f'{prefix}.{item.name}'
             table[key] = number(
                 key,

@@ -24,6 +24,7 @@ from wheel_terra_estimator.configuration.parameters import (
 )
 from wheel_terra_estimator.configuration.ros_yaml import Value
 from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.terramechanics.effects.base import Effect
 
 # Parameters that every ROS node has; they may stand in the same file.
 STANDARD_PARAMETERS = ('use_sim_time', 'start_type_description_service')
@@ -251,7 +252,7 @@ def _cross_check(values: Mapping[str, Any], stated: _Sourced, sources: str) -> N
     if not thresholds[0] < thresholds[1] < thresholds[2]:
         raise refuse('filter.class_thresholds', f'must increase: {thresholds}')
     _check_suspension(values, refuse)
-    _check_effects(values, refuse)
+    _check_effects(values, stated, refuse)
 
 
 def _check_suspension(values: Mapping[str, Any], refuse: Callable[[str, str], UserError]) -> None:
@@ -275,8 +276,10 @@ def _check_suspension(values: Mapping[str, Any], refuse: Callable[[str, str], Us
             )
 
 
-def _check_effects(values: Mapping[str, Any], refuse: Callable[[str, str], UserError]) -> None:
-    """Refuse pairs of effects that the catalogue calls incompatible."""
+def _check_effects(
+    values: Mapping[str, Any], stated: _Sourced, refuse: Callable[[str, str], UserError]
+) -> None:
+    """Refuse effects that the catalogue calls incompatible, and parameters of another form."""
     from wheel_terra_estimator.terramechanics.effects import catalogue
 
     effects = catalogue()
@@ -287,3 +290,29 @@ def _check_effects(values: Mapping[str, Any], refuse: Callable[[str, str], UserE
                 raise refuse(
                     f'effects.{name}.enabled', f'cannot be on together with effects.{other}'
                 )
+        _check_form(effects[name], values, stated, refuse)
+
+
+def _check_form(
+    effect: Effect,
+    values: Mapping[str, Any],
+    stated: _Sourced,
+    refuse: Callable[[str, str], UserError],
+) -> None:
+    """Refuse a parameter of another form where no form is chosen at all: nothing would read it.
+
+    Beside a form that is stated it is left alone: one file may hold the parameters of a model, and
+    a later one choose another form.
+    """
+    key = f'effects.{effect.name}.form'
+    if key in stated:
+        return
+    form = str(values.get(key, effect.form))
+    own = {p.name for p in effect.in_form(form).parameters}
+    for p in effect.all_parameters:
+        parameter = f'effects.{effect.name}.{p.name}'
+        if p.name not in own and parameter in stated:
+            forms = ' or '.join(v.form for v in effect.forms if p in v.parameters)
+            raise refuse(
+                parameter, f'the form {form!r} has no such parameter; state {key}: {forms}'
+            )

@@ -13,7 +13,7 @@ gravity_bias     m/s^2  Accelerometer bias plus gravity that leaks in through at
 shear_strength   ln     Common factor on cohesion and tan(phi); the two are not told apart by
                         wheels of nearly equal load.
 shear_modulus    ln     Common factor on K; seen at low slip, as shear_strength is at high slip.
-slip_sinkage     -      Added to n1 in N = n0 + n1 s.
+slip_sinkage     -      Added to n1 in N = n0 + n1 |s|.
 centroid         -      Common shift of the centroid of the contact stress, as a share of the
                         entrance angle: takes up errors of c1, c2, c3 and of resistances that the
                         torque does not see (bulldozing). Seen by torque against the balance.

@@ -202,7 +202,7 @@ class WheelModels:
         c.rim_speed = math.nan
         c.shear_radius = c.radius
         c.bearing_modulus = self._modulus[wheel] * math.exp(stiffness)
-        c.sinkage_exponent = self._exponent + slip_sinkage * slip
+        c.sinkage_exponent = self._exponent + slip_sinkage * abs(slip)
         c.cohesion, c.tan_friction = self._cohesion * factor, self._tan_friction * factor
         c.shear_modulus = self._shear_modulus * math.exp(modulus)
         c.peak_ratio, c.leaving_ratio = self._peak_ratio, self._leaving_ratio

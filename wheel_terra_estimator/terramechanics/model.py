@@ -76,8 +76,8 @@ class WheelSoilModel:
     soil : Soil
         Floats.
     effects : mapping
-        Effect name -> parameter -> value; only switched-on effects; missing parameters take their
-        defaults.
+        Effect name -> parameter -> value, and ``form``; only switched-on effects; what is missing
+        takes its default. ``model.effects`` has them by variant (``effects.by_variant``).
     method : str
         ``quadrature`` (reference), ``closed_form`` (branch moments, for on-board use) or
         ``triangles`` (the linearised stresses of the literature, for comparison).
@@ -184,8 +184,9 @@ class WheelSoilModel:
         points : OperatingPoints
             N points.
         names : sequence of str
-            ``soil.<field>``, ``effects.<name>.<parameter>`` (an effect that is off counts as on at
-            its neutral values), ``slip`` or ``normal_load``.
+            ``soil.<field>``, ``effects.<name>.<parameter>`` (``<name>:<form>`` for another form
+            than the first; an effect that is off counts as on at its neutral values), ``slip`` or
+            ``normal_load``.
 
         Returns
         -------
@@ -330,7 +331,7 @@ class _Batch:
 
     def _perturb_effect(self, index: int, name: str, effect: str, parameter: str = '') -> None:
         known = catalogue().get(effect)
-        if known is None or parameter not in known.defaults():
+        if known is None or parameter not in known.forms[0].defaults():
             raise ValueError(f'no derivative by {name!r}: not in the catalogue of effects')
         if effect not in self.effects:
             self.effects[effect] = dict(known.neutral())

@@ -78,7 +78,7 @@ class SteadySinkage(ScalarWheels):
         log_stiffness : float
             Both moduli are multiplied by its exponential [-].
         exponent_slope : float
-            Added to the sinkage exponent times slip, beyond what the effects do [-].
+            Added to the sinkage exponent times |slip|, beyond what the effects do [-].
         tan_friction, cohesion, shear_modulus : float, optional
             tan(phi) [-], c [Pa], K [m]; of the soil where not given.
 
@@ -195,7 +195,7 @@ class SteadySinkage(ScalarWheels):
             shear_modulus,
         )
         contact.shear_radius = contact.radius
-        contact.sinkage_exponent = soil.sinkage_exponent + slope * contact.slip
+        contact.sinkage_exponent = soil.sinkage_exponent + slope * abs(contact.slip)
         contact.peak_ratio, contact.leaving_ratio = (
             soil.peak_stress_ratio,
             soil.leaving_angle_ratio,

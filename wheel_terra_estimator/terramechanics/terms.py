@@ -13,8 +13,13 @@ import numpy as np
 
 from wheel_terra_estimator.terramechanics import stresses
 from wheel_terra_estimator.terramechanics.contact import Contact
-from wheel_terra_estimator.terramechanics.effects import catalogue
-from wheel_terra_estimator.terramechanics.effects.base import STAGES, Term
+from wheel_terra_estimator.terramechanics.effects import by_variant, catalogue
+from wheel_terra_estimator.terramechanics.effects.base import (
+    STAGES,
+    Effect,
+    EffectSettings,
+    Term,
+)
 from wheel_terra_estimator.terramechanics.kinematics import speed_ratio
 from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
 from wheel_terra_estimator.terramechanics.soil import Soil
@@ -25,22 +30,32 @@ PEAK_MARGIN = 1e-3
 
 
 class Terms:
-    """The terms of the switched-on effects, sorted by stage, with their parameter values."""
+    """The terms of the switched-on effects, sorted by stage, with their parameter values.
 
-    def __init__(self, settings: Mapping[str, Mapping[str, Any]]) -> None:
+    Within a stage their order does not depend on that of the settings: what an instrument does to
+    the inputs (a misread slip) is undone before the soil sees them, what it does to the outputs
+    comes after all soil and drive.
+    """
+
+    def __init__(self, settings: EffectSettings) -> None:
         known = catalogue()
+        chosen = [(known[key], values) for key, values in by_variant(settings).items()]
         self.stages: dict[str, list[tuple[Term, SimpleNamespace]]] = {s: [] for s in STAGES}
-        for name, values in settings.items():
-            parameters = SimpleNamespace(**values)
-            for stage in STAGES:
-                term = getattr(known[name], stage)
+        for stage in STAGES:
+            for effect, values in sorted(chosen, key=lambda item: _rank(item[0], stage)):
+                term = getattr(effect, stage)
                 if term is not None:
-                    self.stages[stage].append((term, parameters))
+                    self.stages[stage].append((term, SimpleNamespace(**values)))
 
     def apply(self, stage: str, contact: Contact, maths: Any = np) -> None:
         """Run all terms of a stage on the contact."""
         for term, parameters in self.stages[stage]:
             term(contact, parameters, maths)
+
+
+def _rank(effect: Effect, stage: str) -> tuple[bool, str]:
+    """Place of an effect within a stage."""
+    return (effect.instrument == (stage != 'on_inputs'), effect.name)
 
 
 def build_contact(

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from wheel_terra_estimator.terramechanics.effects import by_variant
 from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter
 from wheel_terra_estimator.terramechanics.soil import Soil
 
@@ -214,9 +215,9 @@ def base_coordinates(
 ) -> tuple[Coordinate, ...]:
     """Return the parameters of effects that are on already and whose deviation is stated."""
     found = []
-    for name, values in settings.items():
+    for name, values in by_variant(settings).items():
         for p in catalogue[name].parameters:
-            std = stated.get(name, {}).get(p.name, 0.0)
+            std = stated.get(catalogue[name].base_name, {}).get(p.name, 0.0)
             if std > 0.0:
                 centre = values[p.name]
                 found.append(

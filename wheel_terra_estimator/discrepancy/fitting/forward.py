@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from wheel_terra_estimator.discrepancy.fitting.coordinates import Coordinate
 from wheel_terra_estimator.terramechanics import quadrature
 from wheel_terra_estimator.terramechanics.contact import Contact
+from wheel_terra_estimator.terramechanics.effects import by_variant
 from wheel_terra_estimator.terramechanics.effects.base import Effect
 from wheel_terra_estimator.terramechanics.load_balance import explicit_entrance_angle
 from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
@@ -67,7 +68,7 @@ class Forward:
     ) -> None:
         self.points = points
         self.soil = soil
-        self.base_effects = {name: dict(values) for name, values in base_effects.items()}
+        self.base_effects = by_variant(base_effects)
         self.catalogue = catalogue
         self.nodes = nodes
         self.active = active

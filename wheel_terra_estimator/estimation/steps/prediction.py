@@ -170,7 +170,7 @@ def predict_wheels(
         sensitivity = trust * alpha * target / power
         F[zi, zi] = max(1.0 - trust * alpha * 0.9, 0.05)
         F[zi, ki] = -sensitivity
-        slopes = (math.log(bearing.load / slower.load) / 0.02, max(slip, 0.0) * bearing.log_depth)
+        slopes = (math.log(bearing.load / slower.load) / 0.02, abs(slip) * bearing.log_depth)
         by_ratio, by_slip_sinkage = run.bearing_slopes[i] = smoothed(run.bearing_slopes[i], slopes)
         F[zi, SLIP_SINKAGE] = -sensitivity * by_slip_sinkage
         F[zi, SPEED] = -share * sensitivity * by_ratio * direction / rim

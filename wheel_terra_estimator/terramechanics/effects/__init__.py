@@ -3,7 +3,7 @@
 """The catalogue of effects: one module of this folder per effect, found by itself.
 
 To add one, put a module with an ``EFFECT`` here, or keep it outside the package and call
-``register`` or ``load_file``. Nothing else in the package lists effects by name.
+``register`` or ``load_file``.
 """
 
 from __future__ import annotations
@@ -11,17 +11,20 @@ from __future__ import annotations
 import importlib
 import importlib.util
 import pkgutil
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from functools import lru_cache
 from numbers import Real
 from pathlib import Path
 from types import MappingProxyType
+from typing import Any
 
 from wheel_terra_estimator.terramechanics.effects.base import (
+    FORM_MARK,
     OUTPUTS,
     Effect,
     EffectParameter,
     EffectSettings,
+    Form,
 )
 
 __all__ = [
@@ -29,6 +32,8 @@ __all__ = [
     'Effect',
     'EffectParameter',
     'EffectSettings',
+    'Form',
+    'by_variant',
     'catalogue',
     'check_settings',
     'load_file',
@@ -48,9 +53,53 @@ def _built_in() -> Mapping[str, Effect]:
     return MappingProxyType(found)
 
 
-def catalogue() -> Mapping[str, Effect]:
+class Catalogue(Mapping[str, Effect]):
+    """All effects by name; ``catalogue['name:form']`` is one of them in that form alone."""
+
+    def __init__(self, effects: Mapping[str, Effect]) -> None:
+        self._effects = effects
+
+    def __getitem__(self, key: str) -> Effect:
+        """Return the effect, or its form; ``KeyError`` if there is none."""
+        name, _, form = key.partition(FORM_MARK)
+        effect = self._effects[name]
+        if not form:
+            return effect
+        try:
+            return effect.in_form(form)
+        except ValueError as error:
+            raise KeyError(str(error)) from None
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._effects)
+
+    def __len__(self) -> int:
+        return len(self._effects)
+
+
+def catalogue() -> Catalogue:
     """Return all effects by name: the built-in ones, then the registered ones."""
-    return MappingProxyType({**_built_in(), **_registered})
+    return Catalogue({**_built_in(), **_registered} if _registered else _built_in())
+
+
+def by_variant(settings: EffectSettings) -> dict[str, dict[str, Any]]:
+    """Return the settings with the entry ``form`` put into the key: numbers are all that is left.
+
+    ``{'multipass': {'form': 'rut', 'rut': 0.01}}`` becomes ``{'multipass:rut': {'rut': 0.01}}``;
+    the first form keeps the plain name. Keys that name a form already stay.
+
+    Raises
+    ------
+    ValueError
+        For a form that the effect does not have.
+    """
+    known = catalogue()
+    plain: dict[str, dict[str, Any]] = {}
+    for name, values in settings.items():
+        numbers = dict(values)
+        form = numbers.pop('form', None)
+        plain[name if form is None else known[name].in_form(form).name] = numbers
+    return plain
 
 
 def register(effect: Effect) -> Effect:
@@ -92,37 +141,44 @@ def load_file(path: str | Path) -> list[Effect]:
 
 
 def check_settings(settings: EffectSettings) -> dict[str, dict[str, float]]:
-    """Return the settings with defaults filled in.
+    """Return the settings with defaults filled in, by variant (see ``by_variant``).
 
     Raises
     ------
     ValueError
-        For an unknown effect or parameter, a value outside its range, or two effects that must
-        not be on together; the message names them.
+        For an unknown effect, form or parameter, a value outside its range, or two effects that
+        must not be on together; the message names them.
     """
     known = catalogue()
     full: dict[str, dict[str, float]] = {}
     for name, values in settings.items():
         if name not in known:
             raise ValueError(f'effect {name} is not in the catalogue: {", ".join(known)}')
-        effect = known[name]
-        full[name] = effect.defaults()
         if not isinstance(values, Mapping):
             raise ValueError(f'effects.{name} is {values!r}; allowed is a mapping of parameters')
-        for key, value in values.items():
-            if key not in full[name]:
+    for key, values in by_variant(settings).items():
+        effect = known[key]
+        defaults = effect.forms[0].defaults()
+        full[key] = defaults
+        name, forms = effect.base_name, known[effect.base_name].forms
+        in_form = f' in the form {effect.form}' if len(forms) > 1 else ''
+        for item, value in values.items():
+            if item not in defaults:
                 raise ValueError(
-                    f'effect {name} has no parameter {key}; it has {", ".join(full[name])}'
+                    f'effect {name} has no parameter {item}{in_form}; it has {", ".join(defaults)}'
                 )
-            parameter = effect.parameter(key)
+            parameter = effect.parameter(item)
             if not isinstance(value, Real):
-                raise ValueError(f'effects.{name}.{key} is {value!r}; allowed is a number')
-            if not parameter.lower <= value <= parameter.upper:
+                raise ValueError(f'effects.{name}.{item} is {value!r}; allowed is a number')
+            number = float(value)
+            if not parameter.lower <= number <= parameter.upper:
                 raise ValueError(
-                    f'effects.{name}.{key} is {value:g}; allowed is '
+                    f'effects.{name}.{item} is {number:g}; allowed is '
                     f'[{parameter.lower:g}, {parameter.upper:g}] {parameter.unit}'
                 )
-            full[name][key] = float(value)
-        for other in sorted(effect.incompatible_with & settings.keys()):
+            defaults[item] = number
+    on = {key.partition(FORM_MARK)[0] for key in full}
+    for name in on:
+        for other in sorted(known[name].incompatible_with & on):
             raise ValueError(f'effects {name} and {other} exclude each other: switch one off')
     return full

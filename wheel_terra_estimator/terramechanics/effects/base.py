@@ -5,7 +5,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from types import SimpleNamespace
 from typing import Any, TypeAlias
 
@@ -18,7 +19,9 @@ STAGES = ('on_inputs', 'on_contact', 'on_normal_stress', 'on_outputs')
 # A term changes the contact in place; `parameters.kd` is the value of the parameter ``kd``;
 # `maths` is numpy or ScalarMaths.
 Term: TypeAlias = Callable[[Contact, SimpleNamespace, Any], None]
-EffectSettings: TypeAlias = Mapping[str, Mapping[str, float]]
+# Effect name -> parameter -> value; ``form`` names the form where it is not the first one.
+EffectSettings: TypeAlias = Mapping[str, Mapping[str, Any]]
+FORM_MARK = ':'  # between the name of an effect and that of its form in the key of a variant
 
 
 @dataclass(frozen=True)
@@ -65,8 +68,42 @@ class EffectParameter:
 
 
 @dataclass(frozen=True)
+class Form:
+    """Another law for the same effect, beside the one that the effect itself states.
+
+    Attributes
+    ----------
+    name : str
+        Value of the configuration key ``effects.<effect>.form``.
+    claim, symbol, parameters, validity, source
+        As for the effect.
+    touches, needs : frozenset of str, tuple of str or None
+        None: those of the effect.
+    on_inputs, on_contact, on_normal_stress, on_outputs : callable or None
+        The terms of this form; those of the effect itself play no part in it.
+    """
+
+    name: str
+    claim: str
+    symbol: str
+    parameters: tuple[EffectParameter, ...]
+    validity: str
+    source: str
+    touches: frozenset[str] | None = None
+    needs: tuple[str, ...] | None = None
+    on_inputs: Term | None = None
+    on_contact: Term | None = None
+    on_normal_stress: Term | None = None
+    on_outputs: Term | None = None
+
+
+@dataclass(frozen=True)
 class Effect:
     """One physical or instrument effect of the catalogue.
+
+    The fields state its first form. ``forms`` has all of them, each as an effect of one form:
+    the first under the effect's name, another under ``name:form``. These keys stand wherever
+    effects are settled by name and value, so that two forms can be weighed side by side.
 
     Attributes
     ----------
@@ -92,6 +129,10 @@ class Effect:
         Where it holds; paper and equation.
     candidate : bool
         False: never tried by the discrepancy workflow unless asked for by name.
+    form : str
+        Name of the first form.
+    other_forms : tuple of Form
+        Further forms; a parameter that several forms share is the same object in each.
     on_inputs, on_contact, on_normal_stress, on_outputs : callable or None
         The terms, ``term(contact, parameters, maths)``: see ``Contact`` for what each may change.
     """
@@ -108,13 +149,15 @@ class Effect:
     confounded_with: Mapping[str, str] = field(default_factory=dict)
     incompatible_with: frozenset[str] = frozenset()
     candidate: bool = True
+    form: str = 'standard'
+    other_forms: tuple[Form, ...] = ()
     on_inputs: Term | None = None
     on_contact: Term | None = None
     on_normal_stress: Term | None = None
     on_outputs: Term | None = None
 
     def __post_init__(self) -> None:
-        if not self.name.isidentifier():
+        if not self.base_name.isidentifier():
             raise ValueError(f'effect name is {self.name!r}; allowed is a Python identifier')
         if not self.parameters:
             raise ValueError(f'effect {self.name} has no parameter; it needs at least one')
@@ -122,6 +165,45 @@ class Effect:
             raise ValueError(f'effect {self.name} touches {set(self.touches)}; allowed: {OUTPUTS}')
         if all(getattr(self, stage) is None for stage in STAGES):
             raise ValueError(f'effect {self.name} has no term; it needs one of {STAGES}')
+        names = [self.form, *(form.name for form in self.other_forms)]
+        if len(set(names)) < len(names):
+            raise ValueError(f'forms of effect {self.name} are {names}; each needs its own name')
+        shared: dict[str, EffectParameter] = {}
+        for parameters in (self.parameters, *(form.parameters for form in self.other_forms)):
+            for parameter in parameters:
+                if shared.setdefault(parameter.name, parameter) != parameter:
+                    raise ValueError(
+                        f'effect {self.name} states the parameter {parameter.name} in two ways; '
+                        'forms share a parameter or name it apart'
+                    )
+
+    @property
+    def base_name(self) -> str:
+        """Name of the effect, whichever its form."""
+        return self.name.partition(FORM_MARK)[0]
+
+    @cached_property
+    def forms(self) -> tuple[Effect, ...]:
+        """All forms, the first one first, each as an effect of that form alone."""
+        if not self.other_forms:
+            return (self,)
+        first = replace(self, other_forms=())
+        return (first, *(_variant(first, form) for form in self.other_forms))
+
+    @cached_property
+    def all_parameters(self) -> tuple[EffectParameter, ...]:
+        """Parameters of all forms, each once."""
+        return tuple({p.name: p for form in self.forms for p in form.parameters}.values())
+
+    def in_form(self, form: str) -> Effect:
+        """Return the effect in one form alone; ``ValueError`` if it has no such form."""
+        for variant in self.forms:
+            if variant.form == form:
+                return variant
+        raise ValueError(
+            f'effect {self.name} has no form {form!r}; it has '
+            f'{", ".join(variant.form for variant in self.forms)}'
+        )
 
     def parameter(self, name: str) -> EffectParameter:
         """Return the parameter of that name; ``KeyError`` if there is none."""
@@ -145,3 +227,20 @@ class Effect:
             p.name: p.neutral if p is first or p.prior_mean == p.neutral else p.default
             for p in self.parameters
         }
+
+
+def _variant(first: Effect, form: Form) -> Effect:
+    """Return the effect in another form; its key is ``name:form``."""
+    return replace(
+        first,
+        name=f'{first.name}{FORM_MARK}{form.name}',
+        form=form.name,
+        claim=form.claim,
+        symbol=form.symbol,
+        parameters=form.parameters,
+        validity=form.validity,
+        source=form.source,
+        touches=first.touches if form.touches is None else form.touches,
+        needs=first.needs if form.needs is None else form.needs,
+        **{stage: getattr(form, stage) for stage in STAGES},
+    )

@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""The sinkage exponent changes with slip: soil flows sideways and backwards under the wheel."""
+"""A slipping or skidding wheel sinks in: soil flows sideways and backwards under it."""
 
 from __future__ import annotations
 
@@ -8,24 +8,53 @@ from types import SimpleNamespace
 from typing import Any
 
 from wheel_terra_estimator.terramechanics.contact import Contact
-from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter
+from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter, Form
+
+REFERENCE_PRESSURE = 3000.0  # [Pa]; 80 N on 165 mm x 157 mm, the wheel of Ding et al. 2010
 
 
 def _exponent(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
     skid = maths.maximum(-contact.slip, 0.0)
-    contact.sinkage_exponent = contact.sinkage_exponent + p.n1 * contact.slip + p.n2 * skid
+    growth = p.n1 * maths.abs(contact.slip) + p.n2 * skid
+    contact.sinkage_exponent = contact.sinkage_exponent + growth
 
+
+def _lyasko(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
+    slip = maths.abs(contact.slip)
+    gain = 1.0 + p.gain * ((1.0 + slip) / (1.0 - 0.5 * slip) - 1.0)
+    # The load grows with k z^(N + 1/2): this modulus gives the sinkage `gain` times as much.
+    weaker = gain ** -(contact.sinkage_exponent + 0.5)
+    contact.bearing_modulus = contact.bearing_modulus * weaker
+
+
+def _with_load(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
+    pressure = contact.normal_load / (contact.width * contact.radius)
+    growth = p.nw * maths.log(pressure / REFERENCE_PRESSURE) + p.n1 * maths.abs(contact.slip)
+    contact.sinkage_exponent = contact.sinkage_exponent + growth
+
+
+_N1 = EffectParameter(
+    'n1', '-', 0.3, -0.5, 2.0, 0.4, 'half_normal', 'growth of the exponent with |slip|'
+)
 
 EFFECT = Effect(
     name='slip_sinkage_exponent',
-    claim='sinkage exponent N = n0 + n1 s: slip makes the wheel sink more than its load does',
-    symbol='N = n0 + n1 s (+ n2 |s| where s < 0)',
+    claim='sinkage exponent N = n0 + n1 |s|: slip or skid makes the wheel sink more than its load '
+    'does',
+    form='linear',
+    symbol='N = n0 + n1 |s| (+ n2 |s| where s < 0)',
     parameters=(
+        _N1,
         EffectParameter(
-            'n1', '-', 0.3, -0.5, 2.0, 0.4, 'half_normal', 'growth of the exponent with slip'
-        ),
-        EffectParameter(
-            'n2', '-', 0.0, -1.0, 3.0, 0.5, 'normal', 'further growth while skidding', free=False
+            'n2',
+            '-',
+            0.0,
+            -2.0,
+            3.0,
+            0.5,
+            'normal',
+            'what the coefficient of a skidding wheel has beyond n1',
+            free=False,
         ),
     ),
     touches=frozenset({'sinkage', 'drawbar_pull', 'torque'}),
@@ -35,7 +64,41 @@ EFFECT = Effect(
         'lug_digging': 'pull and torque (digging leaves them alone); a second lug height',
         'hard_layer': 'a load series',
     },
-    validity='slip 0 to 0.6 in the source; sinkage well below 1 m, where k z^N has its reference',
-    source='Ding et al. 2010 eq. 13 (doi 10.1007/s11771-010-0021-7); n2: skid form of later work',
+    validity='slip 0 to 0.6 in the source, skid to -0.4 against measurements; sinkage well below '
+    '1 m, where k z^N has its reference',
+    source='Ding et al. 2010 eq. 13 (doi 10.1007/s11771-010-0021-7); |s| and n2: measured rows of '
+    'a single wheel that brakes (docs/models/validation.md)',
     on_inputs=_exponent,
+    other_forms=(
+        Form(
+            name='lyasko',
+            claim='slip or skid multiplies the sinkage at rest; the exponent stays',
+            symbol='z = z0 [1 + gain ((1 + |s|)/(1 - |s|/2) - 1)] by k *= [...]^-(N + 1/2)',
+            parameters=(
+                EffectParameter(
+                    'gain', '-', 1.0, 0.0, 8.0, 1.0, 'half_normal', 'share of the published growth'
+                ),
+            ),
+            validity='published for wheels and tracks, slip 0 to 0.5; the factor on the sinkage is '
+            'exact for small angles without shear',
+            source='Lyasko 2010, Slip sinkage effect in soil-vehicle mechanics, J. Terramech. 47, '
+            'as quoted in wheel studies; factor on the modulus derived here',
+            on_inputs=_lyasko,
+        ),
+        Form(
+            name='load',
+            claim='the exponent grows with the pressure under the wheel, and with |slip|',
+            symbol='N = n0 + nw ln(W/(b r 3 kPa)) + n1 |s|',
+            parameters=(
+                EffectParameter(
+                    'nw', '-', 0.1, -0.5, 0.5, 0.1, 'normal', 'growth with ln of the mean pressure'
+                ),
+                _N1,
+            ),
+            needs=('normal_load',),
+            validity='pressures W/(b r) of 0.5 to 20 kPa; invisible at one load',
+            source='own form: exponents fitted to plates and wheels differ with their load',
+            on_inputs=_with_load,
+        ),
+    ),
 )

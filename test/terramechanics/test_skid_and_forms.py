@@ -1,0 +1,197 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""A skidding wheel digs in; an effect has several forms, of which settings choose one."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from terra_tools import SAND, WHEEL, points, state
+
+from wheel_terra_estimator.configuration import reader
+from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.terramechanics.conditioned import ConditionedForces
+from wheel_terra_estimator.terramechanics.effects import (
+    Effect,
+    EffectParameter,
+    Form,
+    by_variant,
+    catalogue,
+    check_settings,
+)
+from wheel_terra_estimator.terramechanics.model import METHODS, WheelSoilModel
+from wheel_terra_estimator.terramechanics.soil import Soil
+from wheel_terra_estimator.terramechanics.steady_sinkage import SteadySinkage
+from wheel_terra_estimator.terramechanics.wheel import Wheel
+
+SKID = 'slip_sinkage_exponent'
+FRICTIONLESS = Soil(0.0, 1.2e6, 0.9, 0.0, 0.0, 0.01, 0.3, 0.0)
+
+
+@pytest.mark.parametrize('method', METHODS)
+def test_a_wheel_without_shear_sinks_by_slip_and_skid_alike(method: str) -> None:
+    """Without friction and cohesion motion acts through |s| alone, so the sinkage is even in s."""
+    model = WheelSoilModel(FRICTIONLESS, {SKID: {'n1': 0.5}}, method)
+    z = model.steady_state(points([-0.6, 0.6, 0.0])).sinkage
+    assert z[0] == pytest.approx(z[1], rel=1e-9)
+    assert z[0] > 1.5 * z[2]
+
+
+@pytest.mark.parametrize('rover', ['hit_wh3_lug10'])
+def test_shipped_wheel_digs_in_while_it_skids(rover: str) -> None:
+    configuration = reader.load([f'rovers/{rover}', 'soils/hit_fit'], [])
+    wheels = configuration.wheels.wheel
+    wheel = Wheel(wheels.radius[0], wheels.width[0], wheels.lug_height[0], wheels.lug_count[0])
+    for method in ('quadrature', 'closed_form'):
+        model = WheelSoilModel(configuration.soil, configuration.effects, method)
+        z = model.steady_state(points([-0.6, -0.3, 0.0], wheel=wheel)).sinkage
+        assert z[0] > z[1] > z[2], method
+    floats = SteadySinkage(wheel, configuration.soil, configuration.effects)
+    assert floats.state(0, 1.0 / (1.0 - 0.6), 80.0)[0] > floats.state(0, 1.0, 80.0)[0]
+
+
+def test_skid_has_a_coefficient_of_its_own() -> None:
+    settings = {SKID: {'n1': 0.4, 'n2': -0.1}}
+    skid = state(-0.4, effects=settings)
+    same = WheelSoilModel(
+        Soil(**{**SAND.__dict__, 'sinkage_exponent': SAND.sinkage_exponent + 0.3 * 0.4})
+    ).steady_state(points(-0.4))
+    assert skid.outputs() == pytest.approx(same.outputs(), rel=1e-9)
+    assert state(0.4, effects=settings).outputs() == pytest.approx(
+        state(0.4, effects={SKID: {'n1': 0.4}}).outputs()
+    )
+
+
+def test_lyasko_multiplies_the_sinkage_at_rest() -> None:
+    """Small angles, no shear: z(s)/z(0) = (1 + s)/(1 - s/2), the printed law."""
+    stiff = Soil(0.0, 4e8, 0.9, 0.0, 0.0, 0.01, 0.3, 0.0)
+    model = WheelSoilModel(stiff, {SKID: {'form': 'lyasko', 'gain': 1.0}})
+    slip = np.array([0.0, 0.3, 0.6, -0.3])
+    z = model.steady_state(points(slip)).sinkage
+    s = np.abs(slip)
+    assert z / z[0] == pytest.approx((1.0 + s) / (1.0 - 0.5 * s), rel=2e-3)
+
+
+def test_exponent_that_grows_with_pressure_is_the_soil_s_at_three_kilopascal() -> None:
+    load = np.array([3000.0, 6000.0]) * WHEEL.width * WHEEL.radius
+    settings = {SKID: {'form': 'load', 'nw': 0.2, 'n1': 0.0}}
+    z = state(0.2, load, effects=settings).sinkage
+    assert z[0] == pytest.approx(state(0.2, load[0]).sinkage[0], rel=1e-9)
+    heavier = Soil(
+        **{**SAND.__dict__, 'sinkage_exponent': SAND.sinkage_exponent + 0.2 * math.log(2.0)}
+    )
+    other = WheelSoilModel(heavier).steady_state(points(0.2, load[1])).sinkage
+    assert z[1] == pytest.approx(other[0], rel=1e-9)
+
+
+# The mechanism ---------------------------------------------------------------------------------
+
+
+def test_forms_are_effects_of_one_form_under_keys_of_their_own() -> None:
+    effect = catalogue()[SKID]
+    names = [form.name for form in effect.forms]
+    assert names == [SKID, f'{SKID}:lyasko', f'{SKID}:load']
+    assert catalogue()[f'{SKID}:lyasko'] == effect.forms[1]
+    assert effect.forms[1].base_name == SKID
+    assert {p.name for p in effect.all_parameters} == {'n1', 'n2', 'gain', 'nw'}
+    assert f'{SKID}:none' not in catalogue()
+    assert by_variant({SKID: {'form': 'lyasko', 'gain': 0.5}}) == {f'{SKID}:lyasko': {'gain': 0.5}}
+
+
+@pytest.mark.parametrize(
+    ('settings', 'words'),
+    [
+        ({SKID: {'form': 'none'}}, "has no form 'none'; it has linear, lyasko, load"),
+        (
+            {SKID: {'form': 'lyasko', 'n1': 0.3}},
+            'has no parameter n1 in the form lyasko; it has gain',
+        ),
+        (
+            {'grouser_thrust': {}, 'lug_shear_radius': {}},
+            'exclude each other',
+        ),
+    ],
+)
+def test_settings_of_a_wrong_form_are_refused(settings: dict, words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        check_settings(settings)
+
+
+def test_two_forms_stand_side_by_side_in_one_model() -> None:
+    """What a search over forms needs: the one at its neutral value leaves the other alone."""
+    both = state(0.4, effects={SKID: {'n1': 0.3}, f'{SKID}:lyasko': {'gain': 0.0}})
+    assert both.outputs() == pytest.approx(state(0.4, effects={SKID: {'n1': 0.3}}).outputs())
+    _, rates = WheelSoilModel(SAND).jacobian(points(0.4), [f'effects.{SKID}:lyasko.gain'])
+    step = state(0.4, effects={SKID: {'form': 'lyasko', 'gain': 1e-4}})
+    change = (step.outputs() - state(0.4).outputs()) / 1e-4
+    assert rates[..., 0] == pytest.approx(change, rel=1e-3)
+
+
+def test_the_order_of_settings_does_not_matter() -> None:
+    """A misread slip is put right before any law of the soil sees it."""
+    settings = {SKID: {'n1': 0.4}, 'wheel_radius_bias': {'bias': 0.1}, 'stress_peak_shift': {}}
+    turned = dict(reversed(settings.items()))
+    assert state(0.3, effects=settings).outputs() == pytest.approx(
+        state(0.3, effects=turned).outputs(), rel=1e-12
+    )
+    smooth = Wheel(0.15, 0.15)
+    true_slip = 1.0 - (1.0 - 0.3) / 1.1
+    known = {SKID: {'n1': 0.4}, 'stress_peak_shift': {}}
+    assert state(0.3, wheel=smooth, effects=settings).outputs() == pytest.approx(
+        state(true_slip, wheel=smooth, effects=known).outputs(), rel=1e-9
+    )
+
+
+def test_a_shared_parameter_means_the_same_in_every_form() -> None:
+    def term(contact, p, maths):
+        contact.torque = contact.torque + p.a
+
+    one = EffectParameter('a', '-', 0.0, 0.0, 1.0, 1.0, 'normal', 'm')
+    other = EffectParameter('a', '-', 0.0, 0.0, 2.0, 1.0, 'normal', 'm')
+    with pytest.raises(ValueError, match='states the parameter a in two ways'):
+        Effect(
+            'twice', 'c', 's', (one,), frozenset({'torque'}), 'v', 's', on_outputs=term,
+            other_forms=(Form('other', 'c', 's', (other,), 'v', 's', on_outputs=term),),
+        )  # fmt: skip
+
+
+def test_the_filter_s_forces_know_the_forms() -> None:
+    inputs = (0, 0.7, 0.01, 80.0, 250.0, 0.6, 0.01)
+    plain = ConditionedForces(WHEEL, SAND).forces(*inputs)
+    # With the sinkage given, the bearing law sets no force: the exponent does, a factor on it not.
+    steeper = ConditionedForces(WHEEL, SAND, {SKID: {'n1': 0.5}}).forces(*inputs)
+    weaker = ConditionedForces(WHEEL, SAND, {SKID: {'form': 'lyasko'}}).forces(*inputs)
+    assert steeper.drawbar_pull != pytest.approx(plain.drawbar_pull, rel=1e-4)
+    assert weaker.drawbar_pull == pytest.approx(plain.drawbar_pull, rel=1e-12)
+
+
+# Configuration ---------------------------------------------------------------------------------
+
+ON = f'effects.{SKID}.enabled:=true'
+
+
+def configured(*keys: str) -> dict:
+    return reader.load(['hit_wh3'], [ON, *(f'effects.{SKID}.{key}' for key in keys)]).effects
+
+
+def test_the_form_is_a_key_of_the_configuration() -> None:
+    assert configured('n1:=0.4')[SKID] == {'n1': 0.4, 'n2': 0.0}
+    settings = configured('form:=lyasko', 'gain:=0.7')
+    assert settings[SKID] == {'form': 'lyasko', 'gain': 0.7}
+    assert state(0.4, effects=settings).sinkage > state(0.4).sinkage
+    # A later file may choose a form over the parameters of an earlier one.
+    assert configured('n1:=0.4', 'form:=lyasko')[SKID] == {'form': 'lyasko', 'gain': 1.0}
+
+
+@pytest.mark.parametrize(
+    ('keys', 'words'),
+    [
+        (['form:=lyaskos'], "form: 'lyaskos' is unknown, nearest is 'lyasko'"),
+        (['gain:=0.7'], f"the form 'linear' has no such parameter; state effects.{SKID}.form: lya"),
+    ],
+)
+def test_keys_of_another_form_are_refused(keys: list[str], words: str) -> None:
+    with pytest.raises(UserError, match=words):
+        configured(*keys)
