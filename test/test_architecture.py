@@ -128,6 +128,8 @@ MAY_USE = {
         {'numpy', 'rclpy', 'rcl_interfaces', 'builtin_interfaces', 'diagnostic_msgs'}
         | {'geometry_msgs', 'nav_msgs', 'sensor_msgs', 'std_msgs', 'std_srvs'},
     ),
+    # The public Python interface: all but the node.
+    'api': (None, {'numpy', 'pandas', 'matplotlib'}),
     'cli': (None, {'numpy', 'tqdm', 'matplotlib'}),  # None: all but ros
 }
 

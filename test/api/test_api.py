@@ -1,0 +1,214 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""The Python interface against the commands, and its own examples."""
+
+from __future__ import annotations
+
+import contextlib
+import csv
+import doctest
+import importlib
+import io
+from dataclasses import replace
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+
+from wheel_terra_estimator import api
+from wheel_terra_estimator.cli.main import main
+from wheel_terra_estimator.estimation.measurements import (
+    InertialReading,
+    ReferenceVelocity,
+    SinkageReading,
+    WheelOdometry,
+)
+
+mpl.use('agg')
+MODULES = ('', '.models', '.drives', '.tables', '.pictures', '.frames')
+
+
+@pytest.mark.parametrize('name', MODULES)
+def test_examples_in_docstrings(name):
+    module = importlib.import_module(f'wheel_terra_estimator.api{name}')
+    result = doctest.testmod(module)
+    assert result.failed == 0
+    assert result.attempted > 0 or name in ('.pictures', '.frames')
+
+
+def command(*arguments):
+    """Return what a command prints."""
+    out = io.StringIO()
+    with contextlib.redirect_stdout(out):
+        assert main([str(a) for a in arguments]) == 0
+    return out.getvalue()
+
+
+def test_curve_is_that_of_predict():
+    files = ('hit_wh3', 'hit_fit')
+    printed = command(
+        'predict', '--config', files[0], '--config', files[1], '--slip', '0.1,0.4', '--load', '80'
+    )
+    rows = list(csv.DictReader(io.StringIO(printed)))
+    curve = api.Model.load(*files).curve([0.1, 0.4], 80.0)
+    for name in ('sinkage', 'drawbar_pull', 'torque'):
+        np.testing.assert_allclose(
+            getattr(curve, name), [float(row[name]) for row in rows], rtol=1e-8
+        )
+
+
+def test_a_model_of_objects_is_that_of_its_files():
+    loaded = api.Model.load('hit_wh3', 'hit_fit')
+    built = api.Model(loaded.wheel, loaded.soil, loaded.effects)
+    again = api.Model(loaded.wheel, api.Soil.load('hit_fit'), loaded.effects)
+    slip = np.linspace(-0.5, 0.9, 9)
+    for model in (built, again):
+        np.testing.assert_allclose(
+            model.curve(slip, 60.0).drawbar_pull, loaded.curve(slip, 60.0).drawbar_pull, rtol=1e-9
+        )
+
+
+def test_a_load_that_the_soil_cannot_carry_is_nan():
+    curve = api.Model.load('hit_wh3', 'dlr_mss').curve([0.2, 0.2], [50.0, 1e6])
+    assert np.isfinite(curve.sinkage[0])
+    assert np.isnan(curve.sinkage[1])
+
+
+@pytest.fixture(scope='module')
+def drive():
+    return api.simulate('firm_drive', seed=3, duration=6.0)
+
+
+def test_simulated_drive_and_its_bag_give_the_same_numbers(drive, tmp_path):
+    api.simulate('firm_drive', seed=3, duration=6.0, output=tmp_path / 'bag')
+    direct = api.estimate(drive, as_frame=False)
+    bag = api.estimate(tmp_path / 'bag', drive.configuration, as_frame=False)
+    assert direct.keys() == bag.keys()
+    np.testing.assert_array_equal(direct['stamp'], bag['stamp'])
+    for name in direct:
+        np.testing.assert_allclose(direct[name], bag[name], rtol=1e-6, atol=1e-9, err_msg=name)
+
+
+def logged(drive):
+    """Return the measurements of a drive as a table of logged values, merged by stamp."""
+    wheels = drive.configuration.wheels.names
+    rows: dict[int, dict[str, float]] = {}
+    for arrival in drive.arrivals:
+        m = arrival.measurement
+        row = rows.setdefault(m.stamp, {'time': m.stamp * 1e-9})
+        if isinstance(m, WheelOdometry):
+            row |= {f'rate.{w}': v for w, v in zip(wheels, m.rate, strict=True)}
+            row |= {f'torque.{w}': v for w, v in zip(wheels, m.torque, strict=True)}
+        elif isinstance(m, InertialReading):
+            row |= dict(zip((f'specific_force.{a}' for a in 'xyz'), m.specific_force, strict=True))
+            row |= dict(zip((f'angular_rate.{a}' for a in 'xyz'), m.angular_rate, strict=True))
+            if m.orientation is not None:
+                row |= dict(zip((f'orientation.{a}' for a in 'xyzw'), m.orientation, strict=True))
+        elif isinstance(m, SinkageReading):
+            row |= {f'sinkage.{w}': v for w, v in zip(wheels, m.sinkage, strict=True)}
+        elif isinstance(m, ReferenceVelocity):
+            row |= {'reference_velocity': m.forward, 'reference_velocity_std': m.variance**0.5}
+    names = dict.fromkeys(name for row in rows.values() for name in row)
+    ordered = [rows[stamp] for stamp in sorted(rows)]
+    return {name: np.array([row.get(name, np.nan) for row in ordered]) for name in names}
+
+
+def test_logged_values_give_the_numbers_of_the_drive(drive):
+    # A table has no late arrivals: each reading stands at its stamp.
+    in_order = replace(drive, arrivals=sorted(drive.arrivals, key=lambda a: a.measurement.stamp))
+    direct = api.estimate(in_order, as_frame=False)
+    table = api.estimate(logged(drive), drive.configuration, as_frame=False)
+    assert direct['time'].size > 50
+    for name in direct.keys() - {'stamp'}:
+        np.testing.assert_allclose(direct[name], table[name], rtol=1e-4, atol=1e-5, err_msg=name)
+
+
+@pytest.mark.parametrize(
+    ('change', 'words'),
+    [
+        ({'slip': [0.1]}, 'unknown column'),
+        ({'time': None}, "needs the columns 'time'"),
+        ({'time': [2.0, 1.0]}, 'must not go back'),
+        ({'time': [1.0]}, 'different lengths'),
+        ({'time': ['a', 'b']}, 'does not hold numbers'),
+    ],
+)
+def test_logged_values_that_cannot_be_used(drive, change, words):
+    wheel = drive.configuration.wheels.names[0]
+    rows = {'time': [0.0, 0.1], f'rate.{wheel}': [1.0, 1.0]} | change
+    rows = {name: values for name, values in rows.items() if values is not None}
+    if 'slip' in rows:
+        rows['slip'] = [0.1, 0.1]
+    with pytest.raises(api.UserError, match=words):
+        api.estimate(rows, drive.configuration, as_frame=False)
+
+
+@pytest.fixture(scope='module')
+def named():
+    """A diagnosis of rows in which soil sticks together more than the model says."""
+    true = api.Model.load('hit_wh3', 'hit_fit', parameters=['soil.cohesion:=1500.0'])
+    slip, load = (a.ravel() for a in np.meshgrid(np.linspace(0.05, 0.6, 14), [60.0, 100.0]))
+    rows = true.curve(slip, load).columns()
+    noise = np.random.default_rng(4).standard_normal((3, slip.size))
+    rows['sinkage'] = rows['sinkage'] + 1e-4 * noise[0]
+    rows['drawbar_pull'] = rows['drawbar_pull'] + 0.1 * noise[1]
+    rows['torque'] = rows['torque'] + 0.01 * noise[2]
+    kept = ('slip', 'normal_load', 'sinkage', 'drawbar_pull', 'torque')
+    measured = {name: rows[name] for name in kept}
+    model = api.Model.load('hit_wh3', 'hit_fit')
+    return measured, api.diagnose(measured, model, effects=['cohesion', 'hard_layer'])
+
+
+def test_diagnose_and_the_corrected_model(named):
+    measured, diagnosis = named
+    assert [effect.name for effect in diagnosis.effects] == ['cohesion']
+    after = api.corrected_model(diagnosis).curve(measured['slip'], measured['normal_load'])
+    before = api.Model.load('hit_wh3', 'hit_fit').curve(measured['slip'], measured['normal_load'])
+
+    def error(curve):
+        return np.sqrt(np.mean((curve.drawbar_pull - measured['drawbar_pull']) ** 2))
+
+    assert error(after) < 0.2 < 0.1 * error(before)
+
+
+def test_diagnose_refuses_unknown_columns():
+    with pytest.raises(api.UserError, match='rename it to one of'):
+        api.diagnose({'slipp': [0.1]}, 'hit_wh3')
+
+
+def test_pictures_return_axes(drive, named):
+    from matplotlib import pyplot
+
+    curve = api.Model.load('hit_wh3', 'hit_fit').curve([0.4, 0.1], 80.0)
+    panels = api.plot_curve({'fit': curve})
+    assert panels[0].get_ylabel() == 'sinkage [mm]'
+    assert list(panels[1].lines[0].get_xdata()) == [0.1, 0.4]
+    estimates = api.estimate(drive, as_frame=False)
+    panel = api.plot_estimates(estimates)
+    wheels = drive.configuration.wheels
+    assert len(panel.lines) == wheels.count
+    unknown = estimates[f'slip_class.{wheels.names[0]}'] == 255
+    assert np.isnan(panel.lines[0].get_ydata()[unknown]).all()
+    with pytest.raises(api.UserError, match='there are slip, '):
+        api.plot_estimates(estimates, 'speed')
+    bars = api.plot_diagnosis(named[1])
+    assert len(bars.patches) == 9
+    pyplot.close('all')
+
+
+def test_frames(drive):
+    pandas = pytest.importorskip('pandas')
+    frame = api.estimate(drive)
+    assert isinstance(frame, pandas.DataFrame)
+    assert frame['time'].iloc[0] == 0.0
+    table = pandas.DataFrame(logged(drive))
+    assert len(api.estimate(table, drive.configuration)) > 50
+    curve = api.Model.load('hit_wh3', 'hit_fit').curve([0.1, 0.4], 80.0)
+    assert list(curve.to_frame()['slip']) == [0.1, 0.4]
+
+
+def test_without_pandas_it_says_so(monkeypatch):
+    monkeypatch.setitem(__import__('sys').modules, 'pandas', None)
+    curve = api.Model.load('hit_wh3', 'hit_fit').curve([0.1], 80.0)
+    with pytest.raises(api.UserError, match='pip install pandas'):
+        curve.to_frame()

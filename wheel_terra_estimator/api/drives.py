@@ -1,0 +1,252 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Drives to estimates: a rosbag2, a table of logged values, or a simulated drive."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wheel_terra_estimator.api.frames import Columns, columns_of, to_frame
+from wheel_terra_estimator.configuration import reader
+from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.estimation.measurements import (
+    InertialReading,
+    LeavingAngleReading,
+    Measurement,
+    ReferenceVelocity,
+    SinkageReading,
+    WheelOdometry,
+)
+from wheel_terra_estimator.simulation.drive import SimulatedDrive
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
+FloatArray = NDArray[np.float64]
+
+NANOSECONDS = 1_000_000_000
+AXES = ('x', 'y', 'z')
+PER_WHEEL = ('rate', 'torque', 'sinkage', 'leaving_angle')
+WHOLE = (
+    'time',
+    *(f'specific_force.{axis}' for axis in AXES),
+    *(f'angular_rate.{axis}' for axis in AXES),
+    *(f'orientation.{axis}' for axis in (*AXES, 'w')),
+    'reference_velocity',
+    'reference_velocity_std',
+)
+
+
+def estimate(
+    drive: Any,
+    rover: str | Path | Sequence[str | Path] | Configuration | None = None,
+    *,
+    parameters: Sequence[str] = (),
+    remaps: Mapping[str, str] | None = None,
+    as_frame: bool = True,
+) -> DataFrame | Columns:
+    """Run the estimator over a whole drive.
+
+    The numbers are those of the node and of ``wheel-terra replay`` on the same input.
+
+    Parameters
+    ----------
+    drive : path, DataFrame, mapping or SimulatedDrive
+        A rosbag2 (folder, ``.mcap``, ``.db3``); what `simulate` gave; or logged values, one row per
+        instant in order of time, nan where a sensor said nothing: ``time`` [s]; per wheel
+        ``rate.<wheel>`` [rad/s], ``torque.<wheel>`` [N m], ``sinkage.<wheel>`` [m],
+        ``leaving_angle.<wheel>`` [rad]; ``specific_force.x`` (y, z) [m/s^2], ``angular_rate.x``
+        (y, z) [rad/s], ``orientation.x`` (y, z, w); ``reference_velocity`` [m/s] and
+        ``reference_velocity_std``, in the row of the instant of measurement. Vectors are
+        in ``base_link``; rates are positive forward.
+    rover : str, path, sequence or Configuration
+        Configuration files, or bare names of shipped ones; not needed for a simulated drive.
+    parameters : sequence of str
+        ``NAME:=VALUE``, winning over the files.
+    remaps : mapping, optional
+        For a bag: the estimator's topic -> the bag's.
+    as_frame : bool
+        True: a DataFrame (needs pandas); False: the same columns as a dict of arrays.
+
+    Returns
+    -------
+    DataFrame or dict
+        One row per estimate set: ``stamp`` [ns], ``time`` [s since the first set],
+        ``forward_velocity`` and ``forward_velocity_std`` [m/s], ``stuck``, and per wheel
+        ``slip.<wheel>``, ``slip_std.<wheel>``, ``slip_velocity.<wheel>`` [m/s],
+        ``drawbar_pull.<wheel>`` [N], ``sinkage.<wheel>`` [m], ``normal_load.<wheel>`` [N],
+        ``rim_travel_left.<wheel>`` [m], ``pull_margin.<wheel>`` [N], deviations ``*_std``, and
+        ``slip_class.<wheel>`` (0 low, 1 moderate, 2 high, 3 stuck, 255 unknown).
+
+    Raises
+    ------
+    UserError
+        For input that cannot be used: file, column or key, and the cure.
+
+    Examples
+    --------
+    >>> drive = simulate('firm_drive', seed=1, duration=3.0)
+    >>> columns = estimate(drive, as_frame=False)
+    >>> wheel = drive.configuration.wheels.names[0]
+    >>> bool(abs(columns[f'slip.{wheel}'][-1]) < 0.3)
+    True
+    """
+    if isinstance(drive, SimulatedDrive):
+        configuration = drive.configuration if rover is None else _rover(rover, parameters)
+        measurements: Iterable[Measurement] = (a.measurement for a in drive.arrivals)
+    else:
+        if rover is None:
+            raise UserError("rover is missing; name its configuration files, such as ['my_rover']")
+        configuration = _rover(rover, parameters)
+        if isinstance(drive, str | Path):
+            return _result(_replayed(Path(drive), configuration, remaps or {}), as_frame)
+        rows = columns_of(drive, 'drive')
+        measurements = _measurements(rows, configuration.wheels.names)
+    return _result(_estimated(measurements, configuration), as_frame)
+
+
+def simulate(
+    scenario: str | Path | Mapping[str, Any] = 'climb_soft_patch',
+    *,
+    seed: int = 0,
+    duration: float | None = None,
+    output: str | Path | None = None,
+    overwrite: bool = False,
+) -> SimulatedDrive:
+    """Drive a simulated rover and return its measurements and the truth.
+
+    Parameters
+    ----------
+    scenario : str, path or mapping
+        Bare name of a shipped scenario, a file, or dotted keys with values.
+    seed : int
+        Decides all random quantities.
+    duration : float, optional
+        In place of the scenario's [s].
+    output : path, optional
+        Folder of a rosbag2 to be written as well, as ``wheel-terra simulate`` does.
+    overwrite : bool
+        Whether an earlier one is replaced.
+
+    Returns
+    -------
+    SimulatedDrive
+        ``arrivals`` (typed measurements in order of arrival), ``truth`` (arrays (k, n) of slip,
+        sinkage, drawbar pull, ... at ``truth.stamp``), ``configuration``.
+
+    Examples
+    --------
+    >>> drive = simulate('firm_drive', seed=1, duration=2.0)
+    >>> drive.truth.slip.shape[1] == drive.configuration.wheels.count
+    True
+    """
+    from wheel_terra_estimator.simulation import drive as simulation
+    from wheel_terra_estimator.simulation.scenario import load
+
+    result = simulation.simulate(load(scenario), seed, duration)
+    if output is not None:
+        from wheel_terra_estimator.bags.simulated_drive import write_simulated_drive
+
+        write_simulated_drive(result, Path(output), overwrite)
+    return result
+
+
+def _rover(
+    rover: str | Path | Sequence[str | Path] | Configuration, parameters: Sequence[str]
+) -> Configuration:
+    if isinstance(rover, Configuration):
+        if parameters:
+            raise UserError('parameters go with names of files; use Configuration.replace instead')
+        return rover
+    files = [rover] if isinstance(rover, str | Path) else list(rover)
+    return reader.load(files, parameters)
+
+
+def _replayed(path: Path, configuration: Configuration, remaps: Mapping[str, str]) -> Any:
+    from wheel_terra_estimator.bags.replay import replay
+    from wheel_terra_estimator.bags.storage import open_bag
+
+    with open_bag(path) as bag:
+        return replay(bag, configuration, remaps).history
+
+
+def _estimated(measurements: Iterable[Measurement], configuration: Configuration) -> Any:
+    from wheel_terra_estimator.bags.history import HistoryRecorder
+    from wheel_terra_estimator.estimation.core import EstimatorCore
+    from wheel_terra_estimator.messages.convert import finite
+
+    core = EstimatorCore(configuration)
+    recorder = HistoryRecorder(configuration.wheels.names)
+    for measurement in measurements:
+        for estimates in core.add(measurement):
+            recorder.add(finite(estimates))
+    for estimates in core.flush():
+        recorder.add(finite(estimates))
+    return recorder.history()
+
+
+def _result(history: Any, as_frame: bool) -> DataFrame | Columns:
+    stuck = np.zeros(history.stamp.size, dtype=bool)
+    for warning in history.warnings:
+        until = True if warning.end is None else history.stamp < warning.end
+        stuck |= (history.stamp >= warning.start) & until
+    columns: Columns = {
+        'stamp': history.stamp,
+        'time': history.seconds,
+        'forward_velocity': history.forward_velocity,
+        'forward_velocity_std': history.forward_velocity_std,
+        'stuck': stuck,
+    }
+    for field, values in {**history.values, 'slip_class': history.slip_class}.items():
+        columns |= {f'{field}.{name}': values[:, i] for i, name in enumerate(history.names)}
+    return to_frame(columns) if as_frame else columns
+
+
+def _measurements(
+    columns: Mapping[str, FloatArray], wheels: Sequence[str]
+) -> Iterator[Measurement]:
+    """Yield what each row of logged values measured, in the order of the rows."""
+    known = {*WHOLE, *(f'{field}.{wheel}' for field in PER_WHEEL for wheel in wheels)}
+    for key in columns:
+        if key not in known:
+            raise UserError(
+                f'drive: unknown column {key!r}; known are {", ".join(WHOLE)} and '
+                f'{", ".join(PER_WHEEL)} with .<wheel>, wheels being {", ".join(wheels)}'
+            )
+    if 'time' not in columns or not any(f'rate.{wheel}' in columns for wheel in wheels):
+        raise UserError(f"drive: needs the columns 'time' and 'rate.{wheels[0]}' (all wheels)")
+    time = columns['time']
+    if not np.isfinite(time).all() or (np.diff(time) < 0.0).any():
+        raise UserError('drive: time must be finite and must not go back; sort the rows')
+    blank = np.full(time.size, np.nan)
+
+    def block(names: Iterable[str]) -> FloatArray:
+        return np.column_stack([columns.get(name, blank) for name in names])
+
+    rate, torque, sinkage, leaving = (block(f'{f}.{w}' for w in wheels) for f in PER_WHEEL)
+    force = block(f'specific_force.{axis}' for axis in AXES)
+    turn = block(f'angular_rate.{axis}' for axis in AXES)
+    attitude = block(f'orientation.{axis}' for axis in (*AXES, 'w'))
+    velocity = columns.get('reference_velocity', blank)
+    deviation = columns.get('reference_velocity_std', blank)
+    # Not 0, which is no stamp; the numbers depend on differences of stamps only.
+    stamps = np.round((time - time[:1]) * NANOSECONDS).astype(np.int64) + NANOSECONDS
+    for k, stamp in enumerate(stamps.tolist()):
+        if np.isfinite(force[k]).all() and np.isfinite(turn[k]).all():
+            known_attitude = attitude[k] if np.isfinite(attitude[k]).all() else None
+            yield InertialReading(stamp, force[k], turn[k], known_attitude)
+        if np.isfinite(sinkage[k]).any():
+            yield SinkageReading(stamp, sinkage[k])
+        if np.isfinite(leaving[k]).any():
+            yield LeavingAngleReading(stamp, leaving[k])
+        if np.isfinite(velocity[k]):
+            stated = deviation[k] ** 2 if np.isfinite(deviation[k]) else 0.0
+            yield ReferenceVelocity(stamp, float(velocity[k]), float(stated))
+        if np.isfinite(rate[k]).any():
+            yield WheelOdometry(stamp, rate[k], torque[k])

@@ -1,0 +1,119 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Steady measurements against a model: which physical effect is missing."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from wheel_terra_estimator.api.frames import columns_of
+from wheel_terra_estimator.api.models import Model
+from wheel_terra_estimator.configuration import reader
+from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.errors import UserError
+
+if TYPE_CHECKING:
+    from wheel_terra_estimator.discrepancy.result import Diagnosis
+    from wheel_terra_estimator.discrepancy.tables.steady_table import SteadyTable
+
+
+def diagnose(
+    data: Any,
+    model: Model | Configuration | str | Path | Sequence[str | Path],
+    *,
+    reference: Any = None,
+    effects: Sequence[str] | None = None,
+    remaps: Mapping[str, str] | None = None,
+) -> Diagnosis:
+    """Find where measurements and a model disagree, and name the effect that is missing.
+
+    Parameters
+    ----------
+    data : DataFrame, mapping or path
+        Columns of steady measurements (``docs/tables.md``), a CSV file of them, or a rosbag2.
+    model : Model, Configuration, or names of configuration files
+        The model believed in.
+    reference : DataFrame, mapping or path, optional
+        Measurements in which the effect in question is absent; fitted first, so that structural
+        error common to both cancels.
+    effects : sequence of str, optional
+        Effects that may be named; default: all of the catalogue.
+    remaps : mapping, optional
+        For a bag: the estimator's topic -> the bag's.
+
+    Returns
+    -------
+    Diagnosis
+        ``verdict``, ``sentence``, ``effects``, ``gap``, ... and ``to_dict()`` as ``report.json``.
+
+    Raises
+    ------
+    UserError
+        For input that cannot be used, with row or column and the cure.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> slip, load = (a.ravel() for a in np.meshgrid(np.linspace(0.05, 0.6, 12), [60.0, 90.0]))
+    >>> rows = Model.load('hit_wh3', 'hit_fit').curve(slip, load).columns()
+    >>> measured = {name: rows[name] for name in ('slip', 'normal_load', 'sinkage', 'torque')}
+    >>> diagnose(measured, ['hit_wh3', 'hit_fit'], effects=['cohesion']).verdict
+    'agrees'
+    """
+    from wheel_terra_estimator.discrepancy.workflow import Options
+    from wheel_terra_estimator.discrepancy.workflow import diagnose as run
+
+    configuration = _configuration(model)
+    table = _table(data, 'data', configuration, remaps or {})
+    before = (
+        None if reference is None else _table(reference, 'reference', configuration, remaps or {})
+    )
+    options = Options(tuple(effects) if effects is not None else None)
+    return run(table, configuration, before, options)
+
+
+def corrected_model(diagnosis: Diagnosis) -> Model:
+    """Return the model after a diagnosis: soil refitted, named effects added.
+
+    The same as ``Model.load`` of the configuration and the written ``model.yaml``.
+    """
+    from wheel_terra_estimator.discrepancy.report.model_file import corrected
+
+    return Model.of(corrected(diagnosis)[0])
+
+
+def _configuration(
+    model: Model | Configuration | str | Path | Sequence[str | Path],
+) -> Configuration:
+    if isinstance(model, Model):
+        return model.configuration
+    if isinstance(model, Configuration):
+        return model
+    files = [model] if isinstance(model, str | Path) else list(model)
+    return reader.load(files, complete=False)
+
+
+def _table(
+    data: Any, name: str, configuration: Configuration, remaps: Mapping[str, str]
+) -> SteadyTable:
+    from wheel_terra_estimator.discrepancy.tables.checks import check_table
+    from wheel_terra_estimator.discrepancy.tables.parsing import read_table
+    from wheel_terra_estimator.discrepancy.tables.steady_table import COLUMNS
+
+    if not isinstance(data, str | Path):
+        columns = columns_of(data, name)
+        for key in columns:
+            if key not in COLUMNS:
+                raise UserError(
+                    f'{name}: unknown column {key!r}; leave it out, or rename it to one of '
+                    + ', '.join(COLUMNS)
+                )
+        return check_table(name, columns)
+    path = Path(data)
+    if path.suffix.lower() in ('.csv', '.txt'):
+        return read_table(path)
+    from wheel_terra_estimator.discrepancy.drives.windows import rows_from_bag
+
+    return rows_from_bag(path, configuration, remaps).table()
