@@ -402,9 +402,13 @@ def test_an_effect_of_ones_own(tmp_path):
     from wheel_terra_estimator.terramechanics import effects
 
     try:
-        c = reader.load([file], complete=False)
+        with pytest.raises(UserError, match='--allow-effect-files'):
+            reader.load([file], complete=False)
+        assert 'my_effect' not in effects.catalogue()
+        c = reader.load([file], complete=False, allow_effect_files=True)
         assert c.effects == {'my_effect': {'extra': 2.0}}
         c.write(tmp_path / 'again.yaml')
-        assert reader.load([tmp_path / 'again.yaml'], complete=False).effects == c.effects
+        again = reader.load([tmp_path / 'again.yaml'], complete=False, allow_effect_files=True)
+        assert again.effects == c.effects
     finally:
         effects._registered.pop('my_effect', None)

@@ -58,7 +58,8 @@ def test_it_is_named_with_its_size_and_the_model_file_works(rubbing_table, capsy
         assert gap['after'] <= gap['refit'] * 1.05
     # The corrected model is a configuration like any other, also where nobody knows the effect.
     effects._registered.clear()
-    model = reader.load([folder / 'rig.yaml', folder / 'with' / 'model.yaml'], complete=False)
+    files = [folder / 'rig.yaml', folder / 'with' / 'model.yaml']
+    model = reader.load(files, complete=False, allow_effect_files=True)
     assert model.effects['side_drag']['gain'] == pytest.approx(gain['value'], rel=1e-6)
 
 

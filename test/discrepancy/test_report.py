@@ -219,7 +219,8 @@ def test_cards_show_what_the_soil_does_and_what_the_effect_does(page, named):
     assert three in parsed.text
     closed = [g.shrink for g in named.gap.values() if g.shrink is not None]
     assert closed, 'an effect of 12 noise deviations leaves a gap to be closed'
-    assert f'{100 * min(closed):.0f}' in re.search(r'([\d to-]+) %of the excess', parsed.text)[1]
+    shown = re.search(r'([\d to-]+) %of the gap above the noise', parsed.text)[1]
+    assert f'{100 * min(closed):.0f}' in shown
 
 
 def test_curves_only_where_slip_was_swept(named, tmp_path):

@@ -25,7 +25,12 @@ from wheel_terra_estimator.discrepancy.fitting.coordinates import (
 from wheel_terra_estimator.discrepancy.fitting.evidence import Floor, evidence
 from wheel_terra_estimator.discrepancy.fitting.forward import Forward
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit, fit
-from wheel_terra_estimator.discrepancy.fitting.problem import build_problem, kernel, slip_features
+from wheel_terra_estimator.discrepancy.fitting.problem import (
+    CommonError,
+    build_problem,
+    kernel,
+    slip_features,
+)
 from wheel_terra_estimator.discrepancy.result import Noise
 from wheel_terra_estimator.discrepancy.selection import confidence
 from wheel_terra_estimator.discrepancy.selection import significance as gap_test
@@ -142,9 +147,8 @@ def test_rotation_gives_the_dense_covariance(setting):
     _, truth, std, inputs, scale = setting
     by_slip = np.outer(np.linspace(1, 2, len(truth)), [1e-3, 5.0, 1.0])
     group = np.arange(len(truth)) // 2
-    problem = build_problem(
-        truth, std, inputs, scale, (), by_slip, np.full(len(truth), 0.02), group
-    )
+    common = CommonError(by_slip, np.full(len(truth), 0.02), group)
+    problem = build_problem(truth, std, inputs, scale, common=[common])
     back = np.linalg.inv(problem.rotation)
     dense = (back * problem.variance(0.03)) @ back.T
     row, quantity = problem.row, problem.quantity

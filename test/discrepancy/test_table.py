@@ -60,7 +60,6 @@ def test_reads_numbers_gaps_and_extra_columns(tmp_path):
         ('slip,normal_load,sinkage,drawbarpull,torque', ('drawbarpull', 'drawbar_pull')),
         ('slip,load,sinkage,drawbar_pull,torque', ('normal_load',)),
         ('slip,normal_load,sinkage_mm,drawbar_pull,torque', ('sinkage_mm', "'sinkage' [m]")),
-        ('Slip,normal_load,sinkage,drawbar_pull,torque', ('Slip', "'slip'")),
         ('slip,normal_load,a,b,c', ('none of sinkage',)),
         ('0.1,80,0.01,3,4', ('no header',)),
         ('slip,slip,sinkage,drawbar_pull,torque', ('twice',)),
@@ -80,6 +79,33 @@ def test_columns_misspelt_or_missing(tmp_path, header, parts):
     assert 'bin.csv' in message
     assert '\n' not in message
     assert all(part in message for part in parts), message
+
+
+def test_capitals_units_and_semicolons_are_read_with_a_note(tmp_path):
+    plain = read_table(write(tmp_path, HEADER + '\n' + '\n'.join(lines())))
+    table = rows()
+    header = 'Slip [%];Normal_Load (N);sinkage [mm];Drawbar Pull;torque [N m]'
+    body = [
+        ';'.join(
+            f'{factor * table[key][i]:.6g}'.replace('.', ',')
+            for key, factor in zip(HEADER.split(','), (100, 1, 1000, 1, 1), strict=True)
+        )
+        for i in range(8)
+    ]
+    found = read_table(write(tmp_path, header + '\n' + '\n'.join(body)))
+    np.testing.assert_allclose(found.measured, plain.measured, rtol=1e-5)
+    np.testing.assert_allclose(found.columns['slip'], plain.columns['slip'], rtol=1e-5)
+    assert any("';'" in note for note in found.notes)
+    assert any("'sinkage [mm]' as sinkage (times 0.001)" in note for note in found.notes)
+
+
+def test_all_faults_of_a_header_come_in_one_line(tmp_path):
+    with pytest.raises(UserError) as caught:
+        read_table(write(tmp_path, 'slip,slip,Fz,sinkage [furlong],DP\n' + '\n'.join(lines())))
+    message = str(caught.value)
+    assert '\n' not in message
+    for part in ('twice', "'Fz' to 'normal_load' [N]", 'furlong', 'mm'):
+        assert part in message, message
 
 
 def test_column_names_alone_are_no_table(tmp_path):
@@ -131,6 +157,11 @@ def test_cells_that_are_no_numbers(tmp_path, cell, parts):
         ({'slip': -np.linspace(0.05, 0.8, 8), 'drawbar_pull': np.full(8, 9.0)}, ('wrong sign',)),
         ({'angular_velocity': np.full(8, -0.3)}, ('torque', 'wrong sign', 'reverse')),
         ({'leaving_angle': np.full(8, 0.2)}, ('leaving_angle', 'behind the hub is negative')),
+        ({'sinkage': -np.linspace(0.01, 0.02, 8)}, ('sinkage', 'negative', 'by -1')),
+        (
+            {'slip': np.full(8, 0.2), 'normal_load': np.linspace(40, 90, 8)},
+            ('slip is 0.2 in every row', 'add rows at other slips'),
+        ),
         ({'sinkage': np.full(8, 0.004)}, ('sinkage', 'all 8 rows', 'leave the column out')),
         ({'slip': np.r_[np.nan, np.linspace(0.1, 0.8, 7)]}, ('slip', 'missing')),
     ],
@@ -161,14 +192,9 @@ def test_copies_count_once_but_repeats_stay():
 
 
 def test_readings_that_look_odd_are_said_and_used():
-    table = rows()
-    table.update(sinkage=-table['sinkage'], drawbar_pull=-table['drawbar_pull'])
-    notes = check_table('x.csv', table).notes
-    assert any('sinkages are negative' in note for note in notes)
-    assert any('drawbar_pull falls with slip' in note for note in notes)
     still = check_table('x.csv', rows(sinkage=np.full(8, 0.004), sinkage_std=np.full(8, 1e-3)))
     assert any('0.004 m in all 8 rows' in note for note in still.notes)
-    narrow = rows(slip=np.full(8, 0.2), normal_load=np.linspace(40, 90, 8))
+    narrow = rows(slip=np.linspace(0.2, 0.25, 8), normal_load=np.linspace(40, 90, 8))
     assert any('slip only from 0.2' in note for note in check_table('x.csv', narrow).notes)
     # A skidding wheel may take torque (friction before it) as long as it does not pull.
     skid = rows(slip=-np.linspace(0.1, 0.8, 8), drawbar_pull=np.linspace(-5, -30, 8))

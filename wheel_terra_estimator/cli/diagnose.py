@@ -54,6 +54,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         'ask, up to 0.04; 0: the model is exact)',
     )
     parser.add_argument(
+        '--allowed-error',
+        type=float,
+        default=0.02,
+        metavar='SHARE',
+        help="model error that is no reason for doubt, share of each quantity's range (default "
+        '0.02): a channel off by more than twice its sum with the noise does not agree',
+    )
+    parser.add_argument(
         '--remap',
         action='append',
         default=[],
@@ -78,6 +86,10 @@ def run(arguments: argparse.Namespace) -> int:
     check_folder(output, arguments.overwrite, inputs)
     if arguments.floor is not None and not 0.0 <= arguments.floor <= 0.2:
         raise UserError(f'--floor {arguments.floor:g}: must be a share between 0 and 0.2')
+    if not 0.0 <= arguments.allowed_error <= 0.5:
+        raise UserError(
+            f'--allowed-error {arguments.allowed_error:g}: must be a share between 0 and 0.5'
+        )
     given = [arguments.data, *([arguments.reference] if arguments.reference else [])]
     if arguments.remap and not any(_is_bag(Path(path)) for path in given):
         raise UserError(
@@ -90,7 +102,7 @@ def run(arguments: argparse.Namespace) -> int:
     reference = None
     if arguments.reference:
         reference = _read(arguments.reference, arguments.remap, configuration)
-    options = Options(tuple(arguments.only) or None, arguments.floor)
+    options = Options(tuple(arguments.only) or None, arguments.floor, arguments.allowed_error)
     diagnosis = diagnose(table, configuration, reference, options)
     diagnosis = _with_effect_file(diagnosis, own)
     if not any(key.startswith('soil.') for key in configuration.stated):

@@ -104,7 +104,9 @@ def run(arguments: argparse.Namespace) -> int:
     output: Path | None = arguments.output
     if output is not None:
         _check_output(output, arguments.overwrite, _tables(arguments))
-    configuration = configuration_reader.from_arguments(arguments)
+    # The mass is needed for the default load only.
+    brings_load = bool(arguments.load or arguments.points)
+    configuration = configuration_reader.from_arguments(arguments, complete=not brings_load)
     columns = _points(arguments, configuration)
     try:
         model = WheelSoilModel(
@@ -118,6 +120,7 @@ def run(arguments: argparse.Namespace) -> int:
                 columns['wheel_width'],
                 columns['lug_height'],
                 columns['lug_count'],
+                float(configuration.wheels.lug_thickness[_wheel_index(arguments, configuration)]),
             ),
             slope=columns['slope'],
             slip_radius=configuration.slip_radius,
@@ -179,12 +182,7 @@ def _check_output(output: Path, overwrite: bool, inputs: list[Path]) -> None:
 
 def _points(arguments: argparse.Namespace, configuration: Configuration) -> dict[str, FloatArray]:
     """Return all input columns, (N,) each, from the arguments, the table and the configuration."""
-    wheels = configuration.wheels
-    wheel = 0
-    if arguments.wheel is not None:
-        if arguments.wheel not in wheels.names:
-            raise UserError(f'--wheel {arguments.wheel}: there are {", ".join(wheels.names)}')
-        wheel = wheels.names.index(arguments.wheel)
+    wheels, wheel = configuration.wheels, _wheel_index(arguments, configuration)
     rover = configuration.rover
     defaults = {
         'slope': 0.0,
@@ -205,9 +203,12 @@ def _points(arguments: argparse.Namespace, configuration: Configuration) -> dict
         columns = _read_points(arguments.points)
         count = columns['slip'].size
     else:
-        load = rover.mass * rover.gravity / wheels.count
         slips = _numbers('--slip', arguments.slip or DEFAULT_SLIP)
-        loads = _numbers('--load', arguments.load) if arguments.load else np.array([load])
+        loads = (
+            _numbers('--load', arguments.load)
+            if arguments.load
+            else _share_of_weight(configuration)
+        )
         slopes = _numbers('--slope', arguments.slope) if arguments.slope else np.array([0.0])
         rows = np.array(list(product(loads, slopes, slips)))
         columns = {'normal_load': rows[:, 0], 'slope': rows[:, 1], 'slip': rows[:, 2]}
@@ -216,7 +217,28 @@ def _points(arguments: argparse.Namespace, configuration: Configuration) -> dict
     for name, values in columns.items():
         default = full.get(name)
         full[name] = values if default is None else np.where(np.isnan(values), default, values)
+    for field in ('radius', 'width'):
+        brought = columns.get(f'wheel_{field}', np.full(1, np.nan))
+        if f'wheels.{field}' not in configuration.stated and np.isnan(brought).any():
+            raise UserError(
+                f'wheels.{field} not stated; give a rover file (--config), or the column '
+                f'wheel_{field} in the table of --points'
+            )
     return {name: full[name] for name in INPUTS}
+
+
+def _wheel_index(arguments: argparse.Namespace, configuration: Configuration) -> int:
+    names = configuration.wheels.names
+    if arguments.wheel is None:
+        return 0
+    if arguments.wheel not in names:
+        raise UserError(f'--wheel {arguments.wheel}: there are {", ".join(names)}')
+    return names.index(arguments.wheel)
+
+
+def _share_of_weight(configuration: Configuration) -> FloatArray:
+    rover = configuration.rover
+    return np.array([rover.mass * rover.gravity / configuration.wheels.count])
 
 
 def _numbers(option: str, text: str) -> FloatArray:

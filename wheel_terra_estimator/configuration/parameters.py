@@ -188,7 +188,7 @@ DECLARED: tuple[Parameter, ...] = (
         'effect_file',
         '',
         'Python file that registers effects of your own (path, relative to the file that names '
-        'it); it is executed',
+        'it); it is executed, with --allow-effect-files only',
     ),
     text(
         'slip_radius',

@@ -34,7 +34,11 @@ _Sourced = dict[str, tuple[Any, str]]
 
 
 def load(
-    files: Sequence[str | Path] = (), overrides: Sequence[str] = (), *, complete: bool = True
+    files: Sequence[str | Path] = (),
+    overrides: Sequence[str] = (),
+    *,
+    complete: bool = True,
+    allow_effect_files: bool = False,
 ) -> Configuration:
     """Read parameter files and overrides; later ones win key by key.
 
@@ -46,6 +50,8 @@ def load(
         ``NAME:=VALUE``.
     complete : bool
         Whether wheels and mass must be stated (not needed where a table brings them).
+    allow_effect_files : bool
+        Whether the Python file that ``effect_file`` names may be run.
 
     Raises
     ------
@@ -65,11 +71,15 @@ def load(
             raise UserError(f"-p {override}: must be NAME:=VALUE, such as 'rover.mass:=120.0'")
         key = key.strip()
         sourced.append((key, f'-p {override}', ros_yaml.parse_value(text, f'-p {override}')))
-    return _checked(sourced, complete)
+    return _checked(sourced, complete, allow_effect_files)
 
 
 def from_parameters(
-    parameters: Mapping[str, Any], *, source: str = 'parameters', complete: bool = True
+    parameters: Mapping[str, Any],
+    *,
+    source: str = 'parameters',
+    complete: bool = True,
+    allow_effect_files: bool = True,
 ) -> Configuration:
     """Check parameters that came without a file (the node's overrides, a caller's mapping).
 
@@ -79,14 +89,14 @@ def from_parameters(
         Key -> scalar or sequence; arrays of any kind will do.
     source : str
         What messages name in place of the file.
-    complete : bool
-        As for ``load``.
+    complete, allow_effect_files : bool
+        As for ``load``; a mapping that a program makes is trusted unless told otherwise.
     """
     sourced = [
         (key, source, value.tolist() if hasattr(value, 'tolist') else value)
         for key, value in parameters.items()
     ]
-    return _checked(sourced, complete)
+    return _checked(sourced, complete, allow_effect_files)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -107,15 +117,27 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='NAME:=VALUE',
         help='one parameter, wins over files; may be given several times',
     )
+    parser.add_argument(
+        '--allow-effect-files',
+        action='store_true',
+        help='run the Python file that effect_file names in a configuration',
+    )
 
 
 def from_arguments(arguments: argparse.Namespace, *, complete: bool = True) -> Configuration:
     """Return the configuration that the arguments of ``add_arguments`` ask for."""
-    return load(arguments.config, arguments.parameters, complete=complete)
+    return load(
+        arguments.config,
+        arguments.parameters,
+        complete=complete,
+        allow_effect_files=arguments.allow_effect_files,
+    )
 
 
-def _checked(sourced: Sequence[tuple[str, str, Any]], complete: bool) -> Configuration:
-    _load_effect_file(sourced)
+def _checked(
+    sourced: Sequence[tuple[str, str, Any]], complete: bool, allow_effect_files: bool
+) -> Configuration:
+    _load_effect_file(sourced, allow_effect_files)
     table = declared()
     spellings = by_spelling(table)
     stated: _Sourced = {}
@@ -142,12 +164,17 @@ def _checked(sourced: Sequence[tuple[str, str, Any]], complete: bool) -> Configu
     return Configuration.from_values(values, stated)
 
 
-def _load_effect_file(sourced: Sequence[tuple[str, str, Any]]) -> None:
+def _load_effect_file(sourced: Sequence[tuple[str, str, Any]], allowed: bool) -> None:
     """Register a user's own effects before their keys are judged."""
     for key, source, value in reversed(sourced):
         if key == 'effect_file' and value:
             if not Path(str(value)).is_file():
                 raise UserError(f'{source}: effect_file: there is no file {value}')
+            if not allowed:
+                raise UserError(
+                    f'{source}: effect_file: {value} is Python code; look at it, then add '
+                    '--allow-effect-files to have it run'
+                )
             from wheel_terra_estimator.terramechanics import effects
 
             try:

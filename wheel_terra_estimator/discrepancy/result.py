@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from wheel_terra_estimator.configuration.reader import Configuration
 
 FloatArray = NDArray[np.float64]
-VERDICTS = ('agrees', 'named', 'unexplained')
+VERDICTS = ('agrees', 'named', 'unexplained', 'undecided')
 
 
 @dataclass(frozen=True)
@@ -142,9 +142,11 @@ class Candidate:
 class QuantityGap:
     """Root-mean-square error of one quantity on rows that the fit did not see [its unit].
 
-    ``noise`` is the stated or estimated standard deviation, ``floor`` the model-error floor that
-    the data ask for; ``shrink`` = 1 - excess(after)/excess(refit), where the excess is what is left
-    when noise and floor are subtracted in squares, with a bootstrap interval over the rows.
+    ``noise`` is the stated or estimated standard deviation (an uncertain slip included), ``fitted``
+    the error of the written model on all rows, ``floor`` the model-error floor that the data ask
+    for; ``shrink`` = 1 - excess(after)/excess(refit), where the excess is what is left when the
+    noise alone is subtracted in squares, with a bootstrap interval over the rows. ``limit`` is what
+    noise and the allowed model error permit: an ``after`` beyond it wants an explanation.
     """
 
     before: float
@@ -153,6 +155,8 @@ class QuantityGap:
     noise: float | None
     floor: float = 0.0
     rows: int = 0
+    fitted: float = 0.0
+    limit: float = math.inf
     shrink: float | None = None
     shrink_low: float | None = None
     shrink_high: float | None = None
@@ -163,8 +167,10 @@ class QuantityGap:
             'before': self.before,
             'refit': self.refit,
             'after': self.after,
+            'fitted': self.fitted,
             'rows': self.rows,
             'floor': self.floor,
+            'limit': self.limit,
         }
         for key in ('noise', 'shrink', 'shrink_low', 'shrink_high'):
             if getattr(self, key) is not None:
@@ -336,7 +342,7 @@ class Diagnosis:
     Attributes
     ----------
     verdict : str
-        ``agrees``, ``named`` or ``unexplained``.
+        One of ``VERDICTS``.
     sentence : str
         The verdict for people, in one or two sentences.
     table : SteadyTable
@@ -347,6 +353,8 @@ class Diagnosis:
         Best first, ``nothing`` among them.
     gap : mapping
         Quantity -> QuantityGap.
+    not_tried : mapping
+        Effect of the catalogue that was not tried -> why.
     not_visible : mapping
         Effect -> why these rows could not have shown it.
     smallest_visible : mapping
@@ -368,6 +376,10 @@ class Diagnosis:
         Warnings for people (units, duplicates, constant columns, soil pulls).
     base_effects : tuple of str
         Effects that the configuration had switched on already.
+    refitted : mapping
+        ``effect.parameter`` -> fitted value, of parameters that were on already.
+    nearest : tuple of str
+        Where nothing was named: the effects that come nearest.
     seconds : float
         Time the diagnosis took.
     """
@@ -393,6 +405,9 @@ class Diagnosis:
     floor: float
     notes: tuple[str, ...] = ()
     base_effects: tuple[str, ...] = ()
+    refitted: Mapping[str, FittedParameter] = field(default_factory=dict)
+    nearest: tuple[str, ...] = ()
+    not_tried: Mapping[str, str] = field(default_factory=dict)
     seconds: float = 0.0
 
     def to_dict(self) -> dict[str, Any]:
@@ -404,6 +419,7 @@ class Diagnosis:
                 'effects': [effect.to_dict() for effect in self.effects],
                 'candidates': [candidate.to_dict() for candidate in self.candidates],
                 'gap': {key: value.to_dict() for key, value in self.gap.items()},
+                'not_tried': dict(self.not_tried),
                 'not_visible': sorted(self.not_visible),
                 'why_not_visible': dict(self.not_visible),
                 'smallest_visible': {
@@ -432,6 +448,8 @@ class Diagnosis:
                 },
                 'floor': self.floor,
                 'base_effects': list(self.base_effects),
+                'refitted': {key: value.to_dict() for key, value in self.refitted.items()},
+                'nearest': list(self.nearest),
                 'notes': list(self.notes),
                 'rows': len(self.table.lines),
                 'table': self.table.name,

@@ -25,7 +25,7 @@ from wheel_terra_estimator.discrepancy.fitting.coordinates import (
 from wheel_terra_estimator.discrepancy.fitting.forward import Forward
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
 from wheel_terra_estimator.discrepancy.fitting.reference import join, shared_error
-from wheel_terra_estimator.discrepancy.report import words as summary
+from wheel_terra_estimator.discrepancy.report import words
 from wheel_terra_estimator.discrepancy.result import (
     Candidate,
     Curves,
@@ -44,6 +44,7 @@ from wheel_terra_estimator.discrepancy.selection.verdict import Verdict, decide
 from wheel_terra_estimator.discrepancy.selection.weights import default_floors, shared_floors
 from wheel_terra_estimator.discrepancy.tables.checks import (
     check_against_wheel,
+    check_pull_against_model,
     check_wheel_of_model,
 )
 from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES, SteadyTable
@@ -56,6 +57,7 @@ from wheel_terra_estimator.terramechanics.wheel import Wheel
 FloatArray = NDArray[np.float64]
 
 _CANDIDATES_SHOWN = 12
+_NEAREST = 3  # effects named as nearest where nothing is named
 
 
 @dataclass(frozen=True)
@@ -68,10 +70,14 @@ class Options:
         Effects that may be named; None = all candidates of the catalogue.
     floor : float or None
         Greatest model-error floor, share of each quantity's range; None = as the data ask, to 4 %.
+    allowed_error : float
+        Model error that is no reason for doubt, share of each quantity's range: a channel that is
+        off by more than twice its root sum of squares with the noise does not agree.
     """
 
     effects: tuple[str, ...] | None = None
     floor: float | None = None
+    allowed_error: float = 0.02
 
 
 def diagnose(
@@ -114,13 +120,16 @@ def diagnose(
         np.broadcast_to(points.wheel.width, (len(both),)),
     )
     known = catalogue()
-    effects = _effects_to_try(configuration, chosen, known)
+    effects, not_tried = _effects_to_try(configuration, chosen, known)
     forward = Forward(points, configuration.soil, configuration.effects, known, active=active)
-    _check_soil_carries(both, forward, configuration)
+    configured = _check_soil_carries(both, forward, configuration)
+    check_pull_against_model(both, configured[:, 1])
     nuisance = nuisance_coordinates(configuration, known)
     floors = default_floors(chosen.floor) if reference is None else shared_floors()
     findings = search(both, forward, nuisance, effects, floors)
-    return _report(table, both, configuration, findings, known, started)
+    diagnosis = _report(table, both, configuration, findings, known, chosen)
+    seconds = time.perf_counter() - started
+    return replace(diagnosis, not_tried=not_tried, seconds=seconds)
 
 
 def operating_points(table: SteadyTable, configuration: Configuration) -> OperatingPoints:
@@ -193,24 +202,32 @@ def nuisance_coordinates(
 
 def _effects_to_try(
     configuration: Configuration, options: Options, known: Mapping[str, Effect]
-) -> dict[str, Effect]:
-    if options.effects is not None:
-        for name in options.effects:
-            if name not in known:
-                raise UserError(f'effect {name} is not in the catalogue: {", ".join(known)}')
-        names = list(options.effects)
-    else:
-        names = [name for name, effect in known.items() if effect.candidate]
+) -> tuple[dict[str, Effect], dict[str, str]]:
+    """Return the effects to be tried, and why the others are not."""
+    for name in options.effects or ():
+        if name not in known:
+            raise UserError(f'effect {name} is not in the catalogue: {", ".join(known)}')
     on = configuration.effects
-    return {
-        name: known[name]
-        for name in names
-        if name not in on and not (known[name].incompatible_with & on.keys())
-    }
+    tried, not_tried = {}, {}
+    for name, effect in known.items():
+        excluding = sorted(effect.incompatible_with & on.keys())
+        if name in on:
+            not_tried[name] = 'is on in the configuration already'
+        elif excluding:
+            not_tried[name] = f'excluded by {", ".join(excluding)}, which is on'
+        elif options.effects is not None and name not in options.effects:
+            not_tried[name] = 'was not asked for'
+        elif options.effects is None and not effect.candidate:
+            not_tried[name] = f'is tried only when asked for (--only {name})'
+        else:
+            tried[name] = effect
+    return tried, not_tried
 
 
-def _check_soil_carries(table: SteadyTable, forward: Forward, configuration: Configuration) -> None:
-    """Raise where the configured soil lets the wheel sink in to its hub."""
+def _check_soil_carries(
+    table: SteadyTable, forward: Forward, configuration: Configuration
+) -> FloatArray:
+    """Return (N, 3) values as configured; raise where the soil lets the wheel sink to its hub."""
     nothing = soil_coordinates(configuration.soil, {})
     state = forward.solve([nothing], [np.zeros(len(nothing))], jacobian=False)
     sunk = state.angle[0] > 1.45
@@ -221,6 +238,7 @@ def _check_soil_carries(table: SteadyTable, forward: Forward, configuration: Con
             f'{table.name}, line {table.lines[row]}: the configured soil cannot carry '
             f'{load:g} N on this wheel; check the soil of --config and the units of normal_load'
         )
+    return np.asarray(state.outputs[0])
 
 
 def _report(
@@ -229,17 +247,20 @@ def _report(
     configuration: Configuration,
     findings: Findings,
     known: Mapping[str, Effect],
-    started: float,
+    options: Options,
+    *,
+    off: bool = False,
 ) -> Diagnosis:
-    setting, selection, nothing = findings.setting, findings.selection, findings.nothing
+    setting, selection = findings.setting, findings.selection
     problem = setting.problem
-    verdict = decide(selection, problem.variance)
+    verdict = decide(selection, problem.variance, off=off)
     left = verdict.left
-    after = selection.explanations[verdict.index].fitted
     quiet = [k for k, floor in enumerate(selection.floors) if not floor.unexplained]
     floor_index = quiet[int(np.argmax(selection.log_joint[verdict.index][quiet]))]
     floor = selection.floors[floor_index].largest
     variance = problem.variance(floor)
+    nothing, after = _under_own_floor(findings, verdict, floor_index)
+    findings = replace(findings, nothing=nothing)
     shown = _shown(findings, verdict.index)
     groups = np.where(np.arange(len(both)) < len(table), slip_groups(both), -1)
     kept = [nothing, *(selection.explanations[h].fitted for h in shown)]
@@ -259,17 +280,22 @@ def _report(
             gap_test.chi_square_p_value(nothing, variance),
         ),
     )
-    effects = _named(findings, verdict, left, known, floor_index) if after.names else ()
+    gap = words.gaps(table, findings, curves, floor, options.allowed_error)
+    if verdict.word == 'agrees' and not off and words.channels_off(gap):
+        return _report(table, both, configuration, findings, known, options, off=True)
+    covariance = np.asarray(np.linalg.inv(after.precision()), dtype=float)
+    nearest = () if after.names else _nearest(findings)
+    effects = _named(findings, verdict, left, known, after, covariance) if after.names else ()
     candidates = _candidates(findings, verdict, shown, gains, floor_index)
     stretch = changed_stretch(both, setting, after, variance)
     return Diagnosis(
         verdict=verdict.word,
-        sentence=summary.sentence(verdict, effects, gap_p_value, left, floor, stretch),
+        sentence=words.sentence(verdict, effects, gap_p_value, left, floor, stretch, gap, nearest),
         table=table,
         configuration=configuration,
         effects=effects,
         candidates=candidates,
-        gap=summary.gaps(table, findings, curves, floor),
+        gap=gap,
         not_visible=dict(findings.not_visible),
         smallest_visible=_smallest_visible(findings, known),
         where=locate(both, problem, nothing, setting.observed, len(table)),
@@ -284,9 +310,10 @@ def _report(
         remainder_p_value=left.p_value,
         remainder_amplitude=left.amplitude,
         floor=floor,
-        notes=summary.notes(both, findings, after, stretch),
+        notes=words.notes(both, findings, after, stretch),
         base_effects=tuple(configuration.effects),
-        seconds=time.perf_counter() - started,
+        refitted=_parameters(after, covariance, base=True),
+        nearest=nearest,
     )
 
 
@@ -303,13 +330,24 @@ def _shown(findings: Findings, chosen: int) -> list[int]:
     return shown
 
 
+def _under_own_floor(findings: Findings, verdict: Verdict, floor_index: int) -> tuple[Fit, Fit]:
+    """Refit nothing and the chosen explanation with the noise and floor that it asks for."""
+    setting, chosen = findings.setting, findings.selection.explanations[verdict.index]
+    floor = findings.selection.floors[floor_index]
+    variance = setting.problem.variance(floor.amplitude, chosen.posterior.noise_factor[floor_index])
+    fits = [findings.nothing, chosen.fitted] if chosen.names else [findings.nothing]
+    again = [setting.fit([f.names], [f.u], f.angle, variance)[0] for f in fits]
+    return again[0], again[-1]
+
+
 def _parameters(
-    fitted: Fit, covariance: FloatArray, inflate: float = 1.0
+    fitted: Fit, covariance: FloatArray, *, base: bool = False
 ) -> dict[str, FittedParameter]:
+    """Return the parameters of the effects of a fit, or of those that were on before."""
     found = {}
     for index, c in enumerate(fitted.coordinates):
-        if c.owner in fitted.names:
-            u, std = float(fitted.u[index]), inflate * float(np.sqrt(covariance[index, index]))
+        if c.owner != 'soil' and (c.owner in fitted.names) != base:
+            u, std = float(fitted.u[index]), float(np.sqrt(covariance[index, index]))
             found[c.key] = FittedParameter(
                 float(c.value(u)),
                 c.deviation(u, std),
@@ -326,12 +364,10 @@ def _named(
     verdict: Verdict,
     left: Remainder,
     known: Mapping[str, Effect],
-    floor_index: int,
+    fitted: Fit,
+    covariance: FloatArray,
 ) -> tuple[NamedEffect, ...]:
     """Return the named effects; first the one that alone explains more."""
-    explanation = findings.selection.explanations[verdict.index]
-    fitted = explanation.fitted
-    covariance = explanation.posterior.covariance[floor_index]
     parameters = _parameters(fitted, covariance)
     found = []
     for place, name in enumerate(fitted.names):
@@ -368,6 +404,12 @@ def _named(
     return tuple(effect for _, effect in found)
 
 
+def _nearest(findings: Findings) -> tuple[str, ...]:
+    """Return up to three single effects that the rows favour most."""
+    weights = findings.selection.single_weights()
+    return tuple(sorted(weights, key=lambda name: -weights[name])[:_NEAREST])
+
+
 def _distance_to_nothing(findings: Findings, fitted: Fit) -> float:
     change = findings.setting.problem.rotate(
         findings.setting.problem.flat(fitted.outputs - findings.nothing.outputs)
@@ -401,7 +443,7 @@ def _candidates(
                 float(findings.setting.problem.size - len(fitted.u)),
                 _parameters(fitted, explanation.posterior.covariance[floor_index]),
                 _distance_to_nothing(findings, fitted) if explanation.names else 0.0,
-                '' if h == verdict.index else summary.why_not(findings, verdict, h, totals, chosen),
+                '' if h == verdict.index else words.why_not(findings, verdict, h, totals, chosen),
             )
         )
     return tuple(found)

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import sys
 from typing import Any
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
@@ -37,7 +38,11 @@ def declare_parameters(node: Node) -> Configuration:
     UserError
         If a parameter is unknown or its value cannot be used.
     """
-    configuration = reader.from_parameters(take_overrides(node), source='parameters')
+    configuration = reader.from_parameters(
+        take_overrides(node),
+        source='parameters',
+        allow_effect_files='--allow-effect-files' in sys.argv,
+    )
     values = configuration.flat()
     for key, parameter in declared().items():
         node.declare_parameter(key, values[key], _descriptor(parameter), ignore_override=True)

@@ -271,6 +271,17 @@ class Forward:
         other = self.at(beside).solve([hypothesis], [u], angle[None], jacobian=False).outputs[0]
         return (other - base) / step[:, None]
 
+    def by_leaving_angle(
+        self, hypothesis: Sequence[Coordinate], u: FloatArray, angle: FloatArray
+    ) -> FloatArray:
+        """Return (N, 3) derivative of the outputs by the measured leaving angle; 0 without one."""
+        step = 1e-4
+        given = np.asarray(self.points.leaving_angle, dtype=float)
+        beside = self.at(replace(self.points, leaving_angle=given - step))
+        base = self.solve([hypothesis], [u], angle[None], jacobian=False).outputs[0]
+        other = beside.solve([hypothesis], [u], angle[None], jacobian=False).outputs[0]
+        return np.where(np.isnan(given)[:, None], 0.0, (base - other) / step)
+
     def _balance(
         self,
         hypotheses: Sequence[Sequence[Coordinate]],

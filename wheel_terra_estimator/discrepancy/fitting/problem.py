@@ -96,6 +96,25 @@ class Problem:
         return np.asarray(k[..., self.block] ** 2 + a[..., self.block] ** 2 * self.roughness)
 
 
+@dataclass(frozen=True)
+class CommonError:
+    """Error of an input, felt by all quantities of the rows that share the reading.
+
+    Attributes
+    ----------
+    slope : numpy.ndarray
+        (N, 3) derivative of the quantities by the input.
+    std : numpy.ndarray
+        (N,) standard deviation of the input.
+    group : numpy.ndarray
+        (N,) rows of the same number share one reading.
+    """
+
+    slope: FloatArray
+    std: FloatArray
+    group: IndexArray
+
+
 def kernel(inputs: FloatArray) -> FloatArray:
     """(N, N) correlation of a structural error between rows.
 
@@ -135,9 +154,7 @@ def build_problem(
     inputs: FloatArray,
     scale: FloatArray,
     outliers: Sequence[tuple[int, int]] = (),
-    by_slip: FloatArray | None = None,
-    slip_std: FloatArray | None = None,
-    slip_group: IndexArray | None = None,
+    common: Sequence[CommonError] = (),
 ) -> Problem:
     """Return the problem of an (N, 3) table.
 
@@ -151,11 +168,8 @@ def build_problem(
         (3,) range of each quantity.
     outliers : sequence of (row, quantity)
         Cells set apart.
-    by_slip, slip_std : numpy.ndarray, optional
-        (N, 3) derivative by the recorded slip and (N,) its standard deviation: an error common to
-        the quantities of a row, and to the rows of a group.
-    slip_group : numpy.ndarray, optional
-        (N,) rows that share one reading of the slip.
+    common : sequence of CommonError
+        Errors of inputs (slip, leaving angle), common to the quantities of a row.
     """
     row, quantity = np.nonzero(np.isfinite(measured))
     deviation = std[row, quantity].copy()
@@ -165,7 +179,7 @@ def build_problem(
     deviation[apart] *= OUTLIER_FACTOR
     correlation = kernel(inputs)
     m = len(row)
-    if by_slip is None or slip_std is None or slip_group is None:
+    if not common:
         rotation, roughness = np.zeros((m, m)), np.empty(m)
         block = np.empty(m, dtype=np.intp)
         at = 0
@@ -183,10 +197,11 @@ def build_problem(
             at += mine.size
         log_std = float(np.log(deviation).sum())
     else:
-        common = by_slip[row, quantity]
         noise = np.diag(deviation**2)
-        together = slip_group[row][:, None] == slip_group[row][None, :]
-        noise += np.where(together, np.outer(common * slip_std[row], common * slip_std[row]), 0.0)
+        for error in common:
+            size = error.slope[row, quantity] * error.std[row]
+            together = error.group[row][:, None] == error.group[row][None, :]
+            noise += np.where(together, np.outer(size, size), 0.0)
         lower = np.linalg.cholesky(noise)
         smooth = np.where(
             quantity[:, None] == quantity[None, :],

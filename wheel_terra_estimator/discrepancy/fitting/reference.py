@@ -51,8 +51,20 @@ def join(table: SteadyTable, reference: SteadyTable) -> tuple[SteadyTable, NDArr
         np.concatenate([table.stated_std, reference.stated_std]),
         np.concatenate([table.slip_std, reference.slip_std]),
         (*table.notes, f'{len(reference)} rows of {reference.name} as reference'),
+        _both_angle_stds(table, reference),
     )
     return joined, np.arange(len(joined)) < len(table)
+
+
+def _both_angle_stds(table: SteadyTable, reference: SteadyTable) -> FloatArray | None:
+    if table.leaving_angle_std is None and reference.leaving_angle_std is None:
+        return None
+    return np.concatenate(
+        [
+            np.zeros(len(one)) if one.leaving_angle_std is None else one.leaving_angle_std
+            for one in (table, reference)
+        ]
+    )
 
 
 def shared_error(

@@ -18,6 +18,9 @@ def corrected(diagnosis: Diagnosis) -> tuple[Configuration, list[str]]:
     soil = diagnosis.configuration.soil
     for shift in diagnosis.soil:
         changes.update(_soil_keys(shift.name, shift.after, shift.after_std, soil))
+    for key, parameter in diagnosis.refitted.items():
+        changes[f'effects.{key}'] = float(parameter.value)
+        changes[f'effects.{key}_std'] = float(parameter.std)
     for effect in diagnosis.effects:
         prefix = f'effects.{effect.name}'
         changes[f'{prefix}.enabled'] = True
@@ -67,4 +70,7 @@ def write_model(diagnosis: Diagnosis, path: str | Path) -> None:
     """Write ``model.yaml``: a further ``--config`` of every command and of the node."""
     configuration, keys = corrected(diagnosis)
     unique = list(dict.fromkeys(keys))
-    configuration.write(path, unique, comment=provenance(diagnosis))
+    comment = provenance(diagnosis)
+    if 'effect_file' in unique:
+        comment = f'Runs Python code (effect_file): needs --allow-effect-files\n{comment}'
+    configuration.write(path, unique, comment=comment)

@@ -28,7 +28,7 @@ SOIL_WORDS = {
     'stiffness': 'bearing stiffness (factor on both moduli)',
     'tan_friction': 'tangent of the friction angle',
 }
-_TONES = {'agrees': 'good', 'named': 'warn', 'unexplained': 'bad'}
+_TONES = {'agrees': 'good', 'named': 'warn', 'unexplained': 'bad', 'undecided': 'warn'}
 
 
 def write_report(diagnosis: Diagnosis, folder: str | Path) -> Path:
@@ -172,7 +172,8 @@ def _cards(diagnosis: Diagnosis) -> list[dict[str, str]]:
         cards.append(
             {
                 'value': ' to '.join(dict.fromkeys((ends[0], ends[-1]))) + ' %',
-                'label': f'of the excess gap closed ({", ".join(map(pictures.words, closed))})',
+                'label': 'of the gap above the noise closed '
+                f'({", ".join(map(pictures.words, closed))})',
             }
         )
     cards.append({'value': str(len(diagnosis.table)), 'label': 'rows'})

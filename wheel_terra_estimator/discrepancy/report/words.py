@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,7 +16,7 @@ from wheel_terra_estimator.discrepancy.result import Curves, NamedEffect, Quanti
 from wheel_terra_estimator.discrepancy.selection.remainder import Remainder
 from wheel_terra_estimator.discrepancy.selection.search import Findings
 from wheel_terra_estimator.discrepancy.selection.verdict import Verdict
-from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES, SteadyTable
+from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES, UNITS, SteadyTable
 
 FloatArray = NDArray[np.float64]
 
@@ -25,13 +27,21 @@ _SOIL_KEYS = {
     'stiffness': 'the factor on soil.frictional_modulus and soil.cohesive_modulus',
     'tan_friction': 'the tangent of soil.friction_angle_deg',
 }
+TOO_FAR = 2.0  # times noise and allowed model error: a channel that is off
 _COARSE = 0.05  # model-error floor above which agreement says little
 
 
 def gaps(
-    table: SteadyTable, findings: Findings, curves: Curves, floor: float
+    table: SteadyTable, findings: Findings, curves: Curves, floor: float, allowed_error: float
 ) -> dict[str, QuantityGap]:
-    """Return the held-out errors of each quantity; cells set apart as outliers do not count."""
+    """Return the held-out errors of each quantity; cells set apart as outliers do not count.
+
+    Parameters
+    ----------
+    floor, allowed_error : float
+        Model-error floor in use, and model error that is no reason for doubt [share of the range].
+    """
+    std = _cell_noise(findings)
     measured = table.measured.copy()
     for row, column, _ in findings.outliers:
         if row < len(table):
@@ -47,12 +57,13 @@ def gaps(
             'before': (curves.before - measured)[mine, q] ** 2,
             'refit': (curves.held_out_refit - measured)[mine, q] ** 2,
             'after': (curves.held_out_after - measured)[mine, q] ** 2,
+            'fitted': (curves.after - measured)[mine, q] ** 2,
         }
-        noise = float(np.sqrt(np.mean(findings.noise.std[: len(table)][mine, q] ** 2)))
-        least = floor * findings.setting.problem.scale[q]
+        noise = float(np.sqrt(np.mean(std[: len(table)][mine, q] ** 2)))
+        scale = findings.setting.problem.scale[q]
         shrink = low = high = None
         if findings.selection is not None and not np.array_equal(errors['refit'], errors['after']):
-            known = noise**2 + least**2
+            known = noise**2
             shrink = _shrink(errors['refit'].mean(), errors['after'].mean(), known)
             rows = rng.integers(0, count, (_DRAWS, count))
             refit, after = errors['refit'][rows].mean(axis=1), errors['after'][rows].mean(axis=1)
@@ -65,13 +76,31 @@ def gaps(
             float(np.sqrt(errors['refit'].mean())),
             float(np.sqrt(errors['after'].mean())),
             noise,
-            float(least),
+            float(floor * scale),
             count,
+            float(np.sqrt(errors['fitted'].mean())),
+            TOO_FAR * float(np.hypot(noise, allowed_error * scale)),
             shrink,
             low,
             high,
         )
     return found
+
+
+def _cell_noise(findings: Findings) -> FloatArray:
+    """(N, 3) noise of the cells, with what uncertain slips and leaving angles add."""
+    problem = findings.setting.problem
+    std = findings.noise.std.copy()
+    cells = problem.std
+    if (problem.block < 0).any():
+        cells = np.sqrt((np.linalg.inv(problem.rotation) ** 2).sum(axis=1))
+    std[problem.row, problem.quantity] = cells
+    return std
+
+
+def channels_off(gap: Mapping[str, QuantityGap]) -> tuple[str, ...]:
+    """Return the quantities that unseen rows show to be off by more than is allowed."""
+    return tuple(name for name, item in gap.items() if item.after > item.limit)
 
 
 def _shrink(refit: float, after: float, known: float) -> float | None:
@@ -104,6 +133,20 @@ def why_not(
     if set(names) < chosen:
         return f'leaves what {" + ".join(sorted(chosen - set(names)))} explains ({behind:.1f} nats)'
     return f'fits worse: {behind:.1f} nats behind {_label(chosen)}'
+
+
+def _undecided(gap: Mapping[str, QuantityGap], nearest: tuple[str, ...]) -> str:
+    """Return what is off, by how much, and which effects come nearest."""
+    parts = []
+    for name in channels_off(gap):
+        scale, unit = (1e3, 'mm') if name == 'sinkage' else (1.0, UNITS[name])
+        item = gap[name]
+        parts.append(
+            f'{name.replace("_", " ")} is off by {scale * item.after:.3g} {unit} on unseen rows '
+            f'(noise and allowed model error permit {scale * item.limit:.3g})'
+        )
+    text = f'Not decided: {" and ".join(parts)}, but these rows favour neither nothing nor a name'
+    return f'{text}; nearest: {", ".join(nearest)}.' if nearest else f'{text}.'
 
 
 def _label(names: set[str]) -> str:
@@ -146,9 +189,15 @@ def sentence(
     left: Remainder,
     floor: float,
     stretch: Stretch | None = None,
+    gap: Mapping[str, QuantityGap] | None = None,
+    nearest: tuple[str, ...] = (),
 ) -> str:
     """Return the verdict in words."""
-    within = f', within a model-error floor of {100 * floor:.1f} % of the range' if floor else ''
+    if verdict.word == 'undecided':
+        return _undecided(gap or {}, nearest)
+    within = f', with a model-error floor of {100 * floor:.1f} % of the range'
+    if not floor:
+        within = ' (model-error floor needed: none)'
     if verdict.word == 'agrees' and floor > _COARSE:
         return (
             'These rows are too scattered to judge the model: it agrees with them, but only within '
@@ -156,7 +205,7 @@ def sentence(
         )
     if verdict.word == 'agrees':
         agreed = 'Model and measurement agree once the soil is refitted'
-        return f'{agreed}{within} (p = {gap_p_value:.2g}).'
+        return f'{agreed}{within}.'
     if verdict.word == 'unexplained' and stretch:
         return (
             'Model and measurement disagree; none of the known effects alone explains it, but '

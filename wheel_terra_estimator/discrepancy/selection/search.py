@@ -16,7 +16,12 @@ from wheel_terra_estimator.discrepancy.fitting.evidence import Floor
 from wheel_terra_estimator.discrepancy.fitting.forward import Forward
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit, fit
 from wheel_terra_estimator.discrepancy.fitting.outliers import find_outliers, inverse_covariance
-from wheel_terra_estimator.discrepancy.fitting.problem import Problem, build_problem, slip_features
+from wheel_terra_estimator.discrepancy.fitting.problem import (
+    CommonError,
+    Problem,
+    build_problem,
+    slip_features,
+)
 from wheel_terra_estimator.discrepancy.result import Noise
 from wheel_terra_estimator.discrepancy.selection.candidates import FIT_FLOOR, Explanation, Setting
 from wheel_terra_estimator.discrepancy.selection.signatures import (
@@ -95,6 +100,7 @@ def search(
         builder.linearise(nothing)
         problem, observed = builder.build(noise.std, ())
         nothing = _fit_nothing(builder.forward, problem, observed, nuisance, nothing)
+    builder.read_leaving_angles(nothing)
     noise = builder.estimate(noise, nothing, ())
     # A smooth misfit of any size is allowed here, so that an effect does not look like outliers.
     problem, observed = builder.build(noise.std, ())
@@ -257,6 +263,23 @@ class _Builder:
         self._by_slip: FloatArray | None = None
         self._moved = np.zeros(len(table))
         self._group = _slip_groups(table)
+        self._by_angle: FloatArray | None = None
+
+    def read_leaving_angles(self, nothing: Fit) -> None:
+        """Find how the stated errors of measured leaving angles act on the cells."""
+        if self.table.leaving_angle_std is not None:
+            self._by_angle = self.forward.by_leaving_angle(
+                nothing.coordinates, nothing.u, nothing.angle
+            )
+
+    def _common_errors(self) -> list[CommonError]:
+        found = []
+        if self._by_slip is not None:
+            found.append(CommonError(self._by_slip, self.table.slip_std, self._group))
+        if self._by_angle is not None and self.table.leaving_angle_std is not None:
+            rows = np.arange(len(self.table), dtype=np.intp)
+            found.append(CommonError(self._by_angle, self.table.leaving_angle_std, rows))
+        return found
 
     def linearise(self, nothing: Fit) -> None:
         """Linearise the slip errors around the most probable slips, given all quantities.
@@ -293,9 +316,7 @@ class _Builder:
             self.inputs,
             self.scale,
             [(row, quantity) for row, quantity, _ in outliers],
-            self._by_slip,
-            self.table.slip_std,
-            self._group,
+            self._common_errors(),
         )
         observed = self.last.observed
         if self._by_slip is not None:

@@ -31,6 +31,8 @@ SURE_OF_FLOOR = 0.95
 ODDS_AGAINST_NAMES = 2.0
 # Members of the open set: tempered weights are added up to this mass.
 SET_MASS = 0.97
+# Nats by which a rival must at least beat the same set without it.
+BETTER_THAN_EMPTY = 1.0
 TEMPERATURE = 1.3
 
 
@@ -48,7 +50,7 @@ class Verdict:
     Attributes
     ----------
     word : str
-        ``agrees``, ``named`` or ``unexplained``.
+        ``agrees``, ``named``, ``unexplained`` or ``undecided``.
     index : int
         Explanation that is reported as the fit: of the named set, else of nothing.
     open_sets : tuple of tuple of str
@@ -63,13 +65,16 @@ class Verdict:
     left: Remainder
 
 
-def decide(selection: Selection, variance_of: Variance) -> Verdict:
+def decide(selection: Selection, variance_of: Variance, *, off: bool = False) -> Verdict:
     """Return the verdict on a selection.
 
     Parameters
     ----------
     variance_of : callable
         (amplitude, noise factor) -> (m,) variances of the rotated axes.
+    off : bool
+        Unseen rows are off by more than noise and the allowed model error: then a floor is no
+        reason to ask a name for higher odds, and nothing "agrees".
     """
     joint, unexplained = selection.log_joint, selection.unexplained
     total = np.asarray(log_sum(joint, axis=1))
@@ -81,9 +86,11 @@ def decide(selection: Selection, variance_of: Variance) -> Verdict:
     effects = float(log_sum(total[named])) if named else -np.inf
     exact = np.array([floor.largest == 0.0 for floor in selection.floors])
     floor_share = 1.0 - np.exp(log_sum(joint[nothing][exact]) - agrees)
-    odds = ODDS_OVER_FLOOR if floor_share > SURE_OF_FLOOR else ODDS_TO_SPEAK
+    floor_is_sure = floor_share > SURE_OF_FLOOR and not off
+    odds = ODDS_OVER_FLOOR if floor_is_sure else ODDS_TO_SPEAK
     if np.logaddexp(effects, rest) - agrees < np.log(odds):
-        word = 'agrees' if left.accounted_for else 'unexplained'
+        agreement = 'undecided' if off else 'agrees'
+        word = agreement if left.accounted_for else 'unexplained'
         return Verdict(word, nothing, (), left)
     if not named or rest - effects > np.log(ODDS_AGAINST_NAMES):
         return Verdict('unexplained', nothing, (), left)
@@ -116,11 +123,16 @@ def _rivals(
     """Return effects that could stand in the place of ``name``, most probable first."""
     others = set(names) - {name}
     places: dict[str, float] = {}
+    without = max(
+        (e.log_evidence for e in selection.explanations if set(e.names) == others), default=-np.inf
+    )
     for h, explanation in enumerate(selection.explanations):
         mine = set(explanation.names)
         if len(mine) == len(names) and others <= mine:
             (own,) = mine - others
-            places[own] = float(total[h])
+            # What is no better than leaving the place empty is no rival.
+            if own == name or explanation.log_evidence > without + BETTER_THAN_EMPTY:
+                places[own] = float(total[h])
     order = sorted(places, key=lambda key: -places[key])
     logs = np.array([places[key] for key in order]) / TEMPERATURE
     weights = np.exp(logs - log_sum(logs))

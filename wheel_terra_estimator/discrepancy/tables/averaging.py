@@ -58,6 +58,7 @@ def averaged(table: SteadyTable, most: int) -> SteadyTable:
         np.column_stack([of_mean(table.stated_std[:, q]) for q in range(3)]),
         of_mean(table.slip_std),
         table.notes,
+        None if table.leaving_angle_std is None else of_mean(table.leaving_angle_std),
     )
 
 

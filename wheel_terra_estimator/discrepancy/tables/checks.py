@@ -28,6 +28,8 @@ MINIMUM_SLIP_SPAN = 0.1
 
 
 MINIMUM_LOAD_RATIO = 1.5
+SAME_SLIP = 1e-3
+FLIPPED = 0.5  # a sign is wrong where the other one halves the misfit of the whole column
 
 
 CLEAR_SLIP = 0.2  # beyond it a wheel's torque has the sign of its slip
@@ -61,7 +63,7 @@ def check_table(
     where = np.arange(2, count + 2) if lines is None else np.asarray(lines, dtype=np.intp)
     remarks = list(notes)
     _check_ranges(name, arrays, where)
-    _check_signs(name, arrays, where, remarks)
+    _check_signs(name, arrays, where)
     measured = _columns(arrays, QUANTITIES, count)
     empty = ~np.isfinite(measured).any(axis=1)
     if empty.any():
@@ -75,7 +77,10 @@ def check_table(
     inputs = {key: arrays[key] for key in INPUT_UNITS if key in arrays}
     # No inputs of the model: a measured angle, and when the rows of a drive were.
     inputs.update({key: arrays[key] for key in ('leaving_angle', 'time') if key in arrays})
-    table = SteadyTable(name, where, inputs, measured, stated, slip_std)
+    angle_std = arrays.get('leaving_angle_std')
+    if angle_std is not None:
+        angle_std = np.nan_to_num(angle_std, nan=0.0)
+    table = SteadyTable(name, where, inputs, measured, stated, slip_std, (), angle_std)
     table, copies = _without_copies(table)
     if copies:
         remarks.append(
@@ -101,6 +106,7 @@ def check_table(
         table.stated_std,
         table.slip_std,
         tuple(remarks),
+        table.leaving_angle_std,
     )
 
 
@@ -202,10 +208,8 @@ def _check_size_of_deviation(
             )
 
 
-def _check_signs(
-    name: str, arrays: Mapping[str, FloatArray], lines: NDArray[np.intp], remarks: list[str]
-) -> None:
-    """Raise where torque works against the slip; say where sinkages are negative."""
+def _check_signs(name: str, arrays: Mapping[str, FloatArray], lines: NDArray[np.intp]) -> None:
+    """Raise where torque works against the slip, or where most sinkages are negative."""
     direction = np.where(arrays.get('angular_velocity', np.ones(len(lines))) < 0.0, -1.0, 1.0)
     if 'torque' in arrays:
         slip, torque = arrays['slip'], direction * arrays['torque']
@@ -228,23 +232,14 @@ def _check_signs(
             f'{name}, line {lines[0]}, column leaving_angle: {angle[0]:g} rad and most others are '
             'positive; an angle behind the hub is negative'
         )
-    if 'drawbar_pull' in arrays:
-        driven = np.isfinite(arrays['drawbar_pull']) & (arrays['slip'] >= 0.0)
-        slip, pull = arrays['slip'][driven], (direction * arrays['drawbar_pull'])[driven]
-        if (
-            len(slip) >= MINIMUM_ROWS
-            and min(np.ptp(slip), np.ptp(pull)) > 0.0
-            and np.corrcoef(slip, pull)[0, 1] < -0.6
-        ):
-            remarks.append(
-                'drawbar_pull falls with slip: check its sign, a pull forward is positive'
-            )
     if 'sinkage' in arrays:
         depth = arrays['sinkage'][np.isfinite(arrays['sinkage'])]
         if depth.size and np.mean(depth < 0.0) > 0.8:
-            remarks.append(
-                'nearly all sinkages are negative: sinkage is positive where the rim runs below '
-                'the undisturbed surface'
+            row = int(np.flatnonzero(arrays['sinkage'] < 0.0)[0])
+            raise UserError(
+                f'{name}, line {lines[row]}, column sinkage: {arrays["sinkage"][row]:g} m and most '
+                'others are negative; sinkage is positive where the rim runs below the undisturbed '
+                'surface: multiply the column by -1'
             )
 
 
@@ -317,6 +312,29 @@ def check_against_wheel(table: SteadyTable, radius: FloatArray, width: FloatArra
         )
 
 
+def check_pull_against_model(table: SteadyTable, predicted: FloatArray) -> None:
+    """Raise where the pulls have the other sign than any soil near the configured one gives.
+
+    Parameters
+    ----------
+    predicted : numpy.ndarray
+        (N,) pulls of the configured model [N].
+    """
+    measured = table.measured[:, 1]
+    here = np.isfinite(measured) & np.isfinite(predicted)
+    pull, model = measured[here], predicted[here]
+    if pull.size < MINIMUM_ROWS or min(np.ptp(pull), np.ptp(model)) == 0.0:
+        return
+    as_it_is, flipped = np.sum((pull - model) ** 2), np.sum((pull + model) ** 2)
+    if np.corrcoef(pull, model)[0, 1] < -FLIPPED and flipped < FLIPPED**2 * as_it_is:
+        row = int(np.flatnonzero(here)[np.argmax(np.abs(pull))])
+        raise UserError(
+            f'{table.name}, line {table.lines[row]}, column drawbar_pull: {measured[row]:g} N at '
+            f'slip {table.columns["slip"][row]:g}, as in most rows of the other sign than the '
+            'model gives; a pull of the wheel forward is positive: multiply the column by -1'
+        )
+
+
 def _without_copies(table: SteadyTable) -> tuple[SteadyTable, int]:
     """Drop rows in which every number equals that of an earlier row."""
     everything = np.column_stack(
@@ -344,6 +362,11 @@ def _check_range_of_design(table: SteadyTable, remarks: list[str]) -> None:
         )
     slip, load = table.columns['slip'], table.columns['normal_load']
     span, ratio = np.ptp(slip), load.max() / load.min()
+    if span < SAME_SLIP and not (table.slip_std > 0).any():
+        raise UserError(
+            f'{table.name}: slip is {slip[0]:.3g} in every row; nothing can be told from a single '
+            'slip: add rows at other slips, best from 0.05 to 0.8'
+        )
     if span < MINIMUM_SLIP_SPAN and ratio < MINIMUM_LOAD_RATIO:
         if (table.slip_std > 0).all():
             remarks.append(

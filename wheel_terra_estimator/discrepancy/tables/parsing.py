@@ -6,8 +6,10 @@ from __future__ import annotations
 
 import csv
 import difflib
+import io
 import re
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -36,19 +38,59 @@ _OTHER_NAMES = {
 }
 
 
+_KNOWN = 'slip, normal_load, sinkage, drawbar_pull, torque, ...'
+# Units that a header may state in brackets: factor to SI.
+_TO_SI: dict[str, dict[str, float]] = {
+    'm': {'m': 1.0, 'mm': 1e-3, 'cm': 1e-2},
+    'N': {'n': 1.0, 'kn': 1e3},
+    'N m': {'nm': 1.0, 'knm': 1e3, 'nmm': 1e-3, 'ncm': 1e-2},
+    'rad': {'rad': 1.0, 'deg': np.pi / 180.0, '\u00b0': np.pi / 180.0},
+    'rad/s': {'rad/s': 1.0, 'deg/s': np.pi / 180.0, 'rpm': np.pi / 30.0},
+    'm/s^2': {'m/s^2': 1.0, 'm/s2': 1.0, 'm/s\u00b2': 1.0},
+    '-': {'-': 1.0, '1': 1.0, '': 1.0, '%': 0.01},
+}
+_UNIT = re.compile(r'^(.*?)\s*[\[(]([^\])]*)[\])]$')
+_DECIMAL_COMMA = re.compile(r'[-+]?\d*,\d+([eE][-+]?\d+)?')
+
+
+@dataclass(frozen=True)
+class _Column:
+    """A column that is read: its place in the file, its name, the factor to SI."""
+
+    place: int
+    name: str
+    factor: float = 1.0
+
+
 def read_table(path: str | Path) -> SteadyTable:
     """Read and check a CSV file (header row, UTF-8).
+
+    Capital letters, units in brackets, and ``;`` with decimal commas are read, with a note.
 
     Raises
     ------
     UserError
         One line with file, row and cure for everything that makes the table unusable.
     """
-    path = Path(path)
+    name, (numbered, notes) = str(path), _rows_of(Path(path))
+    _check_layout(name, numbered)
+    columns = _read_header(name, numbered[0][1], notes)
+    values = _read_cells(name, numbered[0][1], columns, numbered[1:])
+    lines = np.array([line for line, _ in numbered[1:]], dtype=np.intp)
+    return check_table(name, values, lines, notes)
+
+
+def _rows_of(path: Path) -> tuple[list[tuple[int, list[str]]], list[str]]:
+    """Return the numbered rows of cells that are not empty, and notes."""
     try:
-        with path.open(encoding='utf-8-sig', newline='') as stream:
-            reader = csv.reader(stream)
-            rows = [(reader.line_num, row) for row in reader]
+        text = path.read_text(encoding='utf-8-sig')
+        found = _split(text, ',')
+        notes: list[str] = []
+        if _is_european(found):
+            found = [
+                (line, [_with_point(cell) for cell in cells]) for line, cells in _split(text, ';')
+            ]
+            notes.append("cells are separated by ';', a comma was read as the decimal mark")
     except FileNotFoundError:
         raise UserError(f'{path}: no such file; give the path of a CSV table') from None
     except IsADirectoryError:
@@ -57,64 +99,111 @@ def read_table(path: str | Path) -> SteadyTable:
         raise UserError(f'{path}: cannot be read ({error.strerror}); check its rights') from None
     except (UnicodeDecodeError, csv.Error) as error:
         raise UserError(f'{path}: not a CSV text in UTF-8 ({error}); export it again') from None
-    numbered = [
-        (line, [cell.strip() for cell in row])
-        for line, row in rows
-        if any(cell.strip() for cell in row)
-    ]
-    if not numbered:
-        raise UserError(f'{path}: empty; the first line must name the columns ({_known()})')
-    _check_layout(str(path), numbered)
-    header = numbered[0][1]
-    notes: list[str] = []
-    names = _check_header(str(path), header, notes)
-    values = _read_cells(str(path), header, names, numbered[1:])
-    lines = np.array([line for line, _ in numbered[1:]], dtype=np.intp)
-    return check_table(str(path), values, lines, notes)
+    if not found:
+        raise UserError(f'{path}: empty; the first line must name the columns ({_KNOWN})')
+    return found, notes
 
 
-def _known() -> str:
-    return 'slip, normal_load, sinkage, drawbar_pull, torque, ...'
+def _split(text: str, delimiter: str) -> list[tuple[int, list[str]]]:
+    reader = csv.reader(io.StringIO(text, newline=''), delimiter=delimiter)
+    rows = [(reader.line_num, [cell.strip() for cell in row]) for row in reader]
+    return [(line, row) for line, row in rows if any(row)]
 
 
-def _check_header(path: str, header: Sequence[str], notes: list[str]) -> list[str]:
-    """Return the known columns; raise where a name looks like a slip of the pen."""
-    known = [name for name in header if name in COLUMNS]
-    for name in known:
-        if header.count(name) > 1:
-            raise UserError(f'{path}, line 1: column {name!r} stands there twice; delete one')
-    if not known and any(_is_number(name) for name in header):
+def _is_european(rows: Sequence[tuple[int, list[str]]]) -> bool:
+    """Whether header and rows are separated by semicolons."""
+    if len(rows) < 2 or len(rows[0][1]) > 1:
+        return False
+    names = rows[0][1][0].split(';')
+    known = sum(_nearest(name) is not None for name in names) > 1
+    return known and ','.join(rows[1][1]).count(';') >= len(names) - 1
+
+
+def _with_point(cell: str) -> str:
+    return cell.replace(',', '.') if _DECIMAL_COMMA.fullmatch(cell) else cell
+
+
+def _read_header(path: str, header: Sequence[str], notes: list[str]) -> list[_Column]:
+    """Return the columns to be read; raise with all faults of the header in one line."""
+    columns: list[_Column] = []
+    faults: list[str] = []
+    ignored: list[str] = []
+    mended: list[str] = []
+    if not any(_column(name) for name in header) and any(_is_number(name) for name in header):
         raise UserError(f'{path}, line 1: no header; the first line must name the columns')
-    ignored = []
-    for name in header:
-        if name in COLUMNS or not name:
-            continue
-        nearest = _nearest(name)
-        if nearest and nearest not in header:
-            unit = INPUT_UNITS.get(nearest) or UNITS.get(nearest)
-            in_unit = f' [{unit}]' if unit and unit != '-' else ''
-            raise UserError(
-                f'{path}, line 1: unknown column {name!r}; rename it to {nearest!r}{in_unit} '
-                'if that is what it holds, else give it another name'
-            )
-        ignored.append(name)
+    for place, title in enumerate(header):
+        name, unit = _column(title) or ('', '')
+        factor = _factor(name, unit) if name else None
+        if name and factor is None:
+            known = ', '.join(_TO_SI[_unit_of(name)])
+            faults.append(f'the unit of {title!r} is not known; give one of {known}')
+        elif name and any(column.name == name for column in columns):
+            faults.append(f'column {name!r} stands there twice; delete one')
+        elif name and factor is not None:
+            columns.append(_Column(place, name, factor))
+            if title != name:
+                in_si = '' if factor == 1.0 else f' (times {factor:.4g})'
+                mended.append(f'{title!r} as {name}{in_si}')
+        elif title:
+            ignored.append(title)
+    names = [column.name for column in columns]
+    missing = [name for name in ('slip', 'normal_load') if name not in names]
+    if not any(name in QUANTITIES for name in names):
+        missing += QUANTITIES
+    for title in list(ignored):
+        meant = _nearest(title) or _other_name(title, missing)
+        if meant and meant not in names:
+            unit = _unit_of(meant)
+            in_unit = '' if unit == '-' else f' [{unit}]'
+            faults.append(f'rename {title!r} to {meant!r}{in_unit} if that is what it holds')
+            ignored.remove(title)
+            missing = [name for name in missing if name != meant]
+    for name in ('slip', 'normal_load'):
+        if name in missing:
+            faults.append(f'no column {name!r} among {", ".join(header)}; it is required')
+    if set(QUANTITIES) <= set(missing):
+        faults.append(
+            f'none of sinkage, drawbar_pull, torque among {", ".join(header)}; add at least one'
+        )
+    if faults:
+        raise UserError(f'{path}, line 1: {"; ".join(faults)}')
+    if mended:
+        notes.append(f'read {", ".join(mended)}')
     if ignored:
         notes.append(f'columns not used: {", ".join(ignored)}')
-    for name in ('slip', 'normal_load'):
-        if name not in known:
-            raise UserError(
-                f'{path}, line 1: no column {name!r} among {", ".join(header)}; '
-                f'{_renaming(header, (name,)) or "it is required"}'
-            )
-    if not any(name in QUANTITIES for name in known):
-        raise UserError(
-            f'{path}, line 1: none of sinkage, drawbar_pull, torque among {", ".join(header)}; '
-            f'{_renaming(header, QUANTITIES) or "add at least one"}'
-        )
-    for name in known:
-        if name in STD_COLUMNS and name.removesuffix('_std') not in known:
+    for name in names:
+        if name in STD_COLUMNS and name.removesuffix('_std') not in names:
             notes.append(f'{name} is not used: there is no column {name.removesuffix("_std")}')
-    return known
+    return columns
+
+
+def _column(title: str) -> tuple[str, str] | None:
+    """Return the known column that a title names, and the unit in brackets (empty = none)."""
+    match = _UNIT.match(title)
+    name, unit = match.groups() if match else (title, '')
+    plain = re.sub(r'[\s-]+', '_', name.strip().lower())
+    return (plain, unit.strip()) if plain in COLUMNS else None
+
+
+def _unit_of(name: str) -> str:
+    """Return the SI unit of a column."""
+    quantity = name.removesuffix('_std')
+    if quantity == 'leaving_angle':
+        return 'rad'
+    return INPUT_UNITS.get(quantity) or UNITS[quantity]
+
+
+def _factor(name: str, unit: str) -> float | None:
+    """Return the factor from a unit to that of the column; None where it is not known."""
+    if not unit:
+        return 1.0
+    plain = re.sub(r'[\s*\u00b7.]+', '', unit.lower())
+    return _TO_SI[_unit_of(name)].get(plain)
+
+
+def _other_name(title: str, wanted: Sequence[str]) -> str:
+    """Return which of the wanted columns other people call like this; empty = none."""
+    return next((name for name in wanted if _plain(title) in _OTHER_NAMES[name]), '')
 
 
 def _check_layout(path: str, rows: Sequence[tuple[int, list[str]]]) -> None:
@@ -129,7 +218,7 @@ def _check_layout(path: str, rows: Sequence[tuple[int, list[str]]]) -> None:
                     f'{path}, line {line}: the cells are separated by {said}; export the table '
                     'with commas between cells and a point as decimal mark'
                 )
-    if not {'slip', 'normal_load'} & set(header):
+    if not any(_column(name) for name in header):
         for later, cells in rows[1:20]:
             if {'slip', 'normal_load'} <= set(cells):
                 raise UserError(
@@ -141,17 +230,6 @@ def _check_layout(path: str, rows: Sequence[tuple[int, list[str]]]) -> None:
 def _plain(name: str) -> str:
     plain = name.lower().replace('-', '_').replace(' ', '_').split('[')[0].split('(')[0]
     return plain.strip('_')
-
-
-def _renaming(header: Sequence[str], wanted: Sequence[str]) -> str:
-    """Return which column may be meant by one of the wanted names; empty = none."""
-    for name in wanted:
-        for column in header:
-            if _plain(column) in _OTHER_NAMES[name] and column not in COLUMNS:
-                unit = INPUT_UNITS.get(name) or UNITS[name]
-                in_unit = '' if unit == '-' else f' [{unit}]'
-                return f'rename {column!r} to {name!r}{in_unit} if that is what it holds'
-    return ''
 
 
 def _nearest(name: str) -> str | None:
@@ -175,46 +253,47 @@ def _is_number(cell: str) -> bool:
 
 
 def _read_cells(
-    path: str, header: Sequence[str], names: Sequence[str], rows: Sequence[tuple[int, list[str]]]
+    path: str,
+    header: Sequence[str],
+    columns: Sequence[_Column],
+    rows: Sequence[tuple[int, list[str]]],
 ) -> dict[str, FloatArray]:
-    position = {name: header.index(name) for name in names}
     if rows:
         line, cells = rows[0]
-        filled = [cells[c] for c in position.values() if c < len(cells) and cells[c]]
+        filled = [cells[c.place] for c in columns if c.place < len(cells) and cells[c.place]]
         if len(filled) > 1 and not any(_is_number(cell) for cell in filled):
             raise UserError(
                 f'{path}, line {line}: no numbers below the column names; delete the line '
-                '(units are fixed: m, N, N m, rad, slip as a ratio)'
+                '(units may stand in brackets behind the names: sinkage [mm])'
             )
-    values = {name: np.full(len(rows), np.nan) for name in names}
+    values = {column.name: np.full(len(rows), np.nan) for column in columns}
     for index, (line, cells) in enumerate(rows):
         if len(cells) > len(header) and any(cells[len(header) :]):
             raise UserError(
                 f'{path}, line {line}: {len(cells)} cells but {len(header)} columns; '
                 'use commas between cells and a point as decimal mark'
             )
-        for name, column in position.items():
-            cell = cells[column] if column < len(cells) else ''
+        for column in columns:
+            cell = cells[column.place] if column.place < len(cells) else ''
             if not cell or cell.lower() in ('nan', 'na', 'n/a', '-'):
                 continue
+            where = f'{path}, line {line}, column {column.name}'
             try:
-                values[name][index] = float(cell)
+                value = float(cell)
             except ValueError:
+                raise UserError(f'{where}: {cell[:40]!r} is not a number; {_cure(cell)}') from None
+            if not np.isfinite(value):
                 raise UserError(
-                    f'{path}, line {line}, column {name}: {cell[:40]!r} is not a number; '
-                    + _cure(cell)
-                ) from None
-            if not np.isfinite(values[name][index]):
-                raise UserError(
-                    f'{path}, line {line}, column {name}: {cell} is not finite; '
-                    'leave the cell empty where nothing was measured'
+                    f'{where}: {cell} is not finite; leave the cell empty where nothing was '
+                    'measured'
                 )
+            values[column.name][index] = column.factor * value
     return values
 
 
 def _cure(cell: str) -> str:
     """Return what to do about a cell that is no number."""
-    if re.fullmatch(r'[-+]?\d*,\d+([eE][-+]?\d+)?', cell):
+    if _DECIMAL_COMMA.fullmatch(cell):
         return 'use a point as decimal mark, without marks between thousands'
     if _is_number(cell.replace(',', '')):
         return 'take out the marks between thousands'

@@ -56,6 +56,8 @@ class SteadyTable:
         (N, 3) stated standard deviations; nan = not stated.
     slip_std : numpy.ndarray
         (N,) standard deviation of the recorded slip; 0 = exact.
+    leaving_angle_std : numpy.ndarray or None
+        (N,) standard deviation of the measured leaving angle [rad]; None = exact.
     notes : tuple of str
         What the reader found odd but usable.
     """
@@ -67,6 +69,7 @@ class SteadyTable:
     stated_std: FloatArray
     slip_std: FloatArray
     notes: tuple[str, ...] = ()
+    leaving_angle_std: FloatArray | None = None
 
     def __len__(self) -> int:
         return len(self.lines)
@@ -99,4 +102,5 @@ class SteadyTable:
             self.stated_std[rows],
             self.slip_std[rows],
             self.notes,
+            None if self.leaving_angle_std is None else self.leaving_angle_std[rows],
         )

@@ -49,6 +49,5 @@ EFFECT = Effect(
     validity='lugs far apart; counts the same thrust as a larger shear radius, hence not with it',
     source='passive earth pressure on grousers (Bekker 1969), n_e lugs in the contact; after '
     'literature read at second hand',
-    candidate=False,
     on_outputs=_thrust,
 )

@@ -43,6 +43,5 @@ EFFECT = Effect(
     validity='metal rims in dry sand; the transition between smooth and lugged is assumed',
     source='Ding et al. 2010 section 2.4 in words (metal-soil friction is below soil friction); '
     'formula reconstructed',
-    candidate=False,
     on_inputs=_slide,
 )

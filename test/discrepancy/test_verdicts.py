@@ -1,0 +1,143 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""No agreement beside a misfit, no rival that is none, no effect passed over in silence."""
+
+from __future__ import annotations
+
+import campaign_tools  # noqa: F401
+import numpy as np
+import pytest
+from test_workflow import make, run
+
+from wheel_terra_estimator.configuration import reader
+from wheel_terra_estimator.discrepancy.report.words import channels_off, sentence
+from wheel_terra_estimator.discrepancy.result import QuantityGap
+from wheel_terra_estimator.discrepancy.tables.checks import check_table
+from wheel_terra_estimator.discrepancy.workflow import Options, operating_points
+from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.terramechanics.effects import catalogue
+from wheel_terra_estimator.terramechanics.model import WheelSoilModel
+
+
+def with_effect(design, seed, name, **parameters):
+    """Return a table to which the catalogue's own effect was added, and the settings."""
+    table, values, soil, _ = make(design, seed=seed)
+    points = operating_points(
+        check_table('t.csv', table), reader.from_parameters(values, complete=False)
+    )
+    true_soil = reader.from_parameters(
+        {
+            f'soil.{key}': getattr(soil, key)
+            for key in ('frictional_modulus', 'cohesive_modulus', 'sinkage_exponent', 'cohesion')
+        },
+        complete=False,
+    ).soil
+    plain = WheelSoilModel(true_soil, {}).steady_state(points)
+    changed = WheelSoilModel(true_soil, {name: parameters}).steady_state(points)
+    for key in ('sinkage', 'drawbar_pull', 'torque'):
+        table[key] = table[key] + getattr(changed, key) - getattr(plain, key)
+    return table, values
+
+
+def test_thrust_of_grousers_at_its_usual_share_is_named_without_being_asked_for():
+    table, values = with_effect('lugs48', 6, 'grouser_thrust')
+    found = run(table, values)
+    assert [effect.name for effect in found.effects] == ['grouser_thrust']
+    rivals = found.effects[0].confounded_with
+    by_name = {candidate.names: candidate for candidate in found.candidates}
+    for rival in rivals:
+        # What is no better than the soil alone is no rival.
+        assert by_name[(rival,)].log_evidence > 1.0
+
+
+def test_every_effect_is_named_tried_or_said_not_to_be():
+    table, values, *_ = make('sweep40')
+    values |= {'effects.lug_shear_radius.enabled': True}
+    found = run(table, values, options=Options(effects=('cohesion', 'bulldozing')))
+    assert set(found.not_tried) == set(catalogue()) - {'cohesion', 'bulldozing'}
+    assert 'on' in found.not_tried['lug_shear_radius']
+    found = run(table, values)
+    assert 'lug_shear_radius' in found.not_tried['grouser_thrust']
+    said = set(found.not_tried) | set(found.not_visible) | set(found.smallest_visible)
+    assert set(catalogue()) <= said
+
+
+def test_a_channel_that_is_off_on_unseen_rows_does_not_agree():
+    """A misfit that any floor up to 20 % would take in, and that no effect accounts for."""
+    table, values, *_ = make('sweep40')
+    rng = np.random.default_rng(8)
+    pull = table['drawbar_pull']
+    ripple = 0.09 * np.ptp(pull) * np.sign(rng.standard_normal(len(pull)))
+    table |= {'drawbar_pull': pull + ripple}
+    table = {key: value for key, value in table.items() if key != 'drawbar_pull_std'}
+    table['drawbar_pull_std'] = np.full(len(pull), 0.015 * np.ptp(pull))
+    found = run(table, values)
+    assert found.gap['drawbar_pull'].after > found.gap['drawbar_pull'].limit
+    assert found.verdict != 'agrees'
+    item = found.to_dict()
+    assert item['verdict'] in ('undecided', 'unexplained')
+    assert item['floor'] >= 0.0
+
+
+def test_undecided_says_channel_size_and_what_comes_nearest():
+    class Word:
+        word = 'undecided'
+
+    gap = {
+        'sinkage': QuantityGap(0.005, 0.004, 0.004, 0.0005, limit=0.002),
+        'torque': QuantityGap(0.5, 0.1, 0.1, 0.1, limit=0.3),
+    }
+    assert channels_off(gap) == ('sinkage',)
+    text = sentence(Word, (), 0.1, None, 0.0, None, gap, ('lug_digging', 'hard_layer'))
+    for part in ('sinkage is off by 4 mm', 'permit 2', 'lug_digging, hard_layer'):
+        assert part in text
+    assert 'torque' not in text
+
+
+def test_agreement_states_the_floor_that_it_needed():
+    table, values, *_ = make('lugs48')
+    found = run(table, values)
+    assert found.verdict == 'agrees'
+    assert 'model-error floor' in found.sentence
+    table, values, *_ = make('lugs48', structure=0.02)
+    found = run(table, values)
+    if found.verdict == 'agrees':
+        assert f'{100 * found.floor:.1f} %' in found.sentence
+
+
+def test_a_gap_is_stated_against_the_noise_and_the_floor_apart():
+    """Whatever the floor, what stays above the noise counts as open."""
+    table, values, *_ = make('lugs48', ('slip_sinkage_exponent',), structure=0.03)
+    found = run(table, values)
+    assert found.verdict == 'named'
+    for gap in found.gap.values():
+        if gap.shrink is not None:
+            open_before = gap.refit**2 - gap.noise**2
+            open_after = max(gap.after**2 - gap.noise**2, 0.0)
+            assert gap.shrink == pytest.approx(1.0 - np.sqrt(open_after / open_before), abs=1e-9)
+
+
+def test_pulls_of_the_other_sign_are_refused_with_the_cure():
+    table, values, *_ = make('lugs48')
+    table['drawbar_pull'] = -table['drawbar_pull']
+    with pytest.raises(UserError, match=r'drawbar_pull: .* multiply the column by -1'):
+        run(table, values)
+
+
+def test_an_uncertain_leaving_angle_counts_as_noise():
+    """Angles 3 degrees off: a finding where they are called exact, none where they are not."""
+    table, values, *_ = make('lugs48')
+    points = operating_points(
+        check_table('t.csv', table), reader.from_parameters(values, complete=False)
+    )
+    model = WheelSoilModel(reader.from_parameters(values, complete=False).soil, {})
+    state = model.steady_state(points)
+    angle, rng = state.leaving_angle, np.random.default_rng(3)
+    for key in ('sinkage', 'drawbar_pull', 'torque'):
+        table[key] = getattr(state, key) + table[f'{key}_std'] * rng.standard_normal(len(angle))
+    table['leaving_angle'] = np.minimum(angle + 0.05 * rng.standard_normal(len(angle)), 0.0)
+    exact = run(table, values)
+    honest = run({**table, 'leaving_angle_std': np.full(len(angle), 0.05)}, values)
+    assert exact.gap_p_value < 1e-3 < honest.gap_p_value
+    assert honest.verdict == 'agrees'
+    assert honest.gap['torque'].noise > exact.gap['torque'].noise
