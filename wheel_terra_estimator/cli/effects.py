@@ -23,6 +23,10 @@ from wheel_terra_estimator.terramechanics.effects import (
 )
 
 SUMMARY = 'list the physical and instrument effects that can be named'
+EXAMPLES = (
+    'wheel-terra effects',
+    'wheel-terra effects lug_digging multipass',
+)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -10,6 +10,10 @@ from pathlib import Path
 from wheel_terra_estimator.errors import UserError
 
 SUMMARY = 'score the estimator against ground truth and baselines'
+EXAMPLES = (
+    'wheel-terra evaluate --kinds climb turns --seeds 4',
+    'wheel-terra evaluate --limiter --seeds 10 -o limiter.md',
+)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -1,58 +1,174 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Entry point of ``wheel-terra``: parse, run the sub-command, turn user errors into one line."""
+"""Entry point of ``wheel-terra``: parse, run the sub-command, turn errors into one line.
+
+Exit status: 0 done, 1 where the sub-command says what it means, 2 input that cannot be used, 3 an
+error of the program itself, 130 interrupted.
+"""
 
 from __future__ import annotations
 
 import argparse
+import difflib
 import importlib
 import os
 import sys
 from collections.abc import Sequence
+from typing import Any, NoReturn
 
 from wheel_terra_estimator import __version__
 from wheel_terra_estimator.errors import UserError
 
-# Each module has SUMMARY, add_arguments(parser) and run(arguments) -> exit status; it imports
-# heavy libraries inside run, so that help and the light commands start at once.
+# Each module has SUMMARY, add_arguments(parser) and run(arguments) -> exit status, and may have
+# EXAMPLES (command lines for its help); it imports heavy libraries inside run, so that help and
+# the light commands start at once.
 COMMANDS = ('simulate', 'replay', 'predict', 'diagnose', 'effects', 'soilbin', 'evaluate', 'demo')
+
+UNUSABLE_INPUT = 2
+PROGRAM_ERROR = 3
+INTERRUPTED = 130
+DEBUG_HELP = 'show the traceback of an error'
+
+
+class Parser(argparse.ArgumentParser):
+    """A parser whose complaints are one line, with the nearest name that it knows."""
+
+    def error(self, message: str) -> NoReturn:
+        """Say what is wrong in one line and end with status 2."""
+        if 'invalid choice: ' in message:
+            message = self._nearest_choice(message)
+        _complain(f'{self.prog}: {message} (help: {self.prog} --help)')
+        self.exit(UNUSABLE_INPUT)
+
+    def _nearest_choice(self, message: str) -> str:
+        wrong = message.partition("invalid choice: '")[2].partition("'")[0]
+        for action in self._actions:
+            named = action.metavar or '/'.join(action.option_strings) or action.dest
+            if action.choices and message.startswith(f'argument {named}:'):
+                known = [str(choice) for choice in action.choices]
+                what = 'no command' if action.dest == 'command' else f'{named}: no choice'
+                return f"{what} '{wrong}'; {_suggestion(wrong, known)}"
+        return message
 
 
 def build_parser() -> argparse.ArgumentParser:
     """Return the parser of all sub-commands."""
-    parser = argparse.ArgumentParser(
+    return _parsers()[0]
+
+
+def sub_parsers() -> dict[str, argparse.ArgumentParser]:
+    """Return sub-command -> its parser."""
+    return _parsers()[1]
+
+
+def _parsers() -> tuple[Parser, dict[str, argparse.ArgumentParser]]:
+    parser = Parser(
         prog='wheel-terra',
         description='Slip, sinkage and drawbar pull of rover wheels in loose soil.',
+        epilog='Help of a command, with examples: wheel-terra COMMAND --help',
     )
     parser.add_argument('--version', action='version', version=__version__)
-    commands = parser.add_subparsers(dest='command', required=True, metavar='COMMAND')
+    parser.add_argument('--debug', action='store_true', help=DEBUG_HELP)
+    parser.add_argument(
+        '--print-completion',
+        action=_PrintCompletion,
+        metavar='SHELL',
+        help='print what completes commands and options in bash, zsh or tcsh (needs shtab)',
+    )
+    commands = parser.add_subparsers(
+        dest='command', required=True, metavar='COMMAND', parser_class=Parser
+    )
     for name in COMMANDS:
         module = importlib.import_module(f'wheel_terra_estimator.cli.{name}')
-        sub = commands.add_parser(name, help=module.SUMMARY, description=module.SUMMARY)
+        examples = getattr(module, 'EXAMPLES', ())
+        sub = commands.add_parser(
+            name,
+            help=module.SUMMARY,
+            description=module.SUMMARY,
+            epilog='\n'.join(('examples:', *(f'  {line}' for line in examples)))
+            if examples
+            else '',
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+        )
         module.add_arguments(sub)
+        sub.add_argument('--debug', action='store_true', default=argparse.SUPPRESS, help=DEBUG_HELP)
         sub.set_defaults(run=module.run)
-    return parser
+    return parser, dict(commands.choices)
+
+
+class _PrintCompletion(argparse.Action):
+    """Print the completion script of a shell, as the library shtab writes it."""
+
+    def __call__(
+        self,
+        parser: argparse.ArgumentParser,
+        namespace: argparse.Namespace,
+        values: Any,
+        option_string: str | None = None,
+    ) -> None:
+        try:
+            import shtab
+        except ImportError:
+            parser.error('--print-completion needs shtab: pip install shtab')
+        if values not in shtab.SUPPORTED_SHELLS:
+            parser.error(f'--print-completion: {_suggestion(values, shtab.SUPPORTED_SHELLS)}')
+        print(shtab.complete(parser, values))
+        parser.exit()
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run ``wheel-terra`` and return the exit status (2 for input that cannot be used)."""
+    """Run ``wheel-terra`` and return the exit status."""
     # Our matrices are small: threads of the linear algebra only get into each other's way. It has
     # to be said before numpy is imported; what the user has set stays.
     for library in ('OMP', 'OPENBLAS'):
         os.environ.setdefault(f'{library}_NUM_THREADS', '1')
-    arguments = build_parser().parse_args(argv)
+    parser, subs = _parsers()
+    arguments, unknown = parser.parse_known_args(argv)
+    if unknown:
+        _refuse(unknown[0], subs[arguments.command])
     try:
         return int(arguments.run(arguments) or 0)
     except UserError as error:
-        print(f'wheel-terra {arguments.command}: {error}', file=sys.stderr)
-        return 2
+        if arguments.debug:
+            raise
+        _complain(f'wheel-terra {arguments.command}: {error}')
+        return UNUSABLE_INPUT
     except KeyboardInterrupt:
-        print(f'wheel-terra {arguments.command}: interrupted', file=sys.stderr)
-        return 130
+        _complain(f'wheel-terra {arguments.command}: interrupted')
+        return INTERRUPTED
     except BrokenPipeError:
         # The reader of our output (head, less) has gone: not an error of ours.
         sys.stderr.close()
         return 0
+    except Exception as error:
+        if arguments.debug:
+            raise
+        _complain(
+            f'wheel-terra {arguments.command}: error of the program '
+            f'({type(error).__name__}: {error}); add --debug for the traceback to report'
+        )
+        return PROGRAM_ERROR
+
+
+def _refuse(word: str, parser: argparse.ArgumentParser) -> NoReturn:
+    """Complain of an argument that a sub-command does not know."""
+    if not word.startswith('-'):
+        parser.error(f"one argument too many: '{word}'")
+    options = [option for action in parser._actions for option in action.option_strings]
+    name = word.partition('=')[0]
+    parser.error(f"no option '{name}'; {_suggestion(name, options)}")
+
+
+def _suggestion(wrong: str, known: Sequence[str]) -> str:
+    close = difflib.get_close_matches(wrong, known, n=1)
+    return f"did you mean '{close[0]}'?" if close else f'there are {", ".join(known)}'
+
+
+def _complain(line: str) -> None:
+    """Print a line on standard error, red on a terminal that wants colours (NO_COLOR: none)."""
+    if sys.stderr.isatty() and not os.environ.get('NO_COLOR'):
+        line = f'\033[31m{line}\033[0m'
+    print(line, file=sys.stderr)
 
 
 if __name__ == '__main__':

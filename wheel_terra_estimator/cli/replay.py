@@ -10,6 +10,10 @@ from pathlib import Path
 from wheel_terra_estimator.configuration import reader as configuration_reader
 
 SUMMARY = 'run the estimator over a rosbag2, without ROS'
+EXAMPLES = (
+    'wheel-terra replay my_bag --config my_rover.yaml -o estimates --report report.html',
+    'wheel-terra replay drive.mcap --config pathfinder --remap reference_odom:=/truth/odometry',
+)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -14,6 +14,10 @@ if TYPE_CHECKING:
     from wheel_terra_estimator.soilbin.case import Case
 
 SUMMARY = 'run the virtual soil bin (discrete elements)'
+EXAMPLES = (
+    'wheel-terra soilbin run quick -o run',
+    'wheel-terra soilbin rows --help',
+)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

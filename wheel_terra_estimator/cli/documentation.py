@@ -1,0 +1,79 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Writes ``docs/commands.md`` from the parsers of the commands: ``python -m`` this module."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+from pathlib import Path
+
+from wheel_terra_estimator.cli.main import sub_parsers
+
+_INTRODUCTION = """# Commands
+
+Written by `python -m wheel_terra_estimator.cli.documentation` from the help of the commands; do not
+edit.
+
+`wheel-terra COMMAND --help` says the same. After colcon the commands are `ros2 run
+wheel_terra_estimator wheel-terra COMMAND`. Every command takes `--debug` (traceback of an error);
+`wheel-terra --print-completion bash` prints what completes commands and options in a shell
+(`pip install shtab`). How a command ends: [exit status](exit_status.md).
+"""
+
+
+def page() -> str:
+    """Return the page as Markdown."""
+    lines = [_INTRODUCTION]
+    for name, parser in sub_parsers().items():
+        lines += _section(parser, f'wheel-terra {name}', 2)
+    return '\n'.join(lines).rstrip() + '\n'
+
+
+def _section(parser: argparse.ArgumentParser, title: str, depth: int) -> Iterator[str]:
+    yield f'{"#" * depth} `{title}`\n'
+    yield f'{_sentence(parser.description or "")}\n'
+    if parser.epilog:
+        examples = [line.strip() for line in parser.epilog.splitlines()[1:]]
+        yield '\n'.join(['```sh', *examples, '```\n'])
+    rows = [row for action in parser._actions if (row := _row(action))]
+    if rows:
+        yield '\n'.join(['| argument | meaning |', '|---|---|', *rows, ''])
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            helps = {choice.dest: choice.help or '' for choice in action._choices_actions}
+            for name, sub in action.choices.items():
+                sub.description = sub.description or helps.get(name, '')
+                yield from _section(sub, f'{title} {name}', depth + 1)
+
+
+def _row(action: argparse.Action) -> str:
+    if isinstance(action, argparse._SubParsersAction | argparse._HelpAction):
+        return ''
+    if action.dest == 'debug' or action.help == argparse.SUPPRESS:
+        return ''
+    value = ''
+    if action.nargs != 0:
+        value = action.metavar if isinstance(action.metavar, str) else ''
+        if not value:
+            value = '{' + ','.join(map(str, action.choices)) + '}' if action.choices else ''
+        value = value or action.dest.upper()
+        if action.nargs in ('+', '*'):
+            value += ' ...'
+    names = ', '.join(f'{option} {value}'.strip() for option in action.option_strings) or value
+    words = (action.help or '').replace('%%', '%').replace('%(default)s', str(action.default))
+    required = ' (required)' if action.option_strings and action.required else ''
+    return f'| `{names}`{required} | {words} |'
+
+
+def _sentence(words: str) -> str:
+    return f'{words[:1].upper()}{words[1:]}.' if words else ''
+
+
+def path() -> Path:
+    """Return where the page stands in a source tree."""
+    return Path(__file__).resolve().parents[2] / 'docs' / 'commands.md'
+
+
+if __name__ == '__main__':
+    path().write_text(page(), encoding='utf-8')
