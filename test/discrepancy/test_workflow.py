@@ -22,6 +22,7 @@ from campaigns.truth import OUTPUTS, TrueSoil, solve
 from wheel_terra_estimator.cli.main import main
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.discrepancy.report.model_file import write_model
+from wheel_terra_estimator.discrepancy.selection.weights import log_prior
 from wheel_terra_estimator.discrepancy.tables.checks import check_table
 from wheel_terra_estimator.discrepancy.workflow import Options, diagnose, operating_points
 from wheel_terra_estimator.errors import UserError
@@ -107,6 +108,29 @@ def test_names_what_is_hidden_and_shrinks_the_gap(name, factor):
     assert after < 3.0 * 1.35  # three quantities at their noise, on rows not seen
     # Cohesion is a soil number: a free soil closes the gap too, at a price in stated deviations.
     assert refit > (1.0 if name == 'cohesion' else 1.3) * after
+
+
+def test_as_many_effects_as_the_rows_carry():
+    """Four at once, two of them of the instruments: all are found, none is false."""
+    hidden = (
+        'slip_sinkage_exponent',
+        'drivetrain_friction',
+        'sinkage_offset',
+        'wheel_radius_bias',
+    )
+    table, values, *_ = make('lugs48', hidden, 2.0)
+    found = run(table, values)
+    assert {effect.name for effect in found.effects} == set(hidden)
+    for gap in found.gap.values():
+        assert gap.after < 1.4 * gap.noise
+
+
+def test_forms_share_the_weight_of_their_effect():
+    alone = log_prior(('cohesion',), ('cohesion', 'multipass'))
+    assert log_prior(('cohesion',), ('cohesion', 'multipass', 'multipass:rut')) == alone
+    with_forms = ('cohesion', 'multipass', 'multipass:rut')
+    both = [log_prior((key,), with_forms) for key in with_forms[1:]]
+    assert np.logaddexp(*both) == pytest.approx(alone)
 
 
 @pytest.mark.parametrize('softer', [0.5, 1.0])

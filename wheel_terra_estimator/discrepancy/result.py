@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from wheel_terra_estimator.discrepancy.effect_keys import effect_of
 from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES, UNITS, SteadyTable
 
 if TYPE_CHECKING:
@@ -61,6 +62,10 @@ class NamedEffect:
         Confounded name -> what would separate the two, from the catalogue.
     features : mapping
         What the confidence was computed from (``confidence.FEATURES``).
+    form : str
+        Which form of the effect; empty where it has one only.
+    other_forms : mapping
+        Other form that was tried -> how far it is behind [nats].
     """
 
     name: str
@@ -73,6 +78,8 @@ class NamedEffect:
     source: str = ''
     separates: Mapping[str, str] = field(default_factory=dict)
     features: Mapping[str, float] = field(default_factory=dict)
+    form: str = ''
+    other_forms: Mapping[str, float] = field(default_factory=dict)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the keys of ``report.json``."""
@@ -83,6 +90,8 @@ class NamedEffect:
             'confidence_of_set': self.confidence_of_set,
             'confounded_with': list(self.confounded_with),
             'remainder': self.remainder,
+            **({'form': self.form} if self.form else {}),
+            'other_forms': dict(self.other_forms),
         }
 
 
@@ -123,12 +132,18 @@ class Candidate:
     @property
     def label(self) -> str:
         """Names joined for people."""
-        return ' + '.join(self.names) if self.names else 'nothing'
+        return ' + '.join(effect_of(key) for key in self.names) or 'nothing'
+
+    @property
+    def form(self) -> str:
+        """Forms of the effects, where they are not the first ones."""
+        return ', '.join(key for key in self.names if effect_of(key) != key)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the keys of ``report.json``."""
         return {
             'name': self.label,
+            'form': self.form,
             'log_evidence': self.log_evidence,
             'why_not': self.why_not,
             'probability': self.probability,

@@ -16,12 +16,14 @@ from wheel_terra_estimator.discrepancy.assessment import next_measurement
 from wheel_terra_estimator.discrepancy.assessment.along import changed_stretch
 from wheel_terra_estimator.discrepancy.assessment.held_out import hold_out, log_scores, slip_groups
 from wheel_terra_estimator.discrepancy.assessment.where import locate
+from wheel_terra_estimator.discrepancy.effect_keys import effect_of
 from wheel_terra_estimator.discrepancy.fitting.coordinates import (
     WIDENING,
     Coordinate,
     base_coordinates,
     soil_coordinates,
 )
+from wheel_terra_estimator.discrepancy.fitting.evidence import log_sum
 from wheel_terra_estimator.discrepancy.fitting.forward import Forward
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
 from wheel_terra_estimator.discrepancy.fitting.reference import join, shared_error
@@ -220,7 +222,7 @@ def _effects_to_try(
         elif options.effects is None and not effect.candidate:
             not_tried[name] = f'is tried only when asked for (--only {name})'
         else:
-            tried[name] = effect
+            tried.update({form.name: form for form in effect.forms})
     return tried, not_tried
 
 
@@ -374,6 +376,11 @@ def _named(
         values = confidences.features(findings.selection, verdict, place, left)
         sure = confidences.confidence(values)
         rivals = verdict.open_sets[place]
+        forms = {
+            explanation.names[0]: float(log_sum(findings.selection.joint_of(explanation.names)))
+            for explanation in findings.selection.explanations
+            if len(explanation.names) == 1 and effect_of(explanation.names[0]) == effect_of(name)
+        }
         own = {
             key.split('.', 1)[1]: value
             for key, value in parameters.items()
@@ -383,20 +390,26 @@ def _named(
             (
                 float(np.logaddexp.reduce(findings.selection.joint_of((name,)))),
                 NamedEffect(
-                    name,
+                    effect_of(name),
                     own,
                     sure.of_name,
                     sure.of_set,
-                    rivals,
+                    tuple(effect_of(rival) for rival in rivals),
                     left.noticeable,
                     known[name].claim,
                     known[name].source,
                     {
                         rival: known[name].confounded_with.get(rival)
-                        or known[rival].confounded_with.get(name, '')
-                        for rival in rivals
+                        or known[rival].confounded_with.get(effect_of(name), '')
+                        for rival in map(effect_of, rivals)
                     },
                     values,
+                    known[name].form if len(known[effect_of(name)].forms) > 1 else '',
+                    {
+                        known[key].form: forms[name] - weight
+                        for key, weight in forms.items()
+                        if key != name
+                    },
                 ),
             )
         )
@@ -407,7 +420,8 @@ def _named(
 def _nearest(findings: Findings) -> tuple[str, ...]:
     """Return up to three single effects that the rows favour most."""
     weights = findings.selection.single_weights()
-    return tuple(sorted(weights, key=lambda name: -weights[name])[:_NEAREST])
+    order = sorted(weights, key=lambda name: -weights[name])
+    return tuple(dict.fromkeys(effect_of(key) for key in order))[:_NEAREST]
 
 
 def _distance_to_nothing(findings: Findings, fitted: Fit) -> float:
@@ -506,11 +520,12 @@ def _smallest_visible(
     findings: Findings, known: Mapping[str, Effect]
 ) -> dict[str, tuple[str, float, str]]:
     """Size of each effect that these rows would have shown clearly (signature scaled linearly)."""
-    found = {}
+    found: dict[str, tuple[str, float, str]] = {}
     for name, s in findings.signatures.items():
         if name in findings.setting.effects and s.distance > 0.0:
             parameter = known[name].parameters[0]
-            found[name] = (parameter.name, abs(s.size) * CLEAR / s.distance, parameter.unit)
+            size = (parameter.name, abs(s.size) * CLEAR / s.distance, parameter.unit)
+            found.setdefault(effect_of(name), size)  # of the first form that is visible
     return found
 
 

@@ -8,6 +8,7 @@ import math
 from pathlib import Path
 
 from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.discrepancy.effect_keys import effect_of
 from wheel_terra_estimator.discrepancy.result import Diagnosis
 from wheel_terra_estimator.terramechanics.soil import Soil
 
@@ -19,11 +20,15 @@ def corrected(diagnosis: Diagnosis) -> tuple[Configuration, list[str]]:
     for shift in diagnosis.soil:
         changes.update(_soil_keys(shift.name, shift.after, shift.after_std, soil))
     for key, parameter in diagnosis.refitted.items():
-        changes[f'effects.{key}'] = float(parameter.value)
-        changes[f'effects.{key}_std'] = float(parameter.std)
+        owner, name = key.split('.', 1)
+        prefix = f'effects.{effect_of(owner)}.{name}'
+        changes[prefix] = float(parameter.value)
+        changes[f'{prefix}_std'] = float(parameter.std)
     for effect in diagnosis.effects:
         prefix = f'effects.{effect.name}'
         changes[f'{prefix}.enabled'] = True
+        if effect.form:
+            changes[f'{prefix}.form'] = effect.form
         for name, parameter in effect.parameters.items():
             changes[f'{prefix}.{name}'] = float(parameter.value)
             changes[f'{prefix}.{name}_std'] = float(parameter.std)

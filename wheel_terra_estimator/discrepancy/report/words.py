@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wheel_terra_estimator.discrepancy.assessment.along import Stretch
+from wheel_terra_estimator.discrepancy.effect_keys import effect_of
 from wheel_terra_estimator.discrepancy.fitting.coordinates import WIDENING
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
 from wheel_terra_estimator.discrepancy.result import Curves, NamedEffect, QuantityGap
@@ -118,6 +119,8 @@ def why_not(
     selection = findings.selection
     names = selection.explanations[index].names
     behind = float(totals[verdict.index] - totals[index])
+    if {effect_of(key) for key in names} == {effect_of(key) for key in chosen}:
+        return f'another form of the same: {behind:.1f} nats behind'
     if not names:
         return f'leaves a gap: {behind:.1f} nats behind {_label(chosen)}'
     open_names = {name for rivals in verdict.open_sets for name in rivals}
@@ -128,10 +131,10 @@ def why_not(
     if verdict.word == 'unexplained':
         return 'leaves a smooth misfit that it does not explain'
     if chosen < set(names):
-        extra = ' + '.join(sorted(set(names) - chosen))
+        extra = _label(set(names) - chosen)
         return f'{extra} adds nothing that the data ask for ({behind:.1f} nats behind)'
     if set(names) < chosen:
-        return f'leaves what {" + ".join(sorted(chosen - set(names)))} explains ({behind:.1f} nats)'
+        return f'leaves what {_label(chosen - set(names))} explains ({behind:.1f} nats)'
     return f'fits worse: {behind:.1f} nats behind {_label(chosen)}'
 
 
@@ -150,7 +153,7 @@ def _undecided(gap: Mapping[str, QuantityGap], nearest: tuple[str, ...]) -> str:
 
 
 def _label(names: set[str]) -> str:
-    return ' + '.join(sorted(names)) or 'nothing'
+    return ' + '.join(sorted(effect_of(key) for key in names)) or 'nothing'
 
 
 def notes(
@@ -231,7 +234,8 @@ def sentence(
             f'{name} = {p.value:.3g} +- {p.std:.2g}{"" if p.unit == "-" else " " + p.unit}'
             for name, p in effect.parameters.items()
         )
-        text = f'{effect.name} ({values}; confidence {effect.confidence:.2f}'
+        form = f' in the form {effect.form}' if effect.form else ''
+        text = f'{effect.name}{form} ({values}; confidence {effect.confidence:.2f}'
         if effect.confounded_with:
             text += f'; these rows cannot tell it from {", ".join(effect.confounded_with)}'
         parts.append(text + ')')

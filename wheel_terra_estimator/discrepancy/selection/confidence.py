@@ -17,6 +17,7 @@ from importlib.resources import files
 import numpy as np
 from scipy.special import expit
 
+from wheel_terra_estimator.discrepancy.effect_keys import effect_of
 from wheel_terra_estimator.discrepancy.fitting.evidence import log_sum
 from wheel_terra_estimator.discrepancy.selection.remainder import Remainder
 from wheel_terra_estimator.discrepancy.selection.verdict import Verdict
@@ -29,7 +30,7 @@ FEATURES = (
     'gain',  # log evidence over nothing, compressed
     'remainder',  # something is left beyond the floor
     'floor',  # probability of a structural error
-    'two',  # two effects are named
+    'two',  # two effects or more are named
     'margin_floor',  # a margin counts for less beside a structural error,
     'margin_two',  # and for less in a pair
     'gain_squared',
@@ -50,9 +51,10 @@ def features(
     """Return the features of the name at ``place`` in the named set."""
     total = np.array([log_sum(row) for row in selection.log_joint])
     name = selection.explanations[verdict.index].names[place]
-    has = np.array([name in e.names for e in selection.explanations])
-    inside = {name, *verdict.open_sets[place]}
-    covered = np.array([bool(inside & set(e.names)) for e in selection.explanations])
+    effects = [{effect_of(key) for key in e.names} for e in selection.explanations]
+    has = np.array([effect_of(name) in mine for mine in effects])
+    inside = {effect_of(key) for key in (name, *verdict.open_sets[place])}
+    covered = np.array([bool(inside & mine) for mine in effects])
 
     def margin(mine: np.ndarray) -> float:
         against = total[~mine]
@@ -63,7 +65,7 @@ def features(
     nothing = next(h for h, e in enumerate(selection.explanations) if not e.names)
     alone = _squash(margin(has))
     gain = float(np.log1p(max(total[verdict.index] - total[nothing], 0.0)))
-    two = float(len(selection.explanations[verdict.index].names) - 1)
+    two = float(len(selection.explanations[verdict.index].names) > 1)
     return {
         'one': 1.0,
         'margin': alone,

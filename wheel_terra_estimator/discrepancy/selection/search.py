@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from wheel_terra_estimator.discrepancy.effect_keys import effect_of
 from wheel_terra_estimator.discrepancy.fitting import noise as noises
 from wheel_terra_estimator.discrepancy.fitting.coordinates import Coordinate
 from wheel_terra_estimator.discrepancy.fitting.evidence import Floor
@@ -31,8 +32,12 @@ from wheel_terra_estimator.discrepancy.selection.signatures import (
     unavailable,
 )
 from wheel_terra_estimator.discrepancy.selection.weights import (
+    MOST_EFFECTS,
     Selection,
+    explain_fewer,
     explain_members,
+    explain_more,
+    explain_other_forms,
     explain_pairs,
     explain_singles,
     weigh,
@@ -138,14 +143,7 @@ def search(
             nothing,
             selection,
             found,
-            {
-                **{name: why for name, why in reasons.items() if why},
-                **{
-                    name: 'even a large one would stay below the noise on these rows'
-                    for name in possible
-                    if found[name].distance < SEEN and name not in selection.explanations[0].names
-                },
-            },
+            _not_visible(reasons, found, selection),
             noise,
             tuple(outliers),
         )
@@ -158,6 +156,18 @@ def search(
         noise = builder.estimate(noise, selection.explanations[0].fitted, outliers)
     assert findings is not None
     return findings
+
+
+def _not_visible(
+    reasons: Mapping[str, str], found: Mapping[str, Signature], selection: Selection
+) -> dict[str, str]:
+    """Return why effects could not have been seen; one visible form is enough to see an effect."""
+    why = dict(reasons)
+    for key, signature in found.items():
+        if signature.distance < SEEN and key not in selection.explanations[0].names:
+            why[key] = 'even a large one would stay below the noise on these rows'
+    seen = {effect_of(key) for key in why if not why[key]}
+    return {effect_of(key): text for key, text in why.items() if effect_of(key) not in seen}
 
 
 def _ranges(table: SteadyTable) -> FloatArray:
@@ -199,7 +209,7 @@ def _select(setting: Setting, nothing: Fit) -> Selection:
     incompatible = {name: e.incompatible_with for name, e in setting.effects.items()}
     explanations: list[Explanation] = list(singles)
     explanations += explain_pairs(setting, singles, incompatible)
-    selection = weigh(explanations, setting.floors, len(setting.effects))
+    selection = weigh(explanations, setting.floors, setting.effects)
     if len(selection.explanations[0].names) < 2:
         return selection
     # A pair may have found a layer's depth or a mound's onset that its member alone had missed.
@@ -210,7 +220,33 @@ def _select(setting: Setting, nothing: Fit) -> Selection:
         else e
         for e in selection.explanations
     ]
-    return weigh(better, setting.floors, len(setting.effects))
+    return _with_more(setting, weigh(better, setting.floors, setting.effects), incompatible)
+
+
+def _with_more(
+    setting: Setting, selection: Selection, incompatible: Mapping[str, frozenset[str]]
+) -> Selection:
+    """Go on from a pair: one effect more, then each of the set left out, while that helps."""
+    while 2 <= len(selection.explanations[0].names) < MOST_EFFECTS:
+        best = selection.explanations[0]
+        more = explain_more(setting, best, incompatible)
+        if not more:
+            break
+        known = {frozenset(e.names) for e in selection.explanations}
+        fresh = [e for e in more if frozenset(e.names) not in known]
+        selection = weigh([*selection.explanations, *fresh], setting.floors, setting.effects)
+        top = selection.explanations[0]
+        if len(top.names) <= len(best.names):
+            break
+        known = {frozenset(e.names) for e in selection.explanations}
+        fewer = [e for e in explain_fewer(setting, top) if frozenset(e.names) not in known]
+        selection = weigh([*selection.explanations, *fewer], setting.floors, setting.effects)
+    best = selection.explanations[0]
+    if len(best.names) < 2:
+        return selection
+    known = {frozenset(e.names) for e in selection.explanations}
+    forms = [e for e in explain_other_forms(setting, best) if frozenset(e.names) not in known]
+    return weigh([*selection.explanations, *forms], setting.floors, setting.effects)
 
 
 def _variances(problem: Problem, amplitude: FloatArray | float) -> list[FloatArray]:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from wheel_terra_estimator.discrepancy.effect_keys import effect_of
 from wheel_terra_estimator.discrepancy.fitting.evidence import log_sum
 from wheel_terra_estimator.discrepancy.selection.remainder import (
     Remainder,
@@ -54,7 +55,7 @@ class Verdict:
     index : int
         Explanation that is reported as the fit: of the named set, else of nothing.
     open_sets : tuple of tuple of str
-        For each named effect, the others that the data cannot tell from it.
+        For each named effect, the others (in their best form) that the data cannot tell from it.
     left : Remainder
         What that explanation leaves.
     """
@@ -98,13 +99,23 @@ def decide(selection: Selection, variance_of: Variance, *, off: bool = False) ->
     quiet = np.array([log_sum(row[~unexplained]) for row in joint])
     misfit = log_sum(joint[:, unexplained].ravel())
     clean = log_sum(quiet[named]) > misfit + np.log(CLEAN_SHARE)
-    best = max(named, key=lambda h: quiet[h] if clean else total[h])
+    best = _best_set(selection, quiet if clean else total, named)
     after = remainder(selection, best, variance_of)
     if after.significant and _explained(selection, nothing, best) < MOST:
         return Verdict('unexplained', nothing, (), left)
     names = selection.explanations[best].names
     open_sets = tuple(_rivals(selection, total, names, name) for name in names)
     return Verdict('named', best, open_sets, after)
+
+
+def _best_set(selection: Selection, weight: FloatArray, named: list[int]) -> int:
+    """Return the best form of the best set of effects: the forms of an effect add up."""
+    sets: dict[frozenset[str], list[int]] = {}
+    for h in named:
+        effects = frozenset(effect_of(key) for key in selection.explanations[h].names)
+        sets.setdefault(effects, []).append(h)
+    forms = max(sets.values(), key=lambda mine: float(log_sum(weight[mine])))
+    return max(forms, key=lambda h: float(weight[h]))
 
 
 def _explained(selection: Selection, nothing: int, best: int) -> float:
@@ -131,9 +142,14 @@ def _rivals(
         if len(mine) == len(names) and others <= mine:
             (own,) = mine - others
             # What is no better than leaving the place empty is no rival.
+            if effect_of(own) == effect_of(name) and own != name:
+                continue  # another form of the same effect
             if own == name or explanation.log_evidence > without + BETTER_THAN_EMPTY:
                 places[own] = float(total[h])
-    order = sorted(places, key=lambda key: -places[key])
+    by_weight = sorted(places, key=lambda key: -places[key])
+    # Of a rival's forms the best one stands for all.
+    best_form = {effect_of(key): key for key in reversed(by_weight)}
+    order = [key for key in by_weight if best_form[effect_of(key)] == key]
     logs = np.array([places[key] for key in order]) / TEMPERATURE
     weights = np.exp(logs - log_sum(logs))
     kept: list[str] = []

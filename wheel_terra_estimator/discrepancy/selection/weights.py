@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Which set of effects: nothing, one, two; with the structural error left over weighed along.
+"""Which set of effects, none to several; the structural error left over is weighed along.
 
 Every hypothesis is a set of effects together with an assumption on the structural error: none, a
 model-error floor of a few per cent, or a smooth misfit beyond it that no listed effect explains.
@@ -10,12 +10,14 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from wheel_terra_estimator.discrepancy.effect_keys import effect_of
 from wheel_terra_estimator.discrepancy.fitting.evidence import Floor, log_sum
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit, fit
 from wheel_terra_estimator.discrepancy.selection.candidates import (
@@ -28,6 +30,8 @@ FloatArray = NDArray[np.float64]
 
 # Prior probabilities: nothing missing, one effect, two effects.
 PRIOR_NOTHING, PRIOR_ONE, PRIOR_TWO = 0.50, 0.45, 0.05
+PRIOR_MORE = 0.2  # each further effect, relative to one effect less
+MOST_EFFECTS = 6
 # Prior of the structural error: floors that a good model may have ...
 _FLOORS = ((0.0, 0.60), (0.007, 0.10), (0.015, 0.12), (0.025, 0.10), (0.04, 0.04))
 # ... and smooth misfits that ask for a name, in all quantities or in one of them.
@@ -37,6 +41,7 @@ _UNEXPLAINED_SOME = (0.015, 0.03, 0.06, 0.15, 0.4)
 _SOME = ((1, 0, 0), (0, 1, 0), (0, 0, 1), (0, 1, 1))
 
 _PAIR_SEEDS = 4  # best single effects to which a second one is added
+_FURTHER = 4  # sets with one effect more that are fitted, at most
 _PAIRS = 8  # pairs that are fitted, at most
 # A pair must promise so many nats over the best single effect: its prior alone costs it four.
 _PROMISE = 1.5
@@ -135,18 +140,33 @@ class Selection:
         return {name: float(s) for (name, _), s in zip(singles, shares, strict=True)}
 
 
+def log_prior(names: Sequence[str], visible: Iterable[str]) -> float:
+    """Return the log prior of a set of effects; the forms of an effect share its weight.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Effects of the set, each in a form.
+    visible : iterable of str
+        All effects and forms that compete.
+    """
+    forms = Counter(effect_of(key) for key in visible)
+    count = len(names)
+    if count == 0:
+        return math.log(PRIOR_NOTHING)
+    prior = PRIOR_ONE if count == 1 else PRIOR_TWO * PRIOR_MORE ** (count - 2)
+    prior /= max(math.comb(len(forms), count), 1)
+    return math.log(prior) - sum(math.log(max(forms[effect_of(key)], 1)) for key in names)
+
+
 def weigh(
-    explanations: Sequence[Explanation], floors: tuple[Floor, ...], visible: int
+    explanations: Sequence[Explanation], floors: tuple[Floor, ...], visible: Iterable[str]
 ) -> Selection:
     """Return posterior probabilities of all explanations and floors."""
-    priors = {
-        0: math.log(PRIOR_NOTHING),
-        1: math.log(PRIOR_ONE / max(visible, 1)),
-        2: math.log(PRIOR_TWO / max(visible * (visible - 1) / 2, 1)),
-    }
+    keys = tuple(visible)
     floor_prior = np.array([floor.log_prior for floor in floors])
     joint = np.array(
-        [e.posterior.log_evidence + floor_prior + priors[len(e.names)] for e in explanations]
+        [e.posterior.log_evidence + floor_prior + log_prior(e.names, keys) for e in explanations]
     )
     order = np.argsort(-log_sum(joint, axis=1))
     joint = joint[order]
@@ -170,13 +190,7 @@ def explain_pairs(
     proposals: dict[frozenset[str], tuple[float, tuple[str, ...], FloatArray, FloatArray]] = {}
     for seed in ranked[:_PAIR_SEEDS]:
         first = seed.names[0]
-        others = [
-            name
-            for name in setting.effects
-            if name != first
-            and name not in incompatible.get(first, frozenset())
-            and first not in incompatible.get(name, frozenset())
-        ]
+        others = _compatible(setting, (first,), incompatible)
         for score, names, start in linear_starts(setting, seed.fitted, others):
             key = frozenset(names)
             total = score - seed.fitted.objective
@@ -198,6 +212,56 @@ def explain_pairs(
         np.array([angle for _, _, _, angle in best]),
     )
     return [setting.explain(f) for f in fits]
+
+
+def _compatible(
+    setting: Setting, names: Sequence[str], incompatible: Mapping[str, frozenset[str]]
+) -> list[str]:
+    """Return the effects that may stand beside a set; never two forms of one effect."""
+    taken = {effect_of(key) for key in names}
+    excluded = set().union(*(incompatible.get(key, frozenset()) for key in names))
+    return [
+        key
+        for key in setting.effects
+        if effect_of(key) not in taken | excluded and not taken & incompatible.get(key, frozenset())
+    ]
+
+
+def explain_more(
+    setting: Setting, best: Explanation, incompatible: Mapping[str, frozenset[str]]
+) -> list[Explanation]:
+    """Add one effect to a set, where the linear evidence promises most; all are refitted."""
+    fitted = best.fitted
+    starts = linear_starts(setting, fitted, _compatible(setting, best.names, incompatible))
+    worth = sorted((s for s in starts if s[0] > _PROMISE), key=lambda s: -s[0])[:_FURTHER]
+    fits = setting.fit([n for _, n, _ in worth], [u for _, _, u in worth], fitted.angle)
+    return [setting.explain(f) for f in fits]
+
+
+def explain_fewer(setting: Setting, best: Explanation) -> list[Explanation]:
+    """Leave one effect of a set out; the others are refitted from where they are."""
+    fitted = best.fitted
+    sets = [tuple(n for n in best.names if n != name) for name in best.names]
+    starts = [
+        np.array([u for c, u in zip(fitted.coordinates, fitted.u, strict=True) if c.owner != name])
+        for name in best.names
+    ]
+    return [setting.explain(f) for f in setting.fit(sets, starts, fitted.angle)]
+
+
+def explain_other_forms(setting: Setting, best: Explanation) -> list[Explanation]:
+    """Put the other forms of each effect of a set in its place, one at a time."""
+    found = []
+    for reduced in explain_fewer(setting, best):
+        (left_out,) = set(best.names) - set(reduced.names)
+        same = effect_of(left_out)
+        others = [key for key in setting.effects if effect_of(key) == same and key != left_out]
+        starts = linear_starts(setting, reduced.fitted, others)
+        fits = setting.fit(
+            [n for _, n, _ in starts], [u for _, _, u in starts], reduced.fitted.angle
+        )
+        found += [setting.explain(f) for f in fits]
+    return found
 
 
 def explain_members(setting: Setting, pair: Explanation) -> list[Explanation]:
