@@ -94,8 +94,8 @@ class FakeEstimator:
 
 
 def make_core(**changes):
-    """Core with a fake estimator; returns both."""
-    config = configuration(**changes)
+    """Core with a fake estimator, a set for every stamp, nothing held back; returns both."""
+    config = configuration(**{'output_rate': 0.0, 'max_lag': 0.0, **changes})
     fake = FakeEstimator(config)
     return EstimatorCore(config, fake), fake
 

@@ -71,7 +71,7 @@ def test_late_inputs_end_in_the_same_bits(rover, seed):
     ends = []
     for order in (stream, late):
         core = EstimatorCore(rover)
-        sets = [s for m in (*order, *tail()) for s in core.add(m)]
+        sets = [s for m in (*order, *tail()) for s in core.add(m)] + core.flush()
         ends.append(bits(sets[-1]))
         assert core.health()['filter_restarts'] == 0
     assert ends[0] == ends[1]

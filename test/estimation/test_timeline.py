@@ -216,14 +216,14 @@ def test_the_log_stays_short_over_a_long_drive():
         core.add(imu(0.004 * i))
         if i % 25 == 0:
             core.add(odometry(0.004 * i))
-    assert len(core._timeline._entries) < 2.0 / 0.004 + 200
+    assert len(core._timeline._log.entries) < 2.0 / 0.004 + 200
 
 
 def test_a_driver_whose_stamp_stands_still_fills_nothing():
     core, _ = make_core()
     for i in range(1000):
         core.add(odometry(0.0, rate=0.1 * i))
-    assert len(core._timeline._entries) == 1
+    assert len(core._timeline._log.entries) == 1
     assert core.health()['joint_states_stamp_repeated'] == 999
 
 

@@ -132,7 +132,7 @@ class Configuration:
         is among the values where it is not the first one of the effect.
     sensors, filter : Section
         ``sensors.*`` and ``filter.*`` as attributes.
-    slip_radius, wheel_odometry, reference_odom_max_rate, rest_speed, max_lag, history
+    slip_radius, wheel_odometry, reference_odom_max_rate, rest_speed, output_rate, max_lag, history
         The parameters that stand in no section.
     stated : frozenset of str
         Keys that a file or an override gave, as against defaults.
@@ -150,7 +150,8 @@ class Configuration:
     wheel_odometry: str
     reference_odom_max_rate: float  # [Hz]
     rest_speed: float  # [m/s]
-    max_lag: float  # [s]
+    output_rate: float  # [Hz], 0 = every stamp
+    max_lag: float  # [s], below 0 = learned
     history: float  # [s]
     provenance: str
     stated: frozenset[str]
@@ -174,6 +175,7 @@ class Configuration:
             wheel_odometry=str(values['wheel_odometry']),
             reference_odom_max_rate=_number(values, 'reference_odom_max_rate'),
             rest_speed=_number(values, 'rest_speed'),
+            output_rate=_number(values, 'output_rate'),
             max_lag=_number(values, 'max_lag'),
             history=_number(values, 'history'),
             provenance=str(values['provenance']),

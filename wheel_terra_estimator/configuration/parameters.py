@@ -221,11 +221,21 @@ DECLARED: tuple[Parameter, ...] = (
         aliases=('filter.rest_speed',),
     ),
     number(
-        'max_lag',
-        0.0,
-        's',
-        'how long inputs are held back to be sorted by stamp; 0 = released at once',
+        'output_rate',
+        20.0,
+        'Hz',
+        'sets of estimates per second of stamps: one at the first wheel odometry at or after each '
+        'multiple of its period; 0 = one for every stamp of the wheel odometry',
         at_least=0.0,
+        at_most=1000.0,
+    ),
+    number(
+        'max_lag',
+        -1.0,
+        's',
+        'how long inputs are held back to be sorted by stamp; -1 = as long as wheel odometry and '
+        'IMU are seen to lag, at most 0.5; 0 = released at once',
+        at_least=-1.0,
         at_most=60.0,
         aliases=('filter.max_lag',),
     ),
@@ -597,6 +607,14 @@ DECLARED: tuple[Parameter, ...] = (
         above=0.0,
     ),
     number('filter.heartbeat_rate', 5.0, 'Hz', 'rate of the sets during such a silence', above=0.0),
+    number(
+        'filter.rerun_rate',
+        60.0,
+        '1/s',
+        'steps that may be run again for late inputs, per second of stamps; what would cost more '
+        'is fused with delay; 0 = any number',
+        at_least=0.0,
+    ),
     number(
         'filter.clock_step',
         1.0,

@@ -25,7 +25,9 @@ from wheel_terra_estimator.estimation.timing.clock_watch import (
     Suspicion,
 )
 from wheel_terra_estimator.estimation.timing.input_checks import CHANNELS, InputChecks
-from wheel_terra_estimator.estimation.timing.timeline import Estimator, Fate, Timeline, TimeSettings
+from wheel_terra_estimator.estimation.timing.input_log import Estimator
+from wheel_terra_estimator.estimation.timing.lag import LagLearner
+from wheel_terra_estimator.estimation.timing.timeline import Fate, Timeline, TimeSettings
 
 FAULT_MEMORY = 5_000_000_000
 """How long a rejected input is told of in the sets [ns of stamps]."""
@@ -52,11 +54,15 @@ class EstimatorCore:
         rate = configuration.reference_odom_max_rate
         tuning = configuration.filter
         self._settings = TimeSettings(
-            max_lag=_nanoseconds(configuration.max_lag),
+            output_rate=configuration.output_rate,
             history=_nanoseconds(configuration.history),
             silence=_nanoseconds(tuning.silence),
             heartbeat=max(_nanoseconds(1.0 / tuning.heartbeat_rate), 1),
             reference_period=_nanoseconds(1.0 / rate) if rate else 0,
+            rerun_rate=_rerun_rate(configuration),
+        )
+        self._lags = LagLearner(
+            _nanoseconds(configuration.max_lag) if configuration.max_lag >= 0.0 else -1
         )
         self._clock_step = _nanoseconds(tuning.clock_step)
         self._estimator = estimator
@@ -67,6 +73,7 @@ class EstimatorCore:
         self._received = [0] * len(CHANNELS)
         self._late = [0] * len(CHANNELS)
         self._told: list[tuple[str, int] | None] = [None] * len(CHANNELS)  # words, stamp of set
+        self._deferred_at: int | None = None
         self._clock_steps = 0
         self._resets = 0
 
@@ -95,7 +102,7 @@ ReferenceVelocity
         """Forget the state, keep the parameters; the next measurement begins a new run."""
         self._resets += 1
         self._watch = self._new_watch()
-        self._timeline.end_run(keep_soil=False)
+        self._end_run(keep_soil=False)
 
     def health(self) -> dict[str, Any]:
         """Return counters and words for diagnostics: key (with unit where it has one) -> value."""
@@ -110,6 +117,9 @@ ReferenceVelocity
             for reason, count in checks.rejected[channel].items():
                 result[f'{name}_rejected: {reason}'] = count
         result.update(timeline.counts)
+        newest = self._watch.newest
+        hold = self._lags.hold(newest) if newest is not None else 0
+        result['held_back_s'] = hold * 1e-9
         result['clock_steps_back'] = self._clock_steps
         result['resets'] = self._resets
         own = dict(getattr(self._estimator, 'health', dict)())
@@ -119,7 +129,7 @@ ReferenceVelocity
 
     def _new_watch(self) -> ClockWatch:
         settings = self._settings
-        return ClockWatch(len(CHANNELS), self._clock_step, settings.max_lag, settings.history)
+        return ClockWatch(len(CHANNELS), self._clock_step, self._lags.longest, settings.history)
 
     def _follow(self, judgement: Judgement) -> list[EstimateSet]:
         sets: list[EstimateSet] = []
@@ -131,19 +141,27 @@ ReferenceVelocity
         if judgement.stepped_back:
             self._clock_steps += 1
             sets += self._timeline.flush()
-            self._timeline.end_run(keep_soil=True)
+            self._end_run(keep_soil=True)
         for arrival in judgement.accepted:
+            self._lags.note(arrival.channel, arrival.measurement.stamp)
             sets += self._insert(arrival)
         newest = self._watch.newest
         if judgement.accepted and newest is not None:
-            sets += self._timeline.advance(newest)
+            hold = self._lags.hold(newest)
+            sets += self._timeline.advance(newest, hold, self._lags.beyond(hold))
         return sets
+
+    def _end_run(self, keep_soil: bool) -> None:
+        self._timeline.end_run(keep_soil=keep_soil)
+        self._lags.begin_run()
 
     def _insert(self, arrival: Arrival) -> list[EstimateSet]:
         channel, measurement = arrival
         fate, sets = self._timeline.insert(channel, measurement)
-        if fate is Fate.LATE:
+        if fate in (Fate.LATE, Fate.DEFERRED):
             self._late[channel] += 1
+            if fate is Fate.DEFERRED:
+                self._deferred_at = arrival.measurement.stamp
         elif fate is Fate.TOO_OLD:
             self._checks.refuse(channel, 'stamp older than the history')
         elif fate is Fate.FULL:
@@ -174,9 +192,19 @@ ReferenceVelocity
             told = self._told[channel]
             if told is not None and abs(stamp - told[1]) < FAULT_MEMORY:
                 faults[checks.names[channel]] = told[0]
+        if self._deferred_at is not None and abs(stamp - self._deferred_at) < FAULT_MEMORY:
+            faults['late inputs'] = (
+                f'more than {self._settings.rerun_rate:.0f} steps a second would be run again '
+                '(filter.rerun_rate): fused with delay'
+            )
         if silent:
             faults[checks.names[0]] = 'silent: wheel rates unknown'
         return faults
+
+
+def _rerun_rate(configuration: Configuration) -> float:
+    """Return the steps that may be run again per second; any number where every stamp is one."""
+    return float(configuration.filter.rerun_rate) if configuration.output_rate > 0.0 else 0.0
 
 
 def _nanoseconds(seconds: float) -> int:

@@ -1,65 +1,32 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Inputs in the order of their stamps, whatever the order of their arrival.
+"""Inputs in the order of their stamps, whatever the order of their arrival; which sets are due.
 
-All inputs of a run stand in one log, sorted by stamp, equal stamps merged. An estimate for a stamp
-is by definition what the estimator gives when it runs through the log from the start of the run to
-that stamp. The rest is economy: kept states, so that a late input costs a short run and not a long
-one, and laziness, so that any number of late inputs between two sets costs one run.
+An estimate for a stamp is by definition what the estimator gives when it runs through the log of
+inputs from the start of the run to that stamp. The timeline says when an input is released, when a
+set is due, and what becomes of inputs that come late; it is lazy, so that any number of late inputs
+between two sets costs one run.
 """
 
 from __future__ import annotations
 
-from bisect import bisect_left
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
-from typing import Any, Protocol
 
 import numpy as np
 
 from wheel_terra_estimator.estimation.estimates import EstimateSet
-from wheel_terra_estimator.estimation.measurements import (
-    FloatArray,
-    LeavingAngleReading,
-    Measurement,
-    SinkageReading,
-    StepInputs,
-    WheelOdometry,
-)
-from wheel_terra_estimator.estimation.timing.input_checks import (
-    INERTIAL,
-    REFERENCE,
-    WHEEL_ODOMETRY,
-)
+from wheel_terra_estimator.estimation.measurements import Measurement
+from wheel_terra_estimator.estimation.timing.input_checks import WHEEL_ODOMETRY
+from wheel_terra_estimator.estimation.timing.input_log import Estimator, InputLog
+from wheel_terra_estimator.estimation.timing.step_grid import StepGrid
 
-KEPT_STATE_SPACING = 50_000_000
-"""Distance of kept states [ns]: what a late input costs, against what keeping costs."""
-DENSE_SPAN = 50_000_000
-"""Inputs that come so little [ns] after a set that would have used them make kept states denser."""
 GREATEST_LENGTH = 100_000
 """Inputs that the log holds at most, so that no publisher can fill the memory."""
-TRIM_LENGTH = 64
-"""Forgotten entries are taken off the log in pieces of this length."""
+ALLOWANCE = 2.0  # [s] over which steps that are run again may be saved up
 
-
-class Estimator(Protocol):
-    """What the timeline runs."""
-
-    def step(self, stamp: int, inputs: StepInputs) -> None:
-        """Bring the state to `stamp` [ns], later than the one before, with all inputs of it."""
-
-    def estimates(self) -> EstimateSet:
-        """Return the estimates at the stamp of the last step."""
-
-    def snapshot(self) -> Any:
-        """Return the state in a form that later steps leave alone."""
-
-    def restore(self, snapshot: Any) -> None:
-        """Return to a kept state."""
-
-    def begin_run(self, stamp: int, keep_soil: bool) -> None:
-        """Start anew at `stamp` [ns]; soil and biases kept but widened, or forgotten."""
+_SECOND = 1_000_000_000
 
 
 class Fate(Enum):
@@ -67,36 +34,25 @@ class Fate(Enum):
 
     IN_ORDER = 'in order'
     LATE = 'late'  # older than the state, fused at its own stamp
+    DEFERRED = 'deferred'  # late, waits until running again is affordable
     TOO_OLD = 'too old'
     FULL = 'no room'
 
 
 @dataclass(frozen=True)
 class TimeSettings:
-    """Times of the contract, in nanoseconds."""
+    """Times of the contract, in nanoseconds, and rates."""
 
-    max_lag: int
+    output_rate: float  # [Hz], 0 = a set at every stamp of the wheel odometry
     history: int
     silence: int
     heartbeat: int  # period
     reference_period: int  # 0 = every reference velocity is used
-
-
-class _Entry:
-    """All inputs of one stamp."""
-
-    __slots__ = ('inputs', 'kept', 'parts', 'stamp')
-
-    def __init__(self, stamp: int, channel: int, measurement: Measurement) -> None:
-        self.stamp = stamp
-        self.parts: list[Any] = [None] * 5
-        self.parts[channel] = measurement
-        self.inputs: StepInputs | None = None  # made when first run
-        self.kept: tuple[Any, int] | None = None  # state after this entry
+    rerun_rate: float = 0.0  # steps run again per second of stamps [Hz], 0 = any number
 
 
 class Timeline:
-    """Log of one run after the other, and the estimator that runs through it.
+    """Log of one run after the other, and the sets that are due.
 
     Parameters
     ----------
@@ -112,7 +68,8 @@ class Timeline:
     Attributes
     ----------
     counts : dict
-        ``runs``, ``steps``, ``reruns``, ``steps_repeated``, ``filter_restarts``.
+        ``runs``, ``filter_restarts``, ``late_inputs_deferred``, ``late_inputs_dropped`` and those
+        of the log.
     repeated : list of int
         Per channel: inputs whose stamp the channel had given before.
     """
@@ -123,37 +80,42 @@ class Timeline:
         settings: TimeSettings,
         finish: Callable[[int, EstimateSet | Exception, bool], tuple[EstimateSet, bool]],
     ) -> None:
-        self.estimator = estimator
         self.settings = settings
-        self.counts = {
+        self._grid = StepGrid(settings.output_rate)
+        self._log = InputLog(estimator, self._grid, settings.reference_period)
+        self._own_counts = {
             'runs': 0,
-            'steps': 0,
-            'reruns': 0,
-            'steps_repeated': 0,
             'filter_restarts': 0,
+            'late_inputs_deferred': 0,
+            'late_inputs_dropped': 0,
         }
-        self.repeated = [0] * 5
         self._finish = finish
-        self._pristine = estimator.snapshot()
-        self._entries: list[_Entry] = []
-        self._stamps: list[int] = []
-        self._origin: tuple[Any, bool] | None  # state before the run, whether soil is kept
         self._begins_run: bool  # the next input is the first of its run
         self._released: int  # entries[:_released] may be used
-        self._ran: int  # entries[:_ran] have been run, and not changed since
-        self._position: int  # entries[:_position] made the estimator's state; -1: none did
         self._state: int | None  # newest released stamp
         self._last_set: int | None
         self._odometry: int | None  # newest released stamp of wheel odometry
         self._heartbeats: int  # sets of the present silence
-        self._next_reference: int  # a reference velocity is used again from here on
-        self._disorder: bool  # inputs come a little after sets that would have used them
-        self._last_kept = 0  # stamp of the newest kept state
-        self._clear(self._pristine, keep_soil=False)
+        self._overdue: int  # wheel odometry lags by so much more than is waited for [ns]
+        self._deferred: list[tuple[int, Measurement]]
+        self._newest: int | None
+        self._allowance: float  # steps that may be run again now
+        self._clear()
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Counters for diagnostics."""
+        return self._own_counts | self._log.counts
+
+    @property
+    def repeated(self) -> list[int]:
+        """Per channel: inputs whose stamp the channel had given before."""
+        return self._log.repeated
 
     def end_run(self, *, keep_soil: bool) -> None:
         """Let the next input begin a new run; soil and biases kept but widened, or forgotten."""
-        self._clear(self.estimator.snapshot() if keep_soil else self._pristine, keep_soil)
+        self._log.clear(keep_soil=keep_soil)
+        self._clear()
 
     def insert(self, channel: int, measurement: Measurement) -> tuple[Fate, list[EstimateSet]]:
         """Put an input into the log.
@@ -166,126 +128,127 @@ class Timeline:
             A set that it made due at once: wheel odometry that comes after younger inputs of
             other channels but is younger than the last set.
         """
-        stamp = measurement.stamp
-        state = self._state
+        stamp, state = measurement.stamp, self._state
         if state is not None and stamp < state - self.settings.history:
             return Fate.TOO_OLD, []
-        entries, stamps = self._entries, self._stamps
-        if len(entries) >= GREATEST_LENGTH:
+        if len(self._log.entries) >= GREATEST_LENGTH:
             return Fate.FULL, []
-        if not stamps:
-            self.counts['runs'] += self._begins_run
-            self._begins_run = False
-        index = len(stamps)
-        if index and stamp <= stamps[-1]:
-            index = bisect_left(stamps, stamp)
-            if stamps[index] == stamp:
-                changed = self._merge(entries[index], channel, measurement)
-            else:
-                self._insert_at(index, _Entry(stamp, channel, measurement))
-                changed = True
-            if changed and index < self._ran:
-                if stamp > stamps[self._ran - 1] - DENSE_SPAN:
-                    self._disorder = True
-                self._ran = index
-        else:
-            entries.append(_Entry(stamp, channel, measurement))
-            stamps.append(stamp)
-        fate = Fate.LATE if state is not None and stamp < state else Fate.IN_ORDER
-        if channel == WHEEL_ODOMETRY and index < self._released:
-            self._hear_odometry(stamp)
-            if self._last_set is None or stamp > self._last_set:
-                return fate, [self._publish(index)]
-        return fate, []
+        cost = self._log.steps_after(stamp) - self._log.dirty
+        if cost > 0 and self.settings.rerun_rate > 0.0:
+            if self._deferred or cost > self._allowance:
+                self._own_counts['late_inputs_deferred'] += 1
+                self._deferred.append((channel, measurement))
+                return Fate.DEFERRED, []
+            self._allowance -= cost
+        return self._insert(channel, measurement)
 
-    def advance(self, newest: int) -> list[EstimateSet]:
-        """Release the inputs that `newest`, the newest stamp seen, lets pass; return the sets."""
-        return self._release(newest - self.settings.max_lag)
+    def advance(self, newest: int, hold: int = 0, overdue: int = 0) -> list[EstimateSet]:
+        """Release inputs and return the sets that became due.
+
+        Parameters
+        ----------
+        newest : int
+            Newest stamp seen [ns].
+        hold : int
+            How long inputs are held back [ns].
+        overdue : int
+            By how much wheel odometry lags behind what is held back [ns]; no silence.
+        """
+        self._overdue = overdue
+        if self._newest is None or newest > self._newest:
+            rate = self.settings.rerun_rate
+            elapsed = 0.0 if self._newest is None else (newest - self._newest) / _SECOND
+            self._allowance = min(self._allowance + rate * elapsed, rate * ALLOWANCE)
+            self._newest = newest
+        if self._deferred:
+            self._insert_deferred()
+        return self._release(newest - hold)
 
     def flush(self) -> list[EstimateSet]:
         """Release everything."""
-        return self._release(self._stamps[-1]) if self._stamps else []
+        self._insert_deferred(at_any_cost=True)
+        return self._release(self._log.stamps[-1]) if self._log.stamps else []
 
     # -- The log --------------------------------------------------------------------------------
 
-    def _clear(self, origin: Any, keep_soil: bool) -> None:
-        self._entries.clear()
-        self._stamps.clear()
-        self._origin = origin, keep_soil
+    def _clear(self) -> None:
         self._begins_run = True
         self._released = 0
-        self._ran = 0
-        self._position = -1
         self._state = None
         self._last_set = None
         self._odometry = None
         self._heartbeats = 0
-        self._next_reference = 0
-        self._disorder = False
+        self._overdue = 0
+        self._deferred = []
+        self._newest = None
+        self._allowance = self.settings.rerun_rate * ALLOWANCE
 
-    def _insert_at(self, index: int, entry: _Entry) -> None:
-        self._entries.insert(index, entry)
-        self._stamps.insert(index, entry.stamp)
-        if index < self._released:
+    def _insert(self, channel: int, measurement: Measurement) -> tuple[Fate, list[EstimateSet]]:
+        stamp, state = measurement.stamp, self._state
+        if not self._log.stamps:
+            self._own_counts['runs'] += self._begins_run
+            self._begins_run = False
+        index, new = self._log.insert(channel, measurement)
+        if new and index < self._released:
             self._released += 1
+        fate = Fate.LATE if state is not None and stamp < state else Fate.IN_ORDER
+        if channel == WHEEL_ODOMETRY and index < self._released:
+            self._hear_odometry(stamp)
+            if self._set_is_due(stamp):
+                return fate, [self._publish(index)]
+        return fate, []
 
-    def _merge(self, entry: _Entry, channel: int, measurement: Any) -> bool:
-        """Merge into the entry of the same stamp; return whether that changes anything."""
-        before = entry.parts[channel]
-        if before is None:
-            entry.parts[channel] = measurement
-        elif channel in (INERTIAL, REFERENCE):
-            self.repeated[channel] += 1
-            if _same(before, measurement):
-                return False
-            entry.parts[channel] = measurement
-        else:
-            merged, overlap = _merge_wheels(before, measurement)
-            self.repeated[channel] += overlap
-            if _same(before, merged):
-                return False
-            entry.parts[channel] = merged
-        entry.inputs = None
-        return True
-
-    def _forget(self) -> None:
-        """Take off what no late input can reach."""
-        stamps = self._stamps
-        if self._state is None or len(stamps) <= TRIM_LENGTH:
+    def _insert_deferred(self, at_any_cost: bool = False) -> None:
+        """Fuse what waited, all at once, as soon as running again for the oldest is affordable."""
+        if not self._deferred:
             return
-        horizon = self._state - self.settings.history
-        if stamps[TRIM_LENGTH] >= horizon:
+        oldest = min(measurement.stamp for _, measurement in self._deferred)
+        cost = self._log.steps_after(oldest) - self._log.dirty
+        if cost > self._allowance and not at_any_cost:
             return
-        # The last kept state from which every input within the history can be run.
-        index = min(bisect_left(stamps, horizon), self._ran) - 1
-        while index > 0 and self._entries[index].kept is None:
-            index -= 1
-        if index > 0:
-            del self._entries[:index], stamps[:index]
-            self._origin = None
-            self._released -= index
-            self._ran -= index
-            self._position -= index
+        self._allowance -= max(cost, 0)
+        deferred, self._deferred = self._deferred, []
+        for channel, measurement in deferred:
+            state = self._state
+            if state is not None and measurement.stamp < state - self.settings.history:
+                self._own_counts['late_inputs_dropped'] += 1
+            else:
+                self._insert(channel, measurement)
 
     # -- Release --------------------------------------------------------------------------------
 
     def _release(self, limit: int) -> list[EstimateSet]:
         sets = []
-        while self._released < len(self._stamps) and self._stamps[self._released] <= limit:
+        log = self._log
+        while self._released < len(log.stamps) and log.stamps[self._released] <= limit:
             index = self._released
-            entry = self._entries[index]
+            entry = log.entries[index]
             self._released = index + 1
             self._state = entry.stamp
             if self._odometry is None:
                 self._hear_odometry(entry.stamp)  # silence counts from the start of the run
             if entry.parts[WHEEL_ODOMETRY] is not None:
                 self._hear_odometry(entry.stamp)
-                if self._last_set is None or entry.stamp > self._last_set:
+                if self._set_is_due(entry.stamp):
                     sets.append(self._publish(index))
             elif self._heartbeat_is_due(entry.stamp):
                 sets.append(self._publish(index))
-        self._forget()
+        if self._state is not None:
+            self._released -= log.forget(self._state - self.settings.history)
         return sets
+
+    def _set_is_due(self, stamp: int) -> bool:
+        """Whether wheel odometry of this stamp is the first since a multiple of the period."""
+        last = self._last_set
+        if last is None:
+            return True
+        if stamp <= last:
+            return False
+        if self._grid.every_stamp:
+            return True
+        first = self._log.first
+        assert first is not None
+        return self._grid.set_index(stamp - first) > self._grid.set_index(last - first)
 
     def _hear_odometry(self, stamp: int) -> None:
         if self._odometry is None or stamp > self._odometry:
@@ -295,7 +258,7 @@ class Timeline:
     def _heartbeat_is_due(self, stamp: int) -> bool:
         """Whether the silence of wheel odometry makes this stamp one of a set."""
         assert self._odometry is not None
-        silent = stamp - self._odometry - self.settings.silence
+        silent = stamp - self._odometry - self.settings.silence - self._overdue
         if silent < 0:
             return False
         beat = silent // self.settings.heartbeat + 1
@@ -307,132 +270,22 @@ class Timeline:
         self._heartbeats = beat
         return True
 
-    # -- Running --------------------------------------------------------------------------------
-
     def _publish(self, index: int) -> EstimateSet:
         """Bring the estimator to an entry and return the set of its stamp."""
-        entry = self._entries[index]
+        stamp = self._log.entries[index].stamp
         assert self._odometry is not None
-        silent = entry.stamp - self._odometry >= self.settings.silence
+        silent = stamp - self._odometry >= self.settings.silence + self._overdue
         outcome: EstimateSet | Exception
         try:
             with np.errstate(all='ignore'):  # the result is judged below, number by number
-                self._run(index)
-                outcome = self.estimator.estimates()
+                self._log.run_to(index)
+                outcome = self._log.estimator.estimates()
         except (ArithmeticError, ValueError, IndexError, np.linalg.LinAlgError) as error:
             outcome = error
-        self._last_set = entry.stamp
-        estimates, failed = self._finish(entry.stamp, outcome, silent)
+        self._last_set = stamp
+        estimates, failed = self._finish(stamp, outcome, silent)
         if failed:
-            self._start_anew(index)
+            self._own_counts['filter_restarts'] += 1
+            self._log.begin_after(index)
+            self._released -= index + 1
         return estimates
-
-    def _start_anew(self, failed: int) -> None:
-        """Forget the state and the log up to the entry at which the estimator failed."""
-        self.counts['filter_restarts'] += 1
-        del self._entries[: failed + 1], self._stamps[: failed + 1]
-        self._released -= failed + 1
-        self._ran, self._position = 0, -1
-        self._origin = self._pristine, False
-
-    def _run(self, last: int) -> None:
-        """Run the log up to and with the entry `last`."""
-        if self._position != self._ran or self._position < 0:
-            self._go_back()
-        elif self._position:
-            self._keep(self._position - 1, self._disorder)
-        entries = self._entries
-        dense = entries[last].stamp - DENSE_SPAN
-        for index in range(self._position, last + 1):
-            entry = entries[index]
-            self._step(entry, must=index == last)
-            entry.kept = None
-            # The state at the end is kept by the next run, if nothing has changed before.
-            if index < last:
-                odometry = entry.parts[WHEEL_ODOMETRY] is not None and entry.stamp >= dense
-                self._keep(index, self._disorder and (odometry or index == last - 1))
-        self._ran = self._position = last + 1
-
-    def _keep(self, index: int, must: bool) -> None:
-        """Keep the estimator's state, which is that after entry `index`, if it is worth it."""
-        entry = self._entries[index]
-        if entry.kept is None and (must or entry.stamp - self._last_kept >= KEPT_STATE_SPACING):
-            entry.kept = self.estimator.snapshot(), self._next_reference
-            self._last_kept = entry.stamp
-
-    def _go_back(self) -> None:
-        """Return to the last kept state before the first entry that has changed."""
-        first = self._ran - 1
-        while first >= 0 and self._entries[first].kept is None:
-            first -= 1
-        if self._position >= 0:
-            self.counts['reruns'] += 1
-            self.counts['steps_repeated'] += max(self._position - first - 1, 0)
-        if first >= 0:
-            kept = self._entries[first].kept
-            assert kept is not None
-            state, self._next_reference = kept
-            self.estimator.restore(state)
-            self._last_kept = self._entries[first].stamp
-        else:
-            assert self._origin is not None
-            state, keep_soil = self._origin
-            self.estimator.restore(state)
-            self.estimator.begin_run(self._stamps[0], keep_soil)
-            self._next_reference = 0
-            self._last_kept = self._stamps[0]
-        self._position = first + 1
-
-    def _step(self, entry: _Entry, must: bool) -> None:
-        parts = entry.parts
-        if parts[REFERENCE] is None or self._reference_is_due(entry.stamp):
-            if entry.inputs is None:
-                entry.inputs = StepInputs(*parts)
-            inputs = entry.inputs
-        else:
-            # Thinned out here, in the order of stamps, so that the order of arrival is nothing.
-            if not must and not any(part is not None for part in parts[:REFERENCE]):
-                return
-            inputs = StepInputs(*parts[:REFERENCE])
-        self.counts['steps'] += 1
-        self.estimator.step(entry.stamp, inputs)
-
-    def _reference_is_due(self, stamp: int) -> bool:
-        period = self.settings.reference_period
-        if not period:
-            return True
-        if stamp < self._next_reference - period // 20:  # leaves room for jitter of stamps
-            return False
-        # In step with the first one, so that jitter does not add up to a lower rate.
-        due = self._next_reference + period
-        self._next_reference = due if due > stamp else stamp + period
-        return True
-
-
-def _same(one: Any, other: Any) -> bool:
-    for a, b in zip(vars(one).values(), vars(other).values(), strict=True):
-        if isinstance(a, np.ndarray) and isinstance(b, np.ndarray):
-            if not np.array_equal(a, b, equal_nan=True):
-                return False
-        elif a is not b and (a is None or b is None or a != b):
-            return False
-    return True
-
-
-def _merge_wheels(before: Any, after: Any) -> tuple[Any, bool]:
-    """Merge two readings of the same stamp; the later arrival wins wheel by wheel."""
-    stamp = before.stamp
-    if isinstance(before, WheelOdometry):
-        rate, overlap = _newer(before.rate, after.rate)
-        torque, _ = _newer(before.torque, after.torque)
-        return WheelOdometry(stamp, rate, torque), overlap
-    if isinstance(before, SinkageReading):
-        sinkage, overlap = _newer(before.sinkage, after.sinkage)
-        return SinkageReading(stamp, sinkage), overlap
-    angle, overlap = _newer(before.leaving_angle, after.leaving_angle)
-    return LeavingAngleReading(stamp, angle), overlap
-
-
-def _newer(before: FloatArray, after: FloatArray) -> tuple[FloatArray, bool]:
-    given = ~np.isnan(after)
-    return np.where(given, after, before), bool(np.any(given & ~np.isnan(before)))

@@ -1,0 +1,264 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Sets at a rate of their own: which stamps they carry, what is merged, what late inputs cost."""
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from fake_estimator import (
+    FakeEstimator,
+    configuration,
+    essence,
+    imu,
+    make_core,
+    odometry,
+    play,
+    reference,
+    sinkage,
+    stamp_at,
+)
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from wheel_terra_estimator.estimation.core import EstimatorCore
+from wheel_terra_estimator.estimation.measurements import WheelOdometry
+
+DEFAULT = {'output_rate': 20.0, 'max_lag': -1.0}
+
+
+def by_the_letter(stamps, rate):
+    """Stamps of the sets by the words of the contract, one multiple after the other."""
+    first, found = min(stamps), []
+    for k in range(math.ceil((max(stamps) - first) * rate / 1e9) + 1):
+        due = [s for s in stamps if s >= first + k * 1e9 / rate]
+        if due and (not found or min(due) > found[-1]):
+            found.append(min(due))
+    return found
+
+
+class Recording(FakeEstimator):
+    """Keeps the inputs of each step."""
+
+    def __init__(self, config):
+        super().__init__(config)
+        self.inputs = []
+
+    def step(self, stamp, inputs):
+        super().step(stamp, inputs)
+        self.inputs.append((stamp, inputs))
+
+
+def recording_core(**changes):
+    config = configuration(**{**DEFAULT, **changes})
+    fake = Recording(config)
+    return EstimatorCore(config, fake), fake
+
+
+def arriving(stream, delays):
+    pairs = zip(delays, stream, strict=True)
+    return [m for _, m in sorted(pairs, key=lambda pair: pair[1].stamp + pair[0] * 1e9)]
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    st.lists(st.integers(1, 90_000_000), min_size=1, max_size=150),
+    st.sampled_from([20.0, 10.0, 7.0, 30.0, 100.0]),
+)
+def test_a_set_at_the_first_odometry_at_or_after_each_multiple(gaps, rate):
+    stamps = np.cumsum([stamp_at(0.0), *gaps]).tolist()
+    core, _ = make_core(**{**DEFAULT, 'output_rate': rate})
+    nan = np.full(2, math.nan)
+    sets = play(core, [WheelOdometry(stamp, np.ones(2), nan) for stamp in stamps])
+    assert [s.stamp for s in sets] == by_the_letter(stamps, rate)
+
+
+def test_twenty_sets_a_second_from_a_hundred_and_no_more_steps():
+    core, fake = make_core(**DEFAULT)
+    stream = [odometry(0.01 * i) for i in range(1000)] + [imu(0.005 * i) for i in range(2000)]
+    sets = play(core, sorted(stream, key=lambda m: m.stamp))
+    assert [s.stamp for s in sets] == [stamp_at(0.05 * i) for i in range(200)]
+    assert fake.steps <= 2 * 200 + 10  # equal stamps of the two topics: one step made again
+
+
+def test_rates_are_averaged_over_the_interval_that_each_stands_for():
+    core, fake = recording_core()
+    nan = math.nan
+    stamps = (0.0, 0.01, 0.04, 0.05)
+    rates = ([1.0, 1.0], [4.0, nan], [2.0, 8.0], [nan, 6.0])
+    torques = ([1.0, 1.0], [2.0, nan], [4.0, nan], [6.0, nan])
+    for t, rate, torque in zip(stamps, rates, torques, strict=True):
+        core.add(WheelOdometry(stamp_at(t), np.array(rate), np.array(torque)))
+    _, (stamp, inputs) = fake.inputs
+    assert stamp == stamp_at(0.05) == inputs.wheel_odometry.stamp
+    left = (4.0 * 0.01 + 2.0 * 0.03) / 0.04
+    right = (8.0 * 0.04 + 6.0 * 0.01) / 0.05
+    np.testing.assert_allclose(inputs.wheel_odometry.rate, [left, right])
+    np.testing.assert_allclose(inputs.wheel_odometry.torque, [4.0, nan])
+
+
+def test_travel_is_kept_by_merging():
+    """Sum of rate times interval, before and after, for a wheel whose rate changes all the time."""
+    rng = np.random.default_rng(1)
+    core, fake = recording_core()
+    times = np.cumsum(rng.uniform(0.002, 0.02, 400))
+    rates = 1.0 + rng.uniform(0.0, 2.0, 400)
+    for t, rate in zip(times, rates, strict=True):
+        core.add(odometry(t, rate=rate))
+    core.flush()
+    stamps = [stamp for stamp, _ in fake.inputs]
+    means = [inputs.wheel_odometry.rate[0] for _, inputs in fake.inputs]
+    last = stamps[-1]
+    seconds = np.round(times * 1e9).astype(int) + stamp_at(0.0)
+    exact = np.sum(rates[1:] * np.diff(seconds) * (seconds[1:] <= last))
+    np.testing.assert_allclose(np.sum(np.diff(stamps) * means[1:]), exact, rtol=1e-9)
+
+
+def test_imu_and_sinkage_are_averaged_and_references_stay_at_their_stamps():
+    core, fake = recording_core()
+    stream = [odometry(0.0), imu(0.01, 1.0), imu(0.02, 3.0), sinkage(0.02, 0.01)]
+    stream += [reference(0.03, 0.5), imu(0.04, 7.0), sinkage(0.045, 0.03), odometry(0.05)]
+    play(core, stream)
+    _, (at_reference, first), (at_set, second) = fake.inputs
+    assert at_reference == stamp_at(0.03) and at_set == stamp_at(0.05)
+    assert first.inertial.specific_force[0] == pytest.approx(2.0)
+    assert first.sinkage.sinkage[0] == 0.01 and first.reference.forward == 0.5
+    assert second.inertial.specific_force[0] == 7.0 and second.reference is None
+    assert second.sinkage.sinkage[0] == 0.03
+
+
+def test_a_slow_odometry_does_not_merge_the_imu_over_seconds():
+    core, fake = recording_core()
+    stream = [odometry(1.0 * i) for i in range(4)] + [imu(0.02 * i + 0.001) for i in range(150)]
+    play(core, sorted(stream, key=lambda m: m.stamp))
+    assert max(b - a for a, b in pairwise([s for s, _ in fake.inputs])) <= 0.15e9
+
+
+def test_numbers_do_not_depend_on_how_often_they_are_asked_for():
+    stream = [odometry(0.01 * i, 1.0 + 0.01 * i) for i in range(300)]
+    stream += [imu(0.02 * i, 0.1 * i) for i in range(150)]
+    stream = sorted(stream, key=lambda m: m.stamp)
+    often = {s.stamp: essence([s]) for s in play(make_core(**DEFAULT)[0], stream)}
+    for rate in (10.0, 5.0, 1.0):
+        sets = play(make_core(**{**DEFAULT, 'output_rate': rate})[0], stream)
+        assert len(sets) == math.ceil(3 * rate)
+        assert all(often[s.stamp] == essence([s]) for s in sets)
+
+
+def drive(duration):
+    stream = [odometry(0.01 * i, rate=1.0 + 0.01 * i) for i in range(round(100 * duration))]
+    stream += [imu(0.008 * i + 0.001, force=0.1 * i) for i in range(round(125 * duration))]
+    stream += [sinkage(0.1 * i + 0.013, depth=0.001 * i) for i in range(round(10 * duration))]
+    stream += [reference(0.5 * i + 0.007, forward=0.01 * i) for i in range(round(2 * duration))]
+    return sorted(stream, key=lambda m: m.stamp)
+
+
+@pytest.mark.parametrize('seed', range(6))
+def test_each_set_is_what_a_run_in_order_through_the_inputs_so_far_gives(seed):
+    """The definition itself, with merged steps: also where late odometry moves their ends."""
+    unbounded = {**DEFAULT, 'max_lag': 0.0, 'filter__rerun_rate': 0.0}
+    stream = drive(0.6)
+    delays = np.random.default_rng(seed).choice([0.0, 0.0, 0.004, 0.03, 0.25], len(stream))
+    core, _ = make_core(**unbounded)
+    arrived = []
+    for measurement in arriving(stream, delays):
+        arrived.append(measurement)
+        for estimates in core.add(measurement):
+            used = [m for m in arrived if m.stamp <= estimates.stamp]
+            fake = FakeEstimator(configuration(**unbounded))
+            plain = EstimatorCore(configuration(**{**unbounded, 'max_lag': 30.0}), fake)
+            expected = play(plain, sorted(used, key=lambda m: m.stamp))
+            # A late odometry may have taken the place of this one: then it ends no step there.
+            if expected[-1].stamp == estimates.stamp:
+                assert essence([estimates]) == essence(expected[-1:])
+
+
+@pytest.mark.parametrize('seed', range(10))
+def test_late_inputs_within_the_history_end_in_the_same_state(seed):
+    stream, last = drive(1.0), odometry(3.2)
+    core, _ = make_core(**DEFAULT)
+    expected = essence(play(core, [*stream, imu(3.19), last]))[-1]
+    rng = np.random.default_rng(seed)
+    delays = rng.uniform(0.0, 0.99, len(stream)) * (rng.random(len(stream)) < 0.5)
+    core, _ = make_core(**DEFAULT)
+    sets = play(core, [*arriving(stream, delays), imu(3.19), last])
+    assert essence(sets)[-1] == expected
+    assert all(a.stamp < b.stamp for a, b in pairwise(sets))
+
+
+def test_the_order_of_arrival_alone_decides():
+    rng = np.random.default_rng(3)
+    stream = drive(5.0)
+    order = arriving(stream, rng.exponential(0.03, len(stream)))
+    runs = [essence(play(make_core(**DEFAULT)[0], order)) for _ in range(2)]
+    assert runs[0] == runs[1]
+
+
+# -- Lag ----------------------------------------------------------------------------------------
+
+
+def late(stream, kind, delay, jitter=0.2, seed=0):
+    """Delay the messages of a kind; a topic's messages never overtake one another."""
+    rng = np.random.default_rng(seed)
+    delays, newest = [], 0.0
+    for m in stream:
+        wait = delay * (1.0 + rng.uniform(-jitter, jitter)) if type(m) is kind else 0.0
+        if wait:
+            newest = max(newest + 1e-6, m.stamp * 1e-9 + wait)
+            wait = newest - m.stamp * 1e-9
+        delays.append(wait)
+    return arriving(stream, delays)
+
+
+@pytest.mark.parametrize(('delay', 'jitter'), [(0.1, 0.2), (0.41, 0.2), (0.5, 0.0)])
+@pytest.mark.parametrize('who', [odometry, imu])
+def test_what_lags_for_good_is_waited_for_and_no_set_is_lost(who, delay, jitter):
+    stream = drive(20.0)
+    punctual_core, punctual = make_core(**DEFAULT)
+    expected = play(punctual_core, stream)
+    core, fake = make_core(**DEFAULT)
+    sets = play(core, late(stream, type(who(0.0)), delay, jitter))
+    assert len(sets) == len(expected) == 400
+    assert fake.steps < 1.5 * punctual.steps
+    assert not any('silent' in str(s.faults) for s in sets)
+
+
+def test_odometry_late_by_less_than_a_second_is_no_silence_though_nothing_waits():
+    core, _ = make_core(**{**DEFAULT, 'max_lag': 0.0})
+    sets = play(core, late(drive(10.0), WheelOdometry, 0.4))
+    assert len(sets) == 200
+
+
+def test_punctual_inputs_are_not_held_back():
+    core, _ = make_core(**DEFAULT)
+    jitter = np.random.default_rng(0).exponential(0.002, 235 * 5)
+    for m in arriving(drive(5.0)[: len(jitter)], jitter):
+        sets = core.add(m)
+        assert m.stamp < stamp_at(0.3) or core.health()['held_back_s'] == 0.0
+        for estimates in sets:
+            assert m.stamp - estimates.stamp <= 0.1e9
+
+
+def test_a_reference_is_never_waited_for():
+    core, _ = make_core(**DEFAULT)
+    stream = [(0.05 * i, odometry(0.05 * i)) for i in range(200)]
+    stream += [(0.5 * i + 0.4, reference(0.5 * i)) for i in range(18)]
+    stream.sort(key=lambda pair: pair[0])
+    assert [s.stamp for _, m in stream for s in core.add(m)] == [
+        stamp_at(0.05 * i) for i in range(200)
+    ]
+
+
+def test_what_is_later_than_can_be_run_again_is_bounded_counted_and_told():
+    """An IMU 1.1 s behind would need twelve steps again for each of its messages."""
+    stream = drive(20.0)
+    core, fake = make_core(**DEFAULT)
+    sets = play(core, late(stream, type(imu(0.0)), 1.1))
+    assert len(sets) == 400
+    health = core.health()
+    assert health['late_inputs_deferred'] > 100
+    assert fake.steps < 20 * (20 + 2 + 60) + 2 * 60 + 200
+    told = [s for s in sets if 'late inputs' in s.faults]
+    assert len(told) > 300
+    assert health['late_inputs_dropped'] == 0

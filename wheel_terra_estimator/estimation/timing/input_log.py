@@ -1,0 +1,313 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""The log of a run's inputs, and the estimator that runs through it in steps.
+
+The log is sorted by stamp, equal stamps merged. How it divides into steps follows from its stamps
+alone (see ``step_grid``), so the state at a stamp does not depend on the order of arrival. Kept
+states make a late input cost a short run and not a long one.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+from typing import Any, NamedTuple, Protocol
+
+from wheel_terra_estimator.estimation.estimates import EstimateSet
+from wheel_terra_estimator.estimation.measurements import Measurement, StepInputs
+from wheel_terra_estimator.estimation.timing.input_checks import (
+    INERTIAL,
+    REFERENCE,
+    WHEEL_ODOMETRY,
+)
+from wheel_terra_estimator.estimation.timing.merging import StepMerger, merge_wheels, same
+from wheel_terra_estimator.estimation.timing.step_grid import LONGEST_STEP, StepGrid
+
+KEPT_STATE_SPACING = 250_000_000
+"""Distance of kept states [ns]: what a late input costs, against what keeping costs."""
+DENSE_SPAN = 100_000_000
+"""Inputs that come so little [ns] after a step that would have used them make them denser."""
+DENSE_DURATION = 2_000_000_000
+"""For so long [ns of stamps] after the last such input."""
+TRIM_LENGTH = 64
+"""Forgotten entries are taken off the log in pieces of this length."""
+
+
+class Estimator(Protocol):
+    """What the timeline runs."""
+
+    def step(self, stamp: int, inputs: StepInputs) -> None:
+        """Bring the state to `stamp` [ns], later than the one before, with all inputs of it."""
+
+    def estimates(self) -> EstimateSet:
+        """Return the estimates at the stamp of the last step."""
+
+    def snapshot(self) -> Any:
+        """Return the state in a form that later steps leave alone."""
+
+    def restore(self, snapshot: Any) -> None:
+        """Return to a kept state."""
+
+    def begin_run(self, stamp: int, keep_soil: bool) -> None:
+        """Start anew at `stamp` [ns]; soil and biases kept but widened, or forgotten."""
+
+
+class _Walk(NamedTuple):
+    """What the division into steps needs to know of the log before a step."""
+
+    next_reference: int  # a reference velocity is used again from this stamp on
+    step_index: int  # of the last wheel odometry; -1: none yet
+    end: int  # stamp of the last step
+    heard: Any  # of ``StepMerger``
+    steps: int  # since the start of the run
+
+
+class _Kept(NamedTuple):
+    """A state to come back to."""
+
+    state: Any
+    walk: _Walk
+
+
+class Entry:
+    """All inputs of one stamp."""
+
+    __slots__ = ('kept', 'parts', 'stamp')
+
+    def __init__(self, stamp: int, channel: int, measurement: Measurement) -> None:
+        self.stamp = stamp
+        self.parts: list[Any] = [None] * 5
+        self.parts[channel] = measurement
+        self.kept: _Kept | None = None  # state after this entry
+
+
+class InputLog:
+    """Inputs of one run and the estimator that runs through them.
+
+    Parameters
+    ----------
+    estimator : Estimator
+        Must be deterministic: the same steps from the same state give the same numbers.
+    grid : StepGrid
+        When a step ends.
+    reference_period : int
+        Reference velocities are thinned to this period, by stamps [ns]; 0: all are used.
+
+    Attributes
+    ----------
+    entries, stamps : list
+        The log; forgotten entries are taken off its front.
+    first : int or None
+        First stamp of the run, from which the grid counts.
+    counts : dict
+        ``steps``, ``reruns``, ``steps_repeated``.
+    repeated : list of int
+        Per channel: inputs whose stamp the channel had given before.
+    dirty : int
+        Steps that the next run will make again.
+    """
+
+    def __init__(self, estimator: Estimator, grid: StepGrid, reference_period: int) -> None:
+        self.estimator = estimator
+        self.grid = grid
+        self.entries: list[Entry] = []
+        self.stamps: list[int] = []
+        self.counts = {'steps': 0, 'reruns': 0, 'steps_repeated': 0}
+        self.repeated = [0] * 5
+        self._reference_period = reference_period
+        self._merger = StepMerger()
+        self._pristine = estimator.snapshot()
+        self.clear(keep_soil=False)
+
+    def clear(self, *, keep_soil: bool) -> None:
+        """Begin a new run; soil and biases kept but widened, or forgotten."""
+        self._origin: tuple[Any, bool] | None = (
+            self.estimator.snapshot() if keep_soil else self._pristine,
+            keep_soil,
+        )
+        self.entries.clear()
+        self.stamps.clear()
+        self.first: int | None = None
+        self.dirty = 0
+        self._ran = 0  # entries[:_ran] have been run, and not changed since
+        self._position = -1  # entries[:_position] made the state of the last step; -1: none did
+        self._astray = False  # the estimator was taken beyond the last step
+        self._walk = _Walk(0, -1, 0, None, 0)
+        self._last_kept = 0  # stamp of the newest kept state
+        self._dense_until = 0
+
+    def insert(self, channel: int, measurement: Measurement) -> tuple[int, bool]:
+        """Put an input where its stamp belongs; return where, and whether as a new entry."""
+        stamp = measurement.stamp
+        entries, stamps = self.entries, self.stamps
+        self.first = stamp if self.first is None else min(self.first, stamp)
+        index = len(stamps)
+        if not index or stamp > stamps[-1]:
+            entries.append(Entry(stamp, channel, measurement))
+            stamps.append(stamp)
+            return index, True
+        index = bisect_left(stamps, stamp)
+        new = stamps[index] != stamp
+        if new:
+            entries.insert(index, Entry(stamp, channel, measurement))
+            stamps.insert(index, stamp)
+            changed = True
+        else:
+            changed = self._merge(entries[index], channel, measurement)
+        if changed and index < self._ran:
+            self.dirty = max(self.dirty, self.steps_after(stamp))
+            if stamp > stamps[self._ran - 1] - DENSE_SPAN:
+                self._dense_until = stamps[self._ran - 1] + DENSE_DURATION
+            self._ran = index
+        return index, new
+
+    def steps_after(self, stamp: int) -> int:
+        """Return how many steps would be made again for an input of this stamp [ns]."""
+        if self._position <= 0 or self.first is None or stamp > self._walk.end:
+            return 0
+        if self.grid.every_stamp:
+            return max(self._position - bisect_left(self.stamps, stamp), 0)
+        before = self.grid.step_index(stamp - self.first)
+        return self.grid.step_index(self._walk.end - self.first) - before + 1
+
+    def run_to(self, last: int) -> None:
+        """Run up to and with the entry `last`."""
+        if self._position != self._ran or self._position < 0 or self._astray:
+            self._go_back()
+        entries = self.entries
+        dense = entries[last].stamp < self._dense_until
+        dense_from = entries[last].stamp - DENSE_SPAN
+        pending: list[list[Any]] = []
+        for index in range(self._position, last + 1):
+            entry = entries[index]
+            entry.kept = None
+            after = self._walk_on(entry, pending)
+            if after is not None:
+                if dense and entry.stamp >= dense_from:
+                    self._keep(always=True)  # what is late by little comes between these
+                self._step(entry.stamp, pending, after)
+                pending.clear()
+                self._position = self._ran = index + 1
+                self._keep()
+        if pending:
+            # The rest is taken in for this one set; the next step begins where this one did.
+            self._keep(always=True)
+            self._astray = True
+            self._step(entries[last].stamp, pending, self._walk)
+        self.dirty = 0
+
+    def begin_after(self, index: int) -> None:
+        """Forget the state and all up to an entry: the estimator failed there."""
+        del self.entries[: index + 1], self.stamps[: index + 1]
+        self._ran, self._position, self._astray = 0, -1, False
+        self._origin = self._pristine, False
+        self.dirty = 0
+
+    def forget(self, horizon: int) -> int:
+        """Take off what no input younger than `horizon` [ns] needs; return how many entries."""
+        stamps = self.stamps
+        if len(stamps) <= TRIM_LENGTH or stamps[TRIM_LENGTH] >= horizon:
+            return 0
+        # The last kept state from which every input within the history can be run.
+        index = min(bisect_left(stamps, horizon), self._ran) - 1
+        while index > 0 and self.entries[index].kept is None:
+            index -= 1
+        if index <= 0:
+            return 0
+        del self.entries[:index], stamps[:index]
+        self._origin = None
+        self._ran -= index
+        self._position -= index
+        return index
+
+    # -- Steps ----------------------------------------------------------------------------------
+
+    def _walk_on(self, entry: Entry, pending: list[list[Any]]) -> _Walk | None:
+        """Add an entry to the next step; if it ends that step, return what follows."""
+        parts, stamp = entry.parts, entry.stamp
+        after = self._walk
+        ends = self.grid.every_stamp or stamp - after.end >= LONGEST_STEP
+        if parts[REFERENCE] is not None:
+            # Thinned out here, in the order of stamps, so that the order of arrival is nothing.
+            due = self._next_reference(stamp)
+            if due is None:
+                parts = [*parts[:REFERENCE], None]
+                ends = ends and any(part is not None for part in parts)
+            else:
+                after = after._replace(next_reference=due)
+                ends = True  # a reference is fused at its own stamp
+        pending.append(parts)
+        if parts[WHEEL_ODOMETRY] is not None:
+            assert self.first is not None
+            step_index = self.grid.step_index(stamp - self.first)
+            if step_index > after.step_index:
+                after = after._replace(step_index=step_index)
+                ends = True
+        return after if ends else None
+
+    def _step(self, stamp: int, pending: list[list[Any]], after: _Walk) -> None:
+        inputs = self._merger.merged(stamp, pending)
+        self.counts['steps'] += 1
+        self._walk = after._replace(end=stamp, heard=self._merger.heard, steps=after.steps + 1)
+        self.estimator.step(stamp, inputs)
+
+    def _next_reference(self, stamp: int) -> int | None:
+        """Return from which stamp on the next one is used; None where this one is left out."""
+        period, due = self._reference_period, self._walk.next_reference
+        if not period:
+            return 0
+        if stamp < due - period // 20:  # leaves room for jitter of stamps
+            return None
+        # In step with the first one, so that jitter does not add up to a lower rate.
+        return due + period if due + period > stamp else stamp + period
+
+    # -- Kept states ----------------------------------------------------------------------------
+
+    def _keep(self, always: bool = False) -> None:
+        """Keep the state after the last step, if it is worth it."""
+        if self._position <= 0:
+            return  # the start of the run is known anyway
+        entry = self.entries[self._position - 1]
+        if entry.kept is None and (always or entry.stamp - self._last_kept >= KEPT_STATE_SPACING):
+            entry.kept = _Kept(self.estimator.snapshot(), self._walk)
+            self._last_kept = entry.stamp
+
+    def _go_back(self) -> None:
+        """Return to the last kept state before the first entry that has changed."""
+        index = self._ran - 1
+        while index >= 0 and self.entries[index].kept is None:
+            index -= 1
+        steps = self._walk.steps
+        if index >= 0:
+            kept = self.entries[index].kept
+            assert kept is not None
+            self._walk = kept.walk
+            self.estimator.restore(kept.state)
+        else:
+            assert self._origin is not None
+            state, keep_soil = self._origin
+            self.estimator.restore(state)
+            self.estimator.begin_run(self.stamps[0], keep_soil)
+            self._walk = _Walk(0, -1, self.stamps[0], None, 0)
+        if self._position >= 0:
+            self.counts['reruns'] += self._position != self._ran
+            self.counts['steps_repeated'] += max(steps - self._walk.steps, 0)
+        self._merger.heard = self._walk.heard
+        self._last_kept = self._walk.end
+        self._position = self._ran = index + 1
+        self._astray = False
+
+    def _merge(self, entry: Entry, channel: int, measurement: Any) -> bool:
+        """Merge into the entry of the same stamp; return whether that changes anything."""
+        before = entry.parts[channel]
+        if before is None:
+            entry.parts[channel] = measurement
+            return True
+        if channel in (INERTIAL, REFERENCE):
+            merged, overlap = measurement, True
+        else:
+            merged, overlap = merge_wheels(before, measurement)
+        self.repeated[channel] += overlap
+        if same(before, merged):
+            return False
+        entry.parts[channel] = merged
+        return True

@@ -1,0 +1,85 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Learns how far wheel odometry and IMU lag behind one another, by stamps and order of arrival.
+
+Where one of them comes late for good, waiting for it is cheaper than running again for each of its
+messages, and no set is lost. A lag of a few milliseconds is not waited for: one step is soon run
+again, and a message at 10 Hz that is held for the next one is a tenth of a second old.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+
+from wheel_terra_estimator.estimation.timing.input_checks import INERTIAL, WHEEL_ODOMETRY
+
+LONGEST_HOLD = 500_000_000
+"""Inputs are held back this long at most [ns]."""
+SHORTEST_HOLD = 20_000_000
+"""A lag below this [ns] is not waited for."""
+
+_MEMORY = 64  # messages of a channel
+_SHARE = 0.95  # of them that are waited for
+_LEARN_EVERY = 8  # messages, once the memory is half full
+_ROOM = 1.05  # over the lag that was seen
+
+
+class LagLearner:
+    """Lag of each of the two channels, and how long to hold inputs back.
+
+    Parameters
+    ----------
+    fixed : int
+        How long inputs are held back [ns]; below 0: as learned.
+    """
+
+    def __init__(self, fixed: int) -> None:
+        self._fixed = fixed
+        self._lags = {c: deque[int](maxlen=_MEMORY) for c in (WHEEL_ODOMETRY, INERTIAL)}
+        self._counts = dict.fromkeys(self._lags, 0)
+        self._newest: int | None = None
+        self._first: int | None = None
+        self._odometry_heard = False
+        self.learned = dict.fromkeys(self._lags, 0)
+
+    @property
+    def longest(self) -> int:
+        """How long inputs may be held back at most [ns]."""
+        return LONGEST_HOLD if self._fixed < 0 else self._fixed
+
+    def begin_run(self) -> None:
+        """Forget the time, not the lags: they belong to the transport."""
+        self._newest = self._first = None
+        self._odometry_heard = False
+
+    def note(self, channel: int, stamp: int) -> None:
+        """Take the stamp [ns] of an accepted message."""
+        if self._first is None:
+            self._first = stamp
+        lags = self._lags.get(channel)
+        if lags is None:
+            return
+        self._odometry_heard |= channel == WHEEL_ODOMETRY
+        newest = self._newest
+        self._newest = stamp if newest is None else max(newest, stamp)
+        lags.append(0 if newest is None else max(newest - stamp, 0))
+        self._counts[channel] += 1
+        if len(lags) < _MEMORY // 2 or self._counts[channel] % _LEARN_EVERY == 0:
+            usual = sorted(lags)[int(_SHARE * (len(lags) - 1) + 0.5)]
+            self.learned[channel] = 0 if usual < SHORTEST_HOLD else round(_ROOM * usual)
+
+    def hold(self, newest: int) -> int:
+        """Return how long inputs are held back now [ns]; `newest` is the newest stamp of all."""
+        if self._fixed >= 0:
+            return self._fixed
+        if (
+            not self._odometry_heard
+            and self._first is not None
+            and newest - self._first < 2 * LONGEST_HOLD
+        ):
+            return LONGEST_HOLD  # it may be on its way
+        return min(max(self.learned.values()), LONGEST_HOLD)
+
+    def beyond(self, hold: int) -> int:
+        """Return how far wheel odometry lags behind what is held back for it [ns]."""
+        return max(self.learned[WHEEL_ODOMETRY] - hold, 0)
