@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from wheel_terra_estimator.cli import evaluate
 from wheel_terra_estimator.cli.main import main
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.estimation.measurements import (
@@ -16,6 +17,7 @@ from wheel_terra_estimator.estimation.measurements import (
 )
 from wheel_terra_estimator.evaluation import baselines, kinds
 from wheel_terra_estimator.evaluation.runner import inputs_of_mode
+from wheel_terra_estimator.evaluation.two_state_filters import slip_course
 from wheel_terra_estimator.simulation.scenario import load
 from wheel_terra_estimator.simulation.sensors import Arrival
 
@@ -79,3 +81,75 @@ def test_modes_change_what_the_estimator_gets():
     assert list(inputs_of_mode(arrivals, 'fixes_2s_late'))[-1] is fix
     assert np.isnan(next(inputs_of_mode(arrivals, 'no_torque')).torque).all()
     assert list(inputs_of_mode(arrivals, 'no_orientation'))[1].orientation is None
+
+
+def _two_state_drive(noise=0.0, delay=4):
+    """Slip 0.1 + 0.8 q with q the mean torque over W r; references `delay` rows late."""
+    rover = reader.load(['generic_six_wheel'])
+    generator = np.random.default_rng(3)
+    weight = rover.rover.mass * rover.rover.gravity
+    radius, rate = rover.wheels.slip_radius, 0.4
+    arrivals, truth, stamps = [], [], []
+    for i in range(1, 600):
+        stamp = 10**9 + i * 10**8
+        demand = 0.2 + 0.15 * np.sin(i / 60.0)
+        torque = demand * weight / 6 * radius
+        arrivals.append((stamp, WheelOdometry(stamp, np.full(6, rate), torque)))
+        slip = 0.1 + 0.8 * demand
+        truth.append(slip)
+        stamps.append(stamp)
+        if i % 10 == 0:
+            speed = (1.0 - slip) * rate * radius[0] + noise * generator.standard_normal()
+            arrivals.append((stamp + delay * 10**8 + 1, ReferenceVelocity(stamp, speed, 1e-6)))
+    arrivals.sort(key=lambda pair: pair[0])
+    return rover, [m for _, m in arrivals], np.array(stamps), np.array(truth)
+
+
+@pytest.mark.parametrize('delay', [0, 15])
+def test_two_states_learn_how_slip_follows_torque_though_the_reference_is_late(delay):
+    rover, measurements, stamps, truth = _two_state_drive(delay=delay)
+    course = slip_course(rover, measurements, stamps, 'torque')
+    late = slice(200, None)
+    error = course.slip[late] - truth[late, None]
+    # The demand is smoothed over half a second; an unlearned offset alone would be off by 0.1.
+    assert np.abs(error).max() < 0.015
+    held = baselines.held_speed(rover, measurements, stamps)
+    rim = np.full((len(stamps), 6), 0.4 * rover.wheels.slip_radius[0])
+    held_slip = baselines.slip_of(held, np.zeros(len(stamps)), rim, rover.wheels.y)
+    assert np.abs(held_slip[late] - truth[late, None]).max() > np.abs(error).max()
+
+
+def test_deviation_of_two_states_grows_with_travel_and_falls_with_a_reference():
+    rover, measurements, stamps, _ = _two_state_drive(delay=0)
+    std = slip_course(rover, measurements, stamps, 'torque').std[:, 0]
+    assert std[0] > 0.1
+    without = [m for m in measurements if not isinstance(m, ReferenceVelocity)]
+    assert np.all(np.diff(slip_course(rover, without, stamps, 'torque').std[:, 0]) >= -1e-3)
+    assert std[-1] < 0.3 * slip_course(rover, without, stamps, 'torque').std[-1, 0]
+
+
+def test_pitch_filter_sees_the_slope_by_orientation_or_by_specific_force():
+    rover = reader.load(['generic_six_wheel'])
+    g, up = rover.rover.gravity, 0.1
+    nose_up = np.array([0.0, -np.sin(0.5 * up), 0.0, np.cos(0.5 * up)])
+    force = np.array([g * np.sin(up), 0.0, g * np.cos(up)])
+    slips = []
+    for orientation in (nose_up, None):
+        measurements = []
+        for i in range(1, 60):
+            stamp = 10**9 + i * 10**8
+            measurements.append(InertialReading(stamp, force, np.zeros(3), orientation))
+            measurements.append(WheelOdometry(stamp, np.full(6, 0.4), np.full(6, np.nan)))
+        slips.append(slip_course(rover, measurements, np.array([stamp]), 'pitch').slip[0, 0])
+    assert slips[0] == pytest.approx(slips[1], abs=1e-3)
+    assert slips[0] == pytest.approx(0.05 + 1.0 * np.sin(up), abs=0.01)
+
+
+def test_worlds_and_kinds_of_the_command():
+    assert {w for w, _ in evaluate._chosen('both', None)} == {'own', 'rival'}
+    assert evaluate._chosen('both', ['spin', 'climb']) == [
+        ('own', 'climb'),
+        ('rival', 'spin'),
+        ('rival', 'climb'),
+    ]
+    assert ('own', 'firm') not in evaluate._chosen('own', None)

@@ -2,12 +2,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """Scores on made-up records whose right answers are known."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from wheel_terra_estimator.evaluation import scores, tables
 from wheel_terra_estimator.evaluation.bench import DriveScore, Results
 from wheel_terra_estimator.evaluation.runner import Record
+from wheel_terra_estimator.evaluation.two_state_filters import SlipCourse
 from wheel_terra_estimator.simulation.truth import TruthTable, entrapped, slip_classes
 
 RADIUS = np.full(4, 0.1)
@@ -57,7 +60,14 @@ def said(true, error=0.0, std=0.05, stuck=None):
 
 
 def take(true, record):
-    return scores.samples(true, record, true.slip + 0.1, true.slip - 0.2, RADIUS)
+    std = np.full_like(true.slip, 0.05)
+    baselines = scores.BaselineSlips(
+        true.slip + 0.1,
+        true.slip - 0.2,
+        SlipCourse(true.slip + 0.06, std),
+        SlipCourse(true.slip - 0.04, std),
+    )
+    return scores.samples(true, record, baselines, RADIUS)
 
 
 def test_errors_and_coverage_are_what_was_put_in():
@@ -71,6 +81,44 @@ def test_errors_and_coverage_are_what_was_put_in():
     assert scores.coverage(data.pull_error, data.pull_std) == 0.0
     assert scores.rms(data.held_error) == pytest.approx(0.1)
     assert scores.rms(data.dead_reckoned_error) == pytest.approx(0.2)
+
+
+def test_slow_part_is_what_stays_over_twenty_seconds():
+    true = truth(np.full(800, 0.4))
+    time = np.arange(800)[:, None] * 0.1
+    wave = 0.03 + 0.05 * np.sin(2.0 * np.pi * time / 2.0)  # whole periods in each block
+    data = take(true, said(true, error=wave))
+    assert scores.rms(data.slip_error) == pytest.approx(np.hypot(0.03, 0.05 / np.sqrt(2)), rel=0.02)
+    assert scores.rms(data.slow_slip_error) == pytest.approx(0.03, rel=0.02)
+
+
+def test_dense_truth_counts_at_ten_hertz():
+    dense, sparse = truth(np.full(2000, 0.4), dt=0.01), truth(np.full(200, 0.4))
+    assert len(take(dense, said(dense))) == pytest.approx(len(take(sparse, said(sparse))), abs=8)
+
+
+def test_error_over_variance():
+    mean, median = scores.squared_over_variance(np.array([0.1, 0.1, 0.1, 0.5]), np.full(4, 0.1))
+    assert mean == pytest.approx(7.0)
+    assert median == pytest.approx(1.0)
+
+
+def test_ratio_is_over_the_better_filter_with_an_interval_from_paired_drives():
+    def drive(error):
+        true = truth(np.full(300, 0.4))
+        return take(true, said(true, error=error))
+
+    # The pitch filter is off by 0.04, the torque filter by 0.06: the first counts.
+    same = scores.ratio_to_better_baseline([drive(0.02)] * 6)
+    assert same.value == pytest.approx(0.5)
+    assert same.error == pytest.approx(0.0, abs=1e-12)
+    assert same.keeps_the_rule
+    worse = scores.ratio_to_better_baseline([drive(0.06)] * 6)
+    assert worse.value == pytest.approx(1.5)
+    assert not worse.keeps_the_rule
+    mixed = scores.ratio_to_better_baseline([drive(e) for e in (0.01, 0.02, 0.04, 0.06)])
+    assert mixed.low < mixed.value < mixed.high
+    assert mixed.value == pytest.approx(np.sqrt(np.mean(np.square([1, 2, 4, 6]))) / 4.0)
 
 
 def test_rest_and_the_first_seconds_are_not_scored():
@@ -123,6 +171,11 @@ def test_tables_hold_every_kind():
     )
     text = tables.report(Results([drive]), ['reference', 'no_torque'])
     assert '| climb |' in text
+    assert 'kept in every kind' in text
+    both = Results([drive, replace(drive, world='rival', kind='spin')])
+    text = tables.report(both, ['reference'])
+    assert 'side by side' in text
+    assert '| climb |' in text and '| spin |' in text
     assert '**pooled**' in text
     assert 'Without torque' not in text
     pooled = tables.pooled_report(Results([drive]), ['reference', 'no_torque'])

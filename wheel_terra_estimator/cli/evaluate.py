@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
 
 from wheel_terra_estimator.errors import UserError
@@ -18,15 +19,23 @@ EXAMPLES = (
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
-    from wheel_terra_estimator.evaluation.kinds import KINDS
     from wheel_terra_estimator.evaluation.runner import MODES
+    from wheel_terra_estimator.evaluation.worlds import WORLDS
 
+    own, rival = WORLDS['own'], WORLDS['rival']
+    parser.add_argument(
+        '--world',
+        choices=[*WORLDS, 'both'],
+        default='own',
+        help='simulator of the drives: that of the package (own), a second one that was written '
+        'apart from it (rival), or both side by side',
+    )
     parser.add_argument(
         '--kinds',
         nargs='+',
         metavar='KIND',
-        default=list(KINDS),
-        help=f'kinds of simulated drives: {", ".join(KINDS)}, firm (default: all but firm)',
+        help=f'kinds of simulated drives (default: all but firm of the own world). own: '
+        f'{", ".join((*own.kinds, *own.more_kinds))}; rival: {", ".join(rival.kinds)}',
     )
     parser.add_argument(
         '--seeds', type=int, default=20, metavar='N', help='drives of each kind (default 20)'
@@ -90,19 +99,13 @@ def run(arguments: argparse.Namespace) -> int:
             with new_file(picture, arguments.overwrite) as fresh:
                 closed_loop.picture(drives[0], fresh)
     else:
-        for given, known, what in (
-            (arguments.kinds, [*kinds.KINDS, 'firm'], 'kind'),
-            (arguments.modes, runner.MODES, 'mode'),
-        ):
-            unknown = [name for name in given if name not in known]
-            if unknown:
-                raise UserError(f'no {what} {unknown[0]!r}; there are {", ".join(known)}')
+        chosen = _chosen(arguments.world, arguments.kinds)
+        _check_names(arguments.modes, runner.MODES, 'mode')
         from tqdm import tqdm
 
-        total = len(arguments.kinds) * arguments.seeds
-        with tqdm(total=total, unit='drive') as bar:
+        with tqdm(total=len(chosen) * arguments.seeds, unit='drive') as bar:
             results = bench.run(
-                arguments.kinds,
+                chosen,
                 seeds,
                 arguments.modes,
                 arguments.processes,
@@ -115,3 +118,21 @@ def run(arguments: argparse.Namespace) -> int:
         with new_file(arguments.output, arguments.overwrite) as fresh:
             fresh.write_text(text + '\n', encoding='utf-8')
     return 0
+
+
+def _chosen(world: str, kinds: list[str] | None) -> list[tuple[str, str]]:
+    """Return the pairs of world and kind to be run."""
+    from wheel_terra_estimator.evaluation.worlds import WORLDS
+
+    worlds = list(WORLDS.values()) if world == 'both' else [WORLDS[world]]
+    if kinds is None:
+        return [(w.name, kind) for w in worlds for kind in w.kinds]
+    known = {kind: None for w in worlds for kind in (*w.kinds, *w.more_kinds)}
+    _check_names(kinds, tuple(known), 'kind')
+    return [(w.name, kind) for w in worlds for kind in kinds if kind in (*w.kinds, *w.more_kinds)]
+
+
+def _check_names(given: Sequence[str], known: Sequence[str], what: str) -> None:
+    unknown = [name for name in given if name not in known]
+    if unknown:
+        raise UserError(f'no {what} {unknown[0]!r}; there are {", ".join(known)}')

@@ -10,8 +10,11 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, field
 from typing import Any
 
-from wheel_terra_estimator.evaluation import baselines, kinds, scores
+from wheel_terra_estimator.estimation.measurements import Measurement
+from wheel_terra_estimator.evaluation import baselines, scores
 from wheel_terra_estimator.evaluation.runner import inputs_of_mode, record, run_estimator
+from wheel_terra_estimator.evaluation.two_state_filters import slip_course
+from wheel_terra_estimator.evaluation.worlds import WORLDS, BenchDrive
 
 
 @dataclass(frozen=True)
@@ -24,6 +27,7 @@ class DriveScore:
     samples: scores.Samples
     warnings: scores.Warnings
     health: dict[str, Any]
+    world: str = 'own'
 
 
 @dataclass
@@ -32,70 +36,89 @@ class Results:
 
     drives: list[DriveScore] = field(default_factory=list)
 
-    def of_mode(self, mode: str) -> dict[str, list[DriveScore]]:
-        """Return kind -> drives of a mode."""
+    @property
+    def worlds(self) -> list[str]:
+        """Worlds of which there are drives."""
+        return [name for name in WORLDS if any(d.world == name for d in self.drives)]
+
+    def of_mode(self, mode: str, world: str | None = None) -> dict[str, list[DriveScore]]:
+        """Return kind -> drives of a mode, of one world or of all."""
         found: dict[str, list[DriveScore]] = defaultdict(list)
         for drive in self.drives:
-            if drive.mode == mode:
+            if drive.mode == mode and world in (None, drive.world):
                 found[drive.kind].append(drive)
         return dict(found)
 
 
-def score_drive(kind: str, seed: int, modes: Sequence[str]) -> list[DriveScore]:
+def score_drive(world: str, kind: str, seed: int, modes: Sequence[str]) -> list[DriveScore]:
     """Simulate one drive and score the estimator on it in each mode."""
-    from wheel_terra_estimator.simulation.drive import simulate
-    from wheel_terra_estimator.simulation.scenario import load
+    drive = WORLDS[world].simulate(kind, seed, None)
+    return [score_mode(world, kind, seed, mode, drive) for mode in modes]
 
-    scenario = load(dict(kinds.FIRM if kind == 'firm' else kinds.KINDS[kind]))
-    drive = simulate(scenario, seed)
+
+def score_mode(world: str, kind: str, seed: int, mode: str, drive: BenchDrive) -> DriveScore:
+    """Score the estimator in one mode on a drive."""
+    configuration, truth = drive.configuration, drive.truth
+    measurements = list(inputs_of_mode(drive.arrivals, mode))
+    sets, health = run_estimator(configuration, measurements)
+    kept = record(sets, health)
+    radius = configuration.wheels.slip_radius
+    return DriveScore(
+        kind=kind,
+        seed=seed,
+        mode=mode,
+        samples=scores.samples(truth, kept, _baselines(drive, measurements), radius),
+        warnings=scores.warnings(truth, kept, radius),
+        health=health,
+        world=world,
+    )
+
+
+def _baselines(drive: BenchDrive, measurements: Sequence[Measurement]) -> scores.BaselineSlips:
+    """Run the baselines over the measurements that the estimator got."""
     configuration, truth = drive.configuration, drive.truth
     wheels = configuration.wheels
     rim = truth.wheel_rate * wheels.slip_radius
-    found = []
-    for mode in modes:
-        measurements = list(inputs_of_mode(drive.arrivals, mode))
-        sets, health = run_estimator(configuration, measurements)
-        kept = record(sets, health)
-        held, reckoned = (
-            baselines.slip_of(
-                speed(configuration, measurements, truth.stamp), truth.yaw_rate, rim, wheels.y
-            )
-            for speed in (baselines.held_speed, baselines.dead_reckoned_speed)
+    held, reckoned = (
+        baselines.slip_of(
+            speed(configuration, measurements, truth.stamp), truth.yaw_rate, rim, wheels.y
         )
-        found.append(
-            DriveScore(
-                kind,
-                seed,
-                mode,
-                scores.samples(truth, kept, held, reckoned, wheels.slip_radius),
-                scores.warnings(truth, kept, wheels.slip_radius),
-                health,
-            )
-        )
-    return found
+        for speed in (baselines.held_speed, baselines.dead_reckoned_speed)
+    )
+    return scores.BaselineSlips(
+        held,
+        reckoned,
+        slip_course(configuration, measurements, truth.stamp, 'torque'),
+        slip_course(configuration, measurements, truth.stamp, 'pitch'),
+    )
 
 
 def run(
-    chosen: Sequence[str],
+    chosen: Sequence[tuple[str, str]],
     seeds: Sequence[int],
     modes: Sequence[str],
     processes: int = 1,
     progress: Callable[[str], object] | None = None,
 ) -> Results:
-    """Run the bench; drives come in the order in which they finish, results do not depend on it."""
+    """Run the bench over pairs of world and kind.
+
+    Drives come in the order in which they finish, results do not depend on it.
+    """
     results = Results()
-    tasks = [(kind, seed) for seed in seeds for kind in chosen]
+    tasks = [(world, kind, seed) for seed in seeds for world, kind in chosen]
     if processes == 1:
-        for kind, seed in tasks:
-            results.drives += score_drive(kind, seed, modes)
+        for world, kind, seed in tasks:
+            results.drives += score_drive(world, kind, seed, modes)
             if progress:
-                progress(f'{kind} {seed}')
+                progress(f'{world} {kind} {seed}')
         return results
     with ProcessPoolExecutor(processes) as pool:
-        waiting = {pool.submit(score_drive, k, s, modes): f'{k} {s}' for k, s in tasks}
+        waiting = {
+            pool.submit(score_drive, *task, modes): ' '.join(map(str, task)) for task in tasks
+        }
         for future in as_completed(waiting):
             results.drives += future.result()
             if progress:
                 progress(waiting[future])
-    results.drives.sort(key=lambda d: (d.kind, d.seed, d.mode))
+    results.drives.sort(key=lambda d: (d.world, d.kind, d.seed, d.mode))
     return results

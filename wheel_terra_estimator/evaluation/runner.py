@@ -20,7 +20,7 @@ from wheel_terra_estimator.estimation.measurements import (
     SinkageReading,
     WheelOdometry,
 )
-from wheel_terra_estimator.simulation.sensors import Arrival
+from wheel_terra_estimator.evaluation.worlds import TimedMeasurement
 
 FloatArray = NDArray[np.float64]
 
@@ -58,21 +58,17 @@ class Record:
     health: dict[str, Any]
 
 
-def inputs_of_mode(arrivals: Iterable[Arrival], mode: str) -> Iterator[Measurement]:
+def inputs_of_mode(arrivals: Iterable[TimedMeasurement], mode: str) -> Iterator[Measurement]:
     """Yield what a mode gets of a drive, in the order of arrival."""
+    timed = [(a.arrival, a.measurement) for a in arrivals]
     if mode in FIX_DELAYS:
         delay = round(FIX_DELAYS[mode] * 1e9)
-        arrivals = sorted(
-            (
-                a._replace(arrival=a.measurement.stamp + delay)
-                if isinstance(a.measurement, ReferenceVelocity)
-                else a
-                for a in arrivals
-            ),
-            key=lambda a: a.arrival,
-        )
-    for arrival in arrivals:
-        measurement = arrival.measurement
+        timed = [
+            (m.stamp + delay if isinstance(m, ReferenceVelocity) else arrival, m)
+            for arrival, m in timed
+        ]
+        timed.sort(key=lambda pair: pair[0])
+    for _, measurement in timed:
         if mode == 'no_reference' and isinstance(measurement, ReferenceVelocity):
             continue
         if mode == 'no_sinkage' and isinstance(measurement, SinkageReading):

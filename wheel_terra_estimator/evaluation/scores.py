@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Scores of a record against the truth, and their sums over drives.
 
-Scored where rim or ground speed exceeds 5 mm/s, after the first 10 s. The truth has no
-hysteresis; class accuracy within 0.05 of a border is listed apart.
+Scored at 10 Hz at most, where rim or ground speed exceeds 5 mm/s, after the first 10 s. The truth
+has no hysteresis; class accuracy within 0.05 of a border is listed apart.
 """
 
 from __future__ import annotations
@@ -15,11 +15,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wheel_terra_estimator.evaluation.runner import Record
-from wheel_terra_estimator.simulation.truth import TruthTable
+from wheel_terra_estimator.evaluation.two_state_filters import SlipCourse
+from wheel_terra_estimator.evaluation.worlds import Truth
 
 FloatArray = NDArray[np.float64]
 
 LEAST_SPEED, FIRST_SECONDS, NEAR_BORDER = 0.005, 10.0, 0.05
+SCORING_PERIOD = 0.1
+"""Of a denser truth one row per period [s] is scored, so that drives count by their length."""
+
+SLOW_TIME = 20.0
+"""The slow part of an error is its mean over blocks of this length [s]."""
+
 LEAST_LOAD = 0.1
 """Pull is scored on wheels that carry at least this share of the mean load."""
 
@@ -37,8 +44,13 @@ class Samples:
     pull_std: FloatArray
     true_class: NDArray[np.uint8]
     said_class: NDArray[np.uint8]
+    slow_slip_error: FloatArray  # mean of slip_error over its block of 20 s
     held_error: FloatArray  # slip, baselines
     dead_reckoned_error: FloatArray
+    torque_filter_error: FloatArray
+    torque_filter_std: FloatArray
+    pitch_filter_error: FloatArray
+    pitch_filter_std: FloatArray
     shared_pull_error: FloatArray  # over the load, baseline: m f_x shared by load
 
     @classmethod
@@ -68,12 +80,18 @@ class Warnings:
     distance: float  # rim travel [m]
 
 
+@dataclass(frozen=True)
+class BaselineSlips:
+    """Slips (k, n) of the baselines on the stamps of the truth."""
+
+    held: FloatArray  # last reference velocity
+    dead_reckoned: FloatArray
+    torque_filter: SlipCourse
+    pitch_filter: SlipCourse
+
+
 def samples(
-    truth: TruthTable,
-    record: Record,
-    held_slip: FloatArray,
-    dead_reckoned_slip: FloatArray,
-    slip_radius: FloatArray,
+    truth: Truth, record: Record, baselines: BaselineSlips, slip_radius: FloatArray
 ) -> Samples:
     """Return the scored samples of a drive."""
     position = np.clip(np.searchsorted(record.stamp, truth.stamp), 0, len(record.stamp) - 1)
@@ -82,7 +100,7 @@ def samples(
     ground = np.abs(truth.wheel_rate * slip_radius - truth.slip_velocity)
     late = (truth.stamp - truth.stamp[0]) * 1e-9 > FIRST_SECONDS
     scored = (np.maximum(rim, ground) > LEAST_SPEED) & ~np.isnan(truth.slip)
-    scored &= (late & matched)[:, None]
+    scored &= (late & matched & _one_per_period(truth.stamp, matched))[:, None]
     load = truth.normal_load
     carried = load > LEAST_LOAD * load.mean()
     total = truth.drawbar_pull.sum(axis=1, keepdims=True)
@@ -94,9 +112,11 @@ def samples(
     def over_load(values: FloatArray) -> FloatArray:
         return take(np.where(carried, values / np.maximum(load, 1e-3), np.nan))
 
+    slip_error = record.slip[position] - truth.slip
+    torque, pitch = baselines.torque_filter, baselines.pitch_filter
     return Samples(
         true_slip=take(truth.slip),
-        slip_error=take(record.slip[position] - truth.slip),
+        slip_error=take(slip_error),
         slip_std=take(record.slip_std[position]),
         sinkage_error=take(record.sinkage[position] - truth.sinkage),
         sinkage_std=take(record.sinkage_std[position]),
@@ -104,13 +124,40 @@ def samples(
         pull_std=over_load(record.drawbar_pull_std[position]),
         true_class=truth.slip_class[scored],
         said_class=record.slip_class[position][scored],
-        held_error=take(held_slip - truth.slip),
-        dead_reckoned_error=take(dead_reckoned_slip - truth.slip),
+        slow_slip_error=take(_block_means(truth.stamp, slip_error, scored)),
+        held_error=take(baselines.held - truth.slip),
+        dead_reckoned_error=take(baselines.dead_reckoned - truth.slip),
+        torque_filter_error=take(torque.slip - truth.slip),
+        torque_filter_std=take(torque.std),
+        pitch_filter_error=take(pitch.slip - truth.slip),
+        pitch_filter_std=take(pitch.std),
         shared_pull_error=over_load(shared - truth.drawbar_pull),
     )
 
 
-def warnings(truth: TruthTable, record: Record, slip_radius: FloatArray) -> Warnings:
+def _one_per_period(stamp: NDArray[np.int64], matched: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return the first matched row of each scoring period (k,)."""
+    # Half a period off, so that stamps at 10 Hz with some jitter all count.
+    period = np.floor((stamp - stamp[0]) * 1e-9 / SCORING_PERIOD + 0.5)
+    rows = np.flatnonzero(matched)
+    first = rows[np.unique(period[rows], return_index=True)[1]]
+    found = np.zeros(len(stamp), dtype=bool)
+    found[first] = True
+    return found
+
+
+def _block_means(
+    stamp: NDArray[np.int64], error: FloatArray, scored: NDArray[np.bool_]
+) -> FloatArray:
+    """Return (k, n) the mean of the scored errors over the block of time of each row."""
+    block = np.floor((stamp - stamp[0]) * 1e-9 / SLOW_TIME).astype(int)
+    count, total = (np.zeros((block[-1] + 1, error.shape[1])) for _ in range(2))
+    np.add.at(count, block, scored.astype(float))
+    np.add.at(total, block, np.where(scored, error, 0.0))
+    return np.asarray((total / np.maximum(count, 1.0))[block])
+
+
+def warnings(truth: Truth, record: Record, slip_radius: FloatArray) -> Warnings:
     """Return how the stuck warning did in a drive."""
     time = (truth.stamp - truth.stamp[0]) * 1e-9
     position = np.clip(np.searchsorted(record.stamp, truth.stamp), 0, len(record.stamp) - 1)
@@ -157,6 +204,64 @@ def coverage(error: FloatArray, std: FloatArray) -> float:
     return (
         float((np.abs(error[there]) <= 1.96 * std[there]).mean()) if there.any() else float('nan')
     )
+
+
+def squared_over_variance(error: FloatArray, std: FloatArray) -> tuple[float, float]:
+    """Return mean and median of the squared error over the stated variance (0.45 of a Gaussian)."""
+    there = ~np.isnan(error) & ~np.isnan(std)
+    if not there.any():
+        return float('nan'), float('nan')
+    ratio = (error[there] / np.maximum(std[there], 1e-6)) ** 2
+    return float(ratio.mean()), float(np.median(ratio))
+
+
+def better_baseline(data: Samples) -> tuple[str, FloatArray]:
+    """Return which two-state filter has the smaller slip error here, and its errors."""
+    found = (('torque', data.torque_filter_error), ('pitch', data.pitch_filter_error))
+    return min(found, key=lambda pair: rms(pair[1]))
+
+
+@dataclass(frozen=True)
+class Ratio:
+    """Slip RMSE over that of the better two-state filter; from drives drawn anew in pairs."""
+
+    value: float
+    low: float  # of the 95 % interval
+    high: float
+    error: float  # standard error
+
+    @property
+    def keeps_the_rule(self) -> bool:
+        """The rule of the bench: not above 1.05 by more than two standard errors."""
+        return self.value <= ALLOWED_RATIO + 2.0 * self.error
+
+
+ALLOWED_RATIO = 1.05
+_RESAMPLES = 2000
+
+
+def ratio_to_better_baseline(drives: Sequence[Samples]) -> Ratio:
+    """Return the ratio over some drives with its interval (bootstrap over whole drives).
+
+    The better filter is chosen once, over all these drives; estimator and baseline of a drive stay
+    together in each draw.
+    """
+    name, _ = better_baseline(Samples.joined(drives))
+    sums = np.array(
+        [
+            [np.nansum(d.slip_error**2), np.nansum(getattr(d, f'{name}_filter_error') ** 2)]
+            for d in drives
+            if len(d)
+        ]
+    )
+    if not len(sums):
+        return Ratio(*(float('nan'),) * 4)
+    value = float(np.sqrt(sums[:, 0].sum() / sums[:, 1].sum()))
+    draws = np.random.default_rng(0).integers(0, len(sums), (_RESAMPLES, len(sums)))
+    drawn = sums[draws].sum(axis=1)
+    ratios = np.sqrt(drawn[:, 0] / drawn[:, 1])
+    low, high = np.quantile(ratios, [0.025, 0.975])
+    return Ratio(value, float(low), float(high), float(np.std(ratios)))
 
 
 def three_class_accuracy(data: Samples, near_border: bool = False) -> float:

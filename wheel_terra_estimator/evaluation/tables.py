@@ -10,8 +10,8 @@ import numpy as np
 
 from wheel_terra_estimator.evaluation import scores
 from wheel_terra_estimator.evaluation.bench import DriveScore, Results
-from wheel_terra_estimator.evaluation.kinds import ENTRAPMENTS
 from wheel_terra_estimator.evaluation.scores import Samples
+from wheel_terra_estimator.evaluation.worlds import WORLDS
 
 _CLASSES = ('low', 'moderate', 'high', 'stuck')
 _MODES = {
@@ -25,6 +25,9 @@ _MODES = {
 }
 
 
+_WORLDS = {'own': 'simulator of the package', 'rival': 'rival simulator'}
+
+
 def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     """Return a Markdown table."""
     lines = ['| ' + ' | '.join(head) + ' |', '|' + '---|' * len(head)]
@@ -33,22 +36,26 @@ def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 
 
 def report(results: Results, modes: Sequence[str]) -> str:
-    """Return all tables of a run."""
+    """Return all tables of a run: the worlds side by side, then each by itself."""
     parts = []
-    for mode in modes:
-        by_kind = results.of_mode(mode)
+    if len(results.worlds) > 1:
+        parts += [_side_by_side(results, mode) for mode in modes]
+    for mode, world in ((mode, world) for mode in modes for world in results.worlds):
+        by_kind = results.of_mode(mode, world)
         if not by_kind:
             continue
         joined = {k: Samples.joined(d.samples for d in drives) for k, drives in by_kind.items()}
         pooled = Samples.joined(joined.values())
         high = float((np.abs(pooled.true_slip) > 0.6).mean())
         count = sum(len(d) for d in by_kind.values())
-        parts.append(f'## {_MODES[mode]}\n')
+        parts.append(f'## {_MODES[mode]}, {_WORLDS[world]}\n')
         parts.append(
             f'{count} drives, {len(pooled)} scored wheel samples, {high:.0%} of them above '
             '|s| = 0.6.\n'
         )
         parts.append(_errors({**joined, '**pooled**': pooled}))
+        parts.append('\nSlip against the two-state filters, and how honest its deviation is:\n')
+        parts.append(_two_states(by_kind))
         parts.append('\nBy true slip:\n')
         parts.append(_errors(_by_slip(pooled)))
         parts.append('\nClasses (rows: truth, columns: estimate; share of the row):\n')
@@ -72,6 +79,90 @@ def pooled_report(results: Results, modes: Sequence[str]) -> str:
             )
             warnings[_MODES[mode]] = drives
     return f'{_errors(rows)}\n\nStuck warnings:\n\n{_warnings(warnings)}\n'
+
+
+def _two_states(by_kind: dict[str, list[DriveScore]]) -> str:
+    """Return the table of the rule of the bench, and a line that says whether it is kept."""
+    rows, broken = [], []
+    pooled = [d for drives in by_kind.values() for d in drives]
+    for kind, drives in (*by_kind.items(), ('**pooled**', pooled)):
+        parts = [d.samples for d in drives]
+        data = Samples.joined(parts)
+        ratio = scores.ratio_to_better_baseline(parts)
+        better, _ = scores.better_baseline(data)
+        if not ratio.keeps_the_rule and kind in by_kind:
+            broken.append(kind)
+        mean, median = scores.squared_over_variance(data.slip_error, data.slip_std)
+        rows.append(
+            (
+                kind,
+                f'{scores.rms(data.slip_error):.4f}',
+                f'{scores.rms(data.torque_filter_error):.4f}',
+                f'{scores.rms(data.pitch_filter_error):.4f}',
+                better,
+                f'{ratio.value:.2f} ({ratio.low:.2f} to {ratio.high:.2f})',
+                'yes' if ratio.keeps_the_rule else '**no**',
+                f'{scores.rms(data.slow_slip_error):.4f}',
+                f'{scores.coverage(data.slip_error, data.slip_std):.1%}',
+                f'{scores.coverage(data.torque_filter_error, data.torque_filter_std):.1%}',
+                f'{mean:.2f}, {median:.2f}',
+            )
+        )
+    head = (
+        *('drives', 'slip RMSE', 'two states, torque', 'two states, pitch', 'better'),
+        *('ratio (95 % interval)', 'rule kept', 'slow part (20 s means)', 'coverage'),
+        *('coverage of two states, torque', 'squared error over variance: mean, median'),
+    )
+    verdict = f'broken in {", ".join(broken)}' if broken else 'kept in every kind'
+    return (
+        f'{table(head, rows)}\n\nThe rule of the bench (slip RMSE not above the better two-state '
+        f'filter by more than 5 % plus two standard errors of the paired drives): {verdict}.'
+    )
+
+
+def _side_by_side(results: Results, mode: str) -> str:
+    """Return the pooled figures of a mode, one column per world."""
+    columns = {}
+    for world in results.worlds:
+        drives = [d for found in results.of_mode(mode, world).values() for d in found]
+        columns[world] = _figures(drives)
+    names = next(iter(columns.values()))
+    rows = [(name, *(column[name] for column in columns.values())) for name in names]
+    head = ('pooled', *(_WORLDS[world] for world in columns))
+    return f'## {_MODES[mode]}: the worlds side by side\n\n{table(head, rows)}\n'
+
+
+def _figures(drives: Sequence[DriveScore]) -> dict[str, str]:
+    parts = [d.samples for d in drives]
+    data = Samples.joined(parts)
+    ratio = scores.ratio_to_better_baseline(parts)
+    better, error = scores.better_baseline(data)
+    mean, median = scores.squared_over_variance(data.slip_error, data.slip_std)
+    by_kind = {d.kind: [e.samples for e in drives if e.kind == d.kind] for d in drives}
+    worst = {kind: scores.rms(Samples.joined(p).slip_error) for kind, p in by_kind.items()}
+    hardest = max(worst, key=lambda kind: worst[kind])
+    found = [d.warnings for d in drives]
+    trapped = [w for w in found if w.entrapped is not None]
+    warned = sum(w.lead_time is not None for w in trapped)
+    hours = sum(w.duration for w in found) / 3600.0
+    return {
+        'drives': str(len(drives)),
+        'slip RMSE': f'{scores.rms(data.slip_error):.4f}',
+        'worst kind': f'{worst[hardest]:.4f} ({hardest})',
+        'better two-state filter': f'{scores.rms(error):.4f} ({better})',
+        'ratio (95 % interval)': f'{ratio.value:.2f} ({ratio.low:.2f} to {ratio.high:.2f})',
+        'last fix held': f'{scores.rms(data.held_error):.4f}',
+        'dead reckoning': f'{scores.rms(data.dead_reckoned_error):.4f}',
+        'slow part of the slip error': f'{scores.rms(data.slow_slip_error):.4f}',
+        'coverage of slip': f'{scores.coverage(data.slip_error, data.slip_std):.1%}',
+        'squared slip error over variance: mean, median': f'{mean:.2f}, {median:.2f}',
+        'sinkage RMSE [mm]': f'{1e3 * scores.rms(data.sinkage_error):.2f}',
+        'coverage of sinkage': f'{scores.coverage(data.sinkage_error, data.sinkage_std):.1%}',
+        'pull RMSE [% load]': f'{100 * scores.rms(data.pull_error):.2f}',
+        'coverage of pull': f'{scores.coverage(data.pull_error, data.pull_std):.1%}',
+        'entrapments warned of before': f'{warned} of {len(trapped)}',
+        'false warnings': f'{sum(w.false_alarms for w in found)} in {hours:.1f} h',
+    }
 
 
 def _by_slip(pooled: Samples) -> dict[str, Samples]:
@@ -147,9 +238,10 @@ def _warnings(by_kind: dict[str, list[DriveScore]]) -> str:
         hours = sum(w.duration for w in found) / 3600.0
         kilometres = sum(w.distance for w in found) / 1000.0
         false = sum(w.false_alarms for w in found)
+        made_to = any(kind in WORLDS[d.world].entrapments for d in drives)
         rows.append(
             (
-                f'{kind}{" (made to entrap)" if kind in ENTRAPMENTS else ""}',
+                f'{kind}{" (made to entrap)" if made_to else ""}',
                 f'{len(trapped)} of {len(found)}',
                 f'{len(warned)} of {len(trapped)}' if trapped else '-',
                 f'{np.median(times):.1f} ({min(times):.1f})' if times else '-',
