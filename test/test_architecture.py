@@ -15,6 +15,7 @@ WITHOUT_ROS = (
     'configuration',
     'estimation',
     'messages',
+    'checks',
     'discrepancy',
     'simulation',
 )
@@ -99,10 +100,11 @@ MAY_USE = {
     'configuration': ({'terramechanics'}, {'numpy', 'yaml'}),
     'estimation': ({'configuration', 'terramechanics'}, {'numpy', 'filterpy'}),
     'messages': ({'configuration', 'estimation'}, {'numpy'}),
+    'checks': ({'configuration', 'estimation'}, {'numpy'}),
     # Sensors of the simulated rover give the estimator's typed measurements.
     'simulation': ({'configuration', 'terramechanics', 'estimation'}, {'numpy'}),
     'bags': (
-        {'configuration', 'terramechanics', 'estimation', 'messages', 'simulation'},
+        {'configuration', 'terramechanics', 'estimation', 'messages', 'simulation', 'checks'},
         {'numpy', 'rosbags', 'lz4', 'compression', 'backports', 'tqdm'},  # zstd by Python version
     ),
     'reporting': (

@@ -22,7 +22,17 @@ from wheel_terra_estimator.errors import UserError
 # Each module has SUMMARY, add_arguments(parser) and run(arguments) -> exit status, and may have
 # EXAMPLES (command lines for its help); it imports heavy libraries inside run, so that help and
 # the light commands start at once.
-COMMANDS = ('simulate', 'replay', 'predict', 'diagnose', 'effects', 'soilbin', 'evaluate', 'demo')
+COMMANDS = (
+    'simulate',
+    'check',
+    'replay',
+    'predict',
+    'diagnose',
+    'effects',
+    'soilbin',
+    'evaluate',
+    'demo',
+)
 
 UNUSABLE_INPUT = 2
 PROGRAM_ERROR = 3

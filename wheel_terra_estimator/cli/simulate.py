@@ -29,6 +29,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='F',
         help=f'scenario file, or the bare name of a shipped one (default: {DEFAULT})',
     )
+    parser.add_argument(
+        '--rover',
+        metavar='F',
+        help="rover file, or the bare name of a shipped one, in place of the scenario's rover",
+    )
     parser.add_argument('--list', action='store_true', help='list the shipped scenarios and stop')
     parser.add_argument('--seed', type=int, default=0, help='decides all random quantities')
     parser.add_argument(
@@ -54,7 +59,10 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.seed < 0:
         raise UserError(f'--seed {arguments.seed}: must not be negative')
     scenario = scenarios.load(
-        arguments.scenario, files=arguments.config, parameters=arguments.parameters
+        arguments.scenario,
+        files=arguments.config,
+        parameters=arguments.parameters,
+        rover=arguments.rover,
     )
     duration = scenario.duration if arguments.duration is None else arguments.duration
     if not 0.0 < duration <= LONGEST:

@@ -233,6 +233,7 @@ def load(
     *,
     files: Sequence[str | Path] = (),
     parameters: Sequence[str] = (),
+    rover: str | Path | None = None,
     **changes: Any,
 ) -> Scenario:
     """Read a scenario.
@@ -243,6 +244,8 @@ def load(
         A path, the bare name of a shipped scenario, or dotted keys with values.
     files, parameters : sequence
         Further configuration files and NAME:=VALUE, known to simulation and estimator.
+    rover : str or pathlib.Path, optional
+        Rover file in place of the scenario's own; its soil and ground stay.
     **changes
         Dotted keys of the scenario with ``__`` for the dot, such as ``sensors__reference=False``.
 
@@ -258,7 +261,7 @@ def load(
         name, values = str(path), dict(ros_yaml.read(path))
     values |= {key.replace('__', '.'): value for key, value in changes.items()}
     checked = _checked(name, values)
-    base = [*checked['configuration'], *files]
+    base = [*_with_rover(checked['configuration'], rover), *files]
     known = [*checked['parameters'], *parameters]
     configuration = reader.load(base, known)
     return Scenario(
@@ -282,6 +285,13 @@ def load(
         dig_efficiency=checked['dig_efficiency'],
         random_fault_rate=checked['faults.random_rate'],
     )
+
+
+def _with_rover(files: Sequence[str], rover: str | Path | None) -> list[str | Path]:
+    """Return the files with another rover in place of those that state the wheels."""
+    if rover is None:
+        return list(files)
+    return [rover, *(f for f in files if 'wheels.names' not in ros_yaml.read(shipped.find(f)))]
 
 
 def shipped_scenarios() -> dict[str, str]:

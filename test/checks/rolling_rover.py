@@ -1,0 +1,102 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""A rover that rolls without slip, written down from kinematics alone: the truth of these tests."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from wheel_terra_estimator.checks.series import (
+    ImuSeries,
+    JointSeries,
+    Recording,
+    SinkageSeries,
+    VelocitySeries,
+)
+from wheel_terra_estimator.configuration import reader
+
+NAMES = ('front_left', 'front_right', 'rear_left', 'rear_right')
+RADIUS, HALF_TRACK, HALF_BASE, MASS, GRAVITY = 0.2, 0.4, 0.1, 60.0, 9.80665
+RESISTANCE = 0.08  # rolling resistance over weight
+START = 1_700_000_000_000_000_000
+RATE = 10.0  # [Hz]
+
+
+def rover(**changes):
+    """The rover file; wheels in one row nearly, so that turns need no skid."""
+    parameters = {
+        'rover.mass': MASS,
+        'wheels.names': list(NAMES),
+        'wheels.radius': [RADIUS] * 4,
+        'wheels.width': [0.1] * 4,
+        'wheels.x': [HALF_BASE, HALF_BASE, -HALF_BASE, -HALF_BASE],
+        'wheels.y': [HALF_TRACK, -HALF_TRACK] * 2,
+        'sensors.reference_std': 0.01,
+    }
+    return reader.from_parameters(parameters | changes)
+
+
+@dataclass(frozen=True)
+class Motion:
+    time: np.ndarray
+    speed: np.ndarray
+    yaw_rate: np.ndarray
+    slope: np.ndarray  # uphill along the drive [rad]
+
+
+def ten_minute_drive(turns=True):
+    """Rest, forward, back, over a hill, then a circle to each side."""
+    time = np.arange(0.0, 300.0, 1.0 / RATE)
+    knots = [0, 15, 16, 60, 61, 65, 66, 100, 101, 105, 106, 300]
+    speed = np.interp(time, knots, [0, 0, 0.3, 0.3, 0, 0, -0.3, -0.3, 0, 0, 0.3, 0.3])
+    yaw = np.interp(
+        time, [160, 161, 220, 221, 225, 226, 285, 286], [0, 0.2, 0.2, 0, 0, -0.2, -0.2, 0]
+    )
+    hill = np.interp(time, [20, 22, 38, 40, 42, 58], [0, 0.12, 0.12, -0.12, -0.12, 0])
+    back = np.interp(time, [70, 72, 95], [0, -0.1, 0])
+    return Motion(time, speed, yaw if turns else 0.0 * yaw, np.where(time < 62, hill, back))
+
+
+def recording(motion=None, seed=0, **changes):
+    """All channels of a drive, with honest noise."""
+    m = ten_minute_drive() if motion is None else motion
+    random = np.random.default_rng(seed)
+    stamp = START + np.round(m.time * 1e9).astype(np.int64)
+    arrival = stamp + 2_000_000
+    y = np.array([HALF_TRACK, -HALF_TRACK] * 2)
+    rate = (m.speed[:, None] - m.yaw_rate[:, None] * y) / RADIUS
+    acceleration = np.gradient(m.speed, m.time)
+    demand = MASS * (acceleration + GRAVITY * np.sin(m.slope))
+    resistance = RESISTANCE * MASS * GRAVITY * np.sign(np.round(rate, 6))
+    torque = RADIUS * (demand[:, None] / 4 + resistance / 4)
+    noise = lambda size, scale: scale * random.standard_normal(size)  # noqa: E731
+    joints = JointSeries(
+        '/joint_states', stamp, arrival, NAMES,
+        rate + noise(rate.shape, 0.004), torque + noise(rate.shape, 0.2),
+    )  # fmt: skip
+    fine = np.arange(0.0, m.time[-1], 0.02)
+    at = lambda values: np.interp(fine, m.time, values)  # noqa: E731
+    imu_stamp = START + np.round(fine * 1e9).astype(np.int64)
+    force = np.column_stack([
+        at(acceleration) + GRAVITY * np.sin(at(m.slope)),
+        at(m.speed) * at(m.yaw_rate),
+        GRAVITY * np.cos(at(m.slope)),
+    ])  # fmt: skip
+    gyro = np.column_stack([0 * fine, -np.gradient(at(m.slope), fine), at(m.yaw_rate)])
+    imu = ImuSeries(
+        '/imu/data', imu_stamp, imu_stamp + 2_000_000,
+        force + noise(force.shape, 0.04), gyro + noise(gyro.shape, 0.004),
+        np.full((fine.size, 4), np.nan),
+    )  # fmt: skip
+    every = slice(0, None, 5)
+    velocity = np.column_stack([m.speed[every], 0 * m.time[every], 0 * m.time[every]])
+    velocity[:, 0] += noise(velocity.shape[0], 0.01)
+    reference = VelocitySeries(
+        '/reference_odom', stamp[every], arrival[every] + 300_000_000, velocity,
+        m.yaw_rate[every], np.full(velocity.shape[0], 1e-4),
+    )  # fmt: skip
+    depth = 0.02 + 0.005 * np.sin(0.3 * m.time)[:, None] * np.ones(4)
+    sinkage = SinkageSeries('/sinkage', stamp, arrival, NAMES, depth + noise(depth.shape, 0.002))
+    topics = (('/joint_states', 'sensor_msgs/msg/JointState', stamp.size),)
+    whole = Recording('drive', topics, joints, imu, sinkage, reference, None)
+    return replace(whole, **changes)

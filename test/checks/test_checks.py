@@ -1,0 +1,207 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Faults put into a rover that rolls without slip; each check has to find its own and no other."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import rolling_rover as rolling
+
+from wheel_terra_estimator.checks.finding import KINDS
+from wheel_terra_estimator.checks.run import check_recording
+
+WHOLE = rolling.recording()
+
+
+def kinds(report):
+    return {(finding.kind, finding.wheel) for finding in report.findings}
+
+
+def checked(configuration=None, whole=WHOLE, **changes):
+    return check_recording(replace(whole, **changes), configuration or rolling.rover())
+
+
+def only(report, kind, wheel=None):
+    assert kinds(report) == {(kind, wheel)}, [str(f) for f in report.findings]
+    return report.findings[0]
+
+
+@pytest.mark.parametrize('seed', range(4))
+def test_nothing_is_found_where_nothing_is_wrong(seed):
+    report = check_recording(rolling.recording(seed=seed), rolling.rover())
+    assert not report.findings, [str(f) for f in report.findings]
+    assert report.figures['rover.rolling_radius_m'] == pytest.approx(rolling.RADIUS, rel=0.01)
+
+
+def test_one_wheel_backwards():
+    joints = WHOLE.joints
+    flip = np.array([1.0, 1.0, -1.0, 1.0])
+    backwards = replace(joints, rate=joints.rate * flip, torque=joints.torque * flip)
+    finding = only(checked(joints=backwards), 'sign', 'rear_left')
+    assert finding.cure == 'wheels.direction: [1, 1, -1, 1]'
+
+
+def test_raw_signs_of_a_whole_side():
+    joints = WHOLE.joints
+    flip = np.array([-1.0, 1.0, -1.0, 1.0])
+    raw = replace(joints, rate=joints.rate * flip, torque=joints.torque * flip)
+    report = checked(joints=raw)
+    assert kinds(report) == {('sign', 'front_left'), ('sign', 'rear_left')}
+    assert report.findings[0].cure == 'wheels.direction: [-1, 1, -1, 1]'
+
+
+def test_swapped_sides_are_told_from_a_straight_drive():
+    joints = WHOLE.joints
+    order = [1, 0, 3, 2]
+    swapped = replace(joints, rate=joints.rate[:, order], torque=joints.torque[:, order])
+    found = checked(joints=swapped).findings
+    assert 'swapped_sides' in {f.kind for f in found}
+    straight = rolling.recording(rolling.ten_minute_drive(turns=False))
+    report = check_recording(straight, rolling.rover())
+    assert 'drive a circle' in next(
+        entry.reason for entry in report.not_checked if entry.kind == 'swapped_sides'
+    )
+
+
+def test_two_wheels_under_each_others_name():
+    joints = WHOLE.joints
+    order = [1, 0, 2, 3]
+    exchanged = replace(joints, rate=joints.rate[:, order], torque=joints.torque[:, order])
+    report = checked(joints=exchanged)
+    assert kinds(report) == {
+        ('exchanged_wheels', 'front_left'),
+        ('exchanged_wheels', 'front_right'),
+    }
+    assert (
+        'wheels.names: [front_right, front_left, rear_left, rear_right]' in report.findings[0].cure
+    )
+
+
+@pytest.mark.parametrize('factor', [60.0 / (2.0 * math.pi), 180.0 / math.pi])
+def test_units_of_the_rates(factor):
+    faster = replace(WHOLE.joints, rate=WHOLE.joints.rate * factor)
+    finding = only(checked(joints=faster), 'unit')
+    assert finding.value == pytest.approx(1.0 / factor)
+
+
+@pytest.mark.parametrize(
+    ('change', 'kind'),
+    [
+        (
+            lambda imu: replace(imu, force=imu.force * [1, -1, -1], rate=imu.rate * [1, -1, -1]),
+            'mounting',
+        ),
+        (lambda imu: replace(imu, force=imu.force / 9.80665), 'unit'),
+        (lambda imu: replace(imu, rate=np.degrees(imu.rate)), 'unit'),
+        (lambda imu: replace(imu, force=imu.force - [0.0, 0.0, 9.80665]), 'gravity'),
+        (lambda imu: replace(imu, rate=0.0 * imu.rate), 'placeholder'),
+        (lambda imu: replace(imu, rate=imu.rate + np.array([0.0, 0.0, 0.03])), 'zero'),
+        (lambda imu: replace(imu, stamp=imu.stamp + 800_000_000), 'delay'),
+    ],
+)
+def test_imu(change, kind):
+    finding = only(checked(imu=change(WHOLE.imu)), kind)
+    if kind == 'mounting':
+        assert finding.parameter == 'sensors.imu_mounting_roll_deg'
+        assert abs(finding.value) == pytest.approx(180.0)
+
+
+def test_a_small_tilt_is_told_by_full_turns():
+    angle = math.radians(4.0)
+    cosine, sine = math.cos(angle), math.sin(angle)
+    about_y = np.array([[cosine, 0.0, sine], [0.0, 1.0, 0.0], [-sine, 0.0, cosine]])
+    imu = WHOLE.imu  # sensor mounted with pitch 4 degrees: its readings are the inverse turn
+    tilted = replace(imu, force=imu.force @ about_y, rate=imu.rate @ about_y)
+    finding = only(checked(imu=tilted), 'mounting')
+    assert finding.parameter == 'sensors.imu_mounting_pitch_deg'
+    assert finding.value == pytest.approx(4.0, abs=0.3)
+
+
+@pytest.mark.parametrize('error', [0.94, 1.06])
+def test_radius_within_one_percent(error):
+    configuration = rolling.rover(**{'wheels.radius': [rolling.RADIUS * error] * 4})
+    finding = only(checked(configuration), 'radius')
+    assert finding.value == pytest.approx(rolling.RADIUS, rel=0.01)
+    assert finding.value == pytest.approx(rolling.RADIUS, abs=3.0 * finding.std)
+
+
+def test_track_of_wheels_that_do_not_skid():
+    configuration = rolling.rover(**{'wheels.y': [0.36, -0.36, 0.36, -0.36]})
+    finding = only(checked(configuration), 'track')
+    assert finding.value == pytest.approx(2.0 * rolling.HALF_TRACK, rel=0.02)
+
+
+def test_torque_scale_is_a_gain_or_a_mass():
+    joints = replace(WHOLE.joints, torque=1.5 * WHOLE.joints.torque)
+    report = checked(joints=joints)
+    assert kinds(report) == {('gain', None), ('mass', None)}
+    gain = next(f for f in report.findings if f.kind == 'gain')
+    assert gain.value == pytest.approx(1.0 / 1.5, abs=3.0 * gain.std)
+
+
+def test_torque_sign_of_one_wheel():
+    torque = WHOLE.joints.torque * [1.0, -1.0, 1.0, 1.0]
+    only(checked(joints=replace(WHOLE.joints, torque=torque)), 'sign', 'front_right')
+
+
+def test_reference():
+    reference = WHOLE.reference
+    reversed_ = replace(reference, velocity=-reference.velocity)
+    assert only(checked(reference=reversed_), 'sign').topic == '/reference_odom'
+    late = replace(reference, stamp=reference.stamp + 900_000_000)
+    assert only(checked(reference=late), 'delay').value == pytest.approx(0.9, abs=0.1)
+    believed = replace(reference, variance=np.full(reference.stamp.size, 1e6))
+    only(checked(reference=believed), 'covariance')
+    fast = replace(reference, velocity=3.6 * reference.velocity)
+    only(checked(reference=fast), 'unit')
+
+
+def test_sinkage():
+    sinkage = WHOLE.sinkage
+    only(checked(sinkage=replace(sinkage, sinkage=1000.0 * sinkage.sinkage)), 'unit')
+    only(checked(sinkage=replace(sinkage, sinkage=-sinkage.sinkage)), 'sign')
+    off = sinkage.sinkage + np.array([0.0, 0.04, 0.0, 0.0])
+    assert only(checked(sinkage=replace(sinkage, sinkage=off)), 'zero', 'front_right').value == (
+        pytest.approx(0.04, abs=0.002)
+    )
+
+
+def test_names():
+    joints = replace(WHOLE.joints, names=('fl_wheel', 'front_right', 'rear_left', 'rear_right'))
+    finding = only(checked(joints=joints), 'unknown_name', 'front_left')
+    assert finding.cure == 'wheels.names: [fl_wheel, front_right, rear_left, rear_right]'
+    fewer = replace(
+        WHOLE.joints,
+        names=rolling.NAMES[:3],
+        rate=WHOLE.joints.rate[:, :3],
+        torque=WHOLE.joints.torque[:, :3],
+    )
+    only(checked(joints=fewer), 'missing_wheel', 'rear_right')
+
+
+def test_transport():
+    joints = WHOLE.joints
+    keep = (np.arange(joints.stamp.size) // 40) % 4 > 0
+    gaps = replace(
+        joints,
+        stamp=joints.stamp[keep],
+        log_time=joints.log_time[keep],
+        rate=joints.rate[keep],
+        torque=joints.torque[keep],
+    )
+    assert ('drop_outs', None) in kinds(checked(joints=gaps))
+    zero = replace(joints, stamp=np.where(np.arange(joints.stamp.size) % 10, joints.stamp, 0))
+    only(checked(joints=zero), 'order')
+
+
+def test_without_a_rover_file_signs_are_found_all_the_same():
+    flip = np.array([1.0, 1.0, 1.0, -1.0])
+    joints = replace(WHOLE.joints, rate=WHOLE.joints.rate * flip, torque=WHOLE.joints.torque * flip)
+    report = check_recording(replace(WHOLE, joints=joints), None)
+    assert kinds(report) == {('sign', 'rear_right')}
+
+
+def test_every_kind_is_one_of_the_contract():
+    assert len(set(KINDS)) == 21

@@ -1,0 +1,35 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""``wheel-terra check``: exit status and JSON of the contract, on the Pathfinder recording."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from wheel_terra_estimator.cli.main import main
+
+PATHFINDER = Path(__file__).resolve().parents[2] / 'data' / 'demo' / 'pathfinder'
+FIELDS = {'kind', 'topic', 'wheel', 'parameter', 'value', 'std', 'confidence', 'words', 'cure'}
+
+
+def test_the_radius_of_pathfinder(capsys):
+    assert main(['check', str(PATHFINDER), '--config', 'pathfinder', '--json']) == 1
+    printed = json.loads(capsys.readouterr().out)
+    assert set(printed) == {'findings', 'not_checked', 'figures'}
+    assert all(set(finding) == FIELDS for finding in printed['findings'])
+    radius = next(f for f in printed['findings'] if f['kind'] == 'radius')
+    assert radius['parameter'] == 'wheels.radius'
+    assert radius['value'] == pytest.approx(0.117, abs=0.001)
+    assert all({'kind', 'reason'} == set(entry) for entry in printed['not_checked'])
+
+
+def test_without_a_rover_file_it_proposes_one(capsys):
+    main(['check', str(PATHFINDER)])
+    said = capsys.readouterr().out
+    assert 'wheels.names: [front_left_wheel_joint, front_right_wheel_joint, rear_left' in said
+
+
+def test_what_cannot_be_used(tmp_path, capsys):
+    assert main(['check', str(tmp_path / 'nothing')]) == 2
+    assert 'no such bag' in capsys.readouterr().err

@@ -1,0 +1,214 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""The input topics of a bag as arrays, for the checks; memory is bounded."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from wheel_terra_estimator.bags.storage import Bag
+from wheel_terra_estimator.checks.series import (
+    ImuSeries,
+    JointSeries,
+    Recording,
+    SinkageSeries,
+    VelocitySeries,
+)
+from wheel_terra_estimator.messages.convert import INPUT_TYPES, stamp_of
+
+MOST_MESSAGES = 400_000
+"""Messages of a topic that are kept; a longer recording is judged by its beginning."""
+MOST_JOINTS = 64
+"""Joints of a topic that are kept."""
+
+_REFERENCE_WORDS = ('reference', 'truth', 'visual', 'vio', 'gps', 'gnss', 'rtk', 'mocap', 'vo')
+_JOINT_WORDS = ('joint_states', 'wheel', 'joint')
+_IMU_WORDS = ('imu/data', 'imu')
+_OWN_TOPICS = ('/wheel_terra_estimator/', '/ground_truth/')
+
+
+def choose_topics(bag: Bag, remaps: Mapping[str, str]) -> dict[str, str]:
+    """Return {estimator's topic: topic in the bag}: as named, else the likeliest one."""
+    chosen: dict[str, str] = {}
+    there = [
+        topic
+        for topic in bag.topics.values()
+        if topic.message_count and not topic.name.startswith(_OWN_TOPICS)
+    ]
+    for name, kind in INPUT_TYPES.items():
+        wanted = remaps.get(name, f'/{name}')
+        fitting = [topic.name for topic in there if topic.type == kind]
+        if wanted in fitting:
+            chosen[name] = wanted
+        elif name not in remaps:
+            guess = _likeliest(name, [t for t in fitting if t not in chosen.values()])
+            if guess:
+                chosen[name] = guess
+    return chosen
+
+
+def _likeliest(name: str, topics: Sequence[str]) -> str | None:
+    words = {
+        'joint_states': _JOINT_WORDS,
+        'imu/data': _IMU_WORDS,
+        'reference_odom': _REFERENCE_WORDS,
+        'sinkage': ('sinkage',),
+        'leaving_angle': ('leaving',),
+        'odom': ('wheel', 'odom'),
+    }[name]
+    for word in words:
+        for topic in topics:
+            slip_free = any(w in topic.lower().replace('/', '_').split('_') for w in words)
+            if word in topic.lower() and (name != 'reference_odom' or slip_free):
+                return topic
+    if name in ('joint_states', 'imu/data') and len(topics) == 1:
+        return topics[0]
+    return None
+
+
+def read_series(bag: Bag, remaps: Mapping[str, str], name: str) -> Recording:
+    """Read the input topics of an open bag.
+
+    Parameters
+    ----------
+    bag : Bag
+        The recording.
+    remaps : mapping of str to str
+        Estimator's topic to the bag's.
+    name : str
+        What reports call the recording.
+    """
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.ROS2_JAZZY)
+    chosen = choose_topics(bag, remaps)
+    by_topic = {topic: own for own, topic in chosen.items()}
+    collectors: dict[str, _Collector] = {
+        own: _COLLECTORS[own](topic) for own, topic in chosen.items() if own in _COLLECTORS
+    }
+    shortened = False
+    for log_time, topic, data in bag.messages([chosen[own] for own in collectors]):
+        collector = collectors[by_topic[topic]]
+        if len(collector.stamps) >= MOST_MESSAGES:
+            shortened = True
+            continue
+        try:
+            message = store.deserialize_cdr(data, INPUT_TYPES[by_topic[topic]])
+        except Exception:  # the library lets many kinds through on damaged bytes
+            continue
+        collector.add(log_time, message)
+
+    def made(own: str) -> Any:
+        collector = collectors.get(own)
+        return collector.series() if collector and collector.stamps else None
+
+    return Recording(
+        name=name,
+        topics=tuple((t.name, t.type, t.message_count) for t in bag.topics.values()),
+        joints=made('joint_states'),
+        imu=made('imu/data'),
+        sinkage=made('sinkage'),
+        reference=made('reference_odom'),
+        wheel_odometry=made('odom'),
+        shortened=shortened,
+    )
+
+
+class _Collector:
+    """Rows of one topic."""
+
+    def __init__(self, topic: str) -> None:
+        self.topic = topic
+        self.stamps: list[int] = []
+        self.log_times: list[int] = []
+        self.rows: list[Any] = []
+
+    def add(self, log_time: int, message: Any) -> None:
+        self.stamps.append(stamp_of(message))
+        self.log_times.append(log_time)
+        self.rows.append(self.row(message))
+
+    def row(self, message: Any) -> Any:
+        raise NotImplementedError
+
+    def series(self) -> Any:
+        raise NotImplementedError
+
+    @property
+    def times(self) -> tuple[Any, Any]:
+        return np.array(self.stamps, dtype=np.int64), np.array(self.log_times, dtype=np.int64)
+
+
+class _Joints(_Collector):
+    """Joint states, sorted by name."""
+
+    def __init__(self, topic: str) -> None:
+        super().__init__(topic)
+        self.names: dict[str, int] = {}
+
+    def row(self, message: Any) -> Any:
+        for name in message.name:
+            if len(self.names) < MOST_JOINTS:
+                self.names.setdefault(name, len(self.names))
+        return tuple(message.name), *self.fields(message)
+
+    def fields(self, message: Any) -> tuple[Any, ...]:
+        return message.velocity, message.effort
+
+    def table(self, column: int) -> Any:
+        values = np.full((len(self.rows), len(self.names)), math.nan)
+        for index, row in enumerate(self.rows):
+            names, numbers = row[0], row[column]
+            if len(names) != len(numbers):
+                continue
+            for name, number in zip(names, numbers, strict=True):
+                place = self.names.get(name)
+                if place is not None:
+                    values[index, place] = number
+        return values
+
+    def series(self) -> Any:
+        return JointSeries(self.topic, *self.times, tuple(self.names), self.table(1), self.table(2))
+
+
+class _Sinkage(_Joints):
+    def fields(self, message: Any) -> tuple[Any, ...]:
+        return (message.position,)
+
+    def series(self) -> Any:
+        return SinkageSeries(self.topic, *self.times, tuple(self.names), self.table(1))
+
+
+class _Imu(_Collector):
+    def row(self, message: Any) -> Any:
+        f, w, q = message.linear_acceleration, message.angular_velocity, message.orientation
+        known = message.orientation_covariance[0] != -1.0
+        orientation = (q.x, q.y, q.z, q.w) if known else (math.nan,) * 4
+        return (f.x, f.y, f.z, w.x, w.y, w.z, *orientation)
+
+    def series(self) -> Any:
+        table = np.array(self.rows, dtype=float)
+        return ImuSeries(self.topic, *self.times, table[:, :3], table[:, 3:6], table[:, 6:])
+
+
+class _Velocity(_Collector):
+    def row(self, message: Any) -> Any:
+        linear, angular = message.twist.twist.linear, message.twist.twist.angular
+        return (linear.x, linear.y, linear.z, angular.z, message.twist.covariance[0])
+
+    def series(self) -> Any:
+        table = np.array(self.rows, dtype=float)
+        return VelocitySeries(self.topic, *self.times, table[:, :3], table[:, 3], table[:, 4])
+
+
+_COLLECTORS: dict[str, Any] = {
+    'joint_states': _Joints,
+    'imu/data': _Imu,
+    'sinkage': _Sinkage,
+    'reference_odom': _Velocity,
+    'odom': _Velocity,
+}

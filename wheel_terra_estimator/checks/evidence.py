@@ -1,0 +1,228 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""All channels of a recording on the stamps of the wheel odometry, in the rover's signs."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wheel_terra_estimator.checks.rover_facts import RoverFacts
+from wheel_terra_estimator.checks.series import Recording, VelocitySeries
+from wheel_terra_estimator.checks.statistics import averaged, robust_std
+
+FloatArray = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+REST_RATE = 0.02
+"""Wheel rate below which a wheel stands, as a share of its working rate [-]."""
+SHORTEST_REST = 1.0
+"""A standstill counts as rest after this time [s]."""
+SETTLING = 0.5
+"""A speed counts as steady this long after it changed [s]."""
+STRAIGHT_SHARE = 0.25
+"""Speed of the sides against the middle, as a share of it, below which a drive is straight [-]."""
+LEAST_MOVING_ROWS = 30
+"""Fewer rows of driving than these tell nothing."""
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """The recording, the rover and what follows from both.
+
+    Attributes
+    ----------
+    recording, facts : Recording, RoverFacts
+        As read.
+    time : numpy.ndarray
+        (k,) stamps of the wheel odometry since the first one [s], increasing.
+    rate, torque : numpy.ndarray
+        (k, n) per wheel of ``facts.names``, positive forward; nan where not there.
+    force, gyro : numpy.ndarray or None
+        (k, 3) specific force and angular rate in ``base_link`` as the rover file has it, averaged
+        over the period of the wheel odometry.
+    rotation : numpy.ndarray
+        (3, 3) from the IMU's frame into ``base_link``.
+    """
+
+    recording: Recording
+    facts: RoverFacts
+    time: FloatArray
+    rate: FloatArray
+    torque: FloatArray
+    force: FloatArray | None
+    gyro: FloatArray | None
+    rotation: FloatArray
+
+    @property
+    def period(self) -> float:
+        """Median time between two rows [s]."""
+        return float(np.median(np.diff(self.time))) if self.time.size > 1 else math.nan
+
+    @property
+    def common_rate(self) -> FloatArray:
+        """Median rate of the wheels (k,) [rad/s]."""
+        return _nanmedian(self.rate)
+
+    @property
+    def working_rate(self) -> float:
+        """Typical size of the wheel rates when moving [rad/s]; 0 if the rover never moves."""
+        size = _nanmedian(np.abs(self.rate))
+        size = size[np.isfinite(size)]
+        top = float(np.quantile(size, 0.95)) if size.size else 0.0
+        moving = size[size > 0.2 * top]
+        return float(np.median(moving)) if moving.size else 0.0
+
+    @property
+    def moving(self) -> Mask:
+        """Rows in which the wheels turn."""
+        return np.asarray(_nanmedian(np.abs(self.rate)) > 0.2 * max(self.working_rate, 1e-9))
+
+    @property
+    def at_rest(self) -> Mask:
+        """Rows in which every wheel has stood still for a while."""
+        rate = np.nan_to_num(self.rate)
+        width = max(round(SHORTEST_REST / max(self.period, 1e-3)), 1)
+        if rate.shape[0] < width:
+            return np.zeros(rate.shape[0], dtype=bool)
+        total = np.vstack([np.zeros(rate.shape[1]), np.cumsum(rate, axis=0)])
+        mean = np.zeros_like(rate)
+        mean[width - 1 :] = (total[width:] - total[:-width]) / width
+        bend = np.diff(rate, 2, axis=0) / math.sqrt(6.0)
+        noise = robust_std(bend.ravel()) if bend.size else 0.0
+        limit = max(REST_RATE * self.working_rate, 4.0 * noise / math.sqrt(width), 1e-9)
+        still = (np.abs(mean) <= limit).all(axis=1)
+        still &= np.abs(rate).max(axis=1) <= max(limit, 5.0 * noise)
+        still[: width - 1] = False
+        return _after(still, self.period, SHORTEST_REST)
+
+    @property
+    def steady(self) -> Mask:
+        """Rows in which the rover moves and its speed has not changed for a while."""
+        rate = self.common_rate
+        width = max(round(SETTLING / max(self.period, 1e-3)), 1)
+        change = np.zeros_like(rate)
+        if rate.size > width:
+            change[width:] = np.abs(rate[width:] - rate[:-width])
+        calm = change < 0.15 * max(self.working_rate, 1e-9)
+        return self.moving & _after(calm, self.period, SETTLING)
+
+    @property
+    def rim(self) -> FloatArray:
+        """Mean rim speed of the wheels (k,) [m/s]; with radius 1 where it is not known."""
+        radius = np.where(np.isfinite(self.facts.radius), self.facts.radius, 1.0)
+        speed = self.rate * radius
+        known = np.isfinite(speed)
+        return np.where(known, speed, 0.0).sum(axis=1) / np.maximum(known.sum(axis=1), 1)
+
+    @property
+    def side_difference(self) -> FloatArray:
+        """Mean rim speed right minus left (k,) [m/s]; nan where the sides are not known."""
+        radius = np.where(np.isfinite(self.facts.radius), self.facts.radius, 1.0)
+        speed = self.rate * radius
+        right, left = self.facts.side < 0, self.facts.side > 0
+        if not right.any() or not left.any():
+            return np.full(self.time.size, np.nan)
+        return _nanmean(speed[:, right]) - _nanmean(speed[:, left])
+
+    @property
+    def straight(self) -> Mask:
+        """Steady rows without a turn, neither by the gyro nor by the wheels."""
+        rim = np.abs(self.rim)
+        rows = self.steady.copy()
+        difference = self.side_difference
+        if np.isfinite(difference).any():
+            width = max(round(SETTLING / max(self.period, 1e-3)), 1)
+            smooth = np.convolve(difference, np.ones(width) / width, mode='same')
+            rows &= np.abs(smooth) < STRAIGHT_SHARE * rim
+        if self.gyro is not None and self.facts.known:
+            yaw = np.abs(self.gyro[:, 2] - np.median(self.gyro[:, 2]))
+            rows &= yaw * float(np.abs(self.facts.lateral).max()) < STRAIGHT_SHARE * rim
+        return rows
+
+    @property
+    def turning(self) -> Mask:
+        """Rows in which the gyro or the wheels see a turn."""
+        if self.gyro is None:
+            return np.zeros(self.time.size, dtype=bool)
+        rate = np.abs(self.gyro[:, 2])
+        return np.asarray(self.moving & (rate > 0.3 * np.quantile(rate, 0.98)))
+
+    def reference(self) -> VelocitySeries | None:
+        """Return the slip-free velocity."""
+        return self.recording.reference
+
+    def rim_at(self, stamp: NDArray[np.int64], values: FloatArray, half: float) -> FloatArray:
+        """Return means of (k,) values within ``half`` [s] around stamps [ns]; nan for none."""
+        at = (stamp - self.origin) * 1e-9
+        first = np.searchsorted(self.time, at - half)
+        last = np.searchsorted(self.time, at + half, side='right')
+        total = np.concatenate([[0.0], np.cumsum(values)])
+        count = last - first
+        mean = (total[last] - total[first]) / np.maximum(count, 1)
+        return np.where(count > 0, mean, np.nan)
+
+    @property
+    def origin(self) -> int:
+        """Stamp of time 0 [ns]."""
+        joints = self.recording.joints
+        assert joints is not None
+        return int(joints.stamp[joints.stamp > 0].min())
+
+    def with_rate(self, rate: FloatArray, torque: FloatArray | None = None) -> Evidence:
+        """Return the evidence with other wheel rates (after something was mended)."""
+        return replace(self, rate=rate, torque=self.torque if torque is None else torque)
+
+
+def gather(recording: Recording, facts: RoverFacts, rotation: FloatArray) -> Evidence | None:
+    """Return the evidence of a recording; None where no wheel of the rover is in it."""
+    joints = recording.joints
+    if joints is None or not joints.stamp.size:
+        return None
+    usable = np.flatnonzero(joints.stamp > 0)
+    if not usable.size:
+        return None
+    _, first = np.unique(joints.stamp[usable], return_index=True)
+    rows = usable[first]
+    time = (joints.stamp[rows] - joints.stamp[rows[0]]) * 1e-9
+    rate = np.full((time.size, len(facts.names)), np.nan)
+    torque = np.full_like(rate, np.nan)
+    for index, name in enumerate(facts.names):
+        if name in joints.names:
+            column = joints.names.index(name)
+            rate[:, index] = facts.direction[index] * joints.rate[rows, column]
+            torque[:, index] = facts.direction[index] * joints.torque[rows, column]
+    force = gyro = None
+    imu = recording.imu
+    if imu is not None and imu.stamp.size > 1 and time.size > 1:
+        at = (imu.stamp - joints.stamp[rows[0]]) * 1e-9
+        width = float(np.median(np.diff(time)))
+        force = averaged(at, np.nan_to_num(imu.force) @ rotation.T, time, width)
+        gyro = averaged(at, np.nan_to_num(imu.rate) @ rotation.T, time, width)
+    return Evidence(recording, facts, time, rate, torque, force, gyro, rotation)
+
+
+def _after(condition: Mask, period: float, duration: float) -> Mask:
+    """Return where a condition has held for some time [s]."""
+    width = max(math.ceil(duration / max(period, 1e-3)), 1)
+    total = np.concatenate([[0], np.cumsum(condition)])
+    held = np.zeros(condition.size, dtype=bool)
+    if condition.size >= width:
+        held[width - 1 :] = total[width:] - total[:-width] == width
+    return held
+
+
+def _nanmedian(values: FloatArray) -> FloatArray:
+    known = np.isfinite(values).any(axis=1)
+    result = np.zeros(values.shape[0])
+    if known.any():
+        result[known] = np.nanmedian(values[known], axis=1)
+    return result
+
+
+def _nanmean(values: FloatArray) -> FloatArray:
+    known = np.isfinite(values)
+    return np.where(known, values, 0.0).sum(axis=1) / np.maximum(known.sum(axis=1), 1)

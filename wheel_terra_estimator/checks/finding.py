@@ -1,0 +1,113 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""What a check says: a finding with its cure, or why it could not look."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, field
+from typing import Any, TypeAlias
+
+KINDS = (
+    'sign',
+    'swapped_sides',
+    'exchanged_wheels',
+    'missing_wheel',
+    'unknown_name',
+    'unit',
+    'mounting',
+    'gravity',
+    'placeholder',
+    'zero',
+    'gain',
+    'delay',
+    'noise',
+    'frozen',
+    'drop_outs',
+    'order',
+    'radius',
+    'track',
+    'mass',
+    'covariance',
+    'jumps',
+)
+"""All kinds of findings."""
+
+SPOILS_SLIP = frozenset({'sign', 'swapped_sides', 'exchanged_wheels', 'unit', 'frozen', 'mounting'})
+"""Kinds that make slip meaningless."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Something wrong, and what mends it.
+
+    Attributes
+    ----------
+    kind : str
+        One of ``KINDS``.
+    topic : str
+        Topic in the recording.
+    wheel : str or None
+        Name of the wheel concerned; None: all, or none in particular.
+    parameter : str or None
+        Key of the rover file that mends it.
+    value, std : float or None
+        Its value as it stands in a file, with one standard deviation.
+    confidence : float
+        Probability that it is so, from the scatter of the evidence.
+    words : str
+        What was seen, with figures.
+    cure : str
+        What to do, ready to copy where a parameter or a remap does it.
+    """
+
+    kind: str
+    topic: str
+    wheel: str | None
+    parameter: str | None
+    value: float | None
+    std: float | None
+    confidence: float
+    words: str
+    cure: str
+
+    def __str__(self) -> str:
+        wheel = f' {self.wheel}:' if self.wheel else ''
+        return (
+            f'{self.kind} ({100 * self.confidence:.0f} %), {self.topic}:{wheel} {self.words}'
+            f' -> {self.cure}'
+        )
+
+
+@dataclass(frozen=True)
+class NotChecked:
+    """A kind of fault that this recording cannot tell, and why (with what to drive instead)."""
+
+    kind: str
+    reason: str
+
+
+Outcome: TypeAlias = 'Finding | NotChecked'
+
+
+@dataclass
+class CheckReport:
+    """Findings, what was not checked, and the figures behind both."""
+
+    findings: list[Finding] = field(default_factory=list)
+    not_checked: list[NotChecked] = field(default_factory=list)
+    figures: dict[str, Any] = field(default_factory=dict)
+
+    def take(self, outcomes: list[Outcome]) -> list[Finding]:
+        """Sort outcomes in; return the findings among them."""
+        found = [o for o in outcomes if isinstance(o, Finding)]
+        self.findings += found
+        self.not_checked += [o for o in outcomes if isinstance(o, NotChecked)]
+        return found
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return what ``check --json`` prints."""
+        return {
+            'findings': [asdict(finding) for finding in self.findings],
+            'not_checked': [asdict(entry) for entry in self.not_checked],
+            'figures': self.figures,
+        }

@@ -1,0 +1,209 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Figures of the rover that a drive tells: rolling radius, track."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wheel_terra_estimator.checks.evidence import Evidence
+from wheel_terra_estimator.checks.finding import Finding, NotChecked, Outcome
+from wheel_terra_estimator.checks.statistics import (
+    Estimate,
+    block_fit,
+    confidence,
+    correlation,
+)
+from wheel_terra_estimator.checks.torque import thrust
+
+FloatArray = NDArray[np.float64]
+
+LEAST_RADIUS_ERROR = 0.025
+"""Share by which a radius is wrong before it is a finding [-]."""
+RADIUS_SIGMAS = 4.0
+SLIP_MODEL_ERROR = 0.3
+"""Uncertainty of the slip that is taken off by its traction, as a share of it."""
+FIRM_SLIP = 0.12
+"""Slip at the usual traction above which the ground is too soft to tell the radius [-]."""
+SLOPE_OF_SLIP = (0.2, 0.2)
+"""Slip over traction of firm ground where the drive does not tell it: mean, deviation [-]."""
+LEAST_REFERENCES = 12
+LEAST_TRACK_ERROR = 0.08
+CLEAR_TURN = 0.95
+"""Correlation of gyro and difference of the sides that a turn has [-]."""
+LEAST_YAW_RATE = 0.02  # [rad/s]
+SKID_TRACK = 0.9
+"""Effective over geometric track below which the rover file's track is too large [-]: skidding
+makes it larger, never smaller."""
+
+
+def radius_ratio(evidence: Evidence, figures: dict[str, Any]) -> Estimate | NotChecked:
+    """Return true over configured radius from straight, steady, firm stretches.
+
+    The reference's velocity is ``v = q (1 - k m) rim`` with the traction m = sum of T/r over the
+    weight: q is the ratio of the radii, k the slope of slip over traction. Without torque a ratio
+    below 1 cannot be told from slip.
+    """
+    reference, facts = evidence.reference(), evidence.facts
+    if reference is None:
+        return NotChecked('radius', 'no reference velocity in it')
+    if not facts.known:
+        return NotChecked('radius', 'no rover file')
+    half = 0.25
+    rim = evidence.rim_at(reference.stamp, evidence.rim, half)
+    straight = evidence.rim_at(reference.stamp, evidence.straight.astype(float), half)
+    forward = reference.velocity[:, 0]
+    rows = np.isfinite(rim) & (straight > 0.99) & np.isfinite(forward)
+    if rows.sum() < LEAST_REFERENCES:
+        return NotChecked('radius', 'no straight, steady stretch with a reference in it')
+    rim, forward = rim[rows], forward[rows]
+    plain = block_fit(rim[:, None], forward)[0]
+    figures['rover.speed_over_rim_speed'] = round(plain.value, 4)
+    if not np.isfinite(evidence.torque).any() or not np.any(np.nan_to_num(evidence.torque)):
+        return _without_torque(evidence, plain)
+    traction = evidence.rim_at(reference.stamp, np.nan_to_num(thrust(evidence)), half)[rows]
+    traction = traction * np.sign(rim) / (facts.mass * facts.gravity)
+    return _with_torque(rim, forward, traction, plain, figures)
+
+
+def _with_torque(
+    rim: FloatArray,
+    forward: FloatArray,
+    traction: FloatArray,
+    plain: Estimate,
+    figures: dict[str, Any],
+) -> Estimate | NotChecked:
+    if float(np.median(np.abs(traction))) > 0.9:
+        return NotChecked('radius', 'torques have no credible scale')
+    both = block_fit(np.column_stack([rim, rim * traction]), forward)
+    # What firm ground does elsewhere is one more observation of k.
+    told, usual = Estimate(-both[1].value / both[0].value, both[1].std), SLOPE_OF_SLIP
+    weight = usual[1] ** 2 / (usual[1] ** 2 + told.std**2)
+    slope = weight * told.value + (1.0 - weight) * usual[0]
+    slope_std = math.sqrt(weight) * told.std
+    middle = float(np.median(traction))
+    slip = slope * middle
+    figures['rover.slip_of_ground'] = round(slip, 4)
+    if slip > FIRM_SLIP:
+        return NotChecked('radius', f'soft ground (slip about {slip:.2f}); drive on firm ground')
+    value = plain.value / (1.0 - slip)
+    nearest = float(np.min(np.abs(np.quantile(traction, [0.05, 0.25, 0.5]))))
+    std = math.hypot(plain.std, slope_std * middle, SLIP_MODEL_ERROR * slope * nearest)
+    if std > 0.05:
+        return NotChecked('radius', 'slip not told from radius; drive up and down a firm slope')
+    return Estimate(value, std)
+
+
+def _without_torque(evidence: Evidence, plain: Estimate) -> Estimate | NotChecked:
+    if plain.value > 1.0:
+        return plain  # nothing but a larger radius makes a rover outrun its rolling wheels
+    if plain.value > 1.0 - LEAST_RADIUS_ERROR:
+        return Estimate(plain.value, math.hypot(plain.std, 0.5 * LEAST_RADIUS_ERROR))
+    return NotChecked(
+        'radius', f'no torque: a speed of {plain.value:.3f} of the rims may be slip; drive on firm'
+    )
+
+
+def check_radius(evidence: Evidence, figures: dict[str, Any]) -> list[Outcome]:
+    """Return a rolling radius that is not the one of the rover file."""
+    ratio = radius_ratio(evidence, figures)
+    if isinstance(ratio, NotChecked):
+        return [ratio]
+    facts, joints = evidence.facts, evidence.recording.joints
+    assert joints is not None and facts.configuration is not None
+    rolling = float(np.mean(facts.radius)) * ratio.value
+    figures['rover.rolling_radius_m'] = round(rolling, 5)
+    figures['rover.rolling_radius_std_m'] = round(float(np.mean(facts.radius)) * ratio.std, 5)
+    sigmas = ratio.sigmas_from(1.0)
+    if abs(ratio.value - 1.0) < LEAST_RADIUS_ERROR or sigmas < RADIUS_SIGMAS:
+        return []
+    rims = facts.radius * ratio.value - (facts.radius - facts.configuration.wheels.radius)
+    listed = ', '.join(f'{radius:.4f}' for radius in rims)
+    return [
+        Finding(
+            'radius',
+            joints.topic,
+            None,
+            'wheels.radius',
+            round(float(np.mean(rims)), 5),
+            round(float(np.mean(facts.radius)) * ratio.std, 5),
+            confidence(sigmas),
+            f'the rover runs {ratio.value:.3f} +- {ratio.std:.3f} of what its rims say on the '
+            'straight',
+            f'wheels.radius: [{listed}]',
+        )
+    ]
+
+
+def skids(evidence: Evidence) -> bool:
+    """Return whether the rover has to skid to turn: wheels in several rows that do not steer."""
+    configuration = evidence.facts.configuration
+    if configuration is None:
+        return True
+    wheels = configuration.wheels
+    steered = any(getattr(wheels, 'steering_joints', ()) or ())
+    track = float(np.ptp(wheels.y))
+    return not steered and float(np.ptp(wheels.x)) > 0.3 * track
+
+
+def track_ratio(evidence: Evidence) -> Estimate | NotChecked:
+    """Return effective over configured track from the gyro and the difference of the sides."""
+    facts, difference = evidence.facts, evidence.side_difference
+    if evidence.gyro is None or not facts.known or not facts.has_sides():
+        return NotChecked('track', 'no IMU, or sides not known')
+    yaw = evidence.gyro[:, 2]
+    rows = evidence.turning & np.isfinite(difference)
+    bias = np.median(yaw[evidence.at_rest]) if evidence.at_rest.sum() > 20 else 0.0
+    clear = rows.sum() > 60 and correlation((yaw - bias)[rows], difference[rows]) > CLEAR_TURN
+    if not clear or float(np.quantile(np.abs(yaw), 0.95)) < LEAST_YAW_RATE:
+        return NotChecked('track', 'no clear turn in it; drive a circle both ways')
+    track = facts.lateral[facts.side > 0].mean() - facts.lateral[facts.side < 0].mean()
+    slope = block_fit((yaw[rows] - bias)[:, None], difference[rows])[0]
+    return Estimate(float(slope.value / track), float(slope.std / abs(track)))
+
+
+def check_track(evidence: Evidence, figures: dict[str, Any]) -> list[Outcome]:
+    """Return a track that the turns contradict."""
+    ratio = track_ratio(evidence)
+    if isinstance(ratio, NotChecked):
+        return [ratio]
+    figures['rover.effective_over_stated_track'] = round(float(ratio.value), 3)
+    figures['rover.effective_over_stated_track_std'] = round(float(ratio.std), 3)
+    skidding = skids(evidence)
+    reference = evidence.reference()
+    slip_free = reference is not None and 'rover.speed_over_rim_speed' in figures
+    if skidding and ratio.value > SKID_TRACK:
+        return [
+            NotChecked(
+                'track',
+                f'the wheels skid in turns (effective track {ratio.value:.2f} of the stated one): '
+                'measure it with a tape',
+            )
+        ]
+    if ratio.sigmas_from(1.0) < 4.0 or abs(ratio.value - 1.0) < LEAST_TRACK_ERROR:
+        return []
+    if not slip_free and not skidding:
+        ratio = Estimate(ratio.value, math.hypot(ratio.std, 0.03))
+    joints = evidence.recording.joints
+    assert joints is not None
+    facts = evidence.facts
+    track = float(facts.lateral[facts.side > 0].mean() - facts.lateral[facts.side < 0].mean())
+    listed = ', '.join(f'{y * ratio.value:.3f}' for y in facts.lateral)
+    return [
+        Finding(
+            'track',
+            joints.topic,
+            None,
+            'wheels.y',
+            round(track * ratio.value, 4),
+            round(track * ratio.std, 4),
+            confidence(ratio.sigmas_from(1.0)),
+            f'turns need a track of {ratio.value:.3f} +- {ratio.std:.3f} of the stated '
+            f'{track:.3f} m',
+            f'wheels.y: [{listed}]',
+        )
+    ]

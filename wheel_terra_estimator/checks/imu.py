@@ -1,0 +1,551 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""The IMU by itself: units, gravity, placeholders, mounting, zeros, noise.
+
+Convention: specific force, +g on z at rest (REP 145), in a frame that the rover file's mounting
+turns into ``base_link``.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wheel_terra_estimator.checks.evidence import Evidence
+from wheel_terra_estimator.checks.finding import Finding, NotChecked, Outcome
+from wheel_terra_estimator.checks.rover_facts import RoverFacts
+from wheel_terra_estimator.checks.series import ImuSeries, Recording
+from wheel_terra_estimator.checks.statistics import (
+    Estimate,
+    block_fit,
+    confidence,
+    correlation,
+    robust_std,
+)
+
+FloatArray = NDArray[np.float64]
+
+STANDARD_GRAVITY = 9.80665  # [m/s^2]
+GRAVITY_TOLERANCE = 0.1
+"""Share by which the mean specific force may differ from gravity (slopes, bias, vibration)."""
+GRAVITIES = {'the Moon': 1.62, 'Mars': 3.71, 'the Earth': 9.81}  # [m/s^2]
+UPSIDE_TILT = math.radians(35.0)
+"""Mean tilt that no rover drives at [rad]: the mounting is wrong, whatever the slope."""
+LEAST_MOUNTING = math.radians(1.5)
+"""Mounting errors below this [rad] are left to calibration."""
+LEAST_TURN = 4.5
+"""Heading that a drive has to cover for the mounting to be told from a slope [rad]."""
+FLAT_TURN_STD = math.radians(0.1)
+"""Part of the mounting that unevenness of the ground leaves open [rad]."""
+NOISE_FACTOR = 4.0
+"""Noise above so many times the stated one is a finding."""
+BIAS_FACTOR = 6.0
+"""A bias above so many stated deviations is a finding."""
+LEAST_GYRO_BIAS = 0.004  # [rad/s]
+FROZEN_SHARE = 0.3
+"""Share of messages that repeat the one before."""
+
+
+@dataclass(frozen=True)
+class ImuState:
+    """The IMU after what was found has been mended: what the later checks use."""
+
+    recording: Recording
+    rotation: FloatArray
+    usable_force: bool = True
+    usable_gyro: bool = True
+
+
+def check_imu(
+    recording: Recording, facts: RoverFacts, rotation: FloatArray, figures: dict[str, Any]
+) -> tuple[list[Outcome], ImuState]:
+    """Return what the IMU says against itself, and the recording with that mended."""
+    imu = recording.imu
+    state = ImuState(recording, rotation)
+    if imu is None or imu.stamp.size < 20:
+        return [
+            NotChecked(kind, 'no IMU in the recording') for kind in ('mounting', 'gravity')
+        ], replace(state, usable_force=False, usable_gyro=False)
+    found: list[Outcome] = []
+    placeholders, state = _placeholders(imu, state)
+    found += placeholders
+    found += _frozen(imu, state)
+    if state.usable_force:
+        outcomes, state = _gravity(facts, state, figures)
+        found += outcomes
+    imu = state.recording.imu
+    assert imu is not None
+    if state.usable_gyro:
+        outcomes, state = _against_orientation(imu, state, figures)
+        found += outcomes
+    return found, state
+
+
+def _placeholders(imu: ImuSeries, state: ImuState) -> tuple[list[Outcome], ImuState]:
+    found: list[Outcome] = []
+    words = {'force': 'linear_acceleration', 'rate': 'angular_velocity'}
+    for name, field in words.items():
+        values = getattr(imu, name)
+        if not np.any(np.nan_to_num(values)):
+            found.append(
+                Finding(
+                    'placeholder',
+                    imu.topic,
+                    None,
+                    None,
+                    None,
+                    None,
+                    0.999,
+                    f'{field} is 0 in every message',
+                    f'fill {field}, or say that there is none: {field}_covariance[0] = -1',
+                )
+            )
+            blind = 'usable_force' if name == 'force' else 'usable_gyro'
+            state = replace(state, **{blind: False})  # type: ignore[arg-type]
+    orientation = imu.orientation[np.isfinite(imu.orientation).all(axis=1)]
+    if orientation.shape[0] > 20:
+        moved = np.ptp(orientation, axis=0).max()
+        norm = np.linalg.norm(orientation, axis=1)
+        if np.median(norm) < 0.5 or (moved == 0.0 and np.ptp(imu.rate, axis=0).max() > 0.0):
+            shown = ', '.join(f'{value:g}' for value in orientation[0])
+            found.append(
+                Finding(
+                    'placeholder',
+                    imu.topic,
+                    None,
+                    None,
+                    None,
+                    None,
+                    0.999,
+                    f'orientation is ({shown}) in every message',
+                    'say that there is none: orientation_covariance[0] = -1 (REP 145)',
+                )
+            )
+            blank = np.full_like(imu.orientation, np.nan)
+            state = replace(
+                state, recording=replace(state.recording, imu=replace(imu, orientation=blank))
+            )
+    return found, state
+
+
+def _frozen(imu: ImuSeries, state: ImuState) -> list[Outcome]:
+    rows = np.hstack([imu.force, imu.rate])
+    same = (np.diff(rows, axis=0) == 0.0).all(axis=1)
+    if not state.usable_force or not state.usable_gyro or np.mean(same) < FROZEN_SHARE:
+        return []
+    return [
+        Finding(
+            'frozen',
+            imu.topic,
+            None,
+            None,
+            None,
+            None,
+            0.99,
+            f'{100 * np.mean(same):.0f} % of the messages repeat the one before',
+            'publish a message when the IMU has measured, not on a timer',
+        )
+    ]
+
+
+def _gravity(
+    facts: RoverFacts, state: ImuState, figures: dict[str, Any]
+) -> tuple[list[Outcome], ImuState]:
+    imu = state.recording.imu
+    assert imu is not None
+    size = float(np.linalg.norm(np.median(imu.force, axis=0)))
+    typical = float(np.median(np.linalg.norm(imu.force, axis=1)))
+    figures['imu.mean_specific_force_m_s2'] = round(size, 4)
+    gravity = facts.gravity
+    if abs(size / gravity - 1.0) <= GRAVITY_TOLERANCE:
+        return [], state
+
+    def found(kind: str, parameter: str | None, value: float, words: str, cure: str) -> Outcome:
+        return Finding(
+            kind,
+            imu.topic,
+            None,
+            parameter,
+            value,
+            None,
+            0.98,
+            f'mean specific force {size:.3g} m/s^2 where gravity is {gravity:.4g}: {words}',
+            cure,
+        )
+
+    if size < 0.3 * min(gravity, STANDARD_GRAVITY) and abs(size - 1.0) > 0.12:
+        outcome = found(
+            'gravity',
+            None,
+            gravity,
+            f'gravity was taken off (what is left: {typical:.2g})',
+            'publish the specific force with gravity (+g on z at rest, REP 145), '
+            'such as imu/data_raw in place of a linear acceleration',
+        )
+        return [outcome], replace(state, usable_force=False)
+    for unit, factor in (('g', STANDARD_GRAVITY), ('mg', STANDARD_GRAVITY / 1000.0)):
+        if abs(size * factor / gravity - 1.0) <= 0.12:
+            outcome = found(
+                'unit',
+                None,
+                factor,
+                f'linear_acceleration is in {unit}',
+                f'multiply linear_acceleration by {factor:.5g} in the driver (m/s^2, REP 103)',
+            )
+            mended = replace(imu, force=imu.force * factor)
+            return [outcome], replace(state, recording=replace(state.recording, imu=mended))
+    for place, there in GRAVITIES.items():
+        if abs(size / there - 1.0) <= GRAVITY_TOLERANCE:
+            outcome = found(
+                'gravity', 'rover.gravity', there, f'this is {place}', f'rover.gravity: {there:g}'
+            )
+            return [outcome], state
+    gain = gravity / size
+    outcome = found(
+        'gain',
+        None,
+        gain,
+        'the accelerometer has another scale',
+        f'multiply linear_acceleration by {gain:.4g} in the driver, or state rover.gravity',
+    )
+    mended = replace(imu, force=imu.force * gain)
+    return [outcome], replace(state, recording=replace(state.recording, imu=mended))
+
+
+def _against_orientation(
+    imu: ImuSeries, state: ImuState, figures: dict[str, Any]
+) -> tuple[list[Outcome], ImuState]:
+    """Compare the gyro with the turning of the orientation, axis by axis."""
+    time, q = imu.stamp * 1e-9, imu.orientation
+    if not np.isfinite(q).all(axis=1).mean() > 0.9 or imu.stamp.size < 200:
+        return [], state
+    step = max(round(0.5 / max(float(np.median(np.diff(time))), 1e-3)), 1)
+    before, after = q[:-step], q[step:]
+    dt = time[step:] - time[:-step]
+    good = np.isfinite(before).all(axis=1) & np.isfinite(after).all(axis=1) & (dt > 0.0)
+    turned = _rotation_between(before[good], after[good]) / dt[good, None]
+    total = np.vstack([np.zeros(3), np.cumsum(imu.rate, axis=0)])
+    mean = ((total[step:] - total[:-step]) / step)[: good.size][good]
+    found: list[Outcome] = []
+    rate = imu.rate.copy()
+    for axis, name in enumerate('xyz'):
+        seen, told = turned[:, axis], mean[:, axis] - np.median(mean[:, axis])
+        fit = correlation(seen - np.median(seen), told)
+        size = robust_std(seen) if robust_std(seen) > 0 else float(np.std(seen))
+        if abs(fit) < 0.6 or float(np.std(seen)) < 0.01 or size == 0.0:
+            continue
+        gain = float(np.sum(told * seen) / np.sum(seen * seen))
+        figures[f'imu.gyro_over_orientation_{name}'] = round(gain, 3)
+        if fit < 0.0:
+            rate[:, axis] *= -1.0
+            found.append(
+                Finding(
+                    'sign',
+                    imu.topic,
+                    None,
+                    None,
+                    -1.0,
+                    None,
+                    confidence(6.0 * abs(fit)),
+                    f'angular_velocity.{name} turns against the orientation',
+                    f'negate angular_velocity.{name} in the driver (no mounting angle does that)',
+                )
+            )
+        if 30.0 < abs(gain) < 110.0:
+            rate[:, axis] *= math.pi / 180.0
+            if not any(o.kind == 'unit' for o in found):
+                found.append(_degrees(imu.topic, f'{abs(gain):.0f} times as fast as orientation'))
+    if not found:
+        return [], state
+    mended = replace(imu, rate=np.radians(imu.rate) if _all_degrees(found) else rate)
+    if _all_degrees(found) and any(o.kind == 'sign' for o in found):
+        mended = replace(imu, rate=rate)
+    return found, replace(state, recording=replace(state.recording, imu=mended))
+
+
+def _all_degrees(found: list[Outcome]) -> bool:
+    return any(o.kind == 'unit' for o in found)
+
+
+def _degrees(topic: str, words: str) -> Finding:
+    return Finding(
+        'unit',
+        topic,
+        None,
+        None,
+        math.pi / 180.0,
+        None,
+        0.99,
+        f'angular_velocity is in degrees per second ({words})',
+        'multiply angular_velocity by 0.0174533 in the driver (rad/s, REP 103)',
+    )
+
+
+def _rotation_between(before: FloatArray, after: FloatArray) -> FloatArray:
+    """Return the rotation vectors (k, 3) from one attitude to the next, in the body's frame."""
+    bx, by, bz, bw = before.T
+    ax, ay, az, aw = after.T
+    vector = np.column_stack(
+        [
+            bw * ax - bx * aw - by * az + bz * ay,
+            bw * ay + bx * az - by * aw - bz * ax,
+            bw * az - bx * ay + by * ax - bz * aw,
+        ]
+    )
+    scalar = bw * aw + bx * ax + by * ay + bz * az
+    sign = np.where(scalar < 0.0, -1.0, 1.0)
+    return 2.0 * vector * sign[:, None]
+
+
+# With the wheels ---------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Mounting:
+    """What is left of the mounting: small tilt about x and y [rad], each with its deviation."""
+
+    roll: Estimate
+    pitch: Estimate
+    turn: float  # heading covered [rad]
+
+
+def gross_tilt(evidence: Evidence) -> FloatArray | None:
+    """Return the rotation that brings the mean specific force upright, if it is far from it."""
+    if evidence.force is None:
+        return None
+    up = np.median(evidence.force, axis=0)
+    up = up / max(float(np.linalg.norm(up)), 1e-9)
+    if math.acos(float(np.clip(up[2], -1.0, 1.0))) < UPSIDE_TILT:
+        return None
+    return _upright(up)
+
+
+def _upright(up: FloatArray) -> FloatArray:
+    """Return a rotation that turns ``up`` into z; half a turn is one about x."""
+    axis = np.cross(up, [0.0, 0.0, 1.0])
+    sine = float(np.linalg.norm(axis))
+    if sine < 0.15 and up[2] < 0.0:
+        return np.diag([1.0, -1.0, -1.0])
+    axis = axis / max(sine, 1e-9)
+    angle = math.atan2(sine, float(up[2]))
+    cross = np.array([[0.0, -axis[2], axis[1]], [axis[2], 0.0, -axis[0]], [-axis[1], axis[0], 0.0]])
+    return np.asarray(np.eye(3) + math.sin(angle) * cross + (1.0 - math.cos(angle)) * cross @ cross)
+
+
+def gyro_bias(evidence: Evidence) -> tuple[FloatArray, FloatArray, str]:
+    """Return the gyro's bias (3,) [rad/s], its deviation, and where it was seen."""
+    assert evidence.gyro is not None
+    rest = evidence.at_rest
+    rows = evidence.gyro[rest]
+    if rest.sum() * evidence.period >= 3.0:
+        spread = np.array([robust_std(column) for column in rows.T])
+        return np.median(rows, axis=0), spread / math.sqrt(max(rest.sum() / 4.0, 1.0)), 'at rest'
+    nothing = np.full(3, np.nan)
+    return np.zeros(3), nothing, 'nowhere: no standstill'
+
+
+def small_tilt(evidence: Evidence) -> Mounting | None:
+    """Return the tilt of the IMU against the chassis from full turns; None where there are none.
+
+    On a plane the specific force at low speed is ``g (m + R(-psi) s)``: the mounting m stays with
+    the rover, the slope s turns with the heading psi.
+    """
+    if evidence.force is None or evidence.gyro is None:
+        return None
+    bias, _, _ = gyro_bias(evidence)
+    yaw = evidence.gyro[:, 2] - bias[2]
+    step = np.diff(evidence.time, prepend=evidence.time[0])
+    heading = np.cumsum(yaw * np.minimum(step, 1.0))
+    width = max(round(2.0 / evidence.period), 1)
+    smooth = np.convolve(yaw, np.ones(width) / width, mode='same')
+    turning = np.abs(smooth) > 0.5 * float(np.quantile(np.abs(smooth), 0.97))
+    covered = float(np.sum(np.abs(yaw[turning]) * np.minimum(step[turning], 1.0)))
+    if covered < LEAST_TURN or turning.sum() < 100 or _evenness(heading[turning]) > 0.6:
+        return None
+    psi, force = heading[turning], evidence.force[turning]
+    zero, one = np.zeros(psi.size), np.ones(psi.size)
+    design = np.empty((2 * psi.size, 4))
+    design[0::2] = np.column_stack([one, zero, np.cos(psi), np.sin(psi)])
+    design[1::2] = np.column_stack([zero, one, -np.sin(psi), np.cos(psi)])
+    upright = float(np.median(force[:, 2]))
+    target = np.empty(2 * psi.size)
+    target[0::2] = force[:, 0] / upright
+    target[1::2] = force[:, 1] / upright
+    along, across = block_fit(design, target)[:2]
+    floor = FLAT_TURN_STD
+    if evidence.facts.configuration is not None:
+        sensors = evidence.facts.configuration.sensors
+        floor = math.hypot(floor, sensors.specific_force_bias_std / evidence.facts.gravity)
+    # A sensor whose x axis points up by p reads +g sin p on x; one rolled by q reads -g sin q on y.
+    return Mounting(
+        roll=Estimate(across.value, math.hypot(across.std, floor)),
+        pitch=Estimate(-along.value, math.hypot(along.std, floor)),
+        turn=covered,
+    )
+
+
+def _evenness(heading: FloatArray) -> float:
+    """Return the length of the mean direction: 0 where all headings occur alike."""
+    return float(np.hypot(np.cos(heading).mean(), np.sin(heading).mean()))
+
+
+def yaw_mounting(evidence: Evidence) -> Estimate | None:
+    """Return the yaw of the IMU against the chassis from starts and stops and from curves [rad]."""
+    if evidence.force is None or evidence.gyro is None or evidence.time.size < 100:
+        return None
+    period = evidence.period
+    width = max(round(0.4 / period), 1)
+    kernel = np.ones(width) / width
+    speed = np.convolve(evidence.rim, kernel, mode='same')
+    change = np.gradient(speed, period)
+    curve = speed * np.convolve(evidence.gyro[:, 2], kernel, mode='same')
+    motion = _without_drift(change + 1j * curve, period)
+    horizontal = np.array(
+        [np.convolve(evidence.force[:, axis], kernel, mode='same') for axis in (0, 1)]
+    )
+    seen = _without_drift(horizontal[0] + 1j * horizontal[1], period)
+    blocks = np.array_split(np.arange(seen.size), 10)
+    parts = np.array([np.vdot(motion[b], seen[b]) for b in blocks])
+    energy = float(np.sum(np.abs(motion) ** 2))
+    total = parts.sum()
+    spread = np.sqrt(np.sum(np.abs(parts - total / parts.size) ** 2))
+    if energy <= 0.0 or not 0.5 < abs(total) / energy < 2.0 or abs(total) < 3.0 * spread:
+        return None
+    return Estimate(float(np.angle(total)), float(spread / abs(total)))
+
+
+def _without_drift(values: NDArray[np.complex128], period: float) -> NDArray[np.complex128]:
+    """Return values less their mean over 6 s: slopes change more slowly than speeds."""
+    width = max(round(6.0 / period), 3)
+    kernel = np.ones(width) / width
+    return np.asarray(values - np.convolve(values, kernel, mode='same'))
+
+
+def check_mounting(evidence: Evidence, figures: dict[str, Any]) -> tuple[list[Outcome], FloatArray]:
+    """Return wrong mounting angles and the rotation into ``base_link`` that they should give."""
+    imu = evidence.recording.imu
+    rotation = evidence.rotation
+    if imu is None or evidence.force is None:
+        return [], rotation
+    fix = gross_tilt(evidence)
+    if fix is not None:
+        rotation = fix @ rotation
+        words = f'{_tilt_in_words(evidence)}: the IMU is mounted upside down or on its side'
+        return [mounting_finding(evidence, rotation, 0.3, 0.999, words)], rotation
+    tilt = small_tilt(evidence)
+    if tilt is None:
+        reason = 'no full circle in it: mounting not told from slope; drive a circle both ways'
+        return [NotChecked('mounting', reason)], rotation
+    figures['imu.tilt_roll_deg'] = round(math.degrees(tilt.roll.value), 3)
+    figures['imu.tilt_pitch_deg'] = round(math.degrees(tilt.pitch.value), 3)
+    figures['imu.tilt_std_deg'] = round(math.degrees(max(tilt.roll.std, tilt.pitch.std)), 3)
+    sigmas = max(tilt.roll.sigmas_from(0.0), tilt.pitch.sigmas_from(0.0))
+    size = math.hypot(tilt.roll.value, tilt.pitch.value)
+    if size < LEAST_MOUNTING or sigmas < 4.0:
+        return [], rotation
+    rotation = tilt_rotation(tilt.roll.value, tilt.pitch.value) @ rotation
+    words = f'its axes lie {math.degrees(size):.2f} degrees off the chassis, seen in full turns'
+    std = math.degrees(max(tilt.roll.std, tilt.pitch.std))
+    return [mounting_finding(evidence, rotation, std, confidence(sigmas), words)], rotation
+
+
+def tilt_rotation(roll: float, pitch: float) -> FloatArray:
+    """Return the small rotation about x, then y, that takes a tilt off."""
+    cr, sr, cp, sp = math.cos(roll), math.sin(roll), math.cos(pitch), math.sin(pitch)
+    about_x = np.array([[1.0, 0.0, 0.0], [0.0, cr, -sr], [0.0, sr, cr]])
+    about_y = np.array([[cp, 0.0, sp], [0.0, 1.0, 0.0], [-sp, 0.0, cp]])
+    return about_y @ about_x
+
+
+def _tilt_in_words(evidence: Evidence) -> str:
+    assert evidence.force is not None
+    up = np.median(evidence.force, axis=0)
+    return f'mean specific force ({up[0]:.2f}, {up[1]:.2f}, {up[2]:.2f}) m/s^2'
+
+
+def mounting_angles(rotation: FloatArray) -> tuple[float, float, float]:
+    """Return roll, pitch, yaw [deg] of a rotation (fixed axes x, then y, then z, as in URDF)."""
+    pitch = math.asin(float(np.clip(-rotation[2, 0], -1.0, 1.0)))
+    roll = math.atan2(rotation[2, 1], rotation[2, 2])
+    yaw = math.atan2(rotation[1, 0], rotation[0, 0])
+    return math.degrees(roll), math.degrees(pitch), math.degrees(yaw)
+
+
+def mounting_finding(
+    evidence: Evidence, rotation: FloatArray, std: float, sure: float, words: str
+) -> Finding:
+    """Return the finding that asks for a rotation; its parameter is the angle that changes most."""
+    new, old = mounting_angles(rotation), mounting_angles(evidence.rotation)
+    change = [abs((a - b + 180.0) % 360.0 - 180.0) for a, b in zip(new, old, strict=True)]
+    most = int(np.argmax(change))
+    names = [f'sensors.imu_mounting_{axis}_deg' for axis in ('roll', 'pitch', 'yaw')]
+    imu = evidence.recording.imu
+    assert imu is not None
+    cure = '  '.join(f'{name}: {angle:.2f}' for name, angle in zip(names, new, strict=True))
+    return Finding(
+        'mounting', imu.topic, None, names[most], round(new[most], 3), std, sure, words, cure
+    )
+
+
+def check_noise_and_zero(evidence: Evidence, figures: dict[str, Any]) -> list[Outcome]:
+    """Compare noise and bias with what the rover file states."""
+    imu, configuration = evidence.recording.imu, evidence.facts.configuration
+    if imu is None or configuration is None or evidence.gyro is None or evidence.force is None:
+        return []
+    found: list[Outcome] = []
+    sensors = configuration.sensors
+    for name, key, unit, stated in (
+        ('force', 'specific_force_std', 'm/s^2', sensors.specific_force_std),
+        ('rate', 'angular_rate_std', 'rad/s', sensors.angular_rate_std),
+    ):
+        change = np.diff(getattr(imu, name), axis=0) / math.sqrt(2.0)
+        # Vibration comes and goes with driving: the root mean square of the livelier half counts.
+        noise = float(np.median([_upper_rms(column) for column in change.T]))
+        figures[f'imu.{key}_{unit}'] = float(f'{noise:.3g}')
+        if noise > NOISE_FACTOR * stated:
+            found.append(
+                Finding(
+                    'noise',
+                    imu.topic,
+                    None,
+                    f'sensors.{key}',
+                    float(f'{noise:.2g}'),
+                    None,
+                    confidence(noise / stated),
+                    f'noise {noise:.2g} {unit} where the rover file has {stated:g} {unit}',
+                    f'sensors.{key}: {noise:.2g}',
+                )
+            )
+    bias, std, where = gyro_bias(evidence)
+    if not np.isfinite(std).all():
+        found.append(NotChecked('zero', 'IMU: no standstill of 3 s in it; stand still for 10 s'))
+        return found
+    figures['imu.gyro_bias_rad_s'] = [float(f'{b:.3g}') for b in bias]
+    limit = max(BIAS_FACTOR * sensors.angular_rate_bias_std, LEAST_GYRO_BIAS)
+    worst = int(np.argmax(np.abs(bias)))
+    if abs(bias[worst]) > limit:
+        listed = ', '.join(f'{value:.5f}' for value in bias)
+        found.append(
+            Finding(
+                'zero',
+                imu.topic,
+                None,
+                'sensors.angular_rate_bias',
+                float(f'{bias[worst]:.4g}'),
+                float(std[worst]),
+                0.99,
+                f'angular_velocity.{"xyz"[worst]} reads {bias[worst]:.3g} rad/s {where}',
+                f'sensors.angular_rate_bias: [{listed}]',
+            )
+        )
+    return found
+
+
+def _upper_rms(values: FloatArray) -> float:
+    blocks = [b for b in np.array_split(values, min(max(values.size // 50, 1), 200)) if b.size]
+    deviations = np.array([robust_std(block) for block in blocks])
+    return float(np.median(np.sort(deviations)[deviations.size // 2 :]))

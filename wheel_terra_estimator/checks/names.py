@@ -1,0 +1,140 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Topics and joints: what is there under which name."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from wheel_terra_estimator.checks.finding import Finding, NotChecked, Outcome
+from wheel_terra_estimator.checks.rover_facts import RoverFacts, side_of, wheel_names
+from wheel_terra_estimator.checks.series import Recording
+
+DEFAULT_TOPICS = {
+    'joint_states': '/joint_states',
+    'imu': '/imu/data',
+    'sinkage': '/sinkage',
+    'reference': '/reference_odom',
+}
+
+
+def check_topics(recording: Recording, remapped: Sequence[str]) -> list[Outcome]:
+    """Return topics that are there under another name than the estimator listens to."""
+    found: list[Outcome] = []
+    for name, default in DEFAULT_TOPICS.items():
+        series = getattr(recording, 'joints' if name == 'joint_states' else name)
+        own = default.lstrip('/')
+        if series is None or series.topic == default or own in remapped:
+            continue
+        if 'truth' not in series.topic:  # kept apart on purpose, to compare with
+            found.append(
+                Finding(
+                    'unknown_name',
+                    series.topic,
+                    None,
+                    None,
+                    None,
+                    None,
+                    0.9,
+                    f'the estimator listens to {default}, the recording has {series.topic}',
+                    f'--remap {own}:={series.topic}',
+                )
+            )
+    return found
+
+
+def check_wheel_names(recording: Recording, facts: RoverFacts) -> list[Outcome]:
+    """Return wheels that are absent from the recording, or there under another name."""
+    joints = recording.joints
+    if joints is None:
+        return [NotChecked('missing_wheel', 'no joint states in the recording')]
+    if not facts.known:
+        return []
+    silent = {
+        name
+        for name, column in zip(joints.names, joints.rate.T, strict=True)
+        if not np.isfinite(column).any()
+    }
+    absent = [name for name in facts.names if name not in joints.names]
+    spare = [name for name in wheel_names(joints.names) if name not in facts.names]
+    renamed = _pairs(absent, spare)
+    found: list[Outcome] = []
+    if renamed:
+        names = [renamed.get(name, name) for name in facts.names]
+        listed = ', '.join(names)
+        for own, other in renamed.items():
+            found.append(
+                Finding(
+                    'unknown_name',
+                    joints.topic,
+                    own,
+                    'wheels.names',
+                    None,
+                    None,
+                    0.95,
+                    f'no joint {own} in the recording, but {other}',
+                    f'wheels.names: [{listed}]',
+                )
+            )
+    for name in absent:
+        if name not in renamed:
+            found.append(_missing(joints.topic, name, 'is in no message'))
+    for name in facts.names:
+        if name in silent:
+            found.append(_missing(joints.topic, name, 'has no rate in any message'))
+    for name in spare:
+        if name not in renamed.values() and 'wheel' in name.lower() and name not in silent:
+            found.append(
+                Finding(
+                    'unknown_name',
+                    joints.topic,
+                    name,
+                    'wheels.names',
+                    None,
+                    None,
+                    0.7,
+                    'turns like a wheel and is not in wheels.names',
+                    f'add {name} to wheels.names, with its radius, width, x and y',
+                )
+            )
+    return found
+
+
+def proposal(recording: Recording) -> dict[str, Any]:
+    """Return what to write for a recording without a rover file: remaps and ``wheels.names``."""
+    remaps = [o.cure for o in check_topics(recording, ()) if isinstance(o, Finding)]
+    names = wheel_names(recording.joints.names) if recording.joints is not None else ()
+    return {'remaps': remaps, 'wheels.names': list(names)}
+
+
+def _missing(topic: str, name: str, words: str) -> Finding:
+    return Finding(
+        'missing_wheel',
+        topic,
+        name,
+        'wheels.names',
+        None,
+        None,
+        0.99,
+        words,
+        f'publish the joint {name}, or take it out of wheels.names and of every per-wheel list',
+    )
+
+
+def _pairs(absent: Sequence[str], spare: Sequence[str]) -> dict[str, str]:
+    """Return {configured name: name in the recording} where they belong together."""
+    left = list(spare)
+    pairs = {}
+    for name in absent:
+        same_side = [other for other in left if side_of(other) in (0, side_of(name))]
+        close = difflib.get_close_matches(name, same_side, n=1, cutoff=0.5)
+        if not close and len(absent) == len(spare):
+            close = [left[0]]  # as many as are missing: in the usual order
+        if close:
+            pairs[name] = close[0]
+            left.remove(close[0])
+    return pairs

@@ -1,0 +1,104 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""What is known of the rover before its recording is looked at: a rover file, or good guesses."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wheel_terra_estimator.configuration.configuration import Configuration
+
+FloatArray = NDArray[np.float64]
+
+_LEFT = re.compile(r'(^|[^a-z])(left|l|fl|ml|rl|lf|lm|lr|bl|lb)([^a-z]|$)')
+_RIGHT = re.compile(r'(^|[^a-z])(right|r|fr|mr|rr|rf|rm|br|rb)([^a-z]|$)')
+_FRONT = re.compile(r'front|(^|[^a-z])f[lr]?([^a-z]|$)')
+_MIDDLE = re.compile(r'mid|cent(re|er)')
+_WHEEL = re.compile(r'wheel|drive|traction')
+
+
+@dataclass(frozen=True)
+class RoverFacts:
+    """The rover as the checks see it; arrays are (n,) in the order of ``names``.
+
+    ``side`` is +1 on the left, -1 on the right, 0 unknown. Without a rover file (``configuration``
+    None) radius, mass and track are nan.
+    """
+
+    configuration: Configuration | None
+    names: tuple[str, ...]
+    side: FloatArray
+    lateral: FloatArray  # y [m]
+    radius: FloatArray  # that the slip refers to [m]
+    direction: FloatArray
+    mass: float
+    gravity: float
+
+    @property
+    def known(self) -> bool:
+        """Whether there is a rover file."""
+        return self.configuration is not None
+
+    def stated(self, key: str) -> bool:
+        """Return whether the rover file states a key."""
+        return self.configuration is not None and key in self.configuration.stated
+
+    def has_sides(self) -> bool:
+        """Return whether wheels on both sides are known."""
+        return bool((self.side > 0).any() and (self.side < 0).any())
+
+
+def from_configuration(configuration: Configuration) -> RoverFacts:
+    """Return what a rover file says."""
+    wheels = configuration.wheels
+    return RoverFacts(
+        configuration=configuration,
+        names=wheels.names,
+        side=np.sign(wheels.y),
+        lateral=wheels.y,
+        radius=wheels.slip_radius,
+        direction=wheels.direction.astype(float),
+        mass=configuration.rover.mass,
+        gravity=configuration.rover.gravity,
+    )
+
+
+def from_names(joints: Sequence[str]) -> RoverFacts:
+    """Return what the names of joints suggest: which are wheels, and where they are."""
+    names = wheel_names(joints)
+    count = len(names)
+    return RoverFacts(
+        configuration=None,
+        names=names,
+        side=np.array([side_of(name) for name in names], dtype=float),
+        lateral=np.full(count, np.nan),
+        radius=np.full(count, np.nan),
+        direction=np.ones(count),
+        mass=np.nan,
+        gravity=9.80665,
+    )
+
+
+def wheel_names(joints: Sequence[str]) -> tuple[str, ...]:
+    """Return the joints that are wheels by their names, front to rear, left before right."""
+    wheels = [n for n in joints if _WHEEL.search(n.lower()) and 'steer' not in n.lower()]
+    wheels = wheels or [n for n in joints if side_of(n)] or list(joints)
+    return tuple(sorted(wheels, key=_place))
+
+
+def side_of(name: str) -> int:
+    """Return +1 for a name of the left side, -1 for the right, 0 where it does not say."""
+    low = name.lower()
+    left, right = bool(_LEFT.search(low)), bool(_RIGHT.search(low))
+    return int(left) - int(right)
+
+
+def _place(name: str) -> tuple[int, int]:
+    low = name.lower()
+    row = 0 if _FRONT.search(low) else 1 if _MIDDLE.search(low) else 2
+    return row, -side_of(name)

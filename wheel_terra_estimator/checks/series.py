@@ -1,0 +1,82 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""A recording as arrays, in the units and signs that the sensors sent.
+
+Stamps and log times are integer nanoseconds; ``nan`` marks what a message did not hold.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Channel:
+    """One topic: its name in the recording, stamps and log times (k,) [ns] in order of arrival."""
+
+    topic: str
+    stamp: IntArray
+    log_time: IntArray
+
+    @property
+    def seconds(self) -> FloatArray:
+        """Stamps relative to the first one [s]."""
+        return (self.stamp - self.stamp[:1].sum()) * 1e-9
+
+
+@dataclass(frozen=True)
+class JointSeries(Channel):
+    """Joint states: rate and effort of every joint that occurs, (k, n)."""
+
+    names: tuple[str, ...]
+    rate: FloatArray
+    torque: FloatArray
+
+
+@dataclass(frozen=True)
+class ImuSeries(Channel):
+    """IMU messages in the sensor's own frame."""
+
+    force: FloatArray  # (k, 3)
+    rate: FloatArray  # (k, 3)
+    orientation: FloatArray  # (k, 4) x, y, z, w; nan where the message says that there is none
+
+
+@dataclass(frozen=True)
+class SinkageSeries(Channel):
+    """Measured sinkage of every name that occurs, (k, n)."""
+
+    names: tuple[str, ...]
+    sinkage: FloatArray
+
+
+@dataclass(frozen=True)
+class VelocitySeries(Channel):
+    """Twists of an odometry topic."""
+
+    velocity: FloatArray  # (k, 3) linear
+    yaw_rate: FloatArray  # (k,)
+    variance: FloatArray  # (k,) of linear.x as stated
+
+
+@dataclass(frozen=True)
+class Recording:
+    """What the checks look at; None where the recording has no such topic.
+
+    ``topics`` lists (name, type, number of messages) of everything that was recorded.
+    """
+
+    name: str
+    topics: tuple[tuple[str, str, int], ...]
+    joints: JointSeries | None
+    imu: ImuSeries | None
+    sinkage: SinkageSeries | None
+    reference: VelocitySeries | None
+    wheel_odometry: VelocitySeries | None
+    shortened: bool = False

@@ -1,0 +1,225 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Measured sinkage: unit, sign, zero, noise, wheel order."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wheel_terra_estimator.checks.evidence import Evidence
+from wheel_terra_estimator.checks.finding import Finding, NotChecked, Outcome
+from wheel_terra_estimator.checks.statistics import robust_std
+
+FloatArray = NDArray[np.float64]
+
+DEEPEST = 1.2
+"""Sinkage over radius that no wheel gets out of [-]."""
+LEAST_READINGS = 50
+NOISE_FACTOR = 4.0
+BELOW_ZERO = 0.006
+"""A median sinkage further above the ground than this [m] is no sinkage (lugs carry less)."""
+ODD_ZERO = 0.015
+"""A wheel that reads this much less or more than every other of its side [m] is odd."""
+
+
+def check_sinkage(evidence: Evidence, figures: dict[str, Any]) -> list[Outcome]:
+    """Return what is wrong with the sinkage readings."""
+    sinkage, facts = evidence.recording.sinkage, evidence.facts
+    if sinkage is None:
+        return [NotChecked('zero', 'no sinkage in the recording')]
+    found: list[Outcome] = []
+    for name in facts.configuration.wheels.names if facts.configuration else ():
+        if name not in sinkage.names:
+            found.append(
+                Finding(
+                    'missing_wheel',
+                    sinkage.topic,
+                    name,
+                    None,
+                    None,
+                    None,
+                    0.9,
+                    'has no sinkage',
+                    f'publish the sinkage of {name}, nan while there is none',
+                )
+            )
+    wheels = facts.configuration.wheels.names if facts.configuration else sinkage.names
+    columns = [i for i, name in enumerate(sinkage.names) if name in wheels]
+    table = sinkage.sinkage[:, columns]
+    names = [sinkage.names[i] for i in columns]
+    if not columns or np.isfinite(table).sum(axis=0).max() < LEAST_READINGS:
+        return [*found, NotChecked('zero', 'hardly any sinkage readings')]
+    unit, table = _unit(evidence, table)
+    found += unit
+    middle = np.array([_median(column) for column in table.T])
+    figures['sinkage.median_m'] = [round(float(m), 4) for m in middle]
+    found += _sign_and_zero(evidence, names, table, middle)
+    found += _noise(evidence, table, figures)
+    return found
+
+
+def _median(column: FloatArray) -> float:
+    known = column[np.isfinite(column)]
+    return float(np.median(known)) if known.size else math.nan
+
+
+def _unit(evidence: Evidence, table: FloatArray) -> tuple[list[Outcome], FloatArray]:
+    sinkage, configuration = evidence.recording.sinkage, evidence.facts.configuration
+    assert sinkage is not None
+    radius = float(np.nanmean(evidence.facts.radius)) if configuration else 0.5
+    stated = configuration.sensors.sinkage_std if configuration else 0.002
+    noise = _reading_noise(table)
+    level = float(np.nanmedian(np.abs(table)))
+    for unit, factor in (('millimetres', 1e-3), ('centimetres', 1e-2)):
+        # Both the depth and the noise have to fit the unit.
+        fits = 0.1 < noise * factor / max(stated, 1e-4) < 10.0 and level * factor < 0.8 * radius
+        if (level > DEEPEST * radius or noise > 0.2 * radius) and fits:
+            outcome = Finding(
+                'unit',
+                sinkage.topic,
+                None,
+                None,
+                factor,
+                None,
+                0.97,
+                f'median sinkage {level:.3g} with noise {noise:.2g} at a wheel radius of '
+                f'{radius:.3g} m: it is in {unit}',
+                f'multiply position by {factor:g} in the driver (m, REP 103)',
+            )
+            return [outcome], table * factor
+    return [], table
+
+
+def _reading_noise(table: FloatArray) -> float:
+    bends = [np.diff(column[np.isfinite(column)], 2) / math.sqrt(6.0) for column in table.T]
+    return float(np.median([robust_std(bend) for bend in bends if bend.size > 10] or [0.0]))
+
+
+def _sign_and_zero(
+    evidence: Evidence, names: list[str], table: FloatArray, middle: FloatArray
+) -> list[Outcome]:
+    sinkage, configuration = evidence.recording.sinkage, evidence.facts.configuration
+    assert sinkage is not None
+    lugs = float(np.max(configuration.wheels.lug_height)) if configuration else 0.0
+    limit = BELOW_ZERO + lugs
+    if np.nanmedian(middle) < -limit:
+        return _reversed_or_zero(evidence, table, float(np.nanmedian(middle)))
+    found: list[Outcome] = []
+    for index, name in enumerate(names):
+        others = np.delete(middle, index)
+        if others.size < 2 or not np.isfinite(middle[index]):
+            continue
+        far = middle[index] - float(np.nanmedian(others))
+        spread = float(np.nanmax(others) - np.nanmin(others))
+        if middle[index] < -limit and np.nanmin(others) > -limit:
+            reading = table[:, index]
+            typical = float(np.nanmedian(others))
+            mirrored = abs(-middle[index] - typical) < 0.6 * typical
+            kind = 'sign' if mirrored and _skew(reading) <= 0.0 else 'zero'
+            found.append(_one_wheel(sinkage.topic, name, kind, middle[index], typical))
+        elif abs(far) > max(ODD_ZERO, 3.0 * spread):
+            found.append(
+                _one_wheel(sinkage.topic, name, 'zero', middle[index], float(np.nanmedian(others)))
+            )
+    return found
+
+
+def _one_wheel(topic: str, name: str, kind: str, reading: float, typical: float) -> Finding:
+    off = reading - typical
+    if kind == 'sign':
+        return Finding(
+            'sign',
+            topic,
+            name,
+            None,
+            -1.0,
+            None,
+            0.9,
+            f'median sinkage {1000 * reading:.0f} mm, the others {1000 * typical:.0f} mm',
+            f'negate position of {name} in the driver (positive down)',
+        )
+    return Finding(
+        'zero',
+        topic,
+        name,
+        'sensors.sinkage_zero',
+        round(off, 4),
+        None,
+        0.9,
+        f'reads {1000 * off:+.0f} mm off the other wheels all the time',
+        f'take {off:.4f} m off sinkage of {name} (sensors.sinkage_zero)',
+    )
+
+
+def _reversed_or_zero(evidence: Evidence, table: FloatArray, middle: float) -> list[Outcome]:
+    """Tell a reversed sign (deep spells go down) from a zero error (deep spells go up)."""
+    sinkage = evidence.recording.sinkage
+    assert sinkage is not None
+    skew = float(np.median([_skew(column) for column in table.T]))
+    top = float(np.nanmedian(np.nanquantile(table, 0.98, axis=0)))
+    if top < 0.004 and skew < 0.3:
+        return [
+            Finding(
+                'sign',
+                sinkage.topic,
+                None,
+                None,
+                -1.0,
+                None,
+                0.9,
+                f'median sinkage {1000 * middle:.0f} mm: the wheels would float',
+                'negate position in the driver (sinkage is positive down)',
+            )
+        ]
+    listed = ', '.join([f'{middle:.4f}'] * table.shape[1])
+    return [
+        Finding(
+            'zero',
+            sinkage.topic,
+            None,
+            'sensors.sinkage_zero',
+            round(middle, 4),
+            None,
+            0.8,
+            f'median sinkage {1000 * middle:.0f} mm: the wheels would float',
+            f'sensors.sinkage_zero: [{listed}]',
+        )
+    ]
+
+
+def _skew(column: FloatArray) -> float:
+    """Return the skewness by quantiles (Bowley 1901), from -1 to 1."""
+    known = column[np.isfinite(column)]
+    if known.size < LEAST_READINGS:
+        return 0.0
+    low, middle, high = np.quantile(known, [0.1, 0.5, 0.9])
+    return float((high + low - 2.0 * middle) / max(high - low, 1e-9))
+
+
+def _noise(evidence: Evidence, table: FloatArray, figures: dict[str, Any]) -> list[Outcome]:
+    sinkage, configuration = evidence.recording.sinkage, evidence.facts.configuration
+    if configuration is None or sinkage is None:
+        return []
+    noise = _reading_noise(table)
+    figures['sinkage.noise_m'] = float(f'{noise:.3g}')
+    stated = float(configuration.sensors.sinkage_std)
+    if noise < NOISE_FACTOR * stated:
+        return []
+    return [
+        Finding(
+            'noise',
+            sinkage.topic,
+            None,
+            'sensors.sinkage_std',
+            float(f'{noise:.2g}'),
+            None,
+            0.95,
+            f'readings scatter by {1000 * noise:.2g} mm where the rover file has '
+            f'{1000 * stated:.2g} mm',
+            f'sensors.sinkage_std: {noise:.2g}',
+        )
+    ]

@@ -1,0 +1,181 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Robust statistics that the checks share."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+MAD_TO_STD = 1.4826
+"""Standard deviation over median absolute deviation of a normal distribution."""
+HUBER = 2.0
+"""Residuals beyond this many deviations count less in a robust fit."""
+ROUNDS = 8
+"""Reweighted fits."""
+BLOCKS = 12
+"""Number of blocks of time that a standard deviation is estimated from: residuals of a drive are
+correlated over seconds, rows are not independent."""
+
+
+class Estimate(NamedTuple):
+    """A number with one standard deviation."""
+
+    value: float
+    std: float
+
+    def sigmas_from(self, other: float) -> float:
+        """Return the distance to a number in standard deviations."""
+        return abs(self.value - other) / max(self.std, 1e-12)
+
+
+def robust_std(values: FloatArray) -> float:
+    """Return the standard deviation that fits the middle half of the values; nan for none."""
+    values = values[np.isfinite(values)]
+    if not values.size:
+        return math.nan
+    return float(MAD_TO_STD * np.median(np.abs(values - np.median(values))))
+
+
+def robust_fit(design: FloatArray, target: FloatArray) -> FloatArray:
+    """Return the coefficients of a least-squares fit that outliers hardly move (Huber 1964).
+
+    Parameters
+    ----------
+    design : numpy.ndarray
+        (k, p) regressors.
+    target : numpy.ndarray
+        (k,) what is to be explained.
+    """
+    return _huber(design, target)[0]
+
+
+def block_fit(design: FloatArray, target: FloatArray) -> list[Estimate]:
+    """Return a robust fit whose deviations come from leaving out one block of time at a time.
+
+    The delete-one-block jackknife (Kuensch 1989) allows for residuals that hang together in time.
+    """
+    whole, weight = _huber(design, target)
+    weighted = design * weight[:, None]
+    edges = np.linspace(0, target.size, BLOCKS + 1).astype(int)[:-1]
+    normals = np.add.reduceat(weighted[:, :, None] * design[:, None, :], edges, axis=0)
+    rights = np.add.reduceat(weighted * target[:, None], edges, axis=0)
+    left_out = np.array(
+        [
+            _solve(normals.sum(axis=0) - n, rights.sum(axis=0) - r)
+            for n, r in zip(normals, rights, strict=True)
+        ]
+    )
+    spread = ((left_out - left_out.mean(axis=0)) ** 2).sum(axis=0)
+    std = np.sqrt((BLOCKS - 1) / BLOCKS * spread)
+    return [Estimate(float(v), float(s)) for v, s in zip(whole, std, strict=True)]
+
+
+def _huber(design: FloatArray, target: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return coefficients and the weights of the rows."""
+    weight: FloatArray = np.ones(target.shape)
+    coefficients: FloatArray = np.zeros(design.shape[1])
+    for _ in range(ROUNDS):
+        weighted = design * weight[:, None]
+        coefficients = _solve(weighted.T @ design, weighted.T @ target)
+        residual = target - design @ coefficients
+        scale = max(robust_std(residual), 1e-12)
+        weight = 1.0 / np.maximum(np.abs(residual) / (HUBER * scale), 1.0)
+    return coefficients, weight
+
+
+def _solve(normal: FloatArray, right: FloatArray) -> FloatArray:
+    """Solve normal equations after scaling; a column of nothing gets coefficient 0."""
+    size = np.sqrt(np.maximum(np.diag(normal), 1e-300))
+    scaled = normal / np.outer(size, size) + 1e-12 * np.eye(size.size)
+    return np.asarray(np.linalg.solve(scaled, right / size) / size)
+
+
+def correlation(first: FloatArray, second: FloatArray) -> float:
+    """Return the correlation of two series about zero, 0 where one of them is nothing."""
+    known = np.isfinite(first) & np.isfinite(second)
+    first, second = first[known], second[known]
+    size = float(np.sqrt((first @ first) * (second @ second)))
+    return float(first @ second / size) if size > 0.0 else 0.0
+
+
+def confidence(sigmas: float) -> float:
+    """Return the probability that a normal error is smaller than this; at most 0.999."""
+    return min(math.erf(abs(sigmas) / math.sqrt(2.0)), 0.999)
+
+
+def averaged(time: FloatArray, values: FloatArray, at: FloatArray, width: float) -> FloatArray:
+    """Return the means of (k, p) values over windows ``[at - width, at]`` [s].
+
+    A window without a sample has the interpolated value at its middle.
+    """
+    order = np.argsort(time, kind='stable')
+    time, values = time[order], values[order]
+    total = np.vstack([np.zeros(values.shape[1]), np.cumsum(values, axis=0)])
+    first = np.searchsorted(time, at - width, side='right')
+    last = np.searchsorted(time, at, side='right')
+    count = (last - first)[:, None]
+    mean = (total[last] - total[first]) / np.maximum(count, 1)
+    middle = np.column_stack([np.interp(at - 0.5 * width, time, column) for column in values.T])
+    return np.where(count > 0, mean, middle)
+
+
+LAG_GAIN = 1.5
+"""By how much the unlike part has to shrink for a lag to count."""
+
+
+class Lag(NamedTuple):
+    """How much later a series is than another [s], and how well they fit then and at no lag."""
+
+    value: float
+    std: float
+    fit: float
+    fit_at_zero: float
+
+    @property
+    def clear(self) -> bool:
+        """Whether the lag explains a good part of what is unlike without it."""
+        return 1.0 - self.fit_at_zero > LAG_GAIN * (1.0 - self.fit)
+
+
+def lag(time: FloatArray, first: FloatArray, second: FloatArray, limit: float) -> Lag | None:
+    """Return by how much ``second`` lags ``first`` on an even grid, at most ``limit`` [s].
+
+    The deviation is that of the lags of thirds of the record. None: nothing to correlate.
+    """
+    step = float(np.median(np.diff(time)))
+    reach = max(round(limit / step), 1)
+    if time.size < 6 * reach or not first.std() or not second.std():
+        return None
+
+    def best(a: FloatArray, b: FloatArray) -> tuple[float, float, float]:
+        a, b = a - a.mean(), b - b.mean()
+        fits = np.empty(2 * reach + 1)
+        inner = a[reach : a.size - reach]
+        for shift in range(-reach, reach + 1):
+            shifted = b[reach + shift : b.size - reach + shift]
+            size = math.sqrt(float(inner @ inner) * float(shifted @ shifted))
+            fits[shift + reach] = float(inner @ shifted) / size if size else 0.0
+        peak = int(np.argmax(fits))
+        offset = 0.0
+        if 0 < peak < fits.size - 1:  # top of a parabola through three points
+            left, middle, right = fits[peak - 1 : peak + 2]
+            bend = left - 2.0 * middle + right
+            offset = 0.5 * (left - right) / bend if bend else 0.0
+        return step * (peak - reach + offset), float(fits[peak]), float(fits[reach])
+
+    value, fit, fit_at_zero = best(first, second)
+    third = time.size // 3
+    parts = [
+        best(first[i * third : (i + 1) * third], second[i * third : (i + 1) * third])
+        for i in range(3)
+        if third > 3 * reach
+    ]
+    good = [part[0] for part in parts if part[1] > 0.5 * fit]
+    std = float(np.std(good, ddof=1) / math.sqrt(len(good))) if len(good) > 1 else step
+    return Lag(value, max(std, 0.2 * step), fit, fit_at_zero)

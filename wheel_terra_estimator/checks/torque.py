@@ -1,0 +1,301 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Drive torques: sign, unit, scale and zero, against weight, slope and each other."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wheel_terra_estimator.checks.evidence import LEAST_MOVING_ROWS, Evidence
+from wheel_terra_estimator.checks.finding import Finding, NotChecked, Outcome
+from wheel_terra_estimator.checks.statistics import Estimate, block_fit, confidence, correlation
+
+FloatArray = NDArray[np.float64]
+
+UPHILL_ENOUGH = -0.02
+"""Specific force along the drive, in g, above which a driven wheel takes power."""
+WRONG_SIGN = -0.4
+"""Correlation of torque and rate below which the sign is wrong."""
+MOST_TRACTION = 0.85
+"""Sum of T/r over the weight that no soil gives on the level (tangent of 40 degrees)."""
+UNIT_TRACTION = 30.0
+"""The same, above which the torque is in N mm."""
+LEAST_TRACTION = 1e-3
+SOFT_TRACTION = 0.25
+"""Level traction above which the soil itself changes what a slope costs."""
+LEAST_SLOPE_STD = 0.25
+"""Scatter of the specific force along the drive that a scale needs [m/s^2]."""
+GAIN_MODEL_STD = 0.05
+"""What rolling resistance, larger uphill, adds to the scale (firm drives of the simulator)."""
+LEAST_GAIN_ERROR = 0.15
+ZERO_FACTOR = 6.0
+
+
+def check_torque(evidence: Evidence, figures: dict[str, Any]) -> tuple[list[Outcome], Evidence]:
+    """Return what is wrong with the torques."""
+    facts, joints = evidence.facts, evidence.recording.joints
+    assert joints is not None
+    kinds = ('gain', 'mass')
+    if not np.isfinite(evidence.torque).any():
+        return [NotChecked(kind, 'no torque in it (effort is empty or nan)') for kind in kinds], (
+            evidence
+        )
+    found, evidence = _signs(evidence)
+    if not facts.known or evidence.force is None:
+        return found, evidence
+    if not np.isfinite(evidence.torque).any(axis=0).all():
+        reason = 'a wheel without torque: the sum is not known'
+        return [*found, *(NotChecked(kind, reason) for kind in kinds)], evidence
+    scale, evidence = _scale(evidence, figures)
+    found += scale
+    if not any(isinstance(o, Finding) for o in scale):
+        found += _gain(evidence, figures)
+    return found + _zeros(evidence, figures), evidence
+
+
+def _signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
+    joints, facts = evidence.recording.joints, evidence.facts
+    assert joints is not None
+    rows = evidence.moving.copy()
+    if evidence.force is not None:
+        along = evidence.force[:, 0] * np.sign(evidence.common_rate) / facts.gravity
+        rows &= along > UPHILL_ENOUGH
+    if rows.sum() < LEAST_MOVING_ROWS:
+        return [NotChecked('sign', 'torque: no stretch on the level or uphill')], evidence
+    found: list[Outcome] = []
+    torque = evidence.torque.copy()
+    for index, name in enumerate(facts.names):
+        fit = correlation(evidence.torque[rows, index], evidence.rate[rows, index])
+        if fit < WRONG_SIGN:
+            found.append(
+                Finding(
+                    'sign',
+                    joints.topic,
+                    name,
+                    None,
+                    -1.0,
+                    None,
+                    confidence(4.0 * abs(fit)),
+                    f'torque brakes where the wheel drives (correlation with its rate {fit:.2f})',
+                    f'negate effort of {name} in the driver (wheels.direction flips rate and '
+                    'torque together)',
+                )
+            )
+            torque[:, index] *= -1.0
+    return found, evidence.with_rate(evidence.rate, torque)
+
+
+def thrust(evidence: Evidence) -> FloatArray:
+    """Return the sum of T/r (k,) [N]."""
+    return np.asarray(np.nansum(evidence.torque / evidence.facts.radius, axis=1))
+
+
+def _scale(evidence: Evidence, figures: dict[str, Any]) -> tuple[list[Outcome], Evidence]:
+    """Judge the level of the torques: units and currents."""
+    facts, joints = evidence.facts, evidence.recording.joints
+    assert joints is not None and evidence.force is not None
+    rows = evidence.straight
+    if rows.sum() < LEAST_MOVING_ROWS:
+        rows = evidence.moving
+    weight = facts.mass * facts.gravity
+    forward = np.sign(evidence.rim[rows])
+    level = (thrust(evidence)[rows] - facts.mass * evidence.force[rows, 0]) * forward
+    traction = float(np.median(level)) / weight
+    figures['torque.level_traction'] = round(traction, 4)
+    if traction > UNIT_TRACTION:
+        outcome = Finding(
+            'unit',
+            joints.topic,
+            None,
+            None,
+            1e-3,
+            None,
+            0.97,
+            f'sum of T/r is {traction:.0f} times the weight on the level: effort is in N mm',
+            'multiply effort by 0.001 in the driver (N m, REP 103)',
+        )
+        return [outcome], evidence.with_rate(evidence.rate, evidence.torque * 1e-3)
+    if traction > MOST_TRACTION or traction < LEAST_TRACTION:
+        return [_off_scale(evidence, traction)], evidence
+    return [], evidence
+
+
+def _off_scale(evidence: Evidence, traction: float) -> Finding:
+    joints = evidence.recording.joints
+    assert joints is not None
+    fit = _slope_fit(evidence)
+    value, std = (1.0 / fit.value, fit.std / fit.value**2) if fit else (None, None)
+    gain = ', '.join([f'{value:.3g}'] * len(evidence.facts.names)) if value else '...'
+    return Finding(
+        'gain',
+        joints.topic,
+        None,
+        'sensors.torque_gain',
+        value,
+        std,
+        0.8,
+        f'sum of T/r is {traction:.3g} of the weight on the level, what no soil asks for: '
+        'a motor current, or a torque before the gear?',
+        f'sensors.torque_gain: [{gain}], or turn current into torque at the wheel '
+        '(motor constant times gear ratio times efficiency)',
+    )
+
+
+def _slope_fit(evidence: Evidence) -> Estimate | None:
+    """Return thrust over mass times specific force: torque gain times true over stated mass."""
+    assert evidence.force is not None
+    rows = evidence.straight
+    along = evidence.force[rows, 0]
+    if rows.sum() < 3 * LEAST_MOVING_ROWS or float(np.std(_smooth(along))) < LEAST_SLOPE_STD:
+        return None
+    sense = np.sign(evidence.rim[rows])
+    columns = [evidence.facts.mass * along, sense]
+    if (sense > 0).any() and (sense < 0).any():
+        columns.append(np.ones(along.size))
+    return block_fit(np.column_stack(columns), thrust(evidence)[rows])[0]
+
+
+def _smooth(values: FloatArray) -> FloatArray:
+    width = min(20, values.size)
+    return np.asarray(np.convolve(values, np.ones(width) / width, mode='valid'))
+
+
+def torque_gain(evidence: Evidence, figures: dict[str, Any]) -> Estimate | NotChecked:
+    """Return the scale of the torques against mass times specific force, model error included."""
+    fit = _slope_fit(evidence)
+    if fit is None:
+        return NotChecked('gain', 'torque: no slopes in it; drive up and down 5 to 10 degrees')
+    traction = figures.get('torque.level_traction', 1.0)
+    if traction > SOFT_TRACTION:
+        return NotChecked(
+            'gain', f'torque: soft ground (it costs {traction:.2f} of the weight); drive on firm'
+        )
+    return Estimate(fit.value, math.hypot(fit.std, GAIN_MODEL_STD))
+
+
+def _gain(evidence: Evidence, figures: dict[str, Any]) -> list[Outcome]:
+    joints, facts = evidence.recording.joints, evidence.facts
+    assert joints is not None and facts.configuration is not None
+    gain = torque_gain(evidence, figures)
+    if isinstance(gain, NotChecked):
+        return [gain, NotChecked('mass', gain.reason)]
+    figures['torque.gain'] = round(gain.value, 4)
+    figures['torque.gain_std'] = round(gain.std, 4)
+    stated = facts.configuration.sensors.torque_gain_std
+    sigmas = abs(gain.value - 1.0) / math.hypot(gain.std, stated)
+    if sigmas < 3.0 or abs(gain.value - 1.0) < LEAST_GAIN_ERROR or gain.value <= 0.0:
+        return []
+    factor = 1.0 / gain.value
+    listed = ', '.join([f'{factor:.3f}'] * len(facts.names))
+    mass = facts.mass * gain.value
+    words = f'slopes cost {gain.value:.2f} +- {gain.std:.2f} of what weight and torque say'
+    return [
+        Finding(
+            'gain',
+            joints.topic,
+            None,
+            'sensors.torque_gain',
+            round(factor, 4),
+            round(gain.std / gain.value**2, 4),
+            0.5 * confidence(sigmas),
+            f'{words}: the torque has another scale, or the mass is another',
+            f'sensors.torque_gain: [{listed}]',
+        ),
+        Finding(
+            'mass',
+            joints.topic,
+            None,
+            'rover.mass',
+            round(mass, 2),
+            round(facts.mass * gain.std, 2),
+            0.5 * confidence(sigmas),
+            f'{words}: the mass is another, or the torque has another scale',
+            f'rover.mass: {mass:.1f}',
+        ),
+    ]
+
+
+def torque_zeros(evidence: Evidence) -> list[Estimate] | None:
+    """Return the zero of each torque from driving both ways on a straight; None without both."""
+    assert evidence.force is not None
+    rows = evidence.straight
+    sense = np.sign(evidence.common_rate[rows])
+    if min((sense > 0).sum(), (sense < 0).sum()) < 2 * LEAST_MOVING_ROWS:
+        return None
+    design = np.column_stack([np.ones(sense.size), sense, evidence.force[rows, 0]])
+    if float(np.std(_smooth(evidence.force[rows, 0]))) < LEAST_SLOPE_STD:
+        design = design[:, :2]
+    return [
+        block_fit(design, np.nan_to_num(evidence.torque[rows, i]))[0]
+        for i in range(len(evidence.facts.names))
+    ]
+
+
+def _zeros(evidence: Evidence, figures: dict[str, Any]) -> list[Outcome]:
+    joints, facts = evidence.recording.joints, evidence.facts
+    assert joints is not None and facts.configuration is not None
+    stated = max(float(facts.configuration.sensors.torque_zero_std), 1e-3)
+    driving = float(np.nanmedian(np.abs(evidence.torque[evidence.moving])))
+    rest = evidence.at_rest
+    found: list[Outcome] = []
+    zeros = torque_zeros(evidence)
+    where = 'driving both ways'
+    if zeros is None:
+        if rest.sum() < LEAST_MOVING_ROWS:
+            reason = 'torque: neither standstill nor both ways in it; stand still, drive back'
+            return [NotChecked('zero', reason)]
+        # Standing wheels are wound up against each other; only an odd one out is told.
+        level = np.nanmedian(evidence.torque[rest], axis=0)
+        middle = float(np.nanmedian(level))
+        spread = 1.5 * float(np.nanmedian(np.abs(level - middle)))
+        zeros = [Estimate(float(value - middle), max(spread, stated)) for value in level]
+        where = 'standing'
+    figures['torque.zero_N_m'] = [round(zero.value, 3) for zero in zeros]
+    wrong = []
+    for name, zero in zip(facts.names, zeros, strict=True):
+        limit = max(ZERO_FACTOR * stated, 0.5 * driving, 5.0 * zero.std)
+        if abs(zero.value) > limit:
+            wrong.append((name, zero))
+    listed = ', '.join(f'{zero.value:.2f}' for zero in zeros)
+    for name, zero in wrong:
+        found.append(
+            Finding(
+                'zero',
+                joints.topic,
+                name,
+                'sensors.torque_zero',
+                round(zero.value, 3),
+                round(zero.std, 3),
+                confidence(zero.sigmas_from(0.0)),
+                f'torque reads {zero.value:.2f} N m off zero, {where}',
+                f'sensors.torque_zero: [{listed}]',
+            )
+        )
+    return found
+
+
+def heading_of_torque(evidence: Evidence) -> Estimate | None:
+    """Return the direction in the IMU's horizontal plane in which slopes cost torque [rad].
+
+    Zero where the IMU's x axis points forward. None without slopes.
+    """
+    if evidence.force is None or not np.isfinite(evidence.torque).any():
+        return None
+    rows = evidence.straight
+    if rows.sum() < 3 * LEAST_MOVING_ROWS:
+        return None
+    horizontal = evidence.force[rows, :2]
+    if max(float(np.std(_smooth(column))) for column in horizontal.T) < LEAST_SLOPE_STD:
+        return None
+    sense = np.sign(evidence.rim[rows])
+    along, across = block_fit(np.column_stack([horizontal, sense]), thrust(evidence)[rows])[:2]
+    size = math.hypot(along.value, across.value)
+    if size < 4.0 * max(along.std, across.std):
+        return None
+    if not 0.5 < size / evidence.facts.mass < 2.0:
+        return None  # the soil's own resistance is at work, not the slope
+    return Estimate(math.atan2(across.value, along.value), max(along.std, across.std) / size)

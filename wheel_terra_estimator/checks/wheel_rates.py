@@ -1,0 +1,538 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Wheel rates: signs, sides, exchanged wheels, units, dead channels, noise."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wheel_terra_estimator.checks.evidence import LEAST_MOVING_ROWS, Evidence
+from wheel_terra_estimator.checks.finding import Finding, NotChecked, Outcome
+from wheel_terra_estimator.checks.statistics import (
+    block_fit,
+    confidence,
+    correlation,
+    robust_std,
+)
+
+FloatArray = NDArray[np.float64]
+
+UNITS = {
+    'revolutions per minute': 2.0 * math.pi / 60.0,
+    'degrees per second': math.pi / 180.0,
+    'revolutions per second': 2.0 * math.pi,
+}
+"""Units that wheel rates come in by mistake: factor to rad/s."""
+UNIT_TOLERANCE = 0.35
+"""Share by which a speed ratio may lie off a unit's factor (slip makes it smaller)."""
+ORDINARY_TRACKS = (0.7, 5.0)
+"""Effective over geometric track of rovers that turn by skidding [-]."""
+FROZEN_TIME = 5.0
+"""A rate that does not change in the last digit for this long [s] while the others do."""
+LONG_FROZEN_TIME = 10.0
+"""The same at a steady speed, where a coarse encoder may repeat itself [s]."""
+NOISE_FACTOR = 5.0
+LEAST_NOISE_SHARE = 0.08
+"""Noise of a rate that matters, as a share of the working rate."""
+LEAST_TURN_RATE = 0.02
+"""Yaw rate below which sides are not compared [rad/s]."""
+TRIAL_ROWS = 1000
+"""Rows, spread over the drive, that signs are tried on."""
+MOST_WHEELS = 10
+"""Wheels for which all combinations of signs are tried."""
+TRACKS = (0.0, 1.0, 1.5, 2.2, 3.2, 5.0)
+"""Effective over geometric half track that are tried, each with both signs."""
+TRACKS_BLIND = (0.0, 1.0, 2.0, 4.0, 7.0, 12.0, 20.0)
+"""Effective half track over wheel radius that are tried without a rover file."""
+
+
+class _Signs(NamedTuple):
+    cost: float
+    signs: tuple[int, ...]
+    track: float
+
+
+def check_dead_wheels(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
+    """Return wheels whose rate is frozen; they are left out of what follows."""
+    found: list[Outcome] = []
+    rate = evidence.rate
+    moving = evidence.moving
+    working = evidence.working_rate
+    mended = rate.copy()
+    if moving.sum() < LEAST_MOVING_ROWS or rate.shape[1] < 2:
+        return [], evidence
+    joints = evidence.recording.joints
+    assert joints is not None
+    for index, name in enumerate(evidence.facts.names):
+        own = rate[:, index]
+        others = np.delete(rate, index, axis=1)
+        longest = 0.0
+        for start, end in _runs(own):
+            if evidence.time[end] - evidence.time[start] < FROZEN_TIME:
+                continue
+            there = np.abs(others[start : end + 1])
+            if own[start] == 0.0:
+                lively = np.nanmedian(there) > 0.5 * working
+            else:
+                beside = np.nanmedian(others[start : end + 1], axis=1)
+                changes = np.mean(np.diff(others[start : end + 1], axis=0) != 0.0)
+                lasting = evidence.time[end] - evidence.time[start] > LONG_FROZEN_TIME
+                lively = np.ptp(beside) > 0.3 * working or (lasting and changes > 0.5)
+            if lively:
+                longest = max(longest, float(evidence.time[end] - evidence.time[start]))
+        repeats = np.mean(np.diff(own[moving]) == 0.0)
+        beside = np.mean(np.diff(others[moving], axis=0) == 0.0)
+        if longest > 0.0 or (repeats > 0.6 and beside < 0.2):
+            words = (
+                f'does not change for up to {longest:.1f} s while the other wheels do'
+                if longest > 0.0
+                else f'repeats its last value in {100 * repeats:.0f} % of the messages'
+            )
+            found.append(
+                Finding(
+                    'frozen',
+                    joints.topic,
+                    name,
+                    'wheels.names',
+                    None,
+                    None,
+                    0.97,
+                    words,
+                    f'look at encoder and cable of {name}; publish nan, or leave it out of the '
+                    'message, while it is dead',
+                )
+            )
+            mended[:, index] = np.nan
+    return found, evidence.with_rate(mended) if found else evidence
+
+
+def _runs(values: FloatArray) -> list[tuple[int, int]]:
+    """Return (first, last) row of each stretch in which a value does not change."""
+    same = np.concatenate([[False], np.diff(values) == 0.0, [False]])
+    edges = np.flatnonzero(np.diff(same.astype(int)))
+    return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+
+
+def check_unit(evidence: Evidence, figures: dict[str, Any]) -> tuple[list[Outcome], Evidence]:
+    """Return the unit of the rates where speeds or turns tell it is not rad/s."""
+    facts, joints = evidence.facts, evidence.recording.joints
+    assert joints is not None
+    if not facts.known:
+        return [NotChecked('unit', 'wheel rates: no radius without a rover file')], evidence
+    ratio = _speed_ratio(evidence)
+    how = 'speed of the reference'
+    if ratio is None and evidence.recording.wheel_odometry is not None:
+        ratio = _odometry_ratio(evidence)
+        how = f'speed of {evidence.recording.wheel_odometry.topic}'
+    track = _track_ratio(evidence)
+    if ratio is not None:
+        figures['wheels.speed_over_rim_speed'] = round(ratio, 4)
+    if ratio is None and track is None:
+        if evidence.working_rate * float(np.nanmean(facts.radius)) > 15.0:
+            ratio, how = math.pi / 30.0, 'rim speed above 15 m/s'
+        else:
+            reason = 'wheel rates: neither reference nor turn in it; drive a circle'
+            return [NotChecked('unit', reason)], evidence
+    for unit, factor in UNITS.items():
+        by_speed = ratio is not None and abs(math.log(ratio / factor)) < UNIT_TOLERANCE
+        by_turn = track is not None and (
+            ORDINARY_TRACKS[0] < abs(track) * factor < ORDINARY_TRACKS[1] * 1.6
+        )
+        ordinary = track is not None and ORDINARY_TRACKS[0] < abs(track) < ORDINARY_TRACKS[1] * 1.6
+        if (by_speed and (track is None or by_turn or not ordinary)) or (
+            ratio is None and by_turn and not ordinary
+        ):
+            outcome = Finding(
+                'unit',
+                joints.topic,
+                None,
+                None,
+                factor,
+                None,
+                0.97,
+                f'velocity is in {unit} ({how if ratio else "turns seen by the gyro"})',
+                f'multiply velocity by {factor:.6g} in the driver (rad/s, REP 103)',
+            )
+            return [outcome], evidence.with_rate(evidence.rate * factor)
+    return [], evidence
+
+
+def _speed_ratio(evidence: Evidence) -> float | None:
+    """Return the upper end of reference speed over rim speed: that of the least slip."""
+    reference = evidence.reference()
+    if reference is None:
+        return None
+    rim = evidence.rim_at(reference.stamp, np.abs(evidence.rim), 0.3)
+    speed = np.linalg.norm(reference.velocity[:, :2], axis=1)
+    working = np.nanquantile(rim, 0.9) if np.isfinite(rim).any() else 0.0
+    rows = (rim > 0.4 * working) & np.isfinite(speed)
+    if working <= 0.0 or rows.sum() < 8:
+        return None
+    return float(np.quantile(speed[rows] / rim[rows], 0.8))
+
+
+def _odometry_ratio(evidence: Evidence) -> float | None:
+    odometry = evidence.recording.wheel_odometry
+    assert odometry is not None
+    rim = evidence.rim_at(odometry.stamp, np.abs(evidence.rim), 0.2)
+    speed = np.abs(odometry.velocity[:, 0])
+    rows = np.isfinite(rim) & (rim > 0.3 * np.nanquantile(rim, 0.9)) & (rim > 0.0)
+    return float(np.median(speed[rows] / rim[rows])) if rows.sum() > 8 else None
+
+
+def _track_ratio(evidence: Evidence) -> float | None:
+    """Return effective over geometric track from the turns; None without turns."""
+    facts, difference = evidence.facts, evidence.side_difference
+    rows = _turning_rows(evidence)
+    if rows.sum() < 40 or evidence.gyro is None or not facts.has_sides():
+        return None
+    track = facts.lateral[facts.side > 0].mean() - facts.lateral[facts.side < 0].mean()
+    yaw = evidence.gyro[rows, 2]
+    if abs(correlation(yaw, difference[rows])) < 0.7 or not track:
+        return None
+    slope = block_fit(yaw[:, None], difference[rows])[0].value
+    return float(slope / track)
+
+
+def _turning_rows(evidence: Evidence) -> NDArray[np.bool_]:
+    if evidence.gyro is None:
+        return np.zeros(evidence.time.size, dtype=bool)
+    yaw = np.abs(evidence.gyro[:, 2])
+    noise = robust_std(np.diff(evidence.gyro[:, 2])) / math.sqrt(2.0)
+    difference = evidence.side_difference
+    return np.asarray(
+        evidence.moving
+        & np.isfinite(difference)
+        & (yaw > max(4.0 * noise, 0.3 * float(np.quantile(yaw, 0.98)), LEAST_TURN_RATE))
+    )
+
+
+def check_signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
+    """Return wheels that count backwards, sides that are swapped, a reference that is reversed."""
+    facts, joints = evidence.facts, evidence.recording.joints
+    assert joints is not None
+    there = np.flatnonzero(np.isfinite(evidence.rate).any(axis=0))
+    rows = evidence.moving & np.isfinite(evidence.rate[:, there]).all(axis=1)
+    if rows.sum() < LEAST_MOVING_ROWS or not there.size:
+        return [NotChecked('sign', 'the rover hardly moves in it; drive straight')], evidence
+    turns = _turning_rows(evidence)
+    chosen = _best_signs(evidence, there, rows)
+    found: list[Outcome] = []
+    if chosen is None or not facts.has_sides() or turns.sum() < 40:
+        reason = 'no turn in it, or no IMU: left and right not checked; drive a circle both ways'
+        found.append(NotChecked('swapped_sides', reason))
+    signs = np.ones(len(facts.names))
+    if chosen is not None:
+        signs[there] = chosen.signs
+    told = _told_direction(evidence, signs)
+    turn_agrees = chosen.track >= 0.0 if chosen is not None else True
+    turn_known = chosen is not None and chosen.track != 0.0
+    reversed_reference = False
+    flip = False
+    if told.reference is not None and told.reference < 0.0:
+        # One of the two is backwards: with the turns on their side it is not the wheels.
+        if turn_known:
+            flip = not turn_agrees
+            reversed_reference = turn_agrees
+        elif told.force is not None:
+            flip = told.force < 0.0
+            reversed_reference = not flip
+        else:
+            reversed_reference = True
+            found.append(_all_backwards(evidence, 0.4))
+    elif told.reference is None and turn_known and not turn_agrees and told.force is not None:
+        flip = told.force < 0.0
+    if flip:
+        signs = -signs
+        turn_agrees = not turn_agrees
+    backwards = [i for i in there if signs[i] < 0.0]
+    mended = evidence
+    if backwards:
+        found += [_backwards(evidence, int(i), signs) for i in backwards]
+        mended = evidence.with_rate(evidence.rate * signs)
+    if turn_known and not turn_agrees:
+        found += _swapped(evidence)
+        mended = replace(mended, facts=replace(facts, side=-facts.side, lateral=-facts.lateral))
+    if reversed_reference:
+        reference = evidence.reference()
+        assert reference is not None
+        found.append(
+            Finding(
+                'sign',
+                reference.topic,
+                None,
+                None,
+                -1.0,
+                None,
+                confidence(3.0) if turn_known or told.force is not None else 0.5,
+                'linear.x runs against the wheels',
+                'negate twist.linear.x in its driver, or turn its frame into base_link',
+            )
+        )
+        turned = replace(reference, velocity=-reference.velocity)
+        mended = replace(mended, recording=replace(mended.recording, reference=turned))
+    if not (turn_known and not turn_agrees):
+        exchanged, mended = _exchanged(mended, turns)
+        found += exchanged
+    return found, mended
+
+
+class _Told(NamedTuple):
+    """Agreement of the common speed with the reference and with the specific force; None: none."""
+
+    reference: float | None
+    force: float | None
+
+
+def _told_direction(evidence: Evidence, signs: FloatArray) -> _Told:
+    speed = np.nan_to_num(np.nanmedian(np.nan_to_num(evidence.rate) * signs, axis=1))
+    reference = evidence.reference()
+    by_reference = by_force = None
+    if reference is not None:
+        at = evidence.rim_at(reference.stamp, speed, 0.3)
+        fit = correlation(np.nan_to_num(at), reference.velocity[:, 0])
+        by_reference = fit if abs(fit) > 0.5 else None
+    if evidence.force is not None and evidence.time.size > 100:
+        width = max(round(0.4 / evidence.period), 1)
+        kernel = np.ones(width) / width
+        change = np.gradient(np.convolve(speed, kernel, mode='same'), evidence.period)
+        slow = np.ones(10 * width) / (10 * width)
+        force = np.convolve(evidence.force[:, 0], kernel, mode='same')
+        force = force - np.convolve(force, slow, mode='same')
+        parts = np.array(
+            [
+                float(a @ b)
+                for a, b in zip(np.array_split(change, 10), np.array_split(force, 10), strict=True)
+            ]
+        )
+        spread = float(np.sqrt(np.sum((parts - parts.mean()) ** 2)))
+        fit = correlation(change, force)
+        if abs(parts.sum()) > 3.0 * spread and abs(fit) > 0.15:
+            by_force = fit
+    return _Told(by_reference, by_force)
+
+
+def _best_signs(
+    evidence: Evidence, there: NDArray[np.intp], rows: NDArray[np.bool_]
+) -> _Signs | None:
+    """Try all signs of the wheels with turns of either sense; None where nothing is clearly best.
+
+    A rolling rover has ``r w_i = v - w_z y_i``: after the turn is taken off, all rims run alike.
+    The track is that of the skid, larger than the geometric one.
+    """
+    facts = evidence.facts
+    if there.size < 2 or there.size > MOST_WHEELS:
+        return None
+    radius = np.where(np.isfinite(facts.radius), facts.radius, 1.0)[there]
+    speed = (evidence.rate[:, there] * radius)[rows]
+    yaw = evidence.gyro[rows, 2] if evidence.gyro is not None else np.zeros(rows.sum())
+    lateral = facts.lateral[there] if facts.known else facts.side[there]
+    tracks: tuple[float, ...] = TRACKS if facts.known else TRACKS_BLIND
+    if not facts.has_sides() or not np.isfinite(lateral).all():
+        lateral, tracks = np.zeros(there.size), (0.0,)
+    if speed.shape[0] > TRIAL_ROWS:
+        keep = np.linspace(0, speed.shape[0] - 1, TRIAL_ROWS).astype(int)
+        speed, yaw = speed[keep], yaw[keep]
+    size = np.maximum(np.abs(speed).mean(axis=1), 1e-9)
+    turns = [t * s for t in tracks for s in (1.0, -1.0) if t or s > 0.0]
+    trials = []
+    for signs in itertools.product((1, -1), repeat=there.size - 1):
+        flipped = speed * (1, *signs)
+        for turn in turns:
+            rolling = flipped + yaw[:, None] * lateral * turn
+            spread = np.abs(rolling - np.median(rolling, axis=1)[:, None]).mean(axis=1)
+            trials.append(_Signs(float(np.mean(spread / size)), (1, *signs), turn))
+    best = min(trials, key=lambda t: t.cost)
+    # With (signs, turn) goes (-signs, -turn): the pair with fewer reversed wheels is meant.
+    if sum(s < 0 for s in best.signs) > there.size / 2.0:
+        best = _Signs(best.cost, tuple(-s for s in best.signs), -best.track)
+    straight = next(t for t in trials if t.signs == (1,) * there.size and t.track == 0.0)
+    as_told = min(
+        (t for t in trials if t.signs == (1,) * there.size and t.track >= 0.0),
+        key=lambda t: t.cost,
+    )
+    if best.cost > 0.8 * as_told.cost - 0.01:
+        # Nothing is clearly better than what the rover file says.
+        sides = as_told.track if as_told.cost < 0.8 * straight.cost - 0.01 else 0.0
+        return _Signs(as_told.cost, as_told.signs, sides)
+    unturned = min((t for t in trials if t.track == 0.0 and _alike(t, best)), key=lambda t: t.cost)
+    if best.cost > 0.8 * unturned.cost - 0.01:
+        best = _Signs(best.cost, best.signs, 0.0)  # the turns say nothing about the sides
+    return best
+
+
+def _alike(first: _Signs, second: _Signs) -> bool:
+    return first.signs in (second.signs, tuple(-s for s in second.signs))
+
+
+def _direction_cure(evidence: Evidence, signs: FloatArray) -> str:
+    listed = ', '.join(
+        f'{int(d * s)}' for d, s in zip(evidence.facts.direction, signs, strict=True)
+    )
+    return f'wheels.direction: [{listed}]'
+
+
+def _backwards(evidence: Evidence, index: int, signs: FloatArray) -> Finding:
+    facts, joints = evidence.facts, evidence.recording.joints
+    assert joints is not None
+    torque, rate = evidence.torque[:, index], evidence.rate[:, index]
+    cure = _direction_cure(evidence, signs)
+    moving = evidence.moving
+    if np.isfinite(torque).any() and correlation(torque[moving], rate[moving]) < -0.3:
+        cure += ' and negate effort in the driver (it has the right sign as it is)'
+    return Finding(
+        'sign',
+        joints.topic,
+        facts.names[index],
+        'wheels.direction',
+        float(-facts.direction[index]),
+        None,
+        0.99,
+        'counts backwards when the rover drives forward',
+        cure,
+    )
+
+
+def _all_backwards(evidence: Evidence, sure: float) -> Finding:
+    joints = evidence.recording.joints
+    assert joints is not None
+    return Finding(
+        'sign',
+        joints.topic,
+        None,
+        'wheels.direction',
+        -1.0,
+        None,
+        sure,
+        'all wheels may count backwards: they run against the reference',
+        _direction_cure(evidence, -np.ones(len(evidence.facts.names))),
+    )
+
+
+def _swapped(evidence: Evidence) -> list[Outcome]:
+    """Return what makes the wheels turn against the gyro: swapped sides or a reversed gyro."""
+    joints, imu = evidence.recording.joints, evidence.recording.imu
+    assert joints is not None and imu is not None
+    facts = evidence.facts
+    orientation_told = bool(np.isfinite(imu.orientation).all(axis=1).mean() > 0.9)
+    names = ', '.join(facts.names)
+    mirrored = ', '.join(f'{-y:g}' for y in facts.lateral)
+    sides = Finding(
+        'swapped_sides',
+        joints.topic,
+        None,
+        'wheels.names',
+        None,
+        None,
+        0.97 if orientation_told else 0.5,
+        'left and right wheels turn against the gyro: the sides are swapped'
+        + ('' if orientation_told else ', or the gyro counts yaw to the right'),
+        f'exchange left and right in wheels.names: [{names}]'
+        + (f', or wheels.y: [{mirrored}]' if facts.known else ''),
+    )
+    if orientation_told:
+        return [sides]
+    gyro = Finding(
+        'sign',
+        imu.topic,
+        None,
+        None,
+        -1.0,
+        None,
+        0.5,
+        'angular_velocity.z turns against the wheels, or left and right wheels are swapped',
+        'negate angular_velocity.z in the driver (REP 103: positive to the left)',
+    )
+    return [sides, gyro]
+
+
+def _exchanged(evidence: Evidence, turns: NDArray[np.bool_]) -> tuple[list[Outcome], Evidence]:
+    """Return a left and a right wheel that go by each other's name."""
+    facts, joints = evidence.facts, evidence.recording.joints
+    assert joints is not None
+    if turns.sum() < 40 or evidence.gyro is None or not facts.has_sides():
+        return [], evidence
+    radius = np.where(np.isfinite(facts.radius), facts.radius, 1.0)
+    speed = np.nan_to_num(evidence.rate * radius)
+    yaw = evidence.gyro[:, 2]
+    slopes = np.full(len(facts.names), np.nan)
+    design = np.column_stack([yaw[turns], np.ones(turns.sum())])
+    middle = 0.5 * (speed.max(axis=1) + speed.min(axis=1))
+    for index in range(slopes.size):
+        if np.isfinite(evidence.rate[:, index]).any():
+            fit = block_fit(design, (speed[:, index] - middle)[turns])[0]
+            if fit.sigmas_from(0.0) > 4.0:
+                slopes[index] = -np.sign(fit.value)
+    wrong = [i for i in range(slopes.size) if slopes[i] * facts.side[i] < 0.0]
+    left = [i for i in wrong if facts.side[i] > 0.0]
+    right = [i for i in wrong if facts.side[i] < 0.0]
+    if not left or not right or len(wrong) > slopes.size / 2.0:
+        return [], evidence
+    names = list(facts.names)
+    found: list[Outcome] = []
+    rate, torque = evidence.rate.copy(), evidence.torque.copy()
+    for a, b in zip(left, right, strict=False):
+        names[a], names[b] = names[b], names[a]
+        rate[:, [a, b]], torque[:, [a, b]] = rate[:, [b, a]], torque[:, [b, a]]
+    listed = ', '.join(names)
+    for a, b in zip(left, right, strict=False):
+        for one, other in ((a, b), (b, a)):
+            found.append(
+                Finding(
+                    'exchanged_wheels',
+                    joints.topic,
+                    facts.names[one],
+                    'wheels.names',
+                    None,
+                    None,
+                    0.95,
+                    f'turns like a wheel of the other side, as {facts.names[other]} does',
+                    f'wheels.names: [{listed}]',
+                )
+            )
+    return found, evidence.with_rate(rate, torque)
+
+
+def check_noise(evidence: Evidence, figures: dict[str, Any]) -> list[Outcome]:
+    """Compare the noise of the rates with what the rover file states."""
+    configuration, joints = evidence.facts.configuration, evidence.recording.joints
+    rows = evidence.steady
+    if configuration is None or joints is None or rows.sum() < 60:
+        return []
+    stated = float(configuration.sensors.wheel_rate_std)
+    found: list[Outcome] = []
+    noises = {}
+    for index, name in enumerate(evidence.facts.names):
+        bend = np.diff(evidence.rate[:, index], 2)[rows[1:-1]] / math.sqrt(6.0)
+        bend = bend[np.isfinite(bend)]
+        if bend.size > 50:
+            noises[name] = max(robust_std(bend), 0.5 * float(np.std(bend)))
+    if not noises:
+        return []
+    typical = float(np.median(list(noises.values())))
+    figures['wheels.rate_noise_rad_s'] = float(f'{typical:.3g}')
+    limit = max(NOISE_FACTOR * stated, LEAST_NOISE_SHARE * evidence.working_rate)
+    for name, noise in noises.items():
+        alone = noise > 4.0 * typical
+        if noise > limit and (alone or name == next(iter(noises))):
+            found.append(
+                Finding(
+                    'noise',
+                    joints.topic,
+                    name if alone else None,
+                    'sensors.wheel_rate_std',
+                    float(f'{noise:.2g}'),
+                    None,
+                    0.95,
+                    f'rate scatters by {noise:.2g} rad/s where the rover file has {stated:g} '
+                    '(noise, or steps of a coarse encoder)',
+                    f'sensors.wheel_rate_std: {noise:.2g}',
+                )
+            )
+    return found
