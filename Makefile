@@ -4,6 +4,7 @@
 # make demo    the shipped drives through the real node: estimates, report, key numbers
 # make test    all tests
 # make lint    ruff and mypy
+# make docs    the site (site/index.html), warnings are errors
 # make clean   remove what these made
 #
 # Each sets up what it needs in a virtual environment (.venv) with pinned versions, once.
@@ -28,7 +29,7 @@ export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
 
-.PHONY: help demo test lint clean
+.PHONY: help demo test lint docs clean
 help:
 	@sed -n 's/^# \(make .*\)/\1/p' Makefile
 
@@ -42,6 +43,14 @@ lint: $(VENV)/.test
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+
+docs: $(VENV)/.docs
+	$(BIN)/python -m mkdocs build --strict --quiet
+	@echo 'site/index.html'
+
+$(VENV)/.docs: $(VENV)/.runtime
+	@$(PIP) -r requirements/docs.txt
+	@touch $@
 
 $(VENV)/.runtime: $(PINS) setup.py pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 10))' || \
@@ -57,4 +66,4 @@ $(VENV)/.test: $(VENV)/.runtime
 	@touch $@
 
 clean:
-	rm -rf $(VENV) demo_output build install log *.egg-info
+	rm -rf $(VENV) site demo_output build install log *.egg-info

@@ -1,0 +1,75 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""The pages: all within two clicks, links that lead somewhere, words that readers can follow."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+ROOT = Path(__file__).resolve().parents[2]
+DOCS = ROOT / 'docs'
+PAGES = sorted(DOCS.rglob('*.md'))
+SITE = yaml.safe_load((ROOT / 'mkdocs.yml').read_text(encoding='utf-8'))
+NAMES = [page.relative_to(DOCS).as_posix() for page in PAGES]
+
+
+def entries(tree: Any, depth: int = 0) -> Iterator[tuple[str, int]]:
+    """Yield the pages of a navigation with their depth."""
+    if isinstance(tree, str):
+        yield tree, depth
+    elif isinstance(tree, list):
+        for item in tree:
+            yield from entries(item, depth)
+    else:
+        for item in tree.values():
+            yield from entries(item, depth + 1)
+
+
+def test_every_page_is_within_two_clicks():
+    reached = dict(entries(SITE['nav']))
+    missing = set(NAMES) - set(reached)
+    assert not missing, f'add to nav in mkdocs.yml: {sorted(missing)}'
+    assert set(reached) <= set(NAMES), 'nav names pages that are not there'
+    # A tab opens on a page of its own; its other pages and sub-sections stand beside it.
+    assert max(reached.values()) <= 3
+
+
+def text_without_code(page: Path) -> str:
+    """Return the words of a page, without blocks and spans of code."""
+    text = re.sub(r'^```.*?^```', '', page.read_text(encoding='utf-8'), flags=re.M | re.S)
+    return re.sub(r'`[^`\n]+`', '', text)
+
+
+@pytest.mark.parametrize(
+    'page',
+    [*PAGES, ROOT / 'README.md', ROOT / 'CONTRIBUTING.md'],
+    ids=lambda page: page.relative_to(ROOT).as_posix(),
+)
+def test_links_lead_to_files(page):
+    for target in re.findall(r'\]\(([^)\s]+)\)', text_without_code(page)):
+        path = target.partition('#')[0]
+        if path and not re.match(r'[a-z]+:', path):
+            assert (page.parent / path).exists(), f'{page.name}: {target}'
+
+
+CLOSED = (
+    r'\bthe contract\b',
+    r'\bin the interface\b',
+    r'\b[Ss]eed [123] (eq|equation|section)',
+    r'EQUATIONS\.md',
+    r'INTERFACE\.md',
+)
+"""Sources that a reader cannot open."""
+
+
+@pytest.mark.parametrize('name', NAMES)
+def test_no_source_that_readers_cannot_open(name):
+    text = text_without_code(DOCS / name)
+    for words in CLOSED:
+        assert not re.search(words, text), f'{name}: {words}'

@@ -1,0 +1,54 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""What MkDocs does beside its own: formulas to MathML, links to files outside ``docs/``."""
+
+from __future__ import annotations
+
+import html
+import re
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+from latex2mathml.converter import convert
+
+SHIM = 'https://unpkg.com/iframe-worker/shim'
+CONTRIBUTING = 'development/contributing.md'
+"""Page that shows ``CONTRIBUTING.md`` of the repository."""
+
+_FORMULA = re.compile(r'<(span|div) class="arithmatex">\\[(\[](.*?)\\[)\]]</\1>', re.DOTALL)
+_LINK = re.compile(r'(?<!!)\[([^\]]+)\]\(((?:\.\./)+[^)#\s]+)(#[^)\s]*)?\)')
+
+
+def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
+    """Turn links that leave ``docs/`` into the path of the file in the repository."""
+    if page.file.src_uri == CONTRIBUTING:
+        root = Path(page.file.abs_src_path).parents[2]
+        markdown = (root / 'CONTRIBUTING.md').read_text(encoding='utf-8')
+        markdown = markdown.replace('](docs/', '](../')
+    depth = len(PurePosixPath(page.file.src_uri).parts) - 1
+
+    def plain(match: re.Match[str]) -> str:
+        words, target, _ = match.groups()
+        if target.count('../') <= depth:
+            return match[0]
+        path = target.replace('../', '')
+        name = words if words.strip('`') == path else f'{words} (`{path}`)'
+        return name
+
+    return _LINK.sub(plain, markdown)
+
+
+def on_page_content(content: str, **_: Any) -> str:
+    """Turn formulas into MathML, which browsers draw without a script."""
+
+    def drawn(match: re.Match[str]) -> str:
+        display = 'block' if match[1] == 'div' else 'inline'
+        return str(convert(html.unescape(match[2]), display=display))
+
+    return _FORMULA.sub(drawn, content)
+
+
+def on_post_page(output: str, page: Any, **_: Any) -> str:
+    """Load the library behind the search from the site itself, so that it works offline."""
+    depth = len(PurePosixPath(page.url).parts) - 1
+    return output.replace(SHIM, '../' * depth + 'assets/iframe-worker.js')
