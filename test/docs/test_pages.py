@@ -73,3 +73,16 @@ def test_no_source_that_readers_cannot_open(name):
     text = text_without_code(DOCS / name)
     for words in CLOSED:
         assert not re.search(words, text), f'{name}: {words}'
+
+
+def test_python_of_the_readme_runs():
+    mpl = pytest.importorskip('matplotlib')
+    mpl.use('agg')
+    from matplotlib import pyplot
+
+    text = (ROOT / 'README.md').read_text(encoding='utf-8')
+    blocks = re.findall(r'^```python\n(.*?)^```', text, re.M | re.S)
+    assert blocks
+    for block in blocks:
+        exec(compile(block, 'README.md', 'exec'), {})
+    pyplot.close('all')

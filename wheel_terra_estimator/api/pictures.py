@@ -135,7 +135,13 @@ def plot_diagnosis(diagnosis: Diagnosis, axes: Axes | None = None) -> Axes:
                     label=labels[k] if row == 0 else None,
                 )
             if gap.noise is not None:
-                panel.hlines(gap.noise / whole, row - 0.4, row + 0.4, color='black', linewidth=1.2)
+                panel.hlines(
+                    gap.noise / whole,
+                    row - 0.4,
+                    row + 0.4,
+                    color='black',
+                    label='noise' if row == 0 else '_',
+                )
             panel.annotate(
                 quantity.replace('_', ' '),
                 (row, 0.0),
@@ -147,7 +153,7 @@ def plot_diagnosis(diagnosis: Diagnosis, axes: Axes | None = None) -> Axes:
         panel.set_xticks([])
         panel.set_ylabel('held-out error / as configured [-]')
         panel.set_title(diagnosis.verdict)
-        panel.legend()
+        panel.legend(loc='upper center', bbox_to_anchor=(0.5, -0.08), ncols=4)
     return panel
 
 
