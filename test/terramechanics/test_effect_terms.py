@@ -29,12 +29,13 @@ CONTRACT = (
     'slip_sinkage_exponent', 'lug_digging', 'lug_support', 'lug_shear_radius', 'soil_mound',
     'stress_peak_shift', 'slope_gravity', 'bulldozing', 'cohesion', 'multipass',
     'rate_dependence', 'hard_layer', 'drivetrain_friction', 'wheel_radius_bias',
-    'sinkage_offset', 'pitch_bias',
+    'sinkage_offset', 'pitch_bias', 'grouser_thrust', 'rim_friction', 'wheel_flexibility',
+    'soil_adhesion', 'soil_transport', 'pull_zero', 'pull_gain', 'torque_gain', 'sinkage_gain',
 )  # fmt: skip
 # Rows on which every effect can show: slips of both signs, a slope, second pass, fast, deep.
 ROW = {
     'slip': np.array([-0.4, 0.1, 0.4, 0.8]),
-    'load': np.array([60.0, 80.0, 160.0, 240.0]),
+    'load': np.array([60.0, 80.0, 160.0, 480.0]),
     'slope': np.array([0.1, 0.0, 0.2, -0.1]),
     'pass_number': np.array([1, 2, 3, 2]),
     'angular_velocity': np.array([1.0, 0.2, 3.0, 0.5]),
@@ -150,7 +151,10 @@ def test_effects_without_their_column_do_nothing() -> None:
     ('settings', 'words'),
     [
         ({'bulldozer': {}}, 'effect bulldozer is not in the catalogue'),
-        ({'lug_digging': {'k': 1.0}}, 'effect lug_digging has no parameter k; it has kd'),
+        (
+            {'lug_digging': {'k': 1.0}},
+            'effect lug_digging has no parameter k in the form linear; it has kd',
+        ),
         ({'lug_digging': {'kd': 9.0}}, r'effects.lug_digging.kd is 9; allowed is \[0, 4\]'),
         (
             {'grouser_thrust': {}, 'lug_shear_radius': {}},

@@ -74,7 +74,7 @@ def test_static_sinkage_is_bekker_s() -> None:
     wheel = Wheel(0.5, 0.2)
     answer = state([0.0], 100.0, soil=soil, wheel=wheel)
     assert answer.sinkage == pytest.approx(
-        stresses.bekker_wheel_sinkage(100.0, wheel, 5e7, 1.0), rel=0.01
+        stresses.rolling_sinkage(100.0, wheel.radius, wheel.width, 5e7, 1.0), rel=0.01
     )
 
 

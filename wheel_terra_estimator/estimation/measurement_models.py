@@ -19,11 +19,12 @@ from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.terramechanics.conditioned import SMALLEST_ANGLE, ConditionedForces
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.maths import ScalarMaths
+from wheel_terra_estimator.terramechanics.stresses import bearing_law
 from wheel_terra_estimator.terramechanics.terms import Terms, set_angles
 
 # Effects of a table or of an instrument that the filter must not apply: loads are terrain-normal
 # already, and the pull comes from specific force, not from an attitude.
-_NOT_IN_FILTER = frozenset({'slope_gravity', 'pitch_bias'})
+_NOT_IN_FILTER = frozenset({'slope_gravity', 'pitch_bias', 'pull_zero', 'pull_gain'})
 _CONTACT_INPUTS = tuple(f.name for f in fields(Contact) if f.default is MISSING)
 _LEAST_BEARING = 0.05  # of the normal stress's part: cohesion alone carries no wheel
 
@@ -89,18 +90,18 @@ class WheelModels:
         self._contacts = []
         for i in range(wheels.count):
             width = float(wheels.width[i])
-            if soil.pressure_law == 'reece':
-                weight = float(soil.density) * gravity
-                modulus = self._cohesion * float(soil.cohesive_modulus) + weight * width * float(
-                    soil.frictional_modulus
-                )
-                depth = width
-            else:
-                modulus = float(soil.cohesive_modulus) / width + float(soil.frictional_modulus)
-                depth = 1.0
+            modulus, depth = bearing_law(
+                soil.pressure_law,
+                float(soil.cohesive_modulus),
+                float(soil.frictional_modulus),
+                width,
+                self._cohesion,
+                float(soil.density) * gravity,
+            )
             contact = Contact(**dict.fromkeys(_CONTACT_INPUTS, 0.0))
             contact.gravity = gravity
-            contact.radius, contact.width = float(wheels.radius[i]), width
+            contact.radius = contact.rim_radius = float(wheels.radius[i])
+            contact.width = width
             contact.lug_height = float(wheels.lug_height[i])
             contact.lug_count = float(wheels.lug_count[i])
             contact.density = float(soil.density)
@@ -200,7 +201,7 @@ class WheelModels:
         c.slip, c.velocity_ratio = slip, min(max(ratio, 0.0), 3.0) * self._slip_radius[wheel]
         c.normal_load = c.stated_load = load
         c.rim_speed = math.nan
-        c.shear_radius = c.radius
+        c.radius = c.shear_radius = c.rim_radius
         c.bearing_modulus = self._modulus[wheel] * math.exp(stiffness)
         c.sinkage_exponent = self._exponent + slip_sinkage * abs(slip)
         c.cohesion, c.tan_friction = self._cohesion * factor, self._tan_friction * factor

@@ -23,7 +23,7 @@ from wheel_terra_estimator.terramechanics import effects as effect_catalogue
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.kinematics import shear_displacement, speed_ratio
 from wheel_terra_estimator.terramechanics.soil import Soil
-from wheel_terra_estimator.terramechanics.stresses import front_stress
+from wheel_terra_estimator.terramechanics.stresses import bearing_law, front_stress
 from wheel_terra_estimator.terramechanics.terms import Terms, set_angles
 from wheel_terra_estimator.terramechanics.wheel import Wheel
 
@@ -101,14 +101,14 @@ class ContactModel:
         self._wheel = wheel
         self._soil = soil
         self._tan_friction = float(np.tan(soil.friction_angle))
-        self._bekker = soil.pressure_law == 'bekker'
-        if self._bekker:
-            self._modulus = soil.cohesive_modulus / wheel.width + soil.frictional_modulus
-        else:
-            self._modulus = (
-                soil.cohesion * soil.cohesive_modulus
-                + soil.density * gravity * wheel.width * soil.frictional_modulus
-            )
+        self._modulus, self._reference_depth = bearing_law(
+            soil.pressure_law,
+            soil.cohesive_modulus,
+            soil.frictional_modulus,
+            wheel.width,
+            soil.cohesion,
+            soil.density * gravity,
+        )
         self._slip_radius = slip_radius
         self._gravity = gravity
         self._terms = Terms(effect_catalogue.check_settings(effects))
@@ -163,7 +163,7 @@ class ContactModel:
             lug_thickness=wheel.lug_thickness,
             shear_radius=wheel.radius,
             bearing_modulus=self._modulus * factors['stiffness'],
-            reference_depth=1.0 if self._bekker else wheel.width,
+            reference_depth=self._reference_depth,
             sinkage_exponent=soil.sinkage_exponent,
             cohesion=soil.cohesion * factors['cohesion'],
             tan_friction=self._tan_friction * factors['friction'],
@@ -171,12 +171,13 @@ class ContactModel:
             peak_ratio=soil.peak_stress_ratio,
             leaving_ratio=soil.leaving_angle_ratio,
             density=soil.density,
+            rim_radius=wheel.radius,
         )
         self._terms.apply('on_inputs', contact)
         contact.sinkage_exponent = soil.sinkage_exponent + factors['slip_sinkage'] * (
             contact.sinkage_exponent - soil.sinkage_exponent
         )
-        entrance = np.arccos(np.clip(1.0 - depth / wheel.radius, -0.5, np.cos(LEAST_ANGLE)))
+        entrance = np.arccos(np.clip(1.0 - depth / contact.radius, -0.5, np.cos(LEAST_ANGLE)))
         set_angles(contact, entrance, None, self._terms)
         t1, tm, t2 = contact.entrance_angle, contact.peak_angle, contact.leaving_angle
         shape = np.broadcast_shapes(np.shape(t1), np.shape(tm), np.shape(t2), np.shape(slip))
@@ -203,7 +204,7 @@ class ContactModel:
         frictional = contact.tan_friction * normal
 
         # Load balance, linear in the factor on the normal stress.
-        radius, width, cohesion = wheel.radius, wheel.width, contact.cohesion
+        radius, width, cohesion = contact.radius, wheel.width, contact.cohesion
         from_cohesion = shear_radius * cohesion * (mobilised_along * sine).sum(0)
         from_stress = radius * (weights * normal * cosine).sum(0) + shear_radius * (
             mobilised_along * frictional * sine

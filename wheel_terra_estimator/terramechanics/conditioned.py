@@ -10,11 +10,13 @@ times faster than numpy.
 from __future__ import annotations
 
 import math
+from copy import copy
 from typing import NamedTuple
 
 from wheel_terra_estimator.terramechanics.balanced_branches import Direction, balanced_forces
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects import catalogue
+from wheel_terra_estimator.terramechanics.kinematics import slip_of_speed_ratio
 from wheel_terra_estimator.terramechanics.maths import ScalarMaths
 from wheel_terra_estimator.terramechanics.scalar_wheels import ScalarWheels
 from wheel_terra_estimator.terramechanics.terms import PEAK_MARGIN, Terms, set_angles
@@ -79,10 +81,34 @@ class ConditionedForces(ScalarWheels):
         ).stages['on_outputs']
         self._proportional = not self._terms.stages['on_contact']
         self._plain = self._proportional and not (self._on_inputs or self._on_sinkage)
+        self._depth_of_reading = self._inverse_gain()
+        self._modulus = [contact.bearing_modulus for contact, _ in self._wheels]
         soil = self._soil
         self._exponent = float(soil.sinkage_exponent)
         self._peak_ratio = float(soil.peak_stress_ratio)
         self._leaving_ratio = float(soil.leaving_angle_ratio)
+        self._load_moves_soil = self._moves_with_load()
+
+    def _moves_with_load(self) -> bool:
+        """Whether an effect makes exponent, K or radius depend on the load."""
+        found = []
+        for load in (100.0, 200.0):
+            self._inputs(0, (1.0, load, 0.0, 0.5, 0.01), 0.0)
+            contact = self._wheels[0][0]
+            found.append((contact.sinkage_exponent, contact.shear_modulus, contact.radius))
+        return found[0] != found[1]
+
+    def _inverse_gain(self) -> float:
+        """Depth per sinkage as read: the terms on it are an offset and a gain, at any slip."""
+        contact = copy(self._wheels[0][0])
+        readings = []
+        for depth in (0.0, 1.0):
+            contact.sinkage = depth
+            for term, parameters in self._on_sinkage:
+                term(contact, parameters, ScalarMaths)
+            readings.append(contact.sinkage)
+        gain = readings[1] - readings[0]
+        return 1.0 if abs(gain - 1.0) < _STEP else 1.0 / gain
 
     def forces(
         self,
@@ -147,14 +173,14 @@ class ConditionedForces(ScalarWheels):
         elif not _BEHIND <= leaving_angle <= _AHEAD:
             leaving, clamped = min(max(leaving_angle, _BEHIND), _AHEAD), True
         if self._plain and leaving is None:
-            angle, outside = self._inputs(contact, given, slip_radius, sinkage)
+            angle, outside = self._inputs(index, given, sinkage)
             by_angle = _set_shares(contact, angle)
             by_speed, scales = (0.0, 0.0, 0.0, slip_radius, 0.0), None
         else:
-            by_speed, by_angle, scales, outside = self._chain(
-                contact, given, slip_radius, sinkage, leaving
-            )
-        rate = 0.0 if outside else 1.0 / (contact.radius * math.sin(contact.entrance_angle))
+            by_speed, by_angle, scales, outside = self._chain(index, given, sinkage, leaving)
+        rate = 0.0
+        if not outside:
+            rate = self._depth_of_reading / (contact.radius * math.sin(contact.entrance_angle))
         torque, pull, d_torque, d_pull = balanced_forces(
             contact,
             centroid_shift,
@@ -163,21 +189,20 @@ class ConditionedForces(ScalarWheels):
         )
         if scales is not None:
             d_torque, d_pull = _scaled(d_torque, scales), _scaled(d_pull, scales)
+        if self._load_moves_soil:
+            by_load = self._by_load(index, given, sinkage, leaving, centroid_shift, (torque, pull))
+            d_torque = (*d_torque[:2], by_load[0], *d_torque[3:])
+            d_pull = (*d_pull[:2], by_load[1], *d_pull[3:])
         if direction < 0.0:
             torque, pull = -torque, -pull
             d_torque, d_pull = tuple([-d for d in d_torque]), tuple([-d for d in d_pull])
         answer = Forces(torque, pull, d_torque, d_pull, clamped or outside)
         if self._on_forces:
-            return self._with_force_terms(contact, answer, given, slip_radius, sinkage, leaving)
+            return self._with_force_terms(index, answer, given, sinkage, leaving)
         return answer
 
     def _chain(
-        self,
-        contact: Contact,
-        given: tuple[float, ...],
-        slip_radius: float,
-        sinkage: float,
-        leaving: float | None,
+        self, index: int, given: tuple[float, ...], sinkage: float, leaving: float | None
     ) -> tuple[Direction, tuple[float, float], tuple[float, ...], bool]:
         """Set the contact, and take the derivatives through the effects' terms.
 
@@ -190,22 +215,24 @@ class ConditionedForces(ScalarWheels):
             Rates by the speed ratio; rates of peak and leaving angle by the entrance angle; rates
             of load, c, tan(phi) and K by themselves; whether the sinkage is outside the model.
         """
+        contact = self._wheels[index][0]
         u, load, cohesion, friction, modulus = given
         du, d_load, d_cohesion, d_friction, d_modulus = [
             _STEP * (value if value > floor else floor)
             for value, floor in zip(given, _FLOORS, strict=True)
         ]  # fmt: skip
+        further = load if self._load_moves_soil else load + d_load  # else `_by_load` has it
         moved = (
-            u + du, load + d_load, cohesion + d_cohesion, friction + d_friction, modulus + d_modulus
+            u + du, further, cohesion + d_cohesion, friction + d_friction, modulus + d_modulus
         )  # fmt: skip
-        angle, _ = self._inputs(contact, moved, slip_radius, sinkage)
+        angle, _ = self._inputs(index, moved, sinkage)
         self._set_angles(contact, angle, leaving)
         ratio_after, load_after = contact.velocity_ratio, contact.normal_load
         cohesion_after, friction_after = contact.cohesion, contact.tan_friction
         modulus_after, exponent_after = contact.shear_modulus, contact.sinkage_exponent
         peak_after, leaving_after = contact.peak_angle, contact.leaving_angle
         angle_after = angle
-        angle, outside = self._inputs(contact, given, slip_radius, sinkage)
+        angle, outside = self._inputs(index, given, sinkage)
         by_angle = self._set_angles(contact, angle, leaving)
         by_speed = (
             (angle_after - angle) / du,
@@ -222,6 +249,24 @@ class ConditionedForces(ScalarWheels):
         )
         return by_speed, by_angle, scales, outside
 
+    def _by_load(
+        self,
+        index: int,
+        given: tuple[float, ...],
+        sinkage: float,
+        leaving: float | None,
+        shift: float,
+        base: tuple[float, float],
+    ) -> tuple[float, float]:
+        """Rates of torque and pull by the load where effects make the soil depend on it."""
+        contact = self._wheels[index][0]
+        step = _STEP * max(given[1], _FLOORS[1])
+        angle, _ = self._inputs(index, (given[0], given[1] + step, *given[2:]), sinkage)
+        self._set_angles(contact, angle, leaving)
+        nowhere = (0.0,) * 5
+        torque, pull, _, _ = balanced_forces(contact, shift, nowhere, nowhere)
+        return (torque - base[0]) / step, (pull - base[1]) / step
+
     def _set_angles(
         self, contact: Contact, angle: float, leaving: float | None
     ) -> tuple[float, float]:
@@ -233,69 +278,75 @@ class ConditionedForces(ScalarWheels):
         set_angles(contact, angle, leaving, self._terms, ScalarMaths)
         return (peak - contact.peak_angle) / _STEP, (left - contact.leaving_angle) / _STEP
 
-    def _inputs(
-        self, contact: Contact, given: tuple[float, ...], slip_radius: float, sinkage: float
-    ) -> tuple[float, bool]:
+    def _inputs(self, index: int, given: tuple[float, ...], sinkage: float) -> tuple[float, bool]:
         """Set the contact to the inputs, effects done; return entrance angle and clamp flag."""
+        contact, slip_radius = self._wheels[index]
         ratio = given[0]
-        contact.slip = 1.0 - ratio if ratio <= 1.0 else 1.0 / ratio - 1.0  # slip_of_speed_ratio
+        contact.slip = slip_of_speed_ratio(ratio, ScalarMaths)
         contact.velocity_ratio = ratio * slip_radius
         contact.normal_load = contact.stated_load = given[1]
         contact.cohesion, contact.tan_friction, contact.shear_modulus = given[2:]
-        contact.shear_radius, contact.sinkage_exponent = contact.radius, self._exponent
+        contact.radius = contact.shear_radius = contact.rim_radius
+        contact.sinkage_exponent, contact.bearing_modulus = self._exponent, self._modulus[index]
         contact.peak_ratio, contact.leaving_ratio = self._peak_ratio, self._leaving_ratio
         for term, parameters in self._on_inputs:
             term(contact, parameters, ScalarMaths)
-        contact.sinkage = 0.0
-        for term, parameters in self._on_sinkage:
-            term(contact, parameters, ScalarMaths)
-        cosine = 1.0 - (sinkage - contact.sinkage) / contact.radius
+        cosine = 1.0 - self._depth(contact, sinkage) / contact.radius
         if not cosine <= _LARGEST_COSINE:  # nan as well
             return SMALLEST_ANGLE, True
         if cosine < 0.0:
             return 0.5 * math.pi, True
         return math.acos(cosine), False
 
+    def _depth(self, contact: Contact, sinkage: float) -> float:
+        """Depth of the stressed contact for a sinkage as read: the terms on it undone."""
+        contact.sinkage = 0.0
+        for term, parameters in self._on_sinkage:
+            term(contact, parameters, ScalarMaths)
+        return (sinkage - contact.sinkage) * self._depth_of_reading
+
     def _with_force_terms(
         self,
-        contact: Contact,
+        index: int,
         forces: Forces,
         given: tuple[float, ...],
-        slip_radius: float,
         sinkage: float,
         leaving: float | None,
     ) -> Forces:
-        """Add the terms that act on torque and pull, and their derivatives (finite steps)."""
+        """Apply the terms that act on torque and pull, and to their derivatives (finite steps)."""
+        contact = self._wheels[index][0]
 
-        def added(inputs: tuple[float, ...], depth: float) -> tuple[float, float]:
-            t1, _ = self._inputs(contact, inputs, slip_radius, depth)
+        def read(
+            inputs: tuple[float, ...], depth: float, torque: float, pull: float
+        ) -> tuple[float, float]:
+            t1, _ = self._inputs(index, inputs, depth)
             set_angles(contact, t1, leaving, self._terms, ScalarMaths)
-            contact.torque = contact.drawbar_pull = 0.0
+            contact.torque, contact.drawbar_pull = torque, pull
             for term, parameters in self._on_forces:
                 term(contact, parameters, ScalarMaths)
             return contact.torque, contact.drawbar_pull
 
-        base = added(given, sinkage)
+        soil = forces.torque, forces.drawbar_pull
+        base = read(given, sinkage, *soil)
         rows = (list(forces.d_torque), list(forces.d_pull))
         # Columns of INPUTS; the last is the sinkage, the others the entries of ``given``.
-        for position, column in enumerate((0, 2, 3, 4, 5, 1)):
-            inputs, depth = list(given), sinkage
+        for position, column in enumerate((0, 2, 3, 4, 5, 1, 6)):
+            inputs, depth, step = list(given), sinkage, _STEP
             if column == 1:
-                step = _STEP * contact.radius
+                step = _STEP * contact.rim_radius
                 depth += step
-            else:
+            elif column < 6:
                 step = _STEP * max(given[position], _FLOORS[position])
                 inputs[position] += step
-            moved = added(tuple(inputs), depth)
+            moved = read(
+                tuple(inputs),
+                depth,
+                soil[0] + step * forces.d_torque[column],
+                soil[1] + step * forces.d_pull[column],
+            )
             for k in (0, 1):
-                rows[k][column] += (moved[k] - base[k]) / step
-        return Forces(
-            forces.torque + base[0],
-            forces.drawbar_pull + base[1],
-            tuple(rows[0]),
-            tuple(rows[1]),
-            forces.clamped,
-        )
+                rows[k][column] = (moved[k] - base[k]) / step
+        return Forces(*base, tuple(rows[0]), tuple(rows[1]), forces.clamped)
 
 
 def _set_shares(contact: Contact, angle: float) -> tuple[float, float]:

@@ -57,3 +57,5 @@ class Contact:
     sinkage: Any = 0.0  # [m]
     drawbar_pull: Any = 0.0  # [N]
     torque: Any = 0.0  # [N m]
+    # Wheel as built, whatever the effects make of `radius`: resets and arms refer to it.
+    rim_radius: Any = 0.0  # [m]

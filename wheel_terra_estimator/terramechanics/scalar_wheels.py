@@ -11,6 +11,7 @@ from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects import EffectSettings, check_settings
 from wheel_terra_estimator.terramechanics.operating_points import STANDARD_GRAVITY
 from wheel_terra_estimator.terramechanics.soil import Soil
+from wheel_terra_estimator.terramechanics.stresses import bearing_law
 from wheel_terra_estimator.terramechanics.terms import SOIL_NUMBERS, Terms
 from wheel_terra_estimator.terramechanics.wheel import Wheel
 
@@ -81,9 +82,17 @@ def scalar_contacts(
     blank: dict[str, float] = dict.fromkeys(Contact.__dataclass_fields__, 0.0)
     for radius, width, height, count, thickness in zip(*(c.tolist() for c in columns), strict=True):
         contact = Contact(**blank)
-        contact.radius, contact.width = radius, width
+        contact.radius = contact.rim_radius = radius
+        contact.width = width
         contact.lug_height, contact.lug_count, contact.lug_thickness = height, count, thickness
         contact.gravity, contact.density = gravity, float(soil.density)
-        contact.reference_depth = width if soil.pressure_law == 'reece' else 1.0
+        contact.bearing_modulus, contact.reference_depth = bearing_law(
+            soil.pressure_law,
+            soil.cohesive_modulus,
+            soil.frictional_modulus,
+            width,
+            soil.cohesion,
+            soil.density * gravity,
+        )
         contacts.append((contact, radius + height if slip_radius == 'lug_tip' else radius))
     return contacts

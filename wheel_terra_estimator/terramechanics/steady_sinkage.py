@@ -107,13 +107,13 @@ class SteadySinkage(ScalarWheels):
         form = closed_form.proportional_forces(self._inputs(index, given), ScalarMaths)
         functions = load, _ = self._functions(contact, form)
         angle, _, _, carried = _balanced(form, functions, contact.normal_load)
-        depth, lift = self._depth(contact, angle)
+        depth = self._depth(contact, angle)
         if not carried:
             return depth, (0.0,) * len(INPUTS), False
         balance = load(angle) - contact.normal_load
         step = _STEP * angle
         slope = (load(angle + step) - contact.normal_load - balance) / step
-        deepening = contact.radius * math.sin(angle)
+        deepening = (self._depth(contact, angle + step) - depth) / step
         derivatives = []
         for position, value in enumerate(given):
             moved = list(given)
@@ -122,8 +122,8 @@ class SteadySinkage(ScalarWheels):
             form = closed_form.proportional_forces(self._inputs(index, tuple(moved)), ScalarMaths)
             load, _ = self._functions(contact, form)
             rise = (load(angle) - contact.normal_load - balance) / change
-            lifted = (self._depth(contact, angle)[1] - lift) / change
-            derivatives.append(-rise / slope * deepening + lifted)
+            shifted = (self._depth(contact, angle) - depth) / change
+            derivatives.append(-rise / slope * deepening + shifted)
         return depth, tuple(derivatives), True
 
     def state(
@@ -194,34 +194,31 @@ class SteadySinkage(ScalarWheels):
             friction,
             shear_modulus,
         )
-        contact.shear_radius = contact.radius
+        contact.radius = contact.shear_radius = contact.rim_radius
         contact.sinkage_exponent = soil.sinkage_exponent + slope * abs(contact.slip)
         contact.peak_ratio, contact.leaving_ratio = (
             soil.peak_stress_ratio,
             soil.leaving_angle_ratio,
         )
-        if soil.pressure_law == 'reece':
-            modulus = stresses.reece_modulus(
-                soil.cohesive_modulus,
-                soil.frictional_modulus,
-                contact.width,
-                cohesion,
-                soil.density * contact.gravity,
-            )
-        else:
-            modulus = stresses.bekker_modulus(
-                soil.cohesive_modulus, soil.frictional_modulus, contact.width
-            )
+        modulus, _ = stresses.bearing_law(
+            soil.pressure_law,
+            soil.cohesive_modulus,
+            soil.frictional_modulus,
+            contact.width,
+            cohesion,
+            soil.density * contact.gravity,
+        )
         contact.bearing_modulus = modulus * math.exp(log_stiffness)
         self._terms.apply('on_inputs', contact, ScalarMaths)
         return contact
 
-    def _depth(self, contact: Contact, angle: float) -> tuple[float, float]:
-        """Sinkage as read, and the part of it that the effects add."""
+    def _depth(self, contact: Contact, angle: float) -> float:
+        """Sinkage as a sensor reads it at an entrance angle."""
         contact.entrance_angle = angle
-        contact.sinkage = contact.torque = contact.drawbar_pull = 0.0
+        contact.sinkage = contact.radius * (1.0 - math.cos(angle))
+        contact.torque = contact.drawbar_pull = 0.0
         self._terms.apply('on_outputs', contact, ScalarMaths)
-        return contact.radius * (1.0 - math.cos(angle)) + contact.sinkage, contact.sinkage
+        return contact.sinkage
 
 
 def _balanced(

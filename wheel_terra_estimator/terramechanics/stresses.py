@@ -24,17 +24,31 @@ def reece_modulus(
     return cohesion * cohesive + weight_density * width * frictional
 
 
+def bearing_law(
+    pressure_law: str,
+    cohesive: Any,
+    frictional: Any,
+    width: Any,
+    cohesion: Any,
+    weight_density: Any,
+) -> tuple[Any, Any]:
+    """Pressure at the reference depth [Pa], and that depth [m], of a law of ``Soil``."""
+    if pressure_law == 'reece':
+        return reece_modulus(cohesive, frictional, width, cohesion, weight_density), width
+    return bekker_modulus(cohesive, frictional, width), 1.0
+
+
 def static_sinkage(load: Any, area: Any, modulus: Any, exponent: Any) -> Any:
     """Sinkage of a plate, (p/k)^(1/n) [m] (Bekker); the limit of a wheel without curvature."""
     return (load / (area * modulus)) ** (1.0 / exponent)
 
 
-def bekker_wheel_sinkage(load: Any, wheel: Any, modulus: Any, exponent: Any) -> Any:
-    """Static sinkage of a towed rigid wheel [m] (Bekker 1969).
+def rolling_sinkage(load: Any, radius: Any, width: Any, modulus: Any, exponent: Any) -> Any:
+    """Sinkage of a towed rigid wheel without slip [m] (Bekker 1969).
 
     z = [3 W / ((3 - n) b k sqrt(D))]^(2/(2n+1)); small sinkage, n below 1.3, stress in front only.
     """
-    force = (3.0 - exponent) * wheel.width * modulus * np.sqrt(2.0 * wheel.radius)
+    force = (3.0 - exponent) * width * modulus * (2.0 * radius) ** 0.5
     return (3.0 * load / force) ** (2.0 / (2.0 * exponent + 1.0))
 
 

@@ -73,17 +73,14 @@ def build_contact(
     wheel = points.wheel
     rate = points.angular_velocity
     tip, rim = wheel.tip_radius, wheel.radius
-    if pressure_law == 'reece':
-        depth = wheel.width
-        weight = soil['density'] * points.gravity
-        modulus = stresses.reece_modulus(
-            soil['cohesive_modulus'], soil['frictional_modulus'], depth, soil['cohesion'], weight
-        )
-    else:
-        depth = 1.0
-        modulus = stresses.bekker_modulus(
-            soil['cohesive_modulus'], soil['frictional_modulus'], wheel.width
-        )
+    modulus, depth = stresses.bearing_law(
+        pressure_law,
+        soil['cohesive_modulus'],
+        soil['frictional_modulus'],
+        wheel.width,
+        soil['cohesion'],
+        soil['density'] * points.gravity,
+    )
     ratio = speed_ratio(points.slip)
     contact = Contact(
         slip=points.slip,
@@ -110,10 +107,11 @@ def build_contact(
         peak_ratio=soil['peak_stress_ratio'],
         leaving_ratio=soil['leaving_angle_ratio'],
         density=soil['density'],
+        rim_radius=rim,
     )
     terms.apply('on_inputs', contact)
     if points.slip_radius == 'shear':
-        contact.velocity_ratio = contact.velocity_ratio / rim * contact.shear_radius
+        contact.velocity_ratio = contact.velocity_ratio / contact.radius * contact.shear_radius
     return contact
 
 

@@ -19,6 +19,7 @@ STAGES = ('on_inputs', 'on_contact', 'on_normal_stress', 'on_outputs')
 # A term changes the contact in place; `parameters.kd` is the value of the parameter ``kd``;
 # `maths` is numpy or ScalarMaths.
 Term: TypeAlias = Callable[[Contact, SimpleNamespace, Any], None]
+REFERENCE_PRESSURE = 3000.0  # [Pa]; 80 N on 165 mm x 157 mm, the wheel of Ding et al. 2010
 # Effect name -> parameter -> value; ``form`` names the form where it is not the first one.
 EffectSettings: TypeAlias = Mapping[str, Mapping[str, Any]]
 FORM_MARK = ':'  # between the name of an effect and that of its form in the key of a variant
@@ -227,6 +228,11 @@ class Effect:
             p.name: p.neutral if p is first or p.prior_mean == p.neutral else p.default
             for p in self.parameters
         }
+
+
+def relative_pressure(contact: Contact) -> Any:
+    """Mean pressure W/(b r) over `REFERENCE_PRESSURE` [-]: what grows with the load."""
+    return contact.normal_load / (contact.width * contact.rim_radius * REFERENCE_PRESSURE)
 
 
 def _variant(first: Effect, form: Form) -> Effect:

@@ -8,7 +8,9 @@ from types import SimpleNamespace
 from typing import Any
 
 from wheel_terra_estimator.terramechanics.contact import Contact
-from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter
+from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter, Form
+
+_LEAST_FRICTION = 0.02  # tan(phi); Terzaghi's factors divide by it
 
 
 def _push(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
@@ -23,19 +25,54 @@ def _push(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
     contact.drawbar_pull = contact.drawbar_pull - contact.direction * p.kb * resistance
 
 
+def _earth_pressure(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
+    friction = maths.arctan(maths.maximum(contact.tan_friction, _LEAST_FRICTION))
+    tan, cos = maths.tan(friction), maths.cos(friction)
+    half = 0.25 * maths.pi + 0.5 * friction
+    turn = maths.exp(2.0 * (0.75 * maths.pi - 0.5 * friction) * tan)
+    n_q = 0.5 * turn / maths.cos(half) ** 2
+    n_c = (n_q - 1.0) / tan
+    n_gamma = 2.0 * (n_q + 1.0) * tan / (1.0 + 0.4 * maths.sin(4.0 * friction))
+    k_c = (n_c - tan) * cos * cos
+    k_gamma = (2.0 * n_gamma / tan + 1.0) * cos * cos
+    depth = contact.radius * (1.0 - maths.cos(contact.entrance_angle))
+    weight = contact.density * contact.gravity
+    # Front of the wheel as a blade that leans by half the entrance angle from the horizontal.
+    lean = 0.5 * maths.pi - 0.5 * contact.entrance_angle
+    front = maths.sin(lean + friction) / (2.0 * maths.sin(lean) * cos)
+    resistance = (
+        contact.width * front * depth * (2.0 * contact.cohesion * k_c + weight * depth * k_gamma)
+    )
+    contact.drawbar_pull = contact.drawbar_pull - contact.direction * p.kb * resistance
+
+
+_KB = EffectParameter(
+    'kb', '-', 0.5, 0.0, 5.0, 0.5, 'half_normal', 'share of the full passive resistance'
+)
+
 EFFECT = Effect(
     name='bulldozing',
     claim='soil is pushed ahead of the wheel',
+    form='wedge',
     symbol='F -= kb b D1 (c z + D2 rho g z^2/2), D1 = cot X + tan(X + phi), '
     'D2 = cot X + cot^2 X tan(phi), X = pi/4 - phi/2',
-    parameters=(
-        EffectParameter(
-            'kb', '-', 0.5, 0.0, 5.0, 0.5, 'half_normal', 'share of the full passive wedge'
-        ),
-    ),
+    parameters=(_KB,),
     touches=frozenset({'drawbar_pull'}),
     confounded_with={'pitch_bias': 'three times the load or another wheel; a level check'},
     validity='sinkage below half the radius; the wedge is taken over the rim width',
     source='Hegedus 1960 in the form of Ishigami et al. 2007 (side force turned to the front)',
     on_outputs=_push,
+    other_forms=(
+        Form(
+            name='terzaghi',
+            claim='soil is pushed ahead of the wheel, after Terzaghi and Hettiaratchi',
+            symbol='F -= kb b sin(a + phi)/(2 sin a cos phi) z (2 c Kc + rho g z Kg), '
+            'Kc = (Nc - tan phi) cos^2 phi, Kg = (2 Ng/tan phi + 1) cos^2 phi, a = (pi - t_1)/2',
+            parameters=(_KB,),
+            validity='friction angle 10 to 45 degrees; sinkage below half the radius',
+            source="Terzaghi's bearing factors in the bulldozing resistance of Bekker 1969 and the "
+            'passive resistance of Hettiaratchi and Reece 1974; Ng by the usual approximation',
+            on_outputs=_earth_pressure,
+        ),
+    ),
 )

@@ -8,37 +8,54 @@ from types import SimpleNamespace
 from typing import Any
 
 from wheel_terra_estimator.terramechanics.contact import Contact
-from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter
+from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter, Form
 
 
 def _thrust(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
+    slip = maths.maximum(contact.slip, 0.0)
+    passive = _passive_coefficient(contact, maths)
+    _push(contact, p.share, (passive - 1.0) * slip, slip, maths)
+
+
+def _textbook(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
+    slip = maths.maximum(contact.slip, 0.0)
+    _push(contact, p.share, _passive_coefficient(contact, maths), slip, maths)
+
+
+def _passive_coefficient(contact: Contact, maths: Any) -> Any:
+    """Rankine's Np = tan^2(pi/4 + phi/2) [-]."""
+    friction = maths.arctan(contact.tan_friction)
+    return maths.tan(0.25 * maths.pi + 0.5 * friction) ** 2
+
+
+def _push(contact: Contact, share: float, of_surcharge: Any, slip: Any, maths: Any) -> None:
+    """Add the thrust of the lugs in the contact, with the given factor on the surcharge q h."""
     span = contact.entrance_angle - contact.leaving_angle
     engaged = contact.lug_count * span / (2.0 * maths.pi)
-    friction = maths.arctan(contact.tan_friction)
-    passive = maths.tan(0.25 * maths.pi + 0.5 * friction) ** 2
+    passive = _passive_coefficient(contact, maths)
     height = contact.lug_height
-    slip = maths.maximum(contact.slip, 0.0)
     surcharge = contact.normal_load / (contact.width * contact.radius * span)
     blade = (
         0.5 * contact.density * contact.gravity * height * height * passive
-        + surcharge * height * (passive - 1.0) * slip
+        + surcharge * height * of_surcharge
         + 2.0 * contact.cohesion * height * maths.sqrt(passive)
     )
     mobilised = -maths.expm1(-slip * contact.radius * span / contact.shear_modulus)
-    thrust = contact.direction * p.share * contact.width * engaged * blade * mobilised
+    thrust = contact.direction * share * contact.width * engaged * blade * mobilised
     contact.drawbar_pull = contact.drawbar_pull + thrust
     contact.torque = contact.torque + thrust * (contact.radius + 0.5 * height)
 
 
+_SHARE = EffectParameter(
+    'share', '-', 0.15, 0.0, 1.5, 0.2, 'half_normal', 'share of the full passive thrust'
+)
+
 EFFECT = Effect(
     name='grouser_thrust',
     claim='lugs push against the soil like blades, each with its passive resistance',
+    form='slip',
     symbol='F += share b n_e [rho g h^2 Np/2 + q h (Np - 1) s + 2 c h sqrt(Np)] (1 - exp(-s L/K))',
-    parameters=(
-        EffectParameter(
-            'share', '-', 0.15, 0.0, 1.5, 0.2, 'half_normal', 'share of the full passive thrust'
-        ),
-    ),
+    parameters=(_SHARE,),
     touches=frozenset({'drawbar_pull', 'torque'}),
     needs=('slip', 'lug_height'),
     confounded_with={
@@ -50,4 +67,17 @@ EFFECT = Effect(
     source='passive earth pressure on grousers (Bekker 1969), n_e lugs in the contact; after '
     'literature read at second hand',
     on_outputs=_thrust,
+    other_forms=(
+        Form(
+            name='textbook',
+            claim='lugs push against the soil like blades under the whole load of the contact',
+            symbol='F += share b n_e [rho g h^2 Np/2 + q h Np + 2 c h sqrt(Np)] (1 - exp(-s L/K))',
+            parameters=(_SHARE,),
+            validity='lugs far apart; counts the same thrust as a larger shear radius, hence not '
+            'with it',
+            source='Bekker 1969 and Wong, Theory of Ground Vehicles: Rankine passive pressure with '
+            'surcharge q; n_e lugs in the contact of length L',
+            on_outputs=_textbook,
+        ),
+    ),
 )

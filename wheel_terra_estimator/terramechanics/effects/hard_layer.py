@@ -8,30 +8,46 @@ from types import SimpleNamespace
 from typing import Any
 
 from wheel_terra_estimator.terramechanics.contact import Contact
-from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter
+from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter, Form
 
 _BLEND = 0.001  # [m]; the layer comes in over a millimetre, so that derivatives exist
 
 
 def _layer(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
-    depth = contact.radius * (maths.cos(contact.angle) - maths.cos(contact.entrance_angle))
+    contact.normal_stress = contact.normal_stress + _support(contact, contact.angle, p, maths)
+
+
+def _bearing(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
+    t1, tm, t2 = contact.entrance_angle, contact.peak_angle, contact.leaving_angle
+    mirrored = t1 - (contact.angle - t2) * (t1 - tm) / (tm - t2)
+    angle = maths.where(contact.angle >= tm, contact.angle, mirrored)
+    contact.normal_stress = contact.normal_stress + _support(contact, angle, p, maths)
+
+
+def _support(contact: Contact, angle: Any, p: SimpleNamespace, maths: Any) -> Any:
+    """Stress that the layer adds where the rim is as deep as at an angle [Pa]."""
+    depth = contact.radius * (maths.cos(angle) - maths.cos(contact.entrance_angle))
     inside = maths.maximum(depth - p.depth, 0.0)
     blended = maths.where(inside < _BLEND, 0.5 * inside * inside / _BLEND, inside - 0.5 * _BLEND)
-    contact.normal_stress = contact.normal_stress + p.stiffness * blended
+    return p.stiffness * blended
 
+
+_PARAMETERS = (
+    EffectParameter(
+        'stiffness', 'Pa/m', 3e6, 0.0, 1e9, 1e7, 'half_normal', 'added bearing stiffness'
+    ),
+    EffectParameter(
+        'depth', 'm', 0.02, 0.0, 0.3, 0.02, 'normal', 'depth of its top', prior_mean=0.02
+    ),
+)
 
 EFFECT = Effect(
     name='hard_layer',
     claim='a stiff layer at some depth carries the wheel once it gets there',
-    symbol='sigma += stiffness (z(t) - depth)+, z(t) = r (cos t - cos t_1)',
-    parameters=(
-        EffectParameter(
-            'stiffness', 'Pa/m', 3e6, 0.0, 1e9, 1e7, 'half_normal', 'added bearing stiffness'
-        ),
-        EffectParameter(
-            'depth', 'm', 0.02, 0.0, 0.3, 0.02, 'normal', 'depth of its top', prior_mean=0.02
-        ),
-    ),
+    form='true_depth',
+    symbol='sigma += stiffness <z(t) - depth>, z(t) = r (cos t - cos t_1); <x> = x^2/(2 mm) up to '
+    'x = 1 mm, x - 0.5 mm beyond',
+    parameters=_PARAMETERS,
     touches=frozenset({'sinkage', 'drawbar_pull', 'torque'}),
     needs=('sinkage',),
     confounded_with={
@@ -42,4 +58,16 @@ EFFECT = Effect(
     validity='top of the layer not shallower than a few millimetres',
     source='own model: linear bearing of the lower layer, depth from the free surface',
     on_normal_stress=_layer,
+    other_forms=(
+        Form(
+            name='bearing',
+            claim='the pressure-sinkage curve stiffens below some depth, as plates show',
+            symbol='p(z) = k z^N + stiffness <z - depth>, behind the peak at the mirrored angle',
+            parameters=_PARAMETERS,
+            validity='top of the layer not shallower than a few millimetres',
+            source='Wong and Reece 1967: rear stress is the front stress at the mirrored angle, '
+            'with the pressure-sinkage curve of layered ground',
+            on_normal_stress=_bearing,
+        ),
+    ),
 )

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from wheel_terra_estimator.terramechanics.contact import Contact
-from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter
+from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter, Form
 
 
 def _support(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
@@ -16,9 +16,15 @@ def _support(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
     contact.sinkage = contact.sinkage - lifted
 
 
+def _by_height(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
+    high = maths.maximum(contact.lug_height - p.free_height, 0.0)
+    contact.sinkage = contact.sinkage - p.share * high
+
+
 EFFECT = Effect(
     name='lug_support',
     claim='lugs carry load: sinkage of a lugged wheel is smaller by a constant',
+    form='constant',
     symbol='z -= dz4 where h > 0',
     parameters=(
         EffectParameter(
@@ -31,4 +37,33 @@ EFFECT = Effect(
     validity='thin lugs; 1.5 mm at h = 10 mm and 3 mm at h = 15 mm in the source, at 80 N',
     source='Ding et al. 2010 section 3.2.2, eq. 20 (doi 10.1007/s11771-010-0021-7)',
     on_outputs=_support,
+    other_forms=(
+        Form(
+            name='by_height',
+            claim='lugs carry load: sinkage is smaller by a share of the lug height',
+            symbol='z -= share (h - free_height)+',
+            parameters=(
+                EffectParameter(
+                    'share', '-', 0.3, 0.0, 2.0, 0.3, 'half_normal', 'sinkage saved per lug height'
+                ),
+                EffectParameter(
+                    'free_height',
+                    'm',
+                    0.005,
+                    0.0,
+                    0.05,
+                    0.003,
+                    'normal',
+                    'height of lugs that carry nothing yet',
+                    prior_mean=0.005,
+                    free=False,
+                ),
+            ),
+            validity='thin lugs; the defaults give the 1.5 mm at 10 mm and 3 mm at 15 mm of the '
+            'source',
+            source='Ding et al. 2010 section 3.2.2 (doi 10.1007/s11771-010-0021-7); straight line '
+            'through its two values',
+            on_outputs=_by_height,
+        ),
+    ),
 )

@@ -8,19 +8,36 @@ from types import SimpleNamespace
 from typing import Any
 
 from wheel_terra_estimator.terramechanics.contact import Contact
-from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter
+from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter, Form
 
 
 def _compacted(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
-    earlier = maths.maximum(contact.pass_number - 1.0, 0.0)
-    # 1, 3/2, 7/4, ... times the gain of the second pass: each pass compacts half of what is left.
-    gain = p.stiffening * 2.0 * (1.0 - maths.exp(-0.6931471805599453 * earlier))
+    gain = p.stiffening * _earlier_passes(contact, maths)
     contact.bearing_modulus = contact.bearing_modulus * (1.0 + gain)
+
+
+def _rut_stress(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
+    rut = p.rut * _earlier_passes(contact, maths) / contact.reference_depth
+    share = maths.maximum(contact.normal_stress / contact.bearing_modulus, 0.0)
+    depth = share ** (1.0 / contact.sinkage_exponent)  # below the bottom of the rut, over z0
+    stress = contact.bearing_modulus * (depth + rut) ** contact.sinkage_exponent
+    contact.normal_stress = maths.where(rut > 0.0, stress, contact.normal_stress)
+
+
+def _rut_depth(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
+    contact.sinkage = contact.sinkage + p.rut * _earlier_passes(contact, maths)
+
+
+def _earlier_passes(contact: Contact, maths: Any) -> Any:
+    """Weight of the earlier passes, 0, 1, 3/2, 7/4, ...: each does half as much as the last."""
+    earlier = maths.maximum(contact.pass_number - 1.0, 0.0)
+    return 2.0 * (1.0 - maths.exp(-0.6931471805599453 * earlier))
 
 
 EFFECT = Effect(
     name='multipass',
     claim='later wheels or passes run in soil that the earlier ones compacted',
+    form='stiffening',
     symbol='k_i = k [1 + 2 stiffening (1 - 2^(1-i))], i = pass number',
     parameters=(
         EffectParameter(
@@ -36,4 +53,21 @@ EFFECT = Effect(
     validity='the same rut; passes that do not dig',
     source='form after Holm 1969 (saturating gain of stiffness), own reconstruction',
     on_inputs=_compacted,
+    other_forms=(
+        Form(
+            name='rut',
+            claim='later wheels start at the bottom of the rut, where the soil has borne its '
+            'pressure already',
+            symbol='p = k (z + z_r)^N below the rut, sinkage z + z_r, z_r = 2 rut (1 - 2^(1-i))',
+            parameters=(
+                EffectParameter(
+                    'rut', 'm', 0.005, 0.0, 0.2, 0.01, 'half_normal', 'depth that pass 1 leaves'
+                ),
+            ),
+            validity='the same rut, its walls not counted; soil that does not spring back',
+            source='Wong 1989, repetitive loading: at the depth of before, the pressure of before',
+            on_normal_stress=_rut_stress,
+            on_outputs=_rut_depth,
+        ),
+    ),
 )

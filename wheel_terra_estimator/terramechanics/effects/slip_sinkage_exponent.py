@@ -8,9 +8,12 @@ from types import SimpleNamespace
 from typing import Any
 
 from wheel_terra_estimator.terramechanics.contact import Contact
-from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter, Form
-
-REFERENCE_PRESSURE = 3000.0  # [Pa]; 80 N on 165 mm x 157 mm, the wheel of Ding et al. 2010
+from wheel_terra_estimator.terramechanics.effects.base import (
+    Effect,
+    EffectParameter,
+    Form,
+    relative_pressure,
+)
 
 
 def _exponent(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
@@ -28,8 +31,7 @@ def _lyasko(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
 
 
 def _with_load(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
-    pressure = contact.normal_load / (contact.width * contact.radius)
-    growth = p.nw * maths.log(pressure / REFERENCE_PRESSURE) + p.n1 * maths.abs(contact.slip)
+    growth = p.nw * maths.log(relative_pressure(contact)) + p.n1 * maths.abs(contact.slip)
     contact.sinkage_exponent = contact.sinkage_exponent + growth
 
 

@@ -8,16 +8,21 @@ from types import SimpleNamespace
 from typing import Any
 
 from wheel_terra_estimator.terramechanics.contact import Contact
-from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter
+from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter, Form
 
 
 def _shift(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
     contact.peak_ratio = contact.peak_ratio + p.c2 * contact.slip
 
 
+def _retreat(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
+    contact.peak_ratio = contact.peak_ratio - p.retreat * contact.slip
+
+
 EFFECT = Effect(
     name='stress_peak_shift',
     claim='the angle of greatest stress moves forward with slip',
+    form='forward',
     symbol='t_m = (c1 + c2 s) t_1',
     parameters=(EffectParameter('c2', '-', 0.2, -0.5, 0.8, 0.2, 'half_normal', 'shift at s = 1'),),
     touches=frozenset({'sinkage', 'drawbar_pull', 'torque'}),
@@ -29,4 +34,20 @@ EFFECT = Effect(
     validity='c1 + c2 s between 0 and 1; clamped inside the contact',
     source='Wong and Reece 1967; Ding et al. 2010 section 3.1.1 (doi 10.1007/s11771-010-0021-7)',
     on_inputs=_shift,
+    other_forms=(
+        Form(
+            name='backward',
+            claim='the angle of greatest stress moves backward with slip',
+            symbol='t_m = (c1 - retreat s) t_1',
+            parameters=(
+                EffectParameter(
+                    'retreat', '-', 0.1, 0.0, 0.8, 0.2, 'half_normal', 'shift back at s = 1'
+                ),
+            ),
+            validity='c1 - retreat s between 0 and 1; clamped inside the contact',
+            source='the same law with the other sign, as fits to small wheels give it '
+            '(docs/models/validation.md)',
+            on_inputs=_retreat,
+        ),
+    ),
 )

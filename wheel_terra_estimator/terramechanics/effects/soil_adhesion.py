@@ -1,0 +1,75 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Soil sticks to the rim."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+from wheel_terra_estimator.terramechanics.contact import Contact
+from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter, Form
+
+
+def _layer(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
+    contact.radius = contact.radius + p.thickness
+    contact.shear_radius = contact.shear_radius + p.thickness
+
+
+def _below_the_rim(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
+    contact.sinkage = contact.sinkage - p.thickness
+
+
+def _tension(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
+    rear = maths.minimum(contact.leaving_angle, -_LEAST_ANGLE)
+    share = maths.maximum(contact.angle / rear, 0.0)
+    contact.normal_stress = contact.normal_stress - p.tension * share
+
+
+_LEAST_ANGLE = 1e-6  # [rad]; no tension where nothing of the contact lies behind the hub
+
+EFFECT = Effect(
+    name='soil_adhesion',
+    claim='soil sticks to the rim: a layer of it rolls with the wheel',
+    form='layer',
+    symbol='r, R += thickness for the soil; z, at the rim, -= thickness',
+    parameters=(
+        EffectParameter(
+            'thickness', 'm', 0.002, 0.0, 0.05, 0.003, 'half_normal', 'thickness of the layer'
+        ),
+    ),
+    touches=frozenset({'sinkage', 'drawbar_pull', 'torque'}),
+    confounded_with={
+        'wheel_radius_bias': 'sinkage, which a misread slip changes less; a look at the rim',
+        'lug_shear_radius': 'rows with other lugs or none; sinkage',
+        'sinkage_offset': 'pull and torque; the zero reading on a hard floor',
+    },
+    validity='an even layer; the recorded slip keeps the configured radius',
+    source='geometry of a coated wheel; sticking soil: Bekker 1969',
+    candidate=False,
+    on_inputs=_layer,
+    on_outputs=_below_the_rim,
+    other_forms=(
+        Form(
+            name='tension',
+            claim='soil sticks to the rim: behind the hub it holds the rim back as it lifts off',
+            symbol='sigma -= tension t/t_2 behind the hub',
+            parameters=(
+                EffectParameter(
+                    'tension',
+                    'Pa',
+                    500.0,
+                    0.0,
+                    2e4,
+                    500.0,
+                    'half_normal',
+                    'greatest tension',
+                ),
+            ),
+            validity='moist or fine soil; needs a leaving angle behind the hub; tension below the '
+            'normal stress',
+            source='adhesion of soil to metal (Bekker 1969); growth to the leaving edge assumed',
+            on_normal_stress=_tension,
+        ),
+    ),
+)

@@ -1,0 +1,57 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""The wheel flattens under its load."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+from wheel_terra_estimator.terramechanics.contact import Contact
+from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter
+from wheel_terra_estimator.terramechanics.stresses import rolling_sinkage
+
+
+def _flatten(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
+    """Widen the contact to the circle of the same chord, r* = r (1 + f/z0)."""
+    modulus = maths.maximum(contact.bearing_modulus, 1.0) / (
+        contact.reference_depth**contact.sinkage_exponent
+    )
+    sinkage = rolling_sinkage(
+        contact.normal_load, contact.rim_radius, contact.width, modulus, contact.sinkage_exponent
+    )
+    flatter = 1.0 + p.compliance * contact.normal_load / sinkage
+    contact.radius = contact.radius * flatter
+    # The belt runs at the rim's speed along a longer contact: j and its force grow alike.
+    contact.shear_radius = contact.shear_radius * flatter
+    contact.velocity_ratio = contact.velocity_ratio * flatter
+
+
+def _arm(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
+    """Keep the arm of the shear at the height of the hub."""
+    contact.torque = contact.torque * (contact.rim_radius / contact.radius)
+
+
+EFFECT = Effect(
+    name='wheel_flexibility',
+    claim='the wheel flattens under its load: it bears on the soil like a larger rigid one',
+    symbol='r* = r (1 + compliance W/z0), z0 = [3 W/((3 - N) b k sqrt(2 r))]^(2/(2N+1));'
+    ' T keeps the arm of the hub',
+    parameters=(
+        EffectParameter(
+            'compliance', 'm/N', 2e-5, 0.0, 1e-3, 5e-5, 'half_normal', 'flattening per load'
+        ),
+    ),
+    touches=frozenset({'sinkage', 'drawbar_pull', 'torque'}),
+    confounded_with={
+        'multipass': 'deflection on a hard floor; a load series',
+        'hard_layer': 'deflection on a hard floor; a penetrometer',
+    },
+    validity='deflection below the sinkage; exponent below 1.3; the sinkage z0 that sets the '
+    'circle is that of the rigid wheel without slip',
+    source='substitute circle of a flattened wheel (Bekker; Schmid 1995, J. Terramech. 32): the '
+    'chord that both circles share, 2 r (z + f) = 2 r* z; z0 after Bekker 1969',
+    candidate=False,
+    on_inputs=_flatten,
+    on_outputs=_arm,
+)
