@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from wheel_terra_estimator.configuration import reader
-from wheel_terra_estimator.estimation.filter_settings import FilterSettings
-from wheel_terra_estimator.estimation.load_distribution import load_distribution
+from wheel_terra_estimator.estimation.contacts.load_distribution import load_distribution
+from wheel_terra_estimator.estimation.rover import Rover
 from wheel_terra_estimator.simulation.suspension import suspension_of
 
 THREE = np.array([[1.0, 0.5], [1.0, -0.5], [-1.0, 0.0]])
@@ -75,7 +75,7 @@ def test_shares_are_kept_and_checked():
 
 def test_rocker_bogie_agrees_with_the_simulators_statics():
     configuration = reader.load(['generic_six_wheel'])
-    ours = FilterSettings.from_configuration(configuration).load
+    ours = Rover.from_configuration(configuration).load
     theirs = suspension_of(configuration)
     rng = np.random.default_rng(0)
     mass = configuration.rover.mass

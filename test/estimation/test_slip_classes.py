@@ -4,7 +4,8 @@
 
 import pytest
 
-from wheel_terra_estimator.estimation.slip_classes import (
+from wheel_terra_estimator.estimation.judgement.classes import (
+    ClassState,
     SlipClassifier,
     exceedance_probability,
     instantaneous_class,
@@ -13,9 +14,12 @@ from wheel_terra_estimator.estimation.slip_classes import (
 BORDERS = (0.3, 0.6, 0.9)
 
 
-def run(slips, std=0.01, dt=0.1, sliding_back=False):
-    classifier = SlipClassifier(1, BORDERS, 0.02, 0.3)
-    return [classifier.update(0, i * dt, slip, std, sliding_back) for i, slip in enumerate(slips)]
+def run(slips, std=0.01, dt=0.1, sliding_back=False, hysteresis=0.02):
+    classifier, state, found = SlipClassifier(BORDERS, hysteresis, 0.3), ClassState(), []
+    for i, slip in enumerate(slips):
+        state = classifier.update(state, i * dt, slip, std, sliding_back)
+        found.append(state.current)
+    return found
 
 
 @pytest.mark.parametrize(
@@ -55,14 +59,10 @@ def test_sliding_back_is_stuck():
     assert run([1.0] * 5, sliding_back=True)[-1] == 3
 
 
-def test_memory_comes_back():
-    classifier = SlipClassifier(2, BORDERS, 0.02, 0.3)
-    for i in range(5):
-        classifier.update(0, 0.1 * i, 0.2, 0.01, False)
-    memory = classifier.snapshot()
-    classifier.unknown(0)
-    classifier.restore(memory)
-    assert classifier.update(0, 0.5, 0.31, 0.01, False) == 0
+def test_the_hysteresis_is_what_keeps_a_flicker_out():
+    flicker = [0.29] * 5 + [0.309, 0.309, 0.309, 0.309, 0.291, 0.291, 0.291, 0.291] * 5
+    assert set(run(flicker)) == {0}
+    assert set(run(flicker, hysteresis=0.0)) == {0, 1}
 
 
 def test_probability_of_a_gaussian():

@@ -1,69 +1,113 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""How speed goes on between fixes."""
-
-import math
+"""How speed goes on between reference velocities."""
 
 import numpy as np
 import pytest
+from parts import SAND, Parts
 
-from wheel_terra_estimator.estimation.measurements import InertialReading
-from wheel_terra_estimator.estimation.speed_process import (
-    Attitude,
-    InertialWindow,
-    speed_step,
-    take_inertial,
-)
+from wheel_terra_estimator.configuration import reader
+from wheel_terra_estimator.estimation.filter.speed_process import RimSpeeds, SpeedProcess
+from wheel_terra_estimator.estimation.filter.state import SPEED
+from wheel_terra_estimator.estimation.inputs.inertial import InertialWindow
+
+NAN = float('nan')
 
 
-def step(speed, **changes):
-    values = {
-        'dt': 0.1,
-        'rim_before': 0.05,
-        'rim_now': 0.05,
-        'ratio': 0.8,
-        'ratio_std': 0.1,
-        'low_rim': 0.006,
-        'ratio_walk': 0.1,
-        'unrest': 0.0,
-        'window': InertialWindow(),
-        'acceleration_noise': 0.03,
-    } | changes
-    found = speed_step(**values)
+def process(rims, ratio=0.8, keys=()):
+    """Return a process after a cycle at 0 s in which all wheels had these rim speeds."""
+    parts = Parts(reader.load(SAND, keys))
+    made = SpeedProcess(parts.configuration, parts.rover, parts.sensors)
+    ekf = parts.filter()
+    # The ratio is remembered from a drive at speed.
+    fast = RimSpeeds((1.0,) * len(rims), 1.0)
+    ekf.set(SPEED, ratio, 1e-4)
+    made.end_cycle(0.0, ekf, fast, settled=True)
+    made.end_cycle(0.0, ekf, speeds(rims), settled=False)
+    return made
+
+
+def speeds(rims):
+    known = [r for r in rims if r == r]
+    return RimSpeeds(tuple(rims), float(np.median(known)) if known else NAN)
+
+
+def step(speed, before=0.05, now=0.05, inflation=0.0, window=None):
+    made = process([before] * 6)
+    made.inflate(inflation)
+    found = made.step(0.1, speeds([now] * 6), window or InertialWindow(), inflated=True)
     return found.speed_gain * speed + found.constant, found.variance
 
 
+def noise(parts_keys=()):
+    return process([0.0] * 6, keys=parts_keys).acceleration_noise
+
+
 def test_slow_rover_follows_its_wheels_through_a_ramp():
-    assert step(0.04, rim_now=0.075)[0] == pytest.approx(0.06)
+    assert step(0.04, now=0.075)[0] == pytest.approx(0.06)
 
 
 def test_restart_takes_the_remembered_ratio():
-    assert step(0.0, rim_before=0.0, rim_now=0.02)[0] == pytest.approx(0.016)
+    assert step(0.0, before=0.0, now=0.02)[0] == pytest.approx(0.016)
 
 
 def test_fast_rover_follows_its_accelerometer_when_wheels_spin_up():
     window = InertialWindow(speed_change=0.05, duration=0.1)
-    fast, _ = step(1.0, rim_before=1.2, rim_now=2.4, window=window)
-    assert fast == pytest.approx(1.05, abs=0.02)
+    assert step(1.0, before=1.2, now=2.4, window=window)[0] == pytest.approx(1.05, abs=0.02)
 
 
 def test_contacts_under_change_open_the_speed_and_the_accelerometer_bounds_it():
-    calm, _ = step(0.04)
-    mean, variance = step(0.04, unrest=0.02)
+    calm, narrow = step(0.04)
+    mean, variance = step(0.04, inflation=0.02)
     assert mean == pytest.approx(calm)
-    assert variance == pytest.approx(step(0.04)[1] + 2.0 * 0.02**2 * 0.1)
+    assert variance == pytest.approx(narrow + 2.0 * 0.02**2 * 0.1)
     window = InertialWindow(speed_change=0.0, duration=0.1)
-    assert step(0.04, unrest=0.5, window=window)[1] <= 0.03**2 * 0.1
+    assert step(0.04, inflation=0.5, window=window)[1] <= noise() ** 2 * 0.1
+
+
+def test_without_a_reference_contacts_under_change_do_not_open_it():
+    made = process([0.05] * 6)
+    made.inflate(0.5)
+    rims, window = speeds([0.05] * 6), InertialWindow()
+    held = made.step(0.1, rims, window, inflated=False)
+    assert held.variance < 1e-3 * made.step(0.1, rims, window, inflated=True).variance
+
+
+def test_the_inflation_is_forgotten_within_a_second():
+    made = process([0.05] * 6)
+    made.inflate(0.02)
+    ekf = Parts(reader.load(SAND)).filter()
+    for i in range(1, 11):
+        made.end_cycle(0.1 * i, ekf, speeds([0.05] * 6), settled=True)
+    assert made.state.inflation == pytest.approx(0.02 * np.exp(-1.0 / 0.3))
 
 
 def test_wheels_that_disagree_leave_the_speed_to_the_accelerometer():
     """Two wheels spin up, two stand: the mean rim speed says nothing of the body."""
     window = InertialWindow(speed_change=0.0, duration=0.1)
-    together, _ = step(0.1, rim_before=0.25, rim_now=0.30, window=window)
-    apart, variance = step(0.1, rim_before=0.25, rim_now=0.30, window=window, discord=0.05)
-    assert together > 0.105
-    assert apart == pytest.approx(0.1, abs=0.001)
-    assert variance <= 0.03**2 * 0.1
+    made = process([0.25] * 4)
+    together = made.step(0.1, speeds([0.30] * 4), window, inflated=True)
+    apart = made.step(0.1, speeds([0.25, 0.25, 0.35, 0.35]), window, inflated=True)
+    assert together.speed_gain * 0.1 + together.constant > 0.103
+    assert apart.speed_gain * 0.1 + apart.constant == pytest.approx(0.1, abs=0.001)
+    assert apart.variance <= made.acceleration_noise**2 * 0.1
+
+
+@pytest.mark.parametrize(
+    ('changes', 'expected'),
+    [
+        ([0.0, 0.0, 0.0, 0.0, 0.0, 0.3], 0.0),  # one wheel apart
+        ([0.2, 0.0, 0.0, 0.2], 0.1),  # two spin up beside two that stand
+        ([0.1, 0.1, 0.1, 0.1], 0.0),  # a ramp
+        ([NAN, 0.0, 0.2], 0.0),  # too few to tell
+    ],
+)
+def test_disagreement_of_the_wheels(changes, expected):
+    made = process([0.3] * len(changes))
+    parts = Parts(reader.load(SAND))
+    least = 3.0 * parts.sensors.wheel_rate_std * max(parts.rover.slip_radius)
+    found = made.disagreement(speeds([0.3 + change for change in changes]))
+    assert found == pytest.approx(max(expected - least, 0.0))
 
 
 def test_slow_rover_does_not_integrate_a_bias():
@@ -73,40 +117,15 @@ def test_slow_rover_does_not_integrate_a_bias():
 
 def test_combination_is_better_than_either():
     window = InertialWindow(speed_change=0.0, duration=0.1)
-    both = step(0.5, rim_before=0.6, rim_now=0.6, window=window)[1]
-    wheels = step(0.5, rim_before=0.6, rim_now=0.6)[1]
-    assert both < wheels
-    assert both < 0.03**2 * 0.1
+    both = step(0.5, before=0.6, now=0.6, window=window)[1]
+    assert both < step(0.5, before=0.6, now=0.6)[1]
+    assert both < noise() ** 2 * 0.1
 
 
-def reading(force=(0.0, 0.0, 9.81), rate=(0.0, 0.0, 0.0), orientation=None):
-    turned = None if orientation is None else np.array(orientation)
-    return InertialReading(0, np.array(force), np.array(rate), turned)
-
-
-def test_nose_up_is_a_negative_pitch():
-    pitch = -0.2
-    attitude = Attitude()
-    attitude.update(
-        reading(orientation=(0.0, math.sin(pitch / 2), 0.0, math.cos(pitch / 2))), 0.01, 9.81
-    )
-    assert attitude.sine_up == pytest.approx(math.sin(0.2))
-
-
-def test_without_orientation_gyro_and_gravity_give_the_slope():
-    attitude = Attitude()
-    slope = 0.15
-    still = reading(force=(9.81 * math.sin(slope), 0.0, 9.81 * math.cos(slope)))
-    for _ in range(2000):
-        attitude.update(still, 0.02, 9.81)
-    assert attitude.sine_up == pytest.approx(math.sin(slope), abs=1e-3)
-    # Nose going up at 0.1 rad/s for half a second.
-    for _ in range(25):
-        attitude.update(reading(force=still.specific_force, rate=(0.0, -0.1, 0.0)), 0.02, 9.81)
-    assert attitude.sine_up == pytest.approx(math.sin(slope) + 0.05, abs=0.01)
-
-
-def test_a_gap_of_the_imu_is_not_integrated_over():
-    window, attitude = InertialWindow(), Attitude()
-    take_inertial(window, attitude, reading(force=(1.0, 0.0, 9.7)), 5.0, 9.81, 0.0, 0.0)
-    assert window.duration == 0.0
+def test_the_slip_walks_as_the_demand_over_the_slope_of_the_traction_curve():
+    made = process([0.05] * 6)
+    walks = []
+    for slope in (0.001, 0.4, 10.0):
+        made.follow_traction_curve(slope)
+        walks.append(made.state.ratio_walk)
+    assert walks == pytest.approx([0.13, 0.025 / 0.4, 0.03])

@@ -6,10 +6,9 @@ from dataclasses import fields, replace
 
 import numpy as np
 import pytest
+from parts import SAND
 
-from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.estimation.estimates import SlipClass
-from wheel_terra_estimator.estimation.filter_state import SPEED
 from wheel_terra_estimator.estimation.measurements import (
     InertialReading,
     ReferenceVelocity,
@@ -17,11 +16,6 @@ from wheel_terra_estimator.estimation.measurements import (
     StepInputs,
     WheelOdometry,
 )
-from wheel_terra_estimator.estimation.steps.context import rim_discord, rims_without_turning
-from wheel_terra_estimator.estimation.steps.force_rows import dragged_pull, smooth_slopes
-from wheel_terra_estimator.estimation.steps.odd_wheels import watch_demand
-from wheel_terra_estimator.estimation.steps.pulls import share_the_rest
-from wheel_terra_estimator.estimation.steps.start import start_context
 from wheel_terra_estimator.estimation.wheel_soil_estimator import WheelSoilEstimator
 from wheel_terra_estimator.evaluation import kinds
 from wheel_terra_estimator.evaluation.runner import inputs_of_mode
@@ -34,7 +28,6 @@ NAMES = {
     SinkageReading: 'sinkage',
     ReferenceVelocity: 'reference',
 }
-SAND = ['generic_six_wheel', 'dry_sand_ding2015']
 
 
 def merged(measurements):
@@ -308,26 +301,6 @@ def test_a_wheel_sunk_to_its_hub_is_followed():
     assert found.sinkage[1] < 0.5 * sunk
 
 
-@pytest.mark.parametrize(
-    ('changes', 'expected'),
-    [
-        ([0.0, 0.0, 0.0, 0.0, 0.0, 0.3], 0.0),  # one odd wheel
-        ([0.2, 0.0, 0.0, 0.2], 0.1),  # two spin up beside two that stand
-        ([0.1, 0.1, 0.1, 0.1], 0.0),  # a ramp
-        ([np.nan, 0.0, 0.2], 0.0),  # too few to tell
-    ],
-)
-def test_disagreement_of_the_wheels(changes, expected):
-    c = start_context(reader.load(SAND if len(changes) == 6 else ['frostyboy']))
-    n = c.settings.wheel_count
-    changes = [*changes, *[np.nan] * (n - len(changes))]
-    c.run.rims_at_cycle = [0.3] * n
-    c.run.rim_speed = [0.3 + change for change in changes]
-    c.run.rate_time = [c.run.time] * n
-    noise = 3.0 * float(c.settings.sensors.wheel_rate_std) * c.settings.slip_radius[0]
-    assert rim_discord(c, rims_without_turning(c)) == pytest.approx(max(expected - noise, 0.0))
-
-
 def test_two_wild_fixes_that_agree_need_a_witness(climb):
     """Torque, slope and rim speed say that nothing changed: a third fix would have to agree."""
     wild = [a.measurement for a in climb.arrivals]
@@ -375,31 +348,6 @@ def test_sinkage_tells_weak_ground_where_no_torque_does():
     assert (np.abs(error) < 1.96 * std).mean() > 0.9
 
 
-def test_a_change_of_slope_opens_the_speed():
-    c = start_context(reader.load(SAND))
-    run = c.run
-    run.rim_speed, run.fresh_travel, run.steepness = [0.05] * 6, 1.0, 0.5
-    run.window.count = 5
-    steep = float(c.settings.gravity) * 0.1
-    for force, expected in ((0.0, 0.0), (0.0, 0.0), (steep, 0.1 / 0.5 * 0.05)):
-        run.force = (force, 0.0, c.settings.gravity)
-        watch_demand(c, 0.1)
-        assert run.unrest == pytest.approx(expected, rel=0.1)
-    for _ in range(100):
-        watch_demand(c, 0.1)
-    assert run.demand == pytest.approx(0.1, rel=0.01)
-
-
-@pytest.mark.parametrize('torque', [-8.0, 20.0])
-def test_a_dragged_wheel_is_a_drag_whatever_its_jammed_drive_reads(torque):
-    c = start_context(reader.load(SAND))
-    c.filter.mean[SPEED] = 0.05
-    c.run.load[:] = [60.0] * 6
-    assert dragged_pull(c, 0, torque, 60.0) < -0.2 * 60.0
-    c.filter.mean[SPEED] = -0.05
-    assert dragged_pull(c, 0, -torque, 60.0) > 0.2 * 60.0
-
-
 def with_inertial(run, change):
     """Return a drive whose IMU readings went through `change(reading, seconds)`."""
     start = min(a.measurement.stamp for a in run.arrivals)
@@ -435,38 +383,3 @@ def test_the_zero_of_the_pitch_gyro_does_not_reach_the_pulls():
     straight, biased = (estimate(r) for r in (run, with_inertial(run, turned)))
     pulls = [np.array([s.drawbar_pull for s in sets[80:]]) for sets in (straight, biased)]
     assert np.ptp(pulls, axis=0).max() < 0.02 * run.truth.normal_load.mean()
-
-
-def test_every_slope_is_smoothed_until_the_contact_changes(climb):
-    context = start_context(climb.configuration)
-    forces = [
-        context.models.forces(0, ratio, 0.02, 200.0, 0.0, 0.0, 0.0, 0.0, 0.05, np.nan)
-        for ratio in (0.95, 0.9)
-    ]
-    context.run.load[0] = 200.0
-    slopes = [smooth_slopes(context, 0, forces[k % 2]) for k in range(80)][40:]
-    for smoothed, raw in zip(np.moveaxis(slopes, 1, 0), ('d_torque', 'd_pull'), strict=True):
-        swing = np.abs(np.subtract(*(getattr(f, raw) for f in forces)))
-        assert (np.ptp(smoothed, axis=0) < 0.12 * swing + 1e-9).all()
-    saturated = context.models.forces(0, 0.1, 0.02, 200.0, 0.0, 0.0, 0.0, 0.0, 0.05, np.nan)
-    torque, pull = smooth_slopes(context, 0, saturated)
-    assert torque[1:] == saturated.d_torque[1:]
-    assert pull[1:] == saturated.d_pull[1:]
-
-
-def test_the_rest_of_the_sum_is_shared_as_least_squares_does(climb):
-    context = start_context(climb.configuration)
-    rng = np.random.default_rng(4)
-    root = rng.normal(size=(6, 6))
-    covariance = root @ root.T
-    pulls = rng.normal(scale=20.0, size=6)
-    total, variance = float(pulls.sum()) + 6.0, 2.0
-    context.run.pull, context.run.load = pulls.tolist(), [300.0] * 6
-    context.filter.mean[context.layout.sinkage] = 0.0
-    context.pull_sum = (total, 1800.0, variance)
-    share_the_rest(context, covariance)
-    # Six priors and one sum, each row in units of its own deviation.
-    whiten = np.linalg.inv(np.linalg.cholesky(covariance))
-    rows = np.vstack([whiten, np.ones(6) / np.sqrt(variance)])
-    values = np.append(whiten @ pulls, total / np.sqrt(variance))
-    assert context.run.pull == pytest.approx(np.linalg.lstsq(rows, values, rcond=None)[0])

@@ -22,7 +22,7 @@ import numpy as np
 import pytest
 
 from wheel_terra_estimator.estimation.core import EstimatorCore
-from wheel_terra_estimator.estimation.filter import GatedFilter
+from wheel_terra_estimator.estimation.filter.ekf import GatedFilter
 from wheel_terra_estimator.evaluation import kinds
 from wheel_terra_estimator.simulation.commands import Command
 from wheel_terra_estimator.simulation.drive import Drive

@@ -2,27 +2,124 @@
 # SPDX-License-Identifier: Apache-2.0
 """Filter, classes and warnings of one rover: one step per stamp, estimates on demand.
 
-Between two filter cycles (``filter.period``) only sums are kept and the speed is carried on, so
-that wheel odometry at 100 Hz costs little more than at 10 Hz; a cycle predicts, fuses what came
-since, and works out the outputs. What a cycle does stands in ``estimation/steps``.
+Between two cycles of the filter (``filter.period``) only sums are kept and the speed is carried on,
+so that wheel odometry at 100 Hz costs little more than at 10 Hz. `WheelSoilEstimator.run_cycle`
+reads top to bottom: predict, fuse what came since the last cycle, work out the outputs.
 """
 
 from __future__ import annotations
 
-from typing import Any
+import math
+from math import isnan
+from typing import Any, NamedTuple, Protocol
 
 from wheel_terra_estimator.configuration.configuration import Configuration
-from wheel_terra_estimator.estimation.estimates import EstimateSet
-from wheel_terra_estimator.estimation.measurements import StepInputs
-from wheel_terra_estimator.estimation.steps.collection import collect
-from wheel_terra_estimator.estimation.steps.cycle import run_cycle
-from wheel_terra_estimator.estimation.steps.outputs import estimate_set
-from wheel_terra_estimator.estimation.steps.slips_and_warning import judge
-from wheel_terra_estimator.estimation.steps.start import (
-    begin_anew,
-    begin_with_soil,
-    start_context,
+from wheel_terra_estimator.estimation.contacts.contact_age import ContactAge
+from wheel_terra_estimator.estimation.contacts.contact_changes import DemandChange, TorqueChange
+from wheel_terra_estimator.estimation.contacts.linearisation import (
+    ContactForces,
+    Linearisation,
+    traction_slope,
 )
+from wheel_terra_estimator.estimation.contacts.loads import LoadState, WheelLoads
+from wheel_terra_estimator.estimation.contacts.pulls import Pulls
+from wheel_terra_estimator.estimation.contacts.stationary_wheels import (
+    StationaryPull,
+    StationaryWheels,
+)
+from wheel_terra_estimator.estimation.contacts.turning import Turning
+from wheel_terra_estimator.estimation.contacts.unloaded_wheels import UnloadedWheels
+from wheel_terra_estimator.estimation.contacts.wheel_models import WheelModels
+from wheel_terra_estimator.estimation.estimates import EstimateSet
+from wheel_terra_estimator.estimation.filter.ekf import Row
+from wheel_terra_estimator.estimation.filter.force_balance import (
+    ForceBalance,
+    SumOfPulls,
+    rut_tilt,
+)
+from wheel_terra_estimator.estimation.filter.initial_state import initial_filter, with_soil_of
+from wheel_terra_estimator.estimation.filter.observability import considered_entries
+from wheel_terra_estimator.estimation.filter.prediction import Prediction
+from wheel_terra_estimator.estimation.filter.reference import ReferenceUpdate
+from wheel_terra_estimator.estimation.filter.repetition import repetitions
+from wheel_terra_estimator.estimation.filter.sinkage import SinkageUpdate
+from wheel_terra_estimator.estimation.filter.sinkage_process import SinkageProcess
+from wheel_terra_estimator.estimation.filter.soil_process import SoilProcess
+from wheel_terra_estimator.estimation.filter.speed_process import RimSpeeds, SpeedProcess
+from wheel_terra_estimator.estimation.filter.state import SHEAR_STRENGTH, SPEED, StateLayout
+from wheel_terra_estimator.estimation.filter.torque import TorqueUpdate
+from wheel_terra_estimator.estimation.filter.zero_velocity import ZeroVelocityUpdate
+from wheel_terra_estimator.estimation.inputs.contact_sensors import (
+    LeavingAngleInput,
+    SinkageInput,
+)
+from wheel_terra_estimator.estimation.inputs.inertial import InertialInput, InertialWindow
+from wheel_terra_estimator.estimation.inputs.wheel_odometry import WheelOdometryInput
+from wheel_terra_estimator.estimation.judgement.pull_margin import PullMargin
+from wheel_terra_estimator.estimation.judgement.slip import BodyMotion, SlipJudge
+from wheel_terra_estimator.estimation.judgement.stuck.monitor import (
+    StuckAssessment,
+    StuckMonitor,
+    StuckSettings,
+)
+from wheel_terra_estimator.estimation.judgement.stuck.situation import (
+    RoverMotion,
+    WheelMotion,
+)
+from wheel_terra_estimator.estimation.measurements import ReferenceVelocity, StepInputs
+from wheel_terra_estimator.estimation.outputs import MissingInputs, Outputs, Sources
+from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
+from wheel_terra_estimator.estimation.scalars import NAN, known
+
+Floats = tuple[float, ...]
+_SECOND = 1e-9  # of a nanosecond
+_PERIOD_ROUNDING = 1e-4
+"""A cycle is due this much before its period is over [s]: stamps jitter."""
+_START_STD = 0.3
+"""Deviation of the shear strength [ln] that a start adds: the contact forms anew, and with it what
+the shear model gets wrong. Tuned on simulated drives, seeds 1000 to 1019."""
+_SHARP_TURN = 0.3
+"""Lateral motion above which slip comes from turning and says nothing of an entrapment [-]."""
+
+
+class Part(Protocol):
+    """What has a memory in the estimator."""
+
+    def reset(self) -> None:
+        """Go back to the start of a run."""
+
+    def snapshot(self) -> Any:
+        """Return the memory."""
+
+    def restore(self, snapshot: Any) -> None:
+        """Go back to a snapshot."""
+
+
+class _Clock(NamedTuple):
+    """Times of a run."""
+
+    origin: int = 0  # [ns]
+    stamp: int = 0
+    time: float = 0.0  # [s] since the origin
+    assessment: StuckAssessment = StuckAssessment()  # of the last stamp that was judged
+    speed: tuple[float, float] | None = None  # and variance, where this stamp was judged
+
+
+class _Cycle(NamedTuple):
+    """What one cycle knows before its update."""
+
+    time: float  # [s]
+    dt: float
+    window: InertialWindow
+    rims: Floats  # [m/s], nan = unknown
+    unturned: RimSpeeds
+    still: bool  # all wheels stand
+    torque: Floats  # means since the last cycle [N m], nan = none came
+    leaving_angles: Floats  # [rad], nan = unknown
+    loads: LoadState
+    turns: tuple[bool, ...]
+    """Wheels for which the contact models hold: they turn under a load."""
+    reference_known: bool  # of late, before this cycle
 
 
 class WheelSoilEstimator:
@@ -35,59 +132,490 @@ class WheelSoilEstimator:
     """
 
     def __init__(self, configuration: Configuration) -> None:
-        self._context = start_context(configuration)
+        self._configuration = configuration
+        self._rover = rover = Rover.from_configuration(configuration)
+        sensors = SensorFigures.from_configuration(configuration)
+        self._layout = layout = StateLayout(rover.wheel_count)
+        models = WheelModels(configuration)
+        # Readings between two cycles.
+        self._inertial = InertialInput(rover.gravity)
+        self._wheels = WheelOdometryInput(rover)
+        self._sinkages = SinkageInput(rover.wheel_count)
+        self._leaving_angles = LeavingAngleInput(rover.wheel_count)
+        # Wheels on the ground.
+        self._turning = Turning(rover, sensors)
+        self._loads = WheelLoads(rover)
+        level = self._loads.state.load
+        self._contact_age = ContactAge(rover)
+        self._unloaded = UnloadedWheels(rover, sensors)
+        self._demand_change = DemandChange(rover, sensors)
+        self._torque_change = TorqueChange(rover, sensors)
+        self._linearisation = Linearisation(rover, layout, models)
+        self._stationary = StationaryWheels(rover, sensors, layout, models)
+        self._pulls = Pulls(rover, sensors, level)
+        # The filter: process and measurements.
+        self._ekf = initial_filter(configuration, rover, sensors, layout, models, level)
+        self._speed = SpeedProcess(configuration, rover, sensors)
+        self._sinkage_process = SinkageProcess(rover, layout, models)
+        self._soil_process = SoilProcess(configuration, layout)
+        self._reference = ReferenceUpdate(configuration, rover, sensors)
+        self._zero_velocity = ZeroVelocityUpdate(rover)
+        self._sinkage = SinkageUpdate(configuration, sensors, layout)
+        self._torque = TorqueUpdate(configuration, rover, sensors)
+        self._balance = ForceBalance(configuration, rover, sensors, layout)
+        # What it means.
+        self._slips = SlipJudge(configuration, rover, sensors)
+        self._margin = PullMargin(sensors, layout, models)
+        self._stuck = StuckMonitor(StuckSettings.from_configuration(configuration))
+        self._outputs = Outputs(configuration, rover, sensors, layout)
+        self._clock = _Clock()
+        self._parts: tuple[Part, ...] = (
+            self._inertial,
+            self._wheels,
+            self._sinkages,
+            self._leaving_angles,
+            self._turning,
+            self._loads,
+            self._contact_age,
+            self._unloaded,
+            self._demand_change,
+            self._torque_change,
+            self._linearisation,
+            self._pulls,
+            self._ekf,
+            self._speed,
+            self._sinkage_process,
+            self._reference,
+            self._zero_velocity,
+            self._sinkage,
+            self._torque,
+            self._balance,
+            self._slips,
+            self._margin,
+            self._stuck,
+        )
+
+    # -- Runs and snapshots ----------------------------------------------------------------------
 
     def begin_run(self, stamp: int, keep_soil: bool) -> None:
         """Start anew at a stamp [ns]; with `keep_soil` soil and biases are kept, widened."""
-        (begin_with_soil if keep_soil else begin_anew)(self._context, stamp)
+        soil, gyro = self._ekf.snapshot(), self._zero_velocity.snapshot()
+        rejected = self._reference.state.rejected, self._sinkage.state.rejected
+        for part in self._parts:
+            part.reset()
+        self._clock = _Clock(stamp, stamp)
+        if keep_soil:
+            self._ekf.restore(with_soil_of(soil, self._ekf.snapshot(), self._layout))
+            self._zero_velocity.keep_zero_of(gyro)
+            self._reference.keep_count(rejected[0])
+            self._sinkage.keep_count(rejected[1])
 
     def snapshot(self) -> tuple[Any, ...]:
         """Return what `restore` needs to come back to this state."""
-        c = self._context
-        return (
-            c.run.copy(),
-            c.filter.snapshot(),
-            c.classifier.snapshot(),
-            c.monitor.snapshot(),
-            c.pull_jacobian,
-        )
+        return self._clock, tuple([part.snapshot() for part in self._parts])
 
     def restore(self, snapshot: tuple[Any, ...]) -> None:
         """Go back to a snapshot."""
-        c = self._context
-        run, filter_memory, classes, monitor, c.pull_jacobian = snapshot
-        c.run = run.copy()
-        c.filter.restore(filter_memory)
-        c.classifier.restore(classes)
-        c.monitor.restore(monitor)
+        self._clock, states = snapshot
+        for part, state in zip(self._parts, states, strict=True):
+            part.restore(state)
+
+    # -- One stamp -------------------------------------------------------------------------------
 
     def step(self, stamp: int, inputs: StepInputs) -> None:
         """Bring the state to a stamp [ns] with the measurements of that stamp."""
-        c = self._context
-        run, settings = c.run, c.settings
-        if run.origin == 0:
-            run.origin = stamp
-        run.stamp = stamp
-        run.time = time = (stamp - run.origin) * 1e-9
-        collect(c, time, inputs)
+        clock = self._clock
+        origin = clock.origin or stamp
+        time = (stamp - origin) * _SECOND
+        self._clock = _Clock(origin, stamp, time, clock.assessment)
+        self._take(time, inputs)
         rolled = inputs.wheel_odometry is not None
-        silent = run.odometry_time is None or time - run.odometry_time > settings.silence
-        period = float(settings.filter.period) - 1e-4
-        due = run.cycle_time is None or time - run.cycle_time >= period
-        if inputs.reference is not None or (due and (rolled or silent)):
-            run_cycle(c, time, inputs.reference)
+        silent = self._wheels.silent(time)
+        if inputs.reference is not None or (self._cycle_is_due(time) and (rolled or silent)):
+            self._run_cycle(time, inputs.reference)
         if rolled or silent:
-            judge(c, time)
+            self._judge(time)
+
+    def _take(self, time: float, inputs: StepInputs) -> None:
+        """Take in the measurements of a stamp, `time` [s] after the start of the run."""
+        if inputs.inertial is not None:
+            self._inertial.update(time, inputs.inertial, self._zero_velocity.state.zero)
+        if inputs.sinkage is not None:
+            self._sinkages.update(inputs.sinkage)
+        if inputs.leaving_angle is not None:
+            self._leaving_angles.update(time, inputs.leaving_angle)
+        if inputs.wheel_odometry is not None:
+            self._wheels.update(time, inputs.wheel_odometry)
+
+    def _cycle_is_due(self, time: float) -> bool:
+        before = self._speed.state.cycle_time
+        return isnan(before) or time - before >= self._rover.period - _PERIOD_ROUNDING
+
+    # -- One cycle of the filter -----------------------------------------------------------------
+
+    def _run_cycle(self, time: float, reference: ReferenceVelocity | None) -> None:
+        """Predict to a time [s], fuse what came since the last cycle, work out the outputs."""
+        ekf, layout = self._ekf, self._layout
+        cycle = self._begin_cycle(time)
+        sinkage_before = ekf.mean[layout.sinkage].copy()
+
+        self._predict(cycle)
+        if not cycle.reference_known and not self._contact_age.settled:
+            self._speed.undo_jolt(ekf, cycle.unturned.typical)
+
+        if reference is not None:
+            self._fuse_reference(cycle, reference)
+        self._zero_velocity.update(
+            ekf,
+            time,
+            rims=cycle.rims,
+            typical_rim=cycle.unturned.typical,
+            still=cycle.still,
+            sliding=time < self._reference.state.sliding_until,
+            window=cycle.window,
+            yaw_rate=self._turning.state.yaw_rate,
+        )
+
+        rows = self._sinkage.update(ekf, time, self._sinkages.take())
+        self._compare_wheels(cycle)
+        forces, total = None, None
+        if cycle.still:
+            self._forget_contacts()
+        elif self._contact_age.settled:
+            forces, total, force_rows = self._force_rows(cycle)
+            rows += force_rows
+        considered = considered_entries(
+            layout,
+            reference_known=self._reference.known(time),
+            settled=self._contact_age.settled,
+            unread=self._sinkage.unread(time),
+        )
+        ekf.fuse(rows, considered)
+
+        self._speed.end_cycle(time, ekf, cycle.unturned, settled=self._contact_age.settled)
+        self._sinkage_process.end_cycle(ekf, sinkage_before, cycle.dt)
+        lateral_motion = self._turning.state.lateral_motion
+        self._speed.keep_least_variance(ekf, cycle.rims, lateral_motion)
+        self._pulls.update(
+            ekf.mean,
+            ekf.covariance,
+            forces,
+            total,
+            loads=cycle.loads,
+            turning=cycle.turns,
+            readings=self._wheels.state.torque,
+            slips=tuple([wheel.slip for wheel in self._slips.state]),
+            lateral_motion=lateral_motion,
+            tilt=rut_tilt(self._rover, layout, ekf),
+        )
+
+    def _begin_cycle(self, time: float) -> _Cycle:
+        """Work out turning, loads and rim speeds; note what changes under the wheels."""
+        ekf, speed, rover = self._ekf, self._speed, self._rover
+        dt = speed.since_cycle(time)
+        window = self._inertial.take()
+        fastest = self._wheels.fastest()
+        turning = self._turning.update(window, dt, float(ekf.mean[SPEED]), fastest)
+        pulls = self._pulls.state
+        loads = self._loads.update(
+            window, pulls.model_pull, pulls.torque, self._unloaded.state.unloaded
+        )
+        speed.inflate(turning.speed_change)
+        if window.readings:
+            change = self._demand_change.update(
+                loads.slope_share, window.readings, dt, speed.state.traction_slope
+            )
+            if self._contact_age.settled:
+                speed.inflate(change * fastest)
+        rims = self._wheels.rim_speeds(time)
+        unturned = RimSpeeds.of(rims, turning.yaw_rate, rover.lateral)
+        reference_known = self._reference.known(time)
+        event = self._contact_age.update(unturned.typical)
+        if event.started and reference_known:
+            # Reference velocities will settle the strength again.
+            ekf.widen(SHEAR_STRENGTH, _START_STD * _START_STD)
+        if event.new_direction:
+            direction = self._contact_age.state.direction
+            speed.forget_ratio(direction, loads.slope_share, turned_back=event.reversed)
+        speed.begin(ekf, unturned)
+        speed.note_change(time, unturned)
+        heard = known(rims)
+        return _Cycle(
+            time=time,
+            dt=dt,
+            window=window,
+            rims=rims,
+            unturned=unturned,
+            still=bool(heard) and all(abs(rim) < rover.rest_speed for rim in heard),
+            torque=self._wheels.take_torque(),
+            leaving_angles=self._leaving_angles.angles(time),
+            loads=loads,
+            turns=self._linearisation.turning(rims, loads.load),
+            reference_known=reference_known,
+        )
+
+    def _predict(self, cycle: _Cycle) -> None:
+        """Predict speed, sinkage, soil and errors of the shear model to the time of a cycle."""
+        x = self._ekf.mean
+        prediction = Prediction.unchanged(x)
+        step = self._speed.step(
+            cycle.time, cycle.unturned, cycle.window, inflated=cycle.reference_known
+        )
+        if not cycle.still and not cycle.reference_known:
+            step = self._speed.towards_usual_slip(
+                step,
+                cycle.dt,
+                cycle.unturned.typical,
+                direction=self._contact_age.state.direction,
+                slope_share=cycle.loads.slope_share,
+            )
+        self._speed.predict(prediction, step, cycle.dt)
+        if not cycle.still and cycle.dt > 0.0:
+            travel = self._sinkage_process.predict(
+                prediction,
+                x,
+                cycle.dt,
+                rims=cycle.rims,
+                loads=cycle.loads.load,
+                yaw_rate=self._turning.state.yaw_rate,
+                leaving_angles=cycle.leaving_angles,
+                reference_known=cycle.reference_known,
+            )
+            self._contact_age.advance(travel)
+            if travel > 0.0:
+                self._soil_process.predict(
+                    prediction,
+                    travel,
+                    reference_known=cycle.reference_known,
+                    torque_known=self._wheels.torque_known(cycle.time),
+                )
+        self._ekf.predict(prediction.mean, prediction.F, prediction.Q)
+
+    def _fuse_reference(self, cycle: _Cycle, reference: ReferenceVelocity) -> None:
+        """Fuse a reference velocity; a speed that was wrong is no growth of the slip."""
+        time = cycle.time
+        opened = self._reference.update(
+            self._ekf,
+            time,
+            reference,
+            still=cycle.still,
+            fastest_rim=self._wheels.fastest(),
+            last_change=self._speed.state.change_time,
+            torque_known=self._wheels.torque_known(time),
+        )
+        if opened:
+            self._stuck.forget_trend()
+
+    def _compare_wheels(self, cycle: _Cycle) -> None:
+        """Find wheels without load, and sudden changes of what the wheels must give."""
+        low = self._rover.low_rim
+        rolling = [
+            i
+            for i, (rim, torque) in enumerate(zip(cycle.rims, cycle.torque, strict=True))
+            if abs(rim) > low and not isnan(torque)
+        ]
+        unloaded = self._unloaded.update(
+            cycle.time, rolling, cycle.torque, cycle.rims, self._turning.state.lateral_motion
+        )
+        change = self._torque_change.update(
+            cycle.time,
+            rolling,
+            unloaded.unloaded,
+            torque=cycle.torque,
+            rims=cycle.rims,
+            loads=cycle.loads.load,
+            traction_slope=self._speed.state.traction_slope,
+        )
+        if change:
+            self._speed.inflate(change * max(abs(cycle.rims[i]) for i in rolling))
+
+    def _forget_contacts(self) -> None:
+        """Let the contacts form anew: all wheels stand."""
+        self._contact_age.stop()
+        self._linearisation.reset()
+        self._sinkage_process.forget_slopes()
+        self._pulls.forget_stationary()
+
+    def _force_rows(self, cycle: _Cycle) -> tuple[ContactForces, SumOfPulls | None, list[Row]]:
+        """Return forces, what is known of their sum, and the rows of torques and balance."""
+        ekf, loads = self._ekf, cycle.loads.load
+        x, motion = ekf.mean, self._turning.state
+        forces = self._linearisation.update(
+            x,
+            turns=cycle.turns,
+            yaw_rate=motion.yaw_rate,
+            rims=cycle.rims,
+            loads=loads,
+            leaving_angles=cycle.leaving_angles,
+        )
+        stationary = self._stationary_pulls(cycle)
+        start = self._contact_age.shear_variance
+        model_variance = tuple(
+            [
+                self._turning.scrub_variance(rim) + start if turns else 0.0
+                for rim, turns in zip(cycle.rims, cycle.turns, strict=True)
+            ]
+        )
+        repeats = repetitions(cycle.rims, cycle.dt)
+        rows = self._torque.update(
+            ekf,
+            forces,
+            torque=cycle.torque,
+            turning=cycle.turns,
+            model_variance=model_variance,
+            repeats=repeats,
+        )
+        self._speed.follow_traction_curve(traction_slope(forces, cycle.rims, loads))
+        if not cycle.window.readings:
+            return forces, None, rows
+        curvature = self._turning.curvature(float(x[SPEED]))
+        total = self._balance.sum_of_pulls(
+            cycle.loads.force, cycle.window.readings, loads, curvature
+        )
+        balance = self._balance.update(
+            ekf,
+            forces,
+            total,
+            stationary=stationary,
+            loads=loads,
+            model_variance=model_variance,
+            repeats=repeats,
+        )
+        return forces, total, [*rows, balance]
+
+    def _stationary_pulls(self, cycle: _Cycle) -> list[StationaryPull | None]:
+        """Return what to expect of the wheels that do not turn under a load; None = it turns."""
+        motion, share = self._turning.state, cycle.loads.slope_share
+        found: list[StationaryPull | None] = []
+        for i, (rim, load) in enumerate(zip(cycle.rims, cycle.loads.load, strict=True)):
+            if cycle.turns[i]:
+                found.append(None)
+                continue
+            pull = NAN
+            if not isnan(rim) and load >= self._linearisation.least_load:
+                pull = self._stationary.pull(
+                    i,
+                    self._ekf.mean,
+                    cycle.torque[i],
+                    load,
+                    yaw_rate=motion.yaw_rate,
+                    lateral_motion=motion.lateral_motion,
+                )
+            expectation = self._stationary.expectation(pull, load, share, motion.lateral_motion)
+            found.append(expectation)
+        self._pulls.note_stationary(tuple([p.pull if p else NAN for p in found]))
+        return found
+
+    # -- What it means ---------------------------------------------------------------------------
+
+    def _judge(self, time: float) -> None:
+        """Judge slip and class of each wheel and the stuck warning at a time [s]."""
+        rover, wheels = self._rover, self._wheels
+        rims = wheels.rim_speeds(time)
+        speed, variance = self._present_speed(rims)
+        motion = self._turning.state
+        slips = self._slips.update(
+            time,
+            rims,
+            BodyMotion(
+                speed,
+                math.sqrt(max(variance, 0.0)),
+                motion.yaw_rate,
+                self._turning.yaw_rate_std,
+                motion.lateral_motion,
+                stopped=self._zero_velocity.standing()
+                and time >= self._reference.state.sliding_until,
+            ),
+        )
+        sinkage = self._ekf.mean[self._layout.sinkage].tolist()
+        seen = []
+        for i, (wheel, rim) in enumerate(zip(slips, rims, strict=True)):
+            limit, torque = rover.torque_limit[i], wheels.state.torque[i]
+            seen.append(
+                WheelMotion(
+                    wheel.slip,
+                    wheel.std,
+                    0.0 if isnan(rim) else rim,
+                    abs(rim) > rover.rest_speed and not wheel.resting,
+                    abs(torque) / limit if limit > 0.0 else NAN,
+                    sinkage[i],
+                    rover.rim_radius[i],
+                )
+            )
+        loads = self._loads.state
+        assessment = self._stuck.update(
+            time,
+            RoverMotion(
+                speed,
+                self._reference.fresh(time),
+                tuple(seen),
+                turning=motion.lateral_motion > _SHARP_TURN,
+                margin=self._margin.share(loads, torque_known=wheels.torque_known(time)),
+            ),
+        )
+        self._clock = self._clock._replace(assessment=assessment, speed=(speed, variance))
+        self._margin.update(time, self._ekf.mean, loads, self._contact_age.state.direction)
+
+    def _present_speed(self, rims: Floats) -> tuple[float, float]:
+        """Return speed [m/s] and variance at the present stamp."""
+        time = self._clock.time
+        return self._speed.present(
+            self._ekf,
+            time,
+            RimSpeeds.of(rims, self._turning.state.yaw_rate, self._rover.lateral),
+            self._inertial.state.window,
+            inflated=self._reference.known(time),
+        )
+
+    # -- Outputs ---------------------------------------------------------------------------------
 
     def estimates(self) -> EstimateSet:
         """Return all outputs at the present stamp; nothing changes."""
-        return estimate_set(self._context)
+        time, loads = self._clock.time, self._loads.state
+        rims = self._wheels.rim_speeds(time)
+        speed, variance = self._clock.speed or self._present_speed(rims)
+        given = Sources(
+            stamp=self._clock.stamp,
+            mean=self._ekf.mean,
+            covariance=self._ekf.covariance,
+            speed=speed,
+            speed_variance=variance,
+            yaw_rate=self._turning.state.yaw_rate,
+            yaw_rate_std=self._turning.yaw_rate_std,
+            rims=rims,
+            slips=self._slips.state,
+            loads=loads,
+            pulls=self._pulls.state,
+            sinkage=self._sinkage_process.state,
+            margin=self._margin.state.margin,
+            assessment=self._clock.assessment,
+        )
+        inertial = self._inertial.state
+        silent = time - inertial.time > self._rover.silence
+        missing = MissingInputs(
+            wheel_odometry=self._wheels.silent(time),
+            imu=silent,
+            orientation=not silent and not inertial.attitude.reported,
+            torque=not self._wheels.torque_known(time),
+            sinkage=len(self._sinkage.unread(time)) == self._rover.wheel_count,
+            reference=not self._reference.known(time),
+        )
+        return self._outputs.estimate_set(given, missing)
 
     def health(self) -> dict[str, Any]:
         """Return counters and consistency figures for diagnostics."""
-        c = self._context
-        report: dict[str, Any] = {f'rejected_{k}': v for k, v in c.run.rejected.items()}
-        report['filter_restarts'] = c.filter.restarts
-        for channel, value in c.run.nis.items():
-            report[f'nis_{channel}'] = round(value, 3)
+        reference, sinkage = self._reference.state, self._sinkage.state
+        report: dict[str, Any] = {
+            'rejected_reference': reference.rejected,
+            'rejected_sinkage': sinkage.rejected,
+            'filter_restarts': self._ekf.restarts,
+        }
+        for channel, nis in (
+            ('sinkage', sinkage.nis),
+            ('reference', reference.nis),
+            ('torque', self._torque.state),
+            ('balance', self._balance.state),
+        ):
+            if nis is not None:
+                report[f'nis_{channel}'] = round(nis, 3)
         return report

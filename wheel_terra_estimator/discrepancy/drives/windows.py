@@ -40,8 +40,8 @@ from wheel_terra_estimator.discrepancy.drives.series import Channel, DriveSeries
 from wheel_terra_estimator.discrepancy.tables.checks import check_table
 from wheel_terra_estimator.discrepancy.tables.steady_table import SteadyTable
 from wheel_terra_estimator.errors import UserError
-from wheel_terra_estimator.estimation.filter_settings import FilterSettings
 from wheel_terra_estimator.estimation.measurements import Measurement
+from wheel_terra_estimator.estimation.rover import Rover
 from wheel_terra_estimator.terramechanics.kinematics import slip_ratio
 
 FloatArray = NDArray[np.float64]
@@ -203,7 +203,7 @@ class _WindowFinder:
     def __init__(self, series: DriveSeries, configuration: Configuration) -> None:
         self.series = series
         self.configuration = configuration
-        self.settings = FilterSettings.from_configuration(configuration)
+        self.settings = Rover.from_configuration(configuration)
         self.stretches: Counter[str] = Counter()
         self.seconds: dict[str, float] = {}
         self._last = ''
@@ -402,7 +402,7 @@ def _with_deviations(windows: list[Window], configuration: Configuration) -> lis
     """Return the windows with the standard deviations of their means."""
     if not windows:
         return []
-    settings, sensors = FilterSettings.from_configuration(configuration), configuration.sensors
+    settings, sensors = Rover.from_configuration(configuration), configuration.sensors
     names = ('slip', 'torque', 'sinkage', 'pull')
     correlation = {name: _correlation(w.series[name] for w in windows) for name in names}
     pooled = {name: _mean(np.array([_variance(w.series[name]) for w in windows])) for name in names}

@@ -1,0 +1,328 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Wheels on the ground: turning, wheels without load or standing, smoothed slopes, pulls."""
+
+import math
+
+import numpy as np
+import pytest
+from parts import SAND, Parts
+
+from wheel_terra_estimator.configuration import reader
+from wheel_terra_estimator.estimation.contacts.contact_age import ContactAge
+from wheel_terra_estimator.estimation.contacts.contact_changes import DemandChange, TorqueChange
+from wheel_terra_estimator.estimation.contacts.linearisation import Linearisation, traction_slope
+from wheel_terra_estimator.estimation.contacts.loads import LoadState, WheelLoads
+from wheel_terra_estimator.estimation.contacts.pulls import Pulls
+from wheel_terra_estimator.estimation.contacts.stationary_wheels import StationaryWheels
+from wheel_terra_estimator.estimation.contacts.turning import Turning
+from wheel_terra_estimator.estimation.contacts.unloaded_wheels import UnloadedWheels
+from wheel_terra_estimator.estimation.contacts.wheel_models import WheelState
+from wheel_terra_estimator.estimation.filter.force_balance import SumOfPulls
+from wheel_terra_estimator.estimation.filter.state import SHEAR_STRENGTH, SPEED
+from wheel_terra_estimator.estimation.inputs.inertial import InertialWindow
+
+NAN = float('nan')
+FORWARD = (0.05,) * 6
+
+
+@pytest.fixture(scope='module')
+def parts():
+    return Parts(reader.load(SAND))
+
+
+def window(yaw=0.0, pitch=0.0, force=(0.0, 0.0, 9.8), readings=5):
+    return InertialWindow(
+        readings,
+        *(readings * f for f in force),
+        yaw_rate=readings * yaw,
+        pitch_rate=readings * pitch,
+    )
+
+
+# -- Turning ----------------------------------------------------------------------------------
+
+
+def turned(parts, yaw, seconds=10.0, pitch=0.0, speed=0.05):
+    turning = Turning(parts.rover, parts.sensors)
+    for _ in range(round(10 * seconds)):
+        turning.update(window(yaw, pitch), 0.1, speed, 0.05)
+    return turning
+
+
+def test_a_steady_turn_weakens_the_shear_models_by_its_lateral_motion(parts):
+    straight, turning = turned(parts, 0.0), turned(parts, 0.05)
+    side = 0.05 * parts.rover.curvature_length / 0.05
+    assert turning.state.yaw_rate == pytest.approx(0.05)
+    assert turning.state.lateral_motion == pytest.approx(side)
+    assert straight.scrub_variance(0.05) == 0.0
+    assert turning.scrub_variance(0.05) == pytest.approx(10.0 * side**2, rel=0.05)
+    assert turning.scrub_variance(0.001) == pytest.approx(10.0)  # sideways only: nothing is known
+
+
+def test_a_change_of_the_turning_may_change_the_speed_for_a_second(parts):
+    turning = turned(parts, 0.0)
+    changes = [turning.update(window(0.05), 0.1, 0.05, 0.05).speed_change for _ in range(60)]
+    side = 0.05 * parts.rover.curvature_length / 0.05
+    assert max(changes) == pytest.approx(1.5 * (side - 0.05) * 0.05, rel=0.2)
+    assert changes[-1] == 0.0
+
+
+def test_the_contacts_form_anew_over_a_contact_length(parts):
+    turning = turned(parts, 0.0)
+    for _ in range(3):
+        turning.update(window(0.05), 0.1, 0.05, 0.05)
+    before = turning.state.transient
+    assert before > 0.1
+    cycles = round(3.0 * parts.rover.contact_length / 0.005)
+    for _ in range(cycles):
+        turning.update(window(0.05), 0.1, 0.05, 0.05)
+    assert turning.state.transient < 0.4 * before
+
+
+def test_ground_that_curves_upwards_turns_the_nose_up(parts):
+    curvature = turned(parts, 0.0, seconds=60.0, pitch=-0.05 * 0.05).curvature(0.05)
+    assert 0.8 * 0.05 < curvature < 0.05  # a little less: the gyro's zero could be part of it
+    assert turned(parts, 0.0, pitch=-0.05 * 0.05).curvature(0.0005) < 0.01
+    assert turned(parts, 0.0, seconds=0.2).curvature(0.05) == 0.0
+
+
+# -- Starts and reversals ---------------------------------------------------------------------
+
+
+def test_a_reversal_begins_a_new_contact(parts):
+    age = ContactAge(parts.rover)
+    assert age.update(NAN) == (False, False, False)
+    assert age.update(0.0) == (False, False, False)
+    assert age.update(0.05) == (True, True, False)
+    age.advance(1.0)
+    assert age.settled
+    assert age.update(0.05) == (False, False, False)
+    assert age.update(-0.05) == (False, True, True)
+    assert not age.settled
+    age.advance(1.0)
+    late = age.shear_variance
+    age.stop()
+    assert age.state.travel == 0.0
+    assert age.update(-0.05).started
+    assert age.shear_variance > 100.0 * late
+
+
+# -- Changes of what the wheels must give -----------------------------------------------------
+
+
+def test_a_change_of_slope_may_change_the_slip_by_it_over_the_traction_curve(parts):
+    demand = DemandChange(parts.rover, parts.sensors)
+    assert demand.update(0.0, 5, 0.1, 0.5) == 0.0
+    assert demand.update(0.0, 5, 0.1, 0.5) == 0.0
+    assert demand.update(0.1, 5, 0.1, 0.5) == pytest.approx(0.1 / 0.5, rel=0.1)
+    assert demand.update(0.1, 5, 0.1, 0.0) == 0.0  # the curve is not known
+    for _ in range(100):
+        demand.update(0.1, 5, 0.1, 0.5)
+    assert demand.state == pytest.approx(0.1, rel=0.01)
+    assert demand.update(0.1, 5, 0.1, 0.5) == 0.0
+
+
+def test_a_jump_of_all_torques_may_change_the_slip(parts):
+    change = TorqueChange(parts.rover, parts.sensors)
+    given = {'rims': FORWARD, 'loads': (300.0,) * 6, 'traction_slope': 0.5}
+
+    def hear(time, torque):
+        return change.update(time, range(6), [False] * 6, torque=(torque,) * 6, **given)
+
+    assert [hear(0.1 * i, 10.0) for i in range(1, 20)] == [0.0] * 19
+    effort = 10.0 / (300.0 * parts.rover.shear_radius[0])
+    # The fast mean runs ahead of the slow one.
+    lead = effort * (-math.expm1(-0.1 / 0.15) + math.expm1(-0.1))
+    assert hear(2.0, 20.0) == pytest.approx(0.5 * lead / 0.5, rel=0.1)
+    assert [hear(2.0 + 0.1 * i, 20.0) for i in range(1, 60)][-1] == 0.0
+    assert change.update(9.0, [], [False] * 6, torque=(1.0,) * 6, **given) == 0.0
+    assert math.isnan(change.state.fast)
+
+
+# -- Wheels without load ----------------------------------------------------------------------
+
+
+def lifted(parts, torque, *, steps, found=None, lateral_motion=0.0, rims=FORWARD):
+    found = found or UnloadedWheels(parts.rover, parts.sensors)
+    start = 0.0 if not hasattr(found, 'clock') else found.clock
+    for i in range(steps):
+        found.update(start + 0.1 * i, range(6), torque, rims, lateral_motion)
+    found.clock = start + 0.1 * steps
+    return found
+
+
+def test_a_wheel_without_torque_carries_nothing_and_is_taken_back(parts):
+    up, down = (0.5, *(10.0,) * 5), (10.0,) * 6
+    found = lifted(parts, up, steps=3)
+    assert not any(found.state.unloaded)  # not at once
+    lifted(parts, up, steps=3, found=found)
+    assert found.state.unloaded == (True, *(False,) * 5)
+    lifted(parts, down, steps=6, found=found)
+    assert not any(found.state.unloaded)
+
+
+@pytest.mark.parametrize(
+    'changes',
+    [
+        {'lateral_motion': 0.5},  # turns part the torques
+        {'rims': (0.01, *(0.05,) * 5)},  # a slower wheel is held
+        {'torque': (0.01, *(0.2,) * 5)},  # too little torque to compare
+    ],
+)
+def test_no_wheel_is_called_unloaded_where_torque_does_not_tell(parts, changes):
+    given = {'torque': (0.5, *(10.0,) * 5), **changes}
+    assert not any(lifted(parts, steps=20, **given).state.unloaded)
+
+
+def test_wheels_that_turn_against_each_other_have_no_middle_rim_speed(parts):
+    rims = (0.05, -0.05, 0.05, -0.05, 0.05, -0.05)
+    given = lifted(parts, (0.5, *(10.0,) * 5), steps=20, rims=rims)
+    assert not any(given.state.unloaded)
+
+
+def test_the_load_of_an_unloaded_wheel_goes_to_the_others(parts):
+    loads, zero = WheelLoads(parts.rover), (0.0,) * 6
+    level = loads.update(window(), zero, zero, (False,) * 6)
+    without = loads.update(window(), zero, zero, (True, *(False,) * 5))
+    assert without.load[0] == 0.0
+    assert sum(without.load) == pytest.approx(sum(level.load))
+    assert loads.update(InertialWindow(), zero, zero, (False,) * 6) == without  # held
+
+
+# -- Wheels that stand ------------------------------------------------------------------------
+
+
+def standing_pull(parts, torque, speed, lateral_motion=0.0):
+    x = parts.filter().mean.copy()
+    x[SPEED] = speed
+    wheels = StationaryWheels(parts.rover, parts.sensors, parts.layout, parts.models)
+    return wheels.pull(0, x, torque, 60.0, yaw_rate=0.0, lateral_motion=lateral_motion)
+
+
+@pytest.mark.parametrize('torque', [-8.0, 20.0])
+def test_a_dragged_wheel_is_a_drag_whatever_its_jammed_drive_reads(parts, torque):
+    assert standing_pull(parts, torque, 0.05) < -0.2 * 60.0
+    assert standing_pull(parts, -torque, -0.05) > 0.2 * 60.0
+
+
+def test_torque_tells_the_drag_of_a_locked_wheel(parts):
+    assert standing_pull(parts, -8.0, 0.05) < standing_pull(parts, -4.0, 0.05) - 5.0
+    # In a turn a torque against the drag may be the soil's.
+    straight, turn = (standing_pull(parts, 8.0, 0.05, side) for side in (0.0, 0.5))
+    assert turn > straight + 5.0
+
+
+def test_torque_over_radius_is_the_pull_of_a_wheel_that_holds_a_standing_rover(parts):
+    assert standing_pull(parts, 3.0, 0.0) == pytest.approx(3.0 / parts.rover.shear_radius[0])
+    assert standing_pull(parts, 1e3, 0.0) == 60.0  # no soil gives more than the load
+    assert math.isnan(standing_pull(parts, NAN, 0.0))
+
+
+# -- Linearisation ----------------------------------------------------------------------------
+
+
+def forces_at(parts, slip, strength=0.0):
+    ekf, linearisation = parts.filter(), Linearisation(parts.rover, parts.layout, parts.models)
+    ekf.mean[SPEED] = (1.0 - slip) * 0.05
+    ekf.mean[SHEAR_STRENGTH] = strength
+    loads = WheelLoads(parts.rover).state.load
+    turns = linearisation.turning(FORWARD, loads)
+    for _ in range(100):  # the slopes are means over a second
+        forces = linearisation.update(
+            ekf.mean,
+            turns=turns,
+            yaw_rate=0.0,
+            rims=FORWARD,
+            loads=loads,
+            leaving_angles=(NAN,) * 6,
+        )
+    return forces, loads
+
+
+def test_rows_are_the_derivatives_of_torque_and_pull(parts):
+    here, loads = forces_at(parts, 0.3)
+    there, _ = forces_at(parts, 0.3, strength=0.01)
+    column = SHEAR_STRENGTH
+    assert here.torque_rows[:, column] == pytest.approx(
+        (there.torque - here.torque) / 0.01, rel=0.05
+    )
+    faster, _ = forces_at(parts, 0.29)
+    slope = float((faster.pull - here.pull).sum() / sum(loads) / 0.01)
+    assert traction_slope(here, FORWARD, loads) == pytest.approx(-slope, rel=0.05)
+    pulls, torques = here.moved_to(here.state)
+    assert pulls == pytest.approx(here.pull)
+    assert torques == pytest.approx(here.torque)
+
+
+def test_every_slope_is_smoothed_until_the_contact_changes(parts):
+    linearisation = Linearisation(parts.rover, parts.layout, parts.models)
+    forces = [
+        parts.models.forces(0, WheelState(ratio, 0.02, 200.0, 0.0, 0.0, rim_speed=0.05))
+        for ratio in (0.95, 0.9, 0.1)
+    ]
+    moment = 200.0 * parts.rover.shear_radius[0]
+    found, torque, pull = [], None, None
+    for k in range(80):
+        torque, pull = linearisation.smoothed(torque, pull, forces[k % 2], moment)
+        found.append((torque, pull))
+    for smoothed, raw in zip(np.moveaxis(found[40:], 1, 0), ('d_torque', 'd_pull'), strict=True):
+        swing = np.abs(np.subtract(*(getattr(f, raw) for f in forces[:2])))
+        assert (np.ptp(smoothed, axis=0) < 0.12 * swing + 1e-9).all()
+    torque, pull = linearisation.smoothed(torque, pull, forces[2], moment)
+    assert torque[1:] == forces[2].d_torque[1:]
+    assert pull[1:] == forces[2].d_pull[1:]
+
+
+# -- Pulls ------------------------------------------------------------------------------------
+
+
+def test_the_residual_of_the_sum_is_distributed_as_least_squares_does(parts):
+    rng = np.random.default_rng(4)
+    root = rng.normal(size=(6, 6))
+    covariance = root @ root.T
+    pulls = rng.normal(scale=20.0, size=6)
+    total, variance = float(pulls.sum()) + 6.0, 2.0
+    found = Pulls(parts.rover, parts.sensors, (300.0,) * 6).distributed(
+        pulls.tolist(),
+        covariance.sum(axis=1),
+        SumOfPulls(total, 1800.0, variance),
+        (300.0,) * 6,
+        0.0,
+    )
+    # Six priors and one sum, each row in units of its own deviation.
+    whiten = np.linalg.inv(np.linalg.cholesky(covariance))
+    rows = np.vstack([whiten, np.ones(6) / np.sqrt(variance)])
+    values = np.append(whiten @ pulls, total / np.sqrt(variance))
+    assert found == pytest.approx(np.linalg.lstsq(rows, values, rcond=None)[0])
+
+
+def published_pull(parts, excess, lateral_motion=0.0):
+    """Pulls after 40 cycles in which all torques read `excess` more than the model."""
+    pulls = Pulls(parts.rover, parts.sensors, (300.0,) * 6)
+    forces, loads = forces_at(parts, 0.3)
+    ekf = parts.filter()
+    ekf.mean[:] = forces.state
+    for _ in range(40):
+        pulls.update(
+            ekf.mean,
+            1e-9 * np.eye(len(ekf.mean)),
+            forces,
+            None,
+            loads=LoadState(loads, (0.0, 0.0, 9.8), force_known=True),
+            turning=(True,) * 6,
+            readings=tuple((forces.torque + excess).tolist()),
+            slips=(0.3,) * 6,
+            lateral_motion=lateral_motion,
+            tilt=0.0,
+        )
+    return np.array(pulls.state.pull), forces
+
+
+def test_the_pull_follows_a_torque_that_the_model_does_not_explain(parts):
+    pull, forces = published_pull(parts, 6.0)
+    gain = forces.pull_rows[:, SHEAR_STRENGTH] / forces.torque_rows[:, SHEAR_STRENGTH]
+    assert pull - forces.pull == pytest.approx(6.0 * gain, rel=0.2)
+    # What the sensor's zero may be is not believed, nor what a turn may do.
+    assert published_pull(parts, 0.05)[0] == pytest.approx(forces.pull, abs=1e-3)
+    assert published_pull(parts, 6.0, lateral_motion=0.5)[0] == pytest.approx(forces.pull)

@@ -1,0 +1,104 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""The gated filter against the textbook, and over a simulated day."""
+
+import numpy as np
+import pytest
+
+from wheel_terra_estimator.estimation.filter.ekf import GatedFilter, chi_square_gate
+
+
+def make(n, seed=0):
+    rng = np.random.default_rng(seed)
+    A = rng.standard_normal((n, n))
+    P = A @ A.T + np.eye(n)
+    wide = np.full(n, 1e9)
+    return GatedFilter(rng.standard_normal(n), P, -wide, wide), P
+
+
+def test_update_is_the_textbook_one():
+    kalman, P = make(6)
+    x = kalman.mean.copy()
+    rng = np.random.default_rng(1)
+    H, R, residual = rng.standard_normal((3, 6)), np.array([0.5, 1.0, 2.0]), rng.standard_normal(3)
+    # Information form: another way to the same answer.
+    information = np.linalg.inv(P) + H.T @ np.diag(1.0 / R) @ H
+    posterior = np.linalg.inv(information)
+    kalman.update(residual, H, R)
+    assert kalman.covariance == pytest.approx(posterior, rel=1e-9)
+    assert kalman.mean == pytest.approx(x + posterior @ H.T @ (residual / R), rel=1e-9)
+
+
+def test_considered_entries_keep_mean_and_variance_but_their_doubt_counts():
+    free, P = make(5)
+    held, _ = make(5)
+    sure, _ = make(5)
+    H, R = np.array([[1.0, 0.0, 2.0, 0.0, 0.0]]), np.array([0.1])
+    before = held.mean.copy()
+    held.update(np.array([1.0]), H, R, considered=(2,))
+    assert held.mean[2] == before[2]
+    assert held.covariance[2, 2] == pytest.approx(P[2, 2])
+    free.update(np.array([1.0]), H, R)
+    assert held.covariance[0, 0] >= free.covariance[0, 0] - 1e-12
+    sure.set(2, before[2], 1e-9)
+    sure.update(np.array([1.0]), H, R)
+    assert held.covariance[0, 0] > sure.covariance[0, 0]
+    assert np.linalg.eigvalsh(held.covariance).min() > 0.0
+
+
+def test_nan_never_stays():
+    kalman, _ = make(4)
+    kalman.update(np.array([np.nan]), np.ones((1, 4)), np.array([1.0]))
+    assert np.isfinite(kalman.mean).all()
+    assert np.isfinite(kalman.covariance).all()
+    assert kalman.restarts == 1
+
+
+def test_gate_brings_an_outlier_to_its_border():
+    extra = chi_square_gate(10.0, 4.0, 9.0)
+    assert 10.0**2 / (4.0 + extra) == pytest.approx(9.0)
+    assert chi_square_gate(1.0, 4.0, 9.0) == 0.0
+
+
+def day(steps):
+    kalman, _ = make(25)
+    rng = np.random.default_rng(2)
+    F = np.eye(25)
+    F[0, 1] = -0.001
+    Q = np.diag(rng.uniform(0.0, 1e-6, 25))
+    Q[3, 3] = 0.0  # a constant: its variance only ever shrinks
+    H = rng.standard_normal((200, 12, 25))
+    noise = rng.standard_normal((200, 12))
+    R = np.full(12, 1e-4)
+    worst = np.inf
+    for i in range(steps):
+        kalman.predict(F @ kalman.mean, F, Q)
+        kalman.update(noise[i % 200] * 1e-2, H[i % 200], R)
+        if i % 500 == 0:
+            P = kalman.covariance
+            assert (P == P.T).all()
+            worst = min(worst, float(np.linalg.eigvalsh(P).min()))
+    return worst
+
+
+def test_covariance_stays_symmetric_and_positive():
+    assert day(5000) > -1e-15
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(0)
+def test_covariance_stays_symmetric_and_positive_for_a_day_at_10_hz():
+    assert day(864000) > -1e-15
+
+
+@pytest.mark.filterwarnings('error')
+def test_readings_of_any_size_bring_no_warning_and_no_restart():
+    kalman, _ = make(4)
+    rng = np.random.default_rng(5)
+    for size in 10.0 ** np.arange(-12, 13, 2):
+        H = size * rng.standard_normal((3, 4))
+        H[2] = H[1] * (1.0 + 1e-13)
+        kalman.update(size * rng.standard_normal(3), H, np.array([1e-12, size, 1e-12]) * size)
+    assert np.isfinite(kalman.mean).all()
+    assert (np.linalg.eigvalsh(kalman.covariance) > -1e-9).all()
+    assert kalman.restarts == 0

@@ -1,0 +1,354 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Process and measurements of the filter, each by itself."""
+
+import numpy as np
+import pytest
+from parts import SAND, Parts
+
+from wheel_terra_estimator.configuration import reader
+from wheel_terra_estimator.estimation.contacts.linearisation import Linearisation
+from wheel_terra_estimator.estimation.contacts.loads import WheelLoads
+from wheel_terra_estimator.estimation.contacts.stationary_wheels import StationaryPull
+from wheel_terra_estimator.estimation.filter.force_balance import ForceBalance
+from wheel_terra_estimator.estimation.filter.observability import considered_entries
+from wheel_terra_estimator.estimation.filter.prediction import Prediction
+from wheel_terra_estimator.estimation.filter.reference import ReferenceUpdate
+from wheel_terra_estimator.estimation.filter.repetition import repetitions
+from wheel_terra_estimator.estimation.filter.sinkage import SinkageUpdate
+from wheel_terra_estimator.estimation.filter.sinkage_process import SinkageProcess
+from wheel_terra_estimator.estimation.filter.soil_process import SoilProcess
+from wheel_terra_estimator.estimation.filter.state import (
+    SHEAR_MODULUS,
+    SHEAR_STRENGTH,
+    SLIP_SINKAGE,
+    SPEED,
+)
+from wheel_terra_estimator.estimation.filter.torque import TorqueUpdate
+from wheel_terra_estimator.estimation.filter.zero_velocity import ZeroVelocityUpdate
+from wheel_terra_estimator.estimation.inputs.contact_sensors import SinkageSums
+from wheel_terra_estimator.estimation.inputs.inertial import InertialWindow
+from wheel_terra_estimator.estimation.measurements import ReferenceVelocity
+
+NAN = float('nan')
+FORWARD = (0.05,) * 6
+
+
+@pytest.fixture
+def parts():
+    return Parts(reader.load(SAND))
+
+
+@pytest.fixture
+def ekf(parts):
+    found = parts.filter()
+    found.set(SPEED, 0.045, 0.005**2)
+    return found
+
+
+# -- Reference velocity -----------------------------------------------------------------------
+
+
+def references(parts, ekf, speeds, torque_known=True, last_change=-1e9):
+    """Fuse one reference per second; return for each whether the speed was opened to it."""
+    update = ReferenceUpdate(parts.configuration, parts.rover, parts.sensors)
+    opened = []
+    for i, speed in enumerate(speeds):
+        ekf.widen(SPEED, 1e-8)
+        opened.append(
+            update.update(
+                ekf,
+                float(i),
+                ReferenceVelocity(0, speed, 0.0),
+                still=False,
+                fastest_rim=0.05,
+                last_change=last_change,
+                torque_known=torque_known,
+            )
+        )
+    return update, opened
+
+
+def test_a_reference_is_the_textbook_update(parts, ekf):
+    before, variance = 0.045, float(ekf.covariance[SPEED, SPEED])
+    references(parts, ekf, [0.046])
+    noise, prior = parts.sensors.reference_std**2, variance + 1e-8
+    expected = before + prior / (prior + noise) * 0.001
+    assert ekf.mean[SPEED] == pytest.approx(expected)
+
+
+def test_references_that_agree_with_one_another_are_believed_after_their_count(parts, ekf):
+    good = [0.045] * 10
+    for torque_known, last_change, count in ((True, -1e9, 3), (False, -1e9, 2), (True, 9.9, 2)):
+        fresh = parts.filter()
+        fresh.set(SPEED, 0.045, 0.005**2)
+        update, opened = references(parts, fresh, good + [0.02] * 3, torque_known, last_change)
+        assert opened.index(True) == 9 + count
+        assert update.state.rejected == count
+        assert fresh.mean[SPEED] == pytest.approx(0.02, abs=0.003)
+
+
+def test_references_beyond_the_fastest_wheel_hardly_count(parts, ekf):
+    _, opened = references(parts, ekf, [0.045] * 10 + [0.5] * 3)
+    assert not any(opened)
+    assert ekf.mean[SPEED] < 0.05
+
+
+def test_a_reference_on_standing_wheels_says_whether_the_rover_slides(parts, ekf):
+    update = ReferenceUpdate(parts.configuration, parts.rover, parts.sensors)
+    for time, speed, sliding in ((0.0, 0.03, True), (10.0, 0.0, False)):
+        update.update(
+            ekf,
+            time,
+            ReferenceVelocity(0, speed, 0.0),
+            still=True,
+            fastest_rim=0.0,
+            last_change=-1e9,
+            torque_known=True,
+        )
+        assert (update.state.sliding_until > time) is sliding
+
+
+# -- Zero velocity ----------------------------------------------------------------------------
+
+
+def rest(parts, ekf, seconds, rims=(0.0,) * 6, yaw=0.0):
+    update = ZeroVelocityUpdate(parts.rover)
+    still = max(abs(r) for r in rims) < 0.001
+    for i in range(round(10 * seconds)):
+        update.update(
+            ekf,
+            0.1 * i,
+            rims=rims,
+            typical_rim=float(np.median(rims)),
+            still=still,
+            sliding=False,
+            window=InertialWindow(readings=5, pitch_rate=5 * 0.002),
+            yaw_rate=yaw,
+        )
+    return update
+
+
+def test_a_rover_that_stands_has_no_speed_and_learns_the_zero_of_its_gyro(parts, ekf):
+    update = rest(parts, ekf, 5.0, yaw=0.003)
+    assert abs(ekf.mean[SPEED]) < 1e-3
+    assert update.standing()
+    assert update.state.zero.yaw == pytest.approx(0.003 * np.sum(1.0 / np.arange(1, 45)), rel=0.1)
+    assert update.state.zero.pitch > 0.0
+    turning = rest(parts, parts.filter(), 5.0, yaw=0.1)
+    assert turning.state.zero == (0.0, 0.0)
+
+
+def test_a_fast_rover_is_not_stopped_at_once(parts):
+    fast = parts.filter()
+    fast.set(SPEED, 1.0, 0.02**2)
+    rest(parts, fast, 0.3)
+    assert fast.mean[SPEED] > 0.8
+    rest(parts, fast, 4.0)
+    assert abs(fast.mean[SPEED]) < 0.01
+
+
+def test_wheels_that_turn_against_each_other_hold_the_body(parts, ekf):
+    ekf.set(SPEED, 0.045, 0.05**2)
+    rest(parts, ekf, 3.0, rims=(0.05, -0.05) * 3)
+    assert abs(ekf.mean[SPEED]) < 0.01
+
+
+# -- Sinkage ----------------------------------------------------------------------------------
+
+
+def test_a_spike_of_the_sinkage_is_dropped_and_eight_in_a_row_are_believed(parts, ekf):
+    update = SinkageUpdate(parts.configuration, parts.sensors, parts.layout)
+    zi = parts.layout.sinkage.start
+
+    def read(time, depth):
+        rows = update.update(ekf, time, SinkageSums((depth,) + (0.0,) * 5, (1,) + (0,) * 5))
+        ekf.fuse(rows)
+        return len(rows)
+
+    for i in range(20):
+        assert read(0.1 * i, 0.03) == 1
+    assert [read(2.0 + 0.1 * i, 0.1) for i in range(8)] == [0] * 7 + [1]
+    assert update.state.rejected == 8
+    assert ekf.mean[zi] == pytest.approx(0.1, abs=0.002)
+    assert update.unread(3.0) == [1, 2, 3, 4, 5]
+    assert update.unread(9.0) == list(range(6))
+
+
+def relaxed(parts, ekf, seconds, loads=None, reference_known=True, speed=0.05, start=None):
+    process = SinkageProcess(parts.rover, parts.layout, parts.models)
+    loads = loads or WheelLoads(parts.rover).state.load
+    x, travel = ekf.mean.copy(), 0.0
+    x[SPEED] = speed
+    if start is not None:
+        x[parts.layout.sinkage] = start
+    for _ in range(round(10 * seconds)):
+        prediction = Prediction.unchanged(x)
+        travel += process.predict(
+            prediction,
+            x,
+            0.1,
+            rims=FORWARD,
+            loads=loads,
+            yaw_rate=0.0,
+            leaving_angles=(NAN,) * 6,
+            reference_known=reference_known,
+        )
+        x = prediction.mean
+    return x[parts.layout.sinkage], travel, prediction
+
+
+def test_the_sinkage_relaxes_over_travel_to_where_the_bearing_law_carries_the_load(parts, ekf):
+    at_rest = ekf.mean[parts.layout.sinkage]  # the same law without slip
+    found, travel, _ = relaxed(parts, ekf, 30.0, start=0.05)
+    assert travel == pytest.approx(1.5)
+    assert found == pytest.approx(at_rest, rel=0.05)
+    halfway, _, _ = relaxed(parts, ekf, 1.0, start=0.05)
+    assert ((at_rest < halfway) & (halfway < 0.05)).all()
+
+
+def test_sinkage_tells_half_as_much_of_the_slip_without_a_reference(parts, ekf):
+    columns = [
+        relaxed(parts, ekf, 0.1, reference_known=known, speed=0.035)[2].F[
+            parts.layout.sinkage, SPEED
+        ]
+        for known in (True, False)
+    ]
+    assert (columns[0] != 0.0).all()
+    assert columns[1] == pytest.approx(0.5 * columns[0])
+
+
+def test_a_wheel_in_the_air_keeps_its_sinkage(parts, ekf):
+    loads = (0.0, *WheelLoads(parts.rover).state.load[1:])
+    found, _, prediction = relaxed(parts, ekf, 0.1, loads=loads, start=0.03)
+    zi = parts.layout.sinkage.start
+    assert found[0] == 0.03
+    assert prediction.Q[zi, zi] > 10.0 * prediction.Q[zi + 1, zi + 1]
+
+
+# -- Soil -------------------------------------------------------------------------------------
+
+
+def soil_noise(parts, **given):
+    prediction = Prediction.unchanged(np.ones(parts.layout.size))
+    SoilProcess(parts.configuration, parts.layout).predict(prediction, 0.5, **given)
+    return prediction
+
+
+def test_soil_walks_with_travel_and_is_learned_with_a_reference_only(parts):
+    known = soil_noise(parts, reference_known=True, torque_known=True)
+    blind = soil_noise(parts, reference_known=False, torque_known=True)
+    for index, std in ((SHEAR_STRENGTH, 0.1), (SHEAR_MODULUS, 0.1), (SLIP_SINKAGE, 0.05)):
+        assert known.Q[index, index] == pytest.approx(std**2 * 0.5)
+        assert blind.Q[index, index] == 0.0
+    assert known.mean[SHEAR_STRENGTH] == pytest.approx(np.exp(-0.5 / 100.0))
+    hold = np.exp(-0.5 / 0.5)
+    e = parts.layout.shear_error
+    assert np.diagonal(known.F)[e] == pytest.approx([hold] * 6)
+
+
+def test_softer_ground_is_weaker_ground_where_no_torque_says_how_weak(parts):
+    k, e = parts.layout.stiffness, parts.layout.shear_error
+    assert (soil_noise(parts, reference_known=True, torque_known=True).Q[k, e] == 0.0).all()
+    Q = soil_noise(parts, reference_known=True, torque_known=False).Q
+    own = Q[k, k] - Q[k, k][0, 1]
+    error = Q[e, e] - Q[e, e][0, 1]
+    correlation = np.diagonal(Q[k, e]) / np.sqrt(np.diagonal(own) * np.diagonal(error))
+    assert correlation == pytest.approx([0.7] * 6)
+
+
+# -- Torque and balance -----------------------------------------------------------------------
+
+
+def forces(parts, ekf):
+    linearisation = Linearisation(parts.rover, parts.layout, parts.models)
+    loads = WheelLoads(parts.rover).state.load
+    found = linearisation.update(
+        ekf.mean,
+        turns=(True,) * 6,
+        yaw_rate=0.0,
+        rims=FORWARD,
+        loads=loads,
+        leaving_angles=(NAN,) * 6,
+    )
+    return found, loads
+
+
+def torque_rows(parts, ekf, excess, doubt=0.0, repeats=1.0):
+    update, (found, _) = (
+        TorqueUpdate(parts.configuration, parts.rover, parts.sensors),
+        forces(parts, ekf),
+    )
+    return update.update(
+        ekf,
+        found,
+        torque=(*(found.torque + excess).tolist()[:5], NAN),
+        turning=(True,) * 4 + (False,) * 2,
+        model_variance=(doubt,) * 6,
+        repeats=repeats,
+    ), found
+
+
+def test_torques_are_rows_of_turning_wheels_that_were_read(parts, ekf):
+    rows, found = torque_rows(parts, ekf, 0.3)
+    assert [row.residual for row in rows] == pytest.approx([0.3] * 4)
+    model = found.torque[0]
+    noise = parts.sensors.torque_std**2 + (parts.rover.load_std * model) ** 2
+    assert rows[0].variance == pytest.approx(noise, rel=1e-3)
+    many, _ = torque_rows(parts, ekf, 0.3, repeats=30.0)
+    assert many[0].variance == pytest.approx(30.0 * noise, rel=1e-3)
+
+
+def test_turning_weakens_a_torque(parts, ekf):
+    rows, found = torque_rows(parts, ekf, 0.0)
+    doubted, _ = torque_rows(parts, ekf, 0.0, doubt=2.0)
+    added = doubted[0].variance - rows[0].variance
+    assert added == pytest.approx(2.0 * found.torque[0] ** 2)
+
+
+def test_a_torque_beyond_the_gate_is_weakened_to_it(parts, ekf):
+    row = torque_rows(parts, ekf, 500.0)[0][0]
+    total = float(row.jacobian @ ekf.covariance @ row.jacobian) + row.variance
+    assert 500.0**2 / total < 10.8
+
+
+def test_the_balance_of_forces_on_a_slope(parts, ekf):
+    balance = ForceBalance(parts.configuration, parts.rover, parts.sensors, parts.layout)
+    found, loads = forces(parts, ekf)
+    ekf.mean[parts.layout.sinkage] = 0.03  # even ruts: the body lies along the ground
+    along = float(found.pull.sum()) + 12.0
+    total = balance.sum_of_pulls((along / parts.rover.mass, 0.0, 9.6), 5, loads, 0.0)
+    given = {'loads': loads, 'model_variance': (0.0,) * 6, 'repeats': 1.0}
+    row = balance.update(ekf, found, total, stationary=[None] * 6, **given)
+    assert row.residual == pytest.approx(12.0, abs=1e-6)
+    rear = int(np.argmin(parts.rover.longitudinal))
+    ekf.mean[parts.layout.sinkage.start + rear] += 0.01  # the nose points up by it
+    tilted = balance.update(ekf, found, total, stationary=[None] * 6, **given)
+    tilt = 0.01 * parts.rover.rut_tilt[rear]
+    assert tilt > 0.0
+    assert tilted.residual == pytest.approx(12.0 - parts.rover.mass * 9.6 * tilt)
+    standing = [StationaryPull(NAN, 5.0, 20.0), *[None] * 5]
+    held = balance.update(ekf, found, total, stationary=standing, **given)
+    assert held.residual - tilted.residual == pytest.approx(float(found.pull[0]) - 5.0)
+
+
+def test_cycles_that_see_the_same_ground_are_one_piece_of_information():
+    assert repetitions(FORWARD, 0.1) == pytest.approx(0.15 / 0.005)
+    assert repetitions((1.5, NAN), 0.2) == 1.0
+    assert repetitions((0.0,) * 4, 0.1) == 100.0
+
+
+def test_what_is_not_seen_is_considered_and_not_learned(parts):
+    layout = parts.layout
+
+    def entries(**changes):
+        given = {'reference_known': True, 'settled': True, 'unread': []}
+        return set(considered_entries(layout, **(given | changes)))
+
+    assert entries() == set()
+    assert entries(settled=False) == set()
+    assert entries(reference_known=False) == {SHEAR_STRENGTH, SHEAR_MODULUS}
+    assert SPEED in entries(reference_known=False, settled=False)
+    one = entries(unread=[2])
+    assert one == {layout.sinkage.start + 2, layout.stiffness.start + 2}
+    assert SLIP_SINKAGE in entries(unread=list(range(6)))

@@ -1,0 +1,131 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Readings between two cycles: sums, means, ages, and the body's slope."""
+
+import math
+
+import numpy as np
+import pytest
+from parts import SAND, Parts
+
+from wheel_terra_estimator.configuration import reader
+from wheel_terra_estimator.estimation.inputs.contact_sensors import (
+    LeavingAngleInput,
+    SinkageInput,
+)
+from wheel_terra_estimator.estimation.inputs.inertial import GyroZero, InertialInput
+from wheel_terra_estimator.estimation.inputs.wheel_odometry import WheelOdometryInput
+from wheel_terra_estimator.estimation.measurements import (
+    InertialReading,
+    LeavingAngleReading,
+    SinkageReading,
+    WheelOdometry,
+)
+
+GRAVITY = 9.81
+NAN = float('nan')
+
+
+def reading(force=(0.0, 0.0, GRAVITY), rate=(0.0, 0.0, 0.0), orientation=None):
+    turned = None if orientation is None else np.array(orientation)
+    return InertialReading(0, np.array(force), np.array(rate), turned)
+
+
+def test_nose_up_is_a_negative_pitch():
+    pitch = -0.2
+    imu = InertialInput(GRAVITY)
+    imu.update(
+        0.0,
+        reading(orientation=(0.0, math.sin(pitch / 2), 0.0, math.cos(pitch / 2))),
+        GyroZero(),
+    )
+    assert imu.state.attitude.sine_up == pytest.approx(math.sin(0.2))
+    assert imu.state.attitude.reported
+
+
+def test_without_orientation_gyro_and_gravity_give_the_slope():
+    imu, slope = InertialInput(GRAVITY), 0.15
+    force = (GRAVITY * math.sin(slope), 0.0, GRAVITY * math.cos(slope))
+    for i in range(2000):
+        imu.update(0.02 * i, reading(force=force), GyroZero())
+    assert imu.state.attitude.sine_up == pytest.approx(math.sin(slope), abs=1e-3)
+    # Nose going up at 0.1 rad/s for half a second.
+    for i in range(2000, 2025):
+        imu.update(0.02 * i, reading(force=force, rate=(0.0, -0.1, 0.0)), GyroZero())
+    assert imu.state.attitude.sine_up == pytest.approx(math.sin(slope) + 0.05, abs=0.01)
+    assert not imu.state.attitude.reported
+
+
+def test_a_gap_of_the_imu_is_not_integrated_over():
+    imu = InertialInput(GRAVITY)
+    for time in (0.0, 5.0):
+        imu.update(time, reading(force=(1.0, 0.0, 9.7), orientation=(0, 0, 0, 1)), GyroZero())
+    window = imu.take()
+    assert window.readings == 2
+    assert window.duration == 0.0
+    imu.update(5.1, reading(force=(1.0, 0.0, 9.7), orientation=(0, 0, 0, 1)), GyroZero())
+    assert imu.take().speed_change == pytest.approx(0.1)
+
+
+def test_the_zero_of_the_gyro_is_taken_off():
+    imu = InertialInput(GRAVITY)
+    imu.update(0.0, reading(rate=(0.0, 0.03, 0.05)), GyroZero(yaw=0.01, pitch=0.02))
+    window = imu.take()
+    assert (window.yaw_rate, window.pitch_rate) == pytest.approx((0.04, 0.01))
+    assert imu.take().readings == 0
+
+
+def odometry(rate, torque):
+    return WheelOdometry(0, np.array(rate), np.array(torque))
+
+
+@pytest.fixture
+def wheels():
+    return WheelOdometryInput(Parts(reader.load(SAND)).rover)
+
+
+def test_torques_are_means_and_the_last_one_is_held(wheels):
+    wheels.update(0.0, odometry([0.4] * 6, [2.0] * 5 + [NAN]))
+    wheels.update(0.1, odometry([0.4] * 6, [4.0] * 5 + [NAN]))
+    mean = wheels.take_torque()
+    assert mean[:5] == pytest.approx([3.0] * 5)
+    assert math.isnan(mean[5])
+    assert math.isnan(wheels.take_torque()[0])
+    assert wheels.state.torque[0] == pytest.approx(3.0)
+    assert wheels.torque_known(1.9)
+    assert not wheels.torque_known(2.2)
+
+
+def test_a_rate_that_is_too_old_is_unknown(wheels):
+    wheels.update(0.0, odometry([0.4] * 6, [NAN] * 6))
+    wheels.update(0.4, odometry([0.4] * 3 + [NAN] * 3, [NAN] * 6))
+    rims = wheels.rim_speeds(0.6)
+    assert not any(math.isnan(rim) for rim in rims[:3])
+    assert all(math.isnan(rim) for rim in rims[3:])
+    assert not wheels.silent(0.8)
+    assert wheels.silent(1.0)
+
+
+def test_fast_odometry_is_smoothed_and_slow_is_not(wheels):
+    for i in range(100):
+        wheels.update(0.01 * i, odometry([0.4 + (0.1 if i % 2 else -0.1)] * 6, [NAN] * 6))
+    radius = wheels.state.rim_speed[0] / 0.4
+    assert radius == pytest.approx(Parts(reader.load(SAND)).rover.slip_radius[0], rel=0.04)
+    wheels.update(1.09, odometry([0.8] * 6, [NAN] * 6))
+    assert wheels.state.rim_speed[0] == pytest.approx(
+        0.8 * Parts(reader.load(SAND)).rover.slip_radius[0]
+    )
+
+
+def test_sinkage_and_leaving_angle_are_kept_wheel_by_wheel():
+    sinkage = SinkageInput(2)
+    for value in (0.01, 0.03):
+        sinkage.update(SinkageReading(0, np.array([value, NAN])))
+    assert sinkage.take() == ((0.04, 0.0), (2, 0))
+    assert sinkage.take() == ((0.0, 0.0), (0, 0))
+    angle = LeavingAngleInput(2)
+    for i in range(30):
+        angle.update(0.1 * i, LeavingAngleReading(0, np.array([-0.2, NAN])))
+    assert angle.angles(3.0)[0] == pytest.approx(-0.2)
+    assert math.isnan(angle.angles(3.0)[1])
+    assert math.isnan(angle.angles(4.0)[0])

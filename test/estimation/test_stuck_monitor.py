@@ -1,0 +1,231 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Stuck warning on made-up courses of slip: early where it digs, silent where it does not."""
+
+import math
+
+from wheel_terra_estimator.estimation.judgement.stuck.monitor import StuckMonitor
+from wheel_terra_estimator.estimation.judgement.stuck.situation import RoverMotion, WheelMotion
+
+
+def wheel(slip, rim=0.05, known=True, torque=math.nan):
+    return WheelMotion(
+        slip=slip,
+        slip_std=0.03,
+        rim_speed=rim,
+        known=known,
+        torque_share=torque,
+        sinkage=0.02,
+        radius=0.12,
+    )
+
+
+def judge(monitor, time, speed, speed_known, wheels, **more):
+    return monitor.update(time, RoverMotion(speed, speed_known, tuple(wheels), **more))
+
+
+def course(rows, dt=0.1, monitor=None, start=0.0):
+    """Run rows of wheels; return the assessments."""
+    monitor = monitor or StuckMonitor()
+    found = []
+    for i, wheels in enumerate(rows):
+        moving = [w for w in wheels if w.known]
+        speed = sum((1.0 - w.slip) * w.rim_speed for w in moving) / max(len(moving), 1)
+        found.append(judge(monitor, start + i * dt, speed, True, wheels))
+    return found
+
+
+def first(found, dt=0.1):
+    return next((i * dt for i, a in enumerate(found) if a.stuck), None)
+
+
+def test_gradual_entrapment_is_announced_seconds_before():
+    slips = [min(0.2 + 0.02 * 0.1 * i * (1 + 0.02 * i * 0.1), 1.0) for i in range(400)]
+    when = first(course([[wheel(s)] * 6 for s in slips]))
+    entrapped = next(i for i, s in enumerate(slips) if s > 0.9) * 0.1 + 1.0
+    assert when is not None
+    assert entrapped - when >= 3.0
+
+
+def test_sudden_entrapment_is_announced_before_it_lasts_a_second():
+    slips = [0.3] * 100 + [min(0.3 + 0.15 * 0.1 * i, 1.0) for i in range(200)]
+    when = first(course([[wheel(s)] * 6 for s in slips]))
+    entrapped = next(i for i, s in enumerate(slips) if s > 0.9) * 0.1 + 1.0
+    assert when < entrapped
+
+
+def test_steep_climb_that_holds_raises_nothing():
+    slips = [min(0.1 + 0.01 * 0.1 * i, 0.6) for i in range(1500)]
+    assert first(course([[wheel(s)] * 6 for s in slips])) is None
+
+
+def test_one_spinning_wheel_raises_nothing():
+    rows = [[wheel(0.1)] * 5 + [wheel(0.95, rim=0.2)] for _ in range(600)]
+    assert first(course(rows)) is None
+
+
+def test_braking_and_locked_wheels_raise_nothing():
+    rows = [[wheel(-0.95, rim=0.005)] * 6 for _ in range(300)]
+    assert first(course(rows)) is None
+
+
+def test_spin_in_place_slip_raises_nothing_by_its_trend():
+    monitor = StuckMonitor()
+    found = [
+        judge(monitor, 0.1 * i, 0.0, True, [wheel(min(0.01 * i, 0.7))] * 6, turning=True)
+        for i in range(200)
+    ]
+    assert first(found) is None
+
+
+def test_clears_after_three_seconds_below():
+    monitor = StuckMonitor()
+    stuck = course([[wheel(0.97)] * 6] * 40, monitor=monitor)
+    assert stuck[-1].stuck
+    out = course([[wheel(0.3)] * 6] * 60, monitor=monitor, start=4.0)
+    cleared = next(i for i, a in enumerate(out) if not a.stuck) * 0.1
+    assert 3.0 <= cleared <= 3.3
+
+
+def test_two_stalled_wheels_of_four_raise_it_without_any_speed():
+    monitor = StuckMonitor()
+    rolling = [wheel(0.2, rim=1.0, torque=0.4)] * 4
+    stalled = [wheel(0.0, rim=0.0, known=False, torque=0.95)] * 2 + [
+        wheel(0.2, rim=1.5, torque=0.1)
+    ] * 2
+    found = [judge(monitor, 0.1 * i, 0.0, False, rolling) for i in range(30)]
+    assert not found[-1].stuck
+    found = [judge(monitor, 3.0 + 0.1 * i, 0.0, False, stalled) for i in range(15)]
+    assert 0.3 <= first(found) <= 0.7
+    assert found[-1].stalled == (True, True, False, False)
+    assert 'stalled' in found[-1].reason
+
+
+def test_pulling_away_from_rest_is_no_stall():
+    monitor = StuckMonitor()
+    slow, quick = ([wheel(0.1, rim=k * i, torque=0.95) for i in range(9)] for k in (0.1, 0.2))
+    rows = [[a] * 2 + [b] * 2 for a, b in zip(slow, quick, strict=True)]
+    assert not any(judge(monitor, 0.1 * i, 0.1 * i, False, w).stuck for i, w in enumerate(rows))
+
+
+def test_travel_left_shrinks_to_nothing():
+    slips = [min(0.3 + 0.03 * 0.1 * i, 0.97) for i in range(300)]
+    left = [a.wheels[0].travel for a in course([[wheel(s)] * 6 for s in slips])]
+    assert left[0] == 10.0
+    middle = left[100]
+    assert 0.0 < middle < 2.0
+    assert left[-1] == 0.0
+
+
+def test_memory_comes_back():
+    monitor = StuckMonitor()
+    course([[wheel(0.97)] * 6] * 10, monitor=monitor)
+    memory = monitor.snapshot()
+    one = course([[wheel(0.97)] * 6] * 20, monitor=monitor, start=1.0)
+    monitor.restore(memory)
+    two = course([[wheel(0.97)] * 6] * 20, monitor=monitor, start=1.0)
+    assert [a.stuck for a in one] == [a.stuck for a in two]
+
+
+def test_wheels_that_are_being_stopped_raise_nothing_by_an_early_reference():
+    monitor = StuckMonitor()
+    # The reference stands 0.9 s before the wheels do, as in a recorded stop on firm ground.
+    found = []
+    for i in range(120):
+        t = 0.1 * i
+        speed = min(max(0.7 - 0.9 * max(t - 8.0, 0.0), 0.0), 0.7)
+        rim = min(max(0.7 - 1.2 * max(t - 9.3, 0.0), 0.0), 0.7)
+        slip = 1.0 - speed / rim if rim > 0.01 else 0.0
+        rows = [wheel(slip, rim=rim, known=rim > 0.01, torque=0.1)] * 4
+        found.append(judge(monitor, t, speed, True, rows))
+    assert first(found) is None
+
+
+def test_drives_that_give_way_near_their_limit_raise_it_without_any_speed():
+    monitor = StuckMonitor()
+    cruise = [wheel(0.2, rim=1.8, torque=0.4)] * 4
+    hard = [wheel(0.2, rim=1.1, torque=0.75)] * 2 + [wheel(0.2, rim=1.75, torque=0.4)] * 2
+    steep = [wheel(0.2, rim=1.75, torque=0.75)] * 4
+    found = [judge(monitor, 0.1 * i, 0.0, False, cruise) for i in range(50)]
+    assert not found[-1].stuck
+    # Near the limit at full speed is only a steep climb.
+    found = [judge(monitor, 5.0 + 0.1 * i, 0.0, False, steep) for i in range(50)]
+    assert not found[-1].stuck
+    found = [judge(monitor, 10.0 + 0.1 * i, 0.0, False, hard) for i in range(10)]
+    assert 0.3 <= first(found) <= 0.6
+    assert 'torque limit' in found[-1].reason
+
+
+def test_without_a_speed_the_margin_of_the_soil_decides():
+    slips = [min(0.3 + 0.004 * i, 0.78) for i in range(300)]
+    answers = []
+    for margin in (0.1, 0.005):
+        monitor = StuckMonitor()
+        found = [
+            judge(monitor, 0.1 * i, 0.01, False, [wheel(s)] * 6, margin=margin)
+            for i, s in enumerate(slips)
+        ]
+        answers.append(found[-1].stuck)
+    assert answers == [False, True]
+
+
+def test_spin_in_place_raises_nothing():
+    """The rover is steered into a spin: its speed goes, its wheels turn on against each other."""
+
+    def raised(turning):
+        monitor = StuckMonitor()
+        found = []
+        for i in range(300):
+            time = 0.1 * i
+            speed = 0.05 * min(max(1.0 - (time - 10.0) / 2.0, 0.0), 1.0)
+            rims = [0.05 + (0.03 if time > 10.0 else 0.0), speed - (0.03 if time > 10.0 else 0.0)]
+            wheels = [wheel(0.4, rim=rim, torque=0.6) for rim in rims * 3]
+            found.append(judge(monitor, time, speed, True, wheels, turning=turning and time > 10))
+        return first(found)
+
+    assert raised(turning=False) is not None  # without the turning it would be a rover that bogs
+    assert raised(turning=True) is None
+
+
+def test_a_level_found_to_be_wrong_is_no_growth():
+    """After wild fixes the speed is opened to them: the jump of the slip is not a trend."""
+
+    def warned(forget):
+        monitor = StuckMonitor()
+        before = course([[wheel(0.3)] * 6] * 100, monitor=monitor)
+        if forget:
+            monitor.forget_trend()
+        after = course([[wheel(0.68)] * 6] * 60, monitor=monitor, start=10.0)
+        return first(before + after) is not None
+
+    assert warned(forget=False)
+    assert not warned(forget=True)
+
+
+def test_fixes_that_disagree_by_chance_are_no_bogging_down():
+    """Slip 0.66 +- 0.07 near the torque limit: each second another fix moves the speed."""
+    monitor = StuckMonitor()
+    found = []
+    for i in range(300):
+        # 4 mm/s between fixes is what 3 mm/s of noise make of a speed of 17 mm/s.
+        slip = 0.66 + (0.04 if i // 10 % 2 else -0.04)
+        wheels = [wheel(slip, torque=0.6)._replace(slip_std=0.07)] * 6
+        found.append(judge(monitor, 0.1 * i, 0.05 * (1.0 - slip), True, wheels))
+    assert first(found) is None
+
+
+def test_a_fast_loss_of_speed_near_the_torque_limit_is_bogging_down():
+    monitor = StuckMonitor()
+    found = []
+    for i in range(100):
+        slip = 0.3 if i < 50 else min(0.3 + 0.02 * (i - 50), 0.85)
+        wheels = [wheel(slip, rim=1.0, torque=0.6)] * 4
+        found.append(judge(monitor, 0.1 * i, 1.0 - slip, True, wheels))
+    assert 5.0 < first(found) < 6.5
+    assert 'bogging down' in next(a.reason for a in found if a.stuck)
+
+
+def test_a_slip_that_nobody_knows_is_not_digging():
+    guess = wheel(1.0)._replace(slip_std=0.4)
+    assert first(course([[guess] * 6] * 300)) is None
+    assert first(course([[wheel(1.0)] * 6] * 300)) is not None

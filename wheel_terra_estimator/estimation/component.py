@@ -1,0 +1,43 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""What all parts of the estimator have in common."""
+
+from __future__ import annotations
+
+from typing import Generic, TypeVar
+
+State = TypeVar('State')
+
+
+class Component(Generic[State]):
+    """A part of the estimator whose whole memory is one immutable value.
+
+    ``update`` replaces that value; it never changes it. So a snapshot is a reference, and no part
+    can be changed behind its back.
+
+    Parameters
+    ----------
+    start : State
+        The memory at the start of a run.
+
+    Attributes
+    ----------
+    state : State
+        The present memory, for everyone to read.
+    """
+
+    def __init__(self, start: State) -> None:
+        self._start = start
+        self.state = start
+
+    def reset(self) -> None:
+        """Go back to the start of a run."""
+        self.state = self._start
+
+    def snapshot(self) -> State:
+        """Return the present memory."""
+        return self.state
+
+    def restore(self, snapshot: State) -> None:
+        """Go back to a snapshot."""
+        self.state = snapshot

@@ -1,0 +1,211 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Torques and pulls of all wheels at the present state, with their rows of the Jacobian."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import isnan
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wheel_terra_estimator.estimation.component import Component
+from wheel_terra_estimator.estimation.contacts.wheel_models import (
+    WheelForces,
+    WheelModels,
+    WheelState,
+)
+from wheel_terra_estimator.estimation.filter.state import (
+    CENTROID,
+    MOUND,
+    SHEAR_MODULUS,
+    SHEAR_STRENGTH,
+    SPEED,
+    StateLayout,
+)
+from wheel_terra_estimator.estimation.rover import Rover
+
+FloatArray = NDArray[np.float64]
+Floats = tuple[float, ...]
+_LEAST_LOADS = 1e-3  # [N]
+_STRENGTH = 2  # column of the strength in the derivatives of `WheelForces`
+
+
+@dataclass(frozen=True)
+class LinearisationTuning:
+    """Tuned on simulated drives, seeds 1000 to 1019, where no other source is given."""
+
+    slope_keep: float = 0.9
+    """Share of the old derivatives kept in a cycle: they are means over about a second."""
+    first_speed_slope: float = 0.2
+    """Share of the first derivatives by speed after a start: the slip is known least there."""
+    new_contact: float = 0.15
+    """Change of a torque by strength, of load times radius, that is no noise of the state."""
+    least_load: float = 1e-3  # [N]: a wheel with less is in the air
+    least_rim_over_rest: float = 2.0
+    """Rim speed over ``rest_speed`` above which a wheel turns."""
+
+
+class SlopeState(NamedTuple):
+    """Smoothed derivatives of torque and pull of each wheel as in `WheelForces`; None = none."""
+
+    torque: tuple[Floats | None, ...]
+    pull: tuple[Floats | None, ...]
+
+
+class ContactForces(NamedTuple):
+    """Torque and pull of the turning wheels in the body's signs; zero for the others."""
+
+    state: FloatArray  # (size,) at which they were worked out
+    pull: FloatArray  # (n,) [N]
+    torque: FloatArray  # (n,) [N m]
+    pull_rows: FloatArray  # (n, size)
+    torque_rows: FloatArray  # (n, size)
+
+    def moved_to(self, state: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return pulls and torques at another state, to first order."""
+        moved = state - self.state
+        return self.pull + self.pull_rows @ moved, self.torque + self.torque_rows @ moved
+
+
+class Linearisation(Component[SlopeState]):
+    """Evaluates the wheel models once per cycle, with smoothed derivatives.
+
+    The curves bend within the uncertainty of the state. A slope taken at the noisy estimate is
+    correlated with its error, which pulls the slip to the flat side and lets strength and K run
+    along T(s) = const to their bounds; a smoothed one is not (docs/estimation/design.md).
+    """
+
+    def __init__(
+        self,
+        rover: Rover,
+        layout: StateLayout,
+        models: WheelModels,
+        tuning: LinearisationTuning = LinearisationTuning(),
+    ) -> None:
+        none = (None,) * rover.wheel_count
+        super().__init__(SlopeState(none, none))
+        self._rover, self._layout, self._models, self._tuning = rover, layout, models, tuning
+        self.least_load = tuning.least_load
+
+    def turning(self, rims: Floats, loads: Floats) -> tuple[bool, ...]:
+        """Say for which wheels the contact models hold: they turn under a load."""
+        tuning = self._tuning
+        least = tuning.least_rim_over_rest * self._rover.rest_speed
+        return tuple(
+            abs(rim) >= least and load >= tuning.least_load
+            for rim, load in zip(rims, loads, strict=True)
+        )
+
+    def update(
+        self,
+        x: FloatArray,
+        *,
+        turns: tuple[bool, ...],
+        yaw_rate: float,
+        rims: Floats,
+        loads: Floats,
+        leaving_angles: Floats,
+    ) -> ContactForces:
+        """Work out the forces of the wheels that turn at a state `x` (size,).
+
+        Parameters
+        ----------
+        x : numpy.ndarray
+            (size,) state.
+        turns : tuple of bool
+            Wheels for which the models hold, see `turning`.
+        yaw_rate : float
+            [rad/s].
+        rims, loads, leaving_angles : tuple of float
+            Of each wheel [m/s], [N], [rad]; nan = unknown.
+        """
+        rover, layout = self._rover, self._layout
+        pull, torque = np.zeros((2, rover.wheel_count))
+        rows = np.zeros((2, rover.wheel_count, layout.size))
+        torque_slopes, pull_slopes = list(self.state.torque), list(self.state.pull)
+        speed, strength = float(x[SPEED]), x[SHEAR_STRENGTH]
+        modulus, centroid = float(x[SHEAR_MODULUS]), float(x[CENTROID])
+        mound = float(x[MOUND])
+        for i in range(rover.wheel_count):
+            if not turns[i]:
+                continue
+            rim = abs(rims[i])
+            direction = 1.0 if rims[i] > 0.0 else -1.0
+            forces = self._models.forces(
+                i,
+                WheelState(
+                    direction * (speed - yaw_rate * rover.lateral[i]) / rim,
+                    float(x[layout.sinkage.start + i]),
+                    loads[i],
+                    float(strength + x[layout.shear_error.start + i]),
+                    modulus,
+                    centroid,
+                    mound,
+                    rim,
+                    leaving_angles[i],
+                ),
+            )
+            pull[i], torque[i] = direction * forces.pull, direction * forces.torque
+            moment = loads[i] * rover.shear_radius[i]
+            torque_slopes[i], pull_slopes[i] = by_torque, by_pull = self.smoothed(
+                torque_slopes[i], pull_slopes[i], forces, moment
+            )
+            self._fill(rows[0, i], i, by_pull, direction, rim)
+            self._fill(rows[1, i], i, by_torque, direction, rim)
+        self.state = SlopeState(tuple(torque_slopes), tuple(pull_slopes))
+        return ContactForces(x.copy(), pull, torque, rows[0], rows[1])
+
+    def smoothed(
+        self,
+        old_torque: Floats | None,
+        old_pull: Floats | None,
+        forces: WheelForces,
+        moment: float,
+    ) -> tuple[Floats, Floats]:
+        """Return the smoothed derivatives of torque and pull; `moment`: load times radius [N m]."""
+        tuning = self._tuning
+        if old_torque is None or old_pull is None:
+            flat = tuning.first_speed_slope
+            return (
+                (flat * forces.d_torque[0], *forces.d_torque[1:]),
+                (flat * forces.d_pull[0], *forces.d_pull[1:]),
+            )
+        torque = smoothed_slopes(old_torque, forces.d_torque, tuning.slope_keep)
+        pull = smoothed_slopes(old_pull, forces.d_pull, tuning.slope_keep)
+        change = abs(forces.d_torque[_STRENGTH] - old_torque[_STRENGTH])
+        if change > tuning.new_contact * moment:
+            # A wheel that comes free or locks is another contact at once.
+            return (torque[0], *forces.d_torque[1:]), (pull[0], *forces.d_pull[1:])
+        return torque, pull
+
+    def _fill(
+        self, row: FloatArray, wheel: int, slopes: Floats, direction: float, rim: float
+    ) -> None:
+        """Write the derivatives of a wheel's force into its row of the Jacobian."""
+        layout = self._layout
+        by_ratio, by_sinkage, by_strength, by_modulus, by_centroid, by_mound = slopes
+        # The ratio is that of the direction of rolling: the two signs cancel.
+        row[SPEED] = by_ratio / rim
+        row[layout.sinkage.start + wheel] = direction * by_sinkage
+        row[SHEAR_STRENGTH] = row[layout.shear_error.start + wheel] = direction * by_strength
+        row[SHEAR_MODULUS] = direction * by_modulus
+        row[CENTROID] = direction * by_centroid
+        row[MOUND] = direction * by_mound
+
+
+def smoothed_slopes(old: Floats | None, new: Floats, keep: float) -> Floats:
+    """Return derivatives of which the share `keep` is that of the cycle before."""
+    if old is None:
+        return new
+    return tuple(keep * a + (1.0 - keep) * b for a, b in zip(old, new, strict=True))
+
+
+def traction_slope(forces: ContactForces, rims: Floats, loads: Floats) -> float:
+    """Return the slope of the traction curve: pull over load lost per v / rim speed [-]."""
+    total = sum(
+        float(forces.pull_rows[i, SPEED]) * abs(rim) for i, rim in enumerate(rims) if not isnan(rim)
+    )
+    return -total / max(sum(loads), _LEAST_LOADS)

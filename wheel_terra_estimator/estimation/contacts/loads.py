@@ -1,0 +1,63 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""What each wheel carries, from the specific force of the last cycle."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from wheel_terra_estimator.estimation.component import Component
+from wheel_terra_estimator.estimation.inputs.inertial import InertialWindow
+from wheel_terra_estimator.estimation.rover import Rover
+
+Floats = tuple[float, ...]
+_LEAST_FORCE = 0.1  # specific force on z [m/s^2] below which a slope is not defined
+_LEAST_TOTAL = 1e-9  # of the loads [N]
+
+
+class LoadState(NamedTuple):
+    """Loads of the last cycle."""
+
+    load: Floats  # [N]
+    force: tuple[float, float, float]  # mean specific force [m/s^2]
+    force_known: bool = False
+
+    @property
+    def slope_share(self) -> float:
+        """What the ground asks of each wheel along the body, as a share of its load [-]."""
+        return self.force[0] / max(self.force[2], _LEAST_FORCE)
+
+
+class WheelLoads(Component[LoadState]):
+    """Normal load of each wheel."""
+
+    def __init__(self, rover: Rover) -> None:
+        level = (0.0, 0.0, rover.gravity)
+        super().__init__(LoadState(tuple(rover.load.loads(level).tolist()), level))
+        self._rover = rover
+
+    def update(
+        self, window: InertialWindow, pulls: Floats, torques: Floats, unloaded: tuple[bool, ...]
+    ) -> LoadState:
+        """Work out the loads of a cycle; they are held where no IMU reading came.
+
+        Parameters
+        ----------
+        window : InertialWindow
+            IMU readings of the cycle.
+        pulls, torques : tuple of float
+            Of each wheel after the last cycle [N], [N m].
+        unloaded : tuple of bool
+            Wheels that carry nothing: their load goes to the others.
+        """
+        if window.readings:
+            force = window.mean_force()
+            rover = self._rover
+            moment = [t - f * r for t, f, r in zip(torques, pulls, rover.rim_radius, strict=True)]
+            loads = rover.load.loads(force, pulls, moment).tolist()
+            if any(unloaded):
+                total = sum(loads)
+                loads = [0.0 if off else w for w, off in zip(loads, unloaded, strict=True)]
+                loads = [w * total / max(sum(loads), _LEAST_TOTAL) for w in loads]
+            self.state = LoadState(tuple(loads), force, force_known=True)
+        return self.state

@@ -1,0 +1,128 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Pull of wheels that stand while the rover moves or pulls: locked, jammed or held."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import isnan
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wheel_terra_estimator.estimation.contacts.wheel_models import WheelModels, WheelState
+from wheel_terra_estimator.estimation.filter.state import (
+    CENTROID,
+    SHEAR_MODULUS,
+    SHEAR_STRENGTH,
+    SPEED,
+    StateLayout,
+)
+from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
+from wheel_terra_estimator.estimation.scalars import NAN, clipped
+
+FloatArray = NDArray[np.float64]
+_STRENGTH = 2  # column of the strength in the derivatives of `WheelForces`
+
+
+@dataclass(frozen=True)
+class StationaryTuning:
+    """Tuned on simulated drives with locked wheels, seeds 1000 to 1019, unless said otherwise."""
+
+    sliding_ratio: float = 3.0
+    """v/(r w) taken for a locked wheel: its shear is saturated long before [-]."""
+    most_drag: float = 1.2  # of the load: friction and the soil pushed ahead
+    straight: float = 0.1
+    """Lateral motion above which a torque against the drag is no sign of a jammed drive [-]."""
+    dragged_doubt: float = 0.1
+    """Standard deviation of a dragged wheel's pull over its load, beside gain and turning."""
+    idle_doubt: float = 0.3
+    """The same of a wheel that stands, is lifted or unknown: it may carry its share of the slope,
+    or nothing."""
+
+
+class StationaryPull(NamedTuple):
+    """Pull of a wheel that does not turn under a load."""
+
+    pull: float  # [N], nan where no torque tells
+    expected: float  # the pull, or what the wheel's share of the slope asks [N]
+    std: float  # [N]
+
+
+class StationaryWheels:
+    """Pulls of wheels for which the models of a turning wheel do not hold."""
+
+    def __init__(
+        self,
+        rover: Rover,
+        sensors: SensorFigures,
+        layout: StateLayout,
+        models: WheelModels,
+        tuning: StationaryTuning = StationaryTuning(),
+    ) -> None:
+        self._rover, self._layout, self._models, self._tuning = rover, layout, models, tuning
+        self._gain_std = sensors.torque_gain_std
+
+    def pull(
+        self,
+        wheel: int,
+        x: FloatArray,
+        torque: float,
+        load: float,
+        *,
+        yaw_rate: float,
+        lateral_motion: float,
+    ) -> float:
+        """Return the pull of a wheel that stands, from its torque [N]; nan without a torque.
+
+        A locked wheel slides: its shear is saturated, and torque gives the pull whatever the
+        strength of the soil. Where its hub stands too, torque and pull balance about the hub. A
+        torque that drives a wheel which is dragged is not the soil's: its drive is jammed.
+
+        Parameters
+        ----------
+        wheel : int
+            Index.
+        x : numpy.ndarray
+            (size,) state.
+        torque, load : float
+            [N m], [N].
+        yaw_rate, lateral_motion : float
+            Turning of the rover [rad/s], [-].
+        """
+        if isnan(torque):
+            return NAN
+        rover, tuning = self._rover, self._tuning
+        speed = float(x[SPEED]) - yaw_rate * rover.lateral[wheel]
+        if abs(speed) < rover.rest_speed:
+            return clipped(torque / rover.shear_radius[wheel], -load, load)
+        direction = 1.0 if speed > 0.0 else -1.0
+        forces = self._models.forces(
+            wheel,
+            WheelState(
+                tuning.sliding_ratio,
+                float(x[self._layout.sinkage.start + wheel]),
+                load,
+                float(x[SHEAR_STRENGTH]),
+                float(x[SHEAR_MODULUS]),
+                float(x[CENTROID]),
+            ),
+        )
+        pull = forces.pull
+        jammed = direction * torque > 0.0 and lateral_motion < tuning.straight
+        if forces.d_torque[_STRENGTH] and not jammed:
+            gain = forces.d_pull[_STRENGTH] / forces.d_torque[_STRENGTH]
+            pull += gain * (direction * torque - forces.torque)
+        return direction * clipped(pull, -tuning.most_drag * load, load)
+
+    def expectation(
+        self, pull: float, load: float, slope_share: float, lateral_motion: float
+    ) -> StationaryPull:
+        """Return what to expect of a wheel that gives `pull` [N], nan = unknown."""
+        tuning = self._tuning
+        if isnan(pull):
+            return StationaryPull(pull, load * slope_share, tuning.idle_doubt * load)
+        # In turns it is pushed sideways, too.
+        doubt = tuning.dragged_doubt + self._gain_std + min(lateral_motion, 1.0)
+        return StationaryPull(pull, pull, doubt * load)

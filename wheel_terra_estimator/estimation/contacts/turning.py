@@ -1,0 +1,138 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""How the rover turns, and how the ground curves along its path."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from wheel_terra_estimator.estimation.component import Component
+from wheel_terra_estimator.estimation.inputs.inertial import InertialWindow
+from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
+from wheel_terra_estimator.estimation.scalars import clipped, gain_of
+
+
+@dataclass(frozen=True)
+class TurningTuning:
+    """Tuned on simulated drives, seeds 1000 to 1019, where no other source is given."""
+
+    least_gain: float = 0.25
+    """Of the yaw rate per cycle while it is steady; what is more than noise is followed."""
+    least_noise: float = 1e-6  # of the yaw rate [rad/s]
+    side_time: float = 1.0
+    """Time over which the lateral motion must change to count as new [s]."""
+    side_dead_band: float = 0.05  # of the lateral motion [-]
+    speed_change: float = 1.5
+    """Change of the body's speed over the rim speed for each change of the lateral motion."""
+    least_curvature_length: float = 0.1  # [m], for rovers with one axle
+    least_travel_share: float = 0.1
+    """Travel, as a share of the curvature length, below which no curvature is known."""
+    steepest: float = 0.3  # curvature of the ground [rad/m]
+    common_curvature: float = 0.1
+    """Curvature of common ground [rad/m], against which the gyro's zero is weighed."""
+    least_speed: float = 1e-4  # [m/s]
+    least_yaw_noise_share: float = 0.4
+    """Of the gyro's noise that the smoothing leaves: sqrt(g / (2 - g)) for the least gain."""
+    scrub: float = 10.0
+    """Variance of a shear model, over its square, at full lateral motion: ten cycles of it are one
+    piece of information."""
+
+
+class TurningState(NamedTuple):
+    """Turning of the rover, curvature of its path."""
+
+    yaw_rate: float = 0.0  # smoothed [rad/s]
+    lateral_motion: float = 0.0
+    """Lateral motion of the outer wheels over the fastest rim speed, 0 to 1 [-]."""
+    lateral_motion_mean: float = 0.0  # over the last second
+    transient: float = 0.0
+    """How far the turning has changed while the contacts form anew [-]."""
+    rotation: float = 0.0  # nose-up, over the last curvature length [rad]
+    travel: float = 0.0  # and the travel that it took [m]
+    speed_change: float = 0.0
+    """Change of the body's speed that the last change of the turning may bring [m/s]."""
+
+
+class Turning(Component[TurningState]):
+    """Follows yaw rate, lateral motion and the curvature of the ground."""
+
+    def __init__(
+        self, rover: Rover, sensors: SensorFigures, tuning: TurningTuning = TurningTuning()
+    ) -> None:
+        super().__init__(TurningState())
+        self._rover, self._sensors, self._tuning = rover, sensors, tuning
+        per_cycle = max(sensors.imu_rate * rover.period, 1.0)
+        noise = sensors.angular_rate_std / math.sqrt(per_cycle)
+        self.yaw_rate_std = math.hypot(
+            tuning.least_yaw_noise_share * noise, sensors.angular_rate_bias_std
+        )
+
+    def update(
+        self, window: InertialWindow, dt: float, speed: float, fastest_rim: float
+    ) -> TurningState:
+        """Take the IMU readings of a cycle of length `dt` [s]; speeds in [m/s]."""
+        state, tuning = self.state, self._tuning
+        if not window.readings:
+            self.state = state = state._replace(speed_change=0.0)
+            return state
+        yaw_rate = self._yaw_rate(window)
+        # Nose-up rotation over travel, both forgotten over the length of the rover.
+        length = max(self._rover.curvature_length, tuning.least_curvature_length)
+        travel = speed * dt
+        keep = math.exp(-abs(travel) / length)
+        state = state._replace(
+            yaw_rate=yaw_rate,
+            rotation=keep * state.rotation - window.pitch_rate / window.readings * dt,
+            travel=keep * state.travel + travel,
+            speed_change=0.0,
+        )
+        if fastest_rim > self._rover.low_rim:
+            state = self._with_lateral_motion(state, dt, fastest_rim)
+        self.state = state
+        return state
+
+    def curvature(self, speed: float) -> float:
+        """Return slope gained per travel [rad/m]: front wheels may climb steeper ground."""
+        state, tuning = self.state, self._tuning
+        if abs(state.travel) < tuning.least_travel_share * self._rover.curvature_length:
+            return 0.0
+        curvature = clipped(state.rotation / state.travel, -tuning.steepest, tuning.steepest)
+        # What the gyro's zero makes of it, against the curvature of common ground.
+        doubt = self._sensors.angular_rate_bias_std / max(abs(speed), tuning.least_speed)
+        return curvature / (1.0 + (doubt / tuning.common_curvature) ** 2)
+
+    def scrub_variance(self, rim_speed: float) -> float:
+        """Return the variance of a wheel's shear model, over its square, from turning [-].
+
+        Turning shears the soil sideways too, which the model does not know.
+        """
+        side = abs(self.state.yaw_rate) * self._rover.curvature_length / abs(rim_speed)
+        return self._tuning.scrub * min(side + self.state.transient, 1.0) ** 2
+
+    def _yaw_rate(self, window: InertialWindow) -> float:
+        """Return the yaw rate: smoothed where its change may be noise, followed where not."""
+        tuning, old = self._tuning, self.state.yaw_rate
+        now = window.yaw_rate / window.readings
+        noise = max(self._sensors.angular_rate_std / math.sqrt(window.readings), tuning.least_noise)
+        gain = clipped(tuning.least_gain * abs(now - old) / noise, tuning.least_gain, 1.0)
+        return old + gain * (now - old)
+
+    def _with_lateral_motion(self, state: TurningState, dt: float, fastest: float) -> TurningState:
+        """Return the state with the lateral motion, and where turning begins or ends."""
+        tuning, rover = self._tuning, self._rover
+        side = min(abs(state.yaw_rate) * rover.curvature_length / fastest, 1.0)
+        mean = state.lateral_motion_mean
+        mean += gain_of(dt, tuning.side_time) * (side - mean)
+        change = abs(side - mean) - tuning.side_dead_band
+        transient, speed_change = state.transient, 0.0
+        if change > 0.0:
+            speed_change = tuning.speed_change * change * fastest
+            transient = max(transient, change)
+        return state._replace(
+            lateral_motion=side,
+            lateral_motion_mean=mean,
+            transient=transient * math.exp(-fastest * dt / rover.contact_length),
+            speed_change=speed_change,
+        )

@@ -1,0 +1,97 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Wheels that carry nothing: found by their torque against that of the others."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import isnan
+from typing import NamedTuple
+
+from wheel_terra_estimator.estimation.component import Component
+from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
+from wheel_terra_estimator.estimation.scalars import NAN, median
+
+Floats = tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class UnloadedTuning:
+    """Tuned on simulated drives with lifted wheels, seeds 1000 to 1019."""
+
+    hold: float = 0.3  # [s] before a wheel is called unloaded, or loaded again
+    free_share: float = 0.2  # of the typical torque: a wheel with less carries nothing
+    loaded_share: float = 0.4  # with more it carries its load again
+    least_rim_share: float = 0.95  # of the typical rim speed: a slower one is held
+    telling_torque: float = 5.0
+    """Typical torque over noise and zero of the sensors above which torques can be compared."""
+    most_lateral_motion: float = 0.1  # turns part the torques as well [-]
+
+
+class UnloadedState(NamedTuple):
+    """Which wheels carry nothing; since when each seems to be otherwise [s], nan = it does not."""
+
+    unloaded: tuple[bool, ...]
+    since: Floats
+
+
+class UnloadedWheels(Component[UnloadedState]):
+    """Finds wheels without load."""
+
+    def __init__(
+        self, rover: Rover, sensors: SensorFigures, tuning: UnloadedTuning = UnloadedTuning()
+    ) -> None:
+        n = rover.wheel_count
+        super().__init__(UnloadedState((False,) * n, (NAN,) * n))
+        self._noise = sensors.torque_std + sensors.torque_zero_std
+        self._tuning = tuning
+
+    def update(
+        self,
+        time: float,
+        rolling: Sequence[int],
+        torque: Floats,
+        rim_speed: Floats,
+        lateral_motion: float,
+    ) -> UnloadedState:
+        """Judge the wheels at a time [s].
+
+        Parameters
+        ----------
+        time : float
+            [s].
+        rolling : sequence of int
+            Wheels that turn and whose torque was read.
+        torque, rim_speed : tuple of float
+            Of all wheels [N m], [m/s]; nan = unknown.
+        lateral_motion : float
+            Of the outer wheels over the fastest rim speed [-].
+        """
+        state, tuning = self.state, self._tuning
+        if len(rolling) < 2:
+            # One wheel cannot be compared with another.
+            if not all(isnan(value) for value in torque):
+                self.state = state._replace(unloaded=(False,) * len(torque))
+            return self.state
+        typical = median([torque[i] for i in rolling])
+        middle_rim = median([rim_speed[i] for i in rolling])
+        telling = abs(typical) > tuning.telling_torque * self._noise
+        telling = telling and lateral_motion < tuning.most_lateral_motion
+        unloaded, since = list(state.unloaded), list(state.since)
+        for i in rolling:
+            share = torque[i] / typical if telling else 1.0
+            if unloaded[i]:
+                free = not telling or share < tuning.loaded_share
+            else:
+                free = telling and abs(share) < tuning.free_share
+                free = free and middle_rim != 0.0
+                free = free and rim_speed[i] / middle_rim > tuning.least_rim_share
+            if free == unloaded[i]:
+                since[i] = NAN
+            elif isnan(since[i]):
+                since[i] = time
+            elif time - since[i] > tuning.hold:
+                unloaded[i], since[i] = free, NAN
+        self.state = UnloadedState(tuple(unloaded), tuple(since))
+        return self.state

@@ -1,0 +1,228 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Wheel-soil models as the filter uses them, in scalar floats, seen in the direction of rolling.
+
+* Torque and pull: ``terramechanics.conditioned``. With the sinkage measured, the load balance fixes
+  the stresses; slip, load and shear strength are enough, and no bearing parameter enters. It holds
+  in soil of unknown stiffness and while the wheel is still sinking.
+* Sinkage: the bearing law says which load the soil would carry at the present sinkage; where that
+  is less than the wheel's load, it sinks on.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import MISSING, dataclass, fields
+from typing import NamedTuple
+
+from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.terramechanics.conditioned import SMALLEST_ANGLE, ConditionedForces
+from wheel_terra_estimator.terramechanics.contact import Contact
+from wheel_terra_estimator.terramechanics.kinematics import slip_of_speed_ratio
+from wheel_terra_estimator.terramechanics.maths import ScalarMaths
+from wheel_terra_estimator.terramechanics.stresses import bearing_law
+from wheel_terra_estimator.terramechanics.terms import Terms, set_angles
+
+# Effects of a table or of an instrument that the filter must not apply: loads are terrain-normal
+# already, and the pull comes from specific force, not from an attitude.
+_NOT_IN_FILTER = frozenset({'slope_gravity', 'pitch_bias', 'pull_zero', 'pull_gain'})
+_CONTACT_INPUTS = tuple(f.name for f in fields(Contact) if f.default is MISSING)
+_LEAST_BEARING = 0.05  # of the normal stress's part: cohesion alone carries no wheel
+_MOST_RATIO = 3.0
+"""v/(r w) beyond which the shear is saturated: more changes nothing [-]."""
+_LEAST_SINKAGE = 1e-4  # [m]
+_MOST_SINKAGE = 0.95  # of the radius: the bearing law ends at the hub
+_LEAST_DEPTH = 1e-6  # at the angle of greatest stress [m]
+_LEAST_MODULUS = 1.0  # bearing modulus [N/m^(n+2)]
+_MOUND_ONSET = 0.4  # slip at which soil begins to pile up behind a wheel
+
+
+class WheelState(NamedTuple):
+    """State of one turning wheel as the models take it, seen in the direction of rolling."""
+
+    speed_ratio: float  # v/(r w) [-]
+    sinkage: float  # [m]
+    load: float  # [N]
+    strength: float  # ln of the factor on c and tan(phi)
+    shear_modulus: float  # ln of the factor on K
+    centroid: float = 0.0
+    """Shift of the stress centroid over the entrance angle, at all slips [-]."""
+    mound: float = 0.0
+    """The same for each (s - onset)+^2 / (1 - onset)^2, to the rear [-]."""
+    rim_speed: float = math.nan  # |r w| [m/s], nan = not known
+    leaving_angle: float = math.nan  # measured [rad], nan = not measured
+    stiffness: float = 0.0  # ln of the factor on the bearing modulus
+    slip_sinkage: float = 0.0  # added to n1
+
+
+class WheelForces(NamedTuple):
+    """Torque and pull of one wheel with their derivatives by the filter's quantities."""
+
+    torque: float  # [N m]
+    pull: float  # [N]
+    d_torque: tuple[float, float, float, float, float, float]
+    d_pull: tuple[float, float, float, float, float, float]
+    """By v/(r w), sinkage, ln shear strength, ln K, centroid, mound."""
+
+
+@dataclass(frozen=True)
+class Bearing:
+    """What the bearing law says at a sinkage."""
+
+    load: float  # that it carries [N]
+    exponent: float  # N
+    log_depth: float  # ln of the depth at the peak stress over the reference depth
+
+
+class WheelModels:
+    """Contact models of all wheels of a rover.
+
+    Parameters
+    ----------
+    configuration : Configuration
+        Soil, wheels, effects.
+    """
+
+    def __init__(self, configuration: Configuration) -> None:
+        soil, wheels = configuration.soil, configuration.wheels
+        effects = {k: v for k, v in configuration.effects.items() if k not in _NOT_IN_FILTER}
+        gravity = float(configuration.rover.gravity)
+        self._forces = ConditionedForces(
+            wheels.wheel, soil, effects, configuration.slip_radius, gravity
+        )
+        self._terms = Terms(effects)
+        self._cohesion = float(soil.cohesion)
+        self._tan_friction = math.tan(float(soil.friction_angle))
+        self._shear_modulus = float(soil.shear_modulus)
+        self._exponent = float(soil.sinkage_exponent)
+        self._peak_ratio = float(soil.peak_stress_ratio)
+        self._leaving_ratio = float(soil.leaving_angle_ratio)
+        self._passes = [float(p) for p in wheels.passes]
+        self._slip_radius = [float(r) for r in wheels.slip_radius]
+        self._radius = [float(r) for r in wheels.radius]
+        self._modulus = []
+        self._contacts = []
+        for i in range(wheels.count):
+            width = float(wheels.width[i])
+            modulus, depth = bearing_law(
+                soil.pressure_law,
+                float(soil.cohesive_modulus),
+                float(soil.frictional_modulus),
+                width,
+                self._cohesion,
+                float(soil.density) * gravity,
+            )
+            contact = Contact(**dict.fromkeys(_CONTACT_INPUTS, 0.0))
+            contact.gravity = gravity
+            contact.radius = contact.rim_radius = float(wheels.radius[i])
+            contact.width = width
+            contact.lug_height = float(wheels.lug_height[i])
+            contact.lug_count = float(wheels.lug_count[i])
+            contact.density = float(soil.density)
+            contact.reference_depth = depth
+            contact.pass_number = self._passes[i]
+            contact.direction = 1.0
+            self._contacts.append(contact)
+            self._modulus.append(max(modulus, _LEAST_MODULUS))
+
+    def forces(self, wheel: int, state: WheelState) -> WheelForces:
+        """Return torque and pull of a wheel with their derivatives.
+
+        Parameters
+        ----------
+        wheel : int
+            Index.
+        state : WheelState
+            Its state; stiffness and slip-sinkage have no part in it.
+        """
+        ratio, sinkage, load, strength, modulus, centroid, mound, rim_speed, leaving_angle = state[
+            :9
+        ]
+        factor = math.exp(strength)
+        cohesion, friction = self._cohesion * factor, self._tan_friction * factor
+        shear_modulus = self._shear_modulus * math.exp(modulus)
+        span = 1.0 - _MOUND_ONSET
+        high = max(span - ratio, 0.0) / span
+        depth = min(max(sinkage, _LEAST_SINKAGE), self._radius[wheel])
+        angle = math.acos(1.0 - depth / self._radius[wheel])
+        shift = centroid - mound * high * high
+        by_depth = shift / (self._radius[wheel] * math.sin(angle)) if depth == sinkage else 0.0
+        torque, pull, d_torque, d_pull, _ = self._forces.forces(
+            wheel,
+            min(max(ratio, 0.0), _MOST_RATIO),
+            sinkage,
+            load,
+            cohesion,
+            friction,
+            shear_modulus,
+            shift * angle,
+            leaving_angle=leaving_angle,
+            rim_speed=rim_speed,
+            pass_number=self._passes[wheel],
+        )
+        by_ratio = 2.0 * mound * high / span * angle
+        t, f = (
+            (
+                d[0] + d[6] * by_ratio,
+                d[1] + d[6] * by_depth,
+                d[3] * cohesion + d[4] * friction,
+                d[5] * shear_modulus,
+                d[6] * angle,
+                -d[6] * angle * high * high,
+            )
+            for d in (d_torque, d_pull)
+        )
+        return WheelForces(torque, pull, t, f)
+
+    def bearing(self, wheel: int, state: WheelState) -> Bearing:
+        """Return the load that the bearing law carries at the sinkage of a wheel.
+
+        Parameters
+        ----------
+        wheel : int
+            Index.
+        state : WheelState
+            Its state; centroid, mound and rim speed have no part in it.
+        """
+        ratio, sinkage, load = state.speed_ratio, state.sinkage, state.load
+        c, m = self._contacts[wheel], ScalarMaths
+        factor = math.exp(state.strength)
+        slip = slip_of_speed_ratio(ratio, m)
+        c.slip, c.velocity_ratio = (
+            slip,
+            min(max(ratio, 0.0), _MOST_RATIO) * self._slip_radius[wheel],
+        )
+        c.normal_load = c.stated_load = load
+        c.rim_speed = math.nan
+        c.radius = c.shear_radius = c.rim_radius
+        c.bearing_modulus = self._modulus[wheel] * math.exp(state.stiffness)
+        c.sinkage_exponent = self._exponent + state.slip_sinkage * abs(slip)
+        c.cohesion, c.tan_friction = self._cohesion * factor, self._tan_friction * factor
+        c.shear_modulus = self._shear_modulus * math.exp(state.shear_modulus)
+        c.peak_ratio, c.leaving_ratio = self._peak_ratio, self._leaving_ratio
+        stages = self._terms.stages
+        for term, values in stages['on_inputs']:
+            term(c, values, m)
+        c.sinkage = c.drawbar_pull = c.torque = c.entrance_angle = 0.0
+        for term, values in stages['on_outputs']:
+            term(c, values, m)
+        depth = min(max(sinkage - c.sinkage, 0.0), _MOST_SINKAGE * c.radius)
+        entrance = max(math.acos(1.0 - depth / c.radius), 10.0 * SMALLEST_ANGLE)
+        set_angles(c, entrance, state.leaving_angle, self._terms, m)
+        t1, tm, t2 = c.entrance_angle, c.peak_angle, c.leaving_angle
+        cos_1, cos_m, cos_2 = math.cos(t1), math.cos(tm), math.cos(t2)
+        sin_1, sin_m, sin_2 = math.sin(t1), math.sin(tm), math.sin(t2)
+        a = (cos_m - cos_2) / (tm - t2) + (cos_m - cos_1) / (t1 - tm)
+        b = (sin_m - sin_2) / (tm - t2) + (sin_m - sin_1) / (t1 - tm)
+        peak_depth = max(c.radius * (cos_m - cos_1), _LEAST_DEPTH)
+        log_depth = math.log(peak_depth / c.reference_depth)
+        c.angle = tm
+        c.normal_stress = c.bearing_modulus * math.exp(c.sinkage_exponent * log_depth)
+        for term, values in stages['on_normal_stress']:
+            term(c, values, m)
+        shear = (c.shear_radius * (t1 - tm) - c.velocity_ratio * (sin_1 - sin_m)) / c.shear_modulus
+        mobilised = math.copysign(-math.expm1(-abs(shear)), shear)
+        tau = mobilised * (c.cohesion + c.normal_stress * c.tan_friction)
+        normal = c.width * c.radius * a * c.normal_stress
+        carried = normal + c.width * c.shear_radius * b * tau
+        return Bearing(max(carried, _LEAST_BEARING * normal), c.sinkage_exponent, log_depth)

@@ -1,0 +1,22 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Whether a channel's innovations are as large as the filter foresees."""
+
+from __future__ import annotations
+
+_KEEP, _GAIN = 0.95, 0.05  # of the mean per reading: it goes over the last 20
+_LARGEST = 100.0  # NIS that enters the mean: one outlier does not fill it
+CONSISTENT = 1.0
+"""Normalised innovation squared (NIS) of a scalar reading, on average, in a filter that is right
+(Bar-Shalom, Li and Kirubarajan 2001, section 5.4)."""
+
+
+def smoothed_nis(mean: float | None, nis: float) -> float:
+    """Return the running mean of the NIS of a channel; None = nothing was read before."""
+    old = CONSISTENT if mean is None else mean
+    return _KEEP * old + _GAIN * min(nis, _LARGEST)
+
+
+def distrusted(variance: float, mean_nis: float) -> float:
+    """Return the variance of a channel whose innovations keep being larger than foreseen."""
+    return variance * max(mean_nis, CONSISTENT) ** 2

@@ -1,0 +1,179 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""filterpy's extended Kalman filter with gates, kept symmetric, positive and finite.
+
+filterpy does the algebra (covariance in Joseph form); innovation, its covariance and the gate are
+our own, before each update, so that a bad reading never touches the state. ``h`` and ``H`` come
+from one pass over the models and are handed in as they are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from filterpy.kalman import ExtendedKalmanFilter
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+_LEAST_VARIANCE = 1e-30  # of an innovation, in its own unit squared
+_LEAST_SHARE = 1e-9  # of the reading's own variance in that of its innovation
+_LEAST_DIAGONAL = 1e-14  # of the covariance
+
+
+class Row(NamedTuple):
+    """One scalar measurement, linearised: z - h(x), dh/dx (n,), variance of z."""
+
+    residual: float
+    jacobian: FloatArray
+    variance: float
+
+
+class FilterMemory(NamedTuple):
+    """What `GatedFilter.restore` needs."""
+
+    mean: FloatArray
+    covariance: FloatArray
+    restarts: int
+
+
+class _KnownPrediction(ExtendedKalmanFilter):
+    """filterpy's filter with a nonlinear prediction of the mean, worked out by the caller."""
+
+    predicted: FloatArray
+
+    def predict_x(self, u: float = 0) -> None:
+        """Take the predicted mean."""
+        self.x = self.predicted
+
+
+class GatedFilter:
+    """State, covariance, gates and counters.
+
+    Parameters
+    ----------
+    mean, covariance : numpy.ndarray
+        (n,) and (n, n) start.
+    lower, upper : numpy.ndarray
+        (n,) physical bounds of the state, enforced after each update.
+    """
+
+    def __init__(
+        self, mean: FloatArray, covariance: FloatArray, lower: FloatArray, upper: FloatArray
+    ) -> None:
+        size = len(mean)
+        self._ekf = _KnownPrediction(dim_x=size, dim_z=1)
+        self._ekf.x = mean.copy()
+        self._ekf.P = covariance.copy()
+        self._start = FilterMemory(mean.copy(), covariance.copy(), 0)
+        self._lower, self._upper = lower, upper
+        self.restarts = 0
+
+    def reset(self) -> None:
+        """Go back to the start; restarts count from 0."""
+        self.restore(self._start)
+
+    @property
+    def mean(self) -> FloatArray:
+        """(n,) state."""
+        return self._ekf.x
+
+    @property
+    def covariance(self) -> FloatArray:
+        """(n, n) covariance."""
+        return self._ekf.P
+
+    def predict(self, mean: FloatArray, transition: FloatArray, noise: FloatArray) -> None:
+        """Go to a predicted mean with transition matrix F and process noise Q."""
+        self._ekf.predicted = mean
+        self._ekf.F = transition
+        self._ekf.Q = noise
+        self._ekf.predict()
+        self._keep_sound()
+
+    def innovation_variance(self, H: FloatArray, noise: FloatArray) -> FloatArray:
+        """Return the (m,) diagonal of H P H^T + R."""
+        return ((H @ self._ekf.P) * H).sum(axis=1) + noise
+
+    def update(
+        self,
+        residual: FloatArray,
+        H: FloatArray,
+        noise: FloatArray,
+        considered: Sequence[int] = (),
+    ) -> None:
+        """Fuse m readings: residual z - h(x) (m,), H (m, n), variances (m,).
+
+        Entries that are `considered` (Schmidt) keep mean and variance: their uncertainty counts,
+        but these readings must not teach them.
+        """
+        ekf = self._ekf
+        before, P = ekf.x, ekf.P
+        # In units of its own deviation each innovation has variance 1: whatever the readings, the
+        # inverse of their covariance exists. A share below the floor is lost in rounding.
+        scale = 1.0 / np.sqrt(np.maximum(self.innovation_variance(H, noise), _LEAST_VARIANCE))
+        residual, H = residual * scale, H * scale[:, None]
+        R = np.diag(np.maximum(noise * scale * scale, _LEAST_SHARE))
+        ekf.update(residual, lambda _: H, lambda _: 0.0, R=R)
+        if considered:
+            gain = ekf.K
+            gain[list(considered)] = 0.0
+            rest = np.eye(len(before)) - gain @ H
+            ekf.x = before + gain @ residual
+            ekf.P = rest @ P @ rest.T + gain @ R @ gain.T
+        self._keep_sound()
+
+    def fuse(self, rows: Sequence[Row], considered: Sequence[int] = ()) -> None:
+        """Fuse rows in one update; without rows nothing happens."""
+        if rows:
+            residuals, jacobians, variances = zip(*rows, strict=True)
+            self.update(np.array(residuals), np.array(jacobians), np.array(variances), considered)
+
+    def fuse_entry(self, index: int, value: float, variance: float) -> None:
+        """Fuse a direct reading of one entry of the state."""
+        H = np.zeros((1, len(self.mean)))
+        H[0, index] = 1.0
+        residual = np.array([value - float(self.mean[index])])
+        self.update(residual, H, np.array([variance]))
+
+    def set(self, index: int, value: float, variance: float) -> None:
+        """Give one entry a value known from elsewhere and cut its correlations."""
+        ekf = self._ekf
+        ekf.x[index] = value
+        ekf.P[index, :] = 0.0
+        ekf.P[:, index] = 0.0
+        ekf.P[index, index] = variance
+
+    def widen(self, index: int, variance: float) -> None:
+        """Add variance to one entry."""
+        self._ekf.P[index, index] += variance
+
+    def snapshot(self) -> FilterMemory:
+        """Return copies of mean and covariance and the count of restarts."""
+        return FilterMemory(self._ekf.x.copy(), self._ekf.P.copy(), self.restarts)
+
+    def restore(self, snapshot: FilterMemory) -> None:
+        """Go back to a snapshot."""
+        mean, covariance, self.restarts = snapshot
+        self._ekf.x, self._ekf.P = mean.copy(), covariance.copy()
+
+    def _keep_sound(self) -> None:
+        ekf = self._ekf
+        # One sum finds nan and inf in either.
+        if not np.isfinite(ekf.x.sum() + ekf.P.sum()):
+            ekf.x = np.where(np.isfinite(ekf.x), ekf.x, 0.0)
+            ekf.P = self._start.covariance.copy()
+            self.restarts += 1
+        np.clip(ekf.x, self._lower, self._upper, out=ekf.x)
+        P = ekf.P
+        P += P.T.copy()
+        P *= 0.5
+        diagonal = np.einsum('ii->i', P)
+        if diagonal.min() <= 0.0:
+            np.maximum(diagonal, _LEAST_DIAGONAL, out=diagonal)
+
+
+def chi_square_gate(residual: float, variance: float, gate: float) -> float:
+    """Return the variance to be added so that residual^2 / variance does not exceed the gate."""
+    return max(residual * residual / gate - variance, 0.0)

@@ -1,0 +1,116 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Row of the update from the balance of forces: mass times specific force is the sum of pulls."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.estimation.contacts.linearisation import ContactForces
+from wheel_terra_estimator.estimation.contacts.stationary_wheels import StationaryPull
+from wheel_terra_estimator.estimation.filter.ekf import GatedFilter, Row
+from wheel_terra_estimator.estimation.filter.state import StateLayout
+from wheel_terra_estimator.estimation.filter.torque import ForceRows
+from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
+
+Floats = tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class BalanceTuning:
+    """Tuned on simulated drives, seeds 1000 to 1019."""
+
+    weight_std: float = 0.005  # of the weight: what curvature, ruts and mass leave open
+    model_share: float = 0.1  # of the load: pull that a doubt of a shear model leaves open
+
+
+class SumOfPulls(NamedTuple):
+    """What the specific force says of the sum of the pulls."""
+
+    along: float  # [N] if the body lay along the ground
+    weight: float  # [N] that a tilt of the body by its ruts turns into it
+    variance: float  # [N^2]
+
+
+class ForceBalance(ForceRows):
+    """Turns the balance of forces along the ground into a row of the update."""
+
+    def __init__(
+        self,
+        configuration: Configuration,
+        rover: Rover,
+        sensors: SensorFigures,
+        layout: StateLayout,
+        tuning: BalanceTuning = BalanceTuning(),
+    ) -> None:
+        super().__init__(configuration)
+        self._rover, self._sensors, self._layout, self._tuning = rover, sensors, layout, tuning
+
+    def sum_of_pulls(
+        self, force: tuple[float, float, float], readings: int, loads: Floats, curvature: float
+    ) -> SumOfPulls:
+        """Return what the specific force [m/s^2], a mean of `readings`, says of the pulls.
+
+        On curved ground (slope per travel, [rad/m]) the wheels' own slopes differ from the body's.
+        """
+        rover, sensors = self._rover, self._sensors
+        weight = rover.mass * force[2]
+        uphill = curvature * sum(w * x for w, x in zip(loads, rover.longitudinal, strict=True))
+        noise = sensors.specific_force_std**2 / readings + sensors.specific_force_bias_std**2
+        variance = rover.mass**2 * noise + (self._tuning.weight_std * weight) ** 2
+        return SumOfPulls(rover.mass * force[0] + uphill, weight, variance)
+
+    def update(
+        self,
+        ekf: GatedFilter,
+        forces: ContactForces,
+        total: SumOfPulls,
+        *,
+        stationary: Sequence[StationaryPull | None],
+        loads: Floats,
+        model_variance: Floats,
+        repeats: float,
+    ) -> Row:
+        """Return the row of a cycle.
+
+        Parameters
+        ----------
+        ekf : GatedFilter
+            At whose state the forces were worked out.
+        forces : ContactForces
+            Of all wheels.
+        total : SumOfPulls
+            What the specific force says.
+        stationary : sequence of StationaryPull or None
+            Of each wheel; None where it turns.
+        loads : tuple of float
+            [N].
+        model_variance : tuple of float
+            Of the shear model of each wheel, over its square [-].
+        repeats : float
+            Cycles that are one piece of information.
+        """
+        jacobian = forces.pull_rows.sum(axis=0)
+        pull_sum = open_variance = 0.0
+        for i, (load, standing) in enumerate(zip(loads, stationary, strict=True)):
+            if standing is None:
+                pull_sum += float(forces.pull[i])
+                open_variance += model_variance[i] * (self._tuning.model_share * load) ** 2
+            else:
+                pull_sum += standing.expected
+                open_variance += standing.std**2
+        tilt = rut_tilt(self._rover, self._layout, ekf)
+        for i, gain in enumerate(self._rover.rut_tilt):
+            # Specific force along the ground: f_x - f_z * tilt (body pitched up by the ruts).
+            jacobian[self._layout.sinkage.start + i] += total.weight * gain
+        residual = total.along - (pull_sum + total.weight * tilt)
+        return self.row(ekf, Row(residual, jacobian, repeats * total.variance + open_variance))
+
+
+def rut_tilt(rover: Rover, layout: StateLayout, ekf: GatedFilter) -> float:
+    """Return by how much ruts of unequal depth pitch the body up against the ground [rad]."""
+    sinkage = ekf.mean[layout.sinkage].tolist()
+    return sum(gain * z for gain, z in zip(rover.rut_tilt, sinkage, strict=True))

@@ -1,0 +1,201 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""State and covariance at the start of a run, and the bounds of the state."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.estimation.contacts.wheel_models import WheelModels, WheelState
+from wheel_terra_estimator.estimation.filter.ekf import FilterMemory, GatedFilter
+from wheel_terra_estimator.estimation.filter.state import (
+    CENTROID,
+    GRAVITY_BIAS,
+    MOUND,
+    SHEAR_MODULUS,
+    SHEAR_STRENGTH,
+    SLIP_SINKAGE,
+    SPEED,
+    StateLayout,
+)
+from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class PriorTuning:
+    """Standard deviations at the start that the configuration does not state, and bounds.
+
+    The spreads are those between a soil and its model in published fits (docs/models), or wide
+    enough to say nothing; the bounds are physical limits, or far outside any fit.
+    """
+
+    speed_std: float = 1.0  # [m/s]
+    slip_sinkage_std: float = 0.1  # of n1 [-]
+    centroid_std: float = 0.06  # [-]
+    mound_mean: float = 0.05  # where the configured soil knows no mound [-]
+    mound_std: float = 0.1
+    sinkage_share: float = 0.5  # of the sinkage at rest
+    sinkage_floor: float = 0.005  # [m]
+    own_stiffness_share: float = 0.5
+    """Spread of the stiffness between wheels, over that of all wheels together."""
+    least_strength_std: float = 0.1  # [ln]
+    least_shear_modulus_std: float = 0.3  # [ln]
+    least_stiffness_std: float = 0.2  # [ln]
+    kept_share: float = 0.5
+    """Share of the old covariance, against that of a start, where soil is kept in a new run."""
+    most_speed: float = 20.0  # [m/s]
+    most_gravity_bias: float = 2.0  # [m/s^2]
+    most_strength: float = 1.0  # [ln]
+    most_shear_modulus: float = 1.0  # [ln]
+    most_slip_sinkage: float = 0.8
+    most_centroid: float = 0.3
+    most_mound: float = 0.6
+    most_stiffness: float = 3.0  # [ln]
+    most_shear_error: float = 1.5  # [ln]
+    highest: float = 0.02  # a wheel above the surface, of the radius
+
+
+@dataclass(frozen=True)
+class SoilPriors:
+    """Prior standard deviations of the soil [ln], and of the errors of the shear model."""
+
+    strength_std: float
+    shear_modulus_std: float
+    stiffness_std: float
+    shear_error_std: float  # of each wheel
+    shear_error_common_std: float
+
+    @classmethod
+    def from_configuration(
+        cls, configuration: Configuration, tuning: PriorTuning = PriorTuning()
+    ) -> SoilPriors:
+        """Derive them from the deviations of the configured soil."""
+        soil, std = configuration.soil, configuration.soil_std
+        phi = float(soil.friction_angle)
+        # d ln tan(phi) = d phi / (sin phi cos phi)
+        strength = std['friction_angle'] / max(math.sin(phi) * math.cos(phi), _LEAST_SINE)
+        stiffness = std['frictional_modulus'] / max(float(soil.frictional_modulus), 1.0)
+        modulus = std['shear_modulus'] / float(soil.shear_modulus)
+        figures = configuration.filter
+        return cls(
+            strength_std=max(strength, tuning.least_strength_std),
+            shear_modulus_std=max(modulus, tuning.least_shear_modulus_std),
+            stiffness_std=max(stiffness, tuning.least_stiffness_std),
+            shear_error_std=math.hypot(
+                float(figures.shear_error_std), float(configuration.sensors.torque_gain_std)
+            ),
+            shear_error_common_std=float(figures.shear_error_common_std),
+        )
+
+    def shear_error_covariance(self, wheel_count: int) -> FloatArray:
+        """Return the (n, n) covariance of what the shear model gets wrong at each wheel."""
+        own = np.eye(wheel_count) * self.shear_error_std**2
+        return own + self.shear_error_common_std**2
+
+
+_LEAST_SINE = 0.05  # of sin(phi) cos(phi): soil without friction
+
+
+def initial_filter(
+    configuration: Configuration,
+    rover: Rover,
+    sensors: SensorFigures,
+    layout: StateLayout,
+    models: WheelModels,
+    loads: tuple[float, ...],
+    tuning: PriorTuning = PriorTuning(),
+) -> GatedFilter:
+    """Return the filter at the start of a run: the nominal soil, wheels at their sinkage at rest.
+
+    Parameters
+    ----------
+    configuration : Configuration
+        Soil and effects.
+    rover, sensors, layout, models
+        Constants of the rover, layout of the state, wheel models.
+    loads : tuple of float
+        Of each wheel on level ground [N].
+    tuning : PriorTuning
+        Deviations and bounds.
+    """
+    priors = SoilPriors.from_configuration(configuration, tuning)
+    n = rover.wheel_count
+    mean = np.zeros(layout.size)
+    deviations = {
+        SPEED: tuning.speed_std,
+        GRAVITY_BIAS: math.hypot(
+            sensors.specific_force_bias_std, rover.gravity * sensors.orientation_std
+        ),
+        SHEAR_STRENGTH: priors.strength_std,
+        SHEAR_MODULUS: priors.shear_modulus_std,
+        SLIP_SINKAGE: tuning.slip_sinkage_std,
+        CENTROID: tuning.centroid_std,
+        MOUND: tuning.mound_std,
+    }
+    P = np.zeros((layout.size, layout.size))
+    for index, std in deviations.items():
+        P[index, index] = std**2
+    mean[MOUND] = 0.0 if 'soil_mound' in configuration.effects else tuning.mound_mean
+    z = [resting_sinkage(models, i, loads[i], rover.rim_radius[i]) for i in range(n)]
+    mean[layout.sinkage] = z
+    spread = tuning.sinkage_share * np.array(z) + tuning.sinkage_floor
+    P[layout.sinkage, layout.sinkage] = np.diag(spread**2)
+    own = tuning.own_stiffness_share * priors.stiffness_std
+    P[layout.stiffness, layout.stiffness] = priors.stiffness_std**2 + np.eye(n) * own**2
+    P[layout.shear_error, layout.shear_error] = priors.shear_error_covariance(n)
+    return GatedFilter(mean, P, *bounds(rover, layout, tuning))
+
+
+def bounds(rover: Rover, layout: StateLayout, tuning: PriorTuning) -> tuple[FloatArray, FloatArray]:
+    """Return the lower and upper bounds of the state, (size,) each."""
+    upper = np.zeros(layout.size)
+    upper[[SPEED, GRAVITY_BIAS]] = tuning.most_speed, tuning.most_gravity_bias
+    upper[[SHEAR_STRENGTH, SHEAR_MODULUS]] = tuning.most_strength, tuning.most_shear_modulus
+    upper[SLIP_SINKAGE] = tuning.most_slip_sinkage
+    upper[[CENTROID, MOUND]] = tuning.most_centroid, tuning.most_mound
+    upper[layout.stiffness], upper[layout.shear_error] = (
+        tuning.most_stiffness,
+        tuning.most_shear_error,
+    )
+    lower = -upper
+    upper[layout.sinkage] = rover.rim_radius
+    lower[layout.sinkage] = [-tuning.highest * r for r in rover.rim_radius]
+    return lower, upper
+
+
+def with_soil_of(
+    old: FilterMemory, start: FilterMemory, layout: StateLayout, tuning: PriorTuning = PriorTuning()
+) -> FilterMemory:
+    """Return the start of a run that keeps soil and biases of an old one, widened."""
+    kept = [GRAVITY_BIAS, SHEAR_STRENGTH, SHEAR_MODULUS, SLIP_SINKAGE, CENTROID, MOUND]
+    kept += range(layout.size)[layout.stiffness]
+    block = np.ix_(kept, kept)
+    covariance, mean = start.covariance.copy(), start.mean.copy()
+    share = tuning.kept_share
+    covariance[block] = share * old.covariance[block] + (1.0 - share) * covariance[block]
+    mean[kept] = old.mean[kept]
+    return FilterMemory(mean, covariance, start.restarts)
+
+
+_BISECTIONS = 30  # to a thousandth of the sinkage and far less
+_SHALLOWEST = 1e-4  # [m]
+_DEEPEST = 0.5  # of the radius
+
+
+def resting_sinkage(models: WheelModels, wheel: int, load: float, radius: float) -> float:
+    """Return the sinkage at which the bearing law carries a load [N] without slip [m]."""
+    low, high = _SHALLOWEST, _DEEPEST * radius
+    for _ in range(_BISECTIONS):
+        z = math.sqrt(low * high)
+        if models.bearing(wheel, WheelState(1.0, z, load, 0.0, 0.0)).load < load:
+            low = z
+        else:
+            high = z
+    return high

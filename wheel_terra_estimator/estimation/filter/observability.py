@@ -1,0 +1,48 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Entries of the state that the present measurements must not teach (Schmidt 1966: considered).
+
+Their uncertainty counts, but they keep mean and variance: else what the models get wrong would end
+up there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from wheel_terra_estimator.estimation.filter.state import (
+    SHEAR_MODULUS,
+    SHEAR_STRENGTH,
+    SLIP_SINKAGE,
+    SPEED,
+    StateLayout,
+)
+
+
+def considered_entries(
+    layout: StateLayout, *, reference_known: bool, settled: bool, unread: Sequence[int]
+) -> list[int]:
+    """Return the indices of what is considered, not learned.
+
+    Parameters
+    ----------
+    layout : StateLayout
+        Of the state.
+    reference_known : bool
+        Without a reference velocity slip and shear strength are not told apart.
+    settled : bool
+        Whether the contacts are those of a steady drive: the rut of a start is none.
+    unread : sequence of int
+        Wheels without a sinkage reading: their sinkage and the errors of their shear model are not
+        told apart.
+    """
+    entries = []
+    if not reference_known:
+        entries += [SHEAR_STRENGTH, SHEAR_MODULUS]
+        if not settled:
+            entries.append(SPEED)
+    for part in (layout.sinkage, layout.stiffness):
+        entries += [part.start + i for i in unread]
+    if len(unread) == layout.wheel_count:
+        entries.append(SLIP_SINKAGE)
+    return entries

@@ -1,0 +1,184 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Update with a reference velocity; the state is opened to references that keep disagreeing."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.estimation.component import Component
+from wheel_terra_estimator.estimation.filter.consistency import smoothed_nis
+from wheel_terra_estimator.estimation.filter.ekf import GatedFilter, chi_square_gate
+from wheel_terra_estimator.estimation.filter.state import SPEED
+from wheel_terra_estimator.estimation.measurements import ReferenceVelocity
+from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
+
+
+@dataclass(frozen=True)
+class ReferenceTuning:
+    """Tuned on simulated drives, seeds 1000 to 1019, and the nine snow immobilisations."""
+
+    known_time: float = 20.0
+    """Age [s] up to which a reference tells slip and soil apart; after that the soil is held."""
+    fresh_time: float = 10.0
+    """Age [s] up to which the speed rests on more than a guess, for the stuck warning."""
+    longest_gap: float = 10.0  # between references that is remembered [s]
+    gap_gain: float = 0.3  # smoothing of it, per reference
+    moving_std: float = 3.0  # deviations from 0 of a reference that moves
+    moving_rest: float = 2.0  # times ``rest_speed``
+    slide_gaps: float = 2.0  # gaps for which a slide on standing wheels is believed
+    shortest_slide: float = 1.0  # [s]
+    fair_nis: float = 3.0
+    """Normalised innovation squared above which a reference is more than chance: the prediction was
+    too sure of itself and is widened."""
+    beyond_rim: float = 1.5  # times the fastest rim speed: no rover drives faster than its wheels
+    beyond_std: float = 5.0
+    same_std: float = 4.0  # deviations within which two references disagree by the same amount
+    count_beyond: int = 4  # references beyond the rim speed that must agree to be believed
+    count_unwitnessed: int = 3
+    """References that must agree where torque, slope and rim speed witness no change: a real change
+    of slip shows in them unless the traction curve is flat."""
+    count: int = 2  # where there is a witness, or no torque to ask
+    witness_time: float = 2.5  # [s] for which a change of the contacts is a witness
+    gate: float = 4.0  # to which an outlier is weakened (squared deviations)
+    gate_beyond: float = 0.01
+
+
+class ReferenceState(NamedTuple):
+    """What is remembered of the references."""
+
+    time: float = -math.inf  # of the last one [s]
+    gap: float = 10.0  # between them, smoothed [s]
+    sliding_until: float = -1.0  # a slide on standing wheels is believed until then [s]
+    rejected: int = 0
+    rejected_in_a_row: int = 0
+    last_rejected: float = 0.0  # innovation of the last rejected one [m/s]
+    nis: float | None = None  # running mean; None = none came yet
+
+
+class ReferenceUpdate(Component[ReferenceState]):
+    """Fuses reference velocities."""
+
+    def __init__(
+        self,
+        configuration: Configuration,
+        rover: Rover,
+        sensors: SensorFigures,
+        tuning: ReferenceTuning = ReferenceTuning(),
+    ) -> None:
+        super().__init__(ReferenceState())
+        self._gate = float(configuration.filter.gate)
+        self._rover, self._sensors, self._tuning = rover, sensors, tuning
+
+    def known(self, time: float) -> bool:
+        """Say whether a reference is young enough to tell slip and soil apart."""
+        return time - self.state.time < self._tuning.known_time
+
+    def fresh(self, time: float) -> bool:
+        """Say whether the present speed rests on a reference."""
+        return time - self.state.time < self._tuning.fresh_time
+
+    def keep_count(self, rejected: int) -> None:
+        """Go on with the count of rejected references of an old run."""
+        self.state = self.state._replace(rejected=rejected)
+
+    def believes(self, agreeing: int, *, beyond: bool, witnessed: bool) -> bool:
+        """Say whether so many references in a row that disagree by the same amount are right."""
+        tuning = self._tuning
+        needed = tuning.count if witnessed else tuning.count_unwitnessed
+        return agreeing >= (tuning.count_beyond if beyond else needed)
+
+    def update(
+        self,
+        ekf: GatedFilter,
+        time: float,
+        reference: ReferenceVelocity,
+        *,
+        still: bool,
+        fastest_rim: float,
+        last_change: float,
+        torque_known: bool,
+    ) -> bool:
+        """Fuse a reference velocity; return whether the speed was opened to it.
+
+        Parameters
+        ----------
+        ekf : GatedFilter
+            Is updated.
+        time : float
+            [s].
+        reference : ReferenceVelocity
+            The reading.
+        still : bool
+            Whether all wheels stand.
+        fastest_rim : float
+            Greatest rim speed [m/s].
+        last_change : float
+            When torque, slope or rim speed last said that the slip may change [s].
+        torque_known : bool
+            Whether there is a torque that could say so.
+        """
+        tuning = self._tuning
+        witnessed = not (torque_known and time - last_change > tuning.witness_time)
+        variance = self._variance(reference)
+        self._note_time(time)
+        if still:
+            self._note_slide(ekf, time, reference.forward, variance)
+        residual = reference.forward - float(ekf.mean[SPEED])
+        total = float(ekf.covariance[SPEED, SPEED]) + variance
+        nis = residual * residual / total
+        state = self.state._replace(nis=smoothed_nis(self.state.nis, nis))
+        opened = False
+        if nis > self._gate:
+            beyond = abs(reference.forward) > (
+                tuning.beyond_rim * fastest_rim + tuning.beyond_std * math.sqrt(total)
+            )
+            apart = abs(residual - state.last_rejected)
+            same = apart < tuning.same_std * math.sqrt(2.0 * variance + total)
+            agreeing = state.rejected_in_a_row + 1
+            opened = same and self.believes(agreeing, beyond=beyond, witnessed=witnessed)
+            if opened:
+                ekf.widen(SPEED, residual * residual)
+            else:
+                gate = tuning.gate_beyond if beyond else tuning.gate
+                variance += chi_square_gate(residual, total, gate)
+            state = state._replace(
+                rejected=state.rejected + 1,
+                rejected_in_a_row=0 if opened else agreeing,
+                last_rejected=residual,
+            )
+        else:
+            state = state._replace(rejected_in_a_row=0)
+            if nis > tuning.fair_nis:
+                # More than chance, less than an outlier: the prediction was too sure of itself.
+                ekf.widen(SPEED, residual * residual / tuning.fair_nis - total)
+        ekf.fuse_entry(SPEED, reference.forward, variance)
+        self.state = state
+        return opened
+
+    def _variance(self, reference: ReferenceVelocity) -> float:
+        """Return the variance of a reading, the sensor's where it states none [(m/s)^2]."""
+        sensors = self._sensors
+        stated = reference.variance
+        variance = stated if stated > 0.0 else sensors.reference_std**2
+        return max(variance, sensors.reference_std_floor**2)
+
+    def _note_time(self, time: float) -> None:
+        state, tuning = self.state, self._tuning
+        gap = state.gap
+        if state.time > -math.inf:
+            gap += tuning.gap_gain * (min(time - state.time, tuning.longest_gap) - gap)
+        self.state = state._replace(time=time, gap=gap)
+
+    def _note_slide(self, ekf: GatedFilter, time: float, forward: float, variance: float) -> None:
+        """Wheels that stand: either the reference agrees with rest, or the rover slides on them."""
+        tuning = self._tuning
+        noise = tuning.moving_std * math.sqrt(variance)
+        until = time
+        if abs(forward) > max(noise, tuning.moving_rest * self._rover.rest_speed):
+            until += max(tuning.slide_gaps * self.state.gap, tuning.shortest_slide)
+            ekf.widen(SPEED, forward**2)
+        self.state = self.state._replace(sliding_until=until)

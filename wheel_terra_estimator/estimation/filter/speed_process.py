@@ -1,0 +1,379 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""How body speed goes on between reference velocities: with the wheels and the accelerometer.
+
+Two predictions of the change of speed over a step, each with its own variance, are combined by
+their inverse variances:
+
+* with the wheels: v / rim speed changes only with the terrain, a random walk per rim travel. Exact
+  through ramps, stops and restarts of a slow rover; poor where a fast rover's wheels spin up.
+* with the accelerometer: dv = (f_x - g_x - bias) dt. Good for fractions of a second; its error per
+  second is nothing to 1 m/s and everything to 5 cm/s.
+
+So the accelerometer's role follows from its noise and the speed; no switch is needed.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from math import isnan
+from typing import NamedTuple
+
+from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.estimation.component import Component
+from wheel_terra_estimator.estimation.filter.ekf import GatedFilter
+from wheel_terra_estimator.estimation.filter.prediction import Prediction
+from wheel_terra_estimator.estimation.filter.state import GRAVITY_BIAS, SPEED
+from wheel_terra_estimator.estimation.inputs.inertial import InertialWindow
+from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
+from wheel_terra_estimator.estimation.scalars import NAN, clipped, known, median
+
+Floats = tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class SpeedTuning:
+    """Tuned on simulated drives, seeds 1000 to 1019, where no other source is given."""
+
+    first_ratio: float = 0.95  # v / rim speed before anything is known: level, loose soil
+    first_ratio_std: float = 0.3
+    reversed_ratio: float = 0.9
+    """v / rim speed on level ground after a reversal; what the slope asks is taken off."""
+    least_reversed_ratio: float = 0.2
+    most_reversed_ratio: float = 1.1
+    first_sight_share: float = 0.3
+    """Deviation of the speed over the rim speed when the wheels are first heard."""
+    least_ratio: float = -0.5  # remembered v / rim speed
+    most_ratio: float = 2.0
+    least_ratio_std: float = 0.1
+    most_ratio_std: float = 0.5
+    ratio_rim: float = 2.0  # over the low rim speed: v / rim speed is remembered above it
+    coast_drift: float = 0.05  # [m/s^2] of a rover whose wheels are not heard
+    coast_walk: float = 0.02  # [m/s/sqrt(s)]
+    rim_change: float = 0.2
+    """Error of a change of rim speed as a change of speed, over that change [-]."""
+    floor_walk: float = 1e-8  # [(m/s)^2/s]
+    inflation_rate: float = 2.0
+    """Process noise of a change of speed, over its square, per second [1/s]: it may come within
+    half a second."""
+    inflation_time: float = 0.3  # with which the inflation decays [s]
+    rate_noise: float = 3.0
+    """Deviations of the wheel rates within which the wheels do not disagree [-]."""
+    least_wheels: int = 3  # that can disagree
+    least_covered: float = 0.5  # of a step by the IMU, to use it
+    attitude_time: float = 0.5
+    """Time within which errors of the attitude change over rough ground [s]."""
+    bias_walk: float = 1e-3  # of the accelerometer's bias [m/s^2/sqrt(s)]
+    leaking_share: float = 0.3
+    """Of gravity times the error of the attitude: what of it changes along the way."""
+    leak_rate: float = 0.1  # of that change [1/s]
+    least_slope: float = 1e-3  # of the traction curve [-]
+    restless_change: float = 0.02  # of the rim speed in a cycle: the command changes
+    restless_share: float = 0.05  # of the rim speed: an inflation that tells of new contacts
+    usual_slip: float = 0.12  # of a rover in loose soil on level ground
+    usual_slip_std: float = 0.2
+    usual_length: float = 1.5  # rim travel over which slip returns to it [m]
+    slip_per_demand: float = 1.2  # uphill: slip for each share of the load that is asked
+    slip_per_brake: float = 0.4  # downhill
+    least_usual_slip: float = -0.2
+    most_usual_slip: float = 0.8
+    start_share: float = 0.5
+    """Of the usual speed: what is farther from it at a start without reference is a jolt."""
+    start_noise: float = 3.0
+    """Times the accelerometer's noise over a second: what is more is no jolt but a slide."""
+    least_slip_std: float = 0.02  # no set of soil models is better than that
+    turning_slip_std: float = 0.04  # the same at full lateral motion
+    present: float = 1e-6  # [s]: a cycle no older is the present
+
+
+class SpeedStep(NamedTuple):
+    """Linear prediction v' = a v + b bias + c with variance q."""
+
+    speed_gain: float
+    bias_gain: float
+    constant: float
+    variance: float
+
+
+class RimSpeeds(NamedTuple):
+    """Rim speeds without the share that turning has in them [m/s]; nan = unknown."""
+
+    each: Floats
+    typical: float
+    """Median of the known ones, so that no single wheel decides; nan = none is known."""
+
+    @classmethod
+    def of(cls, rims: Floats, yaw_rate: float, lateral: Floats) -> RimSpeeds:
+        """Take the turning [rad/s] off the rim speeds of wheels at `lateral` [m]."""
+        each = tuple([rim + yaw_rate * y for rim, y in zip(rims, lateral, strict=True)])
+        heard = known(each)
+        return cls(each, median(heard) if heard else NAN)
+
+
+class SpeedState(NamedTuple):
+    """What the prediction of the speed remembers."""
+
+    cycle_time: float  # of the last cycle [s], nan = none yet
+    rims: RimSpeeds  # at the last cycle
+    ratio: float  # v / rim speed
+    ratio_std: float
+    ratio_walk: float  # random walk of it [1/sqrt(m)]
+    traction_slope: float = 0.0  # of the traction curve at the last cycle; 0 = unknown [-]
+    inflation: float = 0.0
+    """Process-noise inflation: change of speed that changing contacts may bring [m/s]."""
+    change_time: float = -math.inf  # when contacts or commands last changed [s]
+
+
+class SpeedProcess(Component[SpeedState]):
+    """Predicts the body speed."""
+
+    def __init__(
+        self,
+        configuration: Configuration,
+        rover: Rover,
+        sensors: SensorFigures,
+        tuning: SpeedTuning = SpeedTuning(),
+    ) -> None:
+        figures = configuration.filter
+        self._least_walk = float(figures.ratio_walk_least)
+        self._most_walk = float(figures.ratio_walk)
+        self._demand_walk = float(figures.demand_walk)
+        unknown = RimSpeeds((NAN,) * rover.wheel_count, NAN)
+        super().__init__(
+            SpeedState(NAN, unknown, tuning.first_ratio, tuning.first_ratio_std, self._most_walk)
+        )
+        self._rover, self._tuning = rover, tuning
+        rate = max(sensors.imu_rate, 1.0)
+        attitude = rover.gravity * sensors.orientation_std
+        self.acceleration_noise = math.sqrt(
+            sensors.specific_force_std**2 / rate + attitude**2 * tuning.attitude_time
+        )
+        """White noise density of the accelerometer and the attitude [m/s^2 sqrt(s)]."""
+        # The residual of gravity changes as the rover drives over rough ground.
+        leak = tuning.leaking_share * attitude
+        self._bias_walk = tuning.bias_walk**2 + leak**2 * tuning.leak_rate
+        self._rim_noise = tuning.rate_noise * sensors.wheel_rate_std * max(rover.slip_radius)
+
+    # -- What other parts tell -------------------------------------------------------------------
+
+    def inflate(self, speed_change: float) -> None:
+        """Widen the prediction for contacts under change that may bring `speed_change` [m/s]."""
+        if speed_change > self.state.inflation:
+            self.state = self.state._replace(inflation=speed_change)
+
+    def forget_ratio(self, direction: float, slope_share: float, *, turned_back: bool) -> None:
+        """Forget v / rim speed where the drive changes its direction (up becomes down)."""
+        tuning, ratio = self._tuning, self.state.ratio
+        if turned_back:
+            ratio = clipped(
+                tuning.reversed_ratio - direction * slope_share,
+                tuning.least_reversed_ratio,
+                tuning.most_reversed_ratio,
+            )
+        self.state = self.state._replace(ratio=ratio, ratio_std=tuning.first_ratio_std)
+
+    def note_change(self, time: float, rims: RimSpeeds) -> None:
+        """Remember when contacts or commands last changed: a witness for references that jump."""
+        state, tuning, rim = self.state, self._tuning, rims.typical
+        if isnan(rim):
+            return
+        before = state.rims.typical
+        changed = isnan(before) or abs(rim - before) > tuning.restless_change * abs(rim)
+        if changed or state.inflation > tuning.restless_share * abs(rim):
+            self.state = state._replace(change_time=time)
+
+    def follow_traction_curve(self, slope: float) -> None:
+        """Let the slip walk as what the ground asks does, over the slope of the traction curve.
+
+        Where the curve is steep, a change of demand changes the slip little; on the plateau the
+        same change makes the rover dig in.
+        """
+        slope = max(slope, self._tuning.least_slope)
+        walk = clipped(self._demand_walk / slope, self._least_walk, self._most_walk)
+        self.state = self.state._replace(traction_slope=slope, ratio_walk=walk)
+
+    # -- Prediction ------------------------------------------------------------------------------
+
+    def since_cycle(self, time: float) -> float:
+        """Return the time since the last cycle [s]; 0 before the first."""
+        before = self.state.cycle_time
+        return 0.0 if isnan(before) else time - before
+
+    def step(
+        self, time: float, rims: RimSpeeds, window: InertialWindow, *, inflated: bool
+    ) -> SpeedStep:
+        """Return how the speed goes on from the last cycle to a time [s].
+
+        Parameters
+        ----------
+        time : float
+            [s].
+        rims : RimSpeeds
+            At that time.
+        window : InertialWindow
+            IMU readings in between.
+        inflated : bool
+            Whether changing contacts widen it. Without a reference velocity they must not: the
+            speed would follow soil models that are off by as much.
+        """
+        state = self.state
+        by_wheels = self.by_wheels(
+            self.since_cycle(time), rims, state.inflation if inflated else 0.0
+        )
+        return self.combined(by_wheels, self.since_cycle(time), window)
+
+    def predict(self, prediction: Prediction, step: SpeedStep, dt: float) -> None:
+        """Add speed and gravity bias to a prediction over `dt` [s]."""
+        mean, F, Q = prediction
+        mean[SPEED] = (
+            step.speed_gain * mean[SPEED] + step.bias_gain * mean[GRAVITY_BIAS] + step.constant
+        )
+        F[SPEED, SPEED] = step.speed_gain
+        F[SPEED, GRAVITY_BIAS] = step.bias_gain
+        Q[SPEED, SPEED] = step.variance
+        Q[GRAVITY_BIAS, GRAVITY_BIAS] = self._bias_walk * dt
+
+    def by_wheels(self, dt: float, rims: RimSpeeds, inflation: float) -> SpeedStep:
+        """Return the prediction with the wheels alone over `dt` [s]."""
+        state, tuning = self.state, self._tuning
+        before, now = state.rims.typical, rims.typical
+        if isnan(before) or isnan(now):
+            # No wheels: hold the speed, open at the rate at which a rover may brake.
+            variance = (tuning.coast_drift * dt) ** 2 + (tuning.coast_walk**2) * dt
+            return SpeedStep(1.0, 0.0, 0.0, variance)
+        change = now - before
+        mean = 0.5 * (abs(before) + abs(now))
+        variance = mean * mean * state.ratio_walk**2 * mean * dt
+        variance += (tuning.rim_change * change) ** 2 + tuning.floor_walk * dt
+        apart = self.disagreement(rims)
+        variance += tuning.inflation_rate * inflation * inflation * dt + apart * apart
+        if abs(before) > self._rover.low_rim:
+            return SpeedStep(now / before, 0.0, 0.0, variance)
+        variance += state.ratio_std**2 * max(now * now - before * before, 0.0)
+        return SpeedStep(1.0, 0.0, state.ratio * change, variance)
+
+    def combined(self, step: SpeedStep, dt: float, window: InertialWindow) -> SpeedStep:
+        """Return the prediction with the wheels combined with the accelerometer's over `dt` [s]."""
+        covered = window.duration
+        if covered < self._tuning.least_covered * dt or dt <= 0.0:
+            return step
+        # A stretch that the IMU left out is filled with its mean.
+        accelerated = window.speed_change * dt / covered
+        noise = self.acceleration_noise**2 * dt
+        weight = noise / (noise + step.variance)  # of the wheels
+        return SpeedStep(
+            weight * step.speed_gain + (1.0 - weight),
+            -(1.0 - weight) * dt,
+            weight * step.constant + (1.0 - weight) * accelerated,
+            step.variance * noise / (step.variance + noise),
+        )
+
+    def disagreement(self, rims: RimSpeeds) -> float:
+        """Return by how much the wheels disagree on the change of rim speed since the cycle [m/s].
+
+        Median deviation from the median: one wheel apart makes none, two that spin up beside two
+        that stand do. What the noise of the rates makes is taken off.
+        """
+        changes = known(
+            [now - before for now, before in zip(rims.each, self.state.rims.each, strict=True)]
+        )
+        if len(changes) < self._tuning.least_wheels:
+            return 0.0
+        middle = median(changes)
+        return max(median([abs(change - middle) for change in changes]) - self._rim_noise, 0.0)
+
+    def towards_usual_slip(
+        self, step: SpeedStep, dt: float, rim: float, *, direction: float, slope_share: float
+    ) -> SpeedStep:
+        """Without a reference velocity, let v / rim speed return to what such a slope takes.
+
+        On deep or saturated contacts torque and pull hardly change with slip. There the posterior
+        is the prior, and a random walk is no prior: it ends anywhere.
+        """
+        if not abs(rim) >= self._rover.low_rim:
+            return step
+        tuning = self._tuning
+        demand = direction * slope_share
+        per_demand = tuning.slip_per_demand if demand > 0.0 else tuning.slip_per_brake
+        slip = clipped(
+            tuning.usual_slip + per_demand * demand,
+            tuning.least_usual_slip,
+            tuning.most_usual_slip,
+        )
+        usual = 1.0 - slip
+        keep = math.exp(-abs(rim) * dt / tuning.usual_length)
+        return SpeedStep(
+            keep * step.speed_gain,
+            keep * step.bias_gain,
+            keep * step.constant + (1.0 - keep) * usual * rim,
+            keep * keep * step.variance + (1.0 - keep * keep) * (tuning.usual_slip_std * rim) ** 2,
+        )
+
+    def present(
+        self,
+        ekf: GatedFilter,
+        time: float,
+        rims: RimSpeeds,
+        window: InertialWindow,
+        *,
+        inflated: bool,
+    ) -> tuple[float, float]:
+        """Return speed and variance at a time [s], carried on from the last cycle."""
+        x, P = ekf.mean, ekf.covariance
+        speed, variance = float(x[SPEED]), float(P[SPEED, SPEED])
+        if self.since_cycle(time) < self._tuning.present:
+            return speed, variance
+        a, b, constant, noise = self.step(time, rims, window, inflated=inflated)
+        carried = a * speed + b * float(x[GRAVITY_BIAS]) + constant
+        return carried, (
+            a * a * variance
+            + 2.0 * a * b * float(P[SPEED, GRAVITY_BIAS])
+            + b * b * float(P[GRAVITY_BIAS, GRAVITY_BIAS])
+            + noise
+        )
+
+    # -- Corrections of the filter ---------------------------------------------------------------
+
+    def begin(self, ekf: GatedFilter, rims: RimSpeeds) -> None:
+        """At the first sight of the wheels they may roll or spin, or be at rest."""
+        if isnan(self.state.rims.typical) and not isnan(rims.typical):
+            spread = max(self._tuning.first_sight_share * abs(rims.typical), self._rover.rest_speed)
+            ekf.set(SPEED, self.state.ratio * rims.typical, spread * spread)
+
+    def undo_jolt(self, ekf: GatedFilter, rim: float) -> None:
+        """Let a rover that starts without a reference velocity roll as it did before.
+
+        A jolt of the accelerometer weighs much while the wheels turn slowly, and from a speed of
+        nothing the wheels' prediction, v' = v rim'/rim, goes on with nothing. A rover that slides,
+        or wheels that spin up at once, differ by more than the accelerometer's noise.
+        """
+        state, tuning = self.state, self._tuning
+        usual = state.ratio * rim
+        off = abs(float(ekf.mean[SPEED]) - usual)
+        noise = tuning.start_noise * self.acceleration_noise
+        if abs(rim) > self._rover.low_rim and tuning.start_share * abs(usual) < off < noise:
+            ekf.set(SPEED, usual, (state.ratio_std * rim) ** 2)
+
+    def keep_least_variance(self, ekf: GatedFilter, rims: Floats, lateral_motion: float) -> None:
+        """Keep a least slip deviation."""
+        tuning = self._tuning
+        typical = sum(abs(rim) for rim in known(rims)) / len(rims)
+        std = tuning.least_slip_std + tuning.turning_slip_std * min(lateral_motion, 1.0)
+        lacking = (typical * std) ** 2 - float(ekf.covariance[SPEED, SPEED])
+        if lacking > 0.0:
+            ekf.widen(SPEED, lacking)
+
+    def end_cycle(self, time: float, ekf: GatedFilter, rims: RimSpeeds, *, settled: bool) -> None:
+        """Remember what the next cycle needs."""
+        state, tuning, rim = self.state, self._tuning, rims.typical
+        inflation = state.inflation * math.exp(-self.since_cycle(time) / tuning.inflation_time)
+        ratio, ratio_std = state.ratio, state.ratio_std
+        if settled and abs(rim) > tuning.ratio_rim * self._rover.low_rim:
+            speed, variance = float(ekf.mean[SPEED]), float(ekf.covariance[SPEED, SPEED])
+            ratio = clipped(speed / rim, tuning.least_ratio, tuning.most_ratio)
+            std = math.sqrt(variance) / abs(rim)
+            ratio_std = clipped(std, tuning.least_ratio_std, tuning.most_ratio_std)
+        self.state = state._replace(
+            cycle_time=time, rims=rims, ratio=ratio, ratio_std=ratio_std, inflation=inflation
+        )

@@ -1,0 +1,62 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Layout of the filter's state, with the reasons.
+
+===============  =====  ===========================================================================
+entry            unit   why it is there
+===============  =====  ===========================================================================
+speed            m/s    Body speed. The process follows the rim speed (v / rim speed changes only
+                        with the terrain) and the accelerometer, weighted by what each is worth.
+                        Speed itself, not the ratio, so that locked wheels can slide.
+gravity_bias     m/s^2  Accelerometer bias plus gravity that leaks in through attitude errors: what
+                        is wrong with the accelerometer as a sensor of dv/dt.
+shear_strength   ln     Common factor on cohesion and tan(phi); the two are not told apart by
+                        wheels of nearly equal load.
+shear_modulus    ln     Common factor on K; seen at low slip, as shear_strength is at high slip.
+slip_sinkage     -      Added to n1 in N = n0 + n1 |s|.
+centroid         -      Common shift of the centroid of the contact stress, as a share of the
+                        entrance angle: takes up errors of c1, c2, c3 and of resistances that the
+                        torque does not see (bulldozing). Seen by torque against the balance.
+mound            -      The part of that shift that comes with slip, (s - onset)+^2: soil piles up
+                        behind the wheel and pushes it (the effect ``soil_mound``). Seen where slip
+                        changes.
+sinkage (n)      m      Rim below the surface.
+stiffness (n)    ln     Factor on the bearing modulus, per wheel: wheels enter a patch one by one.
+shear_error (n)  ln     Error of the shear model, per wheel, first-order Gauss-Markov over travel.
+                        It makes ten equal residuals at constant slip one piece of information,
+                        and carries what torque says of a wheel's pull in another soil.
+===============  =====  ===========================================================================
+
+Not in it: c and phi apart, n0 apart from the stiffness, torque zeros and sinkage zeros (constant,
+not observable from forces at the same time as the soil: they enter the published deviations).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+SPEED, GRAVITY_BIAS, SHEAR_STRENGTH, SHEAR_MODULUS, SLIP_SINKAGE, CENTROID, MOUND = range(7)
+_COMMON = 7
+
+
+@dataclass(frozen=True)
+class StateLayout:
+    """Where each entry of the state vector is, for n wheels."""
+
+    wheel_count: int
+    size: int = field(init=False)
+    sinkage: slice = field(init=False)
+    stiffness: slice = field(init=False)
+    shear_error: slice = field(init=False)
+
+    def __post_init__(self) -> None:
+        n = self.wheel_count
+        object.__setattr__(self, 'size', _COMMON + 3 * n)
+        object.__setattr__(self, 'sinkage', slice(_COMMON, _COMMON + n))
+        object.__setattr__(self, 'stiffness', slice(_COMMON + n, _COMMON + 2 * n))
+        object.__setattr__(self, 'shear_error', slice(_COMMON + 2 * n, _COMMON + 3 * n))

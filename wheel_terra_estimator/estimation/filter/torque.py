@@ -1,0 +1,82 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Rows of the update from drive torques."""
+
+from __future__ import annotations
+
+from math import isnan
+
+from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.estimation.component import Component
+from wheel_terra_estimator.estimation.contacts.linearisation import ContactForces
+from wheel_terra_estimator.estimation.filter.consistency import distrusted, smoothed_nis
+from wheel_terra_estimator.estimation.filter.ekf import GatedFilter, Row, chi_square_gate
+from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
+
+Floats = tuple[float, ...]
+_FLOOR_VARIANCE = 1e-6  # [N^2 m^2]
+
+
+class ForceRows(Component['float | None']):
+    """Rows of one channel of forces; keeps the running mean of its NIS, None = none came yet.
+
+    A soil change looks like an outlier: a row beyond the gate is weakened, not locked out.
+    """
+
+    def __init__(self, configuration: Configuration) -> None:
+        super().__init__(None)
+        self._gate = float(configuration.filter.gate)
+
+    def row(self, ekf: GatedFilter, row: Row) -> Row:
+        """Return a row with the variance that its channel deserves."""
+        residual, jacobian, variance = row
+        total = float(jacobian @ ekf.covariance @ jacobian) + variance
+        self.state = mean = smoothed_nis(self.state, residual * residual / total)
+        gate = chi_square_gate(residual, total, self._gate)
+        return Row(residual, jacobian, distrusted(variance, mean) + gate)
+
+
+class TorqueUpdate(ForceRows):
+    """Turns the torques of turning wheels into rows of the update."""
+
+    def __init__(self, configuration: Configuration, rover: Rover, sensors: SensorFigures) -> None:
+        super().__init__(configuration)
+        self._variance = sensors.torque_std**2
+        self._load_std = rover.load_std
+
+    def update(
+        self,
+        ekf: GatedFilter,
+        forces: ContactForces,
+        *,
+        torque: Floats,
+        turning: tuple[bool, ...],
+        model_variance: Floats,
+        repeats: float,
+    ) -> list[Row]:
+        """Return the rows of the torques of a cycle.
+
+        Parameters
+        ----------
+        ekf : GatedFilter
+            At whose state the forces were worked out.
+        forces : ContactForces
+            Of all wheels.
+        torque : tuple of float
+            Readings [N m], nan = none.
+        turning : tuple of bool
+            Wheels for which the models hold.
+        model_variance : tuple of float
+            Of the shear model of each wheel, over its square [-].
+        repeats : float
+            Cycles that are one piece of information.
+        """
+        rows = []
+        for i, reading in enumerate(torque):
+            if isnan(reading) or not turning[i]:
+                continue
+            model = float(forces.torque[i])
+            noise = self._variance + (self._load_std * model) ** 2 + _FLOOR_VARIANCE
+            variance = repeats * noise + model_variance[i] * model**2
+            rows.append(self.row(ekf, Row(reading - model, forces.torque_rows[i], variance)))
+        return rows

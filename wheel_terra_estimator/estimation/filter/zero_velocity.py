@@ -1,0 +1,128 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Zero-velocity update where all wheels stand, or spin the rover in place; zero of the gyro."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import isnan
+from typing import NamedTuple
+
+from wheel_terra_estimator.estimation.component import Component
+from wheel_terra_estimator.estimation.filter.ekf import GatedFilter, chi_square_gate
+from wheel_terra_estimator.estimation.filter.state import SPEED
+from wheel_terra_estimator.estimation.inputs.inertial import GyroZero, InertialWindow
+from wheel_terra_estimator.estimation.rover import Rover
+from wheel_terra_estimator.estimation.scalars import NAN, known
+
+
+@dataclass(frozen=True)
+class ZeroVelocityTuning:
+    """Tuned on simulated drives, seeds 1000 to 1019."""
+
+    settling_time: float = 0.15  # [s] of standing wheels before the rover counts as standing
+    std: float = 0.0005  # of a rover that stands [m/s]
+    coasting_time: float = 2.0
+    """Time [s] for which a fast rover may slide on: it is not stopped against its accelerometer."""
+    coasting_gate: float = 9.0
+    gyro_settling_time: float = 0.5  # [s]
+    most_yaw_rate: float = 0.05  # [rad/s]: what turns faster does not stand
+    most_cycles: float = 200.0  # over which the zero of the gyro is a mean
+    spin_ratio: float = 0.2
+    """Typical over mean rim speed below which wheels turn against each other."""
+    least_spin_std: float = 0.002  # of the body's speed in a spin in place [m/s]
+    kept_share: float = 0.5  # of the weight of the zeros, in a run that keeps soil and biases
+
+
+class ZeroVelocityState(NamedTuple):
+    """Since when the wheels stand [s], nan = they do not; zeros of the gyro and their weight."""
+
+    since: float = NAN
+    zero: GyroZero = GyroZero()
+    weight: float = 0.0  # cycles in the mean
+
+
+class ZeroVelocityUpdate(Component[ZeroVelocityState]):
+    """Fuses standing still; learns the zero of the gyro meanwhile."""
+
+    def __init__(self, rover: Rover, tuning: ZeroVelocityTuning = ZeroVelocityTuning()) -> None:
+        super().__init__(ZeroVelocityState())
+        self._rest_speed, self._tuning = rover.rest_speed, tuning
+
+    def keep_zero_of(self, old: ZeroVelocityState) -> None:
+        """Begin a run with the gyro's zero of an old one, at less weight."""
+        weight = self._tuning.kept_share * old.weight
+        self.state = ZeroVelocityState(zero=old.zero, weight=weight)
+
+    def standing(self) -> bool:
+        """Say whether all wheels stand."""
+        return not isnan(self.state.since)
+
+    def update(
+        self,
+        ekf: GatedFilter,
+        time: float,
+        *,
+        rims: tuple[float, ...],
+        typical_rim: float,
+        still: bool,
+        sliding: bool,
+        window: InertialWindow,
+        yaw_rate: float,
+    ) -> None:
+        """Fuse what the wheels say of a rover that stands or spins in place.
+
+        Parameters
+        ----------
+        ekf : GatedFilter
+            Is updated.
+        time : float
+            [s].
+        rims : tuple of float
+            Of each wheel [m/s], nan = unknown.
+        typical_rim : float
+            Median of them without the turning [m/s], nan = unknown.
+        still : bool
+            Whether all wheels stand.
+        sliding : bool
+            Whether a reference says that the rover slides on them.
+        window : InertialWindow
+            IMU readings of the cycle.
+        yaw_rate : float
+            [rad/s].
+        """
+        if not still:
+            if self.standing():
+                self.state = self.state._replace(since=NAN)
+            self._spin_in_place(ekf, rims, typical_rim)
+            return
+        if not self.standing():
+            self.state = self.state._replace(since=time)
+        if sliding:
+            return
+        tuning = self._tuning
+        settled = time - self.state.since
+        if settled < tuning.settling_time:
+            return
+        variance = tuning.std**2
+        if settled < tuning.coasting_time:
+            speed, P = float(ekf.mean[SPEED]), float(ekf.covariance[SPEED, SPEED])
+            variance += chi_square_gate(speed, P + variance, tuning.coasting_gate)
+        ekf.fuse_entry(SPEED, 0.0, variance)
+        turning = abs(yaw_rate) >= tuning.most_yaw_rate
+        if settled > tuning.gyro_settling_time and window.readings and not turning:
+            self._learn_zero(yaw_rate, window.pitch_rate / window.readings)
+
+    def _spin_in_place(self, ekf: GatedFilter, rims: tuple[float, ...], typical_rim: float) -> None:
+        """Hold the body where it is, to a share of the rim speed."""
+        tuning = self._tuning
+        speeds = [abs(rim) for rim in known(rims)]
+        mean = sum(speeds) / len(speeds) if speeds else 0.0
+        if mean > self._rest_speed and abs(typical_rim) < tuning.spin_ratio * mean:
+            ekf.fuse_entry(SPEED, 0.0, max(mean, tuning.least_spin_std) ** 2)
+
+    def _learn_zero(self, yaw_rate: float, pitch_rate: float) -> None:
+        state = self.state
+        weight = min(state.weight + 1.0, self._tuning.most_cycles)
+        zero = GyroZero(state.zero.yaw + yaw_rate / weight, state.zero.pitch + pitch_rate / weight)
+        self.state = state._replace(zero=zero, weight=weight)

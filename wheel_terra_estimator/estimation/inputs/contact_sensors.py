@@ -1,0 +1,91 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Readings of sinkage and leaving angle between two cycles of the filter."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from math import isnan
+from typing import NamedTuple
+
+from wheel_terra_estimator.estimation.component import Component
+from wheel_terra_estimator.estimation.measurements import LeavingAngleReading, SinkageReading
+from wheel_terra_estimator.estimation.scalars import NAN
+
+Floats = tuple[float, ...]
+
+
+class SinkageSums(NamedTuple):
+    """Sum [m] and number of the readings of each wheel since the last cycle."""
+
+    total: Floats
+    readings: tuple[int, ...]
+
+
+class SinkageInput(Component[SinkageSums]):
+    """Sums the sinkage readings of each wheel."""
+
+    def __init__(self, wheel_count: int) -> None:
+        super().__init__(SinkageSums((0.0,) * wheel_count, (0,) * wheel_count))
+
+    def update(self, reading: SinkageReading) -> None:
+        """Take a message; wheels that are nan were not read."""
+        total, count = list(self.state.total), list(self.state.readings)
+        for i, value in enumerate(reading.sinkage.tolist()):
+            if not isnan(value):
+                total[i] += value
+                count[i] += 1
+        self.state = SinkageSums(tuple(total), tuple(count))
+
+    def take(self) -> SinkageSums:
+        """Return the sums since the last call, and begin new ones."""
+        sums = self.state
+        self.reset()
+        return sums
+
+
+@dataclass(frozen=True)
+class LeavingAngleTuning:
+    """Smoothing of the rear cameras' angles."""
+
+    gain: float = 0.3  # per reading
+    longest_age: float = 1.0
+    """An older angle [s] is forgotten: half a wheel's turn of a slow rover."""
+
+
+class LeavingAngleState(NamedTuple):
+    """Smoothed angle [rad] and time [s] of each wheel."""
+
+    angle: Floats
+    time: Floats
+
+
+class LeavingAngleInput(Component[LeavingAngleState]):
+    """Smooths the measured leaving angles."""
+
+    def __init__(self, wheel_count: int, tuning: LeavingAngleTuning = LeavingAngleTuning()) -> None:
+        super().__init__(LeavingAngleState((NAN,) * wheel_count, (-math.inf,) * wheel_count))
+        self._tuning = tuning
+        self._unknown = (NAN,) * wheel_count
+
+    def update(self, time: float, reading: LeavingAngleReading) -> None:
+        """Take a message at a time [s]; wheels that are nan were not read."""
+        tuning = self._tuning
+        angle, when = list(self.state.angle), list(self.state.time)
+        for i, value in enumerate(reading.leaving_angle.tolist()):
+            if not isnan(value):
+                old = value if time - when[i] > tuning.longest_age else angle[i]
+                angle[i] = old + tuning.gain * (value - old)
+                when[i] = time
+        self.state = LeavingAngleState(tuple(angle), tuple(when))
+
+    def angles(self, time: float) -> Floats:
+        """Return the leaving angle of each wheel [rad]; nan where there is none of late."""
+        state, longest = self.state, self._tuning.longest_age
+        if time - max(state.time) >= longest:
+            return self._unknown
+        return tuple(
+            angle if time - when < longest else NAN
+            for angle, when in zip(state.angle, state.time, strict=True)
+        )

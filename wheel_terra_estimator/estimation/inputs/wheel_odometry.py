@@ -1,0 +1,124 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Wheel odometry between two cycles of the filter: newest rim speeds, mean torques."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from math import isnan
+from typing import NamedTuple
+
+from wheel_terra_estimator.estimation.component import Component
+from wheel_terra_estimator.estimation.measurements import WheelOdometry
+from wheel_terra_estimator.estimation.rover import Rover
+from wheel_terra_estimator.estimation.scalars import NAN
+
+Floats = tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class WheelOdometryTuning:
+    """Times of the wheel odometry."""
+
+    smoothing_time: float = 0.05
+    """Time constant of the rim speeds [s]: fast odometry is noisy or quantised; less than any use
+    of the rim speed needs."""
+    longest_smoothed: float = 0.06
+    """Odometry that is this slow [s between messages] is not smoothed."""
+    torque_age: float = 2.0
+    """A torque that is no older [s] counts as known."""
+
+
+class WheelOdometryState(NamedTuple):
+    """What is kept of the wheel odometry; one entry per wheel."""
+
+    time: float  # of the last message [s], -inf = none yet
+    rim_speed: Floats  # [m/s], nan = never known
+    rate_time: Floats  # [s]
+    torque_time: float
+    torque_sum: Floats  # since the last cycle
+    torque_count: tuple[int, ...]
+    torque: Floats  # mean of the last cycle that had one [N m], nan = never known
+
+
+class WheelOdometryInput(Component[WheelOdometryState]):
+    """Keeps the newest rim speeds, sums torques."""
+
+    def __init__(self, rover: Rover, tuning: WheelOdometryTuning = WheelOdometryTuning()) -> None:
+        n = rover.wheel_count
+        never = -math.inf
+        start = WheelOdometryState(
+            never, (NAN,) * n, (never,) * n, never, (0.0,) * n, (0,) * n, (NAN,) * n
+        )
+        super().__init__(start)
+        self._radius = rover.slip_radius
+        self._silence = rover.silence
+        self._tuning = tuning
+
+    def update(self, time: float, odometry: WheelOdometry) -> None:
+        """Take a message at a time [s]."""
+        state, tuning = self.state, self._tuning
+        dt = time - state.time
+        keep = 0.0 if dt >= tuning.longest_smoothed else math.exp(-dt / tuning.smoothing_time)
+        rim_speed, rate_time = list(state.rim_speed), list(state.rate_time)
+        for i, rate in enumerate(odometry.rate.tolist()):
+            if not isnan(rate):
+                rim, old = rate * self._radius[i], rim_speed[i]
+                rim_speed[i] = rim if isnan(old) else keep * old + (1.0 - keep) * rim
+                rate_time[i] = time
+        torque_time = state.torque_time
+        torque_sum, torque_count = list(state.torque_sum), list(state.torque_count)
+        for i, torque in enumerate(odometry.torque.tolist()):
+            if not isnan(torque):
+                torque_sum[i] += torque
+                torque_count[i] += 1
+                torque_time = time
+        self.state = WheelOdometryState(
+            time,
+            tuple(rim_speed),
+            tuple(rate_time),
+            torque_time,
+            tuple(torque_sum),
+            tuple(torque_count),
+            state.torque,
+        )
+
+    def take_torque(self) -> Floats:
+        """Return the mean torque of each wheel since the last call, nan = none came."""
+        state = self.state
+        n = len(state.torque)
+        mean = tuple(
+            total / count if count else NAN
+            for total, count in zip(state.torque_sum, state.torque_count, strict=True)
+        )
+        self.state = state._replace(
+            torque_sum=(0.0,) * n,
+            torque_count=(0,) * n,
+            torque=tuple(
+                old if isnan(new) else new for new, old in zip(mean, state.torque, strict=True)
+            ),
+        )
+        return mean
+
+    def rim_speeds(self, time: float) -> Floats:
+        """Return the rim speeds [m/s], nan where the rate is unknown or too old."""
+        state, silence = self.state, self._silence
+        if time - min(state.rate_time) <= silence:
+            return state.rim_speed
+        return tuple(
+            rim if time - when <= silence else NAN
+            for rim, when in zip(state.rim_speed, state.rate_time, strict=True)
+        )
+
+    def fastest(self) -> float:
+        """Return the greatest known rim speed, whatever its direction or age [m/s]; 0 = none."""
+        return max((abs(rim) for rim in self.state.rim_speed if not isnan(rim)), default=0.0)
+
+    def silent(self, time: float) -> bool:
+        """Say whether no message came for longer than ``filter.silence``."""
+        return time - self.state.time > self._silence
+
+    def torque_known(self, time: float) -> bool:
+        """Say whether a torque was read of late."""
+        return time - self.state.torque_time < self._tuning.torque_age

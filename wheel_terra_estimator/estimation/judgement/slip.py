@@ -1,0 +1,141 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Slip ratio, rest and class of each wheel at the present stamp."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from math import isnan
+from typing import NamedTuple
+
+from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.estimation.component import Component
+from wheel_terra_estimator.estimation.estimates import SlipClass
+from wheel_terra_estimator.estimation.judgement.classes import ClassState, SlipClassifier
+from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
+from wheel_terra_estimator.estimation.scalars import NAN
+
+Floats = tuple[float, ...]
+_TIME_ROUNDING = 1e-6  # [s]
+
+
+@dataclass(frozen=True)
+class SlipTuning:
+    """Deviations of the slip that no model of the filter has."""
+
+    turning_std: float = 0.05
+    """At full lateral motion: turning scrubs the soil sideways (tuned, seeds 1000 to 1019)."""
+    forgetting: float = 0.02  # growth of the deviation per stamp where no rate is known
+    least_std: float = 1e-3
+
+
+class BodyMotion(NamedTuple):
+    """Motion of the body at a stamp."""
+
+    speed: float  # [m/s]
+    speed_std: float
+    yaw_rate: float  # [rad/s]
+    yaw_rate_std: float
+    lateral_motion: float  # of the outer wheels over the fastest rim speed [-]
+    stopped: bool
+    """All wheels stand, and no reference velocity says that the rover slides on them."""
+
+
+class WheelSlip(NamedTuple):
+    """Slip of one wheel."""
+
+    slip: float = 0.0
+    std: float = 1.0
+    rest_since: float = NAN  # [s], nan = not at rest
+    resting: bool = False
+    slip_class: ClassState = ClassState()
+
+
+class SlipJudge(Component[tuple[WheelSlip, ...]]):
+    """Judges slip and class of all wheels."""
+
+    def __init__(
+        self,
+        configuration: Configuration,
+        rover: Rover,
+        sensors: SensorFigures,
+        tuning: SlipTuning = SlipTuning(),
+    ) -> None:
+        super().__init__((WheelSlip(),) * rover.wheel_count)
+        figures = configuration.filter
+        self._classifier = SlipClassifier(
+            [float(border) for border in figures.class_thresholds],
+            float(figures.class_hysteresis),
+            float(figures.class_dwell),
+        )
+        self._rover, self._tuning = rover, tuning
+        self._rim_std = tuple(sensors.wheel_rate_std * r for r in rover.slip_radius)
+
+    def update(self, time: float, rims: Floats, body: BodyMotion) -> tuple[WheelSlip, ...]:
+        """Judge all wheels at a time [s]; `rims` are their rim speeds [m/s], nan = unknown."""
+        self.state = tuple(
+            [
+                self._judged(i, before, time, rim, body)
+                for i, (before, rim) in enumerate(zip(self.state, rims, strict=True))
+            ]
+        )
+        return self.state
+
+    def _judged(
+        self, i: int, before: WheelSlip, time: float, rim: float, body: BodyMotion
+    ) -> WheelSlip:
+        if isnan(rim):
+            std = min(before.std + self._tuning.forgetting, 1.0)
+            return before._replace(std=std, resting=False, slip_class=ClassState())
+        rest = self._rover.rest_speed
+        if body.stopped and abs(body.speed) < rest:
+            # All wheels stand: what the gyro says beside them is noise.
+            v, v_std = 0.0, 0.0
+        else:
+            lateral = self._rover.lateral[i]
+            v = body.speed - body.yaw_rate * lateral
+            v_std = math.hypot(body.speed_std, body.yaw_rate_std * lateral)
+        if abs(rim) < rest and abs(v) < max(rest, 2.0 * v_std):
+            return self._at_rest(before, time)
+        slip, std = slip_and_deviation(rim, v, v_std, self._rim_std[i], rest)
+        std = math.hypot(std, self._tuning.turning_std * body.lateral_motion)
+        slip_class = before.slip_class
+        if std >= 1.0 and slip_class.current == SlipClass.UNKNOWN:
+            slip_class = ClassState()  # nothing is known of it yet
+        else:
+            # Sliding back is told from standing still only where it is more than noise.
+            backwards = abs(rim) > rest and v * rim < 0.0 and abs(v) > max(rest, v_std)
+            slip_class = self._classifier.update(slip_class, time, slip, std, backwards)
+        return WheelSlip(slip, min(max(std, self._tuning.least_std), 1.0), NAN, False, slip_class)
+
+    def _at_rest(self, before: WheelSlip, time: float) -> WheelSlip:
+        """Return a wheel that stands: its slip holds its last value."""
+        since = time if isnan(before.rest_since) else before.rest_since
+        resting = time - since >= self._rover.rest_time - _TIME_ROUNDING
+        slip_class = ClassState() if resting else before.slip_class
+        return before._replace(rest_since=since, resting=resting, slip_class=slip_class)
+
+
+def slip_and_deviation(
+    rim: float, v: float, v_std: float, rim_std: float, rest_speed: float
+) -> tuple[float, float]:
+    """Return the slip ratio and its standard deviation, not both speeds being at rest.
+
+    Parameters
+    ----------
+    rim, v : float
+        Rim and ground speed [m/s].
+    v_std, rim_std : float
+        Their standard deviations [m/s].
+    rest_speed : float
+        Below it a rim stands [m/s].
+    """
+    if abs(rim) <= rest_speed:
+        return -1.0, v_std / max(abs(v), rest_speed)
+    if v * rim < 0.0:
+        return 1.0, v_std / abs(rim)
+    if abs(v) <= abs(rim):
+        slip = 1.0 - v / rim
+        return slip, math.hypot(v_std / rim, (1.0 - slip) * rim_std / rim)
+    return rim / v - 1.0, math.hypot(v_std * rim / (v * v), rim_std / v)

@@ -1,0 +1,139 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Stuck warning: raised by any sign of entrapment, cleared when none has been there for a while."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import isnan
+from typing import NamedTuple
+
+from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.estimation.component import Component
+from wheel_terra_estimator.estimation.judgement.stuck.forecast import WheelForecast, forecast
+from wheel_terra_estimator.estimation.judgement.stuck.signs import (
+    SIGNS,
+    Sign,
+    SignTuning,
+    held_back,
+    needs_met,
+)
+from wheel_terra_estimator.estimation.judgement.stuck.situation import (
+    Observed,
+    RoverMotion,
+    Situation,
+    SituationObserver,
+)
+from wheel_terra_estimator.estimation.scalars import NAN
+
+_TIME_ROUNDING = 1e-9  # [s]
+_TUNING = SignTuning()
+
+
+@dataclass(frozen=True)
+class StuckSettings:
+    """The keys ``filter.stuck_*``."""
+
+    horizon: float = 15.0  # [s]
+    travel: float = 0.3  # [m]
+    clear_slip: float = 0.6
+    clear_time: float = 3.0  # [s]
+
+    @classmethod
+    def from_configuration(cls, configuration: Configuration) -> StuckSettings:
+        """Take them from a configuration."""
+        figures = configuration.filter
+        return cls(
+            horizon=float(figures.stuck_horizon),
+            travel=float(figures.stuck_travel),
+            clear_slip=float(figures.stuck_clear_slip),
+            clear_time=float(figures.stuck_clear_time),
+        )
+
+
+class StuckAssessment(NamedTuple):
+    """Result of one update; tuples have one entry per wheel."""
+
+    stuck: bool = False
+    reason: str = ''
+    wheels: tuple[WheelForecast, ...] = ()
+    stalled: tuple[bool, ...] = ()
+
+
+class StuckState(NamedTuple):
+    """What the monitor remembers."""
+
+    observed: Observed
+    since: tuple[float, ...]  # when each sign came [s], nan = it is not there
+    stuck: bool = False
+    reason: str = ''
+    clear_since: float = NAN  # [s]
+
+
+class StuckMonitor(Component[StuckState]):
+    """Stuck warning of one rover.
+
+    Parameters
+    ----------
+    settings : StuckSettings
+        The parameters.
+    signs : sequence of Sign
+        What raises the warning.
+    """
+
+    def __init__(
+        self,
+        settings: StuckSettings = StuckSettings(),
+        signs: Sequence[Sign] = SIGNS,
+        tuning: SignTuning = _TUNING,
+    ) -> None:
+        self._observer = SituationObserver()
+        super().__init__(StuckState(self._observer.state, (NAN,) * len(signs)))
+        self._settings, self._signs, self._tuning = settings, tuple(signs), tuning
+
+    def forget_trend(self) -> None:
+        """Begin the trend anew: the level of the slip was wrong, which is no growth."""
+        self._observer.restore(self.state.observed)
+        self._observer.forget_trend()
+        self.state = self.state._replace(observed=self._observer.state)
+
+    def update(self, time: float, motion: RoverMotion) -> StuckAssessment:
+        """Judge the motion of the rover at a time [s]."""
+        self._observer.restore(self.state.observed)
+        situation = self._observer.update(time, motion)
+        since, raised = self._signs_at(time, situation)
+        stuck, reason, clear_since = self.state.stuck, self.state.reason, NAN
+        if raised:
+            reason = reason if stuck else raised[0].words(situation, self._tuning)
+            stuck = True
+        elif stuck:
+            clear_since = self._clear_since(time, situation)
+            if time - clear_since >= self._settings.clear_time:
+                stuck, reason, clear_since = False, '', NAN
+        self.state = StuckState(situation.observed, since, stuck, reason, clear_since)
+        wheels = forecast(situation, self._settings.horizon, warned=stuck)
+        return StuckAssessment(stuck, reason, wheels, situation.stalled)
+
+    def _signs_at(self, time: float, situation: Situation) -> tuple[tuple[float, ...], list[Sign]]:
+        """Return since when each sign is there, and the signs that have been for long enough."""
+        met = needs_met(situation)
+        since, raised = [], []
+        for sign, before in zip(self._signs, self.state.since, strict=True):
+            if sign.needs & ~met or not sign.present(situation, self._tuning):
+                since.append(NAN)
+                continue
+            begun = time if isnan(before) else before
+            since.append(begun)
+            held = time - begun >= sign.hold - _TIME_ROUNDING
+            if held and (sign.while_stopping or not situation.stopping):
+                raised.append(sign)
+        return tuple(since), raised
+
+    def _clear_since(self, time: float, situation: Situation) -> float:
+        """Return since when the rover seems to be free [s], nan = it does not."""
+        slipping = not situation.typical_magnitude < self._settings.clear_slip
+        labouring = not situation.motion.turning and held_back(situation, self._tuning)
+        if slipping or labouring:
+            return NAN
+        return time if isnan(self.state.clear_since) else self.state.clear_since

@@ -1,0 +1,250 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Signs of entrapment, one entry each in `SIGNS`; any of them raises the warning.
+
+To add one, write a predicate and a line of words, and enter them in the table with a hold time and
+what the sign needs. Only driving slip counts: braking and skidding are no entrapment. A single
+wheel never raises a sign.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Flag, auto
+from math import isnan
+
+from wheel_terra_estimator.estimation.judgement.classes import exceedance_probability
+from wheel_terra_estimator.estimation.judgement.stuck.situation import Situation
+from wheel_terra_estimator.estimation.scalars import median
+
+ENTRAPPED_SLIP = 0.9
+"""Slip above which a rover makes no way that matters: class *stuck*."""
+
+
+@dataclass(frozen=True)
+class SignTuning:
+    """Thresholds of the signs.
+
+    Tuned on simulated drives, seeds 1000 to 1019, and on the nine snow immobilisations of Lines
+    (Dartmouth, 2021), where half of the wheels stall.
+    """
+
+    digging_slip: float = 0.8
+    sure_std: float = 0.25  # of the slip, to call it digging
+    trend_doubt: float = 0.45
+    """Taken off the trend, over the deviation of the slip [1/s]: 1.5 deviations of the slope of
+    five references in five seconds, 1.5 / (5 s / sqrt(12) sqrt(5))."""
+    ahead_time: float = 10.0  # [s]
+    ahead_slip: float = 0.65
+    sudden_time: float = 4.0  # [s]
+    sudden_slip: float = 0.45
+    ahead_std: float = 0.2  # of the slip
+    spare_margin: float = 0.045  # of the load: with more left, no entrapment is near
+    exhausted_margin: float = 0.015
+    exhausted_slip: float = 0.6
+    held_slip: float = 0.6
+    bog_slip: float = 0.35
+    bog_time: float = 6.0  # to a stand [s]
+    bog_torque: float = 0.5  # of the torque limit, second strongest wheel
+    bog_doubt: float = 1.5
+    """Taken off the loss of speed, in deviations of the speed over the window: what references that
+    disagree by chance make of it."""
+    least_loss: float = 1e-6  # [m/s^2]
+    labour_torque: float = 0.68  # of the torque limit, second strongest wheel
+    labour_ratio: float = 0.87  # of the rim speed of the last seconds
+    least_stalled: int = 2  # wheels
+
+
+class Need(Flag):
+    """What must hold for a sign to tell anything."""
+
+    NOTHING = 0
+    SPEED = auto()  # the speed rests on a reference
+    NO_SPEED = auto()  # it does not
+    STRAIGHT = auto()  # the rover does not turn sharply: a spin in place is commanded
+    PULLED_AWAY = auto()  # the wheels have turned at their own cruise since they stood
+
+
+@dataclass(frozen=True)
+class Sign:
+    """One sign of entrapment.
+
+    Attributes
+    ----------
+    name : str
+        For logs.
+    hold : float
+        Time for which it must be present before it raises the warning [s].
+    needs : Need
+        What must hold for it to be judged at all.
+    while_stopping : bool
+        Whether it counts while the wheels are being stopped.
+    present : callable
+        Says whether it is there.
+    words : callable
+        Says so for the reader of the warning.
+    """
+
+    name: str
+    hold: float
+    needs: Need
+    while_stopping: bool
+    present: Callable[[Situation, SignTuning], bool]
+    words: Callable[[Situation, SignTuning], str]
+
+
+def needs_met(s: Situation) -> Need:
+    """Return what of the needs of signs holds."""
+    met = Need.SPEED if s.speed_known else Need.NO_SPEED
+    if not s.motion.turning:
+        met |= Need.STRAIGHT
+    if not isnan(s.rolling_time):
+        met |= Need.PULLED_AWAY
+    return met
+
+
+def _digging(s: Situation, t: SignTuning) -> bool:
+    """Find the median slip above 0.8 with a probability above one half."""
+    sure = s.settled and s.typical_std < t.sure_std
+    if not (sure and s.slips_known and s.fastest > 0.0):
+        return False
+    return exceedance_probability(s.typical_slip, s.typical_std, t.digging_slip) > 0.5
+
+
+def _exhausted(s: Situation, t: SignTuning) -> bool:
+    """Find that the soil gives hardly more pull than is asked, at high slip."""
+    return s.motion.margin < t.exhausted_margin and s.typical_slip > t.exhausted_slip
+
+
+def _ahead(s: Situation, t: SignTuning) -> bool:
+    """Find that the median slip passes 0.9 soon; the higher it stands, the farther this looks."""
+    slip = s.typical_slip
+    if not s.speed_known and s.motion.margin > t.spare_margin:
+        return False  # without a speed the slip is half a guess: the soil must be near its limit
+    growth = s.trend - t.trend_doubt * s.typical_std
+    soon = slip > t.ahead_slip and slip + t.ahead_time * growth > ENTRAPPED_SLIP
+    at_once = slip > t.sudden_slip and slip + t.sudden_time * growth > ENTRAPPED_SLIP
+    return (soon or at_once) and s.typical_std < t.ahead_std
+
+
+def _lost_share(s: Situation) -> float:
+    """Return the share of the fastest rim speed that the body does not make [-]."""
+    return 1.0 - s.speed_ahead / s.fastest
+
+
+def _held(s: Situation, t: SignTuning) -> bool:
+    """Find little of the fastest rim speed made good while half of the wheels slip or stand.
+
+    Torque-limited wheels stall as often as they spin.
+    """
+    if not (s.moving and s.fastest > 0.0 and any(s.stalled)):
+        return False
+    slow = s.tuning.stall_ratio * s.fastest
+    bad = sum(1 for w in s.moving if w.slip > t.held_slip or abs(w.rim_speed) < slow)
+    bad += len(s.stalled) - len(s.moving)
+    return _lost_share(s) > t.held_slip and 2 * bad >= len(s.stalled)
+
+
+def _time_to_stand(s: Situation, t: SignTuning) -> float:
+    """Return after which time the rover would stand at its present loss of speed [s]."""
+    loss = s.speed_loss
+    if s.speed_known:
+        spread = median([w.slip_std for w in s.moving]) * s.fastest
+        loss -= t.bog_doubt * spread / s.tuning.loss_window
+    return max(s.speed_ahead, 0.0) / loss if loss > t.least_loss else math.inf
+
+
+def _bogging(s: Situation, t: SignTuning) -> bool:
+    """Find wheels near their limit while the rover loses speed against its fastest wheel."""
+    # Two wheels or more: one alone may stand against a stone.
+    if not (s.second_strongest > t.bog_torque and s.moving and s.fastest > 0.0):
+        return False
+    return _lost_share(s) > t.bog_slip and _time_to_stand(s, t) < t.bog_time
+
+
+def _stalling(s: Situation, t: SignTuning) -> bool:
+    """Find half of the wheels near their torque limit, much slower than the fastest."""
+    count = sum(s.stalled)
+    return count >= t.least_stalled and 2 * count >= len(s.stalled)
+
+
+def held_back(s: Situation, t: SignTuning) -> bool:
+    """Find two wheels near their limit and slower than the fastest, the rover slower still."""
+    if not s.moving:
+        return False
+    return (
+        s.second_strongest >= t.labour_torque
+        and s.typical_rim < t.labour_ratio * s.fastest
+        and (not s.speed_known or 1.0 - abs(s.motion.speed) / s.fastest > t.bog_slip)
+    )
+
+
+def _labouring(s: Situation, t: SignTuning) -> bool:
+    """Find wheels near their limit that turn slower than in the last seconds."""
+    slowed = s.typical_rim < t.labour_ratio * s.cruise_rim
+    return slowed and s.rolling_time >= s.tuning.pull_away_time and held_back(s, t)
+
+
+SIGNS: tuple[Sign, ...] = (
+    Sign(
+        'digging',
+        1.5,
+        Need.NOTHING,
+        False,
+        _digging,
+        lambda s, t: f'median slip {s.typical_slip:.2f}: digging in',
+    ),
+    Sign(
+        'exhausted',
+        6.0,
+        Need.NO_SPEED,
+        False,
+        _exhausted,
+        lambda s, t: f'soil gives {s.motion.margin:.3f} of the load more than is asked',
+    ),
+    Sign(
+        'ahead',
+        1.0,
+        Need.NOTHING,
+        False,
+        _ahead,
+        lambda s, t: f'median slip {s.typical_slip:.2f} grows by {s.trend:.3f} per second',
+    ),
+    Sign(
+        'held',
+        0.4,
+        Need.SPEED | Need.PULLED_AWAY,
+        True,
+        _held,
+        lambda s, t: f'{_lost_share(s):.0%} of the fastest rim speed lost, others held',
+    ),
+    Sign(
+        'bogging',
+        0.2,
+        Need.STRAIGHT | Need.PULLED_AWAY,
+        True,
+        _bogging,
+        lambda s, t: (
+            f'bogging down: stands in {_time_to_stand(s, t):.1f} s, wheels near their torque limit'
+        ),
+    ),
+    Sign(
+        'stall',
+        0.4,
+        Need.NOTHING,
+        True,
+        _stalling,
+        lambda s, t: f'{sum(s.stalled)} wheels stalled near their torque limit',
+    ),
+    Sign(
+        'labour',
+        0.4,
+        Need.STRAIGHT,
+        True,
+        _labouring,
+        lambda s, t: f'wheels slowed to {s.typical_rim:.2f} m/s near their torque limit',
+    ),
+)
+"""The signs; where several are there at once, the first gives the words."""

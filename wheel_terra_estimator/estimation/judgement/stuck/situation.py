@@ -1,0 +1,316 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""What the stuck warning observes of the rover: typical slip, its trend, torques, lost speed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from math import isnan
+from typing import NamedTuple
+
+from wheel_terra_estimator.estimation.component import Component
+from wheel_terra_estimator.estimation.judgement.stuck.windows import (
+    Window,
+    appended,
+    slope,
+    trimmed,
+)
+from wheel_terra_estimator.estimation.scalars import NAN, median
+
+_TIME_ROUNDING = 1e-9  # [s]
+
+
+@dataclass(frozen=True)
+class SituationTuning:
+    """Windows and thresholds of what is observed.
+
+    Tuned on simulated drives, seeds 1000 to 1019, and on the nine snow immobilisations of Lines
+    (Dartmouth, 2021) where wheels stall.
+    """
+
+    trend_window: float = 5.0  # over which the growth of the slip is taken [s]
+    shortest_trend: float = 2.5
+    fewest_trend: int = 5  # samples
+    trend_spacing: float = 0.2  # of the samples [s]
+    settling_travel: float = 0.25  # [m] of rim travel after a start in which slip settles
+    growth_travel: float = 0.15  # [m] of rim travel over which the growth of the sinkage is taken
+    growth_samples: float = 10.0  # in it
+    least_growth_share: float = 0.5  # of that travel that must be covered
+    cruise_decay: float = 0.999  # of the greatest rim speed, per update
+    rolling_share: float = 0.5  # of it, above which the rover has pulled away
+    standing_share: float = 0.2  # below which it has stopped
+    pull_away_time: float = 1.0  # [s]: pulling away from rest looks like a stall
+    stall_ratio: float = 0.6  # of the fastest rim speed: a wheel below it is held
+    stall_torque: float = 0.7  # of the torque limit
+    loss_window: float = 1.5  # over which the loss of speed is taken [s]
+    loss_window_rounding: float = 1e-6
+    stopping_window: float = 1.0  # [s]
+    stopping_share: float = 0.8  # of the fastest rim speed in it
+    strained_torque: float = 0.5  # of the limit: two such wheels are held by the soil
+    cruise_window: float = 5.0  # [s]
+
+
+class WheelMotion(NamedTuple):
+    """What the warning needs of one wheel."""
+
+    slip: float
+    slip_std: float
+    rim_speed: float  # [m/s], signed
+    known: bool  # a rate is known and the wheel is not at rest
+    torque_share: float  # |torque| over its limit, nan = unknown
+    sinkage: float  # [m]
+    radius: float  # [m]
+
+
+class RoverMotion(NamedTuple):
+    """What the warning needs of the rover."""
+
+    speed: float  # [m/s]
+    speed_known: bool
+    """Whether the speed rests on more than a guess."""
+    wheels: tuple[WheelMotion, ...]
+    turning: bool = False
+    """Sharply: slip that comes from turning says nothing of what is ahead."""
+    margin: float = NAN
+    """Greatest pull that the soil can give beyond what is asked, over the load; nan = unknown."""
+
+
+class Deepening(NamedTuple):
+    """Sinkage of one wheel over its rim travel."""
+
+    travel: float = 0.0  # [m]
+    samples: Window = ()
+    growth: float = 0.0  # sinkage gained per rim travel [m/m]
+
+
+class Observed(NamedTuple):
+    """What is remembered from update to update."""
+
+    time: float = NAN  # [s]
+    rolling_since: float = NAN  # [s], nan = not pulled away yet
+    cruise: float = 0.0  # greatest rim speed, slowly forgotten [m/s]
+    rim_travel: float = 0.0  # since the wheels last stood [m]
+    slips: Window = ()  # typical slip over time
+    trend: float = 0.0  # its growth [1/s]
+    speeds: Window = ()  # body speed over time
+    fastest: Window = ()  # fastest rim speed over time
+    typical: Window = ()  # typical rim speed over time
+    deepening: tuple[Deepening, ...] = ()
+
+
+@dataclass(frozen=True)
+class Situation:
+    """The rover at one update, as the signs of entrapment see it."""
+
+    motion: RoverMotion
+    observed: Observed
+    moving: tuple[WheelMotion, ...]  # wheels with a known rate that are not at rest
+    stalled: tuple[bool, ...]
+    """Wheels that pull near their limit and hardly turn while another turns."""
+    fastest: float  # rim speed [m/s]
+    typical_slip: float
+    """Median; a stalled wheel offers nothing and counts as one that makes no way."""
+    typical_std: float
+    settled: bool  # the slip has settled after a start
+    stopping: bool
+    """The wheels are being stopped: a late or early reference then shows slip that is none."""
+    rolling_time: float  # [s] since the rover pulled away, nan = it did not
+    tuning: SituationTuning
+
+    @property
+    def speed_known(self) -> bool:
+        """Whether the speed rests on more than a guess."""
+        return self.motion.speed_known
+
+    @property
+    def slips_known(self) -> bool:
+        """Whether any wheel tells a slip."""
+        return bool(self.moving) or any(self.stalled)
+
+    @property
+    def trend(self) -> float:
+        """Growth of the typical slip [1/s]."""
+        return self.observed.trend
+
+    @cached_property
+    def speed_ahead(self) -> float:
+        """Body speed in the direction in which the fastest wheel turns [m/s]."""
+        return self._direction * self.motion.speed
+
+    @property
+    def speed_loss(self) -> float:
+        """Deceleration over the last second and a half [m/s^2]."""
+        return -self._direction * slope(self.observed.speeds)
+
+    @cached_property
+    def second_strongest(self) -> float:
+        """Second greatest share of the torque limit [-]; 0 where fewer are known."""
+        shares = sorted(w.torque_share for w in self.motion.wheels if w.torque_share >= 0.0)
+        return shares[-2] if len(shares) > 1 else 0.0
+
+    @cached_property
+    def typical_rim(self) -> float:
+        """Typical rim speed [m/s]."""
+        return median([abs(w.rim_speed) for w in self.moving]) if self.moving else 0.0
+
+    @cached_property
+    def cruise_rim(self) -> float:
+        """Greatest typical rim speed of the last seconds [m/s]."""
+        return max((rim for _, rim in self.observed.typical), default=0.0)
+
+    @property
+    def typical_magnitude(self) -> float:
+        """Median of |s|, braking included; nan where no wheel tells."""
+        return median([abs(w.slip) for w in self.moving]) if self.moving else NAN
+
+    @cached_property
+    def _direction(self) -> float:
+        return 1.0 if max(self.moving, key=_magnitude).rim_speed > 0.0 else -1.0
+
+
+class SituationObserver(Component[Observed]):
+    """Turns the motion of the rover into the situation that the signs judge."""
+
+    def __init__(self, tuning: SituationTuning = SituationTuning()) -> None:
+        super().__init__(Observed())
+        self._tuning = tuning
+
+    def forget_trend(self) -> None:
+        """Begin the trend anew: the level of the slip was wrong, which is no growth."""
+        self.state = self.state._replace(slips=())
+
+    def update(self, time: float, motion: RoverMotion) -> Situation:
+        """Observe the motion at a time [s]."""
+        old, tuning = self.state, self._tuning
+        dt = 0.0 if isnan(old.time) else max(time - old.time, 0.0)
+        moving = tuple([w for w in motion.wheels if w.known])
+        fastest = max([abs(w.rim_speed) for w in moving], default=0.0)
+        cruise = max(fastest, tuning.cruise_decay * old.cruise)
+        rolling_since = self._rolling_since(time, fastest, cruise)
+        stalled = self._stalled(motion.wheels, fastest, time - rolling_since)
+        # Slip settles over the first travel after a start: its growth there says nothing.
+        rim_travel = old.rim_travel + fastest * dt if moving else 0.0
+        settled = rim_travel > tuning.settling_travel
+        effective = [w.slip for w in moving]
+        effective += [1.0 for w, s in zip(motion.wheels, stalled, strict=True) if s and not w.known]
+        typical = median(effective) if effective else 0.0
+        slips, trend = self._trend(time, typical, follow=settled and not motion.turning)
+        rims = appended(old.fastest, time, fastest, tuning.stopping_window)
+        observed = Observed(
+            time,
+            rolling_since,
+            cruise,
+            rim_travel,
+            slips,
+            trend,
+            self._speeds(time, motion),
+            rims,
+            self._typical_rims(time, motion, moving),
+            self._deepened(motion.wheels, dt, fresh=rim_travel < tuning.settling_travel),
+        )
+        self.state = observed
+        return Situation(
+            motion=motion,
+            observed=observed,
+            moving=moving,
+            stalled=stalled,
+            fastest=fastest,
+            typical_slip=typical,
+            typical_std=median([w.slip_std for w in moving]) if moving else 1.0,
+            settled=settled,
+            stopping=self._stopping(motion.wheels, fastest, rims),
+            rolling_time=time - rolling_since,
+            tuning=tuning,
+        )
+
+    def _rolling_since(self, time: float, fastest: float, cruise: float) -> float:
+        """Return since when the fastest wheel turns at half of its own cruise, nan = it does not.
+
+        It rests on rim speed alone, so that no unaided body speed decides.
+        """
+        since, tuning = self.state.rolling_since, self._tuning
+        if fastest > tuning.rolling_share * cruise and fastest > 0.0:
+            return time if isnan(since) else since
+        return NAN if fastest < tuning.standing_share * cruise else since
+
+    def _stalled(
+        self, wheels: Sequence[WheelMotion], fastest: float, rolling_time: float
+    ) -> tuple[bool, ...]:
+        tuning = self._tuning
+        if not rolling_time >= tuning.pull_away_time:
+            return (False,) * len(wheels)
+        return tuple(
+            [
+                w.torque_share >= tuning.stall_torque
+                and abs(w.rim_speed) < tuning.stall_ratio * fastest
+                for w in wheels
+            ]
+        )
+
+    def _stopping(self, wheels: Sequence[WheelMotion], fastest: float, rims: Window) -> bool:
+        """Wheels that slow down; near their torque limit they are held by the soil instead."""
+        tuning = self._tuning
+        if fastest >= tuning.stopping_share * max(rim for _, rim in rims):
+            return False
+        return sum(w.torque_share > tuning.strained_torque for w in wheels) < 2
+
+    def _trend(self, time: float, typical: float, *, follow: bool) -> tuple[Window, float]:
+        """Return the samples of the typical slip and their growth [1/s], 0 when unknown."""
+        tuning, slips = self._tuning, self.state.slips
+        if not follow:
+            return (), 0.0
+        if not slips or time - slips[-1][0] >= tuning.trend_spacing - _TIME_ROUNDING:
+            slips = (*slips, (time, typical))
+        slips = trimmed(slips, time, tuning.trend_window)
+        if len(slips) < tuning.fewest_trend or slips[-1][0] - slips[0][0] < tuning.shortest_trend:
+            return slips, 0.0
+        return slips, self.state.trend if slips is self.state.slips else slope(slips)
+
+    def _speeds(self, time: float, motion: RoverMotion) -> Window:
+        if motion.turning:
+            # A spin in place has turning wheels and no speed, by command.
+            return ()
+        span = self._tuning.loss_window + self._tuning.loss_window_rounding
+        return appended(self.state.speeds, time, motion.speed, span)
+
+    def _typical_rims(
+        self, time: float, motion: RoverMotion, moving: Sequence[WheelMotion]
+    ) -> Window:
+        if motion.turning:
+            return self.state.typical
+        typical = median([abs(w.rim_speed) for w in moving]) if moving else 0.0
+        return appended(self.state.typical, time, typical, self._tuning.cruise_window)
+
+    def _deepened(
+        self, wheels: Sequence[WheelMotion], dt: float, *, fresh: bool
+    ) -> tuple[Deepening, ...]:
+        """Return the sinkage of each wheel over its last rim travel."""
+        before = self.state.deepening or (Deepening(),) * len(wheels)
+        return tuple(
+            [
+                self._deepening(b, w, w.rim_speed * dt, fresh)
+                for b, w in zip(before, wheels, strict=True)
+            ]
+        )
+
+    def _deepening(
+        self, before: Deepening, wheel: WheelMotion, rolled: float, fresh: bool
+    ) -> Deepening:
+        tuning = self._tuning
+        span = tuning.growth_travel
+        travel = before.travel + abs(rolled)
+        samples = () if fresh else before.samples  # wheels settle into their ruts after a start
+        if not samples or travel - samples[-1][0] >= span / tuning.growth_samples:
+            samples = (*samples, (travel, wheel.sinkage))
+        samples = trimmed(samples, travel, span) or ((travel, wheel.sinkage),)
+        if samples is before.samples:
+            return Deepening(travel, samples, before.growth)
+        covered = samples[-1][0] - samples[0][0]
+        growth = slope(samples) if covered > tuning.least_growth_share * span else 0.0
+        return Deepening(travel, samples, growth)
+
+
+def _magnitude(wheel: WheelMotion) -> float:
+    return abs(wheel.rim_speed)

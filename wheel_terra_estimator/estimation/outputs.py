@@ -1,0 +1,213 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""The set of estimates of a stamp, with reasons and faults in words."""
+
+from __future__ import annotations
+
+import math
+from math import isnan
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.estimation.contacts.loads import LoadState
+from wheel_terra_estimator.estimation.contacts.pulls import PullState
+from wheel_terra_estimator.estimation.estimates import NO_ENTRAPMENT_IN_SIGHT, EstimateSet
+from wheel_terra_estimator.estimation.filter.sinkage_process import SinkageState
+from wheel_terra_estimator.estimation.filter.state import (
+    SHEAR_MODULUS,
+    SHEAR_STRENGTH,
+    StateLayout,
+)
+from wheel_terra_estimator.estimation.judgement.slip import WheelSlip
+from wheel_terra_estimator.estimation.judgement.stuck.forecast import LONGEST_TIME, WheelForecast
+from wheel_terra_estimator.estimation.judgement.stuck.monitor import StuckAssessment
+from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
+
+FloatArray = NDArray[np.float64]
+Floats = tuple[float, ...]
+_LEAST_VARIANCE = 1e-12  # of a speed [(m/s)^2]
+_UNKNOWN_STD = 1.0  # of a slip velocity [m/s]
+_UNKNOWN_YAW_VARIANCE = 1.0  # [(rad/s)^2]
+_UNLOADED_STD = 1.0  # of the pull of a wheel in the air [N]
+_NOTHING_AHEAD = WheelForecast(0.0, LONGEST_TIME, NO_ENTRAPMENT_IN_SIGHT)
+
+
+class Sources(NamedTuple):
+    """What the estimator knows at a stamp."""
+
+    stamp: int  # [ns]
+    mean: FloatArray  # (size,) of the filter
+    covariance: FloatArray  # (size, size)
+    speed: float  # [m/s]
+    speed_variance: float
+    yaw_rate: float  # [rad/s]
+    yaw_rate_std: float
+    rims: Floats  # [m/s], nan = unknown
+    slips: tuple[WheelSlip, ...]
+    loads: LoadState
+    pulls: PullState
+    sinkage: SinkageState
+    margin: Floats  # [N]
+    assessment: StuckAssessment
+
+
+class MissingInputs(NamedTuple):
+    """Which inputs are missing at a stamp."""
+
+    wheel_odometry: bool
+    imu: bool
+    orientation: bool
+    torque: bool
+    sinkage: bool
+    reference: bool
+
+
+_COST = (
+    'no wheel odometry: slip held',
+    'no IMU: loads of level ground, no balance of forces',
+    'no orientation: slope from gyro and specific force',
+    'no torque: pull from the balance of forces and the soil model',
+    'no sinkage: held by its model',
+    'no reference velocity: slip from forces and soil model',
+)
+"""What each of `MissingInputs` costs."""
+
+
+class Outputs:
+    """Writes sets of estimates of one rover."""
+
+    def __init__(
+        self,
+        configuration: Configuration,
+        rover: Rover,
+        sensors: SensorFigures,
+        layout: StateLayout,
+    ) -> None:
+        self._soil = configuration.soil
+        self._rover, self._layout = rover, layout
+        self._rim_std = tuple(sensors.wheel_rate_std * r for r in rover.slip_radius)
+        self._sinkage_zero = sensors.sinkage_zero_std
+
+    def estimate_set(self, given: Sources, missing: MissingInputs) -> EstimateSet:
+        """Return the outputs of a stamp."""
+        layout, rover, n = self._layout, self._rover, self._rover.wheel_count
+        slip_velocity, slip_velocity_std = self._slip_velocity(given)
+        variance = np.diagonal(given.covariance)[layout.sinkage]
+        sinkage_std = np.sqrt(np.maximum(variance, 0.0) + self._sinkage_zero**2)
+        names, soil, soil_std = self.learned_soil(given.mean, given.covariance)
+        load = given.loads.load
+        mean_load_std = rover.load_std * sum(load) / n
+        ahead = given.assessment.wheels or (_NOTHING_AHEAD,) * n
+        return EstimateSet(
+            stamp=given.stamp,
+            slip=np.array([wheel.slip for wheel in given.slips]),
+            slip_std=np.array([wheel.std for wheel in given.slips]),
+            slip_velocity=np.array(slip_velocity),
+            slip_velocity_std=np.array(slip_velocity_std),
+            drawbar_pull=np.array(given.pulls.pull),
+            drawbar_pull_std=np.minimum(
+                np.array(given.pulls.std), [w if w > 0 else _UNLOADED_STD for w in load]
+            ),
+            sinkage=given.mean[layout.sinkage].copy(),
+            sinkage_std=np.minimum(sinkage_std, rover.rim_radius),
+            sinkage_rate=np.array(given.sinkage.rate),
+            sinkage_rate_std=np.array(given.sinkage.rate_std),
+            normal_load=np.array(load),
+            normal_load_std=np.array(
+                [mean_load_std if given.loads.force_known else w for w in load]
+            ),
+            slip_class=np.array(
+                [wheel.slip_class.current for wheel in given.slips], dtype=np.uint8
+            ),
+            rim_travel_left=np.array([wheel.travel for wheel in ahead]),
+            pull_margin=np.array(given.margin),
+            soil_names=names,
+            soil=soil,
+            soil_std=soil_std,
+            forward_velocity=given.speed,
+            forward_velocity_variance=max(given.speed_variance, _LEAST_VARIANCE),
+            yaw_rate=given.yaw_rate,
+            yaw_rate_variance=(
+                given.yaw_rate_std**2 if given.loads.force_known else _UNKNOWN_YAW_VARIANCE
+            ),
+            stuck=given.assessment.stuck,
+            stuck_probability=np.array([wheel.probability for wheel in ahead]),
+            time_to_stuck=np.array([wheel.time for wheel in ahead]),
+            reasons=reasons_in_words(given),
+            faults=faults_in_words(missing),
+        )
+
+    def learned_soil(
+        self, mean: FloatArray, covariance: FloatArray
+    ) -> tuple[tuple[str, ...], FloatArray, FloatArray]:
+        """Return name, value and standard deviation of what was learned of the soil."""
+        soil, k = self._soil, self._layout.stiffness
+        strength = math.exp(float(mean[SHEAR_STRENGTH]))
+        strength_std = math.sqrt(float(covariance[SHEAR_STRENGTH, SHEAR_STRENGTH]))
+        tangent = math.tan(float(soil.friction_angle)) * strength
+        angle = math.degrees(math.atan(tangent))
+        angle_std = math.degrees(tangent * strength_std / (1.0 + tangent * tangent))
+        cohesion = float(soil.cohesion) * strength
+        modulus = float(soil.shear_modulus) * math.exp(float(mean[SHEAR_MODULUS]))
+        modulus_std = math.sqrt(float(covariance[SHEAR_MODULUS, SHEAR_MODULUS]))
+        stiffness = math.exp(float(mean[k].mean()))
+        stiffness_std = math.sqrt(max(float(covariance[k, k].mean()), 0.0))
+        frictional = float(soil.frictional_modulus) * stiffness
+        cohesive = float(soil.cohesive_modulus) * stiffness
+        entries: tuple[tuple[str, float, float], ...] = (
+            ('soil.friction_angle_deg', angle, angle_std),
+            ('soil.cohesion', cohesion, cohesion * strength_std),
+            ('soil.shear_modulus', modulus, modulus * modulus_std),
+            ('soil.frictional_modulus', frictional, frictional * stiffness_std),
+            ('soil.cohesive_modulus', cohesive, abs(cohesive) * stiffness_std),
+        )
+        return (
+            tuple(entry[0] for entry in entries),
+            np.array([entry[1] for entry in entries]),
+            np.array([entry[2] for entry in entries]),
+        )
+
+    def _slip_velocity(self, given: Sources) -> tuple[list[float], list[float]]:
+        """Return r w - v of each wheel and its deviation [m/s]."""
+        velocity, deviation = [], []
+        for rim, y, rim_std in zip(given.rims, self._rover.lateral, self._rim_std, strict=True):
+            if isnan(rim):
+                velocity.append(0.0)
+                deviation.append(_UNKNOWN_STD)
+                continue
+            velocity.append(rim - (given.speed - given.yaw_rate * y))
+            turning = (given.yaw_rate_std * y) ** 2
+            std = math.sqrt(max(given.speed_variance, 0.0) + turning)
+            deviation.append(math.hypot(std, rim_std))
+        return velocity, deviation
+
+
+def reasons_in_words(given: Sources) -> tuple[str, ...]:
+    """Return for each wheel why it is judged as it is."""
+    assessment = given.assessment
+    stalled = assessment.stalled or (False,) * len(given.rims)
+    warning = f'; rover: {assessment.reason}' if assessment.stuck and assessment.reason else ''
+    words = []
+    for rim, stands, wheel in zip(given.rims, stalled, given.slips, strict=True):
+        if isnan(rim):
+            text = 'no wheel rate'
+        elif stands:
+            text = 'stalled: torque near its limit, hardly turning while others turn'
+        elif wheel.resting:
+            text = 'at rest'
+        else:
+            text = f'slip {wheel.slip:.2f} +- {wheel.std:.2f}'
+        words.append(text + warning)
+    return tuple(words)
+
+
+def faults_in_words(missing: MissingInputs) -> dict[str, str]:
+    """Return what is missing, and what that costs."""
+    return {
+        name: words
+        for name, absent, words in zip(MissingInputs._fields, missing, _COST, strict=True)
+        if absent
+    }

@@ -1,0 +1,127 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""What the estimator needs of the configuration, as plain floats (fast in scalar code)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.estimation.contacts.load_distribution import (
+    LoadDistribution,
+    load_distribution,
+)
+
+_LEAST_LOW_RIM = 0.005
+"""Rim speed [m/s] below which v / rim speed is not told from the noise of encoders."""
+_LOW_RIM_OVER_REST = 3.0
+_CONTACT_SHARE = 0.5
+"""Contact length over the rim radius: an entrance angle of 30 degrees, as of rovers in sand."""
+
+
+@dataclass(frozen=True)
+class Rover:
+    """Constants of one rover; tuples have one entry per wheel."""
+
+    wheel_count: int
+    slip_radius: tuple[float, ...]  # [m]
+    rim_radius: tuple[float, ...]
+    shear_radius: tuple[float, ...]  # to the lug tips
+    lateral: tuple[float, ...]  # y in base_link [m]
+    longitudinal: tuple[float, ...]  # x [m]
+    torque_limit: tuple[float, ...]  # [N m], 0 = not stated
+    mass: float
+    gravity: float
+    load: LoadDistribution
+    load_std: float  # relative
+    rut_tilt: tuple[float, ...]
+    """Body pitch up per metre of sinkage of each wheel [rad/m]."""
+    rest_speed: float  # [m/s]
+    rest_time: float  # [s]
+    silence: float  # [s]
+    period: float
+    """Least time between two cycles of the filter [s]."""
+    low_rim: float
+    """Rim speed below which v / rim speed is not told from noise [m/s]."""
+    contact_length: float
+    """Travel after which a contact is new all along, and its shear that of the model [m]."""
+    curvature_length: float
+    """Half the distance between the first and the last axle [m]."""
+
+    @classmethod
+    def from_configuration(cls, configuration: Configuration) -> Rover:
+        """Collect and derive the constants."""
+        wheels, rover, tuning = configuration.wheels, configuration.rover, configuration.filter
+        x = np.asarray(wheels.x, dtype=float)
+        spread = x - x.mean()
+        tilt = -spread / max(float(spread @ spread), 1e-9) if np.ptp(x) > 1e-6 else 0.0 * x
+        rest_speed = configuration.rest_speed
+        return cls(
+            wheel_count=wheels.count,
+            slip_radius=_floats(wheels.slip_radius),
+            rim_radius=_floats(wheels.radius),
+            shear_radius=_floats(wheels.radius + wheels.lug_height),
+            lateral=_floats(wheels.y),
+            longitudinal=_floats(x),
+            torque_limit=_floats(wheels.torque_limit),
+            mass=float(rover.mass),
+            gravity=float(rover.gravity),
+            load=_load_distribution(configuration),
+            load_std=float(rover.load_std),
+            rut_tilt=_floats(tilt),
+            rest_speed=rest_speed,
+            rest_time=float(tuning.rest_time),
+            silence=float(tuning.silence),
+            period=float(tuning.period),
+            low_rim=max(_LOW_RIM_OVER_REST * rest_speed, _LEAST_LOW_RIM),
+            contact_length=_CONTACT_SHARE * min(_floats(wheels.radius)),
+            curvature_length=0.5 * (max(_floats(x)) - min(_floats(x))),
+        )
+
+
+@dataclass(frozen=True)
+class SensorFigures:
+    """Standard deviations and rates of the sensors, as in the keys ``sensors.*``."""
+
+    wheel_rate_std: float  # [rad/s]
+    torque_std: float  # [N m]
+    torque_zero_std: float
+    torque_gain_std: float  # [-]
+    imu_rate: float  # [Hz]
+    specific_force_std: float  # [m/s^2], per message
+    specific_force_bias_std: float
+    angular_rate_std: float  # [rad/s], per message
+    angular_rate_bias_std: float
+    orientation_std: float  # [rad]
+    sinkage_std: float  # [m]
+    sinkage_zero_std: float
+    reference_std: float  # [m/s]
+    reference_std_floor: float
+
+    @classmethod
+    def from_configuration(cls, configuration: Configuration) -> SensorFigures:
+        """Take the figures of a configuration."""
+        sensors = configuration.sensors
+        return cls(**{name: float(getattr(sensors, name)) for name in cls.__annotations__})
+
+
+def _floats(values: np.ndarray) -> tuple[float, ...]:
+    return tuple(float(value) for value in values)
+
+
+def _load_distribution(configuration: Configuration) -> LoadDistribution:
+    wheels, rover = configuration.wheels, configuration.rover
+    shares = np.asarray(rover.load_shares, dtype=float)
+    return load_distribution(
+        mass=float(rover.mass),
+        position=np.column_stack([wheels.x, wheels.y]).astype(float),
+        centre_of_gravity=[float(c) for c in rover.centre_of_gravity],
+        contact_height=float(np.mean(np.asarray(wheels.z) - np.asarray(wheels.radius))),
+        suspension=rover.suspension,
+        shares=shares if shares.any() else np.ones(wheels.count),
+        rocker_pivot=rover.rocker_pivot,
+        bogie_pivot=rover.bogie_pivot,
+        bogie_wheels=rover.bogie_wheels,
+    )
