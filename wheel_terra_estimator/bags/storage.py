@@ -2,48 +2,41 @@
 # SPDX-License-Identifier: Apache-2.0
 """Raw messages of a recording, whatever its shape and state.
 
-A rosbag2 folder, a folder without ``metadata.yaml``, a single ``.mcap`` or ``.db3``, compressed or
-cut off: `open_bag` gives the messages that are whole and says in words what was wrong. On damaged
-files the libraries raise almost anything, hence the wide handlers here.
+A rosbag2 folder, a folder without ``metadata.yaml``, a single ``.mcap`` or ``.db3``, compressed,
+cut off or damaged: `open_bag` gives the messages that are whole and says what was wrong.
 """
 
 from __future__ import annotations
 
 import heapq
+import stat
 from collections import Counter
 from collections.abc import Collection, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import NamedTuple, Protocol
+from typing import Protocol
 
-from wheel_terra_estimator.bags.mcap_recovery import RecoveredMessage, decompress_zstd, recover
+from wheel_terra_estimator.bags import bag_metadata
+from wheel_terra_estimator.bags.compression import ZSTD_MAGIC, unpack_file, unpack_message
+from wheel_terra_estimator.bags.limits import LIMITS, Limits
+from wheel_terra_estimator.bags.losses import Losses
+from wheel_terra_estimator.bags.mcap_file import McapFile
+from wheel_terra_estimator.bags.raw_messages import RawMessage, Topic
+from wheel_terra_estimator.bags.sqlite_file import SqliteFile
 from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.input_file import check_regular
 
 STORAGE_SUFFIXES = ('.mcap', '.db3', '.mcap.zstd', '.db3.zstd')
-ZSTD_MAGIC = b'\x28\xb5\x2f\xfd'
-
-
-class RawMessage(NamedTuple):
-    """A message as it lies in the bag; ``log_time`` in ns, ``data`` in CDR."""
-
-    log_time: int
-    topic: str
-    data: bytes
-
-
-class Topic(NamedTuple):
-    """A topic of the bag, ``type`` as in ``sensor_msgs/msg/Imu``."""
-
-    name: str
-    type: str
-    message_count: int
 
 
 class _Source(Protocol):
     topics: list[Topic]
+    losses: Losses
 
     def messages(self, topics: Collection[str]) -> Iterator[RawMessage]: ...
+
+    def notes(self) -> list[str]: ...
 
 
 class Bag:
@@ -53,21 +46,25 @@ class Bag:
     ----------
     topics : dict of str to Topic
         All topics, by name.
-    notes : list of str
-        What was wrong with the recording and what was done about it; grows while reading.
     """
 
     def __init__(self, path: Path, sources: list[_Source], notes: list[str]) -> None:
         self.path = path
-        self.notes = notes
+        self._notes = notes
         self._sources = sources
         counts: Counter[str] = Counter()
         types: dict[str, str] = {}
         for source in sources:
             for topic in source.topics:
                 counts[topic.name] += topic.message_count
-                types[topic.name] = _normal_type(topic.type)
+                if topic.name not in types or topic.message_count:
+                    types[topic.name] = _normal_type(topic.type)
         self.topics = {name: Topic(name, types[name], counts[name]) for name in sorted(types)}
+
+    @property
+    def notes(self) -> list[str]:
+        """What was wrong with the recording and what was done about it; grows while reading."""
+        return [*self._notes, *(note for source in self._sources for note in source.notes())]
 
     @property
     def message_count(self) -> int:
@@ -79,14 +76,23 @@ class Bag:
         sources = [source.messages(topics) for source in self._sources]
         merged = sources[0] if len(sources) == 1 else heapq.merge(*sources, key=lambda m: m[0])
         for message in merged:
-            if message.data[:4] == ZSTD_MAGIC:  # compressed message by message, without metadata
-                message = message._replace(data=decompress_zstd(message.data))
+            if message.data[:4] == ZSTD_MAGIC:  # compressed message by message
+                message = message._replace(data=unpack_message(message.data))
             yield message
 
 
 @contextmanager
-def open_bag(path: str | Path) -> Iterator[Bag]:
+def open_bag(path: str | Path, limits: Limits = LIMITS) -> Iterator[Bag]:
     """Open a recording.
+
+    A `UserError` that is raised while it is open is completed by what is wrong with the recording.
+
+    Parameters
+    ----------
+    path : str or Path
+        Folder or storage file.
+    limits : Limits
+        What is unpacked and held.
 
     Raises
     ------
@@ -96,111 +102,113 @@ def open_bag(path: str | Path) -> Iterator[Bag]:
     path = Path(path)
     notes: list[str] = []
     with ExitStack() as stack:
-        bag = Bag(path, _open_sources(path, notes, stack), notes)
-        if not bag.message_count:
-            raise UserError(
-                f'{path}: the bag holds no messages; was the recorder stopped before a publisher '
-                'was found (look at `ros2 topic list`)?' + ''.join(f' ({note})' for note in notes)
-            )
-        yield bag
+        bag = Bag(path, _open_sources(path, notes, stack, limits), notes)
+        try:
+            if not bag.message_count:
+                raise UserError(
+                    f'{path}: the bag holds no messages; was the recorder stopped before a '
+                    'publisher was found (look at `ros2 topic list`)?'
+                )
+            yield bag
+        except UserError as error:
+            if not bag.notes:
+                raise
+            raise UserError(f'{error} ({"; ".join(bag.notes)})') from None
 
 
-def _open_sources(path: Path, notes: list[str], stack: ExitStack) -> list[_Source]:
-    """Open what can be opened, from the most to the least regular way."""
-    if not path.exists():
+def _open_sources(path: Path, notes: list[str], stack: ExitStack, limits: Limits) -> list[_Source]:
+    try:
+        folder = path.is_dir()
+        there = folder or path.exists()
+    except OSError as error:
+        raise UserError(f'{path}: cannot be read ({error.strerror})') from None
+    if not there:
         raise UserError(f'{path}: no such bag; give a rosbag2 folder, a .mcap or a .db3 file')
-    if path.is_file():
+    if not folder:
         if not path.name.endswith(STORAGE_SUFFIXES):
             raise UserError(f'{path}: not a bag; give a rosbag2 folder, a .mcap or a .db3 file')
-        return [_open_file(path, notes, stack)]
-    files = sorted(p for p in path.iterdir() if p.name.endswith(STORAGE_SUFFIXES))
-    if (path / 'metadata.yaml').exists():
-        try:
-            return [_Indexed(path, notes, stack)]
-        except Exception as error:
-            if not files:
-                raise UserError(f'{path}: cannot be read ({error})') from None
-            if len(files) > 1 or 'etadata' in str(error):
-                notes.append(f'metadata.yaml was set aside ({error}); files read one by one')
-    elif files:
-        notes.append('metadata.yaml is missing; files read one by one')
+        return [_open_file(path, notes, stack, limits)]
+    metadata = bag_metadata.read(path)
+    files = _storage_files(path, metadata, notes)
     if not files:
         raise UserError(
-            f'{path}: not a bag (no metadata.yaml, no .mcap, no .db3 in it); '
-            'give a rosbag2 folder or a storage file'
+            f'{path}: not a bag (no .mcap, no .db3 in it); give a rosbag2 folder or a storage file'
+            + ''.join(f' ({note})' for note in notes)
         )
-    return [_open_file(file, notes, stack) for file in files]
+    sources = [_open_file(file, notes, stack, limits) for file in files]
+    _compare(metadata, sources, notes)
+    return sources
 
 
-def _open_file(path: Path, notes: list[str], stack: ExitStack) -> _Source:
-    """Open one storage file by its index, or else by reading it from the front."""
-    if path.suffix == '.zstd':
-        folder = Path(stack.enter_context(TemporaryDirectory()))
-        unpacked = folder / path.stem
-        try:
-            unpacked.write_bytes(decompress_zstd(path.read_bytes()))
-        except Exception as error:  # the library's own error class differs with its version
-            raise UserError(f'{path}: cannot be unpacked ({error})') from None
-        path = unpacked
+def _storage_files(path: Path, metadata: bag_metadata.Metadata, notes: list[str]) -> list[Path]:
+    """Return the files of a bag: those that its metadata list if they are there, else all."""
     try:
-        return _Indexed(path, notes, stack)
-    except Exception as error:
-        if path.suffix != '.mcap':
-            raise UserError(
-                f'{path}: cannot be read ({error}); try `sqlite3 {path.name} .recover`'
-            ) from None
-        return _Recovered(path, notes, str(error))
+        found = sorted(p for p in path.iterdir() if p.name.endswith(STORAGE_SUFFIXES))
+    except OSError as error:
+        raise UserError(f'{path}: cannot be read ({error.strerror})') from None
+    regular = []
+    for file in found:
+        if file.is_file() and stat.S_ISREG(file.stat().st_mode):
+            regular.append(file)
+        else:
+            notes.append(f'{file.name} is no regular file and was left out')
+    # A packed file beside the same one unpacked is not read twice.
+    regular = [f for f in regular if f.suffix != '.zstd' or f.with_suffix('') not in regular]
+    if metadata.fault:
+        notes.append(f'{metadata.fault}; files read one by one')
+        return regular
+    names = {file.name: file for file in regular}
+    missing = [name for name in metadata.files if name not in names]
+    if missing or not metadata.files:
+        lists = f'it lists {missing[0]}, which is not there' if missing else 'it lists no file'
+        notes.append(f'{bag_metadata.NAME} was set aside ({lists}); files read one by one')
+        return regular
+    listed = list(dict.fromkeys(metadata.files))
+    notes += [
+        f'{name} is not listed in {bag_metadata.NAME} and was not read'
+        for name in names
+        if name not in listed
+    ]
+    return [names[name] for name in listed]
 
 
-class _Indexed:
-    """A folder or file that the library opens by its index."""
-
-    def __init__(self, path: Path, notes: list[str], stack: ExitStack) -> None:
-        from rosbags.rosbag2 import Reader
-
-        self.path = path
-        self.notes = notes
-        self.reader = stack.enter_context(Reader(path))
-        self.topics = [Topic(c.topic, c.msgtype, c.msgcount) for c in self.reader.connections]
-
-    def messages(self, topics: Collection[str]) -> Iterator[RawMessage]:
-        connections = [c for c in self.reader.connections if c.topic in topics]
-        last = -1
-        if not connections:
+def _compare(metadata: bag_metadata.Metadata, sources: list[_Source], notes: list[str]) -> None:
+    """Let the metadata say how much there should be, or say that they lie."""
+    if metadata.fault:
+        return
+    if any(source.notes() for source in sources):
+        if len(sources) == 1 and sources[0].losses.declared is None and metadata.counts:
+            sources[0].losses.declared = dict(metadata.counts)
+        return
+    held: Counter[str] = Counter()
+    for source in sources:
+        held.update({topic.name: topic.message_count for topic in source.topics})
+    stated = metadata.counts
+    for topic in sorted({*held, *stated}):
+        if held[topic] != stated.get(topic, 0):
+            notes.append(
+                f'{bag_metadata.NAME} was set aside (it states {stated.get(topic, 0)} messages on '
+                f'{topic}, the files hold {held[topic]})'
+            )
             return
-        try:
-            for connection, last, data in self.reader.messages(connections):
-                yield RawMessage(last, connection.topic, bytes(data))
-        except Exception as error:
-            # The index was fine, the content is not: go on behind the damage where possible.
-            files = sorted(self.path.glob('*.mcap')) if self.path.is_dir() else [self.path]
-            if any(file.suffix != '.mcap' for file in files) or not files:
-                self.notes.append(f'{self.path.name} is damaged ({error}); what follows is lost')
-                return
-            for file in files:
-                for message in _Recovered(file, self.notes, str(error)).messages(topics):
-                    if message.log_time > last:
-                        yield message
 
 
-class _Recovered:
-    """An MCAP file that is read from the front because it has no (usable) index."""
-
-    def __init__(self, path: Path, notes: list[str], reason: str) -> None:
-        self._messages, damage = recover(path)
-        notes.append(
-            f'{path.name} was not closed or is damaged: {damage or reason.rstrip(".")}; '
-            f'{len(self._messages)} whole messages recovered'
+def _open_file(path: Path, notes: list[str], stack: ExitStack, limits: Limits) -> _Source:
+    check_regular(path)
+    try:
+        if path.suffix == '.zstd':
+            folder = Path(stack.enter_context(TemporaryDirectory()))
+            unpacked = folder / path.stem
+            if damage := unpack_file(path, unpacked, limits):
+                notes.append(damage)
+            path = unpacked
+        return (
+            McapFile(path, stack, limits)
+            if path.suffix == '.mcap'
+            else SqliteFile(path, stack, limits)
         )
-        counts = Counter((message.topic, message.type) for message in self._messages)
-        self.topics = [Topic(name, kind, count) for (name, kind), count in counts.items()]
-
-    def messages(self, topics: Collection[str]) -> Iterator[RawMessage]:
-        yield from (_raw(m) for m in self._messages if m.topic in topics)
-
-
-def _raw(message: RecoveredMessage) -> RawMessage:
-    return RawMessage(message.log_time, message.topic, message.data)
+    except OSError as error:
+        raise UserError(f'{path}: cannot be read ({error.strerror})') from None
 
 
 def _normal_type(name: str) -> str:

@@ -1,0 +1,277 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Damaged recordings lose what is damaged, nothing else, and it is said what is lost."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import sqlite3
+import struct
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import fuzzing_tools  # noqa: F401
+import pytest
+from fuzzing.mcap_maker import Layout, Sample, make
+
+from wheel_terra_estimator.bags.limits import Limits
+from wheel_terra_estimator.bags.raw_messages import RawMessage
+from wheel_terra_estimator.bags.storage import open_bag
+from wheel_terra_estimator.cli.main import main
+from wheel_terra_estimator.errors import UserError
+
+DEMO = next(Path(__file__).resolve().parents[2].glob('**/demo/entrapment'), Path('absent'))
+TYPES = {'/joint_states': 'sensor_msgs/msg/JointState', '/imu/data': 'sensor_msgs/msg/Imu'}
+START = 1_700_000_000_000_000_000
+
+
+def samples(count: int = 90) -> list[Sample]:
+    topics = list(TYPES)
+    return [
+        Sample(START + 10_000_000 * i, topics[i % 2], b'\0\1\0\0' + struct.pack('<Q', i) * 8)
+        for i in range(count)
+    ]
+
+
+def read(path: Path, **options: Any) -> tuple[list[RawMessage], list[str]]:
+    with open_bag(path, **options) as bag:
+        return list(bag.messages(tuple(bag.topics))), bag.notes
+
+
+def damaged(folder: Path, source: Path, at: int, count: int = 512) -> Path:
+    """Copy a bag and overwrite bytes of its file with zeros."""
+    copy = folder / 'damaged'
+    shutil.copytree(source, copy)
+    (file,) = copy.glob('*.mcap')
+    content = bytearray(file.read_bytes())
+    content[at : at + count] = bytes(count)
+    file.chmod(0o644)
+    file.write_bytes(content)
+    return copy
+
+
+def test_demo_drive_with_a_lost_sector_keeps_every_intact_chunk(tmp_path: Path) -> None:
+    """The sector lies in the first of four chunks, which alone holds schemas and channels."""
+    found, notes = read(damaged(tmp_path, DEMO, 100_000))
+    whole, _ = read(DEMO)
+    assert len(whole) == 10_192
+    assert len(found) >= 7_205
+    assert not Counter(found) - Counter(whole)
+    lost = Counter(message.topic for message in whole) - Counter(m.topic for m in found)
+    assert f'{len(found)} of 10192 whole messages recovered' in notes[0]
+    said = {topic: int(n) for n, topic in re.findall(r'(\d+) of \d+ on (/[\w/]+)', notes[0])}
+    assert said
+    assert all(lost[topic] == count for topic, count in said.items())
+    first, last = map(float, re.search(r'from ([\d.]+) s to ([\d.]+) s', notes[0]).groups())
+    gone = sorted((m.log_time - whole[0].log_time) * 1e-9 for m in Counter(whole) - Counter(found))
+    assert first <= gone[0] + 0.06
+    assert last >= gone[-1] - 0.06
+    assert last - first < gone[-1] - gone[0] + 0.2
+
+
+def test_a_refusal_says_what_is_missing(tmp_path: Path, capsys: Any) -> None:
+    bag = damaged(tmp_path, DEMO, 100_000)
+    assert main(['replay', str(bag), '--config', 'frostyboy']) == 2
+    said = capsys.readouterr().err
+    assert 'no wheel of wheels.names' in said
+    assert 'of 10192 whole messages recovered; lost: ' in said
+    assert said.count('\n') == 1
+
+
+@pytest.mark.shared
+def test_measured_drive_with_a_lost_sector(shared: Path, tmp_path: Path, capsys: Any) -> None:
+    bag = damaged(tmp_path, shared / 'bags' / 'frostyboy_event_1_6_mcap', 30_000)
+    remap = ['--remap', 'reference_odom:=/truth/odometry']
+    report = tmp_path / 'r.html'
+    arguments = ['replay', str(bag), '--config', 'frostyboy', *remap, '--report', str(report)]
+    assert main(arguments) == 0
+    said = capsys.readouterr().out
+    assert int(re.search(r'(\d+) estimate sets', said)[1]) >= 510
+    words = 'whole messages recovered; lost: 1 of 514 on /joint_states'
+    assert words in said
+    assert words in report.read_text()
+
+
+@pytest.mark.parametrize('closed', [True, False])
+@pytest.mark.parametrize('chunk_size', [0, 900])
+def test_a_file_by_topic_without_index_gives_all_topics_in_order(
+    tmp_path: Path, chunk_size: int, closed: bool
+) -> None:
+    layout = Layout(chunk_size, summary=False, by_topic=True, closed=closed)
+    (tmp_path / 'a.mcap').write_bytes(make(samples(), TYPES, layout).content)
+    found, notes = read(tmp_path / 'a.mcap')
+    assert [tuple(m) for m in found] == [tuple(s) for s in samples()]
+    assert bool(notes) is not closed
+
+
+@pytest.mark.parametrize('codec', ['', 'zstd', 'lz4'])
+def test_channels_from_the_summary_and_chunks_behind_the_damage(tmp_path: Path, codec: str) -> None:
+    made = make(samples(), TYPES, Layout(900, codec))
+    begin, end, lost = made.parts[0]
+    content = made.content[:begin] + bytes(end - begin) + made.content[end:]
+    (tmp_path / 'a.mcap').write_bytes(content)
+    found, notes = read(tmp_path / 'a.mcap')
+    assert [tuple(m) for m in found] == [tuple(s) for s in samples()[len(lost) :]]
+    assert f'lost: {(len(lost) + 1) // 2} of 45 on /joint_states' in notes[0]
+
+
+def test_records_behind_a_damage_within_a_chunk_are_found(tmp_path: Path) -> None:
+    made = make(samples(), TYPES, Layout(100_000))
+    at = made.content.index(struct.pack('<Q', 40) * 8)
+    content = made.content[: at - 3] + b'\xff' * 8 + made.content[at + 5 :]
+    (tmp_path / 'a.mcap').write_bytes(content)
+    found, notes = read(tmp_path / 'a.mcap')
+    # Only the values are damaged: the message is there, and that its chunk is doubtful is said.
+    assert len(found) == 90
+    assert '90 of them stand in a chunk with a wrong checksum' in notes[0]
+    head = at - 4 - 31
+    content = made.content[:head] + bytes(31) + made.content[head + 31 :]
+    (tmp_path / 'a.mcap').write_bytes(content)
+    found, notes = read(tmp_path / 'a.mcap')
+    assert [tuple(m) for m in found] == [tuple(s) for i, s in enumerate(samples()) if i != 40]
+    assert 'lost: 1 of 45 on /joint_states; from 0.4 s to 0.4 s' in notes[0]
+
+
+def test_damaged_names_are_no_traceback(tmp_path: Path) -> None:
+    made = make(samples(), TYPES, Layout(900, summary=False))
+    content = made.content.replace(b'/imu/data', b'/imu\xff\xfe\xfa\xf0a')
+    (tmp_path / 'a.mcap').write_bytes(content)
+    found, notes = read(tmp_path / 'a.mcap')
+    assert {m.topic for m in found} == {'/joint_states'}
+    assert len(found) == 45
+    assert 'messages of channels that are not described' in notes[0]
+
+
+def test_the_index_alone_decides_nothing(tmp_path: Path) -> None:
+    """A chunk index entry that points elsewhere, in a file without checksums."""
+    made = make(samples(), TYPES, Layout(900, checksums=False))
+    content = bytearray(made.content)
+    begin = made.parts[2][0]
+    entry = content.index(struct.pack('<Q', begin), made.definitions[-1][1])
+    content[entry : entry + 8] = struct.pack('<Q', begin + 5)
+    (tmp_path / 'a.mcap').write_bytes(content)
+    found, _ = read(tmp_path / 'a.mcap')
+    assert [tuple(m) for m in found] == [tuple(s) for s in samples()]
+
+
+def lying(text: str, old: str, new: str) -> str:
+    assert re.search(old, text)
+    return re.sub(old, new, text)
+
+
+@pytest.mark.parametrize(
+    ('old', 'new'),
+    [
+        ('message_count: [0-9]+', 'message_count: 0'),
+        ('name: /joint_states', 'name: /wheel_speeds'),
+        (r'topics_with_message_count:', 'topics_with_message_count: null\n  old:'),
+        ('message_count: [0-9]+', 'message_count: ' + '9' * 5000),
+        ('name: /joint_states', 'name: null'),
+        ('relative_file_paths:', 'relative_file_paths: [gone.mcap]\n  old:'),
+    ],
+)
+def test_metadata_that_lie_are_set_aside_and_said(make_bag: Any, old: str, new: str) -> None:
+    folder = make_bag()
+    whole, notes = read(folder)
+    assert len(whole) == 84
+    assert not notes
+    metadata = folder / 'metadata.yaml'
+    metadata.write_text(lying(metadata.read_text(), old, new))
+    found, notes = read(folder)
+    assert found == whole
+    assert 'metadata.yaml was set aside' in notes[0]
+
+
+def big_sqlite(tmp_path: Path, count: int = 4000) -> tuple[Path, list[RawMessage]]:
+    path = tmp_path / 'a.db3'
+    with sqlite3.connect(path) as connection:
+        connection.executescript(
+            'CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT, type TEXT,'
+            ' serialization_format TEXT, offered_qos_profiles TEXT);'
+            'CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER, timestamp INTEGER,'
+            ' data BLOB); CREATE INDEX timestamp_idx ON messages (timestamp ASC);'
+        )
+        for number, (topic, kind) in enumerate(TYPES.items(), start=1):
+            connection.execute(
+                'INSERT INTO topics VALUES(?,?,?,?,?)', (number, topic, kind, '', '')
+            )
+        found = samples(count)
+        connection.executemany(
+            'INSERT INTO messages(topic_id, timestamp, data) VALUES(?,?,?)',
+            [(1 + list(TYPES).index(s.topic), s.log_time, s.data) for s in found],
+        )
+    connection.close()
+    return path, [RawMessage(*s) for s in found]
+
+
+def test_rows_behind_damaged_pages_of_sqlite_are_read(tmp_path: Path) -> None:
+    path, whole = big_sqlite(tmp_path)
+    assert read(path) == (whole, [])
+    content = bytearray(path.read_bytes())
+    middle = content.index(struct.pack('<Q', 2000) * 8) // 4096 * 4096
+    content[middle : middle + 8192] = bytes(8192)
+    path.write_bytes(content)
+    found, notes = read(path)
+    assert not Counter(found) - Counter(whole)
+    assert len(found) > len(whole) - 200
+    assert 'is damaged' in notes[0]
+    assert 'from 19.' in notes[0] or 'from 20.' in notes[0]
+
+
+def test_an_index_of_sqlite_that_lies_hides_no_row(tmp_path: Path) -> None:
+    path, whole = big_sqlite(tmp_path)
+    with sqlite3.connect(path) as connection:
+        connection.execute('PRAGMA writable_schema=ON')
+        connection.execute("DELETE FROM sqlite_master WHERE name='timestamp_idx'")
+        connection.execute('PRAGMA writable_schema=OFF')
+    connection.close()
+    assert read(path)[0] == whole
+
+
+def test_rows_of_sqlite_out_of_order_are_sorted(tmp_path: Path) -> None:
+    path, whole = big_sqlite(tmp_path, 50)
+    with sqlite3.connect(path) as connection:
+        connection.execute('UPDATE messages SET timestamp = ? WHERE id = 30', (START - 5,))
+    connection.close()
+    found, _ = read(path)
+    assert found[0].log_time == START - 5
+    assert [m.log_time for m in found] == sorted(m.log_time for m in found)
+    assert len(found) == len(whole)
+
+
+def test_the_write_ahead_log_of_a_recorder_that_died_is_read(tmp_path: Path) -> None:
+    path, whole = big_sqlite(tmp_path, 50)
+    live = sqlite3.connect(path)
+    live.execute('PRAGMA journal_mode=WAL')
+    live.execute('PRAGMA wal_autocheckpoint=0')
+    live.execute('INSERT INTO messages VALUES(99, 1, ?, ?)', (START + 10**12, b'last'))
+    live.commit()
+    other = tmp_path / 'copy'
+    other.mkdir()
+    for file in tmp_path.glob('a.db3*'):
+        shutil.copy(file, other)
+    live.close()
+    (other / 'a.db3-shm').unlink(missing_ok=True)
+    before = sorted(p.name for p in other.iterdir())
+    found, _ = read(other / 'a.db3')
+    assert found[-1].data == b'last'
+    assert len(found) == len(whole) + 1
+    assert sorted(p.name for p in other.iterdir()) == before
+
+
+def test_a_chunk_above_the_limit_is_left_out_and_said(tmp_path: Path) -> None:
+    few = samples()
+    few.insert(45, Sample(few[44].log_time + 1, '/imu/data', bytes(50_000)))
+    (tmp_path / 'a.mcap').write_bytes(make(few, TYPES, Layout(900, 'zstd')).content)
+    found, notes = read(tmp_path / 'a.mcap', limits=Limits(chunk=20_000))
+    assert 80 <= len(found) < 90
+    assert 'was left out' in notes[0]
+
+
+def test_more_than_can_be_held_is_refused_not_swapped(tmp_path: Path) -> None:
+    layout = Layout(900, by_topic=True)
+    (tmp_path / 'a.mcap').write_bytes(make(samples(900), TYPES, layout).content)
+    with pytest.raises(UserError, match='sort it first'):
+        read(tmp_path / 'a.mcap', limits=Limits(held=5_000))

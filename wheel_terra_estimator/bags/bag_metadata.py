@@ -1,0 +1,81 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""What a bag's ``metadata.yaml`` states; it is compared with the files, never relied on."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path, PurePath
+from typing import Any
+
+from wheel_terra_estimator.configuration import bounded_yaml
+from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.input_file import read_text
+
+NAME = 'metadata.yaml'
+LARGEST = 4 * 2**20
+"""Greatest size of the file [byte]; a thousand topics need one megabyte."""
+
+MOST_VALUES = 200_000
+"""Keys and values; a topic has about a hundred."""
+
+_LONGEST_NUMBER = 19  # digits
+
+
+@dataclass(frozen=True)
+class Metadata:
+    """Files and messages per topic, and what is wrong with the file in words."""
+
+    files: tuple[str, ...] = ()
+    counts: Mapping[str, int] = field(default_factory=dict)
+    fault: str = ''
+
+
+def read(folder: Path) -> Metadata:
+    """Read the metadata of a bag; what cannot be used is a fault, not an error."""
+    path = folder / NAME
+    if not path.exists():
+        return Metadata(fault=f'{NAME} is missing')
+    try:
+        # All values as text: no merge keys, no numbers of thousands of digits.
+        document = bounded_yaml.load_texts(read_text(path, LARGEST), MOST_VALUES)
+        information = _mapping(document)['rosbag2_bagfile_information']
+        topics = _list(_mapping(information)['topics_with_message_count'])
+        counts: Counter[str] = Counter()
+        for entry in topics:
+            name = _mapping(_mapping(entry)['topic_metadata'])['name']
+            counts[_text(name)] += _number(_mapping(entry)['message_count'])
+        files = _list(_mapping(information)['relative_file_paths'])
+        return Metadata(tuple(PurePath(_text(file)).name for file in files), dict(counts))
+    except KeyError as error:
+        return Metadata(fault=f'{NAME} was set aside (it has no {error.args[0]})')
+    except UserError as error:
+        return Metadata(fault=f'{NAME} was set aside ({str(error).removeprefix(f"{path}: ")})')
+    except (bounded_yaml.YAMLError, ValueError, TypeError, RecursionError):
+        return Metadata(fault=f'{NAME} was set aside (it cannot be understood)')
+
+
+def _mapping(value: Any) -> Mapping[str, Any]:
+    if not isinstance(value, Mapping):
+        raise TypeError
+    return value
+
+
+def _list(value: Any) -> list[Any]:
+    if not isinstance(value, list):
+        raise TypeError
+    return value
+
+
+def _text(value: Any) -> str:
+    if not isinstance(value, str):
+        raise TypeError
+    return value
+
+
+def _number(value: Any) -> int:
+    if len(_text(value)) > _LONGEST_NUMBER:
+        raise ValueError
+    return int(value)

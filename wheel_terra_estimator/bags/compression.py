@@ -1,0 +1,138 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Zstandard and LZ4 data unpacked as far as they reach and no further than allowed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from wheel_terra_estimator.bags.limits import LIMITS, MEGABYTE, Limits
+from wheel_terra_estimator.errors import UserError
+
+ZSTD_MAGIC = b'\x28\xb5\x2f\xfd'
+CODECS = ('', 'zstd', 'lz4')
+"""Compressions of MCAP chunks that can be read; empty: none."""
+
+_SLICE = 4096  # packed bytes fed at a time behind an error, so that little is lost before it
+
+
+class Unpacked(NamedTuple):
+    """What packed data gave; ``damage`` says in words why it is not all, empty if it is."""
+
+    content: bytes
+    damage: str
+
+
+def unpack(codec: str, packed: bytes | memoryview, size: int, limits: Limits = LIMITS) -> Unpacked:
+    """Unpack a chunk.
+
+    Parameters
+    ----------
+    codec : str
+        One of `CODECS`.
+    packed : bytes-like
+        Packed data, maybe cut or damaged.
+    size : int
+        Unpacked size that the file states [byte].
+    limits : Limits
+        Nothing above ``limits.chunk`` is unpacked.
+    """
+    if size > limits.chunk:
+        return Unpacked(
+            b'', f'a chunk of {size / MEGABYTE:.0f} MB is above {limits.chunk / MEGABYTE:.0f} MB'
+        )
+    if codec not in CODECS:
+        return Unpacked(b'', f'the compression {codec!r} is not known')
+    if not codec:
+        content = bytes(packed[:size])
+        return Unpacked(content, '' if len(content) == size else 'a chunk is cut off')
+    whole = _all_at_once(codec, packed, size)
+    if whole is not None and len(whole) == size:
+        return Unpacked(whole, '')
+    content = b''.join(_piecewise(_decompressor(codec), packed, size))
+    return Unpacked(content[:size], f'a chunk cannot be unpacked beyond {len(content)} of {size} B')
+
+
+def unpack_message(packed: bytes, limits: Limits = LIMITS) -> bytes:
+    """Unpack a message that was packed alone; nothing comes of a damaged or too large one."""
+    found = _all_at_once('zstd', packed, limits.message)
+    return b'' if found is None or len(found) > limits.message else found
+
+
+def unpack_file(path: Path, target: Path, limits: Limits = LIMITS) -> str:
+    """Unpack a ``.zstd`` file into another one, as far as it reaches.
+
+    Returns
+    -------
+    str
+        Why that is not all of it; empty when it is.
+
+    Raises
+    ------
+    UserError
+        It cannot be read or written, or unpacks to far more than recordings do.
+    """
+    written = 0
+    allowed = max(limits.held, limits.packed_share * path.stat().st_size)
+    try:
+        with path.open('rb') as packed, target.open('wb') as out:
+            decompressor = _decompressor('zstd')
+            try:
+                while not decompressor.eof:
+                    piece = packed.read(MEGABYTE) if decompressor.needs_input else b''
+                    if decompressor.needs_input and not piece:
+                        return f'{path.name} is cut off'
+                    content = decompressor.decompress(piece, MEGABYTE)
+                    written += len(content)
+                    if written > allowed:
+                        raise UserError(
+                            f'{path}: unpacks to more than {limits.packed_share} times its size; '
+                            'no recording does, so it is not read'
+                        )
+                    out.write(content)
+            except (OSError, UserError):
+                raise
+            except Exception as error:  # the library's own error class differs with its version
+                return f'{path.name} cannot be unpacked further ({error})'
+    except OSError as error:
+        raise UserError(f'{path}: cannot be unpacked ({error.strerror})') from None
+    return ''
+
+
+def _all_at_once(codec: str, packed: bytes | memoryview, size: int) -> bytes | None:
+    """Return what data unpack to, at most ``size`` bytes and one, None after an error."""
+    try:
+        return bytes(_decompressor(codec).decompress(bytes(packed), size + 1))
+    except Exception:  # each library and version has an error class of its own
+        return None
+
+
+def _piecewise(decompressor: Any, packed: bytes | memoryview, size: int) -> Iterator[bytes]:
+    """Yield what data unpack to until an error."""
+    left = size
+    for at in range(0, len(packed), _SLICE):
+        piece = bytes(packed[at : at + _SLICE])
+        while left > 0 and not decompressor.eof:
+            try:
+                content = bytes(decompressor.decompress(piece, left))
+            except Exception:  # see above
+                return
+            yield content
+            left -= len(content)
+            piece = b''
+            if decompressor.needs_input or not content:
+                break
+
+
+def _decompressor(codec: str) -> Any:
+    if codec == 'lz4':
+        from lz4.frame import LZ4FrameDecompressor
+
+        return LZ4FrameDecompressor()
+    try:  # the library came with rosbags
+        from compression import zstd  # type: ignore[import-not-found,unused-ignore]
+    except ImportError:
+        from backports import zstd
+    return zstd.ZstdDecompressor()

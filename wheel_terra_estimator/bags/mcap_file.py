@@ -1,0 +1,530 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Messages of an MCAP file, whole or damaged, in the order of their log times.
+
+A file is a number of pieces, chunks or stretches of messages outside of chunks. With a summary
+whose checksum is right they come from its index, and damage is met when a piece is read. Else the
+file is surveyed once from front to end: every chunk is unpacked and counted, schemas and channels
+are taken from wherever they stand, and behind damage the next record is looked for. A piece is
+held only while its messages are due.
+"""
+
+from __future__ import annotations
+
+import heapq
+import mmap
+import re
+from bisect import bisect_left
+from collections import Counter, defaultdict
+from collections.abc import Collection, Iterator
+from contextlib import ExitStack, suppress
+from dataclasses import dataclass, field
+from itertools import accumulate
+from pathlib import Path
+from typing import Any, NamedTuple
+from zlib import crc32
+
+from wheel_terra_estimator.bags import mcap_records as mcap
+from wheel_terra_estimator.bags.compression import unpack
+from wheel_terra_estimator.bags.limits import LIMITS, MEGABYTE, Limits
+from wheel_terra_estimator.bags.losses import Losses
+from wheel_terra_estimator.bags.raw_messages import RawMessage, Topic
+from wheel_terra_estimator.errors import UserError
+
+_FOOTER = mcap.HEAD + 20 + len(mcap.MAGIC)  # [byte], with the closing magic
+_IN_CHUNK = (mcap.SCHEMA, mcap.CHANNEL, mcap.MESSAGE)
+_LONGEST_STRETCH = 4 * MEGABYTE  # of messages outside of chunks that are read at once
+_FORGET_AFTER = 32 * MEGABYTE  # of the file that was looked at
+_SOUND = 3  # votes of a definition in a chunk whose checksum is right
+_TOPIC = re.compile(r'[/~A-Za-z_][A-Za-z0-9_/~{}.-]*')
+_TYPE = re.compile(r'[A-Za-z][A-Za-z0-9_]*(/|::)[A-Za-z0-9_/:.-]+')
+
+
+@dataclass
+class Piece:
+    """A chunk (``head`` given) or a stretch of messages; log times in ns."""
+
+    begin: int
+    end: int
+    head: mcap.ChunkHead | None
+    start: int
+    last: int
+    channels: frozenset[int] | None = None  # None: may be any
+
+
+class Content(NamedTuple):
+    """A piece as it stands in the file, unpacked; ``damage`` in words, empty if there is none."""
+
+    data: bytes
+    damage: str
+    sound: bool  # a checksum is there and right
+    wrong_checksum: bool
+
+
+@dataclass
+class Reading:
+    """What one pass over a piece found."""
+
+    counts: Counter[int] = field(default_factory=Counter)  # messages by channel
+    start: int = mcap.LATEST  # log times [ns]
+    last: int = 0
+    definitions: list[mcap.Record] = field(default_factory=list)
+    lost_bytes: int = 0
+    # Log times between which a gap lies; None: before the first, behind the last message.
+    lost_between: list[tuple[int | None, int | None]] = field(default_factory=list)
+    rows: list[Row] = field(default_factory=list)
+
+
+Row = tuple[int, int, int, bytes]
+"""Log time [ns], place in the file, channel and data of a message."""
+
+_ROW_SIZE = 250
+"""Memory that a row takes beside its data [byte]."""
+
+
+class McapFile:
+    """One ``.mcap`` file.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    stack : ExitStack
+        Closes it.
+    limits : Limits
+        What is unpacked and held.
+
+    Attributes
+    ----------
+    topics : list of Topic
+        Topics with the number of messages that can be read (with an index: that it states).
+    losses : Losses
+        What is missing.
+    """
+
+    def __init__(self, path: Path, stack: ExitStack, limits: Limits = LIMITS) -> None:
+        self.path = path
+        self.losses = Losses()
+        self._limits = limits
+        self._pieces: list[Piece] = []
+        self._definitions = _Definitions()
+        self._counts: Counter[int] = Counter()
+        self._touched = 0
+        self._size = path.stat().st_size
+        self._map = self._open(stack)
+        if self._map is None:
+            self.losses.state = 'is empty'
+        elif self._map[: len(mcap.MAGIC)] != mcap.MAGIC and not self._looks_like_one():
+            self.losses.state = 'does not begin as an MCAP file'
+        elif not self._read_index():
+            self._survey()
+        self.channels = self._definitions.channels()
+        if self._pieces:
+            self.losses.start = min(piece.start for piece in self._pieces)
+            self.losses.last = max(piece.last for piece in self._pieces)
+        self._count_topics()
+
+    def notes(self) -> list[str]:
+        """Return what is wrong with the file, as far as it is known by now."""
+        return self.losses.in_words(self.path.name)
+
+    def messages(self, topics: Collection[str]) -> Iterator[RawMessage]:
+        """Yield the messages of some topics in the order of their log times."""
+        wanted = {number: topic for number, (topic, _) in self.channels.items() if topic in topics}
+        counts = Counter(dict.fromkeys(wanted.values(), 0))
+        for log_time, _, channel, data in self._merged(frozenset(wanted)):
+            topic = wanted[channel]
+            counts[topic] += 1
+            yield RawMessage(log_time, topic, data)
+        self.losses.recovered.update(counts)
+
+    def _open(self, stack: ExitStack) -> mmap.mmap | None:
+        if not self._size:
+            return None
+        file = stack.enter_context(self.path.open('rb'))
+        found = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
+        stack.callback(_close, found)
+        return found
+
+    def _looks_like_one(self) -> bool:
+        """Whether a file whose first bytes are damaged ends, or goes on, as an MCAP file."""
+        assert self._map is not None
+        if self._map[-len(mcap.MAGIC) :] == mcap.MAGIC:
+            return True
+        near = mcap.Possible(opcodes=(mcap.CHUNK,))
+        end = min(self._size, 2 * MEGABYTE)
+        return any(isinstance(item, mcap.Record) for item in mcap.records(self._map, 0, end, near))
+
+    # --- The way of a whole file: by its index. ---
+
+    def _read_index(self) -> bool:
+        """Take pieces and channels from the summary; False unless it is surely right."""
+        content = self._map
+        assert content is not None
+        foot = self._size - _FOOTER
+        if foot < len(mcap.MAGIC) or content[-len(mcap.MAGIC) :] != mcap.MAGIC:
+            return False
+        if content[foot : foot + mcap.HEAD] != b'\x02' + (20).to_bytes(8, 'little'):
+            return False
+        begin = int.from_bytes(content[foot + 9 : foot + 17], 'little')
+        checksum = int.from_bytes(content[foot + 25 : foot + 29], 'little')
+        if not checksum or not len(mcap.MAGIC) < begin <= foot:
+            return False
+        if crc32(content[begin : foot + 25]) != checksum:
+            return False
+        definitions, pieces = _Definitions(), []
+        counts: dict[int, int] | None = None
+        for item in mcap.records(content, begin, foot, mcap.Possible()):
+            try:
+                if isinstance(item, mcap.Gap):
+                    return False
+                definitions.add(content, item)
+                if item.opcode == mcap.CHUNK_INDEX:
+                    pieces.append(self._indexed_piece(mcap.indexed_chunk(content, item)))
+                elif item.opcode == mcap.STATISTICS:
+                    counts = mcap.channel_counts(content, item)
+            except ValueError:
+                return False
+        if counts is None or (any(counts.values()) and not pieces):
+            return False
+        self._definitions, self._pieces, self._counts = definitions, pieces, Counter(counts)
+        self._declare(counts)
+        return True
+
+    def _indexed_piece(self, chunk: mcap.IndexedChunk) -> Piece:
+        assert self._map is not None
+        end = chunk.begin + chunk.length
+        if end > self._size:
+            raise ValueError('the index points behind the file')
+        head = mcap.chunk_head(self._map, chunk.begin, self._size)
+        if head is None or head.begin + head.packed != end:
+            raise ValueError('the index points to no chunk')
+        return Piece(chunk.begin, end, head, head.start, head.end, chunk.channels)
+
+    # --- The way of every other file: from front to end. ---
+
+    def _survey(self) -> None:
+        content, limits = self._map, self._limits
+        assert content is not None
+        closed = content[-len(mcap.MAGIC) :] == mcap.MAGIC
+        begin = len(mcap.MAGIC) if content[: len(mcap.MAGIC)] == mcap.MAGIC else 0
+        end = self._size - len(mcap.MAGIC) if closed and self._size > begin else self._size
+        if not closed:
+            self.losses.state = 'was not closed'
+        gaps: list[mcap.Gap] = []
+        statistics: dict[int, int] | None = None
+        possible = mcap.Possible(longest=limits.chunk)
+        for item in mcap.records(content, begin, end, possible):
+            self._forget(item.end - item.begin)
+            if isinstance(item, mcap.Gap):
+                gaps.append(item)
+            elif item.opcode == mcap.CHUNK:
+                self._add_chunk(item)
+            elif item.opcode == mcap.MESSAGE:
+                self._add_loose(item)
+            elif item.opcode == mcap.STATISTICS:
+                try:
+                    statistics = mcap.channel_counts(content, item)
+                except ValueError:
+                    gaps.append(mcap.Gap(item.begin, item.end))
+            else:
+                self._define(item, gaps)
+        damaged = [piece for piece in self._pieces if not self._count(piece, again=False)]
+        for piece in damaged:  # now every channel is known
+            self._count(piece, again=True)
+        self._pieces = [piece for piece in self._pieces if piece.start <= piece.last]
+        self._add_gaps(gaps)
+        if statistics is not None:
+            self._declare(statistics)
+
+    def _add_chunk(self, record: mcap.Record) -> None:
+        assert self._map is not None
+        at = record.begin - mcap.HEAD
+        head = mcap.chunk_head(self._map, at, self._size)
+        assert head is not None
+        self._pieces.append(Piece(at, record.end, head, head.start, head.end))
+
+    def _add_loose(self, record: mcap.Record) -> None:
+        """Lengthen the last stretch of messages, or begin a new one."""
+        assert self._map is not None
+        time = mcap.message(self._map, record).log_time
+        at = record.begin - mcap.HEAD
+        last = self._pieces[-1] if self._pieces else None
+        if (
+            last is not None
+            and last.head is None
+            and last.end == at
+            and at - last.begin < _LONGEST_STRETCH
+        ):
+            last.end = record.end
+            last.start, last.last = min(last.start, time), max(last.last, time)
+        else:
+            self._pieces.append(Piece(at, record.end, None, time, time))
+
+    def _define(self, record: mcap.Record, gaps: list[mcap.Gap]) -> None:
+        assert self._map is not None
+        try:
+            self._definitions.add(self._map, record)
+        except ValueError:
+            gaps.append(mcap.Gap(record.begin, record.end))
+
+    def _count(self, piece: Piece, again: bool) -> bool:
+        """Count the messages of a piece and take its definitions.
+
+        Returns
+        -------
+        bool
+            False if the piece is damaged and has to be read again when all channels are known.
+        """
+        content = self._content(piece)
+        reading = self._read(piece, content)
+        whole = not (reading.lost_bytes or content.damage or content.wrong_checksum)
+        if not again:
+            for record in reading.definitions:
+                try:
+                    votes = _SOUND if content.sound else 1
+                    self._definitions.add(content.data, record, votes)
+                except ValueError:
+                    whole = False
+            if not whole:
+                return False
+        self._counts += reading.counts
+        self._note_damage(piece, content, reading)
+        # The index and the head of a chunk may lie; its messages do not.
+        piece.start, piece.last = reading.start, reading.last
+        return True
+
+    def _add_gaps(self, gaps: list[mcap.Gap]) -> None:
+        """Say for gaps between pieces between which log times they lie."""
+        begins = [piece.begin for piece in self._pieces]
+        latest = list(accumulate((piece.last for piece in self._pieces), max))
+        earliest = list(accumulate((piece.start for piece in reversed(self._pieces)), min))[::-1]
+        for gap in gaps:
+            behind = bisect_left(begins, gap.begin)
+            before = latest[behind - 1 : behind] if behind else []
+            times = [*before, *earliest[behind : behind + 1]]
+            self.losses.spans[gap.begin] = (times[0], max(times)) if times else None
+
+    # --- Reading pieces. ---
+
+    def _merged(self, wanted: frozenset[int]) -> Iterator[Row]:
+        """Yield the messages of some channels of all pieces in order."""
+        waiting = sorted(
+            (p for p in self._pieces if p.channels is None or p.channels & wanted),
+            key=lambda p: (p.start, p.begin),
+            reverse=True,
+        )
+        heap: list[tuple[Row, Iterator[Row], int]] = []
+        held = 0
+        while waiting or heap:
+            while waiting and (not heap or waiting[-1].start <= heap[0][0][0]):
+                rows = self._rows(waiting.pop(), wanted, held)
+                if rows:
+                    size = _size(rows)
+                    held += size
+                    rest = iter(rows)
+                    heapq.heappush(heap, (next(rest), rest, size))
+            if not heap:
+                return
+            row, rest, size = heap[0]
+            yield row
+            following = next(rest, None)
+            if following is None:
+                heapq.heappop(heap)
+                held -= size
+            else:
+                heapq.heapreplace(heap, (following, rest, size))
+
+    def _rows(self, piece: Piece, wanted: frozenset[int], held: int) -> list[Row]:
+        content = self._content(piece)
+        reading = self._read(piece, content, wanted, self._limits.held - held)
+        self._note_damage(piece, content, reading)
+        return sorted(reading.rows, key=lambda row: row[:2])
+
+    def _content(self, piece: Piece) -> Content:
+        """Return the bytes of a piece; a copy, so that nothing of the file stays in memory."""
+        assert self._map is not None
+        head = piece.head
+        self._forget(piece.end - piece.begin)
+        if head is None:
+            return Content(self._map[piece.begin : piece.end], '', False, False)
+        packed = self._map[head.begin : min(head.begin + head.packed, piece.end)]
+        data, damage = unpack(head.codec, packed, head.size, self._limits)
+        right = bool(head.checksum) and not damage and crc32(data) == head.checksum
+        return Content(data, damage, right, bool(head.checksum) and not damage and not right)
+
+    def _read(
+        self, piece: Piece, content: Content, wanted: Collection[int] = (), allowed: int = 0
+    ) -> Reading:
+        """Read the records of a piece.
+
+        Parameters
+        ----------
+        piece, content : Piece, Content
+            The piece and its bytes.
+        wanted : collection of int
+            Channels whose messages are kept.
+        allowed : int
+            Greatest memory that they may take [byte].
+        """
+        head, known = piece.head, self._definitions.numbers()
+        if head is None:
+            possible = [mcap.Possible((mcap.MESSAGE,), known)]
+        elif content.sound:
+            possible = [mcap.Possible(_IN_CHUNK)]
+        else:  # at second try, the times in the head may be what is damaged
+            possible = [mcap.Possible(_IN_CHUNK, known, head.start, head.end)]
+            possible.append(mcap.Possible(_IN_CHUNK, known))
+        best = None
+        for each in possible:
+            reading = self._pass(piece.begin, content.data, each, wanted, allowed)
+            if best is None or reading.lost_bytes < best.lost_bytes:
+                best = reading
+            if not best.lost_bytes:
+                break
+        assert best is not None
+        return best
+
+    def _pass(
+        self,
+        place: int,
+        data: bytes,
+        possible: mcap.Possible,
+        wanted: Collection[int],
+        allowed: int,
+    ) -> Reading:
+        found = Reading()
+        counts, rows = found.counts, found.rows
+        time: int | None = None
+        gap_after: tuple[int | None] | None = None
+        for item in mcap.records(data, 0, len(data), possible):
+            if isinstance(item, mcap.Gap):
+                found.lost_bytes += item.end - item.begin
+                gap_after = gap_after or (time,)
+            elif item.opcode == mcap.MESSAGE:
+                channel, time, begin, end = mcap.message(data, item)
+                counts[channel] += 1
+                found.start, found.last = min(found.start, time), max(found.last, time)
+                if gap_after:
+                    found.lost_between.append((gap_after[0], time))
+                    gap_after = None
+                if channel in wanted:
+                    rows.append((time, place + begin, channel, data[begin:end]))
+                    allowed -= end - begin + _ROW_SIZE
+                    if allowed < 0:
+                        raise UserError(
+                            f'{self.path}: more than {self._limits.held / MEGABYTE:.0f} MB of '
+                            'messages would be held to bring them into order; sort it first '
+                            '(ros2 bag convert)'
+                        )
+            else:
+                found.definitions.append(item)
+        if gap_after:
+            found.lost_between.append((gap_after[0], None))
+        return found
+
+    def _note_damage(self, piece: Piece, content: Content, reading: Reading) -> None:
+        losses = self.losses
+        if content.wrong_checksum:
+            losses.doubtful[piece.begin] = sum(reading.counts.values())
+        left_out = f'{content.damage} and was left out'
+        if 'above' in content.damage and left_out not in losses.left_out:
+            losses.left_out.append(left_out)
+        between = list(reading.lost_between)
+        if content.damage:
+            between.append((reading.last if reading.counts else None, None))
+        for number, times in enumerate(between):
+            losses.spans[piece.begin + number] = _span(piece, *times)
+
+    def _forget(self, count: int) -> None:
+        """Let go of the pages of the file that were looked at: they count as memory of ours."""
+        self._touched += count
+        if self._touched > _FORGET_AFTER and hasattr(mmap, 'MADV_DONTNEED'):
+            assert self._map is not None
+            self._map.madvise(mmap.MADV_DONTNEED)
+            self._touched = 0
+
+    # --- Topics. ---
+
+    def _declare(self, counts: dict[int, int]) -> None:
+        declared: Counter[str] = Counter()
+        for number, (topic, _) in self._definitions.channels().items():
+            declared[topic] += counts.get(number, 0)
+        self.losses.declared = declared
+
+    def _count_topics(self) -> None:
+        counts: Counter[str] = Counter()
+        types: dict[str, Counter[str]] = defaultdict(Counter)
+        for number, (topic, kind) in self.channels.items():
+            counts[topic] += self._counts[number]
+            types[topic][kind] += 1 + self._counts[number]
+        self.topics = [
+            Topic(topic, types[topic].most_common(1)[0][0], counts[topic]) for topic in counts
+        ]
+        unknown = sum(n for number, n in self._counts.items() if number not in self.channels)
+        if unknown:
+            self.losses.left_out.append(f'{unknown} messages of channels that are not described')
+        if not self._indexed():
+            self.losses.recovered.update(counts)
+
+    def _indexed(self) -> bool:
+        return any(piece.channels is not None for piece in self._pieces)
+
+
+class _Definitions:
+    """Schemas and channels, gathered from all copies in a file; the majority decides."""
+
+    def __init__(self) -> None:
+        self._schemas: dict[int, Counter[str]] = defaultdict(Counter)
+        self._channels: dict[int, Counter[tuple[int, str]]] = defaultdict(Counter)
+        self._text = ''
+
+    def add(self, content: Any, record: mcap.Record, votes: int = 1) -> None:
+        """Count a definition; ``ValueError`` if it is damaged."""
+        if record.opcode == mcap.SCHEMA:
+            number, name = mcap.schema(content, record)
+            if _TYPE.fullmatch(name):
+                self._schemas[number][name] += votes
+        elif record.opcode == mcap.CHANNEL:
+            number, schema, topic = mcap.channel(content, record)
+            if _TOPIC.fullmatch(topic):
+                self._channels[number][schema, topic] += votes
+        elif record.opcode == mcap.METADATA and record.end - record.begin < MEGABYTE:
+            # The recorder's own list of topics: it decides where two copies differ.
+            self._text += bytes(content[record.begin : record.end]).decode('utf-8', 'replace')
+
+    def numbers(self) -> frozenset[int]:
+        """Return the identifiers of the known channels."""
+        return frozenset(self._channels)
+
+    def channels(self) -> dict[int, tuple[str, str]]:
+        """Return identifier -> topic, type."""
+        found = {}
+        for number, votes in self._channels.items():
+            schema, topic = self._chosen(votes, lambda definition: definition[1])
+            names = self._schemas.get(schema)
+            found[number] = (topic, self._chosen(names, str) if names else '')
+        return found
+
+    def _chosen(self, votes: Counter[Any], name: Any) -> Any:
+        return max(votes, key=lambda d: votes[d] + (f': {name(d)}\n' in self._text))
+
+
+def _size(rows: list[Row]) -> int:
+    return sum(len(row[3]) + _ROW_SIZE for row in rows)
+
+
+def _span(piece: Piece, first: int | None, last: int | None) -> tuple[int, int] | None:
+    """Return the log times between which something is missing in a piece."""
+    head = piece.head
+    if head is not None and head.start <= head.end <= mcap.LATEST:
+        first = head.start if first is None else first
+        last = head.end if last is None else last
+    if first is None or last is None:
+        return None
+    return first, max(first, last)
+
+
+def _close(content: mmap.mmap) -> None:
+    with suppress(BufferError):  # a search that was given up still looks at it
+        content.close()

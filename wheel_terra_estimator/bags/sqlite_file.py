@@ -1,0 +1,237 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Messages of a rosbag2 SQLite file, whole or damaged, in the order of their log times.
+
+Only the table of messages is read, row by row; no index of the file is relied on. Where a page is
+damaged the rows behind it are looked for.
+"""
+
+from __future__ import annotations
+
+import shutil
+import sqlite3
+from array import array
+from collections import Counter
+from collections.abc import Collection, Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+from urllib.parse import quote
+
+import numpy as np
+
+from wheel_terra_estimator.bags.limits import LIMITS, Limits
+from wheel_terra_estimator.bags.losses import Losses
+from wheel_terra_estimator.bags.raw_messages import RawMessage, Topic
+from wheel_terra_estimator.errors import UserError
+
+_LAST_ROW = 2**63 - 1
+_AT_A_TIME = 500  # rows fetched by number
+
+
+class SqliteFile:
+    """One ``.db3`` file; attributes as of `McapFile`.
+
+    Raises
+    ------
+    UserError
+        It is no rosbag2 file, or so damaged that SQLite cannot find its tables.
+    """
+
+    def __init__(self, path: Path, stack: ExitStack, limits: Limits = LIMITS) -> None:
+        self.path = path
+        self.losses = Losses()
+        self._limits = limits
+        self._connection = self._open(stack)
+        self._number = array('q')  # of the row, and its log time: only where the order differs
+        self._time = array('q')
+        self._ordered = True
+        try:
+            described = self._read_topics()
+        except sqlite3.Error as error:
+            raise UserError(
+                f'{path}: cannot be read ({error}); try `sqlite3 {path.name} .recover`'
+            ) from None
+        self._topic = {number: topic for number, (topic, _) in described.items()}
+        self._damaged_rows = 0
+        counts = self._survey()
+        self.topics = [
+            Topic(topic, kind, counts[number]) for number, (topic, kind) in described.items()
+        ]
+        for topic in self.topics:
+            found = self.losses.recovered.get(topic.name, 0)
+            self.losses.recovered[topic.name] = found + topic.message_count
+        unknown = sum(count for number, count in counts.items() if number not in described)
+        if unknown:
+            self.losses.left_out.append(f'{unknown} messages of topics that are not described')
+        if self._damaged_rows:
+            self.losses.left_out.append(f'{self._damaged_rows} rows that are no messages left out')
+
+    def notes(self) -> list[str]:
+        """Return what is wrong with the file."""
+        return self.losses.in_words(self.path.name)
+
+    def messages(self, topics: Collection[str]) -> Iterator[RawMessage]:
+        """Yield the messages of some topics in the order of their log times."""
+        wanted = {number: name for number, name in self._topic.items() if name in topics}
+        fetch = self._in_rows() if self._ordered else self._by_number()
+        for topic, time, data in fetch:
+            if topic in wanted:
+                yield RawMessage(time, wanted[topic], data)
+
+    def _open(self, stack: ExitStack) -> sqlite3.Connection:
+        """Open the file without writing to its folder, its write-ahead log included."""
+        path = self.path
+        log = path.with_name(f'{path.name}-wal')
+        immutable = '&immutable=1'
+        if log.is_file() and log.stat().st_size:
+            # The newest messages are in the log; SQLite writes beside a file that has one.
+            folder = Path(stack.enter_context(TemporaryDirectory()))
+            try:
+                for file in (path, log):
+                    shutil.copyfile(file, folder / file.name)
+            except OSError as error:
+                raise UserError(f'{path}: cannot be copied ({error.strerror})') from None
+            path, immutable = folder / path.name, ''
+        try:
+            connection = sqlite3.connect(
+                f'file:{quote(str(path.absolute()))}?mode=ro{immutable}', uri=True
+            )
+        except sqlite3.Error as error:
+            raise UserError(f'{self.path}: cannot be read ({error})') from None
+        stack.callback(connection.close)
+        connection.text_factory = bytes  # names may be damaged
+        return connection
+
+    def _read_topics(self) -> dict[int, tuple[str, str]]:
+        """Return number -> name, type."""
+        run = self._connection.execute
+        run('PRAGMA trusted_schema=OFF')
+        tables = {
+            name: text or b''
+            for name, text in run("SELECT name, sql FROM sqlite_master WHERE type = 'table'")
+        }
+        for table in (b'topics', b'messages'):
+            if table not in tables or b'virtual' in tables[table].lower()[:32]:
+                raise sqlite3.DatabaseError(f'no table {table.decode()}')
+        found = {}
+        for number, name, kind in _rows(
+            self._connection, 'SELECT id, id, name, type FROM topics', self._note_gap
+        ):
+            if isinstance(name, bytes) and isinstance(kind, bytes) and isinstance(number, int):
+                found[number] = (name.decode('utf-8', 'replace'), kind.decode('utf-8', 'replace'))
+        return found
+
+    def _survey(self) -> Counter[int]:
+        """Count the rows of each topic, find damage and learn whether rows stand in time order."""
+        counts: Counter[int] = Counter()
+        last = -1
+        text = 'SELECT id, id, topic_id, timestamp, length(data), typeof(data) FROM messages'
+        for number, topic, time, size, kind in _rows(self._connection, text, self._note_gap):
+            if not (_is_message(topic, time) and kind == b'blob' and size <= self._limits.chunk):
+                self._damaged_rows += 1
+                continue
+            counts[topic] += 1
+            self._ordered = self._ordered and time >= last
+            last = time
+            self._number.append(number)
+            self._time.append(time)
+            losses = self.losses
+            losses.start = time if losses.start is None else min(losses.start, time)
+            losses.last = time if losses.last is None else max(losses.last, time)
+        if self._ordered:
+            self._number = self._time = array('q')
+        return counts
+
+    def _note_gap(self, number: int) -> None:
+        """Remember that rows behind a number cannot be read; the log times around say when."""
+        time = self._time[-1] if self._time else None
+        self.losses.spans[number] = None if time is None else (time, time)
+
+    def _in_rows(self) -> Iterator[tuple[int, int, bytes]]:
+        text = (
+            'SELECT id, topic_id, timestamp, typeof(data), '
+            f'CASE WHEN length(data) <= {self._limits.chunk} THEN data END FROM messages'
+        )
+        for topic, time, kind, data in _rows(self._connection, text, lambda number: None):
+            if _is_message(topic, time) and kind == b'blob' and data is not None:
+                yield topic, time, data
+
+    def _by_number(self) -> Iterator[tuple[int, int, bytes]]:
+        numbers = np.asarray(self._number)[np.argsort(np.asarray(self._time), kind='stable')]
+        run = self._connection.execute
+        for number in numbers.tolist():
+            try:
+                row = run(
+                    'SELECT topic_id, timestamp, data FROM messages WHERE id = ?', (number,)
+                ).fetchone()
+            except (sqlite3.Error, MemoryError):
+                continue
+            if row is not None and _is_message(row[0], row[1]) and isinstance(row[2], bytes):
+                yield row
+
+
+def _is_message(topic: Any, time: Any) -> bool:
+    return isinstance(topic, int) and isinstance(time, int) and time >= 0
+
+
+def _rows(connection: sqlite3.Connection, text: str, on_gap: Any) -> Iterator[tuple[Any, ...]]:
+    """Yield the rows of a table in the order of their numbers, those behind damage too.
+
+    Parameters
+    ----------
+    connection : sqlite3.Connection
+        The file.
+    text : str
+        A ``SELECT`` whose first column is the number of the row; it is not yielded.
+    on_gap : callable
+        Told the last number before each damage.
+    """
+    last = -1
+    while True:
+        try:
+            for row in connection.execute(f'{text} WHERE id > ? ORDER BY id', (last,)):
+                last = row[0]
+                yield row[1:]
+            return
+        except (sqlite3.Error, MemoryError, OverflowError):
+            pass
+        # The cursor runs ahead: what stands before the damage comes one by one.
+        while (found := _row(connection, text, last + 1)) is not None:
+            last = found[0]
+            yield found[1:]
+        on_gap(last)
+        behind = _number_behind(connection, text, last)
+        if behind is None:
+            return
+        last = behind - 1
+
+
+def _row(connection: sqlite3.Connection, text: str, number: int) -> tuple[Any, ...] | None:
+    """Return the first row from a number on; None if there is none, or it cannot be read."""
+    try:
+        cursor = connection.execute(f'{text} WHERE id >= ? ORDER BY id LIMIT 1', (number,))
+        found: tuple[Any, ...] | None = cursor.fetchone()
+    except (sqlite3.Error, MemoryError, OverflowError):
+        return None
+    return found
+
+
+def _number_behind(connection: sqlite3.Connection, text: str, last: int) -> int | None:
+    """Return the number of the first row behind damage that can be read, None if there is none."""
+    low, step = last + 1, 1  # the row from `low` on cannot be read
+    while (found := _row(connection, text, low + step)) is None:
+        low += step
+        step *= 2
+        if low + step >= _LAST_ROW:
+            return None
+    high, number = low + step, int(found[0])
+    while high - low > 1:
+        middle = (low + high) // 2
+        nearer = _row(connection, text, middle)
+        if nearer is None:
+            low = middle
+        else:
+            high, number = middle, int(nearer[0])
+    return number

@@ -1,0 +1,63 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Files that a command reads whole: regular files of a bounded size, in UTF-8."""
+
+from __future__ import annotations
+
+import stat
+from pathlib import Path
+
+from wheel_terra_estimator.errors import UserError
+
+LARGEST_TEXT = 2**20
+"""A configuration file has some kilobytes; a text above this size [byte] is none."""
+
+
+def check_regular(path: Path) -> int:
+    """Return the size of a regular file [byte]; never wait for a pipe, never read a device.
+
+    Raises
+    ------
+    UserError
+        Nothing there, or no regular file.
+    """
+    try:
+        found = path.stat()
+    except OSError as error:
+        raise UserError(f'{path}: cannot be read: {error.strerror}') from None
+    if stat.S_ISDIR(found.st_mode):
+        raise UserError(f'{path}: cannot be read: it is a folder; name a file')
+    if not stat.S_ISREG(found.st_mode):
+        raise UserError(f'{path}: cannot be read: it is a pipe or a device; name a regular file')
+    return found.st_size
+
+
+def read_text(path: Path, largest: int = LARGEST_TEXT) -> str:
+    """Return the text of a file.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    largest : int
+        Greatest size that is read [byte].
+
+    Raises
+    ------
+    UserError
+        Not there, no regular file, too large, not UTF-8.
+    """
+    if check_regular(path) > largest:
+        raise UserError(f'{path}: is larger than {largest / 2**20:g} MB; it cannot be such a file')
+    try:
+        with path.open('rb') as file:
+            content = file.read(largest + 1)
+    except OSError as error:
+        raise UserError(f'{path}: cannot be read: {error.strerror}') from None
+    if len(content) > largest:
+        raise UserError(f'{path}: is larger than {largest / 2**20:g} MB; it cannot be such a file')
+    try:
+        return content.decode('utf-8-sig')
+    except UnicodeDecodeError as error:
+        line = content.count(b'\n', 0, error.start) + 1
+        raise UserError(f'{path}: cannot be read: line {line}: not a UTF-8 text') from None
