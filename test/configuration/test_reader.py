@@ -274,7 +274,8 @@ def test_names_of_shipped_files(tmp_path, monkeypatch):
     assert shipped.find('frostyboy').name == 'frostyboy.yaml'
     assert shipped.find('rovers/frostyboy') == shipped.find('frostyboy.yaml')
     message = complaint(shipped.find, 'frostiboy')
-    assert "did you mean 'frostyboy'?" in message and 'rovers/pathfinder' in message
+    assert "did you mean 'frostyboy'?" in message
+    assert 'rovers/frostyboy, ' in message and len(message) < 200  # the nearest three, not ninety
     monkeypatch.chdir(tmp_path)
     (tmp_path / 'frostyboy').mkdir()  # a folder does not hide the shipped file
     assert shipped.find('frostyboy').is_file()

@@ -5,31 +5,34 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wheel_terra_estimator.checks.evidence import Evidence
 from wheel_terra_estimator.checks.finding import Finding, NotChecked, Outcome
+from wheel_terra_estimator.checks.rover_facts import RoverFacts
 from wheel_terra_estimator.checks.statistics import (
     Estimate,
     block_fit,
     confidence,
     correlation,
 )
-from wheel_terra_estimator.checks.torque import thrust
+from wheel_terra_estimator.checks.torque import MOST_TRACTION, thrust
 
 FloatArray = NDArray[np.float64]
 
 LEAST_RADIUS_ERROR = 0.025
 """Share by which a radius is wrong before it is a finding [-]."""
 RADIUS_SIGMAS = 4.0
-SLIP_MODEL_ERROR = 0.3
-"""Uncertainty of the slip that is taken off by its traction, as a share of it."""
+UNIFORM_STD = 1.0 / math.sqrt(12.0)
+"""Standard deviation of what lies anywhere in an interval, as a share of its length [-]."""
+CREDIBLE_STD = 0.05
+"""Deviation of a ratio of radii that is still told [-]."""
 FIRM_SLIP = 0.12
 """Slip at the usual traction above which the ground is too soft to tell the radius [-]."""
-SLOPE_OF_SLIP = (0.2, 0.2)
+SLOPE_OF_SLIP = Estimate(0.2, 0.2)
 """Slip over traction of firm ground where the drive does not tell it: mean, deviation [-]."""
 LEAST_REFERENCES = 12
 LEAST_TRACK_ERROR = 0.08
@@ -66,34 +69,63 @@ def radius_ratio(evidence: Evidence, figures: dict[str, Any]) -> Estimate | NotC
     if not np.isfinite(evidence.torque).any() or not np.any(np.nan_to_num(evidence.torque)):
         return _without_torque(evidence, plain)
     traction = evidence.rim_at(reference.stamp, np.nan_to_num(thrust(evidence)), half)[rows]
-    traction = traction * np.sign(rim) / (facts.mass * facts.gravity)
-    return _with_torque(rim, forward, traction, plain, figures)
+    sense, weight = np.sign(rim), facts.mass * facts.gravity
+    demand = np.zeros(rim.size)
+    if evidence.force is not None:
+        along = evidence.rim_at(reference.stamp, evidence.force[:, 0], half)[rows]
+        demand = along * sense / facts.gravity
+    speeds = _Speeds(rim, forward, traction * sense / weight, demand)
+    ratio = _with_torque(speeds, plain, figures)
+    return ratio if isinstance(ratio, NotChecked) else _between_rim_and_lugs(facts, ratio)
+
+
+def _between_rim_and_lugs(facts: RoverFacts, ratio: Estimate) -> Estimate:
+    """Refer a rolling radius to the slip radius: soil shears between the rim and the lug tips."""
+    assert facts.configuration is not None
+    wheels = facts.configuration.wheels
+    share = float(np.mean(wheels.lug_height / facts.radius))
+    if facts.configuration.slip_radius == 'rim':
+        share = -share
+    return Estimate(ratio.value * (1.0 + 0.5 * share), math.hypot(ratio.std, UNIFORM_STD * share))
+
+
+class _Speeds(NamedTuple):
+    """Speeds at the stamps of the reference (k,) [m/s]; traction and demand over the weight [-]."""
+
+    rim: FloatArray
+    forward: FloatArray
+    traction: FloatArray
+    demand: FloatArray
 
 
 def _with_torque(
-    rim: FloatArray,
-    forward: FloatArray,
-    traction: FloatArray,
-    plain: Estimate,
-    figures: dict[str, Any],
+    speeds: _Speeds, plain: Estimate, figures: dict[str, Any]
 ) -> Estimate | NotChecked:
-    if float(np.median(np.abs(traction))) > 0.9:
+    """Take the slip off the ratio of the speeds.
+
+    A driven wheel rolls without slip somewhere between no torque (the soil drags it back: it
+    skids a little) and no pull (its torque overcomes the resistance: it slips a little). The ratio
+    is taken in the middle, half of the way between both is its uncertainty.
+    """
+    rim, forward, traction = speeds.rim, speeds.forward, speeds.traction
+    if float(np.median(np.abs(traction))) > MOST_TRACTION:
         return NotChecked('radius', 'torques have no credible scale')
     both = block_fit(np.column_stack([rim, rim * traction]), forward)
-    # What firm ground does elsewhere is one more observation of k.
-    told, usual = Estimate(-both[1].value / both[0].value, both[1].std), SLOPE_OF_SLIP
-    weight = usual[1] ** 2 / (usual[1] ** 2 + told.std**2)
-    slope = weight * told.value + (1.0 - weight) * usual[0]
-    slope_std = math.sqrt(weight) * told.std
+    # What firm ground does elsewhere is one more observation of the slope.
+    told = Estimate(-both[1].value / both[0].value, both[1].std)
+    weight = SLOPE_OF_SLIP.std**2 / (SLOPE_OF_SLIP.std**2 + told.std**2)
+    slope = weight * told.value + (1.0 - weight) * SLOPE_OF_SLIP.value
     middle = float(np.median(traction))
     slip = slope * middle
     figures['rover.slip_of_ground'] = round(slip, 4)
     if slip > FIRM_SLIP:
         return NotChecked('radius', f'soft ground (slip about {slip:.2f}); drive on firm ground')
-    value = plain.value / (1.0 - slip)
-    nearest = float(np.min(np.abs(np.quantile(traction, [0.05, 0.25, 0.5]))))
-    std = math.hypot(plain.std, slope_std * middle, SLIP_MODEL_ERROR * slope * nearest)
-    if std > 0.05:
+    no_torque = plain.value / (1.0 - slip)
+    resistance = slope * max(float(np.median(traction - speeds.demand)), 0.0)
+    value = no_torque * (1.0 - 0.5 * resistance)
+    slope_std = math.sqrt(weight) * told.std
+    std = math.hypot(plain.std, slope_std * middle, UNIFORM_STD * resistance)
+    if std > CREDIBLE_STD:
         return NotChecked('radius', 'slip not told from radius; drive up and down a firm slope')
     return Estimate(value, std)
 

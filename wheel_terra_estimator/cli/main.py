@@ -25,6 +25,9 @@ from wheel_terra_estimator.errors import UserError
 COMMANDS = (
     'simulate',
     'check',
+    'calibrate',
+    'init',
+    'config',
     'replay',
     'predict',
     'diagnose',

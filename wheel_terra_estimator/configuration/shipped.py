@@ -7,7 +7,7 @@ from __future__ import annotations
 import difflib
 import importlib.metadata
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from wheel_terra_estimator.errors import UserError
@@ -99,10 +99,20 @@ def find(name: str | Path, kind: str = '') -> Path:
         raise UserError(f"'{text}' is ambiguous: {' or '.join(matches)}")
     if path.is_dir():
         raise UserError(f'{text}: is a folder, not a configuration file')
-    bare = {key.rsplit('/', 1)[-1]: key for key in shipped}
-    close = difflib.get_close_matches(wanted.rsplit('/', 1)[-1], bare, n=1)
-    hint = f"did you mean '{close[0]}'? " if close else ''
+    near = nearest_names(wanted, shipped)
+    first = near[0].rsplit('/', 1)[-1] if near else ''
+    alike = difflib.get_close_matches(wanted.rsplit('/', 1)[-1], [first])
+    hint = f"did you mean '{first}'? " if alike else ''
     raise UserError(
-        f'{text}: no such file, and no shipped file of this name; {hint}there are: '
-        + ', '.join(shipped)
+        f'{text}: no such file, and no shipped file of this name; {hint}the nearest are '
+        f'{", ".join(near)} (all: wheel-terra config list)'
     )
+
+
+def nearest_names(wanted: str, shipped: Iterable[str], count: int = 3) -> list[str]:
+    """Return the shipped names that are most like a word, the likest first."""
+    bare = wanted.rsplit('/', 1)[-1]
+    return sorted(
+        shipped,
+        key=lambda key: -difflib.SequenceMatcher(None, bare, key.rsplit('/', 1)[-1]).ratio(),
+    )[:count]

@@ -1,0 +1,68 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Calibration of a rover that rolls without slip: the written figures are the true ones."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import rolling_rover as rolling
+
+from wheel_terra_estimator.checks.calibration import as_file, calibrate
+from wheel_terra_estimator.configuration import reader
+
+WRONG = {
+    'wheels.radius': [0.94 * rolling.RADIUS] * 4,
+    'wheels.y': [0.36, -0.36] * 2,
+    'sensors.imu_mounting_pitch_deg': 3.0,
+}
+
+
+def calibrated(seed=0, **changes):
+    recording = replace(rolling.recording(seed=seed), **changes)
+    configuration = rolling.rover(**WRONG)
+    return calibrate(recording, configuration), configuration
+
+
+@pytest.mark.parametrize('seed', range(3))
+def test_radius_track_and_mounting(seed):
+    calibration, _ = calibrated(seed)
+    told = {change.key: change for change in calibration.changes}
+    radius, track = told['wheels.radius'], told['wheels.y']
+    assert radius.after[0] == pytest.approx(rolling.RADIUS, rel=0.01)
+    assert abs(radius.after[0] - rolling.RADIUS) < 2.0 * radius.std
+    assert track.after[0] == pytest.approx(rolling.HALF_TRACK, rel=0.02)
+    assert told['sensors.imu_mounting_pitch_deg'].after == pytest.approx(0.0, abs=0.3)
+
+
+def test_the_scale_of_the_torques():
+    joints = rolling.recording().joints
+    calibration, _ = calibrated(joints=replace(joints, torque=1.2 * joints.torque))
+    gain = next(c for c in calibration.changes if c.key == 'sensors.torque_gain')
+    assert abs(gain.after[0] - 1.0 / 1.2) < 2.0 * gain.std
+
+
+def test_what_the_recording_cannot_tell_stays():
+    straight = rolling.recording(rolling.ten_minute_drive(turns=False))
+    calibration = calibrate(straight, rolling.rover(**WRONG))
+    changed = {change.key for change in calibration.changes}
+    assert not changed & {'wheels.y', 'sensors.imu_mounting_pitch_deg'}
+    assert any('circle' in entry.reason for entry in calibration.not_seen)
+
+
+def test_the_file_is_accepted_and_says_where_numbers_come_from(tmp_path):
+    calibration, configuration = calibrated()
+    text, _ = as_file(calibration, configuration, 'drive')
+    path = tmp_path / 'rover.yaml'
+    path.write_text(text)
+    radius = reader.load([path]).wheels.radius
+    assert np.allclose(radius, rolling.RADIUS, rtol=0.01)
+    above = text.splitlines()[
+        text.splitlines().index(
+            next(line for line in text.splitlines() if 'wheels.radius:' in line and '#' not in line)
+        )
+        - 1
+    ]
+    assert 'before [0.188' in above and '+-' in above and '/reference_odom' in above
+    assert math.isfinite(radius[0])

@@ -1,0 +1,88 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""``wheel-terra init``, ``config`` and ``calibrate``: files that every command accepts."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from wheel_terra_estimator.cli.main import main
+from wheel_terra_estimator.configuration import reader
+
+PATHFINDER = Path(__file__).resolve().parents[2] / 'data' / 'demo' / 'pathfinder'
+WHEEL = (
+    '<link name="{0}"><inertial><mass value="2"/></inertial><collision><geometry>'
+    '<cylinder radius="0.2" length="0.1"/></geometry></collision></link>'
+    '<joint name="{0}_wheel_joint" type="continuous"><parent link="chassis"/><child link="{0}"/>'
+    '<origin xyz="0.1 {1} 0" rpy="{2} 0 0"/><axis xyz="0 0 1"/></joint>'
+)
+URDF = (
+    '<robot name="cart"><link name="base_link"/><link name="chassis"><inertial>'
+    '<origin xyz="0 0 0.1"/><mass value="40"/></inertial></link>'
+    '<joint name="fixed" type="fixed"><parent link="base_link"/><child link="chassis"/>'
+    '<origin xyz="0 0 0.2"/></joint>'
+    + WHEEL.format('right', -0.3, 1.5707963)
+    + WHEEL.format('left', 0.3, -1.5707963)
+    + '</robot>'
+)
+
+
+def test_from_a_urdf(tmp_path):
+    (tmp_path / 'cart.urdf').write_text(URDF)
+    output = tmp_path / 'rover.yaml'
+    command = ['init', '--urdf', str(tmp_path / 'cart.urdf'), '-o', str(output)]
+    assert main(command) == 0
+    rover = reader.load([output])
+    assert rover.wheels.names == ('left_wheel_joint', 'right_wheel_joint')
+    assert np.allclose(rover.wheels.y, [0.3, -0.3])
+    assert np.allclose(rover.wheels.z, 0.2)
+    assert np.allclose(rover.wheels.radius, 0.2)
+    # The axis z of a joint rolled by -90 degrees points left, of one rolled by 90 degrees right.
+    assert rover.wheels.direction.tolist() == [1, -1]
+    assert rover.rover.mass == pytest.approx(44.0)
+    assert rover.rover.centre_of_gravity[2] == pytest.approx((40 * 0.3 + 4 * 0.2) / 44, abs=1e-4)
+    assert main(command) == 2  # nothing is overwritten
+
+
+@pytest.mark.parametrize(
+    ('text', 'word'),
+    [
+        ('<!DOCTYPE r [<!ENTITY a "aa">]><robot/>', 'DTD'),
+        ('<robot', 'not valid XML'),
+        ('<robot name="r"><link name="base_link"/></robot>', '--wheels'),
+        ('<sdf/>', '<robot>'),
+    ],
+)
+def test_what_is_no_urdf(tmp_path, capsys, text, word):
+    (tmp_path / 'r.urdf').write_text(text)
+    assert main(['init', '--urdf', str(tmp_path / 'r.urdf'), '-o', str(tmp_path / 'o')]) == 2
+    assert word in capsys.readouterr().err
+    assert not (tmp_path / 'o').exists()
+
+
+def test_from_a_recording_then_checked_and_calibrated(tmp_path, capsys):
+    output = tmp_path / 'rover.yaml'
+    measures = ['--radius', '0.11', '--track', '0.6', '--wheelbase', '0.5', '--mass', '22']
+    assert main(['init', '--bag', str(PATHFINDER), *measures, '-o', str(output)]) == 0
+    rover = reader.load([output])
+    assert rover.wheels.names[0] == 'front_left_wheel_joint'
+    assert np.allclose(rover.wheels.x, [0.25, 0.25, -0.25, -0.25])
+    assert rover.wheels.passes.tolist() == [1, 1, 2, 2]
+    better = tmp_path / 'calibrated.yaml'
+    command = ['calibrate', str(PATHFINDER), '--config', str(output), '-o', str(better)]
+    assert main(command) == 0
+    assert np.allclose(reader.load([better]).wheels.radius, 0.117, atol=0.001)
+
+
+def test_config(capsys):
+    assert main(['config', 'list', 'rovers']) == 0
+    listed = capsys.readouterr().out
+    assert 'rovers/frostyboy' in listed and 'soils/' not in listed
+    assert main(['config', 'path', 'pathfinder']) == 0
+    path = Path(capsys.readouterr().out.strip())
+    assert main(['config', 'show', 'pathfinder']) == 0
+    assert capsys.readouterr().out == path.read_text()
+    assert main(['config', 'show', 'pathfindr']) == 2
+    complaint = capsys.readouterr().err
+    assert 'rovers/pathfinder' in complaint and len(complaint) < 300

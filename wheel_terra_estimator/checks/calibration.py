@@ -1,0 +1,278 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""What a recording tells of a rover's figures: each with its deviation and where it was seen."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from wheel_terra_estimator.checks import geometry, imu, torque
+from wheel_terra_estimator.checks.evidence import Evidence
+from wheel_terra_estimator.checks.finding import CheckReport, Finding, NotChecked
+from wheel_terra_estimator.checks.run import examine
+from wheel_terra_estimator.checks.series import Recording
+from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.configuration.ros_yaml import Value
+from wheel_terra_estimator.errors import UserError
+
+WORTH_CHANGING = 0.2
+"""Relative change of a noise or a rate below which the rover file keeps its number [-]."""
+NOISE_STD = 0.1
+"""Relative deviation of a noise that a drive tells [-]."""
+CLEAREST_MOUNTING = math.radians(1.0)
+"""A mounting is only changed where its deviation is below this [rad]."""
+
+
+@dataclass(frozen=True)
+class Change:
+    """A parameter before and after, in the unit of the file, and where it was seen."""
+
+    key: str
+    before: Value | None
+    after: Value
+    std: float | None
+    source: str
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """What changes, what was not seen and why, and the findings that cannot be calibrated away."""
+
+    changes: tuple[Change, ...]
+    not_seen: tuple[NotChecked, ...]
+    findings: tuple[Finding, ...]
+    figures: dict[str, Any]
+
+
+def calibrate(recording: Recording, configuration: Configuration) -> Calibration:
+    """Return what a recording tells of the rover file.
+
+    Raises
+    ------
+    UserError
+        The recording has no usable wheel rates.
+    """
+    report, evidence = examine(recording, configuration)
+    if evidence is None:
+        raise UserError(f'{recording.name}: no wheel rates in it to calibrate with')
+    changes = [
+        *_directions(report, configuration),
+        *_mounting(evidence, report),
+        *_biases(evidence),
+        *_noises(report, configuration),
+        *_rates(report, configuration),
+    ]
+    radius, evidence = _radius(evidence, report)
+    changes += radius
+    changes += _torques(evidence, report)
+    changes += _track(evidence)
+    mended = {change.key for change in changes}
+    left = [f for f in report.findings if f.parameter not in mended and f.kind != 'mass']
+    return Calibration(tuple(changes), tuple(report.not_checked), tuple(left), report.figures)
+
+
+def _directions(report: CheckReport, configuration: Configuration) -> list[Change]:
+    wrong = {f.wheel for f in report.findings if f.parameter == 'wheels.direction' and f.wheel}
+    if not wrong:
+        return []
+    wheels = configuration.wheels
+    after = [
+        int(-d) if name in wrong else int(d)
+        for name, d in zip(wheels.names, wheels.direction, strict=True)
+    ]
+    source = 'signs against the other wheels, the gyro and the reference'
+    return [
+        Change('wheels.direction', _before(configuration, 'wheels.direction'), after, None, source)
+    ]
+
+
+def _before(configuration: Configuration, key: str) -> Value | None:
+    return configuration.flat().get(key)
+
+
+def _mounting(evidence: Evidence, report: CheckReport) -> list[Change]:
+    configuration = evidence.facts.configuration
+    assert configuration is not None
+    rotation, std, source = evidence.rotation, None, 'mean specific force'
+    tilt = imu.small_tilt(evidence)
+    if tilt is not None and max(tilt.roll.std, tilt.pitch.std) < CLEAREST_MOUNTING:
+        seen = max(tilt.roll.sigmas_from(0.0), tilt.pitch.sigmas_from(0.0)) > 1.0
+        if seen:
+            rotation = imu.tilt_rotation(tilt.roll.value, tilt.pitch.value) @ rotation
+        std = math.degrees(max(tilt.roll.std, tilt.pitch.std))
+        source = f'specific force over {tilt.turn:.0f} rad of turning, slope taken off'
+    before = [_before(configuration, f'sensors.imu_mounting_{a}_deg') for a in _AXES]
+    changes = []
+    for axis, old, new in zip(_AXES, before, imu.mounting_angles(rotation), strict=True):
+        assert isinstance(old, (int, float))
+        apart = abs((new - old + 180.0) % 360.0 - 180.0)
+        if apart > 0.01:
+            key = f'sensors.imu_mounting_{axis}_deg'
+            changes.append(Change(key, old, round(new, 3), std, source))
+    return changes
+
+
+_AXES = ('roll', 'pitch', 'yaw')
+
+
+def _biases(evidence: Evidence) -> list[Change]:
+    configuration = evidence.facts.configuration
+    if evidence.gyro is None or configuration is None:
+        return []
+    bias, std, where = imu.gyro_bias(evidence)
+    if not np.isfinite(std).all():
+        return []
+    key = 'sensors.angular_rate_bias'
+    worst = float(np.max(std))
+    after = [round(float(value), 6) for value in bias]
+    return [Change(key, _before(configuration, key), after, worst, f'mean of the gyro {where}')]
+
+
+_NOISES = {
+    'sensors.specific_force_std': 'imu.specific_force_std_m/s^2',
+    'sensors.angular_rate_std': 'imu.angular_rate_std_rad/s',
+    'sensors.wheel_rate_std': 'wheels.rate_noise_rad_s',
+    'sensors.sinkage_std': 'sinkage.noise_m',
+}
+
+
+def _noises(report: CheckReport, configuration: Configuration) -> list[Change]:
+    changes = []
+    for key, figure in _NOISES.items():
+        seen, stated = report.figures.get(figure), _before(configuration, key)
+        assert isinstance(stated, (int, float))
+        if seen and (not stated or abs(math.log(seen / stated)) > WORTH_CHANGING):
+            source = 'changes from message to message on the move'
+            changes.append(Change(key, stated, float(f'{seen:.3g}'), NOISE_STD * seen, source))
+    if report.figures.get('reference.stated_std_m_s') == 0.0:
+        key, seen = 'sensors.reference_std', report.figures['reference.noise_m_s']
+        source = 'changes from message to message; the messages state none'
+        changes.append(Change(key, _before(configuration, key), seen, NOISE_STD * seen, source))
+    return changes
+
+
+_RATES = {
+    'sensors.wheel_odometry_rate': 'joint_states.rate_hz',
+    'sensors.imu_rate': 'imu.rate_hz',
+    'sensors.sinkage_rate': 'sinkage.rate_hz',
+    'sensors.reference_rate': 'reference.rate_hz',
+}
+
+
+def _rates(report: CheckReport, configuration: Configuration) -> list[Change]:
+    changes = []
+    for key, figure in _RATES.items():
+        seen, stated = report.figures.get(figure), _before(configuration, key)
+        assert isinstance(stated, (int, float))
+        if seen and abs(math.log(seen / stated)) > WORTH_CHANGING:
+            changes.append(Change(key, stated, round(seen, 2), None, 'median period of the stamps'))
+    return changes
+
+
+def _radius(evidence: Evidence, report: CheckReport) -> tuple[list[Change], Evidence]:
+    configuration = evidence.facts.configuration
+    assert configuration is not None
+    ratio = geometry.radius_ratio(evidence, report.figures)
+    if isinstance(ratio, NotChecked) or ratio.sigmas_from(1.0) < 1.0:
+        return [], evidence
+    rolling = evidence.facts.radius * ratio.value
+    lugs = evidence.facts.radius - configuration.wheels.radius
+    after = [round(float(value), 5) for value in rolling - lugs]
+    std = float(np.mean(evidence.facts.radius)) * ratio.std
+    reference = evidence.reference()
+    assert reference is not None
+    source = f'straight, steady, firm stretches against {reference.topic}'
+    change = Change('wheels.radius', _before(configuration, 'wheels.radius'), after, std, source)
+    return [change], replace(evidence, facts=replace(evidence.facts, radius=rolling))
+
+
+def _torques(evidence: Evidence, report: CheckReport) -> list[Change]:
+    configuration = evidence.facts.configuration
+    assert configuration is not None
+    if evidence.force is None or not np.isfinite(evidence.torque).any(axis=0).all():
+        return []
+    changes = []
+    gain = torque.torque_gain(evidence, report.figures)
+    count = len(evidence.facts.names)
+    if not isinstance(gain, NotChecked) and gain.value > 0.0 and gain.sigmas_from(1.0) > 1.0:
+        key, factor = 'sensors.torque_gain', round(1.0 / gain.value, 4)
+        std = gain.std / gain.value**2
+        source = 'sum of T/r against mass times specific force on slopes; the mass taken as stated'
+        changes.append(Change(key, _before(configuration, key), [factor] * count, std, source))
+    zeros = torque.torque_zeros(evidence)
+    if zeros is not None:
+        key = 'sensors.torque_zero'
+        after = [round(zero.value, 3) for zero in zeros]
+        std = max(zero.std for zero in zeros)
+        source = 'straight stretches driven both ways'
+        changes.append(Change(key, _before(configuration, key), after, std, source))
+    return changes
+
+
+def _track(evidence: Evidence) -> list[Change]:
+    configuration = evidence.facts.configuration
+    assert configuration is not None
+    if geometry.skids(evidence):
+        return []
+    ratio = geometry.track_ratio(evidence)
+    if isinstance(ratio, NotChecked) or ratio.sigmas_from(1.0) < 1.0:
+        return []
+    after = [round(float(y) * ratio.value, 4) for y in evidence.facts.lateral]
+    std = float(np.abs(evidence.facts.lateral).max()) * ratio.std
+    source = 'gyro against the difference of the sides in turns'
+    return [Change('wheels.y', _before(configuration, 'wheels.y'), after, std, source)]
+
+
+def as_file(
+    calibration: Calibration, configuration: Configuration, recording: str
+) -> tuple[str, list[Change]]:
+    """Return the rover file as text, and the changes that its format has no parameter for."""
+    from wheel_terra_estimator.configuration import ros_yaml
+    from wheel_terra_estimator.configuration.parameters import declared
+
+    known = declared()
+    changes = {change.key: change for change in calibration.changes if change.key in known}
+    homeless = [change for change in calibration.changes if change.key not in known]
+    values = configuration.flat()
+    keys = [key for key in values if key in configuration.stated or key in changes]
+    lines = [f'# Calibrated from the recording {recording}.', '#']
+    lines += ['# Not seen in it, and left as it was:'] if calibration.not_seen else []
+    lines += [f'#   {entry.kind}: {entry.reason}' for entry in calibration.not_seen]
+    for change in homeless:
+        lines.append(f'# Seen, no parameter here: {change.key}: {_in_words(change)}')
+    lines += ['/**:', '  ros__parameters:']
+    for key in keys:
+        told = changes.get(key)
+        value = values[key] if told is None else told.after
+        if told is not None:
+            lines.append(f'    # {_in_words(told)}')
+        lines.append(f'    {key}: {ros_yaml.format_value(_as_declared(value, values.get(key)))}')
+    return '\n'.join(lines) + '\n', homeless
+
+
+def _as_declared(value: Value, before: Value | None) -> Value:
+    """Return a value with the number type that the rover file had."""
+    if isinstance(value, list) and isinstance(before, list) and isinstance(before[0], float):
+        return [float(item) for item in value]
+    return (
+        float(value) if isinstance(before, float) and not isinstance(value, (str, list)) else value
+    )
+
+
+def _in_words(change: Change) -> str:
+    from wheel_terra_estimator.configuration.ros_yaml import format_value
+
+    before = 'not stated' if change.before is None else format_value(change.before)
+    std = '' if change.std is None else f' +- {change.std:.2g}'
+    return f'before {before}, now {format_value(change.after)}{std}: {change.source}'
+
+
+def summary(calibration: Calibration) -> list[str]:
+    """Return lines for the terminal."""
+    lines = [f'  {change.key}: {_in_words(change)}' for change in calibration.changes]
+    lines += [f'  not seen: {entry.kind}: {entry.reason}' for entry in calibration.not_seen]
+    return lines + [f'  still wrong: {finding}' for finding in calibration.findings]

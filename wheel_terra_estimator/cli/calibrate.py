@@ -1,0 +1,64 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""``wheel-terra calibrate``."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from wheel_terra_estimator.configuration import reader as configuration_reader
+
+SUMMARY = 'write a rover file with what a recording tells: radius, mounting, zeros, noise'
+EXAMPLES = (
+    'wheel-terra calibrate ten_minute_drive --config my_rover.yaml -o my_rover_calibrated.yaml',
+    'wheel-terra calibrate drive --config pathfinder --remap reference_odom:=/truth/odometry '
+    '-o pathfinder_calibrated.yaml',
+)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of the command."""
+    parser.add_argument(
+        'bag',
+        type=Path,
+        metavar='BAG',
+        help='recording of the ten-minute drive (docs/own_rover.md)',
+    )
+    configuration_reader.add_arguments(parser)
+    parser.add_argument(
+        '-o', dest='output', type=Path, metavar='F', required=True, help='rover file to be written'
+    )
+    parser.add_argument(
+        '--remap',
+        action='append',
+        default=[],
+        metavar='FROM:=TO',
+        help="the estimator's topic, then the bag's; may be given several times",
+    )
+    parser.add_argument('--overwrite', action='store_true', help='replace an earlier file')
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Run the command."""
+    from wheel_terra_estimator.bags.reader import parse_remaps
+    from wheel_terra_estimator.bags.series_reader import read_series
+    from wheel_terra_estimator.bags.storage import open_bag
+    from wheel_terra_estimator.checks.calibration import as_file, calibrate, summary
+    from wheel_terra_estimator.output_folder import check_file, new_file
+
+    configuration = configuration_reader.from_arguments(arguments)
+    check_file(arguments.output, arguments.overwrite, [arguments.bag])
+    with open_bag(arguments.bag) as bag:
+        name = arguments.bag.resolve().name
+        recording = read_series(bag, parse_remaps(arguments.remap), name)
+    calibration = calibrate(recording, configuration)
+    text, homeless = as_file(calibration, configuration, name)
+    with new_file(arguments.output, arguments.overwrite) as path:
+        path.write_text(text, encoding='utf-8')
+    print(f'{name}: {len(calibration.changes)} parameters told')
+    print('\n'.join(summary(calibration)))
+    for change in homeless:
+        print(f'  to be applied in the driver, no parameter here: {change.key}')
+    print(f'rover file: {arguments.output}')
+    return 0

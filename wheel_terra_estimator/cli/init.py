@@ -1,0 +1,168 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""``wheel-terra init``."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from wheel_terra_estimator.errors import UserError
+
+if TYPE_CHECKING:
+    from wheel_terra_estimator.configuration.rover_template import RoverSketch
+
+SUMMARY = 'write a new rover file from a URDF, from a recording, or from a few questions'
+EXAMPLES = (
+    'wheel-terra init --urdf rover.urdf -o my_rover.yaml',
+    'wheel-terra init --bag my_drive --radius 0.165 --track 0.57 --wheelbase 0.51 --mass 50 '
+    '-o my_rover.yaml',
+)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of the command."""
+    parser.add_argument(
+        '-o', dest='output', type=Path, metavar='F', required=True, help='rover file to be written'
+    )
+    source = parser.add_mutually_exclusive_group()
+    source.add_argument('--urdf', type=Path, metavar='F', help='robot description (URDF)')
+    source.add_argument('--bag', type=Path, metavar='BAG', help='recording, for the wheel names')
+    parser.add_argument(
+        '--wheels', metavar='NAMES', help='wheel joints, comma between, front to rear, left first'
+    )
+    for name, unit, meaning in _MEASURES:
+        parser.add_argument(f'--{name}', type=_positive, metavar=unit, help=meaning)
+    parser.add_argument('--name', default='', metavar='TEXT', help='name of the rover, for reports')
+    parser.add_argument('--overwrite', action='store_true', help='replace an earlier file')
+
+
+_MEASURES = (
+    ('radius', 'M', 'radius of the wheels, lugs not counted [m]'),
+    ('width', 'M', 'width of the wheels [m]'),
+    ('track', 'M', 'distance of left and right wheels [m]'),
+    ('wheelbase', 'M', 'distance of the first and last axle [m]'),
+    ('mass', 'KG', 'mass of the rover [kg]'),
+)
+_NEEDED = ('radius', 'track', 'wheelbase', 'mass')
+
+
+def _positive(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = -1.0
+    if not 0.0 < value < 1e6:
+        raise argparse.ArgumentTypeError(f'{text!r} must be a number above 0')
+    return value
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Run the command."""
+    from wheel_terra_estimator.configuration import reader
+    from wheel_terra_estimator.configuration.rover_template import rover_file
+    from wheel_terra_estimator.output_folder import check_file, new_file
+
+    inputs = [path for path in (arguments.urdf, arguments.bag) if path]
+    check_file(arguments.output, arguments.overwrite, inputs)
+    sketch = _sketch(arguments)
+    with new_file(arguments.output, arguments.overwrite) as path:
+        path.write_text(rover_file(sketch), encoding='utf-8')
+    reader.load([arguments.output])
+    print(f'rover file: {arguments.output} ({len(sketch.wheels)} wheels, {sketch.mass:g} kg)')
+    for key in sorted(sketch.guessed):
+        print(f'  {key} is a guess: measure it')
+    print(f'next: wheel-terra check RECORDING --config {arguments.output}')
+    return 0
+
+
+def _sketch(arguments: argparse.Namespace) -> RoverSketch:
+    wheels = [n.strip() for n in (arguments.wheels or '').split(',') if n.strip()]
+    if arguments.urdf:
+        from wheel_terra_estimator.configuration.urdf import read_urdf
+
+        sketch = read_urdf(arguments.urdf, wheels)
+        count = len(sketch.wheels)
+        if arguments.radius:
+            sketch = replace(sketch, radius=[arguments.radius] * count)
+        if arguments.width:
+            sketch = replace(sketch, width=[arguments.width] * count)
+        if arguments.mass:
+            guessed = sketch.guessed - {'rover.mass'}
+            sketch = replace(sketch, mass=arguments.mass, guessed=guessed)
+        return replace(sketch, name=arguments.name or sketch.name)
+    if arguments.bag:
+        wheels = wheels or _wheels_of(arguments.bag)
+    elif not wheels:
+        wheels = _ask_wheels()
+    return _from_measures(arguments, wheels)
+
+
+def _wheels_of(path: Path) -> list[str]:
+    from wheel_terra_estimator.bags.series_reader import read_series
+    from wheel_terra_estimator.bags.storage import open_bag
+    from wheel_terra_estimator.checks.rover_facts import wheel_names
+
+    with open_bag(path) as bag:
+        recording = read_series(bag, {}, path.name)
+    if recording.joints is None:
+        raise UserError(f'{path}: no joint states in it; name the wheels with --wheels')
+    return list(wheel_names(recording.joints.names))
+
+
+def _from_measures(arguments: argparse.Namespace, wheels: list[str]) -> RoverSketch:
+    from wheel_terra_estimator.checks.rover_facts import side_of
+    from wheel_terra_estimator.configuration.rover_template import (
+        DEFAULT_WIDTH_SHARE,
+        RoverSketch,
+    )
+
+    measures = {name: getattr(arguments, name) for name, _, _ in _MEASURES}
+    for name, unit, meaning in _MEASURES:
+        if measures[name] is None and name in _NEEDED:
+            measures[name] = _ask_number(name, unit, meaning)
+    sides = [side_of(name) for name in wheels]
+    if 0 in sides:  # left before right, as the file has it
+        sides = [1 if i % 2 == 0 else -1 for i in range(len(wheels))]
+    rows = [sum(side == sides[i] for side in sides[:i]) for i in range(len(wheels))]
+    last = max(rows, default=0)
+    base, half = measures['wheelbase'], 0.5 * measures['track']
+    x = [base * (0.5 - row / last) if last else 0.0 for row in rows]
+    count = len(wheels)
+    return RoverSketch(
+        name=arguments.name or 'my rover',
+        wheels=wheels,
+        radius=[measures['radius']] * count,
+        width=[measures['width'] or DEFAULT_WIDTH_SHARE * measures['radius']] * count,
+        x=[round(value, 4) for value in x],
+        y=[round(half * side, 4) for side in sides],
+        z=[measures['radius']] * count,
+        mass=measures['mass'],
+        guessed=frozenset() if measures['width'] else frozenset({'wheels.width'}),
+        source='wheel names from the recording, the rest as given' if arguments.bag else 'as given',
+    )
+
+
+def _ask_wheels() -> list[str]:
+    text = _ask('names of the wheel joints, comma between, front to rear, left before right: ')
+    wheels = [name.strip() for name in text.split(',') if name.strip()]
+    if not wheels:
+        raise UserError('no wheels named; give --wheels, --bag or --urdf')
+    return wheels
+
+
+def _ask_number(name: str, unit: str, meaning: str) -> float:
+    text = _ask(f'{meaning}: ', f'--{name} {unit} is missing ({meaning})')
+    try:
+        return _positive(text)
+    except argparse.ArgumentTypeError as error:
+        raise UserError(f'--{name}: {error}') from None
+
+
+def _ask(question: str, missing: str = 'give --urdf, --bag or --wheels') -> str:
+    if not sys.stdin.isatty():
+        raise UserError(missing)
+    return input(question)

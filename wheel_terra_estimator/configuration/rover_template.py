@@ -1,0 +1,101 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""A new rover file with comments: what must be stated, and what is worth stating."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from wheel_terra_estimator.configuration.parameters import declared
+from wheel_terra_estimator.configuration.ros_yaml import Value, format_value
+
+DEFAULT_WIDTH_SHARE = 0.6
+"""Width over radius of a wheel whose width is not known [-]."""
+
+
+@dataclass(frozen=True)
+class RoverSketch:
+    """What is known of a rover; nan-free, one entry per wheel, front to rear, left before right.
+
+    ``guessed`` names the keys that are guesses and have to be looked at.
+    """
+
+    name: str
+    wheels: Sequence[str]
+    radius: Sequence[float]  # [m]
+    width: Sequence[float]  # [m]
+    x: Sequence[float]  # [m]
+    y: Sequence[float]  # [m]
+    z: Sequence[float]  # [m]
+    mass: float  # [kg]
+    centre_of_gravity: Sequence[float] = (0.0, 0.0, 0.0)  # [m]
+    direction: Sequence[int] = ()
+    guessed: frozenset[str] = field(default_factory=frozenset)
+    source: str = ''
+
+
+def rover_file(sketch: RoverSketch) -> str:
+    """Return the text of a rover file that all commands accept."""
+    count = len(sketch.wheels)
+    values: dict[str, Value] = {
+        'rover.name': sketch.name,
+        'rover.mass': float(sketch.mass),
+        'rover.centre_of_gravity': [float(v) for v in sketch.centre_of_gravity],
+        'wheels.names': list(sketch.wheels),
+        'wheels.radius': [float(v) for v in sketch.radius],
+        'wheels.width': [float(v) for v in sketch.width],
+        'wheels.x': [float(v) for v in sketch.x],
+        'wheels.y': [float(v) for v in sketch.y],
+        'wheels.z': [float(v) for v in sketch.z],
+        'wheels.direction': [int(v) for v in sketch.direction] or [1] * count,
+        'wheels.passes': passes(sketch.x, sketch.y),
+    }
+    table = declared()
+    lines = [f'# {sketch.name}: made by `wheel-terra init`', '#']
+    lines += [f'# Source: {sketch.source}.'] if sketch.source else []
+    lines += [
+        '# Next: wheel-terra check RECORDING --config THIS_FILE, then wheel-terra calibrate.',
+        '/**:',
+        '  ros__parameters:',
+    ]
+    for key, value in values.items():
+        unit = table[key].unit
+        words = f'{table[key].meaning}' + (f' [{unit}]' if unit not in ('', '-') else '')
+        mark = 'A GUESS, to be measured: ' if key in sketch.guessed else ''
+        lines += [f'    # {mark}{words}', f'    {key}: {format_value(value)}']
+    lines += ['', '    # Worth stating where known (the values are the defaults):']
+    for key in _WORTH_STATING:
+        parameter = table[key]
+        default = parameter.default
+        shown = [default] * count if parameter.size == 'wheels' else default
+        unit = f' [{parameter.unit}]' if parameter.unit not in ('', '-') else ''
+        lines.append(f'    # {key}: {format_value(shown)}  # {parameter.meaning}{unit}')
+    return '\n'.join(lines) + '\n'
+
+
+_WORTH_STATING = (
+    'wheels.lug_height',
+    'wheels.lug_count',
+    'wheels.torque_limit',
+    'rover.suspension',
+    'rover.gravity',
+    'sensors.wheel_rate_std',
+    'sensors.torque_std',
+    'sensors.specific_force_std',
+    'sensors.angular_rate_std',
+    'sensors.reference_std',
+    'sensors.imu_mounting_roll_deg',
+    'sensors.imu_mounting_pitch_deg',
+    'sensors.imu_mounting_yaw_deg',
+)
+
+
+def passes(x: Sequence[float], y: Sequence[float]) -> list[int]:
+    """Return the pass number of each wheel: how many run before it in the same rut, plus one."""
+    count = len(x)
+    same_rut = 0.1  # [m]
+    return [
+        1 + sum(x[k] > x[i] + same_rut and abs(y[k] - y[i]) < same_rut for k in range(count))
+        for i in range(count)
+    ]

@@ -1,0 +1,252 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Wheels and mass of a rover from its URDF.
+
+A URDF may come from anywhere: documents with a DTD or entities are refused (they could blow up or
+read files), and the size is bounded.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wheel_terra_estimator.configuration.rover_template import DEFAULT_WIDTH_SHARE, RoverSketch
+from wheel_terra_estimator.errors import UserError
+
+LARGEST_FILE = 20_000_000  # [byte]
+DEEPEST_CHAIN = 1000
+BASE_LINKS = ('base_link', 'base_footprint')
+
+Pose = NDArray[np.float64]  # (4, 4)
+
+
+def read_urdf(path: Path, wheels: Sequence[str] = ()) -> RoverSketch:
+    """Return the rover that a URDF describes.
+
+    Parameters
+    ----------
+    path : Path
+        URDF file (xacro has to be expanded first).
+    wheels : sequence of str
+        Names of the wheel joints; default: continuous joints whose name or link says wheel.
+
+    Raises
+    ------
+    UserError
+        Not a URDF, no wheels, or a wheel without a radius.
+    """
+    robot = _parse(path)
+    joints = {j.get('name', ''): j for j in robot.iter('joint') if j.get('type')}
+    links = {link.get('name', ''): link for link in robot.iter('link')}
+    names = list(wheels) or [name for name, joint in joints.items() if _is_wheel(name, joint)]
+    missing = [name for name in names if name not in joints]
+    if missing or not names:
+        turning = [n for n, j in joints.items() if j.get('type') in ('continuous', 'revolute')]
+        raise UserError(
+            f'{path}: {"no joint " + missing[0] if missing else "no wheel joints found"}; name the '
+            f'wheels with --wheels; turning joints: {", ".join(turning) or "none"}'
+        )
+    base = _base(links, joints)
+    placed = [(name, _pose(joints[name], joints, base, path)) for name in names]
+    placed.sort(key=lambda item: (-round(item[1][0, 3], 3), -item[1][1, 3]))
+    names = [name for name, _ in placed]
+    poses = [pose for _, pose in placed]
+    shapes = [_cylinder(links, joints[name], path) for name in names]
+    guessed = {'wheels.width'} if any(width is None for _, width in shapes) else set()
+    radius = [r for r, _ in shapes]
+    mass, centre = _mass(links, joints, base, path)
+    if not mass:
+        guessed.add('rover.mass')
+    return RoverSketch(
+        name=robot.get('name', path.stem),
+        wheels=names,
+        radius=radius,
+        width=[w if w is not None else DEFAULT_WIDTH_SHARE * r for r, w in shapes],
+        x=[round(float(p[0, 3]), 5) for p in poses],
+        y=[round(float(p[1, 3]), 5) for p in poses],
+        z=[round(float(p[2, 3]), 5) for p in poses],
+        mass=round(mass, 3) or 50.0,
+        centre_of_gravity=centre,
+        direction=[_direction(joints[n], p) for n, p in zip(names, poses, strict=True)],
+        guessed=frozenset(guessed),
+        source=f'{path.name}, relative to {base}',
+    )
+
+
+def _parse(path: Path) -> ElementTree.Element:
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise UserError(f'{path}: cannot be read: {error.strerror}') from None
+    if len(data) > LARGEST_FILE:
+        raise UserError(f'{path}: larger than {LARGEST_FILE // 1_000_000} MB: not a URDF')
+    try:
+        text = data.decode('utf-8')
+    except UnicodeDecodeError:
+        raise UserError(f'{path}: not a UTF-8 text') from None
+    if re.search(r'<!(DOCTYPE|ENTITY)', text, re.IGNORECASE):
+        raise UserError(f'{path}: holds a DTD or entities, which a URDF does not need; remove them')
+    try:
+        robot = ElementTree.fromstring(text)
+    except ElementTree.ParseError as error:
+        raise UserError(f'{path}: not valid XML: {error}') from None
+    if robot.tag != 'robot':
+        raise UserError(f'{path}: the root is <{robot.tag}>, a URDF has <robot>')
+    if '${' in text or 'xacro:' in text.split('>', 2)[-1]:
+        raise UserError(f'{path}: is a xacro; expand it first: xacro {path.name} > rover.urdf')
+    return robot
+
+
+def _is_wheel(name: str, joint: ElementTree.Element) -> bool:
+    words = f'{name} {_child(joint)}'.lower()
+    caster = re.search(r'caster|steer', words)
+    return joint.get('type') == 'continuous' and 'wheel' in words and not caster
+
+
+def _child(joint: ElementTree.Element) -> str:
+    return _named(joint, 'child', 'link')
+
+
+def _parent(joint: ElementTree.Element) -> str:
+    return _named(joint, 'parent', 'link')
+
+
+def _named(element: ElementTree.Element, tag: str, attribute: str) -> str:
+    found = element.find(tag)
+    return found.get(attribute, '') if found is not None else ''
+
+
+def _base(links: dict[str, ElementTree.Element], joints: dict[str, ElementTree.Element]) -> str:
+    for name in BASE_LINKS:
+        if name in links:
+            return name
+    children = {_child(joint) for joint in joints.values()}
+    roots = [name for name in links if name not in children]
+    return roots[0] if roots else next(iter(links), '')
+
+
+def _numbers(text: str | None, default: tuple[float, ...], path: Path) -> list[float]:
+    try:
+        values = [float(item) for item in text.split()] if text else list(default)
+    except ValueError:
+        raise UserError(f'{path}: {text!r} is not a list of numbers') from None
+    if len(values) != len(default) or not all(math.isfinite(v) for v in values):
+        raise UserError(f'{path}: {text!r} must be {len(default)} finite numbers')
+    return values
+
+
+def _origin(element: ElementTree.Element | None, path: Path) -> Pose:
+    pose = np.eye(4)
+    origin = element.find('origin') if element is not None else None
+    if origin is None:
+        return pose
+    roll, pitch, yaw = _numbers(origin.get('rpy'), (0.0, 0.0, 0.0), path)
+    (sr, cr), (sp, cp), (sy, cy) = ((math.sin(a), math.cos(a)) for a in (roll, pitch, yaw))
+    pose[:3, :3] = [
+        [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+        [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+        [-sp, cp * sr, cp * cr],
+    ]
+    pose[:3, 3] = _numbers(origin.get('xyz'), (0.0, 0.0, 0.0), path)
+    return pose
+
+
+def _link_pose(
+    link: str, joints: dict[str, ElementTree.Element], base: str, path: Path
+) -> Pose | None:
+    """Return the pose of a link in the base; None if it does not hang on it."""
+    above = {_child(joint): joint for joint in joints.values()}
+    pose = np.eye(4)
+    for _ in range(DEEPEST_CHAIN):
+        if link == base:
+            return pose
+        joint = above.get(link)
+        if joint is None:
+            return _seen_from(base, link, joints, path, pose)
+        pose = _origin(joint, path) @ pose
+        link = _parent(joint)
+    raise UserError(f'{path}: the joints of link {link} form a loop')
+
+
+def _seen_from(
+    base: str, root: str, joints: dict[str, ElementTree.Element], path: Path, pose: Pose
+) -> Pose | None:
+    """Return a pose in the base where both hang on the same root above the base."""
+    above = {_child(joint): joint for joint in joints.values()}
+    to_base, link = np.eye(4), base
+    for _ in range(DEEPEST_CHAIN):
+        if link == root:
+            return np.asarray(np.linalg.inv(to_base) @ pose)
+        joint = above.get(link)
+        if joint is None:
+            return None
+        to_base = _origin(joint, path) @ to_base
+        link = _parent(joint)
+    return None
+
+
+def _pose(
+    joint: ElementTree.Element, joints: dict[str, ElementTree.Element], base: str, path: Path
+) -> Pose:
+    pose = _link_pose(_child(joint), joints, base, path)
+    if pose is None:
+        raise UserError(f'{path}: joint {joint.get("name")} does not hang on {base}')
+    return pose
+
+
+def _cylinder(
+    links: dict[str, ElementTree.Element], joint: ElementTree.Element, path: Path
+) -> tuple[float, float | None]:
+    """Return radius and width of a wheel from its collision or visual shape."""
+    link = links.get(_child(joint))
+    for kind in ('collision', 'visual'):
+        for part in link.iter(kind) if link is not None else ():
+            for cylinder in part.iter('cylinder'):
+                radius = _numbers(cylinder.get('radius'), (0.0,), path)[0]
+                length = _numbers(cylinder.get('length'), (0.0,), path)[0]
+                if radius > 0.0:
+                    return radius, length or None
+            for sphere in part.iter('sphere'):
+                radius = _numbers(sphere.get('radius'), (0.0,), path)[0]
+                if radius > 0.0:
+                    return radius, None
+    raise UserError(
+        f'{path}: wheel {joint.get("name")} has no cylinder to take its radius from; give --radius'
+    )
+
+
+def _direction(joint: ElementTree.Element, pose: Pose) -> int:
+    """Return 1 where a positive rate drives forward: the axis points left."""
+    axis = joint.find('axis')
+    xyz = (
+        [float(v) for v in (axis.get('xyz') or '1 0 0').split()] if axis is not None else [1, 0, 0]
+    )
+    return -1 if float((pose[:3, :3] @ np.array(xyz))[1]) < -0.1 else 1
+
+
+def _mass(
+    links: dict[str, ElementTree.Element],
+    joints: dict[str, ElementTree.Element],
+    base: str,
+    path: Path,
+) -> tuple[float, list[float]]:
+    """Return the mass of all links and their centre of gravity in the base."""
+    total, moment = 0.0, np.zeros(3)
+    for name, link in links.items():
+        inertial = link.find('inertial')
+        if inertial is None or inertial.find('mass') is None:
+            continue
+        mass = _numbers(inertial.find('mass').get('value'), (0.0,), path)[0]  # type: ignore[union-attr]
+        pose = _link_pose(name, joints, base, path)
+        if pose is not None and mass > 0.0:
+            total += mass
+            moment += mass * (pose @ _origin(inertial, path))[:3, 3]
+    centre = moment / total if total else moment
+    return total, [round(float(value), 4) for value in centre]
