@@ -69,7 +69,8 @@ def main() -> None:
     folder = ROOT / 'docs' / 'models' / 'effects'
     folder.mkdir(parents=True, exist_ok=True)
     for effect in catalogue().values():
-        draw(effect, folder / f'{effect.name}.svg')
+        if not effect.sparse:  # a law has no shape of its own
+            draw(effect, folder / f'{effect.name}.svg')
     (ROOT / 'docs' / 'effects.md').write_text(as_markdown(catalogue()), encoding='utf-8')
 
 

@@ -64,6 +64,9 @@ def test_effects_come_from_the_catalogue():
     table = declared()
     for name, effect in catalogue().items():
         assert table[f'effects.{name}.enabled'].default is False
+        if effect.sparse:
+            assert table[f'effects.{name}.targets'].size == 0, 'a flat list of any length'
+            continue
         for item in effect.parameters:
             parameter = table[f'effects.{name}.{item.name}']
             assert (parameter.default, parameter.lower, parameter.upper, parameter.unit) == (

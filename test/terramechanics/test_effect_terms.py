@@ -65,7 +65,10 @@ def test_all_names_of_the_contract_are_there_and_complete() -> None:
     assert known['lug_digging'].parameters[0].name == 'kd'
 
 
-VARIANTS = [form.name for effect in catalogue().values() for form in effect.forms]
+# A law without terms (sparse) changes nothing; test_proposal.py is about those with some.
+VARIANTS = [
+    form.name for effect in catalogue().values() if not effect.sparse for form in effect.forms
+]
 
 
 @pytest.mark.parametrize('name', VARIANTS)

@@ -122,6 +122,8 @@ def run(arguments: argparse.Namespace) -> int:
             f'  {quantity} [{unit}]: held-out error {scale * gap.before:.3g} as configured, '
             f'{scale * gap.refit:.3g} soil refitted, {scale * gap.after:.3g} in the end{noise}'
         )
+    if diagnosis.proposal:
+        print(f'  proposed law (proposal.yaml): {diagnosis.proposal.words}')
     if diagnosis.next_measurement:
         print(f'  next measurement: {diagnosis.next_measurement[0].what}')
     for note in diagnosis.notes:
@@ -173,10 +175,12 @@ def _read(data: str, remaps: list[str], configuration: Configuration) -> SteadyT
 
 def _write(diagnosis: Diagnosis, folder: Path, *, pictures: bool) -> None:
     """Write all files of a diagnosis into a folder."""
-    from wheel_terra_estimator.discrepancy.report.model_file import write_model
+    from wheel_terra_estimator.discrepancy.report.model_file import write_model, write_proposal
 
     diagnosis.write_json(folder / 'report.json')
     write_model(diagnosis, folder / 'model.yaml')
+    if diagnosis.proposal:
+        write_proposal(diagnosis, diagnosis.proposal, folder / 'proposal.yaml')
     if pictures:
         from wheel_terra_estimator.discrepancy.report.page import write_report
 

@@ -21,6 +21,7 @@ from wheel_terra_estimator.terramechanics.effects import (
     catalogue,
     load_file,
 )
+from wheel_terra_estimator.terramechanics.effects import learned_closure as law
 
 SUMMARY = 'list the physical and instrument effects that can be named'
 EXAMPLES = (
@@ -76,7 +77,11 @@ def as_text(effects: Mapping[str, Effect]) -> str:
             if len(effect.forms) > 1:
                 lines += _wrapped('form ', form.form)
             lines += [*_wrapped('', form.claim), *_wrapped('term: ', form.symbol)]
-            lines += [line for p in form.parameters for line in _parameter_text(p)]
+            lines += (
+                _law_text()
+                if form.sparse
+                else [line for p in form.parameters for line in _parameter_text(p)]
+            )
             if form is not effect.forms[0]:
                 lines += [*_wrapped('valid: ', form.validity), *_wrapped('source: ', form.source)]
         kind = 'instrument' if effect.instrument else 'soil'
@@ -87,7 +92,9 @@ def as_text(effects: Mapping[str, Effect]) -> str:
             lines += _wrapped('like ', f'{other}; what separates them: {separates}')
         if effect.incompatible_with:
             lines += _wrapped('not with: ', ', '.join(sorted(effect.incompatible_with)))
-        if not effect.candidate:
+        if effect.sparse:
+            lines.append('- Proposed by the discrepancy workflow, never named.')
+        elif not effect.candidate:
             lines += _wrapped('', 'tried by the discrepancy workflow only when asked for by name')
         lines += _wrapped('valid: ', effect.validity)
         lines += _wrapped('source: ', effect.source)
@@ -135,7 +142,7 @@ def as_markdown(effects: Mapping[str, Effect]) -> str:
                 first = ' (the first one, without a key)' if form is effect.forms[0] else ''
                 lines += [f'**`form: {form.form}`**{first}', '']
             lines += [f'{form.claim[0].upper()}{form.claim[1:]}.', '', f'    {form.symbol}', '']
-            lines += _parameter_table(form)
+            lines += _law_table() if form.sparse else _parameter_table(form)
             lines.append(f'- Touches: {_touched(form)}.')
             if form.needs:
                 lines.append(f'- Needs to vary in a table: {", ".join(form.needs)}.')
@@ -148,8 +155,37 @@ def as_markdown(effects: Mapping[str, Effect]) -> str:
             lines.append('- Tried by the discrepancy workflow only when asked for by name.')
         if lines[-1]:
             lines.append('')
-        lines.append(f'![{effect.name}](models/effects/{effect.name}.svg)')
+        if not effect.sparse:
+            lines.append(f'![{effect.name}](models/effects/{effect.name}.svg)')
     return '\n'.join(lines) + '\n'
+
+
+def _law_text() -> list[str]:
+    """Return what a sparse law may change, and with what, for a terminal."""
+    return [
+        *_wrapped('targets: ', ', '.join(law.TARGETS)),
+        *_wrapped('features: ', ', '.join(law.FEATURES)),
+    ]
+
+
+def _law_table() -> list[str]:
+    """Return what a sparse law may change, and with what, as tables."""
+    lines = [
+        'Flat lists of equal length: `targets`, `features`, `coefficients`, `coefficients_std`.',
+        '',
+        '| target | changes | how | bound of the change |',
+        '|---|---|---|---|',
+    ]
+    for name, target in law.TARGETS.items():
+        unit = '' if target.unit == '-' else f', in {target.unit}'
+        how = 'factor exp(x)' if target.factor else f'added{unit}'
+        lines.append(f'| `{name}` | {target.meaning} | {how} | {target.bound:g} |')
+    lines += ['', '| feature | value | varies with |', '|---|---|---|']
+    for name, feature in law.FEATURES.items():
+        columns = ', '.join(feature.columns) or '-'
+        only = ' (`torque` and `drawbar_pull` only)' if feature.after_contact else ''
+        lines.append(f'| `{name}` | {feature.meaning.replace("|", "&#124;")}{only} | {columns} |')
+    return [*lines, '']
 
 
 def _parameter_table(form: Effect) -> list[str]:

@@ -261,6 +261,9 @@ def _effects(values: Mapping[str, Value]) -> tuple[EffectSettings, EffectSetting
     deviations: EffectSettings = {}
     for name in enabled:
         effect, prefix = catalogue()[name], f'effects.{name}'
+        if effect.sparse:
+            settings[name], deviations[name] = _law(values, prefix)
+            continue
         form = str(values.get(f'{prefix}.form', effect.form))
         chosen = effect.in_form(form).parameters
         settings[name] = {p.name: _number(values, f'{prefix}.{p.name}') for p in chosen}
@@ -268,3 +271,18 @@ def _effects(values: Mapping[str, Value]) -> tuple[EffectSettings, EffectSetting
         if form != effect.form:
             settings[name]['form'] = form
     return settings, deviations
+
+
+def _law(values: Mapping[str, Value], prefix: str) -> tuple[dict[str, float], dict[str, float]]:
+    """Return coefficients and deviations of a law by the name of each term."""
+    from wheel_terra_estimator.terramechanics.effects.learned_closure import coefficients_of
+
+    lists: dict[str, Any] = {
+        key: values[f'{prefix}.{key}']
+        for key in ('targets', 'features', 'coefficients', 'coefficients_std')
+    }
+    stds = lists['coefficients_std']
+    if len(stds) == 1:
+        stds = stds * len(lists['coefficients'])
+    pairs = lists['targets'], lists['features']
+    return coefficients_of(*pairs, lists['coefficients']), coefficients_of(*pairs, stds)

@@ -761,6 +761,9 @@ def declared() -> dict[str, Parameter]:
             names = tuple(variant.form for variant in effect.forms)
             laws = '; '.join(f'{variant.form}: {variant.symbol}' for variant in effect.forms)
             table[f'{prefix}.form'] = text(f'{prefix}.form', names[0], laws, choices=names)
+        if effect.sparse:
+            table.update(_lists(prefix))
+            continue
         for item in effect.all_parameters:
             key = f'{prefix}.{item.name}'
             table[key] = number(
@@ -779,6 +782,24 @@ def declared() -> dict[str, Parameter]:
                 at_least=0.0,
             )
     return table
+
+
+def _lists(prefix: str) -> dict[str, Parameter]:
+    """Return the flat lists that state a sparse law."""
+    from wheel_terra_estimator.terramechanics.effects import learned_closure as law
+
+    target, feature = 'torque', 'one'
+    items = (
+        text(f'{prefix}.targets', [target], 'what each term changes', size=0,
+             choices=tuple(law.TARGETS)),
+        text(f'{prefix}.features', [feature], 'with what it changes', size=0,
+             choices=tuple(law.FEATURES)),
+        number(f'{prefix}.coefficients', [0.0], '-', 'by how much', size=0),
+        number(f'{prefix}.coefficients_std', [0.0], '-',
+               'standard deviations of the coefficients as fitted; 0 = not stated', size=0,
+               at_least=0.0),
+    )  # fmt: skip
+    return {item.key: item for item in items}
 
 
 def by_spelling(table: Mapping[str, Parameter]) -> dict[str, Parameter]:

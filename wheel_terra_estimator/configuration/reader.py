@@ -317,7 +317,26 @@ def _check_effects(
                 raise refuse(
                     f'effects.{name}.enabled', f'cannot be on together with effects.{other}'
                 )
-        _check_form(effects[name], values, stated, refuse)
+        if effects[name].sparse:
+            _check_law(name, values, refuse)
+        else:
+            _check_form(effects[name], values, stated, refuse)
+
+
+def _check_law(
+    name: str, values: Mapping[str, Any], refuse: Callable[[str, str], UserError]
+) -> None:
+    from wheel_terra_estimator.terramechanics.effects.learned_closure import coefficients_of
+
+    prefix = f'effects.{name}'
+    lists = [values[f'{prefix}.{key}'] for key in ('targets', 'features', 'coefficients')]
+    stds = values[f'{prefix}.coefficients_std']
+    try:
+        coefficients_of(lists[0], lists[1], lists[2])
+        if len(stds) > 1:
+            coefficients_of(lists[0], lists[1], stds)
+    except ValueError as error:
+        raise refuse(f'{prefix}.targets', str(error)) from None
 
 
 def _check_form(

@@ -19,9 +19,11 @@ from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES, UN
 
 if TYPE_CHECKING:
     from wheel_terra_estimator.configuration.reader import Configuration
+    from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
 
 FloatArray = NDArray[np.float64]
 VERDICTS = ('agrees', 'named', 'unexplained', 'undecided')
+OPEN = ('unexplained', 'undecided')  # verdicts for which a law may be proposed
 
 
 @dataclass(frozen=True)
@@ -191,6 +193,70 @@ class QuantityGap:
             if getattr(self, key) is not None:
                 result[key] = getattr(self, key)
         return result
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """Errors on levels of an input that were left out: soil refitted, and with the law."""
+
+    refit: float
+    law: float
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """A law in the closures of the model for what no listed effect explains.
+
+    Attributes
+    ----------
+    words : str
+        What it says.
+    targets, features : tuple of str
+        Each term changes a target with a feature (``effects.learned_closure`` lists both).
+    coefficients, coefficients_std : tuple of float
+    gap : mapping
+        Quantity -> as in ``Diagnosis.gap``, with the law as ``after``.
+    resembles : tuple of str
+        Listed effects of like signature.
+    not_trusted : tuple of str
+        Where it must not be used.
+    left_out : mapping
+        Input -> quantity -> errors on whole levels of the input that were left out.
+    soil, refitted
+        As in ``Diagnosis``, refitted with the law.
+    fit : Fit or None
+        The fitted model, law included.
+    """
+
+    words: str
+    targets: tuple[str, ...]
+    features: tuple[str, ...]
+    coefficients: tuple[float, ...]
+    coefficients_std: tuple[float, ...]
+    gap: Mapping[str, QuantityGap]
+    resembles: tuple[str, ...]
+    not_trusted: tuple[str, ...]
+    left_out: Mapping[str, Mapping[str, LeftOut]]
+    soil: tuple[SoilShift, ...] = ()
+    refitted: Mapping[str, FittedParameter] = field(default_factory=dict)
+    fit: Fit | None = None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the keys of ``report.json``."""
+        return {
+            'words': self.words,
+            'targets': list(self.targets),
+            'features': list(self.features),
+            'coefficients': list(self.coefficients),
+            'coefficients_std': list(self.coefficients_std),
+            'gap': {key: value.to_dict() for key, value in self.gap.items()},
+            'resembles': list(self.resembles),
+            'not_trusted': list(self.not_trusted),
+            'left_out': {
+                name: {quantity: vars(item) for quantity, item in quantities.items()}
+                for name, quantities in self.left_out.items()
+            },
+        }
 
 
 @dataclass(frozen=True)
@@ -395,6 +461,8 @@ class Diagnosis:
         ``effect.parameter`` -> fitted value, of parameters that were on already.
     nearest : tuple of str
         Where nothing was named: the effects that come nearest.
+    proposal : Proposal or None
+        A law for what no listed effect explains, where one helps.
     seconds : float
         Time the diagnosis took.
     """
@@ -422,6 +490,7 @@ class Diagnosis:
     base_effects: tuple[str, ...] = ()
     refitted: Mapping[str, FittedParameter] = field(default_factory=dict)
     nearest: tuple[str, ...] = ()
+    proposal: Proposal | None = None
     not_tried: Mapping[str, str] = field(default_factory=dict)
     seconds: float = 0.0
 
@@ -465,6 +534,7 @@ class Diagnosis:
                 'base_effects': list(self.base_effects),
                 'refitted': {key: value.to_dict() for key, value in self.refitted.items()},
                 'nearest': list(self.nearest),
+                'proposal': None if self.proposal is None else self.proposal.to_dict(),
                 'notes': list(self.notes),
                 'rows': len(self.table.lines),
                 'table': self.table.name,

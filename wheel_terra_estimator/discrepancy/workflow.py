@@ -27,14 +27,18 @@ from wheel_terra_estimator.discrepancy.fitting.evidence import log_sum
 from wheel_terra_estimator.discrepancy.fitting.forward import Forward
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
 from wheel_terra_estimator.discrepancy.fitting.reference import join, shared_error
+from wheel_terra_estimator.discrepancy.proposal.find import propose
 from wheel_terra_estimator.discrepancy.report import words
 from wheel_terra_estimator.discrepancy.result import (
+    OPEN,
     Candidate,
     Curves,
     Diagnosis,
     FittedParameter,
     NamedEffect,
     NextMeasurement,
+    Proposal,
+    QuantityGap,
     SoilShift,
 )
 from wheel_terra_estimator.discrepancy.selection import confidence as confidences
@@ -53,6 +57,7 @@ from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES, St
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.terramechanics.effects import catalogue
 from wheel_terra_estimator.terramechanics.effects.base import Effect
+from wheel_terra_estimator.terramechanics.effects.learned_closure import NAME
 from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
 from wheel_terra_estimator.terramechanics.wheel import Wheel
 
@@ -219,6 +224,8 @@ def _effects_to_try(
             not_tried[name] = f'excluded by {", ".join(excluding)}, which is on'
         elif options.effects is not None and name not in options.effects:
             not_tried[name] = 'was not asked for'
+        elif effect.sparse:
+            not_tried[name] = 'is a law found from the rows: it is proposed, never named'
         elif options.effects is None and not effect.candidate:
             not_tried[name] = f'is tried only when asked for (--only {name})'
         else:
@@ -316,6 +323,7 @@ def _report(
         base_effects=tuple(configuration.effects),
         refitted=_parameters(after, covariance, base=True),
         nearest=nearest,
+        proposal=_proposal(table, findings, verdict, gap, variance),
     )
 
 
@@ -415,6 +423,28 @@ def _named(
         )
     found.sort(key=lambda item: -item[0])
     return tuple(effect for _, effect in found)
+
+
+def _proposal(
+    table: SteadyTable,
+    findings: Findings,
+    verdict: Verdict,
+    gap: Mapping[str, QuantityGap],
+    variance: FloatArray,
+) -> Proposal | None:
+    """Return a law where something is missing and no name is given; not on top of another."""
+    if verdict.word not in OPEN or NAME in findings.setting.forward.base_effects:
+        return None
+    found = propose(table, findings, gap, variance)
+    if found is None or found.fit is None:
+        return None
+    covariance = np.asarray(np.linalg.inv(found.fit.precision()), dtype=float)
+    base = _parameters(found.fit, covariance, base=True)
+    return replace(
+        found,
+        soil=_soil_shifts(findings, found.fit, variance),
+        refitted={key: value for key, value in base.items() if not key.startswith(f'{NAME}.')},
+    )
 
 
 def _nearest(findings: Findings) -> tuple[str, ...]:

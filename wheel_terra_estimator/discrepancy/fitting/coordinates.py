@@ -216,6 +216,8 @@ def base_coordinates(
     """Return the parameters of effects that are on already and whose deviation is stated."""
     found = []
     for name, values in by_variant(settings).items():
+        if catalogue[name].sparse:
+            continue  # a law stays as it was proposed
         for p in catalogue[name].parameters:
             std = stated.get(catalogue[name].base_name, {}).get(p.name, 0.0)
             if std > 0.0:

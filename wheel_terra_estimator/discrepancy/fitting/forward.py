@@ -113,6 +113,9 @@ class Forward:
         settings: dict[str, dict[str, Any]] = {}
         for name in names:
             resting = {**self.catalogue[name].defaults(), **self.base_effects.get(name, {})}
+            for c in keys.values():  # terms of a sparse law have no defaults
+                if c.owner == name:
+                    resting.setdefault(c.name, c.neutral)
             settings[name] = {
                 p: self._where_active(name, p, stacked[f'{name}.{p}'])
                 if f'{name}.{p}' in stacked

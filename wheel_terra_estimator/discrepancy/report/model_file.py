@@ -5,25 +5,24 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.discrepancy.effect_keys import effect_of
-from wheel_terra_estimator.discrepancy.result import Diagnosis
+from wheel_terra_estimator.discrepancy.result import (
+    Diagnosis,
+    FittedParameter,
+    Proposal,
+    SoilShift,
+)
+from wheel_terra_estimator.terramechanics.effects.learned_closure import NAME
 from wheel_terra_estimator.terramechanics.soil import Soil
 
 
 def corrected(diagnosis: Diagnosis) -> tuple[Configuration, list[str]]:
     """Return the configuration with the diagnosis put in, and the keys that it sets."""
-    changes: dict[str, object] = {}
-    soil = diagnosis.configuration.soil
-    for shift in diagnosis.soil:
-        changes.update(_soil_keys(shift.name, shift.after, shift.after_std, soil))
-    for key, parameter in diagnosis.refitted.items():
-        owner, name = key.split('.', 1)
-        prefix = f'effects.{effect_of(owner)}.{name}'
-        changes[prefix] = float(parameter.value)
-        changes[f'{prefix}_std'] = float(parameter.std)
+    changes = _refitted(diagnosis, diagnosis.soil, diagnosis.refitted)
     for effect in diagnosis.effects:
         prefix = f'effects.{effect.name}'
         changes[f'{prefix}.enabled'] = True
@@ -33,6 +32,40 @@ def corrected(diagnosis: Diagnosis) -> tuple[Configuration, list[str]]:
             changes[f'{prefix}.{name}'] = float(parameter.value)
             changes[f'{prefix}.{name}_std'] = float(parameter.std)
     changes['provenance'] = provenance(diagnosis)
+    return _with(diagnosis, changes)
+
+
+def proposed(diagnosis: Diagnosis, proposal: Proposal) -> tuple[Configuration, list[str]]:
+    """Return the configuration with a proposed law put in, and the keys that it sets."""
+    changes = _refitted(diagnosis, proposal.soil, proposal.refitted)
+    prefix = f'effects.{NAME}'
+    changes[f'{prefix}.enabled'] = True
+    for key in ('targets', 'features', 'coefficients', 'coefficients_std'):
+        changes[f'{prefix}.{key}'] = list(getattr(proposal, key))
+    changes['provenance'] = provenance(diagnosis, proposal)
+    return _with(diagnosis, changes)
+
+
+def _refitted(
+    diagnosis: Diagnosis,
+    soil: Iterable[SoilShift],
+    refitted: Mapping[str, FittedParameter],
+) -> dict[str, object]:
+    """Return the keys of soil and of effects that were on already, at their fitted values."""
+    changes: dict[str, object] = {}
+    for shift in soil:
+        believed = diagnosis.configuration.soil
+        changes.update(_soil_keys(shift.name, shift.after, shift.after_std, believed))
+    for key, parameter in refitted.items():
+        owner, name = key.split('.', 1)
+        prefix = f'effects.{effect_of(owner)}.{name}'
+        changes[prefix] = float(parameter.value)
+        changes[f'{prefix}_std'] = float(parameter.std)
+    return changes
+
+
+def _with(diagnosis: Diagnosis, changes: dict[str, object]) -> tuple[Configuration, list[str]]:
+    """Return the configuration with the changes, and all keys that its file has to hold."""
     stated = diagnosis.configuration.flat()
     if stated.get('effect_file'):
         changes.setdefault('effect_file', stated['effect_file'])
@@ -58,10 +91,12 @@ def _soil_keys(name: str, value: float, std: float, soil: Soil) -> dict[str, flo
     return {f'soil.{name}': value, f'soil.{name}_std': std}
 
 
-def provenance(diagnosis: Diagnosis) -> str:
+def provenance(diagnosis: Diagnosis, proposal: Proposal | None = None) -> str:
     """Return one line: what was changed, from which table, how sure."""
     before = diagnosis.configuration.provenance
-    if diagnosis.effects:
+    if proposal is not None:
+        done = 'a law proposed (learned_closure) and soil refitted'
+    elif diagnosis.effects:
         effects = ', '.join(f'{e.name} (confidence {e.confidence:.2f})' for e in diagnosis.effects)
         done = f'{effects} added and soil refitted'
     else:
@@ -73,9 +108,17 @@ def provenance(diagnosis: Diagnosis) -> str:
 
 def write_model(diagnosis: Diagnosis, path: str | Path) -> None:
     """Write ``model.yaml``: a further ``--config`` of every command and of the node."""
-    configuration, keys = corrected(diagnosis)
+    _write(path, *corrected(diagnosis), provenance(diagnosis))
+
+
+def write_proposal(diagnosis: Diagnosis, proposal: Proposal, path: str | Path) -> None:
+    """Write ``proposal.yaml``: the law, with the soil and effects refitted beside it."""
+    comment = f'{provenance(diagnosis, proposal)}\n{proposal.words}'
+    _write(path, *proposed(diagnosis, proposal), comment)
+
+
+def _write(path: str | Path, configuration: Configuration, keys: list[str], comment: str) -> None:
     unique = list(dict.fromkeys(keys))
-    comment = provenance(diagnosis)
     if 'effect_file' in unique:
         comment = f'Runs Python code (effect_file): needs --allow-effect-files\n{comment}'
     configuration.write(path, unique, comment=comment)

@@ -161,11 +161,13 @@ def check_settings(settings: EffectSettings) -> dict[str, dict[str, float]]:
         defaults = effect.forms[0].defaults()
         full[key] = defaults
         name, forms = effect.base_name, known[effect.base_name].forms
+        allowed = {p.name for p in effect.forms[0].parameters}
         in_form = f' in the form {effect.form}' if len(forms) > 1 else ''
         for item, value in values.items():
-            if item not in defaults:
+            if item not in allowed:
                 raise ValueError(
-                    f'effect {name} has no parameter {item}{in_form}; it has {", ".join(defaults)}'
+                    f'effect {name} has no parameter {item}{in_form}; it has '
+                    f'{", ".join(p.name for p in effect.forms[0].parameters)}'
                 )
             parameter = effect.parameter(item)
             if not isinstance(value, Real):

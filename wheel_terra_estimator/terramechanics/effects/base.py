@@ -130,6 +130,9 @@ class Effect:
         Where it holds; paper and equation.
     candidate : bool
         False: never tried by the discrepancy workflow unless asked for by name.
+    sparse : bool
+        True: parameters that are not given are absent instead of at their defaults, and
+        configuration files state the others as flat lists (``learned_closure``).
     form : str
         Name of the first form.
     other_forms : tuple of Form
@@ -150,6 +153,7 @@ class Effect:
     confounded_with: Mapping[str, str] = field(default_factory=dict)
     incompatible_with: frozenset[str] = frozenset()
     candidate: bool = True
+    sparse: bool = False
     form: str = 'standard'
     other_forms: tuple[Form, ...] = ()
     on_inputs: Term | None = None
@@ -214,7 +218,9 @@ class Effect:
         raise KeyError(name)
 
     def defaults(self) -> dict[str, float]:
-        """Return the default value of each parameter."""
+        """Return the default value of each parameter; none of a sparse effect."""
+        if self.sparse:
+            return {}
         return {p.name: p.default for p in self.parameters}
 
     def neutral(self) -> dict[str, float]:
@@ -224,6 +230,8 @@ class Effect:
         whose prior is centred away from the neutral value) at its default.
         """
         first = self.parameters[0]
+        if self.sparse:
+            return {}
         return {
             p.name: p.neutral if p is first or p.prior_mean == p.neutral else p.default
             for p in self.parameters

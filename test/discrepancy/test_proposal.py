@@ -1,0 +1,167 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""A law for what no listed effect explains: found, judged on rows left out, usable as a file."""
+
+from __future__ import annotations
+
+import campaign_tools  # noqa: F401
+import numpy as np
+import pytest
+from campaigns.campaign import Plan, make_campaign
+from campaigns.scoring import diagnose as diagnose_campaign
+from test_model_file import predicted
+from test_workflow import make, run
+
+from wheel_terra_estimator.configuration import reader
+from wheel_terra_estimator.discrepancy.report.model_file import write_proposal
+from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.terramechanics.conditioned import ConditionedForces
+from wheel_terra_estimator.terramechanics.effects.learned_closure import (
+    EFFECT,
+    REFERENCE_SPEED,
+    coefficients_of,
+)
+from wheel_terra_estimator.terramechanics.model import WheelSoilModel
+from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
+from wheel_terra_estimator.terramechanics.soil import Soil
+from wheel_terra_estimator.terramechanics.wheel import Wheel
+
+QUANTITIES = ('sinkage', 'drawbar_pull', 'torque')
+SHARE = 0.06  # of load times radius per decade of rim speed
+
+
+@pytest.fixture(scope='module')
+def speedy():
+    """Torque that grows with the logarithm of rim speed: in no entry of the catalogue."""
+    table, values, *_ = make('full56')
+    decades = np.log10(table['angular_velocity'] * table['wheel_radius'] / REFERENCE_SPEED)
+    lever = table['normal_load'] * table['wheel_radius']
+    table['torque'] = table['torque'] + SHARE * lever * decades
+    return table, values, run(table, values)
+
+
+def test_the_law_is_found_and_said_in_words(speedy):
+    _, _, found = speedy
+    assert found.verdict in ('unexplained', 'undecided')
+    assert not found.effects
+    proposal = found.proposal
+    at = list(zip(proposal.targets, proposal.features, strict=True)).index(('torque', 'rim_speed'))
+    assert proposal.coefficients[at] == pytest.approx(SHARE, rel=0.25)
+    assert abs(proposal.coefficients[at] - SHARE) < 4.0 * proposal.coefficients_std[at]
+    assert 'Torque grows by' in proposal.words
+    assert 'per decade of rim speed' in proposal.words
+    assert any('angular_velocity outside' in text for text in proposal.not_trusted)
+    gap = proposal.gap['torque']
+    assert gap.after < 0.6 * gap.refit
+    for quantities in proposal.left_out.values():
+        assert quantities['torque'].law < quantities['torque'].refit
+
+
+def test_the_file_of_the_law_gives_the_reported_gap(speedy, tmp_path):
+    table, values, found = speedy
+    configuration = reader.from_parameters(values, complete=False)
+    write_proposal(found, found.proposal, tmp_path / 'proposal.yaml')
+    rows = predicted(table, configuration, tmp_path, 'proposal.yaml')
+    for q, quantity in enumerate(QUANTITIES):
+        error = np.sqrt(np.mean((rows[:, q] - table[quantity]) ** 2))
+        gap = found.proposal.gap[quantity]
+        assert error == pytest.approx(gap.fitted, rel=2e-3)
+        assert error == pytest.approx(gap.after, rel=0.3)
+    law = reader.load([tmp_path / 'proposal.yaml'], complete=False)
+    assert set(law.effects['learned_closure']) == set(
+        coefficients_of(
+            found.proposal.targets, found.proposal.features, found.proposal.coefficients
+        )
+    )
+    # It stands in the proposal alone, never among what was named.
+    report = found.to_dict()
+    assert report['effects'] == []
+    assert 'learned_closure' in report['not_tried']
+    assert report['proposal']['targets'] == list(found.proposal.targets)
+
+
+def test_strangers_of_another_hand_shrink_on_loads_and_lugs_left_out():
+    for seed, design, name in (
+        (507, 'full56', 'side_drag'),
+        (509, 'slope48', 'crosstalk'),
+        (504, 'slope48', 'friction_softening'),
+    ):
+        plan = Plan(hide='outside', names=(name,), noise='mixed')
+        found = diagnose_campaign(make_campaign(seed, design, plan))
+        assert found.verdict != 'agrees'
+        noise = {quantity: gap.noise for quantity, gap in found.gap.items()}
+        items = [
+            (quantity, item)
+            for quantities in found.proposal.left_out.values()
+            for quantity, item in quantities.items()
+        ]
+        refit, law = (
+            sum(max((getattr(item, key) / noise[q]) ** 2 - 1.0, 0.0) for q, item in items)
+            for key in ('refit', 'law')
+        )
+        assert np.sqrt(law / refit) < 0.5, name
+
+
+def test_no_law_where_nothing_is_missing():
+    table, values, *_ = make('lugs48')
+    assert run(table, values).proposal is None
+    table, values, *_ = make('lugs48', ('slip_sinkage_exponent',))
+    assert run(table, values).proposal is None
+
+
+def _points(**changes):
+    wheel = Wheel(0.15, 0.15, 0.01, 20)
+    given = {'slip': np.array([0.1, 0.3, 0.6]), 'normal_load': np.full(3, 80.0), 'wheel': wheel}
+    return OperatingPoints(**{**given, 'angular_velocity': np.full(3, 1.0), **changes})
+
+
+SOIL = Soil(1e4, 2e6, 1.0, 300.0, 0.56, 0.012, 0.42, -0.2, 1600.0)
+LAW = {
+    'friction_by_slip': -0.3,
+    'exponent_by_slip': 0.2,
+    'torque_by_rim_speed': 0.03,
+    'drawbar_pull_by_depth': -0.4,
+}
+
+
+def test_quadrature_closed_form_and_filter_honour_the_law():
+    points = _points()
+    plain = WheelSoilModel(SOIL, {}).steady_state(points)
+    exact = WheelSoilModel(SOIL, {'learned_closure': LAW}).steady_state(points)
+    closed = WheelSoilModel(SOIL, {'learned_closure': LAW}, 'closed_form').steady_state(points)
+    for key in QUANTITIES:
+        changed = np.abs(getattr(exact, key) - getattr(plain, key)).max()
+        assert np.abs(getattr(closed, key) - getattr(exact, key)).max() < 0.25 * changed
+    forces = ConditionedForces(points.wheel, SOIL, {'learned_closure': LAW}, 'lug_tip', 9.81)
+    for k in range(3):
+        ratio = 1.0 - points.slip[k]
+        found = forces.forces(
+            0, ratio, float(exact.sinkage[k]), 80.0, 300.0, np.tan(0.56), 0.012, rim_speed=0.15
+        )
+        assert found.torque == pytest.approx(exact.torque[k], rel=0.03)
+
+
+def test_a_factor_is_bounded_and_no_law_is_the_plain_model():
+    points = _points()
+    plain = WheelSoilModel(SOIL, {}).steady_state(points)
+    none = WheelSoilModel(SOIL, {'learned_closure': {'friction_by_slip': 0.0}})
+    np.testing.assert_allclose(none.steady_state(points).torque, plain.torque, rtol=1e-12)
+    scale = EFFECT.parameter('friction_by_slip').prior_scale
+    wild = WheelSoilModel(SOIL, {'learned_closure': {'friction_by_slip': 40.0 * scale}})
+    assert np.all(wild.steady_state(points).torque < 2.0 * plain.torque)
+
+
+@pytest.mark.parametrize(
+    ('lists', 'part'),
+    [
+        ((['torque'], ['slip', 'load'], [0.1]), '1 targets, 2 features'),
+        ((['sinkage'], ['depth'], [0.1]), 'cannot change sinkage by depth'),
+        ((['torque', 'torque'], ['slip', 'slip'], [0.1, 0.2]), 'twice'),
+        ((['thrust'], ['slip'], [0.1]), 'nearest is'),
+    ],
+)
+def test_lists_that_make_no_law(lists, part):
+    keys = ('targets', 'features', 'coefficients')
+    law = {f'effects.learned_closure.{key}': value for key, value in zip(keys, lists, strict=True)}
+    with pytest.raises(UserError, match=part):
+        reader.from_parameters({'effects.learned_closure.enabled': True, **law}, complete=False)

@@ -1,0 +1,279 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Find a sparse law in the closures of the model, and judge it on what it was not fitted to.
+
+Terms (a target changed by a feature, see ``learned_closure``) are added one at a time, those with
+the greatest evidence first, soil and all terms refitted; then each is left out again. The law is
+proposed only where it predicts whole levels of an input (loads, lug heights, wheels, ...) that
+were left out better than the soil refit does.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wheel_terra_estimator.discrepancy.assessment.held_out import hold_out, slip_groups
+from wheel_terra_estimator.discrepancy.effect_keys import effect_of
+from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
+from wheel_terra_estimator.discrepancy.proposal.words import law_in_words, limits_of_trust
+from wheel_terra_estimator.discrepancy.result import LeftOut, Proposal, QuantityGap
+from wheel_terra_estimator.discrepancy.selection.candidates import (
+    Explanation,
+    Setting,
+    linear_starts,
+)
+from wheel_terra_estimator.discrepancy.selection.search import Findings
+from wheel_terra_estimator.discrepancy.selection.signatures import against_soil
+from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES, SteadyTable
+from wheel_terra_estimator.terramechanics.effects.base import Effect
+from wheel_terra_estimator.terramechanics.effects.learned_closure import (
+    EFFECT,
+    FEATURES,
+    NAME,
+    pair_of,
+)
+
+FloatArray = NDArray[np.float64]
+IndexArray = NDArray[np.intp]
+
+MOST_TERMS = 4
+_TRIED = 6  # terms of the greatest promise that are fitted in each step
+_WORTH = 3.0  # nats by which a term must raise the evidence beyond the choice among all terms
+_LEVELS = 6  # levels of an input that are left out one at a time, at most
+_CLOSED = 0.15  # share of the gap on what was left out that a law must close
+_SMALL_FLOOR = 0.015  # structural error that stays beside a law [share of the range]
+_WORSE = 1.1  # times the soil refit: an error of one quantity that no law may reach ...
+_FINE = 1.35  # ... unless it is no more than so many times the noise
+_ALIKE = 0.8  # cosine of two signatures from which one resembles the other
+_RESEMBLING = 3
+_LEVEL_INPUTS = (
+    'normal_load',
+    'lug_height',
+    'wheel_radius',
+    'wheel_width',
+    'angular_velocity',
+    'pass_number',
+    'slope',
+)
+
+
+def propose(
+    table: SteadyTable, findings: Findings, gap: Mapping[str, QuantityGap], variance: FloatArray
+) -> Proposal | None:
+    """Return the law that the rows ask for; None where none predicts what was left out.
+
+    Parameters
+    ----------
+    table : SteadyTable
+        The rows under diagnosis (a reference not among them).
+    gap : mapping
+        As reported: ``before``, ``noise`` and the range of each quantity are taken from it.
+    variance : numpy.ndarray
+        (m,) of the rotated axes, for the predictions of what was left out.
+    """
+    # A large smooth error would take up what the law is to say.
+    floors = tuple(floor for floor in findings.setting.floors if floor.largest <= _SMALL_FLOOR)
+    setting = replace(findings.setting, effects=_terms(table), floors=floors)
+    plain = setting.fit([()], [findings.nothing.u], findings.nothing.angle)[0]
+    nothing = setting.explain(plain)
+    refit = setting.fit([()], [plain.u], plain.angle, variance)[0]
+    groupings = _groupings(table, len(setting.forward.points))
+    best, most = None, _CLOSED
+    for law in _search(setting, nothing):
+        fitted = setting.fit([law.names], [law.fitted.u], law.fitted.angle, variance)[0]
+        fits = [refit, fitted]
+        judged = {
+            name: _left_out(setting, fits, variance, groups, findings, table)
+            for name, groups in groupings.items()
+        }
+        closed = _closed(judged, gap)
+        if closed > most:
+            best, most = (fits, judged), closed
+    if best is None:
+        return None
+    return _proposal(table, findings, setting, *best, gap)
+
+
+def _terms(table: SteadyTable) -> dict[str, Effect]:
+    """Return the terms whose features vary in the table, each as an effect of one parameter."""
+    varying = set(table.varying())
+    measured = set(table.quantities)
+    found = {}
+    for parameter in EFFECT.parameters:
+        target, feature = pair_of(parameter.name)
+        columns = FEATURES[feature].columns
+        known = not columns or any(len(_levels(table, c)) > 2 for c in varying & set(columns))
+        if known and target not in set(QUANTITIES) - measured:
+            found[parameter.name] = replace(EFFECT, parameters=(parameter,))
+    return found
+
+
+def _levels(table: SteadyTable, column: str) -> FloatArray:
+    """Return the values of an input; of two, neither can be left out and come back."""
+    values = table.columns[column]
+    return np.unique(np.round(values[np.isfinite(values)], 9))
+
+
+def _search(setting: Setting, nothing: Explanation) -> list[Explanation]:
+    """Return laws of one, two, ... terms, each with the greatest evidence."""
+    price = math.log(max(len(setting.effects), 1)) + _WORTH
+    best, score = nothing, nothing.log_evidence
+    found = []
+    for _ in range(MOST_TERMS):
+        others = [name for name in setting.effects if name not in best.names]
+        starts = sorted(linear_starts(setting, best.fitted, others), key=lambda s: -s[0])[:_TRIED]
+        fits = setting.fit([n for _, n, _ in starts], [u for _, _, u in starts], best.fitted.angle)
+        tried = [setting.explain(f) for f in fits]
+        if not tried:
+            break
+        top = max(tried, key=lambda e: e.log_evidence)
+        if top.log_evidence - price < score:
+            break
+        best, score = top, top.log_evidence
+        found.append(best)
+    if len(best.names) > 2:
+        found.append(_without_idle_terms(setting, best, price))
+    return found
+
+
+def _without_idle_terms(setting: Setting, best: Explanation, price: float) -> Explanation:
+    """Leave out terms that later ones have made idle."""
+    fitted = best.fitted
+    sets = [tuple(n for n in best.names if n != name) for name in best.names]
+    starts = [
+        np.array([u for c, u in zip(fitted.coordinates, fitted.u, strict=True) if c.name != name])
+        for name in best.names
+    ]
+    fewer = [setting.explain(f) for f in setting.fit(sets, starts, fitted.angle)]
+    top = max(fewer, key=lambda e: e.log_evidence)
+    return top if top.log_evidence > best.log_evidence - price else best
+
+
+def _groupings(table: SteadyTable, count: int) -> dict[str, IndexArray]:
+    """Return input -> group of each row: its levels; the slips where nothing else varies."""
+    varying = set(table.varying())
+    found = {}
+    for name in _LEVEL_INPUTS:
+        if name in varying:
+            values = np.nan_to_num(table.columns[name], nan=-1.0)
+            levels = np.unique(np.round(values, 9))
+            rank = np.searchsorted(levels, np.round(values, 9))
+            groups = rank * min(_LEVELS, len(levels)) // len(levels)
+            found[name] = np.concatenate([groups, np.full(count - len(groups), -1)])
+    if not found:
+        groups = slip_groups(table)
+        found['slip'] = np.concatenate([groups, np.full(count - len(groups), -1)])
+    return {name: groups.astype(np.intp) for name, groups in found.items()}
+
+
+def _left_out(
+    setting: Setting,
+    fits: Sequence[Fit],
+    variance: FloatArray,
+    groups: IndexArray,
+    findings: Findings,
+    table: SteadyTable,
+) -> dict[str, LeftOut]:
+    """Return the errors of soil refit and law on levels that their fits did not see."""
+    rows = len(table)
+    refit, law = (out[:rows] for out in hold_out(setting, fits, variance, groups))
+    measured = _measured(table, findings)
+    found = {}
+    for q, quantity in enumerate(QUANTITIES):
+        mine = np.isfinite(measured[:, q])
+        if mine.any():
+            errors = [np.sqrt(np.mean((o - measured)[mine, q] ** 2)) for o in (refit, law)]
+            found[quantity] = LeftOut(float(errors[0]), float(errors[1]))
+    return found
+
+
+def _measured(table: SteadyTable, findings: Findings) -> FloatArray:
+    measured = table.measured.copy()
+    problem = findings.setting.problem
+    # Where slips are latent the model stands at the most probable one.
+    shift = np.zeros((int(problem.row.max()) + 1, 3))
+    shift[problem.row, problem.quantity] = findings.setting.observed - problem.observed
+    measured += shift[: len(table)]
+    for row, column, _ in findings.outliers:
+        if row < len(table):
+            measured[row, column] = np.nan
+    return measured
+
+
+def _closed(judged: Mapping[str, Mapping[str, LeftOut]], gap: Mapping[str, QuantityGap]) -> float:
+    """Share of the gap on what was left out that a law closes; 0 where it worsens a quantity."""
+    open_refit = open_law = 0.0
+    for quantities in judged.values():
+        for name, item in quantities.items():
+            noise = gap[name].noise or 1e-9
+            if item.law > max(_WORSE * item.refit, _FINE * noise):
+                return 0.0
+            open_refit += max(item.refit**2 / noise**2 - 1.0, 0.0)
+            open_law += max(item.law**2 / noise**2 - 1.0, 0.0)
+    return 1.0 - math.sqrt(open_law / open_refit) if open_refit > 0.0 else 0.0
+
+
+def _proposal(
+    table: SteadyTable,
+    findings: Findings,
+    setting: Setting,
+    fits: Sequence[Fit],
+    judged: Mapping[str, Mapping[str, LeftOut]],
+    gap: Mapping[str, QuantityGap],
+) -> Proposal:
+    law = fits[1]
+    rows, count = len(table), len(setting.forward.points)
+    slips = np.concatenate([slip_groups(table), np.full(count - rows, -1)]).astype(np.intp)
+    by_slip = _left_out(setting, fits, fits[1].variance, slips, findings, table)
+    measured = _measured(table, findings)
+    covariance = np.linalg.inv(law.precision())
+    names = [c.name for c in law.coordinates if c.owner == NAME]
+    places = [k for k, c in enumerate(law.coordinates) if c.owner == NAME]
+    values = [float(law.coordinates[k].value(law.u[k])) for k in places]
+    stds = [
+        law.coordinates[k].deviation(float(law.u[k]), float(np.sqrt(covariance[k, k])))
+        for k in places
+    ]
+    gaps = {}
+    for q, quantity in enumerate(QUANTITIES):
+        if quantity not in by_slip:
+            continue
+        old = gap[quantity]
+        mine = np.isfinite(measured[:, q])
+        fitted = np.sqrt(np.mean((law.outputs[:rows] - measured)[mine, q] ** 2))
+        gaps[quantity] = QuantityGap(
+            old.before, by_slip[quantity].refit, by_slip[quantity].law, old.noise,
+            old.floor, old.rows, float(fitted), old.limit,
+        )  # fmt: skip
+    return Proposal(
+        law_in_words(names, values, table, setting.forward.points),
+        tuple(pair_of(name)[0] for name in names),
+        tuple(pair_of(name)[1] for name in names),
+        tuple(values),
+        tuple(stds),
+        gaps,
+        _resembling(findings, fits),
+        limits_of_trust(table),
+        {name: dict(quantities) for name, quantities in judged.items()},
+        fit=law,
+    )
+
+
+def _resembling(findings: Findings, fits: Sequence[Fit]) -> tuple[str, ...]:
+    """Return named effects whose signature points the same way, beyond what the soil can do."""
+    problem, nothing = findings.setting.problem, findings.nothing
+    own = problem.rotate(problem.flat(fits[1].outputs - fits[0].outputs))
+    weighted = against_soil(nothing, nothing.variance, own)
+    size = math.sqrt(max(float(own @ weighted), 1e-30))
+    alike: dict[str, float] = {}
+    for key, signature in findings.signatures.items():
+        far = signature.distance * size
+        cosine = float(signature.change @ weighted) / far if far > 0.0 else 0.0
+        alike[effect_of(key)] = max(abs(cosine), alike.get(effect_of(key), 0.0))
+    order = sorted(alike, key=lambda name: -alike[name])
+    return tuple(name for name in order if alike[name] > _ALIKE)[:_RESEMBLING]

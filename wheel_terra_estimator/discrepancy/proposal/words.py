@@ -1,0 +1,90 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""What a proposed law says, and where it must not be trusted, in words."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from wheel_terra_estimator.discrepancy.tables.steady_table import (
+    INPUT_UNITS,
+    QUANTITIES,
+    UNITS,
+    SteadyTable,
+)
+from wheel_terra_estimator.terramechanics.effects.learned_closure import TARGETS, pair_of
+from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
+
+# Feature -> for which step of it a change is stated, and that step.
+_PER = {
+    'one': ('everywhere alike', 1.0),
+    'slip': ('per 0.1 of slip', 0.1),
+    'slip_squared': ('with the square of slip, at 1', 1.0),
+    'slip_over_02': ('per 0.1 of slip beyond 0.2', 0.1),
+    'slip_over_04': ('per 0.1 of slip beyond 0.4', 0.1),
+    'slip_over_06': ('per 0.1 of slip beyond 0.6', 0.1),
+    'load': ('per doubling of the load', math.log10(2.0)),
+    'lug': ('per 0.05 r of lug height', 0.05),
+    'width': ('per 0.1 r of width', 0.1),
+    'rim_speed': ('per decade of rim speed', 1.0),
+    'pass': ('per earlier pass', 1.0),
+    'slope': ('per 10 degrees of slope', math.radians(10.0)),
+    'depth': ('per 0.01 r of sinkage', 0.01),
+}
+
+
+def law_in_words(
+    names: Sequence[str],
+    coefficients: Sequence[float],
+    table: SteadyTable,
+    points: OperatingPoints,
+) -> str:
+    """Return the terms in words: "torque grows by 0.1 N m (4 % of its mean) per decade of ..."."""
+    parts = []
+    for name, value in zip(names, coefficients, strict=True):
+        target, feature = pair_of(name)
+        law = TARGETS[target]
+        per, step = _PER[feature]
+        change = value * step
+        if law.factor:
+            size = f'{100 * abs(math.expm1(change)):.2g} %'
+        elif law.unit == '-':
+            size = f'{abs(change):.2g}'
+        else:
+            size = _size(target, abs(change), table, points)
+        parts.append(f'{law.meaning} {"grows" if change > 0.0 else "falls"} by {size} {per}')
+    text = '; '.join(parts)
+    return f'{text[0].upper()}{text[1:]}, beyond what the soil explains.'
+
+
+def _size(target: str, change: float, table: SteadyTable, points: OperatingPoints) -> str:
+    """Return a change of an angle or an output in the units of the rows."""
+    if target not in QUANTITIES:
+        return f'{100 * change:.2g} % of the entrance angle'
+    rows = slice(len(table))
+    load = np.asarray(points.normal_load)[rows]
+    radius = np.broadcast_to(points.wheel.radius, (len(points),))[rows]
+    scale = {'sinkage': radius, 'drawbar_pull': load, 'torque': load * radius}[target]
+    size = change * float(np.mean(scale))
+    mean = float(np.nanmean(np.abs(table.measured[:, QUANTITIES.index(target)])))
+    shown, unit = (1e3 * size, 'mm') if target == 'sinkage' else (size, UNITS[target])
+    return f'{shown:.2g} {unit} ({100 * size / mean:.2g} % of its mean)'
+
+
+def limits_of_trust(table: SteadyTable) -> tuple[str, ...]:
+    """Return where the law must not be used: outside the ranges of the rows that it came from."""
+    varying = set(table.varying())
+    found = []
+    for name in INPUT_UNITS:
+        if name not in varying:
+            continue
+        values = table.columns[name][np.isfinite(table.columns[name])]
+        unit = '' if INPUT_UNITS[name] == '-' else f' {INPUT_UNITS[name]}'
+        found.append(f'{name} outside {values.min():.3g} to {values.max():.3g}{unit}')
+    still = [name for name in INPUT_UNITS if name in table.columns and name not in varying]
+    if still:
+        found.append(f'other values of what did not vary: {", ".join(still)}')
+    return (*found, 'another soil')
