@@ -154,7 +154,9 @@ class Forward:
             return float(coordinate.value(0.0))
         if coordinate.owner in self.base_effects:
             return self.base_effects[coordinate.owner][coordinate.name]
-        return coordinate.neutral
+        # Strengths vanish; a range or a depth keeps a value at which its term can be computed.
+        neutral = self.catalogue[coordinate.owner].neutral()
+        return neutral.get(coordinate.name, coordinate.neutral)
 
     def solve(
         self,
