@@ -28,6 +28,9 @@ def test_text_names_every_effect_and_parameter(capsys: pytest.CaptureFixture[str
     text = capsys.readouterr().out
     for name, effect in catalogue().items():
         assert f'\n{name}\n' in f'\n{text}'
+        if effect.sparse:
+            assert 'features: one, slip, ' in text
+            continue
         for parameter in effect.parameters:
             assert f'{parameter.name} [{parameter.unit}]' in text
     assert max(map(len, text.splitlines())) <= 100
