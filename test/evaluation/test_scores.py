@@ -118,6 +118,7 @@ def test_ratio_is_over_the_better_filter_with_an_interval_from_paired_drives():
     assert not worse.keeps_the_rule
     mixed = scores.ratio_to_better_baseline([drive(e) for e in (0.01, 0.02, 0.04, 0.06)])
     assert mixed.low < mixed.value < mixed.high
+    assert scores.ratio_to_better_baseline([drive(0.06)]).keeps_the_rule is None
     assert mixed.value == pytest.approx(np.sqrt(np.mean(np.square([1, 2, 4, 6]))) / 4.0)
 
 
@@ -171,6 +172,8 @@ def test_tables_hold_every_kind():
     )
     text = tables.report(Results([drive]), ['reference', 'no_torque'])
     assert '| climb |' in text
+    assert 'not judged' in text
+    text = tables.report(Results([replace(drive, seed=i) for i in range(3)]), ['reference'])
     assert 'kept in every kind' in text
     both = Results([drive, replace(drive, world='rival', kind='spin')])
     text = tables.report(both, ['reference'])

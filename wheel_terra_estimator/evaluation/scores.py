@@ -228,15 +228,19 @@ class Ratio:
     value: float
     low: float  # of the 95 % interval
     high: float
-    error: float  # standard error
+    error: float  # standard error; nan where there are too few drives
 
     @property
-    def keeps_the_rule(self) -> bool:
-        """The rule of the bench: not above 1.05 by more than two standard errors."""
+    def keeps_the_rule(self) -> bool | None:
+        """The rule of the bench: not above 1.05 by more than two standard errors; None: too few."""
+        if np.isnan(self.error):
+            return None
         return self.value <= ALLOWED_RATIO + 2.0 * self.error
 
 
 ALLOWED_RATIO = 1.05
+FEWEST_DRIVES = 3
+"""With fewer drives their scatter is not known."""
 _RESAMPLES = 2000
 
 
@@ -257,6 +261,8 @@ def ratio_to_better_baseline(drives: Sequence[Samples]) -> Ratio:
     if not len(sums):
         return Ratio(*(float('nan'),) * 4)
     value = float(np.sqrt(sums[:, 0].sum() / sums[:, 1].sum()))
+    if len(sums) < FEWEST_DRIVES:
+        return Ratio(value, *(float('nan'),) * 3)
     draws = np.random.default_rng(0).integers(0, len(sums), (_RESAMPLES, len(sums)))
     drawn = sums[draws].sum(axis=1)
     ratios = np.sqrt(drawn[:, 0] / drawn[:, 1])

@@ -90,7 +90,7 @@ def _two_states(by_kind: dict[str, list[DriveScore]]) -> str:
         data = Samples.joined(parts)
         ratio = scores.ratio_to_better_baseline(parts)
         better, _ = scores.better_baseline(data)
-        if not ratio.keeps_the_rule and kind in by_kind:
+        if ratio.keeps_the_rule is False and kind in by_kind:
             broken.append(kind)
         mean, median = scores.squared_over_variance(data.slip_error, data.slip_std)
         rows.append(
@@ -100,8 +100,8 @@ def _two_states(by_kind: dict[str, list[DriveScore]]) -> str:
                 f'{scores.rms(data.torque_filter_error):.4f}',
                 f'{scores.rms(data.pitch_filter_error):.4f}',
                 better,
-                f'{ratio.value:.2f} ({ratio.low:.2f} to {ratio.high:.2f})',
-                'yes' if ratio.keeps_the_rule else '**no**',
+                _interval(ratio),
+                _RULE[ratio.keeps_the_rule],
                 f'{scores.rms(data.slow_slip_error):.4f}',
                 f'{scores.coverage(data.slip_error, data.slip_std):.1%}',
                 f'{scores.coverage(data.torque_filter_error, data.torque_filter_std):.1%}',
@@ -113,11 +113,23 @@ def _two_states(by_kind: dict[str, list[DriveScore]]) -> str:
         *('ratio (95 % interval)', 'rule kept', 'slow part (20 s means)', 'coverage'),
         *('coverage of two states, torque', 'squared error over variance: mean, median'),
     )
+    judged = any(len(drives) >= scores.FEWEST_DRIVES for drives in by_kind.values())
     verdict = f'broken in {", ".join(broken)}' if broken else 'kept in every kind'
+    if not judged:
+        verdict = f'not judged with fewer than {scores.FEWEST_DRIVES} drives of a kind'
     return (
         f'{table(head, rows)}\n\nThe rule of the bench (slip RMSE not above the better two-state '
         f'filter by more than 5 % plus two standard errors of the paired drives): {verdict}.'
     )
+
+
+_RULE = {True: 'yes', False: '**no**', None: 'too few drives'}
+
+
+def _interval(ratio: scores.Ratio) -> str:
+    if np.isnan(ratio.error):
+        return f'{ratio.value:.2f}'
+    return f'{ratio.value:.2f} ({ratio.low:.2f} to {ratio.high:.2f})'
 
 
 def _side_by_side(results: Results, mode: str) -> str:
@@ -150,7 +162,7 @@ def _figures(drives: Sequence[DriveScore]) -> dict[str, str]:
         'slip RMSE': f'{scores.rms(data.slip_error):.4f}',
         'worst kind': f'{worst[hardest]:.4f} ({hardest})',
         'better two-state filter': f'{scores.rms(error):.4f} ({better})',
-        'ratio (95 % interval)': f'{ratio.value:.2f} ({ratio.low:.2f} to {ratio.high:.2f})',
+        'ratio (95 % interval)': _interval(ratio),
         'last fix held': f'{scores.rms(data.held_error):.4f}',
         'dead reckoning': f'{scores.rms(data.dead_reckoned_error):.4f}',
         'slow part of the slip error': f'{scores.rms(data.slow_slip_error):.4f}',

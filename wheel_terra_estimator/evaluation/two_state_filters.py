@@ -39,8 +39,8 @@ class TwoStateTuning:
     offset_std: float = 0.15
     gain: float = 0.7  # slip per demand, at the start
     gain_std: float = 0.5
-    offset_walk: float = 0.15  # of the offset per root of the travel [1/sqrt(m)]
-    gain_walk: float = 0.05  # of the gain per root of the travel [1/sqrt(m)]
+    offset_walk: float = 0.1  # of the offset per root of the travel [1/sqrt(m)]
+    gain_walk: float = 0.2  # of the gain per root of the travel [1/sqrt(m)]
     radius_std: float = 0.01  # of the wheels, as a share: correlated error of the slip
     smoothing: float = 0.5  # [s], of the demand
     yaw_smoothing: float = 0.2  # [s]
