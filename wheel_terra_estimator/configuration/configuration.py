@@ -132,7 +132,8 @@ class Configuration:
         is among the values where it is not the first one of the effect.
     sensors, filter : Section
         ``sensors.*`` and ``filter.*`` as attributes.
-    slip_radius, wheel_odometry, reference_odom_max_rate, rest_speed, output_rate, max_lag, history
+    slip_radius, wheel_odometry, reference_odom_max_rate, rest_speed, output_rate, max_lag, history,
+    soil_file
         The parameters that stand in no section.
     stated : frozenset of str
         Keys that a file or an override gave, as against defaults.
@@ -153,6 +154,7 @@ class Configuration:
     output_rate: float  # [Hz], 0 = every stamp
     max_lag: float  # [s], below 0 = learned
     history: float  # [s]
+    soil_file: str
     provenance: str
     stated: frozenset[str]
     _values: Mapping[str, Value]
@@ -178,6 +180,7 @@ class Configuration:
             output_rate=_number(values, 'output_rate'),
             max_lag=_number(values, 'max_lag'),
             history=_number(values, 'history'),
+            soil_file=str(values['soil_file']),
             provenance=str(values['provenance']),
             stated=frozenset(stated),
             _values=dict(values),

@@ -257,9 +257,20 @@ DECLARED: tuple[Parameter, ...] = (
     ),
     text(
         'executor',
-        'single_threaded',
-        "executor of the node; events is rclpy's experimental one, less CPU",
-        choices=('single_threaded', 'events'),
+        'events',
+        "executor of the node: events (rclpy's, less CPU) or single_threaded",
+        choices=('events', 'single_threaded'),
+    ),
+    flag(
+        'autostart',
+        True,
+        'configure and activate the node at its start; false: a life cycle manager does',
+    ),
+    text(
+        'soil_file',
+        '',
+        'parameter file with the soil and the sensor zeros that were learned: read at start, '
+        'written at ~/save_soil, every 10 s and at the end; empty = none',
     ),
     # Wheels
     text(

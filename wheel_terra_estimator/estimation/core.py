@@ -47,33 +47,19 @@ class EstimatorCore:
     """
 
     def __init__(self, configuration: Configuration, estimator: Estimator | None = None) -> None:
-        if estimator is None:
-            from wheel_terra_estimator.estimation.wheel_soil_estimator import WheelSoilEstimator
-
-            estimator = WheelSoilEstimator(configuration)
-        rate = configuration.reference_odom_max_rate
-        tuning = configuration.filter
-        self._settings = TimeSettings(
-            output_rate=configuration.output_rate,
-            history=_nanoseconds(configuration.history),
-            silence=_nanoseconds(tuning.silence),
-            heartbeat=max(_nanoseconds(1.0 / tuning.heartbeat_rate), 1),
-            reference_period=_nanoseconds(1.0 / rate) if rate else 0,
-            rerun_rate=_rerun_rate(configuration),
-        )
-        self._lags = LagLearner(
-            _nanoseconds(configuration.max_lag) if configuration.max_lag >= 0.0 else -1
-        )
-        self._clock_step = _nanoseconds(tuning.clock_step)
-        self._estimator = estimator
+        self._estimator = estimator or _estimator(configuration)
+        self._settings = _time_settings(configuration)
+        self._lags = LagLearner(_max_lag(configuration))
+        self._clock_step = _nanoseconds(configuration.filter.clock_step)
         self._checks = InputChecks(configuration)
         self._guard = OutputGuard(configuration)
-        self._timeline = Timeline(estimator, self._settings, self._finish)
+        self._timeline = Timeline(self._estimator, self._settings, self._finish)
         self._watch = self._new_watch()
         self._received = [0] * len(CHANNELS)
         self._late = [0] * len(CHANNELS)
         self._told: list[tuple[str, int] | None] = [None] * len(CHANNELS)  # words, stamp of set
         self._deferred_at: int | None = None
+        self._latest: EstimateSet | None = None
         self._clock_steps = 0
         self._resets = 0
 
@@ -103,6 +89,42 @@ ReferenceVelocity
         self._resets += 1
         self._watch = self._new_watch()
         self._end_run(keep_soil=False)
+
+    def retune(self, configuration: Configuration) -> None:
+        """Go on from the present state with other tuning (``filter.*``, rates, lag, history).
+
+        What is held back is released first. Wheels, sensors and soil must be the same.
+        """
+        self._estimator = _estimator(configuration)
+        self._settings = _time_settings(configuration)
+        self._lags.fixed = _max_lag(configuration)
+        self._clock_step = _nanoseconds(configuration.filter.clock_step)
+        self._timeline.retune(self._estimator, self._settings)
+
+    def learned(self) -> dict[str, Any]:
+        """Return what was learned of soil and sensors: configuration key -> value, ``_std`` too.
+
+        Empty where there were no estimates yet.
+        """
+        if hasattr(self._estimator, 'learned'):
+            return dict(self._estimator.learned())
+        latest = self._latest
+        found: dict[str, Any] = {}
+        if latest is not None:
+            rows = zip(
+                latest.soil_names, latest.soil.tolist(), latest.soil_std.tolist(), strict=True
+            )
+            for key, value, std in rows:
+                name, degrees = key.removesuffix('_deg'), key.endswith('_deg')
+                found[key] = value
+                found[f'{name}_std{"_deg" if degrees else ""}'] = std
+        return found
+
+    @property
+    def last_reasons(self) -> dict[str, str]:
+        """Input topic -> why something of it was last rejected."""
+        told = zip(self._checks.names, self._told, strict=True)
+        return {name: told_of[0] for name, told_of in told if told_of is not None}
 
     def health(self) -> dict[str, Any]:
         """Return counters and words for diagnostics: key (with unit where it has one) -> value."""
@@ -178,6 +200,7 @@ ReferenceVelocity
         if silent:
             unknown = np.full(len(estimates.slip_class), SlipClass.UNKNOWN, dtype=np.uint8)
             estimates = replace(estimates, slip_class=unknown)
+        self._latest = estimates
         return estimates, failed
 
     def _faults(self, stamp: int, silent: bool) -> dict[str, str]:
@@ -200,6 +223,28 @@ ReferenceVelocity
         if silent:
             faults[checks.names[0]] = 'silent: wheel rates unknown'
         return faults
+
+
+def _estimator(configuration: Configuration) -> Estimator:
+    from wheel_terra_estimator.estimation.wheel_soil_estimator import WheelSoilEstimator
+
+    return WheelSoilEstimator(configuration)
+
+
+def _time_settings(configuration: Configuration) -> TimeSettings:
+    rate, tuning = configuration.reference_odom_max_rate, configuration.filter
+    return TimeSettings(
+        output_rate=configuration.output_rate,
+        history=_nanoseconds(configuration.history),
+        silence=_nanoseconds(tuning.silence),
+        heartbeat=max(_nanoseconds(1.0 / tuning.heartbeat_rate), 1),
+        reference_period=_nanoseconds(1.0 / rate) if rate else 0,
+        rerun_rate=_rerun_rate(configuration),
+    )
+
+
+def _max_lag(configuration: Configuration) -> int:
+    return _nanoseconds(configuration.max_lag) if configuration.max_lag >= 0.0 else -1
 
 
 def _rerun_rate(configuration: Configuration) -> float:

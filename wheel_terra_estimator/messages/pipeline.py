@@ -8,13 +8,14 @@ They differ in nothing but who brings the messages and where the sets go.
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Callable
 from typing import Any
 
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.core import EstimatorCore
 from wheel_terra_estimator.estimation.estimates import EstimateSet
 from wheel_terra_estimator.messages.convert import InputConverter, finite, input_layout
-from wheel_terra_estimator.messages.diagnostics import Diagnostics
+from wheel_terra_estimator.messages.diagnostics import NODE, Diagnostics
 
 FAULT_MEMORY = 5_000_000_000
 """How long a refused message is shown as a fault [ns of stamps]."""
@@ -29,26 +30,29 @@ class Pipeline:
     ----------
     configuration : Configuration
         Rover, soil, sensors, filter.
+    node_name : str
+        Name of the node with its namespace, for diagnostics.
 
     Attributes
     ----------
     received : Counter
         Messages heard, by input topic.
-    transport_faults, transport_counters : dict, Counter
-        What whoever brings the messages has to say for itself in diagnostics.
+    transport_faults, transport_values : dict, callable
+        What whoever brings the messages has to say for itself in diagnostics: faults in words, and
+        a function that returns key-values.
     diagnostics : Diagnostics
         Says what ``/diagnostics`` is to say, and when.
     """
 
-    def __init__(self, configuration: Configuration) -> None:
+    def __init__(self, configuration: Configuration, node_name: str = NODE) -> None:
         self.configuration = configuration
         self.names = configuration.wheels.names
         self.converter = InputConverter(input_layout(configuration))
         self.core = EstimatorCore(configuration)
         self.received: Counter[str] = Counter()
-        self.diagnostics = Diagnostics(self.names, self.counters, self._faults)
+        self.diagnostics = Diagnostics(self.names, self.counters, self._faults, node_name)
         self.transport_faults: dict[str, str] = {}
-        self.transport_counters: Counter[str] = Counter()
+        self.transport_values: Callable[[], dict[str, Any]] = dict
         self._published = 0
         self._refused: dict[tuple[str, str], tuple[int, int]] = {}  # -> count, stamp
 
@@ -68,6 +72,11 @@ class Pipeline:
         """Forget the state, keep the parameters."""
         self.core.reset()
 
+    def retune(self, configuration: Configuration) -> None:
+        """Go on with other tuning; wheels, sensors and soil must be the same."""
+        self.configuration = configuration
+        self.core.retune(configuration)
+
     @property
     def rejected(self) -> Counter[tuple[str, str]]:
         """Messages that could not be used, by (input topic, reason in words)."""
@@ -84,7 +93,10 @@ class Pipeline:
         result.update((f'{topic}_received', count) for topic, count in self.received.items())
         for (topic, reason), count in self.converter.rejected.items():
             result[f'{topic}{_REJECTED}{reason}'] = count
-        result.update(self.transport_counters)
+        result.update(
+            (f'{topic}_last_reason', reason) for topic, reason in self._last_reasons().items()
+        )
+        result.update(self.transport_values())
         result.update(self.core.health())
         return result
 
@@ -92,6 +104,14 @@ class Pipeline:
         sets = [finite(estimates) for estimates in sets]
         self._published += len(sets)
         return sets
+
+    def _last_reasons(self) -> dict[str, str]:
+        """Return input topic -> why something of it was last rejected."""
+        found = {
+            topic: reason
+            for (topic, reason), _ in sorted(self._refused.items(), key=lambda item: item[1][1])
+        }
+        return found | self.core.last_reasons
 
     def _faults(self, stamp: int) -> dict[str, str]:
         """Return the messages that were refused of late, in words."""

@@ -50,7 +50,7 @@ from wheel_terra_estimator.messages.convert import JOINT_OUTPUTS, stamp_of
 from wheel_terra_estimator.output_folder import check_file, check_folder
 from wheel_terra_estimator.reporting.drive_summary import as_text, summarise
 from wheel_terra_estimator.reporting.replay_report import write_replay_report
-from wheel_terra_estimator.ros.estimator_node import MESSAGE_TYPES
+from wheel_terra_estimator.ros.lifecycle_node import MESSAGE_TYPES
 
 QUEUE = 5000
 PATIENCE = 5.0  # [s] until the next message is sent though the node has not heard the last one

@@ -42,6 +42,7 @@ class EstimatePublisher:
     """
 
     def __init__(self, node: Node, names: tuple[str, ...]) -> None:
+        self._node = node
         self._names = names
         self._stuck: bool | None = None
 
@@ -68,27 +69,52 @@ class EstimatePublisher:
         size = len(names)
         self._classes.layout.dim = [MultiArrayDimension(label='wheel', size=size, stride=size)]
 
+    def destroy(self) -> None:
+        """Take the topics away."""
+        for publisher in (
+            *self._joint_publishers.values(),
+            self._class_publisher,
+            self._twist_publisher,
+            self._stuck_publisher,
+            self._diagnostics_publisher,
+        ):
+            self._node.destroy_publisher(publisher)
+
     def publish(self, estimates: EstimateSet) -> None:
-        """Publish all messages of a set."""
+        """Publish the messages of a set that somebody listens to."""
         stamp = time_message(estimates.stamp)
-        for topic, fields in joint_fields(estimates, self._names).items():
+        wanted = {t for t, p in self._joint_publishers.items() if p.get_subscription_count()}
+        fields_of = joint_fields(estimates, self._names) if wanted else {}
+        if 'slip' not in wanted and self._class_publisher.get_subscription_count():
+            self._publish_classes(estimates)
+        for topic, fields in fields_of.items():
+            if topic not in wanted:
+                continue
             message = self._joint_messages[topic]
             message.header.stamp = stamp
             if len(message.name) != len(fields.name):
                 message.name = list(fields.name)
-            message.position = fields.position
-            message.velocity = fields.velocity
-            message.effort = fields.effort
+            # The setters take an array as it is and look at every item of a list.
+            message.position = array('d', fields.position)
+            message.velocity = array('d', fields.velocity)
+            message.effort = array('d', fields.effort)
             self._joint_publishers[topic].publish(message)
             if topic == 'slip':
-                self._classes.data = array('B', estimates.slip_class.tolist())
-                self._class_publisher.publish(self._classes)
+                self._publish_classes(estimates)
+        if self._twist_publisher.get_subscription_count():
+            self._publish_twist(estimates, stamp)
+        self.publish_stuck(estimates.stuck)
+
+    def _publish_classes(self, estimates: EstimateSet) -> None:
+        self._classes.data = array('B', estimates.slip_class.tolist())
+        self._class_publisher.publish(self._classes)
+
+    def _publish_twist(self, estimates: EstimateSet, stamp: Time) -> None:
         self._twist.header.stamp = stamp
         self._twist.twist.twist.linear.x = estimates.forward_velocity
         self._twist.twist.twist.angular.z = estimates.yaw_rate
         self._twist.twist.covariance = twist_covariance(estimates)
         self._twist_publisher.publish(self._twist)
-        self.publish_stuck(estimates.stuck)
 
     def publish_stuck(self, stuck: bool) -> None:
         """Publish the stuck warning if it is new."""

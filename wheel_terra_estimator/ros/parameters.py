@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-import sys
+from collections.abc import Mapping
 from typing import Any
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
@@ -14,50 +14,65 @@ from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.configuration.parameters import Parameter, declared
 
+TUNING = ('output_rate', 'max_lag', 'history', 'reference_odom_max_rate')
+"""May be changed while the node runs, as all of ``filter.*``."""
 
-def take_overrides(node: Node) -> dict[str, Any]:
-    """Return what the user gave a node, and clear the way to declare it properly.
+
+def is_tuning(key: str) -> bool:
+    """Whether a parameter may be changed while the node runs."""
+    return key in TUNING or key.startswith('filter.')
+
+
+def known() -> Mapping[str, Parameter]:
+    """Return the parameters of the estimator by key."""
+    return declared()
+
+
+def overrides(node: Node) -> dict[str, Any]:
+    """Return what the user gave a node.
 
     The node must have been made with ``automatically_declare_parameters_from_overrides``: only so
     are parameters seen that nobody declares, misspelt ones above all.
     """
-    given = {}
-    for name in node.get_parameters_by_prefix(''):
-        if name in reader.STANDARD_PARAMETERS or name.startswith(reader.STANDARD_PREFIXES):
-            continue
-        given[name] = node.get_parameter(name).value
-        node.undeclare_parameter(name)
-    return given
+    return {
+        name: node.get_parameter(name).value
+        for name in node.get_parameters_by_prefix('')
+        if name not in reader.STANDARD_PARAMETERS and not name.startswith(reader.STANDARD_PREFIXES)
+    }
 
 
-def declare_parameters(node: Node) -> Configuration:
-    """Check and declare all parameters; they are read once, so all are read-only.
+def configuration(given: Mapping[str, Any]) -> Configuration:
+    """Return the checked configuration.
 
     Raises
     ------
     UserError
         If a parameter is unknown or its value cannot be used.
     """
-    configuration = reader.from_parameters(
-        take_overrides(node),
-        source='parameters',
-        allow_effect_files='--allow-effect-files' in sys.argv,
-    )
+    return reader.from_parameters(given, source='parameters')
+
+
+def declare(node: Node, configuration: Configuration) -> None:
+    """Declare all parameters anew, with their values, units and ranges."""
+    for name in overrides(node):
+        node.undeclare_parameter(name)
     values = configuration.flat()
     for key, parameter in declared().items():
         node.declare_parameter(key, values[key], _descriptor(parameter), ignore_override=True)
-    return configuration
 
 
 def _descriptor(parameter: Parameter) -> ParameterDescriptor:
     unit = f' [{parameter.unit}]' if parameter.unit else ''
+    tuning = is_tuning(parameter.key)
+    when = '' if tuning else '; read-only while the node is configured'
     descriptor = ParameterDescriptor(
         description=f'{parameter.meaning}{unit}',
-        additional_constraints=parameter.allowed,
-        read_only=True,
+        additional_constraints=f'{parameter.allowed}{when}',
+        # An integer will do where a number is wanted; the validator knows.
+        dynamic_typing=tuning and parameter.kind == 'number',
     )
     finite = parameter.lower > float('-inf') and parameter.upper < float('inf')
-    if finite and parameter.kind == 'number':
+    if finite and parameter.kind == 'number' and not tuning:
         descriptor.floating_point_range = [
             FloatingPointRange(
                 from_value=float(parameter.lower), to_value=float(parameter.upper), step=0.0

@@ -31,7 +31,7 @@ from wheel_terra_estimator.estimation.traction_law import (
     traction_decision,
 )
 from wheel_terra_estimator.messages.diagnostics import NODE
-from wheel_terra_estimator.ros.estimator_node import run_node
+from wheel_terra_estimator.ros.process import run_node
 from wheel_terra_estimator.ros.qos import input_profile, output_profile
 
 LIMITS = {
@@ -137,7 +137,7 @@ class TractionLimiter(Node):
 
 def main(args: list[str] | None = None) -> int:
     """Run the node."""
-    return run_node(TractionLimiter, args)
+    return run_node(lambda: TractionLimiter, args)
 
 
 if __name__ == '__main__':

@@ -135,6 +135,19 @@ class InputLog:
         self._last_kept = 0  # stamp of the newest kept state
         self._dense_until = 0
 
+    def retune(self, estimator: Estimator, grid: StepGrid, reference_period: int) -> None:
+        """Go on from the state after the last step with another estimator and another grid."""
+        state = self.estimator.snapshot()
+        self.estimator = estimator
+        self._pristine = estimator.snapshot()
+        if self._astray or self._position != self._ran:
+            for entry in self.entries[self._ran :]:
+                entry.kept = None  # run again by the new one
+        estimator.restore(state)
+        self._reference_period = reference_period
+        self.grid = grid
+        self._walk = self._walk._replace(step_index=-1)
+
     def insert(self, channel: int, measurement: Measurement) -> tuple[int, bool]:
         """Put an input where its stamp belongs; return where, and whether as a new entry."""
         stamp = measurement.stamp

@@ -31,10 +31,17 @@ class LagLearner:
     ----------
     fixed : int
         How long inputs are held back [ns]; below 0: as learned.
+
+    Attributes
+    ----------
+    fixed : int
+        As given; may be changed.
+    learned : dict
+        Channel -> lag [ns].
     """
 
     def __init__(self, fixed: int) -> None:
-        self._fixed = fixed
+        self.fixed = fixed
         self._lags = {c: deque[int](maxlen=_MEMORY) for c in (WHEEL_ODOMETRY, INERTIAL)}
         self._counts = dict.fromkeys(self._lags, 0)
         self._newest: int | None = None
@@ -45,7 +52,7 @@ class LagLearner:
     @property
     def longest(self) -> int:
         """How long inputs may be held back at most [ns]."""
-        return LONGEST_HOLD if self._fixed < 0 else self._fixed
+        return LONGEST_HOLD if self.fixed < 0 else self.fixed
 
     def begin_run(self) -> None:
         """Forget the time, not the lags: they belong to the transport."""
@@ -70,8 +77,8 @@ class LagLearner:
 
     def hold(self, newest: int) -> int:
         """Return how long inputs are held back now [ns]; `newest` is the newest stamp of all."""
-        if self._fixed >= 0:
-            return self._fixed
+        if self.fixed >= 0:
+            return self.fixed
         if (
             not self._odometry_heard
             and self._first is not None

@@ -117,6 +117,13 @@ class Timeline:
         self._log.clear(keep_soil=keep_soil)
         self._clear()
 
+    def retune(self, estimator: Estimator, settings: TimeSettings) -> None:
+        """Go on with another estimator of the same kind of state, and other times."""
+        self.settings = settings
+        self._grid = StepGrid(settings.output_rate)
+        self._log.retune(estimator, self._grid, settings.reference_period)
+        self._allowance = min(self._allowance, settings.rerun_rate * ALLOWANCE)
+
     def insert(self, channel: int, measurement: Measurement) -> tuple[Fate, list[EstimateSet]]:
         """Put an input into the log.
 

@@ -1,0 +1,196 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Life cycle, services, live parameters, what is kept over a restart, and signals."""
+
+import json
+import signal
+import time
+from pathlib import Path
+
+import pytest
+from test_estimator_node import NODE, ROVER, hear, latched, parameters, wheel_message
+
+__all__ = ['parameters']
+STALE = b'\x03'
+
+
+def call(node, until, kind, name, request):
+    client = node.create_client(kind, f'{NODE}/{name}')
+    until(client.service_is_ready)
+    future = client.call_async(request)
+    until(future.done)
+    return future.result()
+
+
+def test_life_cycle_services_and_live_parameters(start, parameters, listener, tmp_path):
+    from diagnostic_msgs.msg import DiagnosticArray
+    from lifecycle_msgs.msg import Transition
+    from lifecycle_msgs.srv import ChangeState, GetState
+    from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
+    from rcl_interfaces.srv import SetParameters
+    from sensor_msgs.msg import JointState
+    from std_msgs.msg import Bool
+    from std_srvs.srv import SetBool, Trigger
+
+    from wheel_terra_estimator.configuration import reader
+
+    names = reader.load(['pathfinder']).wheels.names
+    node, until = listener
+    soil = tmp_path / 'soil.yaml'
+    options = ['-p', 'autostart:=false', '-p', f'soil_file:={soil}']
+    process = start('estimator_node', *ROVER, parameters, *options)
+    slip = hear(node, JointState, f'{NODE}/slip')
+    stuck = hear(node, Bool, f'{NODE}/stuck', latched())
+    said = hear(node, DiagnosticArray, '/diagnostics')
+    wheels = node.create_publisher(JointState, 'joint_states', 10)
+    sent = 0
+
+    def change(transition):
+        request = ChangeState.Request(transition=Transition(id=transition))
+        return call(node, until, ChangeState, 'change_state', request).success
+
+    def state():
+        return call(node, until, GetState, 'get_state', GetState.Request()).current_state.label
+
+    def drive(condition, seconds=20.0):
+        def step():
+            nonlocal sent
+            wheels.publish(wheel_message(names, 100.0 + 0.05 * sent))
+            sent += 1
+            return condition()
+
+        until(step, seconds)
+
+    def set_parameter(name, value):
+        kind = ParameterValue(type=ParameterType.PARAMETER_DOUBLE, double_value=value)
+        request = SetParameters.Request(parameters=[Parameter(name=name, value=kind)])
+        return call(node, until, SetParameters, 'set_parameters', request).results[0]
+
+    assert state() == 'unconfigured'
+    assert not call(node, until, Trigger, 'reset', Trigger.Request()).success
+    assert change(Transition.TRANSITION_CONFIGURE)
+    until(lambda: wheels.get_subscription_count() and stuck)
+    drive(lambda: said and said[-1].status[0].message.startswith('inactive'))
+    assert all(s.level == STALE for s in said[-1].status)
+    assert not slip, 'configured, not active: the filter goes on, nothing is published'
+    assert change(Transition.TRANSITION_ACTIVATE)
+    drive(lambda: len(slip) > 2)
+    # The filter had gone on: stamps do not begin anew.
+    assert slip[0].header.stamp.sec + 1e-9 * slip[0].header.stamp.nanosec > 100.0
+
+    assert call(node, until, SetBool, 'set_enabled', SetBool.Request(data=False)).success
+    drive(lambda: said[-1].status[0].message.startswith('disabled'))
+    count = len(slip)
+    drive(lambda: sent % 10 == 0)
+    assert len(slip) == count
+    assert call(node, until, SetBool, 'set_enabled', SetBool.Request(data=True)).success
+    drive(lambda: len(slip) > count + 2)
+
+    refused = set_parameter('rover.mass', 1.0)
+    assert not refused.successful and 'read-only' in refused.reason
+    refused = set_parameter('output_rate', -5.0)
+    assert not refused.successful and 'output_rate' in refused.reason
+    assert set_parameter('output_rate', 2.0).successful
+    count, begin = len(slip), sent
+    drive(lambda: sent >= begin + 40)  # two seconds of stamps
+    assert 1 <= len(slip) - count <= 8
+
+    answer = call(node, until, Trigger, 'save_soil', Trigger.Request())
+    assert answer.success and answer.message == str(soil)
+    again = reader.load([parameters, soil])
+    assert again.soil.cohesion > 0.0 and 'soil.cohesion' in again.stated
+    assert json.loads(soil.with_name('soil.yaml.state.json').read_text())['stuck'] is False
+
+    assert change(Transition.TRANSITION_DEACTIVATE)
+    assert change(Transition.TRANSITION_CLEANUP)
+    assert state() == 'unconfigured'
+    until(lambda: not wheels.get_subscription_count())
+    assert change(Transition.TRANSITION_CONFIGURE)
+    status, words = process.stop(signal.SIGTERM)
+    assert status == 0 and 'Traceback' not in words, words
+
+
+def test_a_warning_and_the_soil_stand_over_a_restart(start, parameters, listener, tmp_path):
+    from diagnostic_msgs.msg import DiagnosticArray
+    from sensor_msgs.msg import JointState
+    from std_msgs.msg import Bool
+    from std_srvs.srv import Trigger
+
+    from wheel_terra_estimator.configuration import reader
+
+    node, until = listener
+    soil = tmp_path / 'soil.yaml'
+    soil.write_text('/**:\n  ros__parameters:\n    soil.cohesion: 432.1\n')
+    state = tmp_path / 'soil.yaml.state.json'
+    kept = {'stuck': True, 'reason': 'wheels dig in', 'stamp': 90_000_000_000}
+    state.write_text(json.dumps(kept))
+    stuck = hear(node, Bool, f'{NODE}/stuck', latched())
+    said = hear(node, DiagnosticArray, '/diagnostics')
+    wheels = node.create_publisher(JointState, 'joint_states', 10)
+    process = start('estimator_node', *ROVER, parameters, '-p', f'soil_file:={soil}')
+    until(lambda: stuck and wheels.get_subscription_count())
+    assert stuck[-1].data
+    names = reader.load(['pathfinder']).wheels.names
+    sent = 0
+
+    def told():
+        nonlocal sent
+        wheels.publish(wheel_message(names, 100.0 + 0.05 * sent, rate=0.0))
+        sent += 1
+        reasons = [
+            value.value
+            for message in said
+            for value in message.status[-1].values
+            if value.key == 'reason'
+        ]
+        return any('before a restart: wheels dig in' in reason for reason in reasons)
+
+    until(told)
+    assert len(stuck) == 1, 'rest does not clear it'
+    assert call(node, until, Trigger, 'reset', Trigger.Request()).success
+    until(lambda: not stuck[-1].data)
+    assert not state.exists()
+    until(lambda: told() and sent % 20 == 0)
+    assert not call(node, until, Trigger, 'save_soil', Trigger.Request()).message.endswith('empty')
+    written = reader.load([parameters, soil]).soil.cohesion
+    assert written == pytest.approx(432.1, rel=0.2)
+    status, words = process.stop(signal.SIGINT)
+    assert status == 0 and 'Traceback' not in words, words
+
+
+def catches_signals(process):
+    """Whether the handlers of the process stand, by the kernel's account."""
+    status = Path(f'/proc/{process._process.pid}/status').read_text()
+    mask = int(next(x for x in status.splitlines() if x.startswith('SigCgt')).split()[1], 16)
+    return bool(mask >> (signal.SIGTERM - 1) & 1)
+
+
+@pytest.mark.skipif(not Path('/proc/self/status').exists(), reason='asks the kernel of Linux')
+@pytest.mark.parametrize('delay', [0.0, 0.7, 2.5])
+def test_signals_end_it_at_any_moment_also_twice(start, parameters, delay):
+    processes = [
+        (start('estimator_node', *ROVER, parameters), signal.SIGINT),
+        (start('traction_limiter_node'), signal.SIGTERM),
+    ]
+    for process, _ in processes:
+        while not catches_signals(process):
+            time.sleep(0.01)
+    time.sleep(delay)
+    for process, number in processes:
+        process._process.send_signal(number)
+        process._process.send_signal(number)
+        begin = time.monotonic()
+        status, words = process.end()
+        assert status == 0, words
+        assert 'Traceback' not in words
+        assert time.monotonic() - begin < 3.0  # one second where the machine is not loaded
+
+
+def test_a_broken_parameter_file_ends_it_with_one_line(start, tmp_path):
+    path = tmp_path / 'broken.yaml'
+    path.write_text('/**:\n  ros__parameters:\n    rover.mass: [1, "a"\n')
+    for name in (path, tmp_path / 'missing.yaml'):
+        status, words = start('estimator_node', *ROVER, str(name)).end()
+        assert status == 2
+        assert 'Traceback' not in words
+        assert len(words.strip().splitlines()) <= 2, words

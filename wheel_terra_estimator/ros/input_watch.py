@@ -1,0 +1,107 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""How the inputs arrive: rate, age, delay and loss of each topic, and what is wrong in words.
+
+Times are of a steady clock, so that silence is seen when nothing comes any more.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+PERIODS_TO_SILENCE = 3.0
+LEAST_SILENCE = 0.75  # [s]
+MEMORY = 5.0  # [s] for which a loss is told
+_SMOOTHING = 0.1
+
+
+class _Topic:
+    """What is known of one topic."""
+
+    __slots__ = ('delay', 'heard', 'lost', 'lost_at', 'number', 'period', 'received', 'stamp')
+
+    def __init__(self) -> None:
+        self.received = 0
+        self.heard = 0.0
+        self.period = 0.0
+        self.delay = 0.0
+        self.stamp = 0
+        self.number: int | None = None  # of the publisher's last message
+        self.lost = 0
+        self.lost_at = float('-inf')
+
+
+class InputWatch:
+    """Watches the transport of the input topics."""
+
+    def __init__(self) -> None:
+        self._topics: dict[str, _Topic] = {}
+
+    def heard(self, topic: str, now: float, delay: float, number: int | None) -> None:
+        """Note a message.
+
+        Parameters
+        ----------
+        topic : str
+            Input topic.
+        now : float
+            Steady time [s].
+        delay : float
+            Time of the node's clock less the stamp [s].
+        number : int or None
+            The publisher's count of its messages; None where several publish or it is not known.
+        """
+        state = self._topics.setdefault(topic, _Topic())
+        if state.received:
+            gap = now - state.heard
+            keep = _SMOOTHING if state.received > 10 else 1.0 / state.received
+            state.period += keep * (gap - state.period)
+        state.delay += (_SMOOTHING if state.received else 1.0) * (delay - state.delay)
+        state.heard = now
+        state.received += 1
+        if number is not None and state.number is not None and number > state.number + 1:
+            self.lost(topic, number - state.number - 1, now)
+        state.number = number
+
+    def lost(self, topic: str, count: int, now: float) -> None:
+        """Note messages that were sent and not heard."""
+        state = self._topics.setdefault(topic, _Topic())
+        state.lost += count
+        state.lost_at = now
+
+    def age(self, topic: str, now: float) -> float | None:
+        """Return for how long a topic has been silent [s]; None if it was never heard."""
+        state = self._topics.get(topic)
+        return None if state is None or not state.received else now - state.heard
+
+    def is_silent(self, topic: str, now: float) -> bool:
+        """Whether a topic that was heard is late by three of its periods."""
+        age = self.age(topic, now)
+        if age is None:
+            return False
+        period = self._topics[topic].period
+        return age > max(LEAST_SILENCE, PERIODS_TO_SILENCE * period)
+
+    def faults(self, now: float) -> dict[str, str]:
+        """Return topic -> what is wrong, in words."""
+        found = {}
+        for topic, state in self._topics.items():
+            if self.is_silent(topic, now):
+                found[topic] = f'silent for {now - state.heard:.1f} s'
+            elif now - state.lost_at < MEMORY:
+                found[topic] = f'{state.lost} messages lost on the way so far'
+        return found
+
+    def values(self, now: float) -> Mapping[str, Any]:
+        """Return key -> value for diagnostics."""
+        found: dict[str, Any] = {}
+        for topic, state in self._topics.items():
+            if state.received:
+                silent = self.is_silent(topic, now)
+                rate = 1.0 / state.period if state.period > 0.0 and not silent else 0.0
+                found[f'{topic}_rate_Hz'] = round(rate, 2)
+                found[f'{topic}_age_s'] = round(now - state.heard, 3)
+                found[f'{topic}_delay_s'] = round(state.delay, 4)
+            found[f'{topic}_lost'] = state.lost
+        return found

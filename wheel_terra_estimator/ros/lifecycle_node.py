@@ -1,0 +1,536 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""The node: hears the rover's topics, publishes slip, sinkage, pull, classes and warnings.
+
+It is an adapter of `Pipeline`; what it adds is transport: life cycle, quality of service,
+parameters, services, what is kept over a restart, and diagnostics when nothing is heard.
+Estimation is driven by messages and their stamps alone; the timers run on the steady clock and
+watch over silence.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from functools import partial
+from inspect import signature
+from pathlib import Path
+from typing import Any, TextIO
+
+from nav_msgs.msg import Odometry
+from rcl_interfaces.msg import SetParametersResult
+from rclpy.clock import Clock
+from rclpy.clock_type import ClockType
+from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from rclpy.parameter import Parameter
+from rclpy.qos import qos_policy_name_from_kind
+from rclpy.subscription import Subscription
+from rclpy.timer import Timer
+from sensor_msgs.msg import Imu, JointState
+from std_srvs.srv import SetBool, Trigger
+
+from wheel_terra_estimator.configuration import soil_file
+from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.estimation.estimates import EstimateSet
+from wheel_terra_estimator.messages.convert import INPUT_TYPES, stamp_of
+from wheel_terra_estimator.messages.diagnostics import (
+    ERROR,
+    NODE,
+    OK,
+    STALE,
+    Status,
+    stale_statuses,
+)
+from wheel_terra_estimator.messages.pipeline import Pipeline
+from wheel_terra_estimator.ros import parameters
+from wheel_terra_estimator.ros.input_watch import InputWatch
+from wheel_terra_estimator.ros.outputs import EstimatePublisher, time_message
+from wheel_terra_estimator.ros.qos import OVERRIDABLE, input_profile
+from wheel_terra_estimator.ros.stuck_memory import StuckMemory
+
+MESSAGE_TYPES = {
+    'joint_states': JointState,
+    'odom': Odometry,
+    'imu/data': Imu,
+    'sinkage': JointState,
+    'leaving_angle': JointState,
+    'reference_odom': Odometry,
+}
+
+WATCH_PERIOD = 0.25  # [s]
+DIAGNOSTICS_PERIOD = 1.0  # [s] of the steady clock, while nothing is heard
+SILENCE = 1.5  # [s] of the steady clock without a set
+SAVE_PERIOD = 10.0  # [s]
+NAMES_PERIOD = 5.0  # [s] between two looks for a node of the same name
+
+LEVELS = ('OK', 'WARN', 'ERROR', 'STALE')
+
+_SECOND = 1_000_000_000
+
+
+class WithInfo:
+    """A callback that takes a message and what the middleware knows of it.
+
+    The single-threaded executor calls it with both, the events executor of Jazzy with a pair.
+    """
+
+    __signature__ = signature(lambda message, info: None)
+
+    def __init__(self, callback: Callable[[Any, dict[str, Any]], None]) -> None:
+        self._callback = callback
+
+    def __call__(self, *given: Any) -> None:
+        """Pass message and information on."""
+        message, info = given if len(given) == 2 else given[0]
+        self._callback(message, info)
+
+
+class EstimatorNode(LifecycleNode):
+    """Managed node around the estimator; with ``autostart`` it makes itself active.
+
+    Raises
+    ------
+    UserError
+        If ``autostart`` is on and a parameter is unknown or its value cannot be used.
+    """
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(NODE, automatically_declare_parameters_from_overrides=True, **options)
+        self._given = parameters.overrides(self)
+        self._full_name = self.get_fully_qualified_name().lstrip('/')
+        self._steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self._pipeline: Pipeline | None = None
+        self._publisher: EstimatePublisher | None = None
+        self._subscriptions_made: list[Subscription] = []
+        self._timers_made: list[Timer] = []
+        self._active = False
+        self._enabled = True
+        self._arrival: TextIO | None = None
+        self._level = -1
+        self.create_service(Trigger, '~/reset', self._reset)
+        self.create_service(Trigger, '~/save_soil', self._save_soil)
+        self.create_service(SetBool, '~/set_enabled', self._set_enabled)
+        self.add_on_set_parameters_callback(self._on_parameters)
+        if self._given.get('autostart', True) is not False:
+            self._configure()
+            self.trigger_configure()
+            self.trigger_activate()
+
+    # -- Life cycle -----------------------------------------------------------------------------
+
+    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Check the parameters and begin to listen; refuse with the reason."""
+        if self._pipeline is None:
+            try:
+                self._configure()
+            except UserError as error:
+                self.get_logger().error(str(error))
+                return TransitionCallbackReturn.FAILURE
+        return super().on_configure(state)
+
+    def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Begin to publish estimates."""
+        self._active = True
+        self._say_stuck()
+        return super().on_activate(state)
+
+    def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Stop publishing estimates; the filter goes on."""
+        self._active = False
+        return super().on_deactivate(state)
+
+    def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Stop listening and forget the state."""
+        self._release()
+        return super().on_cleanup(state)
+
+    def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Keep what was learned and close."""
+        self._release()
+        return super().on_shutdown(state)
+
+    def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Go back to the beginning."""
+        self._release()
+        return TransitionCallbackReturn.SUCCESS
+
+    def destroy_node(self) -> None:
+        """Keep what was learned and close what was opened."""
+        self._release()
+        super().destroy_node()
+
+    def _configure(self) -> None:
+        """Read the parameters, make pipeline, publishers, subscriptions and timers.
+
+        Raises
+        ------
+        UserError
+            If a parameter is unknown or its value cannot be used.
+        """
+        configuration = parameters.configuration(self._given)
+        kept = self._kept_over_restart(configuration)
+        configuration = configuration.replace(kept) if kept else configuration
+        parameters.declare(self, configuration)
+        self._arrival = self._open_arrival_log(configuration)
+        self._pipeline = Pipeline(configuration, self._full_name)
+        self._soil_path = Path(configuration.soil_file).expanduser()
+        self._keeps_soil = bool(configuration.soil_file)
+        self._stuck = self._stuck_memory(configuration)
+        self._watch_inputs = InputWatch()
+        self._latest: EstimateSet | None = None
+        self._started = self._seconds()
+        self._set_at = self._diagnostics_at = float('-inf')
+        self._incompatible: dict[str, str] = {}
+        self._numbered: set[str] = set()
+        self._same_name = False
+        self._pipeline.transport_values = self._transport_values
+        self._publisher = EstimatePublisher(self, self._pipeline.names)
+        self._publisher.publish_stuck(self._stuck.state.stuck)
+        self._listen()
+        self._timers_made = [
+            self.create_timer(period, callback, clock=self._steady)
+            for period, callback in (
+                (WATCH_PERIOD, self._watch),
+                (NAMES_PERIOD, self._watch_names),
+                (SAVE_PERIOD, self._save_now_and_then),
+            )
+        ]
+        self.get_logger().info(
+            f'ready: {len(self._pipeline.names)} wheels, '
+            f'listening to {", ".join(self._pipeline.converter.layout.topics)}'
+        )
+
+    def _release(self) -> None:
+        if self._pipeline is None:
+            return
+        self._active = False
+        self._save_quietly()
+        for timer in self._timers_made:
+            self.destroy_timer(timer)
+        for subscription in self._subscriptions_made:
+            self.destroy_subscription(subscription)
+        self._timers_made, self._subscriptions_made = [], []
+        if self._publisher is not None:
+            self._publisher.destroy()
+        if self._arrival is not None:
+            self._arrival.close()
+            self._arrival = None
+        self._pipeline = self._publisher = None
+
+    # -- Inputs ---------------------------------------------------------------------------------
+
+    def _listen(self) -> None:
+        assert self._pipeline is not None
+        for topic in self._pipeline.converter.layout.topics:
+            self._subscriptions_made.append(
+                self.create_subscription(
+                    MESSAGE_TYPES[topic],
+                    topic,
+                    WithInfo(partial(self._hear, topic)),
+                    input_profile(topic),
+                    event_callbacks=SubscriptionEventCallbacks(
+                        incompatible_qos=partial(self._on_incompatible_qos, topic),
+                        message_lost=partial(self._on_message_lost, topic),
+                        use_default_callbacks=False,
+                    ),
+                    qos_overriding_options=OVERRIDABLE,
+                )
+            )
+
+    def _hear(self, topic: str, message: Any, info: dict[str, Any]) -> None:
+        pipeline = self._pipeline
+        if pipeline is None:
+            return  # was in the queue when the node was cleaned up
+        stamp = stamp_of(message)
+        if self._arrival is not None:
+            self._arrival.write(f'{topic} {stamp}\n')
+        now = self._seconds()
+        number = info.get('publication_sequence_number') if topic in self._numbered else None
+        delay = (self.get_clock().now().nanoseconds - stamp) / _SECOND
+        self._watch_inputs.heard(topic, now, delay, number)
+        self._incompatible.pop(topic, None)
+        for estimates in pipeline.hear(topic, message):
+            self._take(estimates, now)
+
+    def _take(self, estimates: EstimateSet, now: float) -> None:
+        assert self._pipeline is not None and self._publisher is not None
+        before = self._stuck.state
+        estimates = self._stuck.follow(estimates)
+        self._latest = estimates
+        self._set_at = now
+        if self._stuck.state is not before:
+            self._log_stuck()
+            self._save_state()
+        if not (self._active and self._enabled):
+            return
+        self._publisher.publish(estimates)
+        if statuses := self._pipeline.diagnostics.due(estimates):
+            self._say(time_message(estimates.stamp), statuses, now)
+
+    def _on_incompatible_qos(self, topic: str, event: Any) -> None:
+        policy = qos_policy_name_from_kind(event.last_policy_kind)
+        name = self.resolve_topic_name(topic)
+        words = (
+            f'a publisher offers another {policy} than asked for, so nothing comes from it; '
+            f'set qos_overrides.{name}.subscription.* to what it offers'
+        )
+        self._incompatible[topic] = words
+        self.get_logger().warning(f'{name}: {words}')
+
+    def _on_message_lost(self, topic: str, event: Any) -> None:
+        self._watch_inputs.lost(topic, event.total_count_change, self._seconds())
+
+    # -- Services -------------------------------------------------------------------------------
+
+    def _reset(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        if self._pipeline is None or self._publisher is None:
+            response.success, response.message = False, 'not configured: there is no state'
+            return response
+        if self._arrival is not None:
+            self._arrival.write('reset\n')
+        self._pipeline.reset()
+        self._latest = None
+        self._stuck.clear()
+        if self._keeps_soil:
+            soil_file.clear_state(self._soil_path)
+        self._publisher.publish_stuck(False)
+        response.success = True
+        response.message = 'state forgotten, parameters kept'
+        self.get_logger().info('reset')
+        return response
+
+    def _save_soil(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        if self._pipeline is None or not self._keeps_soil:
+            response.success = False
+            response.message = 'parameter soil_file is empty: there is no file to write'
+            if self._pipeline is None:
+                response.message = 'not configured: nothing was learned'
+            return response
+        try:
+            written = self._save()
+        except UserError as error:
+            response.success, response.message = False, str(error)
+            return response
+        response.success = written
+        response.message = str(self._soil_path) if written else 'no estimates yet: nothing learned'
+        return response
+
+    def _set_enabled(
+        self, request: SetBool.Request, response: SetBool.Response
+    ) -> SetBool.Response:
+        self._enabled = bool(request.data)
+        response.success = True
+        response.message = 'estimates are published' if self._enabled else 'estimates are stopped'
+        if not self._active:
+            response.message += ' once the node is active'
+        self.get_logger().info(response.message)
+        self._say_stuck()
+        return response
+
+    # -- What is kept over a restart ------------------------------------------------------------
+
+    def _kept_over_restart(self, configuration: Configuration) -> dict[str, Any]:
+        """Return the parameters in the soil file; one that is broken is said and left."""
+        if not configuration.soil_file:
+            return {}
+        path = Path(configuration.soil_file).expanduser()
+        try:
+            kept = soil_file.read_values(path)
+            configuration.replace(kept)
+        except UserError as error:
+            self.get_logger().error(f'soil_file is not used: {error}')
+            return {}
+        if kept:
+            self.get_logger().info(f'{path}: {len(kept)} parameters learned before')
+        return kept
+
+    def _stuck_memory(self, configuration: Configuration) -> StuckMemory:
+        state = soil_file.StuckState()
+        if self._keeps_soil:
+            try:
+                state = soil_file.read_state(self._soil_path)
+            except UserError as error:
+                self.get_logger().error(str(error))
+        if state.stuck:
+            self.get_logger().error(f'stuck before the restart: {state.reason}')
+        tuning = configuration.filter
+        return StuckMemory(state, float(tuning.stuck_clear_slip), float(tuning.stuck_clear_time))
+
+    def _save(self) -> bool:
+        """Write what was learned; return whether there was anything."""
+        assert self._pipeline is not None
+        learned = self._pipeline.core.learned()
+        if learned:
+            soil_file.write_values(self._soil_path, learned)
+        soil_file.write_state(self._soil_path, self._stuck.state)
+        return bool(learned)
+
+    def _save_quietly(self) -> None:
+        if self._pipeline is not None and self._keeps_soil:
+            try:
+                self._save()
+            except UserError as error:
+                self.get_logger().error(str(error))
+
+    def _save_now_and_then(self) -> None:
+        if self._latest is not None:
+            self._save_quietly()
+
+    def _save_state(self) -> None:
+        if self._keeps_soil:
+            try:
+                soil_file.write_state(self._soil_path, self._stuck.state)
+            except UserError as error:
+                self.get_logger().error(str(error))
+
+    # -- What the operator sees -----------------------------------------------------------------
+
+    def _say_stuck(self) -> None:
+        if self._publisher is not None and self._active and self._enabled:
+            self._publisher.publish_stuck(self._stuck.state.stuck)
+
+    def _log_stuck(self) -> None:
+        state = self._stuck.state
+        if state.stuck:
+            self.get_logger().error(f'stuck: {state.reason}')
+        else:
+            self.get_logger().info(f'no longer stuck: {state.reason}')
+
+    def _say(self, stamp: Any, statuses: list[Status], now: float) -> None:
+        """Publish diagnostics; log a change of the node's level."""
+        assert self._publisher is not None
+        self._diagnostics_at = now
+        self._publisher.publish_diagnostics(stamp, statuses)
+        level, message = statuses[0].level, statuses[0].message
+        if level != self._level:
+            self._level = level
+            words = f'{LEVELS[level]}: {message}'
+            if level == OK:
+                self.get_logger().info(words)
+            elif level == ERROR:
+                self.get_logger().error(words)
+            else:
+                self.get_logger().warning(words)
+
+    def _watch(self) -> None:
+        """Keep diagnostics going when stamps do not: silence, or a slowly played bag."""
+        assert self._pipeline is not None
+        now = self._seconds()
+        self._look_at_transport(now)
+        silent = now - self._set_at > SILENCE
+        stopped = self._stopped_in_words()
+        # While sets flow they bring their own diagnostics; leave them the first word.
+        flowing = not (silent or stopped)
+        level_changes = (silent or bool(stopped)) and self._level != STALE
+        wait = DIAGNOSTICS_PERIOD + (WATCH_PERIOD if flowing else 0.0)
+        if now - self._diagnostics_at < wait and not level_changes:
+            return
+        stamp = self.get_clock().now().to_msg()
+        if silent or stopped or self._latest is None:
+            words = stopped or self._silence_in_words(now)
+            counters = self._pipeline.counters()
+            statuses = stale_statuses(
+                self._pipeline.names, words, counters, self._latest, self._full_name
+            )
+        else:
+            statuses = self._pipeline.diagnostics.now(self._latest)
+        self._say(stamp, statuses, now)
+
+    def _stopped_in_words(self) -> str:
+        if not self._active:
+            return 'inactive: estimates go on but are not published'
+        return '' if self._enabled else 'disabled by ~/set_enabled: estimates are not published'
+
+    def _look_at_transport(self, now: float) -> None:
+        """Tell the pipeline what is wrong with the transport."""
+        assert self._pipeline is not None
+        faults = self._watch_inputs.faults(now) | self._incompatible
+        if self._same_name:
+            faults['name'] = f'another node is called /{self._full_name}: both publish estimates'
+        if self._has_no_clock():
+            faults['clock'] = 'use_sim_time is true, but nothing comes on /clock'
+        self._pipeline.transport_faults.clear()
+        self._pipeline.transport_faults.update(faults)
+
+    def _has_no_clock(self) -> bool:
+        sim_time = self.get_parameter('use_sim_time').value
+        return bool(sim_time) and self.get_clock().now().nanoseconds == 0
+
+    def _watch_names(self) -> None:
+        """Look for a node of the same name, and for topics with more than one publisher."""
+        namespaces = self.get_node_names_and_namespaces()
+        names = [f'{space.rstrip("/")}/{name}' for name, space in namespaces]
+        self._same_name = names.count(f'/{self._full_name}') > 1
+        assert self._pipeline is not None
+        topics: Iterable[str] = self._pipeline.converter.layout.topics
+        # With several publishers the counts of their messages cannot be told apart.
+        self._numbered = {topic for topic in topics if self.count_publishers(topic) == 1}
+
+    def _transport_values(self) -> dict[str, Any]:
+        return dict(self._watch_inputs.values(self._seconds()))
+
+    def _silence_in_words(self, now: float) -> str:
+        assert self._pipeline is not None
+        words = []
+        for topic in self._pipeline.converter.layout.topics:
+            name = self.resolve_topic_name(topic)
+            age = self._watch_inputs.age(topic, now)
+            if topic in self._incompatible:
+                words.append(f'{name}: {self._incompatible[topic]}')
+            elif age is None:
+                words.append(f'{name}: never heard ({self._publishers_in_words(topic)})')
+            elif age > SILENCE:
+                words.append(f'{name}: silent for {age:.0f} s')
+        for (topic, reason), count in self._pipeline.rejected.items():
+            reason = self._pipeline.converter.in_words(topic, reason)
+            words.append(f'{self.resolve_topic_name(topic)}: rejected: {reason} ({count} messages)')
+        words += [
+            f'{subject}: {self._pipeline.transport_faults[subject]}'
+            for subject in ('clock', 'name')
+            if subject in self._pipeline.transport_faults
+        ]
+        seconds = now - max(self._set_at, self._started)
+        return '; '.join([f'no estimates for {seconds:.0f} s', *words])
+
+    def _publishers_in_words(self, topic: str) -> str:
+        types = [p.topic_type for p in self.get_publishers_info_by_topic(topic)]
+        others = sorted(set(types) - {INPUT_TYPES[topic]})
+        if others:
+            return f'{", ".join(others)} comes there, needed is {INPUT_TYPES[topic]}'
+        return f'{len(types) or "no"} publishers'
+
+    # -- Parameters -----------------------------------------------------------------------------
+
+    def _on_parameters(self, changes: list[Parameter]) -> SetParametersResult:
+        """Take changes of tuning at once; all else only while the node is not configured."""
+        values = {change.name: change.value for change in changes}
+        if self._pipeline is None:
+            self._given.update(values)
+            return SetParametersResult(successful=True)
+        values = {key: v for key, v in values.items() if key in parameters.known()}
+        fixed = [key for key in values if not parameters.is_tuning(key)]
+        if fixed:
+            reason = f'{fixed[0]} is read-only while the node is configured (clean it up first)'
+            return SetParametersResult(successful=False, reason=reason)
+        if values:
+            try:
+                self._pipeline.retune(self._pipeline.configuration.replace(values))
+            except UserError as error:
+                return SetParametersResult(successful=False, reason=str(error))
+            self._given.update(values)
+        return SetParametersResult(successful=True)
+
+    def _open_arrival_log(self, configuration: Configuration) -> TextIO | None:
+        name = str(configuration.flat()['record_arrival'])
+        if not name:
+            return None
+        try:
+            return Path(name).expanduser().open('w', encoding='utf-8', buffering=1)
+        except OSError as error:
+            raise UserError(
+                f'record_arrival: {name} cannot be written ({error.strerror})'
+            ) from None
+
+    def _seconds(self) -> float:
+        return float(self._steady.now().nanoseconds) * 1e-9

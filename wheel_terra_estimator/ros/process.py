@@ -1,0 +1,109 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""The process of a node: it ends in order at SIGINT and SIGTERM, at any moment, also twice.
+
+Imports nothing heavy, so that the handlers stand before rclpy and numpy are loaded.
+"""
+
+from __future__ import annotations
+
+import gc
+import os
+import signal
+import sys
+import threading
+from collections.abc import Callable
+from types import FrameType
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rclpy.node import Node
+
+LONGEST_END = 0.8  # [s] for saving and closing, then the process ends anyway
+LOOK_UP = 0.1  # [s] between two looks at the signals
+
+
+class _Signals:
+    """First ends the process at once; while serving, asks it to end."""
+
+    def __init__(self) -> None:
+        self.stopped = False
+        self.serving = False
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, self._on_signal)
+
+    def _on_signal(self, number: int, frame: FrameType | None) -> None:
+        if not self.serving:
+            os._exit(0)  # nothing has been opened yet
+        if not self.stopped:
+            self.stopped = True
+            end = threading.Timer(LONGEST_END, os._exit, (0,))
+            end.daemon = True
+            end.start()
+
+
+def run_node(make: Callable[[], Callable[[], Node]], args: list[str] | None = None) -> int:
+    """Make a node and serve it until it is told to stop; return the exit status.
+
+    Parameters
+    ----------
+    make : callable
+        Imports what is needed and returns what makes the node.
+    args : list of str, optional
+        Arguments of ROS; default: those of the process.
+    """
+    signals = _Signals() if threading.current_thread() is threading.main_thread() else None
+    factory = make()
+    import rclpy
+    from rclpy.executors import ExternalShutdownException
+    from rclpy.signals import SignalHandlerOptions
+    from rclpy.utilities import try_shutdown
+
+    from wheel_terra_estimator.errors import UserError
+
+    node: Any = None
+    status = 0
+    try:
+        try:
+            rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+        except Exception as error:  # rcl's: a parameter file or argument that cannot be read
+            print(f'{_first_line(error)}', file=sys.stderr)
+            return 2
+        node = factory()
+        if signals is not None:
+            signals.serving = True
+        gc.collect()
+        gc.freeze()  # what lives as long as the node needs no more looking at
+        _spin(node, lambda: signals is not None and signals.stopped)
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    except UserError as error:
+        print(f'[FATAL] {error}', file=sys.stderr)
+        status = 2
+    finally:
+        if node is not None:
+            node.destroy_node()
+        try_shutdown()
+    return status
+
+
+def _first_line(error: Exception) -> str:
+    """Return what rcl complains of, without the places in its source."""
+    return str(error).splitlines()[0].partition(', at ')[0]
+
+
+def _spin(node: Any, stopped: Callable[[], bool]) -> None:
+    import rclpy
+    from rclpy.executors import Executor, SingleThreadedExecutor
+
+    executor: Executor
+    if node.has_parameter('executor') and node.get_parameter('executor').value == 'events':
+        from rclpy.experimental import EventsExecutor
+
+        executor = EventsExecutor()
+    else:
+        executor = SingleThreadedExecutor()
+    executor.add_node(node)
+    # The events executor's spin(), and its spin_once() without a timeout, run hot in Jazzy.
+    while rclpy.ok() and not stopped():
+        executor.spin_once(timeout_sec=LOOK_UP)
