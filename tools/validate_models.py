@@ -4,8 +4,8 @@
 
     python tools/validate_models.py [--shared ../shared] [--only SECTION ...]
 
-Needs the folder with measured data; takes about two minutes. With ``--only`` the sections are
-printed and nothing is written but their pictures.
+Needs the folder with measured data; takes about two minutes. With ``--only`` these sections of the
+page are written anew and the others are left as they are.
 """
 
 from __future__ import annotations
@@ -44,17 +44,26 @@ def main() -> int:
         print(f'no measured data in {arguments.shared}; name the folder with --shared')
         return 2
     pages = ROOT / 'docs' / 'models'
-    texts = []
+    page = pages / 'validation.md'
+    texts = _sections(page) if arguments.only else {}
     for name in arguments.only or SECTIONS:
         print(f'{name} ...', file=sys.stderr)
         module = importlib.import_module(f'model_validation.{name}')
-        texts.append(module.section(arguments.shared, pages / 'figures'))
-    page = '\n\n'.join(texts) + '\n'
-    if arguments.only:
-        print(page)
-    else:
-        (pages / 'validation.md').write_text(f'{HEAD}\n{page}', encoding='utf-8')
+        text = module.section(arguments.shared, pages / 'figures')
+        texts[_title(text)] = text
+    body = '\n\n'.join(text.strip() for text in texts.values())
+    page.write_text(f'{HEAD}\n{body}\n', encoding='utf-8')
     return 0
+
+
+def _sections(page: Path) -> dict[str, str]:
+    """Return the sections of the page as it is, by title."""
+    parts = page.read_text(encoding='utf-8').split('\n## ')[1:]
+    return {_title(f'## {part}'): f'## {part}' for part in parts}
+
+
+def _title(text: str) -> str:
+    return text.splitlines()[0]
 
 
 if __name__ == '__main__':

@@ -16,6 +16,8 @@ from wheel_terra_estimator.terramechanics import branch_moments, closed_form
 from wheel_terra_estimator.terramechanics.conditioned import INPUTS, ConditionedForces
 from wheel_terra_estimator.terramechanics.maths import ScalarMaths
 from wheel_terra_estimator.terramechanics.model import WheelSoilModel
+from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
+from wheel_terra_estimator.terramechanics.soil import Soil
 from wheel_terra_estimator.terramechanics.steady_sinkage import INPUTS as SINKAGE_INPUTS
 from wheel_terra_estimator.terramechanics.steady_sinkage import SteadySinkage
 from wheel_terra_estimator.terramechanics.terms import Terms, build_contact, set_angles
@@ -140,8 +142,10 @@ def test_conditioned_forces_are_the_closed_form_at_its_own_sinkage(slip: float) 
     steady = WheelSoilModel(SAND, MOUND, 'closed_form').steady_state(points([slip]))
     ratio = 1.0 - slip if slip >= 0.0 else 1.0 / (1.0 + slip)
     got = answer(conditioned(MOUND), ratio, float(steady.sinkage[0]))
-    assert got.torque == pytest.approx(steady.torque[0], rel=1e-6, abs=1e-6)
-    assert got.drawbar_pull == pytest.approx(steady.drawbar_pull[0], rel=1e-6, abs=1e-6)
+    # In skid the filter's form keeps one place per side, the model takes four: 3 % of the load.
+    error = 1e-6 if slip > 0.0 else 0.03 * 80.0
+    assert got.torque == pytest.approx(steady.torque[0], rel=1e-6, abs=error * WHEEL.radius)
+    assert got.drawbar_pull == pytest.approx(steady.drawbar_pull[0], rel=1e-6, abs=error)
 
 
 def test_conditioned_forces_are_close_to_the_quadrature() -> None:
@@ -282,3 +286,37 @@ def test_derivatives_of_the_steady_sinkage() -> None:
 def test_soil_that_cannot_carry_is_said_not_raised() -> None:
     depth, derivatives, carried = SteadySinkage(WHEEL, SAND).sinkage(0, 0.9, 1e6)
     assert not carried and depth <= WHEEL.radius and derivatives == (0.0,) * 7
+
+
+def test_closed_form_in_skid_is_as_close_as_in_slip() -> None:
+    """Random contacts of skidding wheels against 40 nodes: 95 % in shares of the load."""
+    random = np.random.default_rng(77)
+    count = 300
+    wheel = Wheel(random.uniform(0.05, 0.3, count), 0.15, 0.01, 20)
+    cases = OperatingPoints(random.uniform(-0.6, 0.0, count), 3000.0 * 0.15 * wheel.radius, wheel)
+    soil = Soil(
+        0.0,
+        10 ** random.uniform(5.8, 6.5, count),
+        random.uniform(0.6, 1.2, count),
+        random.uniform(0.0, 800.0, count),
+        random.uniform(0.4, 0.7, count),
+        random.uniform(0.004, 0.03, count),
+        random.uniform(0.3, 0.6, count),
+        random.uniform(-0.4, 0.0, count),
+    )
+    effects = {'slip_sinkage_exponent': {'n1': 0.3}, 'lug_shear_radius': {}}
+    form, exact = (
+        WheelSoilModel(soil, effects, method, strict=False, nodes=40).steady_state(cases)
+        for method in ('closed_form', 'quadrature')
+    )
+    error = np.abs(form.drawbar_pull - exact.drawbar_pull) / cases.normal_load
+    assert np.quantile(error, 0.95) < 0.008
+    assert np.quantile(np.abs(form.sinkage / exact.sinkage - 1.0), 0.95) < 0.02
+
+
+def test_the_turn_from_rolling_to_skid_is_smooth() -> None:
+    slip = np.linspace(-0.12, 0.05, 171)
+    pull = state(slip, effects=EFFECTS, method='closed_form').drawbar_pull
+    steps = np.diff(pull)
+    assert (steps > 0.0).all()
+    assert np.max(np.abs(np.diff(steps))) < 0.25 * np.max(steps)

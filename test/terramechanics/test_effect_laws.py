@@ -285,8 +285,10 @@ def test_the_filter_s_forces_from_the_sinkage_agree_with_the_model(name: str, sl
     known = {'rim_speed': 2.0 * WHEEL.radius}
     args = [ratio, steady.sinkage[0], 150.0, SAND.cohesion, TAN, SAND.shear_modulus]
     forces = wheel.forces(0, *args, **known)
-    assert forces.torque == pytest.approx(steady.torque[0], rel=2e-3, abs=0.01)
-    assert forces.drawbar_pull == pytest.approx(steady.drawbar_pull[0], rel=2e-3, abs=0.1)
+    # In skid the filter's form keeps one place per side, the model takes four.
+    share = 2e-3 if slip > 0.0 else 0.03
+    assert forces.torque == pytest.approx(steady.torque[0], rel=share, abs=0.01)
+    assert forces.drawbar_pull == pytest.approx(steady.drawbar_pull[0], rel=share, abs=0.1)
     for column, _ in enumerate(INPUTS[:6]):
         step = 1e-4 * args[column]
         pairs = []

@@ -71,7 +71,7 @@ def soils() -> list[dict[str, float]]:
     return found
 
 
-def family(count: int, seed: int, mound: bool) -> Family:
+def family(count: int, seed: int, mound: bool, slips: tuple[float, float] = (0.0, 0.95)) -> Family:
     """Draw the family that the issue prints.
 
     r 0.05 to 0.3 m, b/r 0.5 to 1.5, h/r 0 to 0.15, named soils with every number +-30 %, mean
@@ -92,7 +92,7 @@ def family(count: int, seed: int, mound: bool) -> Family:
     width = radius * random.uniform(0.5, 1.5, count)
     lugs = radius * random.uniform(0.0, 0.15, count)
     load = random.uniform(1e3, 10e3, count) * radius * width
-    slip = random.uniform(0.0, 0.95, count)
+    slip = random.uniform(*slips, count)
     effects = {
         'slip_sinkage_exponent': {'n1': random.uniform(0.0, 0.5, count), 'n2': 0.0},
         'stress_peak_shift': {'c2': random.uniform(0.0, 0.3, count)},
@@ -125,6 +125,7 @@ def table(count: int, seed: int) -> list[str]:
         '| | cases | within 2 % of W | 95 % below | within 2 %, sinkage below r/2 |',
         '|---|---|---|---|---|',
     ]
+    lines += skid_rows(count, seed + 2)
     for mound in (False, True):
         label = 'with mound' if mound else 'no mound'
         cases = family(count, seed + mound, mound)
@@ -184,6 +185,28 @@ def table(count: int, seed: int) -> list[str]:
         '',
         *decoupled,
     ]
+
+
+def skid_rows(count: int, seed: int) -> list[str]:
+    """Return rows of the accuracy table for the same family in skid, in two ranges."""
+    cases = family(count, seed, mound=False, slips=(-0.9, 0.0))
+    depth = 1.0 - np.cos(cases.angle)
+    angle, pull, _, good = cases.solve(closed_form.forces)
+    lines = []
+    for label, chosen in (
+        ('slip -0.6 to 0', cases.slip >= -0.6),
+        ('slip -0.9 to -0.6', cases.slip < -0.6),
+    ):
+        known = cases.carried & good & chosen
+        pull_error = (np.abs(pull - cases.pull) / cases.load)[known]
+        depth_error = np.abs((1.0 - np.cos(angle)) / depth - 1.0)[known]
+        both = np.mean((pull_error < 0.05) & (depth_error < 0.1))
+        lines.append(
+            f'| branch moments with nodes in skid, no mound, {label} | {known.sum()} '
+            f'| {100 * both:.1f} % | {100 * np.quantile(pull_error, 0.95):.2f} % of W '
+            f'| {100 * np.quantile(depth_error, 0.95):.2f} % |'
+        )
+    return lines
 
 
 def quadrature_error(count: int, seed: int) -> str:

@@ -4,6 +4,9 @@
 
 Area and centroid of the normal stress follow from its exponent, the mobilised share of the shear
 strength from the shear displacement at that centroid (docs/models). Nothing is fitted.
+
+Where the rim skids, shear displacement turns back inside the contact and no one place stands for
+a side: there four nodes on each side take the place of the centroid.
 """
 
 from __future__ import annotations
@@ -14,6 +17,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wheel_terra_estimator.terramechanics.contact import Contact
+
+# Skid beyond pure rolling, v/(w R) - 1, over which the nodes take over from the centroid.
+_TAKE_OVER = 0.05
+# Gauss-Legendre nodes and weights on (0, 1), squared towards 0, where the stress starts like v^N.
+_NODES = tuple(
+    (0.25 * (x + 1.0) ** 2, 0.5 * w * (x + 1.0))
+    for x, w in zip(*(part.tolist() for part in np.polynomial.legendre.leggauss(4)), strict=True)
+)
 
 
 def branch_moments(exponent: Any, skew: Any) -> tuple[Any, Any]:
@@ -88,14 +99,15 @@ class BranchForces:
     __slots__ = (
         '_abs', '_arc_front', '_arc_rear', '_cohesion_front', '_cohesion_rear', '_copysign',
         '_edge_front', '_edge_rear', '_exponent', '_friction_front', '_friction_rear', '_half',
-        '_middle_front', '_middle_rear', '_modulus', '_normal_front', '_normal_rear', '_peak',
-        '_place_front', '_place_rear', '_rim_front', '_rim_rear', '_roll', '_shear_radius',
-        '_sin', '_sqrt', '_width',
+        '_maths', '_middle_front', '_middle_rear', '_modulus', '_normal_front', '_normal_rear',
+        '_peak', '_place_front', '_place_rear', '_rim_front', '_rim_rear', '_roll',
+        '_shear_radius', '_sin', '_skid', '_skidding', '_sqrt', '_stress', '_width',
     )  # fmt: skip
 
     def __init__(
         self, contact: Contact, peak_share: Any, leaving_share: Any, maths: Any = np
     ) -> None:
+        self._maths = maths
         self._sin, self._sqrt = maths.sin, maths.sqrt
         self._abs, self._copysign = maths.abs, maths.copysign
         self._exponent = n = contact.sinkage_exponent
@@ -109,6 +121,7 @@ class BranchForces:
         self._half = 0.5 * front
         r, R = contact.radius, contact.shear_radius
         self._modulus = contact.shear_modulus
+        self._shear_radius, self._width = R, contact.width
         self.set_speed(contact.velocity_ratio)
         turn = R / self._modulus
         self._rim_front, self._rim_rear = turn * (1.0 - place_front), turn * (1.0 - place_rear)
@@ -116,16 +129,24 @@ class BranchForces:
         # A branch is an arc: its resultant is a little smaller than the sum of its stresses.
         self._arc_front, self._arc_rear = spread * square_front, spread * square_rear
         self._edge_front, self._edge_rear = square_front / 24.0, square_rear / 24.0
-        self._peak = contact.bearing_modulus * area * (2.0 * r / contact.reference_depth) ** n
+        self._stress = contact.bearing_modulus * (2.0 * r / contact.reference_depth) ** n
+        self._peak = area * self._stress
         self._normal_front, self._normal_rear = r * front, r * rear
         grip, cling = R * contact.tan_friction, R * contact.cohesion
         self._friction_front, self._friction_rear = grip * front, grip * rear
         self._cohesion_front, self._cohesion_rear = cling * front, cling * rear
-        self._shear_radius, self._width = R, contact.width
 
     def set_speed(self, velocity_ratio: Any) -> None:
         """Change v/w [m]; all else stays as it is."""
         self._roll = velocity_ratio / self._modulus
+        share = (velocity_ratio / self._shear_radius - 1.0) / _TAKE_OVER
+        if self._maths is np:
+            share = np.minimum(np.maximum(share, 0.0), 1.0)
+            self._skidding = bool(np.any(share > 0.0))
+        else:
+            share = 0.0 if share <= 0.0 else min(share, 1.0)
+            self._skidding = share > 0.0
+        self._skid = share * share * (3.0 - 2.0 * share)
 
     @property
     def exponent(self) -> Any:
@@ -145,6 +166,8 @@ class BranchForces:
 
     def load(self, angle: Any) -> Any:
         """Vertical force at an entrance angle [N]: as ``forces``, half as long."""
+        if self._skidding:
+            return self.forces(angle)[0]
         sin, sqrt, roll, square = self._sin, self._sqrt, self._roll, angle * angle
         top, front, rear = sin(angle), sin(self._place_front * angle), sin(self._place_rear * angle)
         x = self._rim_front * angle - roll * (top - front)
@@ -218,7 +241,57 @@ class BranchForces:
             + cohesion_rear * sqrt(1.0 - mean * mean)
         )
         torque = size * self._shear_radius * (rub_front + rub_rear + stick_front + stick_rear)
+        if self._skidding:
+            return self._with_skid(angle, (load, pull, torque))
         return load, pull, torque
+
+    def _with_skid(self, angle: Any, rolling: tuple[Any, Any, Any]) -> tuple[Any, Any, Any]:
+        """Load, pull and torque with the nodes' share where the rim skids."""
+        skid = self._skid
+        if np.ndim(skid) == 0 or np.shape(skid) != np.shape(angle):
+            skidding = self._node_forces(angle)
+            load, pull, torque = (
+                r + skid * (s - r) for r, s in zip(rolling, skidding, strict=True)
+            )
+            return load, pull, torque
+        rows = skid > 0.0
+        skidding = self.take(rows)._node_forces(angle[rows])
+        for r, s in zip(rolling, skidding, strict=True):
+            r[rows] += skid[rows] * (s - r[rows])
+        return rolling
+
+    def _node_forces(self, angle: Any) -> tuple[Any, Any, Any]:
+        """Load, pull and torque from nodes on either side of the peak."""
+        maths, sin, sqrt = self._maths, self._sin, self._sqrt
+        R, roll = self._shear_radius, self._roll
+        front, top = 2.0 * self._half, sin(angle)
+        leaving = 2.0 * self._middle_rear - (1.0 - front)
+        rear = 1.0 - front - leaving
+        load = pull = torque = 0.0
+        for place, weight in _NODES:
+            ahead = 1.0 - front * place
+            depth = sin(0.5 * (1.0 + ahead) * angle) * sin(0.5 * front * place * angle)
+            stress = self._stress * depth**self._exponent
+            for at, normal, friction, cohesion in (
+                (ahead, self._normal_front, self._friction_front, self._cohesion_front),
+                (
+                    leaving + rear * place,
+                    self._normal_rear,
+                    self._friction_rear,
+                    self._cohesion_rear,
+                ),
+            ):
+                sine = sin(at * angle)
+                cosine = sqrt(1.0 - sine * sine)
+                x = R / self._modulus * (1.0 - at) * angle - roll * (top - sine)
+                share = self._copysign(-maths.expm1(-self._abs(x)), x)
+                pressed = weight * normal * stress
+                sheared = weight * (friction * stress + cohesion) * share
+                load = load + pressed * cosine + sheared * sine
+                pull = pull + sheared * cosine - pressed * sine
+                torque = torque + sheared
+        size = self._width * angle
+        return size * load, size * pull, size * R * torque
 
     def small_angle(self, load: Any) -> Any:
         """Entrance angle at which the normal stress alone carries a load, for small angles.

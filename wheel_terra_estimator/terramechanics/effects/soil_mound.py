@@ -12,7 +12,7 @@ from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectPara
 
 
 def _mound(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
-    """Raise the rear contact height: z2 = z20 + kappa z ((s - onset)+/(1 - onset))^2."""
+    """Raise the rear contact height by kappa z ((s - onset)+/(1 - onset))^2, below the hub."""
     excess = maths.maximum(contact.slip - p.onset, 0.0) / (1.0 - p.onset)
     rise = p.kappa * excess * excess * (1.0 - maths.cos(contact.entrance_angle))
     # 1 - cos is the contact height over r. The slope of a circle is steeper the higher one gets, so
@@ -26,7 +26,8 @@ def _mound(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
 EFFECT = Effect(
     name='soil_mound',
     claim='at high slip, soil piles up behind the wheel and moves the leaving angle back',
-    symbol='r (1 - cos t_2) += kappa z x^2, x = (s - onset)+/(1 - onset)',
+    symbol='1 - cos t_2 = b + (1 - b) [1 - exp(-kappa z x^2/(r (1 - b)))], b = 1 - cos(c_3 t_1), '
+    'x = (s - onset)+/(1 - onset); about r (1 - cos t_2) += kappa z x^2 while small',
     parameters=(
         EffectParameter(
             'kappa',
