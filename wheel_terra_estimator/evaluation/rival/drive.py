@@ -5,16 +5,22 @@
 from __future__ import annotations
 
 import zlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.evaluation.rival.ground import Ground, Patch, RandomField
-from wheel_terra_estimator.evaluation.rival.kinds import KINDS, Kind
+from wheel_terra_estimator.evaluation.rival.kinds import KINDS, Kind, PatchPlan
 from wheel_terra_estimator.evaluation.rival.motion import Plant, State, WheelCommand, World
-from wheel_terra_estimator.evaluation.rival.rovers import Draw, draw_rover, slope_for_slip
+from wheel_terra_estimator.evaluation.rival.rovers import (
+    Draw,
+    TrueSoil,
+    draw_rover,
+    slope_for_slip,
+    steepest_slope,
+)
 from wheel_terra_estimator.evaluation.rival.sensing import (
     Arrival,
     Course,
@@ -38,7 +44,7 @@ _STANDING = 3.0  # [s] at rest before the first start
 _RAMP = 1.0  # [s]
 _HEADING_GAIN = 0.4  # [1/s], of the driver that keeps the heading
 _STEERING_SHARE = 0.3  # of the speed, at most, for that
-_COURSE_LIMIT = 50.0  # a slope goes on beyond its ends for so many nominal ways
+_TRAPPING_SHARE = 0.85  # of the slope: what a patch that traps still carries the rover up
 
 
 @dataclass(frozen=True)
@@ -92,19 +98,7 @@ def _world(generator: np.random.Generator, plan: Kind, draw: Draw, length: float
         undulation=RandomField(generator, plan.undulation, size),
         stiffness=RandomField(generator, scatter * float(generator.uniform(0.05, 0.2)), 0.5 * size),
         friction=RandomField(generator, scatter * float(generator.uniform(0.01, 0.04)), 0.5 * size),
-        patches=tuple(
-            Patch(
-                start=p.start * way + front,
-                end=min(p.end, _COURSE_LIMIT) * way + front,
-                stiffness=p.stiffness,
-                cohesion=p.cohesion,
-                friction=p.friction,
-                right=-np.inf if p.side != 'left' else 0.0,
-                left=np.inf if p.side != 'right' else 0.0,
-                border=p.border * way,
-            )
-            for p in plan.patches
-        ),
+        patches=tuple(_patch(p, draw, way, front, slopes[-1]) for p in plan.patches),
     )
     return World(
         vehicle=vehicle,
@@ -115,6 +109,35 @@ def _world(generator: np.random.Generator, plan: Kind, draw: Draw, length: float
         torque_limit=draw.torque_limit,
         rut_stiffening=float(generator.uniform(0.0, 0.15)),
         load_errors=tuple(RandomField(generator, 0.025, wheelbase) for _ in range(vehicle.count)),
+    )
+
+
+def _patch(plan: PatchPlan, draw: Draw, way: float, front: float, slope: float) -> Patch:
+    """Return a patch in metres; on a slope [rad] that it shall not carry the rover up."""
+    friction = plan.friction
+    while plan.traps and steepest_slope(draw.vehicle, _in_patch(draw.soil, plan, friction)) > (
+        _TRAPPING_SHARE * slope
+    ):
+        friction *= 0.95
+    return Patch(
+        start=plan.start * way + front,
+        end=plan.end * way + front,
+        stiffness=plan.stiffness,
+        cohesion=plan.cohesion,
+        friction=friction,
+        right=0.0 if plan.side == 'left' else -np.inf,
+        left=0.0 if plan.side == 'right' else np.inf,
+        border=plan.border * way,
+    )
+
+
+def _in_patch(soil: TrueSoil, plan: PatchPlan, friction: float) -> TrueSoil:
+    return replace(
+        soil,
+        stiffness=soil.stiffness * plan.stiffness,
+        cohesive_modulus=soil.cohesive_modulus * plan.stiffness,
+        cohesion=soil.cohesion * plan.cohesion,
+        tan_friction=soil.tan_friction * friction,
     )
 
 

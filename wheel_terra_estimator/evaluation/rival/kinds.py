@@ -23,7 +23,10 @@ _SKID_STEERED = RoverClass(wheels=(4,), track=(1.0, 1.4))
 
 @dataclass(frozen=True)
 class PatchPlan:
-    """Other soil between two shares of the way; factors as in ``ground.Patch``."""
+    """Other soil between two shares of the way; factors as in ``ground.Patch``.
+
+    One that `traps` is made weak enough that the rover cannot climb it on the slope there.
+    """
 
     start: float
     end: float
@@ -32,6 +35,7 @@ class PatchPlan:
     cohesion: float = 1.0
     border: float = 0.03
     side: Literal['both', 'left', 'right'] = 'both'
+    traps: bool = False
 
 
 @dataclass(frozen=True)
@@ -103,16 +107,16 @@ KINDS: Mapping[str, Kind] = {
     ),
     'entrapment': Kind(
         'a climb into loose soil that does not carry: trapped within seconds',
-        slopes=((0.0, 0.05), (0.3, 0.25)),
-        patches=(PatchPlan(0.35, 9.0, 0.3, 0.6, 0.3),),
+        slopes=((0.0, 0.05), (0.15, 0.25)),
+        patches=(PatchPlan(0.18, 9.0, 0.3, 0.7, 0.3, traps=True),),
     ),
     'creeping_entrapment': Kind(
         'soil that gets weaker: slip from 0.4 to 0.9 in about a minute',
         slopes=((0.0, 0.1), (0.12, 0.38)),
-        patches=(PatchPlan(0.14, 9.0, 0.6, 0.65, 0.6, border=0.45),),
+        patches=(PatchPlan(0.14, 9.0, 0.6, 0.8, 0.6, border=0.33, traps=True),),
         undulation=0.003,
         soil_scatter=0.3,
-        duration=110.0,
+        duration=120.0,
     ),
     'recovery': Kind(
         'a steep pitch at high slip, driven out of',

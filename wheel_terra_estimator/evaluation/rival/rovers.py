@@ -176,6 +176,11 @@ def slope_for_slip(vehicle: Vehicle, soil: TrueSoil, slip: float) -> float:
     return float(np.arctan(pull))
 
 
+def steepest_slope(vehicle: Vehicle, soil: TrueSoil) -> float:
+    """Return the steepest slope [rad] that the rover is expected to climb."""
+    return float(np.arctan(traction_curve(vehicle, soil, _SLIPS).max()))
+
+
 def _true_soil(generator: np.random.Generator, nominal: object) -> TrueSoil:
     errors = SoilErrors()
 
