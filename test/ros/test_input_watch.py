@@ -1,0 +1,32 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Rate, silence and loss of the inputs."""
+
+import pytest
+
+from wheel_terra_estimator.ros.input_watch import InputWatch
+
+
+def test_rate_age_and_silence_after_three_periods():
+    watch = InputWatch()
+    for i in range(50):
+        watch.heard('imu/data', 0.01 * i, 0.002, None)
+        watch.heard('reference_odom', 2.0 * i, 0.5, None)
+    values = watch.values(98.1)
+    assert values['reference_odom_rate_Hz'] == pytest.approx(0.5)
+    assert values['reference_odom_age_s'] == pytest.approx(0.1)
+    assert values['reference_odom_delay_s'] == pytest.approx(0.5)
+    assert watch.faults(0.5) == {}
+    assert watch.faults(103.9).keys() == {'imu/data'}
+    assert watch.faults(104.1)['reference_odom'] == 'silent for 6.1 s'
+
+
+def test_loss_by_the_publishers_own_count_is_told_for_a_while():
+    watch = InputWatch()
+    for number in (1, 2, 5, 6, 1, 2):  # three to four are missing, then the publisher restarts
+        watch.heard('joint_states', 0.01 * number, 0.0, number)
+    assert watch.values(0.1)['joint_states_lost'] == 2
+    assert watch.faults(0.1) == {'joint_states': '2 messages lost on the way so far'}
+    for i in range(1000):
+        watch.heard('joint_states', 0.1 + 0.01 * i, 0.0, None)
+    assert watch.faults(10.1) == {}
