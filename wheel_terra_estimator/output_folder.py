@@ -123,22 +123,25 @@ def new_folder(
         beside = Path(tempfile.mkdtemp(dir=path.parent, prefix=f'.{path.name}.wheel-terra-'))
     except OSError as error:
         raise cannot_write(path, error) from None
+    kept = False
     try:
         fresh = beside / path.name
         try:
             fresh.mkdir()
             yield fresh
         except BaseException:
-            if keep_partial and fresh.is_dir() and not path.exists():
+            if keep_partial and not path.exists() and fresh.is_dir() and any(fresh.iterdir()):
                 with suppress(OSError):
                     mark(fresh)
                 with suppress(OSError):
                     fresh.rename(path)
+                    kept = True
             raise
         mark(fresh)
         _put_in_place(fresh, path, beside)
     except OSError as error:
-        raise cannot_write(path, error) from None
+        words = '; what was written before is kept there' if kept else ''
+        raise UserError(f'{cannot_write(path, error)}{words}') from None
     finally:
         shutil.rmtree(beside, ignore_errors=True)
 

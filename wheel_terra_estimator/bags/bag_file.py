@@ -6,11 +6,12 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Collection, Iterable, Mapping
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from types import TracebackType
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
+from wheel_terra_estimator.bags.mcap_closing import close_cut_file
 from wheel_terra_estimator.bags.message_factory import MessageFactory
 from wheel_terra_estimator.output_folder import check_folder, new_folder
 
@@ -98,10 +99,30 @@ class BagFile:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        # Not the library's own exit, which leaves a file without index after an error.
         with self._stack:
-            self._writer.close()
+            if isinstance(error, OSError):
+                self._close_cut()
+            else:  # not the library's own exit, which leaves a file without index after an error
+                try:
+                    self._writer.close()
+                except OSError:
+                    self._close_cut()
+                    raise
             self._stack.__exit__(kind, error, trace)
+
+    def _close_cut(self) -> None:
+        """Close the bag on a disk that takes no more: it keeps all chunks that are whole."""
+        storage: Any = self._writer.storage
+        if self._storage != 'mcap' or storage is None:
+            return
+        with suppress(OSError):  # then nothing can be kept; the first error is the one to be said
+            storage.bio.raw.close()  # what is buffered has no place any more
+            kept = close_cut_file(storage.path)
+            self._writer.counts = {c.id: kept.counts[c.id] for c in self._connections.values()}
+            self._writer.min_timestamp, self._writer.max_timestamp = kept.start, kept.end
+            writer: Any = self._writer
+            writer.storage = _ClosedFile(storage.path)
+            self._writer.close()  # writes the metadata
 
     def write(self, topic: str, message: Any, log_time: int) -> None:
         """Append a message at a log time [ns]."""
@@ -112,6 +133,15 @@ class BagFile:
         """Append a message that is serialised already (CDR)."""
         self._writer.write(self._connections[topic], log_time, data)
         self.counts[topic] += 1
+
+
+class _ClosedFile(NamedTuple):
+    """Stands for a storage file that needs no closing."""
+
+    path: Path
+
+    def close(self, version: int, metadata: str) -> None:
+        """Do nothing."""
 
 
 def _qos(latched: bool) -> Any:

@@ -1,0 +1,114 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""A disk that takes no more leaves a bag that is closed, and one line."""
+
+from __future__ import annotations
+
+import errno
+import resource
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from wheel_terra_estimator.bags.bag_file import BagFile
+from wheel_terra_estimator.bags.storage import open_bag
+from wheel_terra_estimator.cli.main import main
+from wheel_terra_estimator.errors import UserError
+
+TOPIC = '/diagnostics'
+KIND = 'std_msgs/msg/String'
+MEGABYTE = 2**20
+
+
+def fill(path: Path, count: int) -> None:
+    with BagFile(path, {TOPIC: KIND, '/other': KIND}) as bag:
+        for number in range(count):
+            bag.write_raw(TOPIC, number.to_bytes(8, 'little') * 1000, 1000 + number)
+
+
+@pytest.mark.parametrize('fails_at', [2.5, 3.02, 4.0])
+def test_bag_on_a_disk_that_fills_up_is_closed_and_readable(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fails_at: float
+) -> None:
+    """A limit on the size of files stands for a full disk: both fail in the middle of a write."""
+    from rosbags.rosbag2 import Reader
+
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (int(fails_at * MEGABYTE), hard))
+    try:
+        with pytest.raises(UserError, match='what was written before is kept there') as caught:
+            fill(tmp_path / 'out', 1000)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert '\n' not in str(caught.value)
+    with Reader(tmp_path / 'out') as reader:
+        times = [time for _, time, _ in reader.messages()]
+        assert reader.message_count == len(times)
+    assert times == list(range(1000, 1000 + len(times)))
+    assert len(times) * 8000 > (fails_at - 1.2) * MEGABYTE
+    with open_bag(tmp_path / 'out') as bag:
+        assert bag.topics[TOPIC].message_count == len(times)
+        assert bag.topics[TOPIC].type == KIND
+        assert sum(1 for _ in bag.messages((TOPIC,))) == len(times)
+        assert not bag.notes
+    fill_again = [p.name for p in tmp_path.iterdir()]
+    assert fill_again == ['out']
+
+
+def test_a_disk_that_is_full_at_the_end_only(tmp_path: Path, monkeypatch: Any) -> None:
+    """The last chunk does not fit when the bag is closed."""
+    from rosbags.rosbag2.storage_mcap import McapWriter
+
+    def full(*_: Any) -> None:
+        raise OSError(errno.ENOSPC, 'No space left on device')
+
+    monkeypatch.setattr(McapWriter, 'close', full)
+    with pytest.raises(UserError, match='No space left on device'):
+        fill(tmp_path / 'out', 500)
+    with open_bag(tmp_path / 'out') as bag:
+        assert bag.topics[TOPIC].message_count > 200
+
+
+@pytest.mark.parametrize('command', ['replay', 'simulate', 'diagnose', 'evaluate', 'predict'])
+def test_places_that_cannot_be_written_are_one_line_before_anything_is_computed(
+    make_bag: Any, tmp_path: Path, capsys: Any, command: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    table = tmp_path / 't.csv'
+    table.write_text('slip,normal_load,sinkage\n0.1,100,0.01\n')
+    arguments = {
+        'replay': ['replay', str(make_bag()), '--config', 'frostyboy', '-o'],
+        'simulate': ['simulate', '--duration', '3600', '-o'],
+        'diagnose': ['diagnose', str(table), '-o'],
+        'evaluate': ['evaluate', '--overwrite', '-o'],
+        'predict': ['predict', '--overwrite', '-o'],
+    }[command]
+    for place in ('/proc/out.csv', '/proc/new/out.csv', '/dev/full'):
+        assert main([*arguments, place]) == 2
+        said = capsys.readouterr().err
+        assert place in said
+        assert said.count('\n') == 1
+
+
+def test_full_disk_of_the_real_command(make_bag: Any, make_drive: Any, rover: Any, tmp_path: Path):
+    """From the shell: a drive of ten minutes onto a disk with room for two megabytes."""
+    rover.write(tmp_path / 'rover.yaml')
+    bag = make_bag(messages=make_drive(3000), name='long')
+    out = tmp_path / 'out'
+    code = (
+        'import resource, sys; from wheel_terra_estimator.cli.main import main; '
+        'resource.setrlimit(resource.RLIMIT_FSIZE, (2200000, 2200000)); sys.exit(main())'
+    )
+    command = ['replay', str(bag), '--config', str(tmp_path / 'rover.yaml'), '-o', str(out)]
+    done = subprocess.run(
+        [sys.executable, '-c', code, *command], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 2, done.stderr
+    assert 'cannot be written (File too large)' in done.stderr
+    assert done.stderr.count('\n') == 1
+    with open_bag(out) as opened:
+        assert opened.message_count > 1000
+        assert not opened.notes
