@@ -93,7 +93,7 @@ def test_the_configuration_is_read_without_the_heavy_libraries():
 
 # Folder -> (folders of the package, libraries beyond the standard one) that its modules may
 # import, at the top or inside a function. A new folder needs a line here.
-COMMON = {'errors', 'input_file', 'output_folder', '__version__'}
+COMMON = {'errors', 'input_file', 'output_folder', 'worker_pool', '__version__'}
 PICTURES = {'matplotlib', 'jinja2'}
 MAY_USE = {
     'terramechanics': (set(), {'numpy'}),

@@ -12,6 +12,9 @@ from wheel_terra_estimator.errors import UserError
 LARGEST_TEXT = 2**20
 """A configuration file has some kilobytes; a text above this size [byte] is none."""
 
+LARGEST_TABLE = 16 * 2**20
+"""A table of measurements above this size [byte] has more rows than can be worked on."""
+
 
 def check_regular(path: Path) -> int:
     """Return the size of a regular file [byte]; never wait for a pipe, never read a device.
@@ -23,10 +26,15 @@ def check_regular(path: Path) -> int:
     """
     try:
         found = path.stat()
-    except OSError as error:
-        raise UserError(f'{path}: cannot be read: {error.strerror}') from None
+    except FileNotFoundError:
+        raise UserError(
+            f'{path}: cannot be read: No such file or directory; give the path of one'
+        ) from None
+    except (OSError, ValueError) as error:
+        reason = getattr(error, 'strerror', None) or error
+        raise UserError(f'{path}: cannot be read: {reason}') from None
     if stat.S_ISDIR(found.st_mode):
-        raise UserError(f'{path}: cannot be read: it is a folder; name a file')
+        raise UserError(f'{path}: cannot be read: it is a folder; give the path of a file')
     if not stat.S_ISREG(found.st_mode):
         raise UserError(f'{path}: cannot be read: it is a pipe or a device; name a regular file')
     return found.st_size

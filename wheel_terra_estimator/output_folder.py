@@ -258,7 +258,10 @@ def _refuse_place(path: Path, inputs: Iterable[Path]) -> None:
         if place is not None and (target == place or target in place.parents):
             raise UserError(f'{path}: {words}; name a new folder')
     for given in inputs:
-        source = given.resolve()
+        try:
+            source = given.resolve()
+        except (OSError, RuntimeError):  # whoever reads it will say so
+            continue
         inside = source in target.parents and given.is_dir()
         if source == target or target in source.parents or inside:
             raise UserError(

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import re
 import signal
 import sys
 import threading
@@ -21,11 +22,17 @@ from wheel_terra_estimator.bags.storage import Bag
 from wheel_terra_estimator.bags.writer import EstimateBagWriter
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.input_file import read_text
 from wheel_terra_estimator.messages.convert import stamp_of
 from wheel_terra_estimator.messages.pipeline import Pipeline
 
 LONG_DRIVE = 20_000
 """Number of messages from which a progress bar is shown."""
+
+LARGEST_ARRIVAL_LOG = 256 * 2**20
+"""Size [byte] of an arrival log of ten hours."""
+
+_STAMP = re.compile(r'-?[0-9]{1,19}')
 
 RESET = 'reset'
 """Line of an arrival log for a call of ``~/reset``."""
@@ -133,10 +140,7 @@ def _notes(bag: Bag, reader: MeasurementReader, interrupted: bool) -> Iterator[s
 
 def _in_order_of(arrival: Path, reader: MeasurementReader) -> Iterator[tuple[int, str, Any]]:
     """Yield the messages of a bag in the order in which a live node heard them."""
-    try:
-        lines = arrival.read_text(encoding='utf-8').splitlines()
-    except OSError as error:
-        raise UserError(f'{arrival}: cannot be read ({error.strerror})') from None
+    lines = read_text(arrival, LARGEST_ARRIVAL_LOG).splitlines()
     stored: dict[tuple[str, int], deque[tuple[int, Any]]] = defaultdict(deque)
     for log_time, name, message in reader.messages():
         stored[name, stamp_of(message)].append((log_time, message))
@@ -146,7 +150,7 @@ def _in_order_of(arrival: Path, reader: MeasurementReader) -> Iterator[tuple[int
             yield log_time, RESET, None
             continue
         name, _, stamp = line.rpartition(' ')
-        if not stamp.lstrip('-').isdigit() or not stored[name, int(stamp)]:
+        if not _STAMP.fullmatch(stamp) or not stored[name, int(stamp)]:
             raise UserError(
                 f'{arrival}: line {number}: no message "{line}" in {reader.bag.path}; '
                 'the log belongs to another bag'

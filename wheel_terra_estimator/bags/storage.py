@@ -195,13 +195,16 @@ def _compare(metadata: bag_metadata.Metadata, sources: list[_Source], notes: lis
 
 def _open_file(path: Path, notes: list[str], stack: ExitStack, limits: Limits) -> _Source:
     check_regular(path)
+    if path.suffix == '.zstd':
+        unpacked = Path(stack.enter_context(TemporaryDirectory())) / path.stem
+        if damage := unpack_file(path, unpacked, limits):
+            notes.append(damage)
+        try:
+            return _open_file(unpacked, notes, stack, limits)
+        except UserError as error:
+            words = f' ({damage})' if damage else ''
+            raise UserError(f'{error}{words}'.replace(str(unpacked), str(path))) from None
     try:
-        if path.suffix == '.zstd':
-            folder = Path(stack.enter_context(TemporaryDirectory()))
-            unpacked = folder / path.stem
-            if damage := unpack_file(path, unpacked, limits):
-                notes.append(damage)
-            path = unpacked
         return (
             McapFile(path, stack, limits)
             if path.suffix == '.mcap'

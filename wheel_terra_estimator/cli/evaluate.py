@@ -10,6 +10,7 @@ from pathlib import Path
 
 from wheel_terra_estimator.errors import UserError
 
+INTERRUPTED = 130
 SUMMARY = 'score the estimator against ground truth and baselines'
 EXAMPLES = (
     'wheel-terra evaluate --kinds climb turns --seeds 4',
@@ -82,6 +83,7 @@ def run(arguments: argparse.Namespace) -> int:
     )
     from wheel_terra_estimator.output_folder import check_file, new_file
 
+    status = 0
     picture: Path | None = None
     if arguments.output:
         check_file(arguments.output, arguments.overwrite)
@@ -113,11 +115,14 @@ def run(arguments: argparse.Namespace) -> int:
             )
         write = tables.pooled_report if arguments.pooled else tables.report
         text = write(results, arguments.modes)
+        if results.interrupted:
+            text += f'\n\n{results.interrupted}'
+            status = INTERRUPTED
     print(text)
     if arguments.output:
         with new_file(arguments.output, arguments.overwrite) as fresh:
             fresh.write_text(text + '\n', encoding='utf-8')
-    return 0
+    return status
 
 
 def _chosen(world: str, kinds: list[str] | None) -> list[tuple[str, str]]:

@@ -17,6 +17,7 @@ from collections.abc import Sequence
 from typing import Any, NoReturn
 
 from wheel_terra_estimator import __version__
+from wheel_terra_estimator.cli.terminal import harmless_output, one_line, termination_as_interrupt
 from wheel_terra_estimator.errors import UserError
 
 # Each module has SUMMARY, add_arguments(parser) and run(arguments) -> exit status, and may have
@@ -140,7 +141,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     if unknown:
         _refuse(unknown[0], subs[arguments.command])
     try:
-        return int(arguments.run(arguments) or 0)
+        with harmless_output(), termination_as_interrupt():
+            return int(arguments.run(arguments) or 0)
     except UserError as error:
         if arguments.debug:
             raise
@@ -179,6 +181,7 @@ def _suggestion(wrong: str, known: Sequence[str]) -> str:
 
 def _complain(line: str) -> None:
     """Print a line on standard error, red on a terminal that wants colours (NO_COLOR: none)."""
+    line = one_line(line)
     if sys.stderr.isatty() and not os.environ.get('NO_COLOR'):
         line = f'\033[31m{line}\033[0m'
     print(line, file=sys.stderr)

@@ -10,6 +10,7 @@ import math
 import re
 import sys
 from collections.abc import Iterable, Mapping, Sequence
+from io import StringIO
 from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,6 +20,7 @@ from numpy.typing import NDArray
 
 from wheel_terra_estimator.configuration import reader as configuration_reader
 from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.input_file import LARGEST_TABLE, read_text
 from wheel_terra_estimator.output_folder import check_file, new_file
 from wheel_terra_estimator.terramechanics.model import METHODS, OVERLOADED, WheelSoilModel
 from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
@@ -35,6 +37,7 @@ EXAMPLES = (
     'wheel-terra predict --config hit_wh3 --config dlr_mss -o curves.png',
 )
 DEFAULT_SLIP = '0:0.9:19'
+MOST_POINTS = 100_000
 
 # Columns of the result, in the layout of the tables of steady measurements.
 INPUTS = (
@@ -214,6 +217,8 @@ def _points(arguments: argparse.Namespace, configuration: Configuration) -> dict
             else _share_of_weight(configuration)
         )
         slopes = _numbers('--slope', arguments.slope) if arguments.slope else np.array([0.0])
+        if (asked := slips.size * loads.size * slopes.size) > MOST_POINTS:
+            raise UserError(f'{asked} points asked for; at most {MOST_POINTS} are computed')
         rows = np.array(list(product(loads, slopes, slips)))
         columns = {'normal_load': rows[:, 0], 'slope': rows[:, 1], 'slip': rows[:, 2]}
         count = len(rows)
@@ -250,25 +255,23 @@ def _numbers(option: str, text: str) -> FloatArray:
     try:
         if ':' in text:
             first, last, count = text.split(':')
-            if int(count) < 1:
+            if not 1 <= int(count) <= MOST_POINTS:
                 raise ValueError
             return np.linspace(float(first), float(last), int(count))
         return np.array([float(part) for part in text.split(',')])
     except ValueError:
         raise UserError(
-            f'{option} {text}: must be A:B:N (N values from A to B) or a list A,B,C of numbers'
+            f'{option} {text}: must be A:B:N (N values from A to B, at most {MOST_POINTS}) or a '
+            'list A,B,C of numbers'
         ) from None
 
 
 def _read_points(path: Path) -> dict[str, FloatArray]:
     """Read the input columns of a table; others are left alone."""
     try:
-        with path.open(encoding='utf-8-sig', newline='') as stream:
-            table = csv.DictReader(stream)
-            rows, header = list(table), list(table.fieldnames or ())
-    except OSError as error:
-        raise UserError(f'{path}: {error.strerror}; give the path of a CSV table') from None
-    except (UnicodeDecodeError, csv.Error) as error:
+        table = csv.DictReader(StringIO(read_text(path, LARGEST_TABLE), newline=''))
+        rows, header = list(table), list(table.fieldnames or ())
+    except csv.Error as error:
         raise UserError(f'{path}: not a CSV text in UTF-8 ({error})') from None
     for needed in ('slip', 'normal_load'):
         if needed not in header:

@@ -17,7 +17,9 @@ from typing import Any, TypeAlias
 
 import yaml
 
+from wheel_terra_estimator.configuration import bounded_yaml
 from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.input_file import read_text
 
 NODE_NAME = 'wheel_terra_estimator'
 
@@ -26,6 +28,9 @@ Value: TypeAlias = 'Scalar | list[Any]'
 
 _TRUE = frozenset({'Y', 'y', 'yes', 'Yes', 'YES', 'true', 'True', 'TRUE', 'on', 'On', 'ON'})
 _FALSE = frozenset({'N', 'n', 'no', 'No', 'NO', 'false', 'False', 'FALSE', 'off', 'Off', 'OFF'})
+LONGEST_INTEGER = 24
+"""Digits, leading zeros too: those of 64 bits to the base 8, and the prefix."""
+
 _NULL = frozenset({'', '~', 'null', 'Null', 'NULL'})
 _INTEGER = re.compile(r'[+-]?(0[xX][0-9a-fA-F]+|0[0-7]*|[1-9][0-9]*)')
 _DECIMAL = re.compile(r'[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?')
@@ -87,6 +92,8 @@ def plain_scalar(text: str) -> Scalar | _Null:
         return text in _TRUE
     if _INTEGER.fullmatch(text):
         digits = text.lstrip('+-')
+        if len(digits) > LONGEST_INTEGER:
+            return float(text) if _DECIMAL.fullmatch(text) else text
         if digits[:2] in ('0x', '0X'):
             value = int(digits, 16)
         else:
@@ -115,7 +122,7 @@ def parse_value(text: str, source: str) -> Value:
         What the error message names.
     """
     try:
-        value = yaml.load(text, Loader=_RosLoader)
+        value = bounded_yaml.load(text, _RosLoader)
     except yaml.YAMLError as error:
         raise UserError(f'{source}: {_in_words(error)}') from None
     return _checked(value if text.strip() else _NO_VALUE, source)
@@ -137,11 +144,9 @@ def read(path: Path) -> dict[str, Value]:
     UserError
         If the file cannot be read, is not YAML or not a parameter file.
     """
+    text = read_text(path)
     try:
-        document = yaml.load(path.read_text(encoding='utf-8'), Loader=_RosLoader)
-    except (OSError, UnicodeDecodeError) as error:
-        reason = error.strerror if isinstance(error, OSError) else 'not a UTF-8 text'
-        raise UserError(f'{path}: cannot be read: {reason}') from None
+        document = bounded_yaml.load(text, _RosLoader)
     except yaml.YAMLError as error:
         raise UserError(f'{path}: {_in_words(error)}') from None
     if not isinstance(document, Mapping):

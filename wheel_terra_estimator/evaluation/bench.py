@@ -5,8 +5,8 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import as_completed
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -15,6 +15,7 @@ from wheel_terra_estimator.evaluation import baselines, scores
 from wheel_terra_estimator.evaluation.runner import inputs_of_mode, record, run_estimator
 from wheel_terra_estimator.evaluation.two_state_filters import slip_course
 from wheel_terra_estimator.evaluation.worlds import WORLDS, BenchDrive
+from wheel_terra_estimator.worker_pool import worker_pool
 
 
 @dataclass(frozen=True)
@@ -35,6 +36,7 @@ class Results:
     """All scores of a run of the bench."""
 
     drives: list[DriveScore] = field(default_factory=list)
+    interrupted: str = ''  # in words, if not all drives were run
 
     @property
     def worlds(self) -> list[str]:
@@ -102,23 +104,37 @@ def run(
 ) -> Results:
     """Run the bench over pairs of world and kind.
 
-    Drives come in the order in which they finish, results do not depend on it.
+    Drives come in the order in which they finish, results do not depend on it. Interrupted, it
+    returns the drives that are done.
     """
     results = Results()
     tasks = [(world, kind, seed) for seed in seeds for world, kind in chosen]
-    if processes == 1:
-        for world, kind, seed in tasks:
-            results.drives += score_drive(world, kind, seed, modes)
+    done = 0
+    try:
+        for scores_of_drive, words in _scored(tasks, modes, processes):
+            results.drives += scores_of_drive
+            done += 1
             if progress:
-                progress(f'{world} {kind} {seed}')
-        return results
-    with ProcessPoolExecutor(processes) as pool:
+                progress(words)
+    except KeyboardInterrupt:
+        if not done:
+            raise
+        results.interrupted = f'interrupted: {done} of {len(tasks)} drives'
+    results.drives.sort(key=lambda d: (d.world, d.kind, d.seed, d.mode))
+    return results
+
+
+def _scored(
+    tasks: Sequence[tuple[str, str, int]], modes: Sequence[str], processes: int
+) -> Iterator[tuple[list[DriveScore], str]]:
+    """Yield the scores of each drive and its name."""
+    if processes == 1:
+        for task in tasks:
+            yield score_drive(*task, modes), ' '.join(map(str, task))
+        return
+    with worker_pool(processes) as pool:
         waiting = {
             pool.submit(score_drive, *task, modes): ' '.join(map(str, task)) for task in tasks
         }
         for future in as_completed(waiting):
-            results.drives += future.result()
-            if progress:
-                progress(waiting[future])
-    results.drives.sort(key=lambda d: (d.world, d.kind, d.seed, d.mode))
-    return results
+            yield future.result(), waiting[future]

@@ -25,6 +25,7 @@ from wheel_terra_estimator.discrepancy.tables.steady_table import (
     SteadyTable,
 )
 from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.input_file import LARGEST_TABLE, read_text
 
 FloatArray = NDArray[np.float64]
 
@@ -83,7 +84,7 @@ def read_table(path: str | Path) -> SteadyTable:
 def _rows_of(path: Path) -> tuple[list[tuple[int, list[str]]], list[str]]:
     """Return the numbered rows of cells that are not empty, and notes."""
     try:
-        text = path.read_text(encoding='utf-8-sig')
+        text = read_text(path, LARGEST_TABLE)
         found = _split(text, ',')
         notes: list[str] = []
         if _is_european(found):
@@ -91,13 +92,7 @@ def _rows_of(path: Path) -> tuple[list[tuple[int, list[str]]], list[str]]:
                 (line, [_with_point(cell) for cell in cells]) for line, cells in _split(text, ';')
             ]
             notes.append("cells are separated by ';', a comma was read as the decimal mark")
-    except FileNotFoundError:
-        raise UserError(f'{path}: no such file; give the path of a CSV table') from None
-    except IsADirectoryError:
-        raise UserError(f'{path}: is a folder; give a CSV table or a rosbag2') from None
-    except OSError as error:
-        raise UserError(f'{path}: cannot be read ({error.strerror}); check its rights') from None
-    except (UnicodeDecodeError, csv.Error) as error:
+    except csv.Error as error:
         raise UserError(f'{path}: not a CSV text in UTF-8 ({error}); export it again') from None
     if not found:
         raise UserError(f'{path}: empty; the first line must name the columns ({_KNOWN})')

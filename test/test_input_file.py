@@ -1,0 +1,172 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Hostile and mistaken input ends in one line, soon and within bounds of memory."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import fuzzing_bags
+import pytest
+
+from wheel_terra_estimator.cli.main import main
+from wheel_terra_estimator.configuration import reader
+from wheel_terra_estimator.errors import UserError
+
+HEAD = '/**:\n  ros__parameters:\n'
+LAUGHS = 'a0: &a0 [x, x]\n' + ''.join(
+    f'a{i}: &a{i} [{", ".join([f"*a{i - 1}"] * 10)}]\n' for i in range(1, 12)
+)
+
+
+@pytest.mark.parametrize(
+    ('text', 'words'),
+    [
+        (LAUGHS, 'is an alias'),
+        (HEAD + '    rover.mass: &m 20.0\n    rover.gravity: *m\n', 'is an alias'),
+        ('[' * 100_000, 'nested deeper than'),
+        ('{a: ' * 100_000, 'nested deeper than'),
+        (HEAD + '    rover.mass: ' + '9' * 5000, 'rover.mass'),
+        (HEAD + '    wheels.names: [' + 'a, ' * 100_000 + 'b]', 'keys and values'),
+        (HEAD + '    rover.name: ' + 'x' * 2_000_000, 'larger than 1 MB'),
+    ],
+)
+def test_yaml_that_blows_up_is_refused(tmp_path: Path, text: str, words: str) -> None:
+    file = tmp_path / 'rover.yaml'
+    file.write_text(text)
+    start = time.process_time()
+    with pytest.raises(UserError, match=re.escape(words)) as caught:
+        reader.load(['frostyboy', file])
+    assert time.process_time() - start < 5.0
+    assert '\n' not in str(caught.value)
+
+
+def limited(arguments: list[str], seconds: float = 60.0) -> tuple[int, str, float]:
+    """Run a command in a process with 1 GB; return its status, complaint and processor time."""
+    code = (
+        'import resource, sys; from wheel_terra_estimator.cli.main import main; '
+        'status = main(); used = resource.getrusage(resource.RUSAGE_SELF); '
+        'print(used.ru_maxrss, used.ru_utime + used.ru_stime); sys.exit(status)'
+    )
+    done = subprocess.run(
+        [sys.executable, '-c', code, *arguments],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=seconds,
+    )
+    memory, used = map(float, done.stdout.split('\n')[-2].split())
+    assert memory < 2**20, memory  # [kB]
+    return done.returncode, done.stderr, used
+
+
+def test_bombs_in_recordings(tmp_path: Path) -> None:
+    """A chunk that unpacks to a gigabyte, one that says less than it holds, a file of zeros."""
+    for name, content in fuzzing_bags.bombs(tmp_path):
+        path = tmp_path / name
+        path.write_bytes(content)
+        status, said, used = limited(['replay', str(path), '--config', 'frostyboy'])
+        assert status == 2, said
+        assert said.count('\n') == 1, said
+        assert str(path) in said
+        assert used < 10.0  # with the start of the program, on a machine that does other things
+
+
+@pytest.fixture
+def places(tmp_path: Path) -> dict[str, Path]:
+    pipe, loop, folder = tmp_path / 'pipe', tmp_path / 'loop', tmp_path / 'x.mcap'
+    os.mkfifo(pipe)
+    loop.symlink_to(loop)
+    folder.mkdir()
+    bag_pipe, bag_zero = tmp_path / 'pipe.mcap', tmp_path / 'zero.mcap'
+    os.mkfifo(bag_pipe)
+    bag_zero.symlink_to('/dev/zero')
+    inside = tmp_path / 'bag'
+    inside.mkdir()
+    os.mkfifo(inside / 'a.mcap')
+    return {
+        'pipe': pipe,
+        'loop': loop,
+        'folder': folder,
+        'zero': Path('/dev/zero'),
+        'bag_pipe': bag_pipe,
+        'bag_zero': bag_zero,
+        'inside': inside,
+    }
+
+
+@pytest.mark.timeout(120)
+def test_what_is_no_regular_file_is_refused_and_never_waited_for(
+    places: dict[str, Path], tmp_path: Path, capsys: Any
+) -> None:
+    out = ['-o', str(tmp_path / 'out')]
+    for place in places.values():
+        for command in (
+            ['replay', str(place), '--config', 'frostyboy'],
+            ['diagnose', str(place), '--config', 'frostyboy', *out],
+            ['predict', '--config', str(place)],
+            ['predict', '--config', 'frostyboy', '--points', str(place)],
+            ['simulate', '--scenario', str(place), *out],
+        ):
+            assert main(command) == 2, command
+            said = capsys.readouterr().err
+            assert said.count('\n') == 1, said
+    assert not (tmp_path / 'out').exists()
+
+
+@pytest.mark.parametrize(
+    'arguments',
+    [
+        ['--slip', '0:1:1000000000'],
+        ['--slip', '0:1:' + '9' * 5000],
+        ['--slip', '0:1:1000', '--load', '1:100:1000'],
+        ['-p', 'rover.mass:=' + '9' * 5000],
+        ['-p', 'rover.mass:=' + '[' * 5000],
+    ],
+)
+def test_numbers_out_of_all_bounds(arguments: list[str], capsys: Any) -> None:
+    start = time.process_time()
+    assert main(['predict', '--config', 'frostyboy', *arguments]) == 2
+    assert time.process_time() - start < 5.0
+    said = capsys.readouterr().err
+    assert said.count('\n') == 1
+    assert len(said) < 3000
+
+
+def test_control_characters_in_names_do_not_reach_the_terminal(
+    tmp_path: Path, make_bag: Any, drive: Any, factory: Any, capsys: Any
+) -> None:
+    evil = '\x1b]0;owned\x07\x1b[31mred\u202e\r\x9b2J'
+    folder = make_bag(
+        messages=drive,
+        topics={
+            '/joint_states': 'sensor_msgs/msg/JointState',
+            '/imu/data': 'sensor_msgs/msg/Imu',
+            '/reference_odom': 'nav_msgs/msg/Odometry',
+        },
+    )
+    evil_folder = folder.rename(tmp_path / f'drive{evil}')
+    table = tmp_path / 't.csv'
+    table.write_text(f'slip,normal_load,{evil}\n0.1,10{evil},0.1\n')
+    rover = tmp_path / 'rover.yaml'
+    rover.write_text(
+        HEAD + '    wheels.names: [left, right]\n    wheels.radius: [0.2, 0.2]\n'
+        '    wheels.width: [0.1, 0.1]\n    wheels.y: [0.4, -0.4]\n    rover.mass: 40.0\n'
+    )
+    assert main(['replay', str(evil_folder), '--config', str(rover)]) == 0
+    main(['replay', str(evil_folder), '--config', str(rover), '--remap', f'odom:=/{evil}'])
+    main(['diagnose', str(table), '-o', str(tmp_path / 'out'), '--config', 'frostyboy'])
+    main(['predict', '--config', f'no{evil}'])
+    main(['predict', '--config', 'frostyboy', '-p', f'{evil}:=1'])
+    captured = capsys.readouterr()
+    harmful = re.compile('[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e]')
+    assert 'owned' in captured.out
+    assert not harmful.search(captured.out)
+    assert captured.err.count('owned') >= 3
+    assert not harmful.search(captured.err)

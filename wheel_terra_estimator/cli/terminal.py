@@ -1,0 +1,76 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""What reaches the terminal: no control characters out of files, whatever names they hold."""
+
+from __future__ import annotations
+
+import re
+import signal
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager, redirect_stdout
+from types import FrameType
+from typing import IO, Any
+
+LONGEST_LINE = 2000
+"""Characters of an error line that are shown; the middle of a longer one is left out."""
+
+# Control characters but tabulator and line feed, marks that reverse the direction of writing, and
+# halves of characters that stand for bytes that are no UTF-8.
+_HARMFUL = re.compile(
+    '[\x00-\x08\x0b-\x1f\x7f-\x9f\u200e\u200f\u202a-\u202e\u2066-\u2069\ud800-\udfff]'
+)
+
+
+def harmless(text: str) -> str:
+    r"""Return a text whose control characters are written out (``\x1b``)."""
+    return _HARMFUL.sub(lambda found: ascii(found[0])[1:-1], text)
+
+
+def one_line(text: str) -> str:
+    """Return an error as a line that can be shown."""
+    line = harmless(text.replace('\n', ' '))
+    if len(line) > LONGEST_LINE:
+        half = LONGEST_LINE // 2
+        line = f'{line[:half]} ... {line[-half:]}'
+    return line
+
+
+class _Harmless:
+    """A text stream that writes control characters out."""
+
+    def __init__(self, stream: IO[str]) -> None:
+        self._stream = stream
+
+    def write(self, text: str) -> int:
+        self._stream.write(harmless(text))
+        return len(text)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
+
+
+@contextmanager
+def harmless_output() -> Iterator[None]:
+    """Keep control characters out of standard output within the block."""
+    stream: Any = _Harmless(sys.stdout)
+    with redirect_stdout(stream):
+        yield
+
+
+@contextmanager
+def termination_as_interrupt() -> Iterator[None]:
+    """Treat SIGTERM within the block as Ctrl-C, so that what was begun is cleaned up or kept."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def on_signal(number: int, frame: FrameType | None) -> None:
+        raise KeyboardInterrupt
+
+    earlier = signal.signal(signal.SIGTERM, on_signal)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, earlier)
