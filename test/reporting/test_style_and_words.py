@@ -4,11 +4,14 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 
+from wheel_terra_estimator.estimation.estimates import SlipClass
 from wheel_terra_estimator.reporting.drive_summary import short_names
 from wheel_terra_estimator.reporting.html import picture, render
-from wheel_terra_estimator.reporting.style import picture_style, thin
+from wheel_terra_estimator.reporting.style import CLASS_COLOURS, drawn_slip, picture_style, thin
 
 
 def test_a_thinned_line_keeps_ends_and_extremes() -> None:
@@ -65,3 +68,26 @@ def test_text_of_others_is_escaped(tmp_path: object) -> None:
     )
     page = render('page.html', folder, name='<script>alert(1)</script>')
     assert '<script>' not in page
+
+
+def lightness(colour: str) -> float:
+    """Return CIE L* of an sRGB colour (IEC 61966-2-1, CIE 1976)."""
+    channels = [int(colour[i : i + 2], 16) / 255.0 for i in (1, 3, 5)]
+    linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in channels]
+    luminance = float(np.dot(linear, (0.2126, 0.7152, 0.0722)))
+    return 116.0 * luminance ** (1.0 / 3.0) - 16.0
+
+
+def test_classes_differ_in_grey_and_darker_is_worse() -> None:
+    ranked = [SlipClass.LOW, SlipClass.MODERATE, SlipClass.HIGH, SlipClass.STUCK]
+    levels = [lightness(CLASS_COLOURS[c]) for c in ranked]
+    steps = -np.diff(levels)
+    assert (steps > 12.0).all(), levels
+
+
+def test_slip_that_was_never_known_is_not_drawn() -> None:
+    values = {'slip': np.array([[1.0], [0.2], [0.3]]), 'slip_std': np.array([[1.0], [0.1], [0.1]])}
+    history = SimpleNamespace(
+        values=values, slip_class=np.array([[255], [0], [255]], dtype=np.uint8)
+    )
+    np.testing.assert_array_equal(drawn_slip(history)[:, 0], [np.nan, 0.2, 0.3])

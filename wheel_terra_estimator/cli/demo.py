@@ -22,13 +22,12 @@ import numpy as np
 from wheel_terra_estimator.errors import UserError
 
 if TYPE_CHECKING:
-    from wheel_terra_estimator.bags.history import EstimateHistory
     from wheel_terra_estimator.bags.truth import Truth
 
 SUMMARY = 'run the estimator over two shipped drives and report'
 EXAMPLES = ('wheel-terra demo', 'wheel-terra demo --no-node -o /tmp/demo --overwrite')
-SETTLED = 10.0
-"""Seconds at the start that the figures against the truth leave out [s]."""
+UNITS = {'slip': (1.0, ''), 'sinkage': (1e3, ' mm'), 'drawbar_pull': (1.0, ' N')}
+"""Quantity -> factor from SI to what is printed, its unit."""
 
 
 class DemoDrive(NamedTuple):
@@ -148,6 +147,7 @@ def _key_numbers(drive: DemoDrive, output: Path) -> None:
     from wheel_terra_estimator.configuration.shipped import demo_recording
     from wheel_terra_estimator.reporting.drive_pictures import overview
     from wheel_terra_estimator.reporting.style import picture_style
+    from wheel_terra_estimator.reporting.truth_errors import SETTLED, truth_errors
     from wheel_terra_estimator.simulation.truth import entrapped
 
     configuration = reader.load(drive.configuration)
@@ -159,19 +159,11 @@ def _key_numbers(drive: DemoDrive, output: Path) -> None:
         overview(history, truth).savefig(output / f'{drive.name}.png', dpi=110)
     if truth is None or truth.slip is None:
         return
-    moving = _seconds(truth, truth.slip.stamp) > SETTLED
     print(f'\nAgainst the truth in the recording, after the first {SETTLED:g} s:')
-    for name, unit, scale, known in (
-        ('slip', '', 1.0, truth.slip),
-        ('sinkage', ' mm', 1e3, truth.sinkage),
-        ('drawbar_pull', ' N', 1.0, truth.drawbar_pull),
-    ):
-        if known is None:
-            continue
-        estimate = _at(history, name, known.stamp)
-        error = (estimate - known.value)[moving[: len(known.stamp)]]
-        rms = float(np.sqrt(np.nanmean(error**2)))
-        print(f'  {name.replace("_", " "):13s} rms error {scale * rms:.3g}{unit}')
+    for error in truth_errors(history, truth):
+        scale, unit = UNITS[error.quantity]
+        words = error.quantity.replace('_', ' ')
+        print(f'  {words:13s} rms error {scale * error.rms:.3g}{unit}')
     stuck = entrapped(truth.slip.stamp, truth.slip.value)
     warnings = [_seconds(truth, np.array([w.start]))[0] for w in history.warnings]
     if stuck.any():
@@ -185,9 +177,3 @@ def _key_numbers(drive: DemoDrive, output: Path) -> None:
 
 def _seconds(truth: Truth, stamp: np.ndarray) -> np.ndarray:
     return (stamp - truth.velocity.stamp[0]) * 1e-9
-
-
-def _at(history: EstimateHistory, name: str, stamp: np.ndarray) -> np.ndarray:
-    """Return the newest estimates at stamps."""
-    rows = np.clip(np.searchsorted(history.stamp, stamp, side='right') - 1, 0, None)
-    return history.values[name][rows]

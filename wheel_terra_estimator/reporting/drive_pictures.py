@@ -15,10 +15,12 @@ from wheel_terra_estimator.bags.truth import Truth, WheelTruth
 from wheel_terra_estimator.estimation.estimates import SlipClass
 from wheel_terra_estimator.reporting.drive_summary import short_names
 from wheel_terra_estimator.reporting.style import (
+    BAND,
     CLASS_COLOURS,
     LINE_COLOURS,
     TRUTH_COLOUR,
     WARNING_COLOUR,
+    drawn_slip,
     picture_style,
     thin,
 )
@@ -29,8 +31,8 @@ if TYPE_CHECKING:
 
 FloatArray = NDArray[np.float64]
 
-BAND = 2.0
-"""Half width of the drawn bands in standard deviations."""
+LINE_POINTS, BAND_POINTS, SPANS = 400, 150, 250
+"""Points of a line on a printed page; more would only make the file large."""
 
 
 def overview(history: EstimateHistory, truth: Truth | None) -> Figure:
@@ -51,7 +53,7 @@ def overview(history: EstimateHistory, truth: Truth | None) -> Figure:
         ):
             scale = 1e3 if quantity == 'sinkage' else 1.0
             for i in range(wheels):
-                x, y = thin(history.seconds, scale * history.values[quantity][:, i])
+                x, y = thin(history.seconds, scale * _drawn(history, quantity)[:, i], LINE_POINTS)
                 axis.plot(x, y, color=_colour(i), label=names[i])
             axis.set_ylabel(label)
         axes[1].set_ylim(-1.05, 1.05)
@@ -94,7 +96,7 @@ def _by_wheel(
     wheels = len(history.names)
     columns = 2 if wheels > 1 else 1
     rows = -(-wheels // columns)
-    values = scale * history.values[quantity]
+    values = scale * _drawn(history, quantity)
     deviation = scale * BAND * history.values[f'{quantity}_std']
     with picture_style():
         figure = Figure(figsize=(10.5, 1.1 + 1.9 * rows))
@@ -124,10 +126,19 @@ def _by_wheel(
     return figure
 
 
+def _drawn(history: EstimateHistory, quantity: str) -> FloatArray:
+    return drawn_slip(history) if quantity == 'slip' else history.values[quantity]
+
+
 def _velocity(axis: Axes, history: EstimateHistory, truth: Truth | None) -> None:
     velocity = history.forward_velocity
     rim = velocity + history.values['slip_velocity'].mean(axis=1)
-    axis.plot(*thin(history.seconds, rim), color='#9aa5b0', linewidth=1.0, label='mean rim speed')
+    axis.plot(
+        *thin(history.seconds, rim, LINE_POINTS),
+        color='#9aa5b0',
+        linewidth=1.0,
+        label='mean rim speed',
+    )
     _band(
         axis,
         history.seconds,
@@ -155,19 +166,19 @@ def _band(
     colour: str,
     label: str = 'estimate',
 ) -> None:
-    lower_x, lower = thin(x, y - half_width, 600)
+    lower_x, lower = thin(x, y - half_width, BAND_POINTS)
     upper = np.interp(lower_x, x, y + half_width)
     axis.fill_between(
         lower_x, lower, upper, color=colour, alpha=0.2, linewidth=0, label='± 2 std. deviations'
     )
-    axis.plot(*thin(x, y), color=colour, label=label)
+    axis.plot(*thin(x, y, LINE_POINTS), color=colour, label=label)
 
 
 def _truth_line(
     axis: Axes, history: EstimateHistory, truth: WheelTruth, column: int, scale: float
 ) -> None:
     seconds = (truth.stamp - history.stamp[0]) * 1e-9
-    x, y = thin(seconds, scale * truth.value[:, column])
+    x, y = thin(seconds, scale * truth.value[:, column], LINE_POINTS)
     axis.plot(x, y, color=TRUTH_COLOUR, linewidth=0.9, linestyle=(0, (4, 2)), label='truth')
 
 
@@ -192,14 +203,27 @@ def _class_strips(axis: Axes, history: EstimateHistory) -> None:
 
 def _spans(axis: Axes, history: EstimateHistory, wheel: int, low: float, height: float) -> None:
     """Draw the classes of a wheel as coloured spans at a height of the axis."""
-    classes = history.slip_class[:, wheel]
-    seconds = history.seconds
+    classes, seconds = _coarser(history.slip_class[:, wheel], history.seconds)
     starts = np.concatenate(([0], np.flatnonzero(np.diff(classes)) + 1))
     ends = np.append(seconds[starts[1:]], seconds[-1])
     for slip_class, colour in CLASS_COLOURS.items():
         mine = classes[starts] == slip_class
         bars: Any = np.column_stack((seconds[starts], ends - seconds[starts]))[mine]
         axis.broken_barh(bars, (low, height), color=colour, linewidth=0)
+
+
+def _coarser(
+    classes: NDArray[np.uint8], seconds: FloatArray
+) -> tuple[NDArray[np.uint8], FloatArray]:
+    """Return the worst known class of each of `SPANS` stretches of a long drive."""
+    if classes.size <= SPANS:
+        return classes, seconds
+    starts = np.linspace(0, classes.size, SPANS, endpoint=False).astype(int)
+    known = np.where(classes == SlipClass.UNKNOWN, -1, classes.astype(int))
+    worst = np.maximum.reduceat(known, starts)
+    ends = np.append(seconds[starts[1:]], seconds[-1])
+    coarse = np.where(worst < 0, SlipClass.UNKNOWN, worst).astype(np.uint8)
+    return np.append(coarse, coarse[-1]), np.append(seconds[starts], ends[-1])
 
 
 def _shade_warnings(axis: Axes, history: EstimateHistory) -> None:

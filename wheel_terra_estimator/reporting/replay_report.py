@@ -4,7 +4,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from wheel_terra_estimator.bags.history import EstimateHistory
 from wheel_terra_estimator.bags.truth import Truth
@@ -14,7 +16,9 @@ from wheel_terra_estimator.output_folder import new_file
 from wheel_terra_estimator.reporting import drive_pictures
 from wheel_terra_estimator.reporting.drive_summary import DriveSummary
 from wheel_terra_estimator.reporting.html import picture, render, write_page
-from wheel_terra_estimator.reporting.style import CLASS_COLOURS
+from wheel_terra_estimator.reporting.interactive import drive_figure, plotly_script
+from wheel_terra_estimator.reporting.style import BAND, CLASS_COLOURS
+from wheel_terra_estimator.reporting.truth_errors import SETTLED, TruthError, truth_errors
 
 
 def write_replay_report(
@@ -24,6 +28,7 @@ def write_replay_report(
     truth: Truth | None,
     configuration: Configuration,
     overwrite: bool = False,
+    findings: Sequence[Any] = (),
 ) -> None:
     """Write the report of a drive.
 
@@ -39,6 +44,8 @@ def write_replay_report(
         Listed at the end, with the sources of the effects in it.
     overwrite : bool
         Whether an earlier report is replaced.
+    findings : sequence, optional
+        What a check of the recording found (``words``, ``wheel``, ``cure``), shown at the top.
     """
     from wheel_terra_estimator.terramechanics.effects import catalogue
 
@@ -55,12 +62,33 @@ def write_replay_report(
             for c, colour in CLASS_COLOURS.items()
         ],
         pictures=_pictures(history, truth) if summary.sets else [],
+        figure=drive_figure(history, truth) if summary.sets else '',
+        library=plotly_script() if summary.sets else '',
+        findings=findings,
+        errors=[_error_row(error) for error in truth_errors(history, truth)],
+        settled=SETTLED,
+        truth_source=truth.source if truth else '',
         provenance=configuration.provenance,
         parameters=[(key, values[key]) for key in values if key in configuration.stated],
         sources=[(name, effects[name].source) for name in configuration.effects],
     )
     with new_file(path, overwrite) as fresh:
         write_page(fresh, page)
+
+
+def _error_row(error: TruthError) -> dict[str, str]:
+    scale, unit = {
+        'slip': (1.0, ''),
+        'sinkage': (1e3, ' mm'),
+        'drawbar_pull': (1.0, ' N'),
+    }[error.quantity]
+    return {
+        'quantity': error.quantity.replace('_', ' '),
+        'rms': f'{scale * error.rms:.3g}{unit}',
+        'worst': f'{scale * error.worst:.3g}{unit}',
+        'wheel': error.worst_wheel,
+        'coverage': f'{100 * error.coverage:.0f} %',
+    }
 
 
 def _tone(summary: DriveSummary) -> str:
@@ -92,7 +120,7 @@ def _cards(summary: DriveSummary) -> list[dict[str, str]]:
 
 def _pictures(history: EstimateHistory, truth: Truth | None) -> list[dict[str, str]]:
     beside = f' The truth ({truth.source}) is dashed.' if truth else ''
-    band = f'Bands are ± {drive_pictures.BAND:g} standard deviations.'
+    band = f'Bands are ± {BAND:g} standard deviations.'
     red = ' Red: stuck warning.' if history.warnings else ''
     drawn = (
         (

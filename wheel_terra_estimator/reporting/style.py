@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from wheel_terra_estimator.bags.history import EstimateHistory
 from wheel_terra_estimator.estimation.estimates import SlipClass
 
 FloatArray = NDArray[np.float64]
@@ -27,12 +28,17 @@ LINE_COLOURS = (
     '#6B6B6B',
 )
 CLASS_COLOURS = {
-    SlipClass.LOW: '#7fbf9b',
-    SlipClass.MODERATE: '#f3d36b',
-    SlipClass.HIGH: '#ee9440',
-    SlipClass.STUCK: '#b3261e',
-    SlipClass.UNKNOWN: '#c9ced4',
+    SlipClass.LOW: '#efe3a8',
+    SlipClass.MODERATE: '#e9a94b',
+    SlipClass.HIGH: '#c4552d',
+    SlipClass.STUCK: '#6b1238',
+    SlipClass.UNKNOWN: '#9aa5b0',
 }
+"""Darker is worse: they differ in grey and for every eye; unknown is drawn thinner."""
+BAND = 2.0
+"""Half width of the drawn bands in standard deviations."""
+NEVER_KNOWN = 1.0
+"""Standard deviation of a slip of which nothing is known [-]."""
 TRUTH_COLOUR = '#111111'
 WARNING_COLOUR = '#b3261e'
 
@@ -67,6 +73,13 @@ def picture_style() -> Iterator[None]:
 
     with mpl.rc_context(_SETTINGS):
         yield
+
+
+def drawn_slip(history: EstimateHistory) -> FloatArray:
+    """Return the slip to draw, (k, n): nan where nothing is known of it."""
+    unknown = history.slip_class == SlipClass.UNKNOWN
+    unknown &= history.values['slip_std'] >= NEVER_KNOWN
+    return np.where(unknown, np.nan, history.values['slip'])
 
 
 def thin(x: FloatArray, y: FloatArray, points: int = 1200) -> tuple[FloatArray, FloatArray]:

@@ -1,0 +1,187 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Reports in a headless browser: two widths, light and dark; skipped where there is no Chromium."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from wheel_terra_estimator.bags.history import WHEEL_FIELDS, EstimateHistory, StuckWarning
+from wheel_terra_estimator.bags.truth import Truth, WheelTruth
+from wheel_terra_estimator.configuration import reader
+from wheel_terra_estimator.reporting.drive_summary import summarise
+from wheel_terra_estimator.reporting.replay_report import write_replay_report
+
+BROWSER = next(
+    (
+        path
+        for name in ('chromium', 'chromium-browser', 'google-chrome')
+        if (path := shutil.which(name))
+    ),
+    None,
+)
+SMALLEST_TEXT = 11.0  # [px]
+LARGEST_FILE = 4_000_000  # bytes, for an hour of driving
+HOUR = 3600.0  # [s]
+RATE = 10.0  # sets a second
+
+PROBE = """
+<script>
+window.addEventListener('load', () => setTimeout(() => {
+  const small = [];
+  const walk = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
+  while (walk.nextNode()) {
+    const text = walk.currentNode.textContent.trim();
+    const element = walk.currentNode.parentElement;
+    if (!text || ['SCRIPT', 'STYLE', 'NOSCRIPT'].includes(element.tagName)) continue;
+    if (!element.getClientRects().length) continue;
+    const size = parseFloat(getComputedStyle(element).fontSize);
+    if (size < %(smallest)g) small.push(text.slice(0, 30) + ': ' + size);
+  }
+  const result = {
+    width: window.innerWidth,
+    overflow: document.documentElement.scrollWidth - window.innerWidth,
+    dark: matchMedia('(prefers-color-scheme: dark)').matches,
+    small: small,
+    paths: document.querySelectorAll('#figure .scatterlayer path.js-line').length,
+    ground: getComputedStyle(document.body).backgroundColor,
+  };
+  parent.postMessage(JSON.stringify(result), '*');
+}, 1500));
+</script></body>
+"""
+FRAME = """<!DOCTYPE html><body style="margin:0">
+<iframe src="%(page)s" style="border:0;width:%(width)dpx;height:900px"></iframe>
+<pre id="result"></pre>
+<script>addEventListener('message', (event) => {
+  document.getElementById('result').textContent = 'RESULT' + event.data + 'END'; });</script>
+</body>"""
+
+
+def an_hour() -> tuple[EstimateHistory, Truth]:
+    """Return a made-up hour of driving that is as restless as estimates can be."""
+    random = np.random.default_rng(5)
+    names = tuple(f'{side}_{row}_wheel' for row in 'abc' for side in ('left', 'right'))
+    count = round(HOUR * RATE)
+    stamp = (np.arange(count) / RATE * 1e9).astype(np.int64) + 1_000_000_000
+    values = {
+        name: random.standard_normal((count, len(names))).cumsum(axis=0) * 1e-3
+        for name in WHEEL_FIELDS
+    }
+    for name in ('slip_std', 'sinkage_std', 'drawbar_pull_std'):
+        values[name] = np.abs(values[name]) + 0.01
+    values['slip'] = np.tanh(values['slip'])
+    values['slip'][:20], values['slip_std'][:20] = 1.0, 1.0
+    classes = np.repeat(random.integers(0, 4, (count // 100, len(names))), 100, axis=0)
+    classes[:20] = 255
+    warning = StuckWarning(int(stamp[20_000]), int(stamp[22_000]), 'median slip 0.83: digging in')
+    history = EstimateHistory(
+        names,
+        stamp,
+        values,
+        classes.astype(np.uint8),
+        values['slip'][:, 0],
+        values['slip_std'][:, 0],
+        (warning,),
+    )
+    known = {
+        name: WheelTruth(stamp, values[name] + 0.01) for name in ('slip', 'sinkage', 'drawbar_pull')
+    }
+    velocity = WheelTruth(stamp, history.forward_velocity[:, None])
+    return history, Truth('/ground_truth', velocity, **known)
+
+
+@pytest.fixture(scope='module')
+def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    history, truth = an_hour()
+    summary = summarise('an hour', history, {'joint_states': '/joint_states'}, {}, {}, ['a note'])
+    path = tmp_path_factory.mktemp('report') / 'report.html'
+    write_replay_report(path, summary, history, truth, reader.load(['generic_six_wheel']))
+    return path
+
+
+def test_an_hour_of_driving_stays_a_small_file_that_needs_nothing_else(report: Path) -> None:
+    text = report.read_text(encoding='utf-8')
+    assert report.stat().st_size < LARGEST_FILE
+    assert text.count('plotly.js (basic') == 1
+    own = re.sub(r'<script>/\*\*.*?</script>', '', text, flags=re.S)
+    assert not re.search(r'(src|href)="(https?:)?//', own)
+    data = json.loads(re.search(r'id="drive-data"[^>]*>(.*?)</script>', text, re.S)[1])
+    axes = {trace.get('xaxis', 'x') for trace in data['traces']}
+    assert axes == {'x'}  # one time axis
+    slips = [t for t in data['traces'] if t['yaxis'] == 'y2' and t['meta']['kind'] == 'line']
+    assert len(slips) == 6
+    assert all(trace['y'][0] is None for trace in slips)  # never known: not drawn as slip 1
+    reasons = [a for a in data['layout']['annotations'] if a.get('name') == 'warning']
+    assert 'digging in' in reasons[0]['text'].replace('<br>', ' ')
+    assert reasons[0]['x'] == pytest.approx(2000.0)
+
+
+@pytest.fixture(scope='module')
+def diagnosis_report(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    from wheel_terra_estimator import api
+    from wheel_terra_estimator.discrepancy.report.page import write_report
+
+    slip, load = (a.ravel() for a in np.meshgrid(np.linspace(0.05, 0.6, 10), [60.0, 100.0]))
+    model = api.Model.load('hit_wh3', 'dlr_mss')
+    rows = api.Model.load(
+        'hit_wh3', 'dlr_mss', parameters=['effects.slip_sinkage_exponent.enabled:=true']
+    )
+    columns = rows.curve(slip, load).columns()
+    kept = ('slip', 'normal_load', 'sinkage', 'drawbar_pull', 'torque')
+    folder = tmp_path_factory.mktemp('diagnosis')
+    write_report(api.diagnose({name: columns[name] for name in kept}, model), folder)
+    return folder / 'report.html'
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(BROWSER is None, reason='no Chromium')
+@pytest.mark.parametrize('scheme', ['light', 'dark'])
+@pytest.mark.parametrize('width', [1280, 390])
+@pytest.mark.parametrize('kind', ['report', 'diagnosis_report'])
+def test_in_a_browser(
+    request: pytest.FixtureRequest, tmp_path: Path, kind: str, width: int, scheme: str
+) -> None:
+    report: Path = request.getfixturevalue(kind)
+    page = tmp_path / 'page.html'
+    text = report.read_text(encoding='utf-8')
+    page.write_text(text.replace('</body>', PROBE % {'smallest': SMALLEST_TEXT}), encoding='utf-8')
+    frame = tmp_path / 'frame.html'
+    frame.write_text(FRAME % {'page': page.as_uri(), 'width': width}, encoding='utf-8')
+    run = subprocess.run(
+        [
+            str(BROWSER),
+            '--headless',
+            '--no-sandbox',
+            '--disable-gpu',
+            '--enable-logging=stderr',
+            '--allow-file-access-from-files',
+            '--virtual-time-budget=15000',
+            f'--user-data-dir={tmp_path / "profile"}',
+            f'--blink-settings=preferredColorScheme={0 if scheme == "dark" else 1}',
+            '--window-size=1400,1000',
+            '--dump-dom',
+            frame.as_uri(),
+        ],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=120,
+    )
+    complaints = [line for line in run.stderr.splitlines() if 'CONSOLE' in line]
+    assert not complaints, complaints
+    found = json.loads(re.search(r'RESULT(.*?)END', run.stdout, re.S)[1].replace('&gt;', '>'))
+    assert found['width'] == width
+    assert found['dark'] == (scheme == 'dark')
+    assert found['overflow'] <= 0
+    assert found['small'] == []
+    assert found['paths'] >= 20 or kind != 'report'
+    light = [int(v) for v in re.findall(r'\d+', found['ground'])[:3]]
+    assert (sum(light) < 150) == (scheme == 'dark')
