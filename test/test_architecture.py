@@ -116,6 +116,8 @@ MAY_USE = {
         {'configuration', 'terramechanics', 'estimation', 'reporting', 'bags'},
         {'numpy', 'scipy'} | PICTURES,
     ),
+    # The truth of a trial knows nothing of the models that are to find it.
+    'trials': ({'configuration', 'discrepancy', 'reporting'}, {'numpy'} | PICTURES),
     'evaluation': (
         {'configuration', 'terramechanics', 'estimation', 'simulation', 'bags'},
         {'numpy'} | PICTURES,

@@ -8,10 +8,6 @@ import campaign_tools  # noqa: F401
 import numpy as np
 import pytest
 from campaigns import DESIGNS, Plan, make_campaign
-from campaigns.designs import random_rows, random_soil
-from campaigns.detectability import Ruler
-from campaigns.hidden import LISTED, OTHER, OUTSIDE, SmoothError
-from campaigns.truth import OUTPUTS, TrueSoil, solve
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
@@ -19,9 +15,17 @@ from wheel_terra_estimator.terramechanics.model import WheelSoilModel
 from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
 from wheel_terra_estimator.terramechanics.soil import Soil
 from wheel_terra_estimator.terramechanics.wheel import Wheel
+from wheel_terra_estimator.trials.designs import random_rows, random_soil
+from wheel_terra_estimator.trials.detectability import Ruler
+from wheel_terra_estimator.trials.hidden import LISTED, OTHER, OUTSIDE, SmoothError
+from wheel_terra_estimator.trials.truth import OUTPUTS, TrueSoil, solve
 
 # Main parameter of each effect in the package's catalogue, and its second one where it has any.
 PARAMETERS = {
+    'pull_zero': 'offset',
+    'pull_gain': 'gain',
+    'torque_gain': 'gain',
+    'sinkage_gain': 'gain',
     'slip_sinkage_exponent': 'n1',
     'lug_digging': 'kd',
     'lug_support': 'dz4',

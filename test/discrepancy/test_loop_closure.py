@@ -7,8 +7,6 @@ from __future__ import annotations
 import campaign_tools  # noqa: F401
 import numpy as np
 import pytest
-from campaigns.hidden import LISTED
-from campaigns.truth import OUTPUTS, TrueSoil, solve
 
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.discrepancy.report.model_file import write_model
@@ -18,6 +16,8 @@ from wheel_terra_estimator.estimation.core import EstimatorCore
 from wheel_terra_estimator.estimation.measurements import SinkageReading
 from wheel_terra_estimator.evaluation.runner import inputs_of_mode
 from wheel_terra_estimator.simulation import drive, scenario
+from wheel_terra_estimator.trials.hidden import LISTED
+from wheel_terra_estimator.trials.truth import OUTPUTS, TrueSoil, solve
 
 FILES = ['generic_six_wheel', 'hit_lss1']
 LUGS = 'wheels.lug_height:=[0.015, 0.015, 0.015, 0.015, 0.015, 0.015]'

@@ -12,12 +12,8 @@ import re
 import campaign_tools  # noqa: F401
 import numpy as np
 import pytest
-from campaigns.campaign import make_campaign
-from campaigns.designs import random_rows, random_soil
 from campaigns.groups import GROUPS
-from campaigns.hidden import LISTED, OUTSIDE, SmoothError
 from campaigns.scoring import diagnose as diagnose_campaign
-from campaigns.truth import OUTPUTS, TrueSoil, solve
 
 from wheel_terra_estimator.cli.main import main
 from wheel_terra_estimator.configuration import reader
@@ -27,6 +23,10 @@ from wheel_terra_estimator.discrepancy.tables.checks import check_table
 from wheel_terra_estimator.discrepancy.workflow import Options, diagnose, operating_points
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.terramechanics.model import WheelSoilModel
+from wheel_terra_estimator.trials.campaign import make_campaign
+from wheel_terra_estimator.trials.designs import random_rows, random_soil
+from wheel_terra_estimator.trials.hidden import LISTED, OUTSIDE, SmoothError
+from wheel_terra_estimator.trials.truth import OUTPUTS, TrueSoil, solve
 
 SHARE = {'sinkage': 0.02, 'drawbar_pull': 0.015, 'torque': 0.015}  # noise over the range
 

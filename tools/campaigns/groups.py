@@ -6,8 +6,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from .campaign import Plan
-from .designs import DESIGNS
+from wheel_terra_estimator.trials.campaign import Plan
+from wheel_terra_estimator.trials.designs import DESIGNS
 
 # Noise is Gaussian or Student-t by lot, some cells are empty: what a laboratory hands over.
 _LAB = {'noise': 'mixed', 'missing': 0.03}

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from .campaign import Campaign
-from .truth import OUTPUTS
+from wheel_terra_estimator.trials.campaign import Campaign
+from wheel_terra_estimator.trials.truth import OUTPUTS
 
 Record = dict[str, Any]
 
@@ -52,15 +52,21 @@ FIELDS = (
 )
 
 
-def diagnose(campaign: Campaign) -> Any:
-    """Return the package's diagnosis of the campaign's table."""
+def diagnose(campaign: Campaign, without: tuple[str, ...] = ()) -> Any:
+    """Return the package's diagnosis of the campaign's table, ``without`` some effects to name."""
     from wheel_terra_estimator.configuration import reader
     from wheel_terra_estimator.discrepancy.tables.checks import check_table
+    from wheel_terra_estimator.discrepancy.workflow import Options
     from wheel_terra_estimator.discrepancy.workflow import diagnose as run
+    from wheel_terra_estimator.terramechanics.effects import catalogue
 
     configuration = reader.from_parameters(campaign.settings(), complete=False)
     table = check_table(f'campaign {campaign.seed}', campaign.table)
-    return run(table, configuration)
+    if not without:
+        return run(table, configuration)
+    known = catalogue()
+    names = tuple(n for n, e in known.items() if e.candidate and n not in without)
+    return run(table, configuration, options=Options(effects=names))
 
 
 def score(group: str, campaign: Campaign, diagnosis: Any) -> Record:

@@ -82,6 +82,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Run the command."""
     from wheel_terra_estimator.configuration import reader
+    from wheel_terra_estimator.discrepancy.report.files import write_files
     from wheel_terra_estimator.discrepancy.tables.steady_table import UNITS
     from wheel_terra_estimator.discrepancy.workflow import Options, diagnose
 
@@ -113,7 +114,7 @@ def run(arguments: argparse.Namespace) -> int:
         note = 'no soil was stated (--config): the default sand was taken for the model believed in'
         diagnosis = replace(diagnosis, notes=(*diagnosis.notes, note))
     with new_folder(output, arguments.overwrite, inputs) as folder:
-        _write(diagnosis, folder, pictures=not arguments.no_pictures)
+        write_files(diagnosis, folder, pictures=not arguments.no_pictures)
     print(diagnosis.sentence)
     for quantity, gap in diagnosis.gap.items():
         scale, unit = (1e3, 'mm') if quantity == 'sinkage' else (1.0, UNITS[quantity])
@@ -171,17 +172,3 @@ def _read(data: str, remaps: list[str], configuration: Configuration) -> SteadyT
     from wheel_terra_estimator.discrepancy.tables.parsing import read_table
 
     return read_table(path)
-
-
-def _write(diagnosis: Diagnosis, folder: Path, *, pictures: bool) -> None:
-    """Write all files of a diagnosis into a folder."""
-    from wheel_terra_estimator.discrepancy.report.model_file import write_model, write_proposal
-
-    diagnosis.write_json(folder / 'report.json')
-    write_model(diagnosis, folder / 'model.yaml')
-    if diagnosis.proposal:
-        write_proposal(diagnosis, diagnosis.proposal, folder / 'proposal.yaml')
-    if pictures:
-        from wheel_terra_estimator.discrepancy.report.page import write_report
-
-        write_report(diagnosis, folder)

@@ -32,6 +32,7 @@ COMMANDS = (
     'replay',
     'predict',
     'diagnose',
+    'trial',
     'effects',
     'soilbin',
     'evaluate',

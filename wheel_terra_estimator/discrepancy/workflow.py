@@ -42,7 +42,7 @@ from wheel_terra_estimator.discrepancy.result import (
     SoilShift,
 )
 from wheel_terra_estimator.discrepancy.selection import confidence as confidences
-from wheel_terra_estimator.discrepancy.selection import significance as gap_test
+from wheel_terra_estimator.discrepancy.selection import significance
 from wheel_terra_estimator.discrepancy.selection.remainder import Remainder
 from wheel_terra_estimator.discrepancy.selection.search import Findings, search
 from wheel_terra_estimator.discrepancy.selection.signatures import CLEAR
@@ -64,6 +64,8 @@ from wheel_terra_estimator.terramechanics.wheel import Wheel
 FloatArray = NDArray[np.float64]
 
 _CANDIDATES_SHOWN = 12
+_AT_NOISE = 1.2  # times the noise: a quantity that was never off
+_MOST_EXCLUDED = 3  # names that worsen a quantity, after which the last one stands
 _NEAREST = 3  # effects named as nearest where nothing is named
 
 
@@ -259,10 +261,18 @@ def _report(
     options: Options,
     *,
     off: bool = False,
+    excluded: tuple[int, ...] = (),
 ) -> Diagnosis:
+    """Return the diagnosis; once more where it would agree beside a misfit, or name what worsens.
+
+    Parameters
+    ----------
+    off, excluded
+        As in ``verdict.decide``.
+    """
     setting, selection = findings.setting, findings.selection
     problem = setting.problem
-    verdict = decide(selection, problem.variance, off=off)
+    verdict = decide(selection, problem.variance, off=off, excluded=excluded)
     left = verdict.left
     quiet = [k for k, floor in enumerate(selection.floors) if not floor.unexplained]
     floor_index = quiet[int(np.argmax(selection.log_joint[verdict.index][quiet]))]
@@ -285,16 +295,21 @@ def _report(
         1.0,
         2.0
         * min(
-            gap_test.scan_p_value(nothing, variance, names, one_sided),
-            gap_test.chi_square_p_value(nothing, variance),
+            significance.scan_p_value(nothing, variance, names, one_sided),
+            significance.chi_square_p_value(nothing, variance),
         ),
     )
     gap = words.gaps(table, findings, curves, floor, options.allowed_error)
     if verdict.word == 'agrees' and not off and words.channels_off(gap):
         return _report(table, both, configuration, findings, known, options, off=True)
+    if after.names and words.channels_worsened(gap) and len(excluded) < _MOST_EXCLUDED:
+        further = (*excluded, verdict.index)
+        return _report(
+            table, both, configuration, findings, known, options, off=off, excluded=further
+        )
     covariance = np.asarray(np.linalg.inv(after.precision()), dtype=float)
     nearest = () if after.names else _nearest(findings)
-    effects = _named(findings, verdict, left, known, after, covariance) if after.names else ()
+    effects = _named(findings, verdict, left, known, after, gap) if after.names else ()
     candidates = _candidates(findings, verdict, shown, gains, floor_index)
     stretch = changed_stretch(both, setting, after, variance)
     return Diagnosis(
@@ -375,13 +390,16 @@ def _named(
     left: Remainder,
     known: Mapping[str, Effect],
     fitted: Fit,
-    covariance: FloatArray,
+    gap: Mapping[str, QuantityGap],
 ) -> tuple[NamedEffect, ...]:
     """Return the named effects; first the one that alone explains more."""
+    covariance = np.asarray(np.linalg.inv(fitted.precision()), dtype=float)
     parameters = _parameters(fitted, covariance)
+    shown = _what_rows_show(findings, fitted, gap)
     found = []
     for place, name in enumerate(fitted.names):
-        values = confidences.features(findings.selection, verdict, place, left)
+        values = confidences.features(findings.selection, verdict, place, left) | shown
+        values['strength'] = _strength(fitted, name)
         sure = confidences.confidence(values)
         rivals = verdict.open_sets[place]
         forms = {
@@ -452,6 +470,42 @@ def _nearest(findings: Findings) -> tuple[str, ...]:
     weights = findings.selection.single_weights()
     order = sorted(weights, key=lambda name: -weights[name])
     return tuple(dict.fromkeys(effect_of(key) for key in order))[:_NEAREST]
+
+
+def _what_rows_show(
+    findings: Findings, fitted: Fit, gap: Mapping[str, QuantityGap]
+) -> dict[str, float]:
+    """Return features of the confidence that follow from unseen rows and from the fit.
+
+    ``worse``: how far an effect worsens a quantity; ``idle``: share of its signature in quantities
+    that were never off; ``misfit``, ``soil``: how improbable the residual and the soil are.
+    """
+    change = (fitted.outputs - findings.nothing.outputs)[: len(findings.noise.std)]
+    worse, idle, total = 0.0, 0.0, 1e-12
+    for q, item in enumerate(gap.get(name) for name in QUANTITIES):
+        if item is None or not item.noise:
+            continue
+        worse = max(worse, (item.after**2 - item.refit**2) / item.noise**2)
+        square = float(np.nanmean(change[:, q] ** 2)) / item.noise**2
+        total += square
+        idle += square if item.refit < _AT_NOISE * item.noise else 0.0
+    misfit = significance.chi_square_p_value(fitted, fitted.variance)
+    return {
+        'worse': float(np.tanh(worse)),
+        'idle': idle / total,
+        'misfit': -float(np.log10(max(misfit, 1e-6))),
+        'soil': -float(np.log10(max(significance.soil_p_value(fitted), 1e-6))),
+    }
+
+
+def _strength(fitted: Fit, name: str) -> float:
+    """Size of an effect in deviations of its prior, compressed."""
+    sizes = [
+        abs(u - c.coordinate(c.neutral))
+        for c, u in zip(fitted.coordinates, fitted.u, strict=True)
+        if c.owner == name and c.role == 'strength'
+    ]
+    return float(np.log1p(max(sizes, default=0.0)))
 
 
 def _distance_to_nothing(findings: Findings, fitted: Fit) -> float:

@@ -28,6 +28,7 @@ _SOIL_KEYS = {
     'stiffness': 'the factor on soil.frictional_modulus and soil.cohesive_modulus',
     'tan_friction': 'the tangent of soil.friction_angle_deg',
 }
+WORSE = 1.25  # times soil refit and noise: a quantity that a name has made worse
 TOO_FAR = 2.0  # times noise and allowed model error: a channel that is off
 _COARSE = 0.05  # model-error floor above which agreement says little
 
@@ -102,6 +103,15 @@ def _cell_noise(findings: Findings) -> FloatArray:
 def channels_off(gap: Mapping[str, QuantityGap]) -> tuple[str, ...]:
     """Return the quantities that unseen rows show to be off by more than is allowed."""
     return tuple(name for name, item in gap.items() if item.after > item.limit)
+
+
+def channels_worsened(gap: Mapping[str, QuantityGap]) -> tuple[str, ...]:
+    """Return the quantities that an effect predicts worse on unseen rows than the soil alone."""
+    return tuple(
+        name
+        for name, item in gap.items()
+        if item.after > WORSE * item.refit and item.after > WORSE * (item.noise or 0.0)
+    )
 
 
 def _shrink(refit: float, after: float, known: float) -> float | None:

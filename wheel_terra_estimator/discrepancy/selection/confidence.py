@@ -34,6 +34,11 @@ FEATURES = (
     'margin_floor',  # a margin counts for less beside a structural error,
     'margin_two',  # and for less in a pair
     'gain_squared',
+    'worse',  # a quantity is predicted worse on unseen rows than by the soil alone
+    'idle',  # share of the signature in quantities that were never off
+    'misfit',  # improbability of the residual,
+    'soil',  # and of the soil
+    'strength',  # in deviations of the prior
 )
 
 

@@ -7,6 +7,7 @@ The thresholds were chosen on campaigns apart from those that score them (docs/d
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -66,7 +67,13 @@ class Verdict:
     left: Remainder
 
 
-def decide(selection: Selection, variance_of: Variance, *, off: bool = False) -> Verdict:
+def decide(
+    selection: Selection,
+    variance_of: Variance,
+    *,
+    off: bool = False,
+    excluded: Collection[int] = (),
+) -> Verdict:
     """Return the verdict on a selection.
 
     Parameters
@@ -76,6 +83,8 @@ def decide(selection: Selection, variance_of: Variance, *, off: bool = False) ->
     off : bool
         Unseen rows are off by more than noise and the allowed model error: then a floor is no
         reason to ask a name for higher odds, and nothing "agrees".
+    excluded : collection of int
+        Explanations that may not be named: they worsen a quantity on unseen rows.
     """
     joint, unexplained = selection.log_joint, selection.unexplained
     total = np.asarray(log_sum(joint, axis=1))
@@ -93,6 +102,7 @@ def decide(selection: Selection, variance_of: Variance, *, off: bool = False) ->
         agreement = 'undecided' if off else 'agrees'
         word = agreement if left.accounted_for else 'unexplained'
         return Verdict(word, nothing, (), left)
+    named = [h for h in named if h not in excluded]
     if not named or rest - effects > np.log(ODDS_AGAINST_NAMES):
         return Verdict('unexplained', nothing, (), left)
     # An effect beside a mere floor goes before one beside a misfit that asks for another name.
@@ -100,6 +110,9 @@ def decide(selection: Selection, variance_of: Variance, *, off: bool = False) ->
     misfit = log_sum(joint[:, unexplained].ravel())
     clean = log_sum(quiet[named]) > misfit + np.log(CLEAN_SHARE)
     best = _best_set(selection, quiet if clean else total, named)
+    behind = total[nothing] - total[best]
+    if excluded and behind > -np.log(ODDS_TO_SPEAK):
+        return Verdict('unexplained', nothing, (), left)  # what is left to name is no better
     after = remainder(selection, best, variance_of)
     if after.significant and _explained(selection, nothing, best) < MOST:
         return Verdict('unexplained', nothing, (), left)

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .truth import Rows, TrueSoil, solve
+from wheel_terra_estimator.trials.truth import Rows, TrueSoil, solve
 
 DESIGNS = ('basic16', 'sweep40', 'slope48', 'lugs48', 'full56')
 _SLIPS = np.array([0.03, 0.08, 0.15, 0.25, 0.36, 0.5, 0.65, 0.8])

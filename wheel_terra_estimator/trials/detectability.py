@@ -11,8 +11,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from .hidden import LISTED, Kind, SmoothError
-from .truth import OUTPUTS, SOIL_SD, FloatArray, Hidden, Rows, TrueSoil, moved_soil, solve
+from wheel_terra_estimator.trials.hidden import LISTED, Kind, SmoothError
+from wheel_terra_estimator.trials.truth import (
+    OUTPUTS,
+    SOIL_SD,
+    FloatArray,
+    Hidden,
+    Rows,
+    TrueSoil,
+    moved_soil,
+    solve,
+)
 
 _STEP = 0.2
 

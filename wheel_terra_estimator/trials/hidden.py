@@ -1,10 +1,10 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Effects of the hidden world: the 16 of the catalogue, other formulas of them, and strangers.
+"""Effects of the hidden world: those of the catalogue, other formulas of them, and strangers.
 
 ``LISTED[name]`` follows the public contract and the compendium's equations; ``OTHER[name]``
 stands for the same physical claim written with another formula (what a real soil would do to us);
-``OUTSIDE[name]`` are eight effects that no catalogue entry describes. Each is a function
+``OUTSIDE[name]`` are effects that no catalogue entry describes. Each is a function
 ``(size, spice, rows, soil) -> Hidden``: ``size`` is the main parameter in its own unit, ``spice``
 in 0..1 draws the second one (onset slip, layer depth).
 """
@@ -16,7 +16,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .truth import OUTPUTS, FloatArray, Hidden, Rows, Setup, TrueSoil, solve
+from wheel_terra_estimator.trials.truth import (
+    OUTPUTS,
+    FloatArray,
+    Hidden,
+    Rows,
+    Setup,
+    TrueSoil,
+    solve,
+)
 
 Prepare = Callable[[Setup, Rows], None]
 Finish = Callable[[Rows, Setup, Rows], None]
@@ -239,6 +247,31 @@ def _pitch(size: float, rotates: bool) -> Hidden:
     return Change('pitch_bias', None, finish)
 
 
+def _reading(name: str, key: str, size: float, bent: float) -> Hidden:
+    """Gain of a reading; the other formula saturates or grows with the reading."""
+
+    def finish(out: Rows, setup: Setup, rows: Rows) -> None:
+        reading = out[key]
+        share = np.abs(reading) / np.nanmax(np.abs(reading))
+        out[key] = reading * (1.0 + size * (1.0 - bent * share))
+
+    return Change(name, None, finish)
+
+
+def _gain_kind(name: str, key: str, other: bool) -> Kind:
+    def make(size: float, spice: float, rows: Rows, soil: TrueSoil) -> Hidden:
+        return _reading(name, key, size, 0.4 if other else 0.0)
+
+    return Kind(make, lambda rows, soil: 0.08, 5, signed=True, requires=key)
+
+
+def _pull_zero(size: float, with_load: float) -> Hidden:
+    def shift(out: Rows, setup: Setup, rows: Rows) -> FloatArray:
+        return size * (1 + with_load * (rows['normal_load'] / _load(rows) - 1))
+
+    return Change('pull_zero', None, _pull(shift))
+
+
 def _lug(rows: Rows) -> float:
     return float(np.max(rows['lug_height']))
 
@@ -372,6 +405,16 @@ def _kinds(other: bool) -> dict[str, Kind]:
             signed=True,
             requires='sinkage',
         ),
+        'pull_zero': Kind(
+            lambda a, k, r, s: _pull_zero(a, 0.3 if other else 0.0),
+            lambda r, s: 0.03 * _load(r),
+            4,
+            signed=True,
+            requires='drawbar_pull',
+        ),
+        'pull_gain': _gain_kind('pull_gain', 'drawbar_pull', other),
+        'torque_gain': _gain_kind('torque_gain', 'torque', other),
+        'sinkage_gain': _gain_kind('sinkage_gain', 'sinkage', other),
         'pitch_bias': Kind(
             lambda a, k, r, s: _pitch(a, other),
             one(0.02),
@@ -403,22 +446,6 @@ def _crosstalk(size: float, spice: float, rows: Rows, soil: TrueSoil) -> Hidden:
     return Change(
         'crosstalk', None, _pull(lambda out, setup, rows: size * out['torque'] / setup.radius)
     )
-
-
-def _elastic(size: float, spice: float, rows: Rows, soil: TrueSoil) -> Hidden:
-    """A wheel that flattens: the contact has a larger radius in proportion to the load."""
-
-    def prepare(setup: Setup, rows: Rows) -> None:
-        stretch = 1 + size * rows['normal_load'] / _load(rows)
-        setup.radius = setup.radius * stretch
-        setup.shear_radius = setup.shear_radius * stretch
-        setup.advance = setup.advance * stretch
-
-    return Change('elastic', prepare)
-
-
-def _sinkage_gain(size: float, spice: float, rows: Rows, soil: TrueSoil) -> Hidden:
-    return Change('sinkage_gain', None, _sinkage(lambda out, setup, rows: size * out['sinkage']))
 
 
 def _softening(size: float, spice: float, rows: Rows, soil: TrueSoil) -> Hidden:
@@ -481,8 +508,6 @@ def _const(value: float) -> Callable[[Rows, TrueSoil], float]:
 OUTSIDE = {
     'hump': Kind(_hump, _const(0.05), 10, signed=True),
     'crosstalk': Kind(_crosstalk, _const(0.05), 10, signed=True),
-    'elastic': Kind(_elastic, _const(0.05), 8),
-    'sinkage_gain': Kind(_sinkage_gain, _const(0.1), 8, signed=True),
     'friction_softening': Kind(_softening, _const(0.1), 6),
     'ripple': Kind(_ripple, _const(0.03), 12, signed=True),
     'torque_saturation': Kind(_saturation, _const(0.1), 6),

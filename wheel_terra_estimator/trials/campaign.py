@@ -11,10 +11,19 @@ from pathlib import Path
 
 import numpy as np
 
-from .designs import random_rows, random_soil
-from .detectability import Ruler, listed_kinds, size_for
-from .hidden import LISTED, OTHER, OUTSIDE, SmoothError
-from .truth import OUTPUTS, SOIL_SD, BoolArray, Hidden, Rows, TrueSoil, moved_soil, solve
+from wheel_terra_estimator.trials.designs import random_rows, random_soil
+from wheel_terra_estimator.trials.detectability import Ruler, listed_kinds, size_for
+from wheel_terra_estimator.trials.hidden import LISTED, OTHER, OUTSIDE, SmoothError
+from wheel_terra_estimator.trials.truth import (
+    OUTPUTS,
+    SOIL_SD,
+    BoolArray,
+    Hidden,
+    Rows,
+    TrueSoil,
+    moved_soil,
+    solve,
+)
 
 INPUTS = (
     'slip',
@@ -60,6 +69,8 @@ class Plan:
         the mean over the wheels.
     names : tuple of str
         Hide these instead of some drawn by lot (``distance_left`` is then not measured).
+    least : float
+        Least d' that is asked for; 0: 2.5 for one effect, 4 for each of two.
     """
 
     hide: str = 'one'
@@ -73,6 +84,7 @@ class Plan:
     noise_given: bool = True
     drive: bool = False
     names: tuple[str, ...] = ()
+    least: float = field(default=0.0, repr=False)  # no part of the seed
 
 
 @dataclass(frozen=True)
@@ -288,7 +300,7 @@ def _hide(
         names = [*plan.names] or [str(name) for name in drawn]
     sizes, effects, spices = [], [], []
     for name in names:
-        low = 4.0 if plan.hide == 'two' else 2.5
+        low = plan.least or (4.0 if plan.hide == 'two' else 2.5)
         wanted = float(np.exp(rng.uniform(np.log(low), np.log(60.0))))
         if plan.hide == 'outside':
             wanted *= 1.5
