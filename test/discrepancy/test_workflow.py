@@ -229,7 +229,7 @@ def test_next_measurement_would_part_the_rivals():
     proposals = run(table, values).next_measurement
     assert any('hard, level floor' in p.what for p in proposals)
     best = max((p for p in proposals if p.rows), key=lambda p: p.distance_then)
-    assert 'without lugs' in best.what
+    assert 'lugs' in best.what  # none at all, or higher ones: the load they carry or the sensor
     assert best.distance_then > 2.0 * best.distance_now
 
 

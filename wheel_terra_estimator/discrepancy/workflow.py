@@ -571,7 +571,7 @@ def _curves(
     singles = [e.fitted for e in findings.selection.explanations if len(e.names) == 1]
     ordered = ([after] if after.names else []) + [f for f in singles if f.names != after.names]
     shapes = [_signature_shape(findings, f) for f in ordered[:2]]
-    labels = [' + '.join(f.names) for f in ordered[:2]]
+    labels = [' + '.join(effect_of(key) for key in f.names) for f in ordered[:2]]
     return Curves(
         (configured.outputs[0] - moved)[:rows],
         (findings.nothing.outputs + refit_error)[:rows],

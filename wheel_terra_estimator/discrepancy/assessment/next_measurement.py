@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from wheel_terra_estimator.discrepancy.effect_keys import effect_of
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
 from wheel_terra_estimator.discrepancy.result import NextMeasurement
 from wheel_terra_estimator.discrepancy.selection.candidates import Setting
@@ -50,9 +51,12 @@ def propose(
     predicted = _predicted(setting, [chosen, *rivals], [points for _, points in menu])
     for place, rival in enumerate(rivals, 1):
         names = (_label(chosen), _label(rival))
+        if names[0] == names[1]:  # two forms of the same
+            names = (' + '.join(chosen.names), ' + '.join(rival.names))
         now = _distance(setting, chosen, rival, None, std)
-        for name in dict.fromkeys((*chosen.names, *rival.names)):
-            if name in ZERO_CHECKS and (name in chosen.names) != (name in rival.names):
+        ours, theirs = ([effect_of(key) for key in f.names] for f in (chosen, rival))
+        for name in dict.fromkeys((*ours, *theirs)):
+            if name in ZERO_CHECKS and (name in ours) != (name in theirs):
                 found.append(NextMeasurement(ZERO_CHECKS[name], names, now, np.inf))
         blocks = []
         for (what, points), (values, sensitivity) in zip(menu, predicted, strict=True):
@@ -76,7 +80,7 @@ def propose(
 
 
 def _label(fitted: Fit) -> str:
-    return ' + '.join(fitted.names) or 'nothing'
+    return ' + '.join(effect_of(key) for key in fitted.names) or 'nothing'
 
 
 def _menu(setting: Setting) -> list[tuple[str, OperatingPoints]]:

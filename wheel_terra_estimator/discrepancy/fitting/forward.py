@@ -145,7 +145,7 @@ class Forward:
         """Put a candidate's parameter at neutral on rows of a reference."""
         if self.active is None or name in self.base_effects:
             return values
-        neutral = self.catalogue[name].parameter(parameter).neutral
+        neutral = self.catalogue[name].neutral().get(parameter, 0.0)
         return np.where(self.active, values, neutral)
 
     def _resting_value(self, coordinate: Coordinate) -> float:

@@ -268,8 +268,7 @@ def _candidates(diagnosis: Diagnosis) -> list[dict[str, Any]]:
         rows.append(
             {
                 'label': pictures.words(candidate.label),
-                'chosen': bool(candidate.names)
-                and set(candidate.names) == {effect.name for effect in diagnosis.effects},
+                'chosen': bool(candidate.names) and not candidate.why_not,
                 'parameters': [
                     f'{key.split(".")[-1]} {number(item.value)} ± {number(item.std, 2)}'
                     + _unit(item.unit)
