@@ -12,7 +12,7 @@ import pytest
 from terra_tools import SAND, WHEEL, points
 
 from wheel_terra_estimator.terramechanics.conditioned import ConditionedForces
-from wheel_terra_estimator.terramechanics.entrapment import rim_travel_to_depth, sinkage_growth
+from wheel_terra_estimator.terramechanics.entrapment import digging_per_turn, rim_travel_to_depth
 from wheel_terra_estimator.terramechanics.inverse import (
     centroid_angle,
     entrance_angle,
@@ -83,8 +83,11 @@ from wheel_terra_estimator.terramechanics.wheel import Wheel
             lambda: SlopeLocomotion(WheelSoilModel(SAND), WHEEL, 80.0).climb([0.1, 2.0]),
             r'slope is 2 rad \(entry 1\); allowed is \[-1\.5708, 1\.5708\] rad',
         ),
-        (lambda: sinkage_growth(0.95, WHEEL, 0.0), r'contact length is 0 m'),
-        (lambda: sinkage_growth(2.0, WHEEL, 0.1), r'slip is 2; allowed is \[-1, 1\]'),
+        (lambda: digging_per_turn(WHEEL, 1.5), r'efficiency is 1.5; allowed is \[0, 1\]'),
+        (
+            lambda: rim_travel_to_depth(0.01, 0.02, 2.0, WHEEL),
+            r'slip is 2; allowed is \[-1, 1\]',
+        ),
         (lambda: rim_travel_to_depth(0.01, 0.3, 0.95, WHEEL), r'depth is 0\.3 m; allowed is \[0'),
         (
             lambda: longitudinal_slip_sinkage(0.5, -0.1, 0.1, -0.05, 0.5),

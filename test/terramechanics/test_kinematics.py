@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Slip ratio of the contract and the shear displacement that follows from it."""
+"""Slip ratio and the shear displacement that follows from it."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def test_speed_ratio_is_the_inverse() -> None:
 
 
 def test_change_of_radius() -> None:
-    # EQUATIONS.md section 1: r = 157 mm, h = 10 mm, rolling at the rim is 0.060 at the tip.
+    # r = 157 mm, h = 10 mm, rolling at the rim is 0.060 at the tip.
     assert change_of_radius(0.0, 0.157, 0.167) == pytest.approx(0.0599, abs=1e-4)
 
 

@@ -12,9 +12,10 @@ import pytest
 from terra_tools import EFFECTS, SAND, WHEEL, points, state
 
 from wheel_terra_estimator.terramechanics.entrapment import (
+    digging_per_turn,
+    digging_rate,
     digging_share,
     rim_travel_to_depth,
-    sinkage_growth,
 )
 from wheel_terra_estimator.terramechanics.inverse import (
     centroid_angle,
@@ -51,7 +52,7 @@ def test_the_climb_is_the_effect_slope_gravity_at_zero_hitch_pull() -> None:
     assert hitch == pytest.approx(0.0, abs=1e-6)
 
 
-def test_coefficients_of_the_second_paper() -> None:
+def test_coefficients_of_nakashima_2010() -> None:
     climb = climber().climb([0.15])
     assert climb.pull_coefficient == pytest.approx(math.sin(0.15))
     torque = climb.torque / (80.0 * WHEEL.tip_radius)
@@ -140,28 +141,27 @@ def test_centroid_angle_is_the_centroid_of_the_stress() -> None:
 
 
 def test_digging_starts_near_stuck_and_grows_with_the_lugs() -> None:
-    assert digging_share(0.8) == 0.0 and digging_share(0.99) == 1.0
-    assert 0.0 < digging_share(0.9) < 1.0
-    low, high = (sinkage_growth(0.98, replace(WHEEL, lug_height=h), 0.1) for h in (0.005, 0.015))
-    assert high > low > 0.0
-    assert sinkage_growth(-0.98, WHEEL, 0.1) == 0.0
-    with pytest.raises(ValueError, match='contact length is 0 m'):
-        sinkage_growth(0.98, WHEEL, 0.0)
+    assert digging_share(0.85) == 0.0 and digging_share(1.0) == 1.0
+    assert digging_share(0.925) == pytest.approx(0.5)
+    assert digging_rate(-0.98, WHEEL, 1.0) == 0.0
+    low, high = (digging_rate(0.98, replace(WHEEL, lug_height=h), 1.0) for h in (0.005, 0.015))
+    assert high == pytest.approx(3.0 * low)
+    assert digging_rate(0.98, SMOOTH, 1.0) > 0.0
+    assert digging_rate(0.98, WHEEL, -2.0) == pytest.approx(2.0 * digging_rate(0.98, WHEEL, 1.0))
 
 
-def test_rim_travel_to_a_depth_is_the_integral_of_the_growth() -> None:
-    depth, travel, target = 0.02, 0.0, 0.06
-    while depth < target:
-        length = WHEEL.radius * math.acos(1.0 - depth / WHEEL.radius)
-        depth += float(sinkage_growth(0.97, WHEEL, length)) * 1e-4
-        travel += 1e-4
-    assert rim_travel_to_depth(0.02, target, 0.97, WHEEL) == pytest.approx(travel, rel=1e-3)
-    assert rim_travel_to_depth(0.02, target, 0.5, WHEEL) == math.inf
-    assert rim_travel_to_depth(0.07, target, 0.97, WHEEL) == 0.0
+def test_a_spinning_wheel_throws_out_the_layer_of_its_lugs_once_per_lug() -> None:
+    """Thirty lugs of 10 mm pass in a turn; with all of it thrown out it is 300 mm deeper."""
+    assert digging_per_turn(WHEEL, efficiency=1.0) == pytest.approx(0.300)
+    turn = 2.0 * math.pi * WHEEL.radius
+    deeper = digging_per_turn(WHEEL)
+    assert rim_travel_to_depth(0.02, 0.02 + 2.0 * deeper, 1.0, WHEEL) == pytest.approx(2.0 * turn)
+    assert rim_travel_to_depth(0.02, 0.06, 0.5, WHEEL) == math.inf
+    assert rim_travel_to_depth(0.07, 0.06, 0.97, WHEEL) == 0.0
 
 
-def test_longitudinal_construction_of_seed_1() -> None:
-    # EQUATIONS.md 2.5: static entrance angle 14.5 deg, (c1, c2) = (0.18, 0.32).
+def test_longitudinal_construction_of_ding_2010() -> None:
+    # Static entrance angle 14.5 deg, (c1, c2) = (0.18, 0.32).
     static = math.acos(1.0 - 0.005 / 0.15735)
     got = []
     for slip in (0.0, 0.05, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0):

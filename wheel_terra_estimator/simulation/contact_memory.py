@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wheel_terra_estimator.simulation.contact import SoilForces
+from wheel_terra_estimator.terramechanics.entrapment import digging_rate
 from wheel_terra_estimator.terramechanics.wheel import Wheel
 
 FloatArray = NDArray[np.float64]
@@ -32,8 +33,6 @@ SINKING_TRAVEL = 0.5
 """Travel over which the depth follows the load, as a share of the contact length."""
 SLIP_SINKING = 0.3
 """Share of the slip travel that counts for sinking."""
-DIGGING_SLIP = (0.85, 1.0)
-"""Slip at which a wheel begins to dig itself in, and at which it does so fully."""
 DEPTH_RANGE = (1e-3, 0.9)
 """Least and greatest depth as a share of the radius; beyond, the chassis lies on the ground."""
 LEAST_SPEED = 1e-6  # [m/s]; keeps ratios of speeds finite
@@ -63,9 +62,7 @@ class ContactMemory:
         n = slip_radius.size
         self._radius = np.broadcast_to(np.asarray(wheel.radius, float), n)
         self._slip_radius = slip_radius
-        # Soil thrown out per radian at full slip; a smooth rim moves a band of a few grains.
-        lugs = np.maximum(wheel.lug_height * wheel.lug_count, 0.02 * self._radius)
-        self._dig_depth = dig_efficiency * lugs / (2.0 * np.pi)
+        self._wheel, self._dig_efficiency = wheel, dig_efficiency
         self.shear = Shear(np.zeros(n), np.zeros(n))
         self.sense = np.zeros(n)
         self.depth = 0.05 * self._radius
@@ -136,9 +133,8 @@ class ContactMemory:
         depth = self.depth + (wanted - self.depth) * -np.expm1(
             -worked_here / (SINKING_TRAVEL * length)
         )
-        onset, full = DIGGING_SLIP
-        spinning = np.clip((shear.slip * np.sign(rate) - onset) / (full - onset), 0.0, 1.0)
-        depth += self._dig_depth * np.abs(rate) * dt * spinning
+        spinning = shear.slip * np.sign(rate)
+        depth += digging_rate(spinning, self._wheel, rate, self._dig_efficiency) * dt
         self.depth = np.clip(depth, DEPTH_RANGE[0] * self._radius, DEPTH_RANGE[1] * self._radius)
         self.lug_sinkage = self.lug_sinkage + (soil.lug_sinkage - self.lug_sinkage) * -np.expm1(
             -worked / (SINKING_TRAVEL * length)

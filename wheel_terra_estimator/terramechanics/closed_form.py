@@ -177,18 +177,23 @@ def decoupled_pull_shaped(torque: Any, contact: Contact, maths: Any = np) -> Any
     return contact.width * (thrust * along - contact.radius * sigma * normal_y)
 
 
+def peak_stresses(contact: Contact, terms: Terms, maths: Any = np) -> tuple[Any, Any]:
+    """Normal and shear stress at the peak angle, effects included [Pa]."""
+    peak = contact.peak_angle
+    contact.angle = peak
+    contact.normal_stress = stresses.front_stress(contact, peak, maths)
+    terms.apply('on_normal_stress', contact, maths)
+    sigma = contact.normal_stress
+    return sigma, stresses.shear_stress(contact, peak, sigma, maths)
+
+
 def triangle_forces(contact: Contact, terms: Terms, maths: Any = np) -> tuple[Any, Any, Any]:
     """Load [N], pull [N] and torque [N m] of triangular stresses, angles given.
 
     W = b (r A sigma_m + R B tau_m), F = b (R A tau_m - r B sigma_m), T = b R^2 C tau_m.
     """
-    peak = contact.peak_angle
-    a, b, c = coefficients(contact.entrance_angle, peak, contact.leaving_angle, maths)
-    contact.angle = peak
-    contact.normal_stress = stresses.front_stress(contact, peak, maths)
-    terms.apply('on_normal_stress', contact, maths)
-    sigma = contact.normal_stress
-    tau = stresses.shear_stress(contact, peak, sigma, maths)
+    a, b, c = coefficients(contact.entrance_angle, contact.peak_angle, contact.leaving_angle, maths)
+    sigma, tau = peak_stresses(contact, terms, maths)
     r, R, width = contact.radius, contact.shear_radius, contact.width
     load = width * (r * a * sigma + R * b * tau)
     pull = width * (R * a * tau - r * b * sigma)

@@ -10,71 +10,60 @@ import numpy as np
 
 from wheel_terra_estimator.terramechanics.checks import check_range
 
-# Below the first slip nothing is dug beyond the steady sinkage, above the second all of it.
-DIGGING_STARTS, DIGGING_FULL = 0.85, 0.95
-# Share of the conveyed layer that does not fall back under the wheel; no measurement found, the
-# value puts a rover wheel at half its radius within some metres of rim travel, as mission reports
-# tell (Purgatory, Troy).
-DIGGING_EFFICIENCY = 0.2
-# Layer that a smooth rim drags along, about ten grains of fine sand [m].
-ENTRAINED_LAYER = 0.002
+# Below the first slip nothing is dug beyond the steady sinkage, at the second all of it.
+DIGGING_SLIP = (0.85, 1.0)
+# Share of the soil between passing lugs that does not fall back; no measurement found, the value
+# puts a rover wheel at half its radius within some metres of rim travel, as mission reports tell
+# (Purgatory, Troy).
+DIGGING_EFFICIENCY = 0.05
+# Soil that a smooth rim throws out per turn, a band of a few grains, as a share of its radius.
+SMOOTH_BAND = 0.02
 
 
 def digging_share(slip: Any) -> Any:
-    """Share of full digging at a slip ratio: 0 below 0.85, 1 above 0.95, smooth between [-]."""
-    share = np.clip((np.abs(slip) - DIGGING_STARTS) / (DIGGING_FULL - DIGGING_STARTS), 0.0, 1.0)
-    return share * share * (3.0 - 2.0 * share)
+    """Share of full digging at a slip ratio: 0 up to 0.85, 1 at 1, a straight line between [-]."""
+    start, full = DIGGING_SLIP
+    return np.clip((np.asarray(slip) - start) / (full - start), 0.0, 1.0)
 
 
-def sinkage_growth(
-    slip: Any,
-    wheel: Any,
-    contact_length: Any,
-    efficiency: float = DIGGING_EFFICIENCY,
-    entrained_layer: float = ENTRAINED_LAYER,
+def digging_per_turn(wheel: Any, efficiency: float = DIGGING_EFFICIENCY) -> Any:
+    """Depth gained per turn of a wheel that spins on the spot [m].
+
+    Every lug that passes throws out a share of a layer of its height: efficiency h n, or a thin
+    band for a smooth rim.
+    """
+    check_range('efficiency', efficiency, 0.0, 1.0)
+    lugs = np.multiply(wheel.lug_height, wheel.lug_count)
+    return efficiency * np.maximum(lugs, np.multiply(SMOOTH_BAND, wheel.radius))
+
+
+def digging_rate(
+    slip: Any, wheel: Any, angular_velocity: Any, efficiency: float = DIGGING_EFFICIENCY
 ) -> Any:
-    """Sinkage gained per metre of rim travel, beyond the steady sinkage [m/m].
-
-    Mass balance: lugs and rim convey a layer h + d backwards; what does not fall back deepens the
-    contact, dz/dx = efficiency (h + d)/L.
+    """Rate at which a driving wheel digs itself in, beyond its steady sinkage [m/s].
 
     Parameters
     ----------
     slip : float or array_like
-        Slip ratio; only driving wheels dig.
+        Slip ratio, positive when driving; a braking wheel does not dig itself in.
     wheel : Wheel
-        Its lug height counts.
-    contact_length : float or array_like
-        L = r (t1 - t2) [m], positive.
+        Its radius and lugs count.
+    angular_velocity : float or array_like
+        [rad/s], either sign.
     """
-    check_range('slip', slip, -1.0, 1.0)
-    check_range('contact length', contact_length, 0.0, unit='m', open_lower=True)
-    check_range('efficiency', efficiency, 0.0, 1.0)
-    check_range('entrained layer', entrained_layer, 0.0, unit='m')
-    conveyed = wheel.lug_height + entrained_layer
-    driving = np.where(np.asarray(slip) > 0.0, digging_share(slip), 0.0)
-    return efficiency * driving * conveyed / contact_length
+    turns = np.abs(angular_velocity) / (2.0 * np.pi)
+    return digging_per_turn(wheel, efficiency) * turns * digging_share(slip)
 
 
 def rim_travel_to_depth(
     sinkage: Any, depth: Any, slip: Any, wheel: Any, efficiency: float = DIGGING_EFFICIENCY
 ) -> Any:
-    """Rim travel until the sinkage reaches a depth at constant slip [m]; inf where it never does.
-
-    The contact lengthens as the wheel sinks, L = r arccos(1 - z/r), so that digging slows down:
-    integral of L dz over the conveyed layer, from the geometry of the circle.
-    """
-    radius = wheel.radius
+    """Rim travel until digging at constant slip takes the sinkage to a depth [m]; inf for never."""
     for name, value in (('sinkage', sinkage), ('depth', depth)):
-        check_range(name, value, 0.0, float(np.min(radius)), 'm')
-    rate = sinkage_growth(slip, wheel, 1.0, efficiency)  # times L: layer per rim travel
-
-    def integral(z: Any) -> Any:
-        # Int arccos(1 - z/r) dz = r [sin a - a cos a], a = arccos(1 - z/r); times r.
-        angle = np.arccos(np.clip(1.0 - np.asarray(z) / radius, -1.0, 1.0))
-        return radius * radius * (np.sin(angle) - angle * np.cos(angle))
-
-    missing = np.maximum(integral(depth) - integral(sinkage), 0.0)
+        check_range(name, value, 0.0, float(np.min(wheel.radius)), 'm')
+    check_range('slip', slip, -1.0, 1.0)
+    missing = np.maximum(np.asarray(depth, float) - sinkage, 0.0)
+    rate = digging_rate(slip, wheel, 1.0 / np.asarray(wheel.radius), efficiency)  # per rim travel
     with np.errstate(divide='ignore', invalid='ignore'):
         travel = missing / rate
     return np.where(missing == 0.0, 0.0, np.where(rate > 0.0, travel, np.inf))

@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Slip ratio of the public contract and what follows from it for the soil under the rim."""
+"""Slip ratio and what follows from it for the soil under the rim."""
 
 from __future__ import annotations
 
@@ -73,8 +73,8 @@ def shear_displacement(
 ) -> Any:
     """Shear displacement j = R (t1 - t) - (v/w)(sin t1 - sin t) [m].
 
-    Seed 1 equation 14, written with v/w so that slip radius and shear radius may differ; j < 0 is
-    a rim that drags the soil along (braking).
+    Ding et al. 2010 eq. 14 (doi 10.1007/s11771-010-0021-7), with v/w so that slip radius and
+    shear radius may differ; j < 0 is a rim that drags the soil along (braking).
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ def shear_displacement(
 
 
 def lug_passage_period(wheel: Any, angular_velocity: Any) -> Any:
-    """Time between two lugs [s], seed 1 equation 2: 2 pi/(n w) = 2 pi r (1 - s)/(n v).
+    """Time between two lugs [s]: 2 pi/(n w) = 2 pi r (1 - s)/(n v) (Ding et al. 2010 eq. 2).
 
     Infinite for a smooth or a standing wheel.
     """

@@ -1,7 +1,8 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Slip-sinkage by backward flow of soil, the construction of seed 1 equations 3 to 8.
+"""Slip-sinkage by backward flow of soil, constructed from a slip surface.
 
+Ding et al. 2010, equations 3 to 8 (doi 10.1007/s11771-010-0021-7), their geometry completed here.
 A diagnostic: the load balance contains this part already (through the peak angle), so it must not
 be added to the model's sinkage.
 """

@@ -23,7 +23,7 @@ class OperatingPoints:
     Attributes
     ----------
     slip : array_like
-        (N,) recorded slip ratio of the public contract, in [-1, 1] [-].
+        (N,) recorded slip ratio (``kinematics.slip_ratio``), in [-1, 1] [-].
     normal_load : array_like
         (N,) load on the wheel as recorded (terrain normal, unless `slope_gravity` is on) [N].
     wheel : Wheel
@@ -32,7 +32,7 @@ class OperatingPoints:
         (N,) slope, positive uphill [rad].
     slip_radius : str
         Radius to which `slip` refers: ``lug_tip`` (r + h), ``rim`` (r), or ``shear`` (the model's
-        shear radius: equation 14 as seed 1 prints it).
+        shear radius: eq. 14 as Ding et al. 2010 print it).
     gravity : array_like
         (N,) [m/s^2].
     angular_velocity : array_like

@@ -30,7 +30,8 @@ def _rule(nodes: int, dimensions: int) -> tuple[NDArray[np.float64], NDArray[np.
 def forces(contact: Contact, terms: Terms, nodes: int = NODES) -> tuple[Any, Any, Any]:
     """Vertical force, longitudinal force and torque on the wheel, angles given.
 
-    Seed 1 equations 17 to 19 for the load, the same integrals for pull and torque:
+    Ding et al. 2010 eq. 19 (doi 10.1007/s11771-010-0021-7) for the load, the same integrals for
+    pull and torque:
     W = b Int (r sigma cos + R tau sin), F = b Int (R tau cos - r sigma sin), T = b R^2 Int tau.
 
     Returns

@@ -20,7 +20,7 @@ from wheel_terra_estimator.terramechanics.wheel import Wheel
 
 FloatArray = NDArray[np.float64]
 # ``weight``: the weight W is given, the soil carries W cos a. ``constant``: the soil carries W on
-# every slope, as in the second paper, whose rig turns the load with the bed.
+# every slope, as in the model and rig of Nakashima et al. 2010, which turn the load with the bed.
 LOAD_CONVENTIONS = ('weight', 'constant')
 LARGEST_SLIP = 0.98
 

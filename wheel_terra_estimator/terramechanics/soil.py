@@ -34,7 +34,7 @@ class Soil:
     friction_angle : float or numpy.ndarray
         phi [rad].
     shear_modulus : float or numpy.ndarray
-        K, shear displacement scale of Janosi and Hanamoto [m].
+        K, shear deformation modulus of Janosi and Hanamoto [m].
     peak_stress_ratio : float or numpy.ndarray
         c1 = angle of greatest stress over entrance angle at zero slip [-].
     leaving_angle_ratio : float or numpy.ndarray

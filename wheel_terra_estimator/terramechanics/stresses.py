@@ -58,9 +58,10 @@ def compaction_resistance(width: Any, modulus: Any, exponent: Any, sinkage: Any)
 
 
 def front_stress(contact: Contact, angle: Any, maths: Any = np, cosine: Any = None) -> Any:
-    """Normal stress ahead of its peak, k [(r/z0)(cos t - cos t1)]^N [Pa] (seed 1 equation 17).
+    """Normal stress ahead of its peak, k [(r/z0)(cos t - cos t1)]^N [Pa].
 
-    ``cosine`` of the angle, where it is known already.
+    Wong and Reece 1967; Ding et al. 2010 eq. 17 (doi 10.1007/s11771-010-0021-7). ``cosine`` of the
+    angle, where it is known already.
     """
     cosine = maths.cos(angle) if cosine is None else cosine
     depth = contact.radius * (cosine - maths.cos(contact.entrance_angle))
@@ -77,9 +78,10 @@ def mobilised_share(displacement: Any, shear_modulus: Any, maths: Any = np) -> A
 def shear_stress(
     contact: Contact, angle: Any, normal_stress: Any, maths: Any = np, sine: Any = None
 ) -> Any:
-    """Shear stress (c + sigma tan phi) sgn(j) (1 - exp(-|j|/K)) [Pa] (seed 1 equation 18).
+    """Shear stress (c + sigma tan phi) sgn(j) (1 - exp(-|j|/K)) [Pa].
 
-    ``sine`` of the angle, where it is known already.
+    Janosi and Hanamoto 1961; Ding et al. 2010 eq. 18 (doi 10.1007/s11771-010-0021-7). ``sine`` of
+    the angle, where it is known already.
     """
     displacement = shear_displacement(
         angle, contact.entrance_angle, contact.shear_radius, contact.velocity_ratio, maths, sine

@@ -16,6 +16,7 @@ from dataclasses import MISSING, dataclass, fields
 from typing import NamedTuple
 
 from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.terramechanics.closed_form import coefficients, peak_stresses
 from wheel_terra_estimator.terramechanics.conditioned import SMALLEST_ANGLE, ConditionedForces
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.kinematics import slip_of_speed_ratio
@@ -209,20 +210,10 @@ class WheelModels:
         depth = min(max(sinkage - c.sinkage, 0.0), _MOST_SINKAGE * c.radius)
         entrance = max(math.acos(1.0 - depth / c.radius), 10.0 * SMALLEST_ANGLE)
         set_angles(c, entrance, state.leaving_angle, self._terms, m)
-        t1, tm, t2 = c.entrance_angle, c.peak_angle, c.leaving_angle
-        cos_1, cos_m, cos_2 = math.cos(t1), math.cos(tm), math.cos(t2)
-        sin_1, sin_m, sin_2 = math.sin(t1), math.sin(tm), math.sin(t2)
-        a = (cos_m - cos_2) / (tm - t2) + (cos_m - cos_1) / (t1 - tm)
-        b = (sin_m - sin_2) / (tm - t2) + (sin_m - sin_1) / (t1 - tm)
-        peak_depth = max(c.radius * (cos_m - cos_1), _LEAST_DEPTH)
-        log_depth = math.log(peak_depth / c.reference_depth)
-        c.angle = tm
-        c.normal_stress = c.bearing_modulus * math.exp(c.sinkage_exponent * log_depth)
-        for term, values in stages['on_normal_stress']:
-            term(c, values, m)
-        shear = (c.shear_radius * (t1 - tm) - c.velocity_ratio * (sin_1 - sin_m)) / c.shear_modulus
-        mobilised = math.copysign(-math.expm1(-abs(shear)), shear)
-        tau = mobilised * (c.cohesion + c.normal_stress * c.tan_friction)
-        normal = c.width * c.radius * a * c.normal_stress
+        a, b, _ = coefficients(c.entrance_angle, c.peak_angle, c.leaving_angle, m)
+        sigma, tau = peak_stresses(c, self._terms, m)
+        peak_depth = c.radius * (math.cos(c.peak_angle) - math.cos(c.entrance_angle))
+        log_depth = math.log(max(peak_depth, _LEAST_DEPTH) / c.reference_depth)
+        normal = c.width * c.radius * a * sigma
         carried = normal + c.width * c.shear_radius * b * tau
         return Bearing(max(carried, _LEAST_BEARING * normal), c.sinkage_exponent, log_depth)

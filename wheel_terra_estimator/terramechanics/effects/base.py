@@ -109,7 +109,7 @@ class Effect:
     Attributes
     ----------
     name : str
-        As in the public contract.
+        As in docs/effects.md and in configuration keys.
     claim : str
         One line: what it stands for.
     symbol : str

@@ -12,7 +12,8 @@ from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectPara
 
 
 def _shift(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
-    contact.peak_ratio = contact.peak_ratio + p.c2 * contact.slip
+    skid = maths.maximum(-contact.slip, 0.0)
+    contact.peak_ratio = contact.peak_ratio + p.c2 * contact.slip + p.skid * skid
 
 
 def _retreat(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
@@ -23,8 +24,21 @@ EFFECT = Effect(
     name='stress_peak_shift',
     claim='the angle of greatest stress moves forward with slip',
     form='forward',
-    symbol='t_m = (c1 + c2 s) t_1',
-    parameters=(EffectParameter('c2', '-', 0.2, -0.5, 0.8, 0.2, 'half_normal', 'shift at s = 1'),),
+    symbol='t_m = (c1 + c2 s) t_1 (+ skid |s| t_1 where s < 0)',
+    parameters=(
+        EffectParameter('c2', '-', 0.2, -0.5, 0.8, 0.2, 'half_normal', 'shift at s = 1'),
+        EffectParameter(
+            'skid',
+            '-',
+            0.0,
+            -1.0,
+            1.0,
+            0.2,
+            'normal',
+            'shift forward of a skidding wheel, beyond c2',
+            free=False,
+        ),
+    ),
     touches=frozenset({'sinkage', 'drawbar_pull', 'torque'}),
     needs=('slip',),
     confounded_with={
@@ -32,7 +46,8 @@ EFFECT = Effect(
         'slip_sinkage_exponent': 'high load, braking rows, slip near 0.9; stress cells in the rim',
     },
     validity='c1 + c2 s between 0 and 1; clamped inside the contact',
-    source='Wong and Reece 1967; Ding et al. 2010 section 3.1.1 (doi 10.1007/s11771-010-0021-7)',
+    source='Wong and Reece 1967; Ding et al. 2010 section 3.1.1 (doi 10.1007/s11771-010-0021-7); '
+    'skid: measured rows of a single wheel that brakes (docs/models/validation.md)',
     on_inputs=_shift,
     other_forms=(
         Form(
