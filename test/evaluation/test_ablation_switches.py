@@ -1,0 +1,76 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Each treatment of the ablation study can be switched off, and is on again afterwards."""
+
+import importlib
+import sys
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / 'tools'))
+
+import ablation
+from ablations.switches import ROOT, patched, tuned, without_sign
+from ablations.treatments import SIGNS, TREATMENTS
+
+
+def module(name):
+    return importlib.import_module(ROOT + name)
+
+
+@pytest.mark.parametrize('treatment', TREATMENTS, ids=lambda t: t.name)
+def test_there_is_what_is_switched_off(treatment):
+    with treatment.off():
+        pass
+
+
+def test_every_stuck_sign_is_tried():
+    assert set(SIGNS) == {sign.name for sign in module('judgement.stuck.signs').SIGNS}
+
+
+def test_tuning_is_changed_where_components_take_it_and_comes_back():
+    process = module('filter.speed_process')
+    defaults = process.SpeedProcess.__init__.__defaults__
+    with tuned('filter.speed_process:SpeedTuning', rim_change=0.0)():
+        changed = [d for d in process.SpeedProcess.__init__.__defaults__ if d is not None]
+        assert [d.rim_change for d in changed if hasattr(d, 'rim_change')] == [0.0]
+    assert process.SpeedProcess.__init__.__defaults__ == defaults
+    with pytest.raises(TypeError), tuned('filter.speed_process:SpeedTuning', no_such=0.0)():
+        pass
+
+
+def test_sign_is_gone_for_the_monitor_and_comes_back():
+    signs, monitor = module('judgement.stuck.signs'), module('judgement.stuck.monitor')
+    with without_sign('stall')():
+        assert 'stall' not in {sign.name for sign in monitor.SIGNS}
+    assert monitor.SIGNS is signs.SIGNS
+    with pytest.raises(LookupError), without_sign('no_such')():
+        pass
+
+
+def test_patch_wants_what_is_there():
+    with pytest.raises(AttributeError), patched('filter.torque:ForceRows.no_such', None)():
+        pass
+
+
+def row(treatment, drive, world, slip, **more):
+    figures = {'slip_square': 100.0 * slip**2, 'slip_count': 100.0, 'covered': 95.0, **more}
+    return {'treatment': treatment, 'drive': drive, 'world': world, **figures}
+
+
+def test_table_says_what_earns_its_place():
+    useful, idle = TREATMENTS[0].name, TREATMENTS[1].name
+    rows = {ablation.AS_IT_IS: {}, useful: {}, idle: {}}
+    for i, base in enumerate((0.02, 0.03, 0.05, 0.04)):
+        for world in ('own', 'rival'):
+            name = f'{world} {i}'
+            rows[ablation.AS_IT_IS][name] = row('', name, world, base)
+            rows[useful][name] = row('', name, world, base * (1.5 if world == 'rival' else 1.0))
+            rows[idle][name] = row('', name, world, base * 1.001)
+    text = ablation.report(rows)
+    lines = {line.split('|')[2].strip(): line for line in text.splitlines() if line.count('|') > 5}
+    assert '+50.0 ± 0.0' in lines[useful] and lines[useful].rstrip().endswith('| yes |')
+    assert '+0.1 ± 0.0' in lines[idle] and 'yes' not in lines[idle]
+    assert text.splitlines()[-1].endswith(f'{idle}.')
+    assert useful not in text.splitlines()[-1]

@@ -1,0 +1,135 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Ways to switch off a part of the estimator for a while, from outside, by name.
+
+A switch names what it changes; what is not there is an error, so that the list of treatments
+cannot outlive them unseen.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+import inspect
+import pkgutil
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager
+from dataclasses import replace
+from typing import Any
+
+import wheel_terra_estimator.estimation as estimation
+
+Switch = Callable[[], AbstractContextManager[None]]
+ROOT = 'wheel_terra_estimator.estimation.'
+
+
+def tuned(place: str, **values: Any) -> Switch:
+    """Return a switch that gives a tuning dataclass (`module:Class`) other numbers.
+
+    The defaults of every function and every name of the estimator that hold an instance of the
+    class are replaced, wherever the instance stands.
+    """
+
+    @contextlib.contextmanager
+    def switched() -> Iterator[None]:
+        kind = _object(place)
+        old = [_swap(holder, kind, values) for holder in _holders()]
+        undo = [u for found in old for u in found]
+        if not undo:
+            raise LookupError(f'{place}: no default holds an instance of it')
+        try:
+            yield
+        finally:
+            for restore in reversed(undo):
+                restore()
+
+    return switched
+
+
+def patched(place: str, value: Any) -> Switch:
+    """Return a switch that replaces a function, a method or a constant (`module:name.name`)."""
+
+    @contextlib.contextmanager
+    def switched() -> Iterator[None]:
+        module, _, path = place.partition(':')
+        *parents, name = path.split('.')
+        owner: Any = importlib.import_module(ROOT + module)
+        for parent in parents:
+            owner = getattr(owner, parent)
+        kept = inspect.getattr_static(owner, name)
+        setattr(owner, name, value)
+        try:
+            yield
+        finally:
+            setattr(owner, name, kept)
+
+    return switched
+
+
+def without_sign(name: str) -> Switch:
+    """Return a switch that leaves a stuck sign out."""
+
+    @contextlib.contextmanager
+    def switched() -> Iterator[None]:
+        signs = _object('judgement.stuck.signs:SIGNS')
+        left = tuple(sign for sign in signs if sign.name != name)
+        if len(left) == len(signs):
+            raise LookupError(f'no sign {name!r}')
+        holders = [m for m in _modules() if getattr(m, 'SIGNS', None) is signs]
+        for module in holders:
+            module.SIGNS = left
+        try:
+            yield
+        finally:
+            for module in holders:
+                module.SIGNS = signs
+
+    return switched
+
+
+def _object(place: str) -> Any:
+    module, _, name = place.partition(':')
+    return getattr(importlib.import_module(ROOT + module), name)
+
+
+def _modules() -> list[Any]:
+    found = pkgutil.walk_packages(estimation.__path__, ROOT)
+    return [importlib.import_module(info.name) for info in found]
+
+
+def _holders() -> Iterator[Any]:
+    """Yield modules, and the functions of the estimator with those of its classes."""
+    for module in _modules():
+        yield module
+        for member in vars(module).values():
+            if getattr(member, '__module__', None) != module.__name__:
+                continue
+            if inspect.isfunction(member):
+                yield member
+            elif inspect.isclass(member):
+                for value in vars(member).values():
+                    inner = getattr(value, '__func__', value)  # of a class method
+                    if inspect.isfunction(inner):
+                        yield inner
+
+
+def _swap(holder: Any, kind: type, values: dict[str, Any]) -> list[Callable[[], None]]:
+    """Replace the instances of a class that a holder has; return what undoes it."""
+
+    def other(value: Any) -> Any:
+        return replace(value, **values) if isinstance(value, kind) else value
+
+    undo: list[Callable[[], None]] = []
+    if inspect.isfunction(holder):
+        defaults, by_name = holder.__defaults__ or (), holder.__kwdefaults__ or {}
+        if any(isinstance(v, kind) for v in (*defaults, *by_name.values())):
+            undo.append(lambda: setattr(holder, '__defaults__', defaults or None))
+            undo.append(lambda: setattr(holder, '__kwdefaults__', by_name or None))
+            holder.__defaults__ = tuple(map(other, defaults)) or None
+            holder.__kwdefaults__ = {k: other(v) for k, v in by_name.items()} or None
+        return undo
+    for name, value in list(vars(holder).items()):
+        if isinstance(value, kind):
+            undo.append(lambda name=name, value=value: setattr(holder, name, value))
+            setattr(holder, name, other(value))
+    return undo

@@ -1,0 +1,151 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Special treatments of the estimator, each with the way to switch it off."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from ablations.switches import Switch, patched, tuned, without_sign
+
+NEVER = 1e9
+
+
+@dataclass(frozen=True)
+class Treatment:
+    """One special treatment; `warnings_only` where it can change nothing but ``~/stuck``."""
+
+    name: str
+    group: str
+    off: Switch
+    warnings_only: bool = False
+
+
+def _nothing(*_: Any, **__: Any) -> None:
+    return None
+
+
+def _plain_row(self: Any, ekf: Any, row: Any) -> Any:
+    return row
+
+
+def _speed(**values: Any) -> Switch:
+    return tuned('filter.speed_process:SpeedTuning', **values)
+
+
+def _reference(**values: Any) -> Switch:
+    return tuned('filter.reference:ReferenceTuning', **values)
+
+
+def _turning(**values: Any) -> Switch:
+    return tuned('contacts.turning:TurningTuning', **values)
+
+
+def _pulls(**values: Any) -> Switch:
+    return tuned('contacts.pulls:PullTuning', **values)
+
+
+def _soil(**values: Any) -> Switch:
+    return tuned('filter.soil_process:SoilTuning', **values)
+
+
+def _changes(**values: Any) -> Switch:
+    return tuned('contacts.contact_changes:ChangeTuning', **values)
+
+
+def _sinkage(**values: Any) -> Switch:
+    return tuned('filter.sinkage_process:SinkageTuning', **values)
+
+
+SIGNS = ('digging', 'exhausted', 'ahead', 'held', 'bogging', 'stall', 'labour')
+_OPENING, _GATE, _HOLD = 'process opening', 'gate rule', 'hold'
+_AFTER, _MODEL, _SIGN = 'correction after the update', 'model of a special case', 'stuck sign'
+
+TREATMENTS: tuple[Treatment, ...] = (
+    Treatment('opening on a change of demand', _OPENING, _changes(most_demand_slip=0.0)),
+    Treatment('opening on a change of torque', _OPENING, _changes(most_effort_slip=0.0)),
+    Treatment('opening on a change of turning', _OPENING, _turning(speed_change=0.0)),
+    Treatment('opening where wheels disagree', _OPENING, _speed(rate_noise=NEVER)),
+    Treatment('noise with a change of rim speed', _OPENING, _speed(rim_change=0.0)),
+    Treatment('all openings of the speed', _OPENING, _speed(inflation_rate=0.0)),
+    Treatment(
+        'wider strength at a start', _OPENING, patched('wheel_soil_estimator:_START_STD', 0.0)
+    ),
+    Treatment('wider when a reference is too far off', _OPENING, _reference(fair_nis=NEVER)),
+    Treatment('soft ground is weak', _OPENING, _soil(soft_is_weak=0.0)),
+    Treatment('own stiffness of each wheel', _OPENING, _soil(own_stiffness_walk=0.01)),
+    Treatment(
+        'return to the usual slip', _OPENING, _speed(usual_slip_std=NEVER, usual_length=NEVER)
+    ),
+    Treatment('references beyond the rim speed', _GATE, _reference(beyond_rim=NEVER)),
+    Treatment(
+        'references must agree before they are believed',
+        _GATE,
+        _reference(count=1, count_unwitnessed=1, count_beyond=1),
+    ),
+    Treatment('witness for a reference', _GATE, _reference(count_unwitnessed=2)),
+    Treatment(
+        'force rows weakened by gate and NIS',
+        _GATE,
+        patched('filter.torque:ForceRows.row', _plain_row),
+    ),
+    Treatment(
+        'sinkage readings rejected',
+        _GATE,
+        tuned('filter.sinkage:SinkageUpdateTuning', believed_after=1),
+    ),
+    Treatment(
+        'same ground counts once',
+        _HOLD,
+        patched('wheel_soil_estimator:repetitions', lambda *_: 1.0),
+    ),
+    Treatment(
+        'states considered, not learned',
+        _HOLD,
+        patched('wheel_soil_estimator:considered_entries', lambda *_, **__: []),
+    ),
+    Treatment(
+        'shear model in doubt behind a start',
+        _HOLD,
+        tuned('contacts.contact_age:ContactAgeTuning', start_variance=0.0),
+    ),
+    Treatment(
+        'no force rows before a contact length',
+        _HOLD,
+        patched('contacts.contact_age:ContactAge.settled', property(lambda self: True)),
+    ),
+    Treatment('sinkage tells half of the slip', _HOLD, _sinkage(law_share=1.0)),
+    Treatment('bearing law frozen at high slip', _HOLD, _sinkage(steady_slip=2.0)),
+    Treatment(
+        'jolt at a start undone',
+        _AFTER,
+        patched('filter.speed_process:SpeedProcess.undo_jolt', _nothing),
+    ),
+    Treatment(
+        'least deviation of the speed',
+        _AFTER,
+        patched('filter.speed_process:SpeedProcess.keep_least_variance', _nothing),
+    ),
+    Treatment('pull follows the torque at once', _AFTER, _pulls(excess_gain=0.0)),
+    Treatment(
+        'residual of the balance distributed',
+        _AFTER,
+        patched('contacts.pulls:Pulls.distributed', lambda self, pull, *_: list(pull)),
+    ),
+    Treatment('wider pull of piled soil', _AFTER, _pulls(piled_std=0.0)),
+    Treatment('wider slip in turns', _AFTER, tuned('judgement.slip:SlipTuning', turning_std=0.0)),
+    Treatment('scrub of turns in the force rows', _MODEL, _turning(scrub=0.0)),
+    Treatment('curvature of the ground', _MODEL, _turning(steepest=0.0)),
+    Treatment(
+        'wheels without load',
+        _MODEL,
+        tuned('contacts.unloaded_wheels:UnloadedTuning', hold=NEVER),
+    ),
+    Treatment(
+        'sliding on standing wheels believed',
+        _MODEL,
+        _reference(slide_gaps=0.0, shortest_slide=0.0),
+    ),
+    *(Treatment(f'sign {name}', _SIGN, without_sign(name), warnings_only=True) for name in SIGNS),
+)
