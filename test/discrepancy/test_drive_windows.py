@@ -10,6 +10,8 @@ import pytest
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.discrepancy.drives.windows import (
     GOOD,
+    block_moments,
+    pooled_correlation,
     rows_from_bag,
     rows_from_measurements,
 )
@@ -275,3 +277,41 @@ def test_pathfinder_recording_skids_by_its_radius_error():
     # The stated radius is 6 % too small: wheels that roll seem to skid by that much.
     assert -0.12 < np.mean(rows.columns['slip']) < -0.03
     assert len(rows.windows) >= 5
+
+
+def first_order_blocks(correlation, lengths, seed):
+    """Blocks of one first-order process each, with steps of its stationary variance."""
+    rng = np.random.default_rng(seed)
+    found = []
+    for length in lengths:
+        values = np.empty((length, 1))
+        values[0] = rng.standard_normal()
+        for k in range(1, length):
+            step = np.sqrt(1.0 - correlation**2) * rng.standard_normal()
+            values[k] = correlation * values[k - 1] + step
+        found.append(values)
+    return found
+
+
+@pytest.mark.parametrize('correlation', [0.2, 0.5, 0.8])
+def test_pooled_correlation_does_not_hang_on_the_order_of_blocks(correlation):
+    blocks = first_order_blocks(correlation, [6, 9, 30] * 200, seed=4)
+    found = pooled_correlation(blocks)
+    assert found == pytest.approx(correlation, abs=0.04)
+    shuffled = [blocks[k] for k in np.random.default_rng(1).permutation(len(blocks))]
+    assert pooled_correlation(shuffled) == pytest.approx(found, abs=1e-6)
+    assert pooled_correlation(blocks[::-1]) == pytest.approx(found, abs=1e-6)
+
+
+@pytest.mark.parametrize('length', [4, 12])
+def test_variance_of_the_mean_of_a_block(length):
+    """Against the scatter of the means of many blocks."""
+    blocks = first_order_blocks(0.6, [length] * 4000, seed=7)
+    means = np.var([block.mean() for block in blocks])
+    neighbours, squares, of_mean = block_moments(length, 0.6)
+    assert of_mean == pytest.approx(means, rel=0.08)
+    left = [block - block.mean() for block in blocks]
+    assert np.mean([(d * d).sum() for d in left]) == pytest.approx(squares, rel=0.05)
+    assert np.mean([(d[1:] * d[:-1]).sum() for d in left]) == pytest.approx(
+        neighbours, abs=0.05 * squares
+    )

@@ -46,6 +46,9 @@ from wheel_terra_estimator.terramechanics.kinematics import slip_ratio
 
 FloatArray = NDArray[np.float64]
 
+_GREATEST_CORRELATION = 0.95  # of neighbouring segments
+_HALVINGS = 30
+
 LEAST_PASSAGES = 10  # lug passages in a window
 LEAST_DURATION = 4.0  # [s]
 LEAST_SEGMENTS = 8  # into which a window is cut to judge drift and scatter
@@ -380,22 +383,52 @@ def _drifts(values: FloatArray, allowed: float | np.floating) -> bool:
     return bool(np.any((np.abs(parted) > float(allowed)) & (np.abs(parted) > 3 * error)))
 
 
-def _correlation(blocks: Iterable[FloatArray]) -> float:
-    """Return the lag-one correlation within blocks (k, n), pooled, corrected for shortness."""
+def block_moments(length: int, correlation: float) -> tuple[float, float, float]:
+    """Moments of a first-order process of variance 1 in a block that lost its mean.
+
+    Returns
+    -------
+    tuple of float
+        Expected sum of products of neighbours, expected sum of squares (both about the block's
+        mean), and the variance of that mean.
+    """
+    place = np.arange(length)
+    covariance = correlation ** np.abs(place[:, None] - place[None, :])
+    to_mean = covariance.mean(axis=1)  # covariance of each with the mean
+    of_mean = float(to_mean.mean())
+    neighbours = correlation - to_mean[1:] - to_mean[:-1] + of_mean
+    return float(neighbours.sum()), length * (1.0 - of_mean), of_mean
+
+
+def pooled_correlation(blocks: Iterable[FloatArray]) -> float:
+    """Return the lag-one correlation within blocks (k, n) of any lengths, pooled.
+
+    The correlation at which the expected sums over all blocks, each with its own length, stand in
+    the ratio of those found: nothing depends on the order of the blocks.
+    """
     above = below = 0.0
-    length = 0
+    columns: Counter[int] = Counter()
     for block in blocks:
         d = block - block.mean(0)
         d = d[:, np.isfinite(d).all(0)]
-        if d.size:
+        if d.size and len(d) > 1:
             above += float((d[1:] * d[:-1]).sum())
             below += float((d * d).sum())
-            length = len(d)
+            columns[len(d)] += d.shape[1]
     if below <= 0.0:
         return 0.0
-    raw = above / below
-    # Expectation of the estimate in blocks of length k: r - (1 + 4 r)/k (Marriott, Pope 1954).
-    return float(np.clip((raw * length + 1) / max(length - 4, 1), 0.0, 0.95))
+
+    def expected(correlation: float) -> float:
+        sums = [(n, block_moments(k, correlation)) for k, n in columns.items()]
+        return sum(n * m[0] for n, m in sums) / sum(n * m[1] for n, m in sums)
+
+    low, high = 0.0, _GREATEST_CORRELATION
+    if above / below <= expected(low):
+        return low
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if above / below > expected(middle) else (low, middle)
+    return 0.5 * (low + high)
 
 
 def _with_deviations(windows: list[Window], configuration: Configuration) -> list[Window]:
@@ -404,11 +437,12 @@ def _with_deviations(windows: list[Window], configuration: Configuration) -> lis
         return []
     settings, sensors = Rover.from_configuration(configuration), configuration.sensors
     names = ('slip', 'torque', 'sinkage', 'pull')
-    correlation = {name: _correlation(w.series[name] for w in windows) for name in names}
-    pooled = {name: _mean(np.array([_variance(w.series[name]) for w in windows])) for name in names}
+    correlation = {name: pooled_correlation(w.series[name] for w in windows) for name in names}
+    pooled = {
+        name: _mean(np.array([_variance(w.series[name], correlation[name]) for w in windows]))
+        for name in names
+    }
     # What white noise of the sensors leaves at best: the scatter must not promise more.
-    duration = np.mean([w.end - w.start for w in windows])
-    imu = max(duration * float(sensors.imu_rate), 1.0)
     least = {
         'torque': 1e-3
         * settings.mass
@@ -416,7 +450,7 @@ def _with_deviations(windows: list[Window], configuration: Configuration) -> lis
         / settings.wheel_count
         * np.mean(settings.rim_radius),
         'sinkage': 5e-5,
-        'pull': settings.mass / settings.wheel_count * float(sensors.specific_force_std) / imu**0.5,
+        'pull': settings.mass / settings.wheel_count * float(sensors.specific_force_std),
     }
     result = []
     for window in windows:
@@ -424,20 +458,24 @@ def _with_deviations(windows: list[Window], configuration: Configuration) -> lis
         for name in names:
             k = window.segments
             # A window's own scatter counts as much as ten degrees of freedom of all windows.
-            variance = (_variance(window.series[name]) * (k - 1) + 10 * pooled[name]) / (k + 9)
             r = correlation[name]
-            std[name] = np.sqrt(variance / k * (1 + r) / (1 - r))
+            own = _variance(window.series[name], r)
+            variance = (own * (k - 1) + 10 * pooled[name]) / (k + 9)
+            std[name] = np.sqrt(variance * block_moments(k, r)[2])
         rim = np.abs(window.rate) * np.asarray(settings.slip_radius)
         std['slip'] = np.maximum(np.maximum(std['slip'], window.reference_std / rim), 2e-3)
+        imu = max((window.end - window.start) * float(sensors.imu_rate), 1.0)
         for name, floor in least.items():
-            std[name] = np.maximum(std[name], floor)
+            std[name] = np.maximum(std[name], floor / (imu**0.5 if name == 'pull' else 1.0))
         result.append(replace(window, std=std))
     return result
 
 
-def _variance(values: FloatArray) -> FloatArray:
+def _variance(values: FloatArray, correlation: float) -> FloatArray:
+    """Variance of a correlated series of which only what is left of its mean is seen."""
     good = np.isfinite(values).all(0)
-    return np.where(good, np.var(np.where(good, values, 0.0), axis=0, ddof=1), np.nan)
+    squares = len(values) * np.var(np.where(good, values, 0.0), axis=0)
+    return np.where(good, squares / block_moments(len(values), correlation)[1], np.nan)
 
 
 def _merge(windows: list[Window], most: int) -> list[Window]:
