@@ -25,7 +25,7 @@ from wheel_terra_estimator.terramechanics.inverse import (
 )
 from wheel_terra_estimator.terramechanics.longitudinal_sinkage import longitudinal_slip_sinkage
 from wheel_terra_estimator.terramechanics.model import WheelSoilModel
-from wheel_terra_estimator.terramechanics.slope_locomotion import SlopeLocomotion
+from wheel_terra_estimator.terramechanics.slope_locomotion import SlopeLocomotion, rover_climb
 
 SMOOTH = replace(WHEEL, lug_height=0.0)
 
@@ -72,6 +72,33 @@ def test_too_steep_is_nan_and_the_greatest_slope_is_the_border() -> None:
     assert wheel.climb(at_20).slip == pytest.approx(0.2, abs=1e-3)
     rolling = wheel.self_propelled()
     assert rolling.drawbar_pull == pytest.approx(0.0, abs=1e-6) and rolling.slip > 0.0
+
+
+def test_a_rover_of_equal_wheels_climbs_like_one_of_them() -> None:
+    slopes = np.radians([-5.0, 0.0, 8.0, 14.0])
+    one = climber().climb(slopes)
+    rover = rover_climb(WheelSoilModel(SAND), WHEEL, [80.0] * 4, slopes)
+    assert rover.slip == pytest.approx(one.slip, abs=1e-9)
+    assert rover.sinkage == pytest.approx(np.tile(one.sinkage[:, None], 4))
+    assert rover.power_number == pytest.approx(one.power_number)
+    assert np.isnan(rover_climb(WheelSoilModel(SAND), WHEEL, [80.0] * 4, [0.9]).slip).all()
+
+
+def test_a_rover_s_wheels_pull_the_weight_together() -> None:
+    """Unequal loads and wheels that run in ruts: the sum is W sin a, none of them by itself."""
+    slopes = np.radians([0.0, 10.0])
+    level = np.array([60.0, 90.0, 90.0])
+    model = WheelSoilModel(SAND, {'multipass': {'stiffening': 0.6}})
+    loads = level * np.cos(slopes)[:, None] + np.outer(np.tan(slopes), [-30.0, 0.0, 30.0])
+    rover = rover_climb(model, WHEEL, loads, slopes, [1, 2, 3])
+    assert rover.drawbar_pull.sum(axis=1) == pytest.approx(240.0 * np.sin(slopes), abs=1e-6)
+    assert np.ptp(rover.drawbar_pull[1]) > 2.0
+    again = model.steady_state(
+        points([rover.slip[1]] * 3, loads[1], slope=slopes[1], pass_number=[1, 2, 3])
+    )
+    assert rover.drawbar_pull[1] == pytest.approx(again.drawbar_pull)
+    virgin, compacted = (rover_climb(model, WHEEL, level, slopes, n).sinkage for n in (1, 3))
+    assert (compacted < virgin).all()
 
 
 def test_slope_gravity_in_the_model_would_count_twice() -> None:
