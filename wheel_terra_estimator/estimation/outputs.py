@@ -32,6 +32,11 @@ _LEAST_VARIANCE = 1e-12  # of a speed [(m/s)^2]
 _UNKNOWN_STD = 1.0  # of a slip velocity [m/s]
 _UNKNOWN_YAW_VARIANCE = 1.0  # [(rad/s)^2]
 _UNLOADED_STD = 1.0  # of the pull of a wheel in the air [N]
+_BELIEVED_LOAD = 0.1
+"""Sum of the loads over the rover's weight below which the specific force is none of a rover on
+its wheels."""
+_LEAST_FORCE_STD = 1e-4
+"""Least deviation of a load or a pull, over a wheel's share of the weight."""
 _NOTHING_AHEAD = WheelForecast(0.0, LONGEST_TIME, NO_ENTRAPMENT_IN_SIGHT)
 
 
@@ -98,8 +103,7 @@ class Outputs:
         variance = np.diagonal(given.covariance)[layout.sinkage]
         sinkage_std = np.sqrt(np.maximum(variance, 0.0) + self._sinkage_zero**2)
         names, soil, soil_std = self.learned_soil(given.mean, given.covariance)
-        load = given.loads.load
-        mean_load_std = rover.load_std * sum(load) / n
+        load_std, pull_std = self._force_deviations(given)
         ahead = given.assessment.wheels or (_NOTHING_AHEAD,) * n
         return EstimateSet(
             stamp=given.stamp,
@@ -108,17 +112,13 @@ class Outputs:
             slip_velocity=np.array(slip_velocity),
             slip_velocity_std=np.array(slip_velocity_std),
             drawbar_pull=np.array(given.pulls.pull),
-            drawbar_pull_std=np.minimum(
-                np.array(given.pulls.std), [w if w > 0 else _UNLOADED_STD for w in load]
-            ),
+            drawbar_pull_std=np.array(pull_std),
             sinkage=given.mean[layout.sinkage].copy(),
             sinkage_std=np.minimum(sinkage_std, rover.rim_radius),
             sinkage_rate=np.array(given.sinkage.rate),
             sinkage_rate_std=np.array(given.sinkage.rate_std),
-            normal_load=np.array(load),
-            normal_load_std=np.array(
-                [mean_load_std if given.loads.force_known else w for w in load]
-            ),
+            normal_load=np.array(given.loads.load),
+            normal_load_std=np.array(load_std),
             slip_class=np.array(
                 [wheel.slip_class.current for wheel in given.slips], dtype=np.uint8
             ),
@@ -169,6 +169,22 @@ class Outputs:
             np.array([entry[1] for entry in entries]),
             np.array([entry[2] for entry in entries]),
         )
+
+    def _force_deviations(self, given: Sources) -> tuple[list[float], list[float]]:
+        """Return the deviations of load and pull of each wheel [N], never 0."""
+        rover, load = self._rover, given.loads.load
+        share = rover.mass * rover.gravity / rover.wheel_count
+        if sum(load) < _BELIEVED_LOAD * rover.mass * rover.gravity:
+            # Upside down, in free fall or wrongly mounted: nothing is known.
+            return [share] * len(load), [share] * len(load)
+        mean_load_std = rover.load_std * sum(load) / len(load)
+        loads = [mean_load_std if given.loads.force_known else w for w in load]
+        pulls = [
+            min(std, w if w > 0.0 else _UNLOADED_STD)
+            for std, w in zip(given.pulls.std, load, strict=True)
+        ]
+        least = _LEAST_FORCE_STD * share
+        return [max(std, least) for std in loads], [max(std, least) for std in pulls]
 
     def _slip_velocity(self, given: Sources) -> tuple[list[float], list[float]]:
         """Return r w - v of each wheel and its deviation [m/s]."""

@@ -63,6 +63,7 @@ class Turning(Component[TurningState]):
     ) -> None:
         super().__init__(TurningState())
         self._rover, self._sensors, self._tuning = rover, sensors, tuning
+        self._curvature_length = max(rover.curvature_length, tuning.least_curvature_length)
         per_cycle = max(sensors.imu_rate * rover.period, 1.0)
         noise = sensors.angular_rate_std / math.sqrt(per_cycle)
         self.yaw_rate_std = math.hypot(
@@ -73,15 +74,14 @@ class Turning(Component[TurningState]):
         self, window: InertialWindow, dt: float, speed: float, fastest_rim: float
     ) -> TurningState:
         """Take the IMU readings of a cycle of length `dt` [s]; speeds in [m/s]."""
-        state, tuning = self.state, self._tuning
+        state = self.state
         if not window.readings:
             self.state = state = state._replace(speed_change=0.0)
             return state
         yaw_rate = self._yaw_rate(window)
         # Nose-up rotation over travel, both forgotten over the length of the rover.
-        length = max(self._rover.curvature_length, tuning.least_curvature_length)
         travel = speed * dt
-        keep = math.exp(-abs(travel) / length)
+        keep = math.exp(-abs(travel) / self._curvature_length)
         state = state._replace(
             yaw_rate=yaw_rate,
             rotation=keep * state.rotation - window.pitch_rate / window.readings * dt,
@@ -96,7 +96,7 @@ class Turning(Component[TurningState]):
     def curvature(self, speed: float) -> float:
         """Return slope gained per travel [rad/m]: front wheels may climb steeper ground."""
         state, tuning = self.state, self._tuning
-        if abs(state.travel) < tuning.least_travel_share * self._rover.curvature_length:
+        if abs(state.travel) < tuning.least_travel_share * self._curvature_length:
             return 0.0
         curvature = clipped(state.rotation / state.travel, -tuning.steepest, tuning.steepest)
         # What the gyro's zero makes of it, against the curvature of common ground.

@@ -1,0 +1,73 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Rovers and mountings at the edge: one wheel, an IMU upside down."""
+
+import numpy as np
+import pytest
+from parts import SAND, Parts
+
+from wheel_terra_estimator.configuration import reader
+from wheel_terra_estimator.estimation.contacts.turning import Turning
+from wheel_terra_estimator.estimation.inputs.inertial import InertialWindow
+from wheel_terra_estimator.estimation.measurements import (
+    InertialReading,
+    ReferenceVelocity,
+    StepInputs,
+    WheelOdometry,
+)
+from wheel_terra_estimator.estimation.wheel_soil_estimator import WheelSoilEstimator
+
+ONE_WHEEL = ['hit_wh3', 'hit_lss1']
+START = 10**12
+SECOND = 10**9
+
+
+def run(estimator, seconds, wheels, up=9.8, gap=0.1, rate=0.4):
+    sets = []
+    for i in range(round(seconds / gap)):
+        stamp = START + round(i * gap * SECOND)
+        given = StepInputs(
+            wheel_odometry=WheelOdometry(stamp, np.full(wheels, rate), np.full(wheels, 2.0)),
+            inertial=InertialReading(stamp, np.array([0.1, 0.0, up]), np.zeros(3), None),
+            reference=ReferenceVelocity(stamp, 0.04, 1e-6) if i % 10 == 5 else None,
+        )
+        estimator.step(stamp, given)
+        sets.append(estimator.estimates())
+    return sets
+
+
+def test_a_rover_with_one_axle_has_no_curvature_before_it_has_moved():
+    parts = Parts(reader.load(ONE_WHEEL))
+    turning = Turning(parts.rover, parts.sensors)
+    assert turning.curvature(0.05) == 0.0
+    turning.update(InertialWindow(5, 0.0, 0.0, 49.0), 0.1, 0.0, 0.05)
+    assert turning.curvature(0.05) == 0.0
+
+
+@pytest.mark.parametrize('gap', [0.1, 2.0])
+@pytest.mark.parametrize('rate', [0.0, 0.4, -3.0])
+def test_a_rig_with_one_wheel_works(gap, rate):
+    sets = run(WheelSoilEstimator(reader.load(ONE_WHEEL)), 20.0, 1, gap=gap, rate=rate)
+    for s in sets:
+        for name, value in vars(s).items():
+            if isinstance(value, np.ndarray):
+                assert np.isfinite(value).all(), name
+                assert not name.endswith('_std') or (value > 0.0).all(), name
+    if rate > 0.0:
+        rim = rate * float(reader.load(ONE_WHEEL).wheels.slip_radius[0])
+        assert sets[-1].slip[0] == pytest.approx(1.0 - 0.04 / rim, abs=0.02)
+
+
+def test_loads_of_an_imu_upside_down_are_not_known():
+    sets = run(WheelSoilEstimator(reader.load(SAND)), 5.0, 6, up=-9.8)
+    rover = reader.load(SAND).rover
+    share = rover.mass * rover.gravity / 6
+    assert sets[-1].normal_load_std == pytest.approx([share] * 6)
+    assert sets[-1].drawbar_pull_std == pytest.approx([share] * 6)
+
+
+def test_loads_have_a_deviation_even_where_the_load_model_is_said_to_be_exact():
+    exact = reader.load(SAND, ['rover.load_std:=0.0'])
+    for s in run(WheelSoilEstimator(exact), 3.0, 6):
+        assert (s.normal_load_std > 0.0).all()
+        assert (s.drawbar_pull_std > 0.0).all()
