@@ -64,6 +64,19 @@ def test_agrees_with_the_quadrature_at_its_own_steady_state(rover, models, slip)
     assert bearing.load == pytest.approx(load, rel=0.15)
 
 
+@pytest.mark.parametrize('enabled', ['true', 'false'])
+def test_the_onset_of_the_mound_is_that_of_the_configuration(enabled):
+    keys = [f'effects.soil_mound.enabled:={enabled}', 'effects.soil_mound.onset:=0.7']
+    late = WheelModels(reader.load(['generic_six_wheel', 'dry_sand_ding2015'], keys))
+    for ratio, pushes in ((0.5, False), (0.31, False), (0.29, True), (0.1, True)):
+        without, pushed = (forces(late, ratio=ratio, mound=m) for m in (0.0, 0.5))
+        assert (pushed.pull > without.pull) is pushes, ratio
+    # At slip 1 the mound is whole, wherever it began.
+    early = WheelModels(reader.load(['generic_six_wheel', 'dry_sand_ding2015'], keys[:1]))
+    if enabled == 'false':
+        assert forces(late, ratio=0.0).pull == pytest.approx(forces(early, ratio=0.0).pull)
+
+
 def test_mound_pushes_only_above_its_onset(models):
     low = forces(models, ratio=0.7, mound=0.0), forces(models, ratio=0.7, mound=0.5)
     high = forces(models, ratio=0.1, mound=0.0), forces(models, ratio=0.1, mound=0.5)

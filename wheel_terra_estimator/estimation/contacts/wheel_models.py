@@ -35,7 +35,6 @@ _LEAST_SINKAGE = 1e-4  # [m]
 _MOST_SINKAGE = 0.95  # of the radius: the bearing law ends at the hub
 _LEAST_DEPTH = 1e-6  # at the angle of greatest stress [m]
 _LEAST_MODULUS = 1.0  # bearing modulus [N/m^(n+2)]
-_MOUND_ONSET = 0.4  # slip at which soil begins to pile up behind a wheel
 
 
 class WheelState(NamedTuple):
@@ -98,6 +97,8 @@ class WheelModels:
         self._exponent = float(soil.sinkage_exponent)
         self._peak_ratio = float(soil.peak_stress_ratio)
         self._leaving_ratio = float(soil.leaving_angle_ratio)
+        # Slip above which soil may pile up behind a wheel, whether the effect is configured or not.
+        self._mound_span = 1.0 - float(configuration.flat()['effects.soil_mound.onset'])
         self._passes = [float(p) for p in wheels.passes]
         self._slip_radius = [float(r) for r in wheels.slip_radius]
         self._radius = [float(r) for r in wheels.radius]
@@ -142,7 +143,7 @@ class WheelModels:
         factor = math.exp(strength)
         cohesion, friction = self._cohesion * factor, self._tan_friction * factor
         shear_modulus = self._shear_modulus * math.exp(modulus)
-        span = 1.0 - _MOUND_ONSET
+        span = self._mound_span
         high = max(span - ratio, 0.0) / span
         depth = min(max(sinkage, _LEAST_SINKAGE), self._radius[wheel])
         angle = math.acos(1.0 - depth / self._radius[wheel])
