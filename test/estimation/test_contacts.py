@@ -223,7 +223,10 @@ def test_torque_over_radius_is_the_pull_of_a_wheel_that_holds_a_standing_rover(p
 
 
 def forces_at(parts, slip, strength=0.0):
-    ekf, linearisation = parts.filter(), Linearisation(parts.rover, parts.layout, parts.models)
+    ekf, linearisation = (
+        parts.filter(),
+        Linearisation(parts.rover, parts.layout, parts.models, 0.05),
+    )
     ekf.mean[SPEED] = (1.0 - slip) * 0.05
     ekf.mean[SHEAR_STRENGTH] = strength
     loads = WheelLoads(parts.rover).state.load
@@ -256,7 +259,7 @@ def test_rows_are_the_derivatives_of_torque_and_pull(parts):
 
 
 def test_every_slope_is_smoothed_until_the_contact_changes(parts):
-    linearisation = Linearisation(parts.rover, parts.layout, parts.models)
+    linearisation = Linearisation(parts.rover, parts.layout, parts.models, 0.05)
     forces = [
         parts.models.forces(0, WheelState(ratio, 0.02, 200.0, 0.0, 0.0, rim_speed=0.05))
         for ratio in (0.95, 0.9, 0.1)

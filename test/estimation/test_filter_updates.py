@@ -261,7 +261,7 @@ def test_softer_ground_is_weaker_ground_where_no_torque_says_how_weak(parts):
 
 
 def forces(parts, ekf):
-    linearisation = Linearisation(parts.rover, parts.layout, parts.models)
+    linearisation = Linearisation(parts.rover, parts.layout, parts.models, 0.05)
     loads = WheelLoads(parts.rover).state.load
     found = linearisation.update(
         ekf.mean,
@@ -297,6 +297,36 @@ def test_torques_are_rows_of_turning_wheels_that_were_read(parts, ekf):
     assert rows[0].variance == pytest.approx(noise, rel=1e-3)
     many, _ = torque_rows(parts, ekf, 0.3, repeats=30.0)
     assert many[0].variance == pytest.approx(30.0 * noise, rel=1e-3)
+
+
+def test_the_error_of_a_measured_leaving_angle_weakens_torque_and_balance(parts, ekf):
+    """With 0.05 rad a row is as uncertain as half of what 0.1 rad change the force."""
+    loads = WheelLoads(parts.rover).state.load
+    balance = ForceBalance(parts.configuration, parts.rover, parts.sensors, parts.layout)
+    variances, torques, pulls = [], [], []
+    for std, angle in ((1e-9, -0.2), (0.05, -0.2), (1e-9, -0.25), (0.05, NAN), (1e-9, NAN)):
+        found = Linearisation(parts.rover, parts.layout, parts.models, std).update(
+            ekf.mean,
+            turns=(True,) * 6,
+            yaw_rate=0.0,
+            rims=FORWARD,
+            loads=loads,
+            leaving_angles=(angle,) * 6,
+        )
+        given = {'model_variance': (0.0,) * 6, 'repeats': 1.0}
+        rows = TorqueUpdate(parts.configuration, parts.rover, parts.sensors).update(
+            ekf, found, torque=tuple(found.torque.tolist()), turning=(True,) * 6, **given
+        )
+        total = balance.sum_of_pulls((0.0, 0.0, 9.8), 5, loads, 0.0)
+        along = total._replace(along=float(found.pull.sum()))
+        row = balance.update(ekf, found, along, stationary=[None] * 6, loads=loads, **given)
+        variances.append((rows[0].variance, row.variance))
+        torques.append(float(found.torque[0]))
+        pulls.append(found.pull)
+    sure, unsure, _, unmeasured, without = variances
+    assert unsure[0] - sure[0] == pytest.approx((torques[2] - torques[0]) ** 2, rel=1e-6)
+    assert unsure[1] - sure[1] == pytest.approx(float(((pulls[2] - pulls[0]) ** 2).sum()), rel=0.01)
+    assert unmeasured == without
 
 
 def test_turning_weakens_a_torque(parts, ekf):

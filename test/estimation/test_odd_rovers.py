@@ -11,6 +11,7 @@ from wheel_terra_estimator.estimation.contacts.turning import Turning
 from wheel_terra_estimator.estimation.inputs.inertial import InertialWindow
 from wheel_terra_estimator.estimation.measurements import (
     InertialReading,
+    LeavingAngleReading,
     ReferenceVelocity,
     StepInputs,
     WheelOdometry,
@@ -71,3 +72,28 @@ def test_loads_have_a_deviation_even_where_the_load_model_is_said_to_be_exact():
     for s in run(WheelSoilEstimator(exact), 3.0, 6):
         assert (s.normal_load_std > 0.0).all()
         assert (s.drawbar_pull_std > 0.0).all()
+
+
+@pytest.mark.parametrize('measured', [True, False])
+def test_the_error_of_the_rear_camera_counts_where_it_measures(measured):
+    deviations = []
+    for degrees in (0.1, 10.0):
+        configuration = reader.load(SAND, [f'sensors.leaving_angle_std_deg:={degrees}'])
+        estimator = WheelSoilEstimator(configuration)
+        for i in range(80):
+            stamp = START + i * SECOND // 10
+            angle = LeavingAngleReading(stamp, np.full(6, -0.2)) if measured else None
+            estimator.step(
+                stamp,
+                StepInputs(
+                    wheel_odometry=WheelOdometry(stamp, np.full(6, 0.4), np.full(6, 12.0)),
+                    inertial=InertialReading(stamp, np.array([0.1, 0, 9.8]), np.zeros(3), None),
+                    leaving_angle=angle,
+                    reference=ReferenceVelocity(stamp, 0.045, 1e-6) if i % 10 == 5 else None,
+                ),
+            )
+        deviations.append(estimator.estimates().drawbar_pull_std.mean())
+    if measured:
+        assert deviations[1] > 1.1 * deviations[0]
+    else:
+        assert deviations[1] == deviations[0]

@@ -97,6 +97,7 @@ class SensorFigures:
     orientation_std: float  # [rad]
     sinkage_std: float  # [m]
     sinkage_zero_std: float
+    leaving_angle_std: float  # [rad]
     reference_std: float  # [m/s]
     reference_std_floor: float
 

@@ -150,7 +150,8 @@ class WheelSoilEstimator:
         self._unloaded = UnloadedWheels(rover, sensors)
         self._demand_change = DemandChange(rover, sensors)
         self._torque_change = TorqueChange(rover, sensors)
-        self._linearisation = Linearisation(rover, layout, models)
+        angle_std = sensors.leaving_angle_std * self._leaving_angles.noise_share
+        self._linearisation = Linearisation(rover, layout, models, angle_std)
         self._stationary = StationaryWheels(rover, sensors, layout, models)
         self._pulls = Pulls(rover, sensors, level)
         # The filter: process and measurements.

@@ -63,6 +63,8 @@ class ContactForces(NamedTuple):
     torque: FloatArray  # (n,) [N m]
     pull_rows: FloatArray  # (n, size)
     torque_rows: FloatArray  # (n, size)
+    pull_noise: FloatArray  # (n,) [N]: what the error of a measured leaving angle makes of it
+    torque_noise: FloatArray  # (n,) [N m]
 
     def moved_to(self, state: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return pulls and torques at another state, to first order."""
@@ -73,6 +75,15 @@ class ContactForces(NamedTuple):
 class Linearisation(Component[SlopeState]):
     """Evaluates the wheel models once per cycle, with smoothed derivatives.
 
+    Parameters
+    ----------
+    rover, layout, models
+        Constants of the rover, layout of the state, wheel models.
+    leaving_angle_std : float
+        Of a measured leaving angle as it is used, smoothed [rad].
+
+    Notes
+    -----
     The curves bend within the uncertainty of the state. A slope taken at the noisy estimate is
     correlated with its error, which pulls the slip to the flat side and lets strength and K run
     along T(s) = const to their bounds; a smoothed one is not (docs/estimation/design.md).
@@ -83,11 +94,13 @@ class Linearisation(Component[SlopeState]):
         rover: Rover,
         layout: StateLayout,
         models: WheelModels,
+        leaving_angle_std: float,
         tuning: LinearisationTuning = LinearisationTuning(),
     ) -> None:
         none = (None,) * rover.wheel_count
         super().__init__(SlopeState(none, none))
         self._rover, self._layout, self._models, self._tuning = rover, layout, models, tuning
+        self._leaving_angle_std = leaving_angle_std
         self.least_load = tuning.least_load
 
     def turning(self, rims: Floats, loads: Floats) -> tuple[bool, ...]:
@@ -123,7 +136,7 @@ class Linearisation(Component[SlopeState]):
             Of each wheel [m/s], [N], [rad]; nan = unknown.
         """
         rover, layout = self._rover, self._layout
-        pull, torque = np.zeros((2, rover.wheel_count))
+        pull, torque, pull_noise, torque_noise = np.zeros((4, rover.wheel_count))
         rows = np.zeros((2, rover.wheel_count, layout.size))
         torque_slopes, pull_slopes = list(self.state.torque), list(self.state.pull)
         speed, strength = float(x[SPEED]), x[SHEAR_STRENGTH]
@@ -134,20 +147,20 @@ class Linearisation(Component[SlopeState]):
                 continue
             rim = abs(rims[i])
             direction = 1.0 if rims[i] > 0.0 else -1.0
-            forces = self._models.forces(
-                i,
-                WheelState(
-                    direction * (speed - yaw_rate * rover.lateral[i]) / rim,
-                    float(x[layout.sinkage.start + i]),
-                    loads[i],
-                    float(strength + x[layout.shear_error.start + i]),
-                    modulus,
-                    centroid,
-                    mound,
-                    rim,
-                    leaving_angles[i],
-                ),
+            wheel = WheelState(
+                direction * (speed - yaw_rate * rover.lateral[i]) / rim,
+                float(x[layout.sinkage.start + i]),
+                loads[i],
+                float(strength + x[layout.shear_error.start + i]),
+                modulus,
+                centroid,
+                mound,
+                rim,
+                leaving_angles[i],
             )
+            forces = self._models.forces(i, wheel)
+            if not isnan(wheel.leaving_angle):
+                torque_noise[i], pull_noise[i] = self._noise_of_angle(i, wheel, forces)
             pull[i], torque[i] = direction * forces.pull, direction * forces.torque
             moment = loads[i] * rover.shear_radius[i]
             torque_slopes[i], pull_slopes[i] = by_torque, by_pull = self.smoothed(
@@ -156,7 +169,15 @@ class Linearisation(Component[SlopeState]):
             self._fill(rows[0, i], i, by_pull, direction, rim)
             self._fill(rows[1, i], i, by_torque, direction, rim)
         self.state = SlopeState(tuple(torque_slopes), tuple(pull_slopes))
-        return ContactForces(x.copy(), pull, torque, rows[0], rows[1])
+        return ContactForces(x.copy(), pull, torque, rows[0], rows[1], pull_noise, torque_noise)
+
+    def _noise_of_angle(
+        self, wheel: int, state: WheelState, forces: WheelForces
+    ) -> tuple[float, float]:
+        """Return what one deviation of the leaving angle makes of torque and pull."""
+        angle = state.leaving_angle - self._leaving_angle_std
+        there = self._models.forces(wheel, state._replace(leaving_angle=angle))
+        return abs(there.torque - forces.torque), abs(there.pull - forces.pull)
 
     def smoothed(
         self,

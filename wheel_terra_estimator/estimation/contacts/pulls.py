@@ -166,6 +166,7 @@ class Pulls(Component[PullState]):
                 own[i] = self._own_variance(
                     i, pull[i], torque[i], load, slips[i], level=not loads.force_known
                 )
+                own[i] += forces.pull_noise[i] ** 2
                 std[i] = math.sqrt(max(float(joint[i, i]), 0.0) + own[i])
         model_pull = tuple(pull)
         if forces is not None and total is not None:

@@ -99,6 +99,7 @@ class ForceBalance(ForceRows):
             if standing is None:
                 pull_sum += float(forces.pull[i])
                 open_variance += model_variance[i] * (self._tuning.model_share * load) ** 2
+                open_variance += float(forces.pull_noise[i]) ** 2
             else:
                 pull_sum += standing.expected
                 open_variance += standing.std**2

@@ -78,5 +78,6 @@ class TorqueUpdate(ForceRows):
             model = float(forces.torque[i])
             noise = self._variance + (self._load_std * model) ** 2 + _FLOOR_VARIANCE
             variance = repeats * noise + model_variance[i] * model**2
+            variance += float(forces.torque_noise[i]) ** 2
             rows.append(self.row(ekf, Row(reading - model, forces.torque_rows[i], variance)))
         return rows

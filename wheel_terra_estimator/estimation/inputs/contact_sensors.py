@@ -80,6 +80,12 @@ class LeavingAngleInput(Component[LeavingAngleState]):
                 when[i] = time
         self.state = LeavingAngleState(tuple(angle), tuple(when))
 
+    @property
+    def noise_share(self) -> float:
+        """Deviation of a smoothed angle over that of one reading [-]: sqrt(g / (2 - g))."""
+        gain = self._tuning.gain
+        return math.sqrt(gain / (2.0 - gain))
+
     def angles(self, time: float) -> Floats:
         """Return the leaving angle of each wheel [rad]; nan where there is none of late."""
         state, longest = self.state, self._tuning.longest_age
