@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import MISSING, dataclass, fields
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.terramechanics.closed_form import coefficients, peak_stresses
@@ -98,7 +98,8 @@ class WheelModels:
         self._peak_ratio = float(soil.peak_stress_ratio)
         self._leaving_ratio = float(soil.leaving_angle_ratio)
         # Slip above which soil may pile up behind a wheel, whether the effect is configured or not.
-        self._mound_span = 1.0 - float(configuration.flat()['effects.soil_mound.onset'])
+        onset = cast('float', configuration.flat()['effects.soil_mound.onset'])
+        self._mound_span = 1.0 - onset
         self._passes = [float(p) for p in wheels.passes]
         self._slip_radius = [float(r) for r in wheels.slip_radius]
         self._radius = [float(r) for r in wheels.radius]
