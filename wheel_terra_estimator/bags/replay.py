@@ -33,6 +33,8 @@ LARGEST_ARRIVAL_LOG = 256 * 2**20
 """Size [byte] of an arrival log of ten hours."""
 
 _STAMP = re.compile(r'-?[0-9]{1,19}')
+TRUTH_TOPICS = ('/ground_truth/', '/truth/')
+"""Topics that are compared with the estimates, never heard."""
 
 RESET = 'reset'
 """Line of an arrival log for a call of ``~/reset``."""
@@ -59,6 +61,7 @@ def replay(
     *,
     overwrite: bool = False,
     arrival: Path | None = None,
+    distrust: str = '',
 ) -> Replay:
     """Run the estimator over an open bag.
 
@@ -76,6 +79,8 @@ def replay(
         Whether an earlier output is replaced.
     arrival : Path, optional
         Log of a live node (parameter ``record_arrival``): hear the messages in that order.
+    distrust : str
+        What makes slip meaningless, see `Pipeline`.
 
     Raises
     ------
@@ -83,7 +88,7 @@ def replay(
         Input that cannot be used, an output path that is taken.
     """
     reader = MeasurementReader(bag, remaps, configuration)
-    pipeline = Pipeline(configuration)
+    pipeline = Pipeline(configuration, distrust=distrust)
     recorder = HistoryRecorder(pipeline.names)
     messages = _in_order_of(arrival, reader) if arrival else reader.messages()
     with ExitStack() as stack:
@@ -132,7 +137,9 @@ def _notes(bag: Bag, reader: MeasurementReader, interrupted: bool) -> Iterator[s
     if reader.absent:
         yield f'not in the bag: {", ".join(reader.absent)}'
     used = set(reader.topics.values())
-    unknown = [t for t in bag.topics.values() if t.name not in used]
+    unknown = [
+        t for t in bag.topics.values() if t.name not in used and not t.name.startswith(TRUTH_TOPICS)
+    ]
     if unknown:
         count = sum(topic.message_count for topic in unknown)
         yield f'{count} messages not used, on {", ".join(topic.name for topic in unknown)}'

@@ -70,7 +70,9 @@ def _likeliest(name: str, topics: Sequence[str]) -> str | None:
     return None
 
 
-def read_series(bag: Bag, remaps: Mapping[str, str], name: str) -> Recording:
+def read_series(
+    bag: Bag, remaps: Mapping[str, str], name: str, most: int = MOST_MESSAGES
+) -> Recording:
     """Read the input topics of an open bag.
 
     Parameters
@@ -81,6 +83,8 @@ def read_series(bag: Bag, remaps: Mapping[str, str], name: str) -> Recording:
         Estimator's topic to the bag's.
     name : str
         What reports call the recording.
+    most : int
+        Messages of a topic that are kept; the rest of a longer recording is not looked at.
     """
     from rosbags.typesys import Stores, get_typestore
 
@@ -93,7 +97,7 @@ def read_series(bag: Bag, remaps: Mapping[str, str], name: str) -> Recording:
     shortened = False
     for log_time, topic, data in bag.messages([chosen[own] for own in collectors]):
         collector = collectors[by_topic[topic]]
-        if len(collector.stamps) >= MOST_MESSAGES:
+        if len(collector.stamps) >= most:
             shortened = True
             continue
         try:

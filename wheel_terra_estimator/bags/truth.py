@@ -55,7 +55,22 @@ def read_truth(bag: Bag, remaps: Mapping[str, str], configuration: Configuration
     From a body velocity (``/truth/odometry``) the true slip of each wheel follows with the wheel
     rates and the yaw rate of the IMU.
     """
-    names = configuration.wheels.names
+    simulated = read_simulated_truth(bag, configuration.wheels.names)
+    if simulated is not None and simulated.source != BODY_VELOCITY:
+        return simulated
+    if BODY_VELOCITY in bag.topics:
+        odometry = list(_messages(bag, BODY_VELOCITY))
+        velocity = _column([(stamp_of(m), [m.twist.twist.linear.x]) for m in odometry])
+        if velocity.stamp.size:
+            slip_truth = _slip_from_velocity(
+                velocity, MeasurementReader(bag, remaps, configuration), configuration
+            )
+            return Truth(BODY_VELOCITY, velocity, slip_truth, None, None)
+    return None
+
+
+def read_simulated_truth(bag: Bag, names: tuple[str, ...]) -> Truth | None:
+    """Return the truth that needs no rover file: a simulator's, or a true body velocity alone."""
     if '/ground_truth/twist' in bag.topics:
         slips = list(_messages(bag, '/ground_truth/slip'))
         sinkages = list(_messages(bag, '/ground_truth/sinkage'))
@@ -70,11 +85,7 @@ def read_truth(bag: Bag, remaps: Mapping[str, str], configuration: Configuration
     if BODY_VELOCITY in bag.topics:
         odometry = list(_messages(bag, BODY_VELOCITY))
         velocity = _column([(stamp_of(m), [m.twist.twist.linear.x]) for m in odometry])
-        if velocity.stamp.size:
-            slip_truth = _slip_from_velocity(
-                velocity, MeasurementReader(bag, remaps, configuration), configuration
-            )
-            return Truth(BODY_VELOCITY, velocity, slip_truth, None, None)
+        return Truth(BODY_VELOCITY, velocity, None, None, None) if velocity.stamp.size else None
     return None
 
 

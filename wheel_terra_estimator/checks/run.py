@@ -32,7 +32,7 @@ from wheel_terra_estimator.checks.rover_facts import RoverFacts
 from wheel_terra_estimator.checks.series import Recording
 from wheel_terra_estimator.configuration.configuration import Configuration
 
-SURE = 0.5
+SURE = 0.9
 """Confidence from which a finding counts against the estimates."""
 
 
@@ -162,4 +162,5 @@ def _rest(evidence: Evidence, report: CheckReport) -> Evidence:
 
 def spoils_slip(finding: Finding) -> bool:
     """Return whether slip classes are worth nothing until this is mended."""
-    return finding.kind in SPOILS_SLIP and finding.confidence >= SURE
+    concerns_motion = not finding.topic.endswith('sinkage')
+    return finding.kind in SPOILS_SLIP and concerns_motion and finding.confidence >= SURE

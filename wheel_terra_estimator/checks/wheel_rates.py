@@ -42,6 +42,8 @@ LEAST_NOISE_SHARE = 0.08
 """Noise of a rate that matters, as a share of the working rate."""
 LEAST_TURN_RATE = 0.02
 """Yaw rate below which sides are not compared [rad/s]."""
+CLEAR_SPEED = 5.0
+"""Speed over the noise of the reference that a ratio of speeds needs [-]."""
 TRIAL_ROWS = 1000
 """Rows, spread over the drive, that signs are tried on."""
 MOST_WHEELS = 10
@@ -173,6 +175,11 @@ def _speed_ratio(evidence: Evidence) -> float | None:
     working = np.nanquantile(rim, 0.9) if np.isfinite(rim).any() else 0.0
     rows = (rim > 0.4 * working) & np.isfinite(speed)
     if working <= 0.0 or rows.sum() < 8:
+        return None
+    noise = robust_std(np.diff(reference.velocity[:, 0], 2)) / math.sqrt(6.0)
+    if float(np.quantile(speed[rows], 0.8)) < CLEAR_SPEED * noise:
+        return None  # hardly moves: stuck, not another unit
+    if correlation(np.nan_to_num(rim), np.nan_to_num(speed)) < 0.8:
         return None
     return float(np.quantile(speed[rows] / rim[rows], 0.8))
 

@@ -29,6 +29,7 @@ COMMANDS = (
     'calibrate',
     'init',
     'config',
+    'compare',
     'replay',
     'predict',
     'diagnose',

@@ -6,7 +6,8 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
 
@@ -201,3 +202,8 @@ def as_text(summary: DriveSummary) -> str:
         lines.append(f'  {name:{width}}{row.count:8}   {row.rejected or "none"}')
     lines += [f'  note: {note}' for note in summary.notes]
     return '\n'.join(lines)
+
+
+def as_dict(summary: DriveSummary) -> dict[str, Any]:
+    """Return the summary for JSON."""
+    return {**asdict(summary), 'verdict': summary.verdict}

@@ -1,0 +1,80 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Findings before estimates, truth in sight, two runs side by side."""
+
+import json
+
+import numpy as np
+import pytest
+
+from wheel_terra_estimator.bags.bag_file import BagFile
+from wheel_terra_estimator.bags.simulated_drive import write_simulated_drive
+from wheel_terra_estimator.bags.storage import open_bag
+from wheel_terra_estimator.cli.main import main
+from wheel_terra_estimator.messages.convert import INPUT_TYPES
+from wheel_terra_estimator.simulation import scenario
+from wheel_terra_estimator.simulation.drive import simulate
+
+CONFIG = ['--config', 'generic_six_wheel', '--config', 'test_sand']
+
+
+@pytest.fixture(scope='module')
+def drive(tmp_path_factory):
+    path = tmp_path_factory.mktemp('drive') / 'drive'
+    write_simulated_drive(simulate(scenario.load('turns'), seed=5, duration=40.0), path)
+    return path
+
+
+@pytest.fixture(scope='module')
+def upside_down(drive, tmp_path_factory):
+    """The same drive with the IMU on its back."""
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.ROS2_JAZZY)
+    path = tmp_path_factory.mktemp('fault') / 'drive'
+    topics = {f'/{name}': kind for name, kind in INPUT_TYPES.items()}
+    with open_bag(drive) as bag, BagFile(path, topics) as file:
+        for log_time, topic, data in bag.messages([t for t in topics if t in bag.topics]):
+            message = store.deserialize_cdr(data, topics[topic])
+            if topic == '/imu/data':
+                for vector in (message.linear_acceleration, message.angular_velocity):
+                    vector.y, vector.z = -vector.y, -vector.z
+                message.orientation_covariance = np.array([-1.0] + [0.0] * 8)
+            file.write(topic, message, log_time)
+    return path
+
+
+def test_truth_and_table(drive, tmp_path, capsys):
+    table = tmp_path / 'table.csv'
+    assert main(['replay', str(drive), *CONFIG, '--table', str(table)]) == 0
+    said = capsys.readouterr().out
+    assert 'against the truth (/ground_truth)' in said and 'true / estimated' in said
+    assert 'not used, on /ground_truth' not in said
+    assert table.read_text().startswith('stamp [ns],wheel,')
+    assert main(['replay', str(drive), *CONFIG, '--table', str(tmp_path / 't.xls')]) == 2
+
+
+def test_while_a_finding_stands_nothing_is_judged(upside_down, tmp_path, capsys):
+    assert main(['replay', str(upside_down), *CONFIG, '--json']) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert [f['kind'] for f in told['findings']] == ['mounting']
+    assert not told['warnings']
+    assert all(set(np.flatnonzero(list(w['seconds'].values()))) == {4} for w in told['wheels'])
+    assert main(['replay', str(upside_down), *CONFIG]) == 0
+    said = capsys.readouterr().out
+    assert said.startswith('finding: mounting') and 'imu_mounting_roll_deg: 180' in said
+
+
+def test_compare(drive, tmp_path, capsys):
+    for name, extra in (('a', []), ('b', ['-p', 'soil.cohesion:=900.0'])):
+        assert main(['replay', str(drive), *CONFIG, *extra, '-o', str(tmp_path / name)]) == 0
+    capsys.readouterr()
+    pair = [str(tmp_path / 'a'), str(tmp_path / 'b')]
+    page = tmp_path / 'compare.html'
+    command = ['compare', *pair, '--truth', str(drive), '--json', '--report', str(page)]
+    assert main(command) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told['differences']['drawbar_pull']['rms'] > 0.0
+    assert told['errors']['a']['quantities']['slip']['rms'] > 0.0
+    assert '<img' in page.read_text()
+    assert main(['compare', pair[0], str(drive)]) == 2

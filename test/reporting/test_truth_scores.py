@@ -1,0 +1,85 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Errors against a truth that was written down by hand."""
+
+import csv
+
+import numpy as np
+import pytest
+
+from wheel_terra_estimator.bags.history import WHEEL_FIELDS, EstimateHistory, StuckWarning
+from wheel_terra_estimator.bags.truth import Truth, WheelTruth
+from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.reporting.comparison import compare
+from wheel_terra_estimator.reporting.estimates_table import write_table
+from wheel_terra_estimator.reporting.truth_scores import truth_errors
+
+STAMP = 10**12 + np.arange(100, dtype=np.int64) * 100_000_000
+THRESHOLDS = np.array([0.3, 0.6, 0.9])
+
+
+def history(slip, classes=0, warnings=()):
+    values = {name: np.zeros((100, 2)) for name in WHEEL_FIELDS}
+    values['slip'] = np.asarray(slip, float)
+    values['slip_std'] = np.full((100, 2), 0.05)
+    return EstimateHistory(
+        ('left', 'right'),
+        STAMP,
+        values,
+        np.broadcast_to(np.asarray(classes, np.uint8), (100, 2)),
+        np.full(100, 0.1),
+        np.full(100, 0.01),
+        warnings,
+    )
+
+
+def truth(slip):
+    still = WheelTruth(STAMP, np.full((100, 1), 0.1))
+    return Truth('/ground_truth', still, WheelTruth(STAMP, np.asarray(slip, float)), None, None)
+
+
+def test_errors_and_classes():
+    true = np.tile(np.linspace(0.0, 0.99, 100)[:, None], (1, 2))
+    seen = true + np.array([0.04, -0.12])
+    errors = truth_errors(history(seen), truth(true), THRESHOLDS)
+    slip = errors.quantities[0]
+    assert slip.name == 'slip'
+    assert slip.rms == pytest.approx(np.sqrt((0.04**2 + 0.12**2) / 2))
+    assert slip.bias == pytest.approx(-0.04)
+    assert slip.worst == pytest.approx(0.12)
+    assert slip.within_two_std == pytest.approx(0.5)
+    # All was called low; truth has 31 sets up to 0.3 (bound included), then 30, 30 and 9.
+    assert errors.class_matrix[:, 0] == pytest.approx([0.31, 0.30, 0.30, 0.09])
+    assert errors.class_matrix[:, 1:].sum() == 0.0
+
+
+def test_lead_of_a_warning_and_one_that_was_wrong():
+    true = np.zeros((100, 2))
+    true[60:] = 0.8
+    right = StuckWarning(int(STAMP[40]), None, '')
+    errors = truth_errors(history(true, warnings=(right,)), truth(true), THRESHOLDS)
+    assert errors.warnings[0].right and errors.warnings[0].lead == pytest.approx(2.0)
+    assert errors.first_stuck == pytest.approx(6.0)
+    calm = truth_errors(history(true, warnings=(right,)), truth(0.0 * true), THRESHOLDS)
+    assert not calm.warnings[0].right and calm.first_stuck is None
+
+
+def test_comparison():
+    first, second = history(np.zeros((100, 2))), history(np.zeros((100, 2)))
+    second.values['sinkage'][7, 1] = 0.25
+    told = {d.name: d for d in compare(first, second, ('a', 'b'), None).differences}
+    assert told['sinkage'].greatest == 0.25
+    assert told['sinkage'].where == 'right at 0.7 s'
+    assert told['slip'].rms == 0.0
+    apart = EstimateHistory(**{**vars(second), 'stamp': STAMP + 10**15})
+    with pytest.raises(UserError, match='no stamp in common'):
+        compare(first, apart, ('a', 'b'), None)
+
+
+def test_table(tmp_path):
+    path = tmp_path / 'table.csv'
+    write_table(history(np.full((100, 2), 0.5), 1), path)
+    rows = list(csv.DictReader(path.open()))
+    assert len(rows) == 200
+    assert rows[1]['wheel'] == 'right' and rows[1]['stamp [ns]'] == str(STAMP[0])
+    assert float(rows[1]['slip [-]']) == 0.5 and rows[1]['slip_class'] == '1'

@@ -1,0 +1,64 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""``wheel-terra compare``."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+
+SUMMARY = 'put two bags of estimates side by side, against the truth where there is one'
+EXAMPLES = (
+    'wheel-terra compare estimates_a estimates_b',
+    'wheel-terra compare estimates_a estimates_b --truth my_drive --report compare.html',
+)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of the command."""
+    parser.add_argument('first', type=Path, metavar='A', help='bag of estimates (replay -o)')
+    parser.add_argument('second', type=Path, metavar='B', help='bag of estimates of the same drive')
+    parser.add_argument('--truth', type=Path, metavar='BAG', help='recording with ground truth')
+    parser.add_argument('--json', action='store_true', help='print the differences as JSON')
+    parser.add_argument('--report', type=Path, metavar='F.html', help='page with both overlaid')
+    parser.add_argument('--overwrite', action='store_true', help='replace an earlier report')
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Run the command."""
+    from wheel_terra_estimator.bags.history import read_estimates
+    from wheel_terra_estimator.bags.storage import open_bag
+    from wheel_terra_estimator.bags.truth import read_simulated_truth
+    from wheel_terra_estimator.errors import UserError
+    from wheel_terra_estimator.output_folder import check_file
+    from wheel_terra_estimator.reporting.comparison import (
+        as_dict,
+        as_text,
+        compare,
+        write_comparison,
+    )
+
+    inputs = [arguments.first, arguments.second]
+    if arguments.report:
+        check_file(arguments.report, arguments.overwrite, inputs)
+    histories = []
+    for path in inputs:
+        with open_bag(path) as bag:
+            histories.append(read_estimates(bag))
+    truth = None
+    if arguments.truth:
+        with open_bag(arguments.truth) as bag:
+            truth = read_simulated_truth(bag, histories[0].names)
+        if truth is None:
+            raise UserError(
+                f'{arguments.truth}: no truth in it: neither /ground_truth/twist nor '
+                '/truth/odometry'
+            )
+    comparison = compare(histories[0], histories[1], [str(path) for path in inputs], truth)
+    print(json.dumps(as_dict(comparison), indent=2) if arguments.json else as_text(comparison))
+    if arguments.report:
+        write_comparison(arguments.report, comparison, histories, truth, arguments.overwrite)
+        if not arguments.json:
+            print(f'report: {arguments.report}')
+    return 0

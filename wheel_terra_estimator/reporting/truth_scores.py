@@ -1,0 +1,211 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Estimates against the truth of a recording: errors, classes, lead of the warnings."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wheel_terra_estimator.bags.history import EstimateHistory
+from wheel_terra_estimator.bags.truth import Truth, WheelTruth
+from wheel_terra_estimator.estimation.estimates import SlipClass
+
+FloatArray = NDArray[np.float64]
+
+WARNED_SLIP = 0.75
+"""Median absolute slip that a warning foretells [-]."""
+WARNING_HORIZON = 20.0
+"""A warning is right if that slip comes within this time [s]."""
+LONGEST_BRIDGE = 0.5
+"""Truth further away than this [s] is not compared."""
+TRUE_CLASSES = (SlipClass.LOW, SlipClass.MODERATE, SlipClass.HIGH, SlipClass.STUCK)
+CLASSES = (*TRUE_CLASSES, SlipClass.UNKNOWN)
+
+
+@dataclass(frozen=True)
+class QuantityError:
+    """Error of one quantity over all wheels and sets."""
+
+    name: str
+    unit: str
+    rms: float
+    bias: float
+    worst: float
+    within_two_std: float  # share of errors below two stated deviations; nan where none is stated
+
+
+@dataclass(frozen=True)
+class WarningScore:
+    """A stuck warning: when [s], whether it was right, how long before the slip [s] (negative: after)."""
+
+    start: float
+    right: bool
+    lead: float | None
+
+
+@dataclass(frozen=True)
+class TruthErrors:
+    """Everything that the truth says; ``class_matrix`` (true, estimated) in shares of time."""
+
+    source: str
+    quantities: tuple[QuantityError, ...]
+    class_matrix: FloatArray | None  # (4, 5)
+    warnings: tuple[WarningScore, ...]
+    first_stuck: float | None  # true slip first above ``WARNED_SLIP`` [s]
+
+
+def truth_errors(
+    history: EstimateHistory, truth: Truth, thresholds: FloatArray
+) -> TruthErrors | None:
+    """Compare estimates with the truth.
+
+    Parameters
+    ----------
+    history : EstimateHistory
+        The estimates.
+    truth : Truth
+        What the recording knows.
+    thresholds : numpy.ndarray
+        (3,) upper bounds of the classes low, moderate and high.
+    """
+    if not history.stamp.size:
+        return None
+    values = history.values
+    quantities = []
+    table = (
+        ('slip', '-', truth.slip, values['slip'], values['slip_std']),
+        ('sinkage', 'm', truth.sinkage, values['sinkage'], values['sinkage_std']),
+        (
+            'drawbar_pull',
+            'N',
+            truth.drawbar_pull,
+            values['drawbar_pull'],
+            values['drawbar_pull_std'],
+        ),
+        (
+            'forward_velocity',
+            'm/s',
+            truth.velocity,
+            history.forward_velocity[:, None],
+            history.forward_velocity_std[:, None],
+        ),
+    )
+    known = history.slip_class != SlipClass.UNKNOWN
+    for name, unit, true, seen, std in table:
+        if true is None or not true.stamp.size:
+            continue
+        there = at_stamps(true, history.stamp)
+        rows = np.isfinite(there) & (known if name == 'slip' else True)
+        if rows.any():
+            quantities.append(_error(name, unit, (seen - there)[rows], std[rows]))
+    slip = None if truth.slip is None else at_stamps(truth.slip, history.stamp)
+    return TruthErrors(
+        source=truth.source,
+        quantities=tuple(quantities),
+        class_matrix=None if slip is None else _matrix(slip, history.slip_class, thresholds),
+        warnings=() if slip is None else _warnings(history, slip),
+        first_stuck=None if slip is None else _first_stuck(history, slip),
+    )
+
+
+def at_stamps(truth: WheelTruth, stamps: NDArray[np.int64]) -> FloatArray:
+    """Return the truth (k, n) at stamps [ns], linear between its own; nan where it is silent."""
+    time, at = truth.stamp * 1e-9, stamps * 1e-9
+    columns = [np.interp(at, time, column) for column in truth.value.T]
+    nearest = np.clip(np.searchsorted(time, at), 1, max(time.size - 1, 1))
+    if time.size == 1:
+        gap = np.abs(at - time[0])
+    else:
+        gap = np.minimum(np.abs(at - time[nearest - 1]), np.abs(at - time[nearest]))
+    return np.where(gap[:, None] <= LONGEST_BRIDGE, np.column_stack(columns), np.nan)
+
+
+def _error(name: str, unit: str, error: FloatArray, std: FloatArray) -> QuantityError:
+    return QuantityError(
+        name=name,
+        unit=unit,
+        rms=float(np.sqrt(np.mean(error**2))),
+        bias=float(np.mean(error)),
+        worst=float(np.max(np.abs(error))),
+        within_two_std=float(np.mean(np.abs(error) <= 2.0 * std)),
+    )
+
+
+def _matrix(slip: FloatArray, seen: NDArray[np.uint8], thresholds: FloatArray) -> FloatArray:
+    """Return shares of the wheel time by true class (rows) and estimated class (columns)."""
+    rows = np.isfinite(slip)
+    true = np.searchsorted(thresholds, np.abs(slip[rows]), side='left')
+    estimated = seen[rows]
+    counts = np.array(
+        [[np.sum((true == t) & (estimated == e)) for e in CLASSES] for t in TRUE_CLASSES], float
+    )
+    return np.asarray(counts / max(counts.sum(), 1.0))
+
+
+def _first_stuck(history: EstimateHistory, slip: FloatArray) -> float | None:
+    deep = np.flatnonzero(_median(slip) > WARNED_SLIP)
+    return float(history.seconds[deep[0]]) if deep.size else None
+
+
+def _median(slip: FloatArray) -> FloatArray:
+    return np.median(np.abs(np.nan_to_num(slip)), axis=1)
+
+
+def _warnings(history: EstimateHistory, slip: FloatArray) -> tuple[WarningScore, ...]:
+    deep, seconds, begin = _median(slip) > WARNED_SLIP, history.seconds, int(history.stamp[0])
+    scores = []
+    for warning in history.warnings:
+        start = (warning.start - begin) * 1e-9
+        near = np.flatnonzero(deep & (np.abs(seconds - start) <= WARNING_HORIZON))
+        right = bool(near.size and seconds[near[-1]] >= start)
+        lead = float(seconds[near[0]] - start) if right else None
+        scores.append(WarningScore(start, right, lead))
+    return tuple(scores)
+
+
+def as_lines(errors: TruthErrors) -> list[str]:
+    """Return the lines that the terminal shows."""
+    lines = [f'  against the truth ({errors.source})']
+    lines.append(f'    {"":18}{"rms":>10}{"bias":>10}{"worst":>10}   within two std')
+    for q in errors.quantities:
+        label = f'{q.name} [{q.unit}]'
+        share = f'{100 * q.within_two_std:.0f} %'
+        lines.append(f'    {label:22}{q.rms:>8.3g}{q.bias:>10.2g}{q.worst:>10.3g}{share:>12}')
+    if errors.class_matrix is not None:
+        names = [c.name.lower() for c in CLASSES]
+        lines.append(f'    {"true / estimated":18}' + ''.join(f'{name:>10}' for name in names))
+        for name, row in zip(names, errors.class_matrix, strict=False):
+            shares = ''.join(f'{100 * share:9.1f}%' for share in row)
+            lines.append(f'    {name:18}{shares}')
+    for warning in errors.warnings:
+        told = f'slip passed 0.75 {warning.lead:+.1f} s from it'
+        lead = told if warning.right else 'no such slip came'
+        lines.append(f'    warning at {warning.start:.1f} s: {lead}')
+    if errors.first_stuck is not None and not errors.warnings:
+        lines.append(f'    no warning, though the slip passed 0.75 at {errors.first_stuck:.1f} s')
+    return lines
+
+
+def as_dict(errors: TruthErrors) -> dict[str, Any]:
+    """Return the errors for JSON."""
+    return {
+        'source': errors.source,
+        'quantities': {
+            q.name: {
+                'unit': q.unit,
+                'rms': q.rms,
+                'bias': q.bias,
+                'worst': q.worst,
+                'within_two_std': q.within_two_std,
+            }
+            for q in errors.quantities
+        },
+        'classes': [c.name.lower() for c in CLASSES],
+        'class_matrix': None if errors.class_matrix is None else errors.class_matrix.tolist(),
+        'warnings': [vars(warning) for warning in errors.warnings],
+        'first_stuck': errors.first_stuck,
+    }
