@@ -205,3 +205,15 @@ def test_without_a_rover_file_signs_are_found_all_the_same():
 
 def test_every_kind_is_one_of_the_contract():
     assert len(set(KINDS)) == 21
+
+
+def test_values_that_are_no_numbers_are_passed_over():
+    imu, joints, reference = WHOLE.imu, WHOLE.joints, WHOLE.reference
+    force, rate, velocity = imu.force.copy(), joints.rate.copy(), reference.velocity.copy()
+    force[::9], rate[::5, 1], velocity[::7] = np.nan, np.nan, np.nan
+    report = checked(
+        imu=replace(imu, force=force),
+        joints=replace(joints, rate=rate),
+        reference=replace(reference, velocity=velocity),
+    )
+    assert not report.findings, [str(f) for f in report.findings]

@@ -122,6 +122,16 @@ def read_series(
     )
 
 
+LARGEST = 1e9
+"""A number beyond this is damage in any unit."""
+
+
+def _credible(values: Any) -> Any:
+    """Return values with nan in place of infinity and absurd numbers."""
+    with np.errstate(invalid='ignore'):
+        return np.where(np.abs(values) < LARGEST, values, math.nan)
+
+
 class _Collector:
     """Rows of one topic."""
 
@@ -173,7 +183,7 @@ class _Joints(_Collector):
                 place = self.names.get(name)
                 if place is not None:
                     values[index, place] = number
-        return values
+        return _credible(values)
 
     def series(self) -> Any:
         return JointSeries(self.topic, *self.times, tuple(self.names), self.table(1), self.table(2))
@@ -195,17 +205,18 @@ class _Imu(_Collector):
         return (f.x, f.y, f.z, w.x, w.y, w.z, *orientation)
 
     def series(self) -> Any:
-        table = np.array(self.rows, dtype=float)
+        table = _credible(np.array(self.rows, dtype=float))
         return ImuSeries(self.topic, *self.times, table[:, :3], table[:, 3:6], table[:, 6:])
 
 
 class _Velocity(_Collector):
     def row(self, message: Any) -> Any:
         linear, angular = message.twist.twist.linear, message.twist.twist.angular
-        return (linear.x, linear.y, linear.z, angular.z, message.twist.covariance[0])
+        variance = min(float(message.twist.covariance[0]), 0.1 * LARGEST)
+        return (linear.x, linear.y, linear.z, angular.z, variance)
 
     def series(self) -> Any:
-        table = np.array(self.rows, dtype=float)
+        table = _credible(np.array(self.rows, dtype=float))
         return VelocitySeries(self.topic, *self.times, table[:, :3], table[:, 3], table[:, 4])
 
 

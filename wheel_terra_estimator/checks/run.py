@@ -52,7 +52,8 @@ def check_recording(
     remapped : sequence of str
         Topics of the estimator that the user has named himself.
     """
-    report, _ = examine(recording, configuration, remapped)
+    with np.errstate(all='ignore'):  # damaged recordings hold anything
+        report, _ = examine(recording, configuration, remapped)
     return report
 
 
@@ -74,6 +75,7 @@ def examine(
     report.take(names.check_wheel_names(recording, facts))
     facts = _with_names_in(facts, report)
     report.take(transport.check_transport(recording, figures))
+    recording = _whole_rows(recording)
     rotation = configured_mounting(configuration)
     outcomes, state = imu.check_imu(recording, facts, rotation, figures)
     report.take(outcomes)
@@ -88,6 +90,32 @@ def examine(
     evidence = _tilt(evidence, report)
     evidence = _wheels(evidence, report)
     return report, _rest(evidence, report)
+
+
+def _whole_rows(recording: Recording) -> Recording:
+    """Leave out IMU and reference messages with values that are no numbers."""
+    measured, velocity = recording.imu, recording.reference
+    if measured is not None:
+        keep = np.isfinite(measured.force).all(axis=1) & np.isfinite(measured.rate).all(axis=1)
+        measured = replace(
+            measured,
+            stamp=measured.stamp[keep],
+            log_time=measured.log_time[keep],
+            force=measured.force[keep],
+            rate=measured.rate[keep],
+            orientation=measured.orientation[keep],
+        )
+    if velocity is not None:
+        keep = np.isfinite(velocity.velocity).all(axis=1)
+        velocity = replace(
+            velocity,
+            stamp=velocity.stamp[keep],
+            log_time=velocity.log_time[keep],
+            velocity=velocity.velocity[keep],
+            yaw_rate=velocity.yaw_rate[keep],
+            variance=velocity.variance[keep],
+        )
+    return replace(recording, imu=measured, reference=velocity)
 
 
 def configured_mounting(configuration: Configuration | None) -> np.ndarray:

@@ -40,7 +40,7 @@ class QuantityError:
 
 @dataclass(frozen=True)
 class WarningScore:
-    """A stuck warning: when [s], whether it was right, how long before the slip [s] (negative: after)."""
+    """A stuck warning: when [s], whether right, its lead over the slip [s] (negative: late)."""
 
     start: float
     right: bool
