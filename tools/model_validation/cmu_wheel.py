@@ -9,6 +9,7 @@ from collections import defaultdict
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from model_validation.fitting import HEADER, FloatArray, Free, Misfit, Model, fit, listed
@@ -70,24 +71,36 @@ def plates(path: Path) -> tuple[Soil, float, dict[str, float]]:
     return soil, float(np.sqrt(np.mean(found.fun**2))), values
 
 
-def section(shared: Path, figures: Path) -> str:
-    """Return the section and draw its picture."""
+def rows(shared: Path) -> tuple[Soil, OperatingPoints, FloatArray]:
+    """Return the soil of the plates, all steady rows without side slip, and their measurements."""
     folder = shared / 'measured' / 'cmu_single_wheel'
-    soil, rms, plate_values = plates(folder / 'pressure_sinkage.csv')
+    soil, _, _ = plates(folder / 'pressure_sinkage.csv')
     with (folder / 'steady_state.csv').open(encoding='utf-8') as stream:
-        rows = [row for row in csv.DictReader(stream) if row['beta_cmd_deg'] == '0']
-    rows.sort(key=lambda row: float(row['slip_ratio']))
+        found = [row for row in csv.DictReader(stream) if row['beta_cmd_deg'] == '0']
+    found.sort(key=lambda row: float(row['slip_ratio']))
 
     def column(name: str) -> FloatArray:
-        return np.array([float(row[name]) for row in rows])
+        return np.array([float(row[name]) for row in found])
 
-    slip = np.clip(column('slip_ratio'), -1.0, 1.0)
-    measured = np.full((slip.size, 3), np.nan)
+    measured = np.full((len(found), 3), np.nan)
     measured[:, 0], measured[:, 1] = 1e-3 * column('sinkage_mm'), column('drawbar_pull_N')
-    load = column('vertical_load_N')
+    slip = np.clip(column('slip_ratio'), -1.0, 1.0)
+    return soil, OperatingPoints(slip, column('vertical_load_N'), WHEEL), measured
 
-    def points(chosen: FloatArray) -> OperatingPoints:
-        return OperatingPoints(slip[chosen], load[chosen], WHEEL)
+
+def chosen(points: OperatingPoints, selected: NDArray[np.bool_]) -> OperatingPoints:
+    """Return some of the rows."""
+    return OperatingPoints(points.slip[selected], points.normal_load[selected], WHEEL)
+
+
+def section(shared: Path, figures: Path) -> str:
+    """Return the section and draw its picture."""
+    soil, everything, measured = rows(shared)
+    _, rms, plate_values = plates(shared / 'measured' / 'cmu_single_wheel' / 'pressure_sinkage.csv')
+    slip = everything.slip
+
+    def points(selected: NDArray[np.bool_]) -> OperatingPoints:
+        return chosen(everything, selected)
 
     base = Model(soil, EFFECTS)
     rolling = np.abs(slip) < 0.01

@@ -90,6 +90,52 @@ def fit(
     return model.with_values(values), values
 
 
+def deviations(
+    model: Model,
+    data: Sequence[tuple[OperatingPoints, FloatArray]],
+    sigma: Sequence[float],
+    free: Sequence[Free],
+    prior_weight: float = 0.3,
+) -> dict[str, float]:
+    """Return standard deviations of fitted parameters.
+
+    The inverse of the normal matrix of `fit` at its end, expected values included, times the misfit
+    per degree of freedom where that exceeds one. What the rows do not settle has a large one.
+    """
+    rows = []
+    misfit = np.concatenate([_errors(model, points, m, sigma) for points, m in data])
+    names = [item.name for item in free]
+    for item in free:
+        name = item.name
+        kind, _, rest = name.partition('.')
+        source: Any = model.soil if kind == 'soil' else model.effects[rest.split('.')[0]]
+        value = getattr(source, rest) if kind == 'soil' else source[rest.split('.')[1]]
+        step = 1e-4 * item.scale
+        ends = [min(value + step, item.upper), max(value - step, item.lower)]
+        pair = [
+            np.concatenate(
+                [_errors(model.with_values({name: end}), points, m, sigma) for points, m in data]
+            )
+            for end in ends
+        ]
+        rows.append((pair[0] - pair[1]) / (ends[0] - ends[1]))
+    slopes = np.array(rows)
+    freedom = max(int(np.count_nonzero(misfit)) - len(names), 1)
+    factor = max(1.0, float(misfit @ misfit) / freedom)
+    normal = slopes @ slopes.T / factor
+    normal += np.diag([(prior_weight / item.scale) ** 2 for item in free])
+    variance = np.diag(np.linalg.inv(normal))
+    return {name: float(np.sqrt(v)) for name, v in zip(names, variance, strict=True)}
+
+
+def _errors(
+    model: Model, points: OperatingPoints, measured: FloatArray, sigma: Sequence[float]
+) -> FloatArray:
+    """Return the errors of a prediction in shares of their weights; 0 where not measured."""
+    error = (model.predict(points) - measured) / np.asarray(sigma)
+    return np.where(np.isnan(error), 0.0, error).ravel()
+
+
 @dataclass(frozen=True)
 class Misfit:
     """Errors of a prediction against measured rows."""

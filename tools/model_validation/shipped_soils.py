@@ -1,0 +1,58 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Print the fitted numbers of config/soils/cmu_sand_fit.yaml and grc3_fit.yaml, with deviations.
+
+    python -m model_validation.shipped_soils ../shared      (in the folder tools)
+
+Fitted to all rows (a wheel that is locked aside), where the validation page fits every second one.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from model_validation import cmu_wheel, grc3_wheel
+from model_validation.fitting import FloatArray, Free, Model, deviations, fit
+from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
+
+
+def report(
+    name: str,
+    model: Model,
+    data: Sequence[tuple[OperatingPoints, FloatArray]],
+    sigma: Sequence[float],
+    free: Sequence[Free],
+) -> None:
+    """Fit and print value and deviation of each parameter, and the misfit of the rows."""
+    fitted, values = fit(model, data, sigma, free)
+    std = deviations(fitted, data, sigma, free)
+    print(name)
+    for key, value in values.items():
+        angle = np.degrees(1.0) if key.endswith('friction_angle') else 1.0
+        print(f'  {key}: {angle * value:.5g} +- {angle * std[key]:.2g}')
+    for points, measured in data:
+        error = fitted.predict(points) - measured
+        print('  rms', np.sqrt(np.nanmean(error**2, axis=0)))
+
+
+def main() -> None:
+    """Fit both soils."""
+    shared = Path(sys.argv[1])
+    soil, points, measured = cmu_wheel.rows(shared)
+    turning = points.slip > -0.99
+    data = [(cmu_wheel.chosen(points, turning), measured[turning])]
+    free = (*cmu_wheel.FREE, cmu_wheel.SKID_PEAK)
+    report('cmu_sand_fit', Model(soil, cmu_wheel.EFFECTS), data, cmu_wheel.SIGMA, free)
+    slip, pull = grc3_wheel.read(shared)
+    points = replace(grc3_wheel.points_at(slip), slip_radius='rim')
+    free = (*grc3_wheel.SOIL, *grc3_wheel.MOUND)
+    report('grc3_fit', grc3_wheel.BASE, [(points, pull)], grc3_wheel.SIGMA, free)
+
+
+if __name__ == '__main__':
+    main()
