@@ -33,7 +33,7 @@ def test_time_in_class_counts_no_pauses() -> None:
                 slip_class=np.array([value, 255], dtype=np.uint8),
             )
         )
-    times = recorder.history().time_in_class()
+    times = recorder.history().figures().seconds_in_class
     assert [times[c][0] for c in SlipClass] == pytest.approx([1.0, 0.0, 0.5, 0.5, 0.0])
     assert times[SlipClass.UNKNOWN][1] == pytest.approx(2.0)
 

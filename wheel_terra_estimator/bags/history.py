@@ -8,7 +8,8 @@ same.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import sys
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wheel_terra_estimator.bags.storage import Bag
+from wheel_terra_estimator.bags.thinning import ThinnedRows
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.estimation.estimates import EstimateSet, SlipClass
 from wheel_terra_estimator.messages.convert import JOINT_STATE, OUTPUT_TYPES, stamp_of
@@ -35,6 +37,10 @@ WHEEL_FIELDS = (
     'rim_travel_left',
     'pull_margin',
 )
+
+LONGEST_STEP = 1.0
+"""A longer pause between sets, or a step back of the clock, is no time in any class [s]."""
+
 _TOPIC_FIELDS = {
     'slip': ('slip', 'slip_velocity', 'drawbar_pull'),
     'slip_stddev': ('slip_std', None, 'drawbar_pull_std'),
@@ -53,11 +59,73 @@ class StuckWarning:
     reason: str
 
 
+class DriveFigures:
+    """Figures of a whole drive, set by set; per-wheel arrays are (n,).
+
+    Attributes
+    ----------
+    sets : int
+        Number of sets.
+    duration : float
+        From the first set to the latest stamp [s].
+    seconds_in_class : dict
+        Class to the time of each wheel in it [s].
+    max_slip : (n,) array
+        Greatest |slip| outside of class unknown [-].
+    max_sinkage, max_sinkage_std : (n,) array
+        Greatest sinkage and its standard deviation [m].
+    least_margin : (n,) array
+        Least pull margin [N].
+    """
+
+    def __init__(self, wheels: int) -> None:
+        self.sets = 0
+        self.duration = 0.0
+        self.seconds_in_class = {c: np.zeros(wheels) for c in SlipClass}
+        self.max_slip = np.zeros(wheels)
+        self.max_sinkage = np.full(wheels, -np.inf)
+        self.max_sinkage_std = np.zeros(wheels)
+        self.least_margin = np.full(wheels, np.inf)
+        self._pull = np.zeros(wheels)
+        self._known = np.zeros(wheels)
+        self._first = self._stamp = 0
+        self._class: NDArray[np.uint8] = np.zeros(wheels, dtype=np.uint8)
+
+    @property
+    def mean_pull(self) -> FloatArray:
+        """Mean drawbar pull outside of class unknown, (n,) [N]."""
+        return self._pull / np.maximum(self._known, 1.0)
+
+    def add(
+        self, stamp: int, slip_class: NDArray[np.uint8], values: Mapping[str, FloatArray]
+    ) -> None:
+        """Take a set: stamp [ns], classes and quantities of `WHEEL_FIELDS`."""
+        if self.sets == 0:
+            self._first = stamp
+        else:
+            step = (stamp - self._stamp) * 1e-9
+            if 0.0 <= step <= LONGEST_STEP:
+                for c, seconds in self.seconds_in_class.items():
+                    seconds += step * (self._class == c)
+        self.sets += 1
+        self._stamp, self._class = stamp, slip_class
+        self.duration = max(self.duration, (stamp - self._first) * 1e-9)
+        known = slip_class != SlipClass.UNKNOWN
+        self._pull += np.where(known, values['drawbar_pull'], 0.0)
+        self._known += known
+        self.max_slip = np.maximum(self.max_slip, np.where(known, np.abs(values['slip']), 0.0))
+        deeper = values['sinkage'] > self.max_sinkage
+        self.max_sinkage = np.where(deeper, values['sinkage'], self.max_sinkage)
+        self.max_sinkage_std = np.where(deeper, values['sinkage_std'], self.max_sinkage_std)
+        self.least_margin = np.minimum(self.least_margin, values['pull_margin'])
+
+
 @dataclass(frozen=True)
 class EstimateHistory:
     """Estimates of a drive; per-wheel arrays are (k, n), the others (k,).
 
-    ``values`` holds the arrays of ``WHEEL_FIELDS`` by name, units as in `EstimateSet`.
+    ``values`` holds the arrays of ``WHEEL_FIELDS`` by name, units as in `EstimateSet`. A long
+    drive may be thinned; ``whole`` are the figures of all its sets.
     """
 
     names: tuple[str, ...]
@@ -67,40 +135,50 @@ class EstimateHistory:
     forward_velocity: FloatArray  # [m/s]
     forward_velocity_std: FloatArray
     warnings: tuple[StuckWarning, ...]
+    whole: DriveFigures | None = None  # None: the arrays are all there is
 
     @property
     def seconds(self) -> FloatArray:
         """Time since the first set [s]."""
         return (self.stamp - self.stamp[0]) * 1e-9 if self.stamp.size else np.empty(0)
 
-    def time_in_class(self) -> dict[SlipClass, FloatArray]:
-        """Return how long each wheel was in each class, (n,) [s]."""
-        step = np.diff(self.stamp, append=self.stamp[-1:]) * 1e-9
-        # A pause or a step back of the clock is no time in any class.
-        step = np.where((step < 0.0) | (step > 1.0), 0.0, step)
-        return {c: ((self.slip_class == c) * step[:, None]).sum(axis=0) for c in SlipClass}
+    def figures(self) -> DriveFigures:
+        """Return the figures of the whole drive."""
+        if self.whole is not None:
+            return self.whole
+        found = DriveFigures(len(self.names))
+        for i, stamp in enumerate(self.stamp.tolist()):
+            row = {name: values[i] for name, values in self.values.items()}
+            found.add(stamp, self.slip_class[i], row)
+        return found
 
 
 class HistoryRecorder:
-    """Collects estimate sets into an `EstimateHistory`."""
+    """Collects estimate sets into an `EstimateHistory`.
 
-    def __init__(self, names: Sequence[str]) -> None:
+    Parameters
+    ----------
+    names : sequence of str
+        Wheel names.
+    most : int, optional
+        Greatest number of sets that are kept (see `ThinnedRows`; of those left out the one with
+        the greatest slip stays); the figures count all. Default: all are kept.
+    """
+
+    def __init__(self, names: Sequence[str], most: int | None = None) -> None:
         self._names = tuple(names)
-        self._rows: list[tuple[Any, ...]] = []
+        self._figures = DriveFigures(len(self._names))
+        self._rows = ThinnedRows(sys.maxsize if most is None else most)
         self._warnings: list[StuckWarning] = []
 
     def add(self, estimates: EstimateSet) -> None:
         """Append a set."""
         e = estimates
-        self._rows.append(
-            (
-                e.stamp,
-                e.forward_velocity,
-                e.forward_velocity_variance,
-                e.slip_class,
-                *(getattr(e, name) for name in WHEEL_FIELDS),
-            )
-        )
+        values = {name: getattr(e, name) for name in WHEEL_FIELDS}
+        self._figures.add(e.stamp, e.slip_class, values)
+        general = (e.forward_velocity, e.forward_velocity_variance)
+        row = np.concatenate([general, e.slip_class, *values.values()])
+        self._rows.add(e.stamp, row, float(np.abs(e.slip).max(initial=0.0)))
         running = bool(self._warnings) and self._warnings[-1].end is None
         if e.stuck and not running:
             self._warnings.append(StuckWarning(e.stamp, None, stuck_reason(e.reasons)))
@@ -110,20 +188,20 @@ class HistoryRecorder:
 
     def history(self) -> EstimateHistory:
         """Return what was collected."""
-        count, wheels = len(self._rows), len(self._names)
-        columns = list(zip(*self._rows, strict=True)) or [()] * (4 + len(WHEEL_FIELDS))
-
-        def per_wheel(column: tuple[Any, ...]) -> FloatArray:
-            return np.array(column, dtype=np.float64).reshape(count, wheels)
-
+        wheels = len(self._names)
+        rows = self._rows.values(2 + wheels * (1 + len(WHEEL_FIELDS)))
+        classes, *fields = (
+            rows[:, at : at + wheels] for at in range(2, rows.shape[1], wheels or 1)
+        )
         return EstimateHistory(
             names=self._names,
-            stamp=np.array(columns[0], dtype=np.int64),
-            forward_velocity=np.array(columns[1], dtype=np.float64),
-            forward_velocity_std=np.sqrt(np.array(columns[2], dtype=np.float64)),
-            slip_class=np.array(columns[3], dtype=np.uint8).reshape(count, wheels),
-            values={n: per_wheel(columns[4 + i]) for i, n in enumerate(WHEEL_FIELDS)},
+            stamp=self._rows.stamps(),
+            forward_velocity=rows[:, 0],
+            forward_velocity_std=np.sqrt(rows[:, 1]),
+            slip_class=classes.astype(np.uint8),
+            values=dict(zip(WHEEL_FIELDS, fields, strict=True)),
             warnings=tuple(self._warnings),
+            whole=self._figures,
         )
 
 

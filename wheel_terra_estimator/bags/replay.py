@@ -19,6 +19,7 @@ from typing import Any
 from wheel_terra_estimator.bags.history import EstimateHistory, HistoryRecorder
 from wheel_terra_estimator.bags.reader import MeasurementReader
 from wheel_terra_estimator.bags.storage import Bag
+from wheel_terra_estimator.bags.thinning import MOST_ROWS
 from wheel_terra_estimator.bags.writer import EstimateBagWriter
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.errors import UserError
@@ -89,7 +90,7 @@ def replay(
     """
     reader = MeasurementReader(bag, remaps, configuration)
     pipeline = Pipeline(configuration, distrust=distrust)
-    recorder = HistoryRecorder(pipeline.names)
+    recorder = HistoryRecorder(pipeline.names, MOST_ROWS)
     messages = _in_order_of(arrival, reader) if arrival else reader.messages()
     with ExitStack() as stack:
         writer = None

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from wheel_terra_estimator.bags.reader import MeasurementReader
 from wheel_terra_estimator.bags.storage import Bag
+from wheel_terra_estimator.bags.thinning import ThinnedRows
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.measurements import InertialReading, WheelOdometry
 from wheel_terra_estimator.messages.convert import JOINT_STATE, ODOMETRY, stamp_of
@@ -37,6 +38,11 @@ class WheelTruth:
     stamp: NDArray[np.int64]
     value: FloatArray
 
+    def known(self) -> WheelTruth:
+        """Return the rows in which something is known."""
+        some = ~np.isnan(self.value).all(axis=1)
+        return WheelTruth(self.stamp[some], self.value[some])
+
 
 @dataclass(frozen=True)
 class Truth:
@@ -59,8 +65,7 @@ def read_truth(bag: Bag, remaps: Mapping[str, str], configuration: Configuration
     if simulated is not None and simulated.source != BODY_VELOCITY:
         return simulated
     if BODY_VELOCITY in bag.topics:
-        odometry = list(_messages(bag, BODY_VELOCITY))
-        velocity = _column([(stamp_of(m), [m.twist.twist.linear.x]) for m in odometry])
+        velocity = _thinned(bag, BODY_VELOCITY, _forward, 1).known()
         if velocity.stamp.size:
             slip_truth = _slip_from_velocity(
                 velocity, MeasurementReader(bag, remaps, configuration), configuration
@@ -72,19 +77,24 @@ def read_truth(bag: Bag, remaps: Mapping[str, str], configuration: Configuration
 def read_simulated_truth(bag: Bag, names: tuple[str, ...]) -> Truth | None:
     """Return the truth that needs no rover file: a simulator's, or a true body velocity alone."""
     if '/ground_truth/twist' in bag.topics:
-        slips = list(_messages(bag, '/ground_truth/slip'))
-        sinkages = list(_messages(bag, '/ground_truth/sinkage'))
-        twists = list(_messages(bag, '/ground_truth/twist'))
+        wheels = len(names)
+        slips = _thinned(
+            bag,
+            '/ground_truth/slip',
+            lambda m: [*_ordered(m, m.position, names), *_ordered(m, m.effort, names)],
+            2 * wheels,
+        )
         return Truth(
             source='/ground_truth',
-            velocity=_column([(stamp_of(m), [m.twist.twist.linear.x]) for m in twists]),
-            slip=_column([(stamp_of(m), _ordered(m, m.position, names)) for m in slips]),
-            sinkage=_column([(stamp_of(m), _ordered(m, m.position, names)) for m in sinkages]),
-            drawbar_pull=_column([(stamp_of(m), _ordered(m, m.effort, names)) for m in slips]),
+            velocity=_thinned(bag, '/ground_truth/twist', _forward, 1).known(),
+            slip=WheelTruth(slips.stamp, slips.value[:, :wheels]).known(),
+            sinkage=_thinned(
+                bag, '/ground_truth/sinkage', lambda m: _ordered(m, m.position, names), wheels
+            ).known(),
+            drawbar_pull=WheelTruth(slips.stamp, slips.value[:, wheels:]).known(),
         )
     if BODY_VELOCITY in bag.topics:
-        odometry = list(_messages(bag, BODY_VELOCITY))
-        velocity = _column([(stamp_of(m), [m.twist.twist.linear.x]) for m in odometry])
+        velocity = _thinned(bag, BODY_VELOCITY, _forward, 1).known()
         return Truth(BODY_VELOCITY, velocity, None, None, None) if velocity.stamp.size else None
     return None
 
@@ -93,19 +103,17 @@ def _slip_from_velocity(
     velocity: WheelTruth, reader: MeasurementReader, configuration: Configuration
 ) -> WheelTruth:
     wheels = configuration.wheels
-    rates: list[tuple[int, FloatArray]] = []
-    yaw: list[tuple[int, float]] = []
+    rates, yaw_rates = ThinnedRows(), ThinnedRows()
     for _, measurement in reader.measurements():
         if isinstance(measurement, WheelOdometry):
-            rates.append((measurement.stamp, measurement.rate))
+            rates.add(measurement.stamp, measurement.rate)
         elif isinstance(measurement, InertialReading):
-            yaw.append((measurement.stamp, float(measurement.angular_rate[2])))
-    rate = _column(rates)
+            yaw_rates.add(measurement.stamp, measurement.angular_rate[2:])
+    rate, yaw = _sorted(rates, wheels.count).known(), _sorted(yaw_rates, 1).known()
     body = np.interp(rate.stamp, velocity.stamp, velocity.value[:, 0])
-    yaw_truth = _column([(stamp, [value]) for stamp, value in yaw])
     turning = (
-        np.interp(rate.stamp, yaw_truth.stamp, yaw_truth.value[:, 0])
-        if yaw
+        np.interp(rate.stamp, yaw.stamp, yaw.value[:, 0])
+        if yaw.stamp.size
         else np.zeros(rate.stamp.size)
     )
     speed = body[:, None] - turning[:, None] * wheels.y
@@ -128,10 +136,19 @@ def _ordered(message: Any, values: Any, names: tuple[str, ...]) -> list[float]:
     return [float(found.get(name, np.nan)) for name in names]
 
 
-def _column(rows: list[tuple[int, Any]]) -> WheelTruth:
-    """Sort rows by stamp, drop those that are not finite at all."""
-    rows = sorted(rows, key=lambda row: row[0])
-    stamp = np.array([row[0] for row in rows], dtype=np.int64)
-    value = np.array([row[1] for row in rows], dtype=np.float64).reshape(len(rows), -1)
-    known = ~np.isnan(value).all(axis=1)
-    return WheelTruth(stamp[known], value[known])
+def _thinned(bag: Bag, topic: str, values: Callable[[Any], list[float]], width: int) -> WheelTruth:
+    """Return what the messages of a topic say, sorted by stamp."""
+    rows = ThinnedRows()
+    for message in _messages(bag, topic):
+        rows.add(stamp_of(message), values(message))
+    return _sorted(rows, width)
+
+
+def _sorted(rows: ThinnedRows, width: int) -> WheelTruth:
+    stamps, values = rows.stamps(), rows.values(width)
+    order = np.argsort(stamps, kind='stable')
+    return WheelTruth(stamps[order], values[order])
+
+
+def _forward(message: Any) -> list[float]:
+    return [message.twist.twist.linear.x]

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from wheel_terra_estimator.bags.history import EstimateHistory
+from wheel_terra_estimator.bags.history import DriveFigures, EstimateHistory
 from wheel_terra_estimator.estimation.estimates import SlipClass
 
 
@@ -103,13 +103,13 @@ def summarise(
     notes : sequence of str
         What else the reader should know.
     """
-    seconds = history.seconds
+    figures = history.figures()
     begin = int(history.stamp[0]) if history.stamp.size else 0
     return DriveSummary(
         title=title,
-        duration=float(seconds.max()) if seconds.size else 0.0,
-        sets=int(seconds.size),
-        wheels=_wheels(history) if seconds.size else (),
+        duration=figures.duration,
+        sets=figures.sets,
+        wheels=_wheels(history.names, figures) if figures.sets else (),
         warnings=tuple(
             WarningSpan(
                 (w.start - begin) * 1e-9,
@@ -134,27 +134,22 @@ def short_names(names: Sequence[str]) -> list[str]:
     return ['_'.join(p) for p in parts]
 
 
-def _wheels(history: EstimateHistory) -> tuple[WheelSummary, ...]:
-    times = history.time_in_class()
+def _wheels(names: Sequence[str], figures: DriveFigures) -> tuple[WheelSummary, ...]:
+    times = figures.seconds_in_class
     total = np.maximum(sum(times.values()), 1e-9)
-    values = history.values
-    known = history.slip_class != SlipClass.UNKNOWN
     result = []
-    for i, name in enumerate(short_names(history.names)):
+    for i, name in enumerate(short_names(names)):
         seconds = {c.name.lower(): float(times[c][i]) for c in SlipClass}
-        deepest = int(np.argmax(values['sinkage'][:, i]))
-        slips = np.abs(values['slip'][known[:, i], i])
-        pulls = values['drawbar_pull'][known[:, i], i]
         result.append(
             WheelSummary(
                 name=name,
                 seconds=seconds,
                 shares={key: value / float(total[i]) for key, value in seconds.items()},
-                max_slip=float(slips.max(initial=0.0)),
-                max_sinkage=float(values['sinkage'][deepest, i]),
-                max_sinkage_std=float(values['sinkage_std'][deepest, i]),
-                mean_pull=float(pulls.mean()) if pulls.size else 0.0,
-                least_margin=float(values['pull_margin'][:, i].min()),
+                max_slip=float(figures.max_slip[i]),
+                max_sinkage=float(figures.max_sinkage[i]),
+                max_sinkage_std=float(figures.max_sinkage_std[i]),
+                mean_pull=float(figures.mean_pull[i]),
+                least_margin=float(figures.least_margin[i]),
             )
         )
     return tuple(result)

@@ -1,0 +1,50 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Some hundred damaged inputs; any number of them by hand with ``tools/fuzz_files.py``."""
+
+from __future__ import annotations
+
+import random
+from pathlib import Path
+from typing import Any
+
+import fuzzing_tools  # noqa: F401
+import pytest
+from fuzz_files import fuzz
+from fuzzing import cases
+from fuzzing.mcap_maker import Layout, make
+
+
+def test_damaged_inputs_of_all_kinds() -> None:
+    done, faults = fuzz(0, 300)
+    assert not faults
+    assert set(done) == set(cases.CASES)
+
+
+def test_the_judgement_can_fail(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A reader that drops one message is found out."""
+    from wheel_terra_estimator.bags.mcap_file import McapFile
+
+    honest = McapFile.messages
+
+    def careless(self: Any, topics: Any) -> Any:
+        found = list(honest(self, topics))
+        yield from found[: len(found) // 2]
+        yield from found[len(found) // 2 + 1 :]
+
+    monkeypatch.setattr(McapFile, 'messages', careless)
+    said = [cases.run('mcap', random.Random(number), tmp_path) for number in range(10)]
+    assert any('intact messages missing' in words for words in said)
+
+
+def test_the_maker_is_read_by_another_reader(tmp_path: Path) -> None:
+    from rosbags.rosbag2 import Reader
+
+    dice = random.Random(5)
+    samples = cases._samples(dice)
+    for codec in ('', 'zstd', 'lz4'):
+        path = tmp_path / f'drive_{codec}.mcap'
+        path.write_bytes(make(samples, cases.TYPES, Layout(codec=codec)).content)
+        with Reader(path) as reader:
+            found = [(time, c.topic, bytes(data)) for c, time, data in reader.messages()]
+        assert found == [tuple(sample) for sample in samples]
