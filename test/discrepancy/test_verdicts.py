@@ -13,7 +13,8 @@ from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.discrepancy.report.words import channels_off, sentence
 from wheel_terra_estimator.discrepancy.result import QuantityGap
 from wheel_terra_estimator.discrepancy.tables.checks import check_table
-from wheel_terra_estimator.discrepancy.workflow import Options, operating_points
+from wheel_terra_estimator.discrepancy.tables.together import together
+from wheel_terra_estimator.discrepancy.workflow import Options, diagnose, operating_points
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.terramechanics.effects import catalogue
 from wheel_terra_estimator.terramechanics.model import WheelSoilModel
@@ -141,3 +142,22 @@ def test_an_uncertain_leaving_angle_counts_as_noise():
     assert exact.gap_p_value < 1e-3 < honest.gap_p_value
     assert honest.verdict == 'agrees'
     assert honest.gap['torque'].noise > exact.gap['torque'].noise
+
+
+def test_two_tables_with_other_lugs_share_one_soil_and_tell_more():
+    """What one lug height cannot tell, two tables can: what both share is one soil."""
+    table, values, *_ = make('lugs48', ('lug_support',), 1.5)
+    bare = table['lug_height'] == 0.0
+    parts = [
+        check_table(name, {key: column[rows] for key, column in table.items()})
+        for name, rows in (('bare.csv', bare), ('lugs.csv', ~bare))
+    ]
+    configuration = reader.from_parameters(values, complete=False)
+    both = together(parts)
+    assert len(both) == len(table['slip'])
+    found = diagnose(both, configuration)
+    whole = run(table, values)
+    assert [e.name for e in found.effects] == [e.name for e in whole.effects] == ['lug_support']
+    assert found.gap['sinkage'].after == pytest.approx(whole.gap['sinkage'].after, rel=0.05)
+    assert any('2 tables share one soil' in note for note in found.notes)
+    assert together(parts[:1]) is parts[0]

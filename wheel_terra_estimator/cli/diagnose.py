@@ -28,7 +28,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
     from wheel_terra_estimator.configuration import reader
 
-    parser.add_argument('data', metavar='DATA', help='CSV table of steady rows, or a rosbag2')
+    parser.add_argument(
+        'data',
+        nargs='+',
+        metavar='DATA',
+        help='CSV table of steady rows, or a rosbag2; several share one soil',
+    )
     parser.add_argument('-o', '--output', required=True, metavar='DIR', help='folder to be written')
     parser.add_argument(
         '--reference',
@@ -84,10 +89,11 @@ def run(arguments: argparse.Namespace) -> int:
     from wheel_terra_estimator.configuration import reader
     from wheel_terra_estimator.discrepancy.report.files import write_files
     from wheel_terra_estimator.discrepancy.tables.steady_table import UNITS
+    from wheel_terra_estimator.discrepancy.tables.together import together
     from wheel_terra_estimator.discrepancy.workflow import Options, diagnose
 
     output = Path(arguments.output)
-    inputs = [Path(path) for path in (arguments.data, arguments.reference) if path]
+    inputs = [Path(path) for path in (*arguments.data, arguments.reference) if path]
     check_folder(output, arguments.overwrite, inputs)
     if arguments.floor is not None and not 0.0 <= arguments.floor <= 0.2:
         raise UserError(f'--floor {arguments.floor:g}: must be a share between 0 and 0.2')
@@ -95,7 +101,7 @@ def run(arguments: argparse.Namespace) -> int:
         raise UserError(
             f'--allowed-error {arguments.allowed_error:g}: must be a share between 0 and 0.5'
         )
-    given = [arguments.data, *([arguments.reference] if arguments.reference else [])]
+    given = [*arguments.data, *([arguments.reference] if arguments.reference else [])]
     if arguments.remap and not any(_is_bag(Path(path)) for path in given):
         raise UserError(
             f'--remap {arguments.remap[0]}: renames topics of a bag, but {given[0]} is a table; '
@@ -103,7 +109,7 @@ def run(arguments: argparse.Namespace) -> int:
         )
     own = _load_effects(arguments.effects)
     configuration = reader.from_arguments(arguments, complete=False)
-    table = _read(arguments.data, arguments.remap, configuration)
+    table = together([_read(data, arguments.remap, configuration) for data in arguments.data])
     reference = None
     if arguments.reference:
         reference = _read(arguments.reference, arguments.remap, configuration)

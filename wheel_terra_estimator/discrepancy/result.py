@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from wheel_terra_estimator.discrepancy.effect_keys import effect_of
 from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES, UNITS, SteadyTable
+from wheel_terra_estimator.terramechanics.effects.base import FORM_MARK
 
 if TYPE_CHECKING:
     from wheel_terra_estimator.configuration.reader import Configuration
@@ -135,6 +136,12 @@ class Candidate:
     def label(self) -> str:
         """Names joined for people."""
         return ' + '.join(effect_of(key) for key in self.names) or 'nothing'
+
+    @property
+    def full_label(self) -> str:
+        """Names with their forms, where these are not the first ones."""
+        parts = (key.partition(FORM_MARK) for key in self.names)
+        return ' + '.join(f'{n} ({form})' if form else n for n, _, form in parts) or 'nothing'
 
     @property
     def form(self) -> str:

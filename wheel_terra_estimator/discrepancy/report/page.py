@@ -14,7 +14,7 @@ import numpy as np
 
 from wheel_terra_estimator.discrepancy.report import pictures as pictures
 from wheel_terra_estimator.discrepancy.report.model_file import corrected
-from wheel_terra_estimator.discrepancy.report.words import STRONG_PULL
+from wheel_terra_estimator.discrepancy.report.words import STRONG_PULL, far_soil, in_words
 from wheel_terra_estimator.discrepancy.result import Diagnosis, FittedParameter, NextMeasurement
 from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES
 from wheel_terra_estimator.reporting.html import render, write_page
@@ -47,13 +47,17 @@ def write_report(diagnosis: Diagnosis, folder: str | Path) -> Path:
         The page.
     """
     folder = Path(folder)
+    another_soil = far_soil(diagnosis) if diagnosis.verdict == 'agrees' else []
     configuration, keys = corrected(diagnosis)
     new, old = configuration.flat(), diagnosis.configuration.flat()
     page = render(
         'diagnosis.html',
         TEMPLATES,
         diagnosis=diagnosis,
-        tone=_TONES[diagnosis.verdict],
+        tone='warn' if another_soil else _TONES[diagnosis.verdict],
+        another_soil=another_soil,
+        said=in_words(diagnosis),
+        left_out=_left_out(diagnosis),
         title=Path(diagnosis.table.name).name,
         cards=_cards(diagnosis),
         figures=_figures(folder, diagnosis),
@@ -83,6 +87,18 @@ def write_report(diagnosis: Diagnosis, folder: str | Path) -> Path:
     path = folder / 'report.html'
     write_page(path, page)
     return path
+
+
+def _left_out(diagnosis: Diagnosis) -> list[tuple[str, str, str, str]]:
+    """Rows (left out, quantity, refitted, with the law) of a proposed law."""
+    rows = []
+    for name, quantities in (diagnosis.proposal.left_out if diagnosis.proposal else {}).items():
+        for quantity, item in quantities.items():
+            scale, unit = pictures.SHOWN[quantity]
+            texts = [number(scale * value) for value in (item.refit, item.law)]
+            shown_name = f'{pictures.words(quantity)} [{unit}]'
+            rows.append((pictures.words(name), shown_name, texts[0], texts[1]))
+    return rows
 
 
 def number(value: float, digits: int = 3) -> str:
@@ -267,7 +283,7 @@ def _candidates(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     for candidate in diagnosis.candidates:
         rows.append(
             {
-                'label': pictures.words(candidate.label),
+                'label': pictures.words(candidate.full_label),
                 'chosen': bool(candidate.names) and not candidate.why_not,
                 'parameters': [
                     f'{key.split(".")[-1]} {number(item.value)} ± {number(item.std, 2)}'

@@ -13,7 +13,13 @@ from wheel_terra_estimator.discrepancy.assessment.along import Stretch
 from wheel_terra_estimator.discrepancy.effect_keys import effect_of
 from wheel_terra_estimator.discrepancy.fitting.coordinates import WIDENING
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
-from wheel_terra_estimator.discrepancy.result import Curves, NamedEffect, QuantityGap
+from wheel_terra_estimator.discrepancy.result import (
+    OPEN,
+    Curves,
+    Diagnosis,
+    NamedEffect,
+    QuantityGap,
+)
 from wheel_terra_estimator.discrepancy.selection.remainder import Remainder
 from wheel_terra_estimator.discrepancy.selection.search import Findings
 from wheel_terra_estimator.discrepancy.selection.verdict import Verdict
@@ -103,6 +109,56 @@ def _cell_noise(findings: Findings) -> FloatArray:
 def channels_off(gap: Mapping[str, QuantityGap]) -> tuple[str, ...]:
     """Return the quantities that unseen rows show to be off by more than is allowed."""
     return tuple(name for name, item in gap.items() if item.after > item.limit)
+
+
+def in_words(diagnosis: Diagnosis) -> dict[str, list[str]]:
+    """Return what shrank, what stays open and what to do next, without any statistics."""
+    shrank, still_off = [], channels_off(diagnosis.gap)
+    for name, item in diagnosis.gap.items():
+        scale, unit = (1e3, 'mm') if name == 'sinkage' else (1.0, UNITS[name])
+        stages = [f'{scale * item.before:.3g} as configured', f'{scale * item.refit:.3g} refitted']
+        if diagnosis.effects:
+            stages.append(f'{scale * item.after:.3g} with the effect')
+        noise = f'; its noise is {scale * item.noise:.3g}' if item.noise else ''
+        shrank.append(f'{_plain(name)} [{unit}]: off by {", ".join(stages)}{noise}.')
+    left = [
+        f'{_plain(name)} is still off by more than noise and the allowed model error.'
+        for name in still_off
+    ]
+    if any(effect.remainder for effect in diagnosis.effects):
+        left.append('Something is left that the named effect does not explain.')
+    for effect in diagnosis.effects:
+        if effect.confounded_with:
+            rivals = ', '.join(map(_plain, effect.confounded_with))
+            left.append(f'These rows cannot tell {_plain(effect.name)} from {rivals}.')
+    if diagnosis.verdict in OPEN and not still_off:
+        left.append('Why these rows need another soil, or more scatter, than was stated.')
+    if not left:
+        left.append('Nothing beyond noise and the allowed model error.')
+    following = [f'Measure next: {item.what}.' for item in diagnosis.next_measurement[:1]]
+    if diagnosis.verdict in OPEN and diagnosis.where.box:
+        following.append(f'Look first where the gap is largest: {diagnosis.where.sentence}.')
+    if diagnosis.proposal:
+        following.append(
+            'Until then proposal.yaml may stand in, inside the range of these rows only.'
+        )
+    if not following:
+        following.append('Nothing; model.yaml is the model to go on with.')
+    return {'shrank': shrank, 'open': left, 'next': following}
+
+
+def far_soil(diagnosis: Diagnosis) -> list[str]:
+    """Return the soil numbers that had to move far, in words."""
+    return [
+        f'{_SOIL_KEYS.get(shift.name, "soil." + shift.name)}: {shift.before:.3g} stated, '
+        f'{shift.after:.3g} here ({abs(shift.pull):.1f} stated deviations)'
+        for shift in diagnosis.soil
+        if abs(shift.pull) > STRONG_PULL
+    ]
+
+
+def _plain(name: str) -> str:
+    return name.replace('_', ' ')
 
 
 def channels_worsened(gap: Mapping[str, QuantityGap]) -> tuple[str, ...]:
