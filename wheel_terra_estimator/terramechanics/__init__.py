@@ -10,5 +10,6 @@
 - Load to sinkage, pull, torque: ``model`` (arrays, by ``load_balance``), ``steady_sinkage``
   (floats); sinkage to torque and pull: ``conditioned`` by ``balanced_branches`` (floats, for the
   filter). ``scalar_wheels`` is what both have in common.
-- Questions: ``inverse``, ``slope_locomotion``, ``entrapment``, ``longitudinal_sinkage``.
+- Questions: ``inverse``, ``equivalent_contact``, ``slope_locomotion``, ``entrapment``,
+  ``longitudinal_sinkage``.
 """

@@ -24,7 +24,8 @@ from wheel_terra_estimator.terramechanics.wheel import Wheel
 
 FloatArray = NDArray[np.float64]
 # ``weight``: the weight W is given, the soil carries W cos a. ``constant``: the soil carries W on
-# every slope, as in the model and rig of Nakashima et al. 2010, which turn the load with the bed.
+# every slope, as the rig of Nakashima et al. 2010 does, which turns the load with the bed (their
+# nomenclature has W cos a for the same quantity; their tables fit W).
 LOAD_CONVENTIONS = ('weight', 'constant')
 LARGEST_SLIP = 0.98
 

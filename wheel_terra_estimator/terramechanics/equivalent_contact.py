@@ -1,0 +1,104 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Drawbar pull from measured torque, load and contact, stresses on an equivalent radius.
+
+The lugs carry a ring of soil: stresses act at a radius between rim and lug tip, and entrance and
+leaving angle are those of that circle. With the leaving angle measured (a mound behind the wheel
+is higher than the ground) the form holds up to a slip of 0.9, where angles without it fail.
+
+Guo, Ding et al., High-slip wheel-terrain contact modelling for grouser-wheeled planetary rovers
+traversing on sandy terrains, Mech. Mach. Theory: equivalent radius, angles and the three
+coefficients k1, k2, k3. Their formulas are not public; these are derived here from the words of the
+paper, with A, B, C of ``closed_form.coefficients`` for the three coefficients.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from wheel_terra_estimator.terramechanics.checks import check_range
+from wheel_terra_estimator.terramechanics.closed_form import coefficients, decoupled_pull
+
+
+@dataclass(frozen=True)
+class EquivalentContact:
+    """Angles of a contact on its equivalent circle, one entry per measurement.
+
+    Attributes
+    ----------
+    radius : float or numpy.ndarray
+        r_e [m].
+    entrance_angle, peak_angle, leaving_angle : float or numpy.ndarray
+        [rad]; the leaving angle is negative behind the hub.
+    """
+
+    radius: Any
+    entrance_angle: Any
+    peak_angle: Any
+    leaving_angle: Any
+
+    def coefficients(self) -> tuple[Any, Any, Any]:
+        """Return k1, k2, k3 [-]: W = b r_e (k1 sigma + k2 tau), T = b r_e^2 k3 tau."""
+        return coefficients(self.entrance_angle, self.peak_angle, self.leaving_angle)
+
+    def drawbar_pull(self, torque: Any, normal_load: Any) -> Any:
+        """Pull from torque and load, no soil parameter [N].
+
+        F = (k1^2 + k2^2)/(k1 k3) T/r_e - (k2/k1) W.
+        """
+        return decoupled_pull(
+            torque,
+            normal_load,
+            self.entrance_angle,
+            self.peak_angle,
+            self.leaving_angle,
+            self.radius,
+        )
+
+
+def equivalent_contact(
+    wheel: Any,
+    sinkage: Any,
+    rear_height: Any,
+    peak_ratio: Any,
+    lug_sinkage: Any = 0.0,
+    lug_share: Any = 0.5,
+) -> EquivalentContact:
+    """Return the contact on the circle of radius r + lug_share h.
+
+    t1e = arccos(1 - (z - dz)/r_e), t2e = -arccos(1 - z2/r_e), tme = peak_ratio t1e.
+
+    Parameters
+    ----------
+    wheel : Wheel
+        Rim radius and lug height count.
+    sinkage : float or array_like
+        Of the rim, as measured [m].
+    rear_height : float or array_like
+        Height of the soil behind the wheel above the lowest point of the rim, z2 [m]; above the
+        sinkage where a mound stands there.
+    peak_ratio : float or array_like
+        Angle of greatest stress over entrance angle, c1 + c2 s [-].
+    lug_sinkage : float or array_like
+        Part of the sinkage that lugs dug or saved, dz [m].
+    lug_share : float or array_like
+        Share of the lug height, lambda [-].
+
+    Raises
+    ------
+    ValueError
+        If the sinkage less the lugs' part, or the rear height, is outside 0 to the radius, or the
+        peak outside the contact.
+    """
+    radius = wheel.radius + lug_share * np.asarray(wheel.lug_height)
+    depth = np.asarray(sinkage, float) - lug_sinkage
+    largest = float(np.min(radius))
+    check_range('sinkage less lugs', depth, 0.0, largest, 'm', open_lower=True)
+    check_range('rear height', rear_height, 0.0, largest, 'm')
+    check_range('peak ratio', peak_ratio, 0.0, 0.99, open_lower=True)
+    entrance = np.arccos(1.0 - depth / radius)
+    leaving = -np.arccos(1.0 - np.asarray(rear_height, float) / radius)
+    return EquivalentContact(radius, entrance, peak_ratio * entrance, leaving)
