@@ -228,3 +228,13 @@ def test_scenarios_do_what_they_say(name: str) -> None:
         assert all(0.55 < greatest < 0.88 for _, greatest in found)
     if name == 'firm_drive':
         assert all(greatest < 0.6 for _, greatest in found)
+
+
+def test_messages_of_one_topic_never_overtake_each_other() -> None:
+    fast = {**LEVEL, 'duration': 5.0, 'sensors.jitter': 0.02}
+    drive = simulate(load(fast))
+    for type_ in (WheelOdometry, InertialReading, SinkageReading, ReferenceVelocity):
+        stamps = [m.stamp for m in kind(drive, type_)]
+        assert stamps == sorted(stamps)
+    everything = [a.measurement.stamp for a in drive.arrivals]
+    assert everything != sorted(everything), 'different topics do'

@@ -94,6 +94,7 @@ class SensorSuite:
         self._counted: FloatArray | None = None
         self._held_sinkage = np.zeros(n)
         self._last_stamp = dict.fromkeys(self._periods, START)
+        self._last_arrival: dict[type, int] = {}  # of each topic
 
     @property
     def odometry_period(self) -> float:
@@ -237,7 +238,10 @@ class SensorSuite:
         delay = self._random.exponential(self._there.jitter) if self._there.jitter else 0.0
         if name == 'reference':
             delay += self._delay
+        # A topic's messages wait for one another: none overtakes the one before.
         arrival = measurement.stamp + round(delay * 1e9)
+        arrival = max(arrival, self._last_arrival.get(type(measurement), 0))
+        self._last_arrival[type(measurement)] = arrival
         if name != 'reference' and self._failed('zero_stamps', time) is not None:
             measurement = replace(measurement, stamp=0)
         elif name != 'reference' and self._failed('repeated_stamps', time) is not None:
