@@ -61,7 +61,7 @@ def arriving(stream, delays):
     return [m for _, m in sorted(pairs, key=lambda pair: pair[1].stamp + pair[0] * 1e9)]
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(
     st.lists(st.integers(1, 90_000_000), min_size=1, max_size=150),
     st.sampled_from([20.0, 10.0, 7.0, 30.0, 100.0]),

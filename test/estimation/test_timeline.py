@@ -114,7 +114,7 @@ def test_max_lag_holds_back_until_the_newest_stamp_passes():
 # -- Order of arrival -----------------------------------------------------------------------------
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(st.data())
 def test_with_a_large_max_lag_the_order_of_arrival_is_nothing(data):
     stream = drive(1.0)
@@ -126,7 +126,7 @@ def test_with_a_large_max_lag_the_order_of_arrival_is_nothing(data):
     assert essence(play(core, shuffled)) == expected
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(st.data())
 def test_late_inputs_within_the_history_end_in_the_same_state(data):
     stream = drive(2.0)
@@ -142,7 +142,7 @@ def test_late_inputs_within_the_history_end_in_the_same_state(data):
     assert not any('older' in key for key in core.health())
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=12, deadline=None)
 @given(st.data())
 def test_each_set_is_what_a_run_in_order_through_the_inputs_so_far_gives(data):
     """The definition itself: laziness, kept states and forgetting must not show."""
@@ -378,7 +378,7 @@ def test_the_reference_is_thinned_by_stamps():
     assert sets[-1].yaw_rate == 10.0  # the fake counts the references that it was given
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=12, deadline=None)
 @given(st.permutations(range(20)))
 def test_thinning_does_not_depend_on_the_order_of_arrival(order):
     stream = [reference(0.05 * i + 0.003, forward=0.01 * i) for i in order]
@@ -393,7 +393,7 @@ def test_thinning_does_not_depend_on_the_order_of_arrival(order):
 # -- Whatever comes -------------------------------------------------------------------------------
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=80, deadline=None)
 @given(
     st.lists(
         st.tuples(

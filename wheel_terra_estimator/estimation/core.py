@@ -179,7 +179,10 @@ ReferenceVelocity
 
     def _insert(self, arrival: Arrival) -> list[EstimateSet]:
         channel, measurement = arrival
+        contradicted = self._timeline.contradicted[channel]
         fate, sets = self._timeline.insert(channel, measurement)
+        if self._timeline.contradicted[channel] != contradicted:
+            self._checks.reject(channel, 'stamp repeated with other numbers (the newer ones count)')
         if fate in (Fate.LATE, Fate.DEFERRED):
             self._late[channel] += 1
             if fate is Fate.DEFERRED:

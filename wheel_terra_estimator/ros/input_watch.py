@@ -12,6 +12,8 @@ from typing import Any
 
 PERIODS_TO_SILENCE = 3.0
 LEAST_SILENCE = 0.75  # [s]
+MESSAGES_TO_PERIOD = 3  # from which the period of a topic is known
+UNKNOWN_PERIOD = 5.0  # [s] of silence until then
 MEMORY = 5.0  # [s] for which a loss is told
 _SMOOTHING = 0.1
 
@@ -80,8 +82,9 @@ class InputWatch:
         age = self.age(topic, now)
         if age is None:
             return False
-        period = self._topics[topic].period
-        return age > max(LEAST_SILENCE, PERIODS_TO_SILENCE * period)
+        state = self._topics[topic]
+        least = LEAST_SILENCE if state.received > MESSAGES_TO_PERIOD else UNKNOWN_PERIOD
+        return age > max(least, PERIODS_TO_SILENCE * state.period)
 
     def faults(self, now: float) -> dict[str, str]:
         """Return topic -> what is wrong, in words."""

@@ -250,6 +250,8 @@ class EstimatorNode(LifecycleNode):
         delay = (self.get_clock().now().nanoseconds - stamp) / _SECOND
         self._watch_inputs.heard(topic, now, delay, number)
         self._incompatible.pop(topic, None)
+        if pipeline.transport_faults:
+            pipeline.transport_faults.pop(topic, None)  # no longer silent; the watch knows the rest
         for estimates in pipeline.hear(topic, message):
             self._take(estimates, now)
 

@@ -102,6 +102,8 @@ class InputLog:
         ``steps``, ``reruns``, ``steps_repeated``.
     repeated : list of int
         Per channel: inputs whose stamp the channel had given before.
+    contradicted : list of int
+        Those of them that held other numbers than the first.
     dirty : int
         Steps that the next run will make again.
     """
@@ -113,6 +115,7 @@ class InputLog:
         self.stamps: list[int] = []
         self.counts = {'steps': 0, 'reruns': 0, 'steps_repeated': 0}
         self.repeated = [0] * 5
+        self.contradicted = [0] * 5
         self._reference_period = reference_period
         self._merger = StepMerger()
         self._pristine = estimator.snapshot()
@@ -322,5 +325,6 @@ class InputLog:
         self.repeated[channel] += overlap
         if same(before, merged):
             return False
+        self.contradicted[channel] += overlap
         entry.parts[channel] = merged
         return True

@@ -99,14 +99,16 @@ class StepMerger:
     def _odometry(self, stamp: int, readings: list[WheelOdometry]) -> WheelOdometry | None:
         if not readings:
             return None
+        first = readings[0]
+        before = np.zeros(len(first.rate), dtype=np.int64) if self.heard is None else self.heard
+        if len(readings) == 1:
+            self.heard = np.where(np.isnan(first.rate), before, first.stamp)
+            return first
         rates = np.stack([reading.rate for reading in readings])
         valid = ~np.isnan(rates)
         stamps = np.array([[reading.stamp] for reading in readings])
-        before = np.zeros(rates.shape[1], dtype=np.int64) if self.heard is None else self.heard
         last = np.maximum.accumulate(np.vstack([before[None], np.where(valid, stamps, 0)]), axis=0)
         self.heard = last[-1]
-        if len(readings) == 1:
-            return readings[0]
         weight = np.clip(stamps - last[:-1], 1, LONGEST_INTERVAL) * valid
         total = weight.sum(axis=0)
         mean = (weight * np.where(valid, rates, 0.0)).sum(axis=0) / np.maximum(total, 1)

@@ -112,6 +112,11 @@ class Timeline:
         """Per channel: inputs whose stamp the channel had given before."""
         return self._log.repeated
 
+    @property
+    def contradicted(self) -> list[int]:
+        """Per channel: inputs of a stamp given before, with other numbers."""
+        return self._log.contradicted
+
     def end_run(self, *, keep_soil: bool) -> None:
         """Let the next input begin a new run; soil and biases kept but widened, or forgotten."""
         self._log.clear(keep_soil=keep_soil)
