@@ -8,3 +8,6 @@ class UserError(Exception):
 
     Commands print it on standard error and exit with status 2; the node logs it and ends.
     """
+
+    def __init__(self, line: str) -> None:
+        super().__init__(' '.join(line.splitlines()))  # cells and keys may hold line feeds

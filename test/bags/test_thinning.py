@@ -30,13 +30,6 @@ def test_rows_stay_in_order_evenly_spread_and_few(count: int) -> None:
     assert count - stamps[-1] <= max(steps, default=1)
 
 
-def test_the_highest_peak_stays() -> None:
-    rows = ThinnedRows(8)
-    for stamp in range(5000):
-        rows.add(stamp, [0.0], score=1.0 if stamp == 3333 else 0.0)
-    assert 3333 in rows.stamps()
-
-
 def sets(count: int):
     dice = np.random.default_rng(3)
     first = estimate_set()

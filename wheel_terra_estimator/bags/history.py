@@ -161,8 +161,8 @@ class HistoryRecorder:
     names : sequence of str
         Wheel names.
     most : int, optional
-        Greatest number of sets that are kept (see `ThinnedRows`; of those left out the one with
-        the greatest slip stays); the figures count all. Default: all are kept.
+        Greatest number of sets that are kept (see `ThinnedRows`); the figures count all.
+        Default: all are kept.
     """
 
     def __init__(self, names: Sequence[str], most: int | None = None) -> None:
@@ -178,7 +178,7 @@ class HistoryRecorder:
         self._figures.add(e.stamp, e.slip_class, values)
         general = (e.forward_velocity, e.forward_velocity_variance)
         row = np.concatenate([general, e.slip_class, *values.values()])
-        self._rows.add(e.stamp, row, float(np.abs(e.slip).max(initial=0.0)))
+        self._rows.add(e.stamp, row)
         running = bool(self._warnings) and self._warnings[-1].end is None
         if e.stuck and not running:
             self._warnings.append(StuckWarning(e.stamp, None, stuck_reason(e.reasons)))

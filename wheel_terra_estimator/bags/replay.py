@@ -62,6 +62,7 @@ def replay(
     *,
     overwrite: bool = False,
     arrival: Path | None = None,
+    every_set: bool = False,
     distrust: str = '',
 ) -> Replay:
     """Run the estimator over an open bag.
@@ -80,6 +81,8 @@ def replay(
         Whether an earlier output is replaced.
     arrival : Path, optional
         Log of a live node (parameter ``record_arrival``): hear the messages in that order.
+    every_set : bool
+        Whether the history holds every set of a long drive, whatever memory that takes.
     distrust : str
         What makes slip meaningless, see `Pipeline`.
 
@@ -90,7 +93,7 @@ def replay(
     """
     reader = MeasurementReader(bag, remaps, configuration)
     pipeline = Pipeline(configuration, distrust=distrust)
-    recorder = HistoryRecorder(pipeline.names, MOST_ROWS)
+    recorder = HistoryRecorder(pipeline.names, None if every_set else MOST_ROWS)
     messages = _in_order_of(arrival, reader) if arrival else reader.messages()
     with ExitStack() as stack:
         writer = None
@@ -126,15 +129,22 @@ def replay(
         heard=pipeline.received,
         rejected=reader.rejected + pipeline.rejected,
         counters=pipeline.counters(),
-        notes=tuple(_notes(bag, reader, interrupted.is_set())),
+        notes=tuple(_notes(bag, reader, pipeline, interrupted.is_set())),
         interrupted=interrupted.is_set(),
     )
 
 
-def _notes(bag: Bag, reader: MeasurementReader, interrupted: bool) -> Iterator[str]:
+def _notes(
+    bag: Bag, reader: MeasurementReader, pipeline: Pipeline, interrupted: bool
+) -> Iterator[str]:
     if interrupted:
         yield 'interrupted: this is the drive up to there'
     yield from bag.notes
+    counters = pipeline.counters()
+    if restarts := counters.get('filter_restarts', 0):
+        yield f'the filter failed and was started anew {restarts} times; please report this drive'
+    if steps := counters.get('clock_steps_back', 0):
+        yield f'the clock stepped back {steps} times; the estimates start anew there'
     if reader.absent:
         yield f'not in the bag: {", ".join(reader.absent)}'
     used = set(reader.topics.values())

@@ -96,6 +96,7 @@ def run(arguments: argparse.Namespace) -> int:
             arguments.output,
             overwrite=arguments.overwrite,
             arrival=arguments.arrival,
+            every_set=bool(arguments.table),
             distrust='; '.join(f'{f.words}: {f.cure}' for f in checked.findings if spoils_slip(f)),
         )
         truth = read_truth(bag, remaps, configuration)

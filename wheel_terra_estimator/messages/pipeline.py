@@ -23,6 +23,7 @@ from wheel_terra_estimator.messages.diagnostics import NODE, Diagnostics
 FAULT_MEMORY = 5_000_000_000
 """How long a refused message is shown as a fault [ns of stamps]."""
 
+_REPEATED = '_stamp_repeated'  # likewise, behind the topic
 _REJECTED = '_rejected: '  # between topic and reason in the keys of the core's counters
 
 
@@ -94,6 +95,8 @@ class Pipeline:
             topic, mark, reason = key.partition(_REJECTED)
             if mark:
                 found[topic, reason] += count
+            elif key.endswith(_REPEATED):
+                found[key.removesuffix(_REPEATED), 'stamp repeated, merged'] += count
         return found
 
     def counters(self) -> dict[str, Any]:
