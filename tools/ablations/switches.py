@@ -9,6 +9,7 @@ cannot outlive them unseen.
 from __future__ import annotations
 
 import contextlib
+import functools
 import importlib
 import inspect
 import pkgutil
@@ -92,25 +93,24 @@ def _object(place: str) -> Any:
     return getattr(importlib.import_module(ROOT + module), name)
 
 
-def _modules() -> list[Any]:
+@functools.cache
+def _modules() -> tuple[Any, ...]:
     found = pkgutil.walk_packages(estimation.__path__, ROOT)
-    return [importlib.import_module(info.name) for info in found]
+    return tuple(importlib.import_module(info.name) for info in found)
 
 
-def _holders() -> Iterator[Any]:
-    """Yield modules, and the functions of the estimator with those of its classes."""
+@functools.cache
+def _holders() -> tuple[Any, ...]:
+    """Return modules, and the functions of the estimator with those of its classes."""
+    functions = []
     for module in _modules():
-        yield module
         for member in vars(module).values():
             if getattr(member, '__module__', None) != module.__name__:
                 continue
-            if inspect.isfunction(member):
-                yield member
-            elif inspect.isclass(member):
-                for value in vars(member).values():
-                    inner = getattr(value, '__func__', value)  # of a class method
-                    if inspect.isfunction(inner):
-                        yield inner
+            members = vars(member).values() if inspect.isclass(member) else (member,)
+            # A class method wraps its function.
+            functions += [getattr(value, '__func__', value) for value in members]
+    return (*_modules(), *(f for f in functions if inspect.isfunction(f)))
 
 
 def _swap(holder: Any, kind: type, values: dict[str, Any]) -> list[Callable[[], None]]:
