@@ -18,7 +18,7 @@ import itertools
 import json
 import os
 import sys
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Sequence
 from contextlib import nullcontext
 from pathlib import Path
@@ -46,7 +46,18 @@ compressed."""
 _RESAMPLES = 1000
 _WORLDS = ('own', 'rival', 'recorded')
 
-Rows = dict[str, dict[str, dict[str, float]]]  # treatment -> drive -> figures
+_HEAD = """# What each special treatment of the estimator is worth
+
+    python tools/ablation.py run ablation.jsonl --measured ../shared/measured   # or goes on
+    python tools/ablation.py show ablation.jsonl -o docs/development/ablation.md
+
+Each treatment is switched off by itself (`tools/ablations/treatments.py` says how) and the
+estimator run again over drives of [both worlds](worlds.md) and recorded ones, some without a
+reference. A loss is the price of doing without; a negative one says that the treatment did harm.
+"""
+
+Figures = dict[str, dict[str, float]]  # drive -> figures
+Rows = dict[str, Figures]  # treatment -> drive -> figures
 
 
 def run(arguments: argparse.Namespace) -> None:
@@ -77,7 +88,7 @@ def show(arguments: argparse.Namespace) -> None:
     rows: Rows = defaultdict(dict)
     for row in _read(arguments.file):
         rows[str(row['treatment'])][str(row['drive'])] = row
-    text = report(rows)
+    text = '\n'.join([_HEAD, *filter(None, [arguments.note]), '', report(rows)])
     print(text)
     if arguments.output:
         arguments.output.write_text(text + '\n', encoding='utf-8')
@@ -86,58 +97,83 @@ def show(arguments: argparse.Namespace) -> None:
 def report(rows: Rows) -> str:
     """Return the table of all treatments, strongest first, and what is worth nothing."""
     base = rows[AS_IT_IS]
-    lines, idle = [], []
+    lines = []
+    by_verdict: dict[str, list[str]] = defaultdict(list)
     for treatment in TREATMENTS:
         found = rows.get(treatment.name, {})
         names = [drive for drive in found if drive in base]
         if not names:
             continue
-        cells, needed, most = [], False, 0.0
-        value, error = _change(base, found, names, 'slip')
-        cells.append(_percent(value, error))
-        needed |= value > ALLOWED + 2.0 * error
-        for world in _WORLDS:
-            own = [n for n in names if base[n]['world'] == world]
-            value, error = _change(base, found, own, 'slip')
-            cells.append(_percent(value, error))
-            needed |= value > ALLOWED + 2.0 * error
-            most = max(most, value if np.isfinite(value) else 0.0)
-        value, error = _change(base, found, names, 'pull')
-        needed |= value > ALLOWED + 2.0 * error
-        cells.append(_percent(value, error))
+        loss = _losses(base, found, names)
+        verdict = _verdict(base, found, names, loss)
+        by_verdict[verdict].append(treatment.name)
+        cells = [_percent(*pair) for pair in loss.values()]
         cells.append(f'{100 * (_coverage(found, names) - _coverage(base, names)):+.1f}')
-        false, missed = (_sum(found, names, k) - _sum(base, names, k) for k in ('false', 'missed'))
-        cells += [f'{false:+.0f}', f'{missed:+.0f}']
-        cells.append(_worst(base, found, names))
-        needed |= false > 0 or missed > 0
-        if not needed:
-            idle.append(treatment.name)
-        lines.append((most, (treatment.group, treatment.name, *cells, 'yes' if needed else '')))
+        cells += [f'{_more(base, found, names, key):+.0f}' for key in ('false', 'missed')]
+        worst, name = _worst(base, found, names)
+        cells.append(f'{name} {100 * worst:+.0f} %' if name else '-')
+        lines.append((worst, (treatment.group, treatment.name, *cells, verdict)))
     lines.sort(key=lambda pair: -pair[0])
     head = (
-        *('kind', 'treatment', 'slip, all [%]', *(f'slip, {w} [%]' for w in _WORLDS), 'pull [%]'),
-        *('coverage [points]', 'false warnings', 'missed', 'drive hit most', 'earns its place'),
+        *('kind', 'treatment', 'slip [%]', *(f'{w} [%]' for w in _WORLDS), 'pull [%]'),
+        *('coverage [points]', 'false warnings', 'missed', 'slip of the drive hit most'),
+        'earns its place',
     )
-    count = defaultdict(int)
-    for row in base.values():
-        count[row['world']] += 1
+    count = Counter(row['world'] for row in base.values())
     drives = ', '.join(f'{count[w]} {w}' for w in _WORLDS)
+    lists = '\n'.join(
+        f'- {words}: {"; ".join(by_verdict[verdict]) or "none"}.'
+        for verdict, words in _VERDICTS.items()
+    )
     return (
-        f'Drives: {drives}. Change of the root mean square error when the treatment is off, with '
-        'one standard error (paired drives, drawn anew). A treatment earns its place where a loss '
-        f'exceeds {ALLOWED:.0%} plus two standard errors in one of the columns, or a warning gets '
-        f'worse.\n\n{table(head, (cells for _, cells in lines))}\n\n'
-        f'Worth no more than {ALLOWED:.0%} plus two standard errors anywhere here: '
-        f'{"; ".join(idle) or "none"}.'
+        f'Drives: {drives}. Change of the root mean square errors when the treatment is off, with '
+        'one standard error (whole drives drawn anew; not known of fewer than '
+        f'{FEWEST_DRIVES}).\n\n{table(head, (cells for _, cells in lines))}\n\n{lists}'
     )
 
 
-def _change(
-    base: dict[str, dict[str, float]],
-    found: dict[str, dict[str, float]],
-    names: Sequence[str],
-    what: str,
-) -> tuple[float, float]:
+_VERDICTS = {
+    'yes': f'Earns its place (a loss above {ALLOWED:.0%} plus two standard errors in slip or pull, '
+    'or a warning gets worse)',
+    'open': f'Open (within that, but some drive loses more than {ALLOWED:.0%}: more drives needed)',
+    'no': f'Worth nothing on these drives (no drive loses more than {ALLOWED:.0%})',
+    'did not act': 'Changed nothing at all, so nothing is known',
+}
+
+
+def _losses(base: Figures, found: Figures, names: Sequence[str]) -> dict[str, tuple[float, float]]:
+    """Return the change and its standard error of slip, slip by world, and pull."""
+    losses = {'slip': _change(base, found, names, 'slip')}
+    for world in _WORLDS:
+        here = [n for n in names if base[n]['world'] == world]
+        losses[world] = _change(base, found, here, 'slip')
+    losses['pull'] = _change(base, found, names, 'pull')
+    return losses
+
+
+def _verdict(
+    base: Figures, found: Figures, names: Sequence[str], loss: dict[str, tuple[float, float]]
+) -> str:
+    if any(_more(base, found, names, key) > 0 for key in ('false', 'missed')):
+        return 'yes'
+    if any(value > ALLOWED + 2.0 * error for value, error in loss.values()):
+        return 'yes'
+    if all(_same(base[n], found[n]) for n in names):
+        return 'did not act'
+    each = [_change(base, found, [n], what)[0] for n in names for what in ('slip', 'pull')]
+    return 'open' if any(value > ALLOWED for value in each) else 'no'
+
+
+def _same(one: dict[str, float], other: dict[str, float]) -> bool:
+    keys = ('slip_square', 'pull_square', 'covered', 'false', 'missed', 'lead')
+    return all(np.isclose(one.get(k, 0.0), other.get(k, 0.0), rtol=1e-9) for k in keys)
+
+
+def _more(base: Figures, found: Figures, names: Sequence[str], key: str) -> float:
+    return sum(found[n].get(key, 0.0) - base[n].get(key, 0.0) for n in names)
+
+
+def _change(base: Figures, found: Figures, names: Sequence[str], what: str) -> tuple[float, float]:
     """Return the relative change of a root mean square and its standard error; nan for none.
 
     The error of fewer than three drives is not known: infinite.
@@ -164,25 +200,20 @@ def _percent(value: float, error: float) -> str:
     return f'{100 * value:+.1f}' + (f' ± {100 * error:.1f}' if np.isfinite(error) else ' (few)')
 
 
-def _coverage(rows: dict[str, dict[str, float]], names: Sequence[str]) -> float:
+def _coverage(rows: Figures, names: Sequence[str]) -> float:
     counted = [n for n in names if rows[n].get('slip_count', 0.0) > 0.0]
     total = sum(rows[n]['slip_count'] for n in counted)
     return sum(rows[n]['covered'] for n in counted) / total if total else float('nan')
 
 
-def _sum(rows: dict[str, dict[str, float]], names: Sequence[str], key: str) -> float:
-    return sum(rows[n].get(key, 0.0) for n in names)
-
-
-def _worst(
-    base: dict[str, dict[str, float]], found: dict[str, dict[str, float]], names: Sequence[str]
-) -> str:
+def _worst(base: Figures, found: Figures, names: Sequence[str]) -> tuple[float, str]:
+    """Return the greatest loss of slip on a single drive, and which."""
     changes = {n: _change(base, found, [n], 'slip')[0] for n in names}
     known = {n: c for n, c in changes.items() if np.isfinite(c)}
     if not known:
-        return '-'
+        return float('-inf'), ''
     name = max(known, key=lambda n: known[n])
-    return f'{name} {100 * known[name]:+.0f} %'
+    return known[name], name
 
 
 def _read(path: Path) -> list[dict[str, float]]:
@@ -207,6 +238,7 @@ def main() -> None:
     shows = commands.add_parser('show', help='make the table')
     shows.add_argument('file', type=Path)
     shows.add_argument('-o', dest='output', type=Path)
+    shows.add_argument('--note', default='', help='a paragraph about this run, above the table')
     shows.set_defaults(command=show)
     arguments = parser.parse_args()
     arguments.command(arguments)

@@ -70,7 +70,18 @@ def test_table_says_what_earns_its_place():
             rows[idle][name] = row('', name, world, base * 1.001)
     text = ablation.report(rows)
     lines = {line.split('|')[2].strip(): line for line in text.splitlines() if line.count('|') > 5}
-    assert '+50.0 ± 0.0' in lines[useful] and lines[useful].rstrip().endswith('| yes |')
-    assert '+0.1 ± 0.0' in lines[idle] and 'yes' not in lines[idle]
-    assert text.splitlines()[-1].endswith(f'{idle}.')
-    assert useful not in text.splitlines()[-1]
+    assert '+50.0 ± 0.0' in lines[useful]
+    assert lines[useful].endswith('| yes |')
+    assert '+0.1 ± 0.0' in lines[idle]
+    assert lines[idle].endswith('| no |')
+    # What moved nothing tells nothing; one drive that loses leaves it open.
+    base = rows[ablation.AS_IT_IS]
+    silent, doubtful = TREATMENTS[2].name, TREATMENTS[3].name
+    rows[silent] = dict(base)
+    rows[doubtful] = {**base, 'own 2': row('', 'own 2', 'own', 0.055)}
+    text = ablation.report(rows)
+    lines = {line.split('|')[2].strip(): line for line in text.splitlines() if line.count('|') > 5}
+    assert lines[silent].endswith('| did not act |')
+    assert lines[doubtful].endswith('| open |')
+    rows[silent]['own 1'] = {**base['own 1'], 'missed': 1.0}
+    assert f'{silent}.' not in ablation.report(rows).splitlines()[-1]
