@@ -67,9 +67,10 @@ def run(arguments: argparse.Namespace) -> None:
     drives: Iterable[Drive] = simulated(arguments.drives, arguments.seed, duration)
     if arguments.measured:
         drives = itertools.chain(drives, recorded(arguments.measured))
+    chosen = [t for t in TREATMENTS if not arguments.groups or t.group in arguments.groups]
     with arguments.file.open('a', encoding='utf-8') as stream:
         for drive in drives:
-            for name, treatment in [(AS_IT_IS, None), *((t.name, t) for t in TREATMENTS)]:
+            for name, treatment in [(AS_IT_IS, None), *((t.name, t) for t in chosen)]:
                 if (name, drive.name) in done or _without_effect(treatment, drive):
                     continue
                 with nullcontext() if treatment is None else treatment.off():
@@ -233,6 +234,7 @@ def main() -> None:
     runs.add_argument(
         '--duration', type=float, default=35.0, help='of a rival drive [s] (default 35)'
     )
+    runs.add_argument('--groups', nargs='+', choices=sorted({t.group for t in TREATMENTS}))
     runs.add_argument('--measured', type=Path, help='folder of the recorded drives')
     runs.set_defaults(command=run)
     shows = commands.add_parser('show', help='make the table')
