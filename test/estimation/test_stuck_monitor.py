@@ -4,7 +4,12 @@
 
 import math
 
+import pytest
+
+from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.estimation.judgement.stuck.monitor import StuckMonitor
+from wheel_terra_estimator.estimation.judgement.stuck.settings import StuckSettings
+from wheel_terra_estimator.estimation.judgement.stuck.signs import SIGNS
 from wheel_terra_estimator.estimation.judgement.stuck.situation import RoverMotion, WheelMotion
 
 
@@ -229,3 +234,104 @@ def test_a_slip_that_nobody_knows_is_not_digging():
     guess = wheel(1.0)._replace(slip_std=0.4)
     assert first(course([[guess] * 6] * 300)) is None
     assert first(course([[wheel(1.0)] * 6] * 300)) is not None
+
+
+# -- Horizon, travel and clearing -------------------------------------------------------------
+
+
+def deepening(settings, slip=0.4, per_metre=0.03, seconds=40.0):
+    """All wheels sink by `per_metre` of their rim travel at a steady slip."""
+    monitor, found = StuckMonitor(settings), []
+    for i in range(round(10 * seconds)):
+        sunk = 0.01 + per_metre * 0.05 * 0.1 * i
+        wheels = [wheel(slip)._replace(sinkage=min(sunk, 0.1))] * 6
+        found.append(judge(monitor, 0.1 * i, 0.05 * (1.0 - slip), True, wheels))
+    return found
+
+
+def test_a_steady_deepening_warns_before_the_lugs_cannot_climb_out():
+    found = deepening(StuckSettings())
+    warned = next(i for i, a in enumerate(found) if a.stuck)
+    assert 0.15 < found[warned].wheels[0].travel < 0.3
+    assert 'rim travel' in found[warned].reason
+    assert min(a.wheels[0].travel for a in found) == pytest.approx(0.05)
+    # Ground on which wheels sink no further than into their ruts raises nothing.
+    assert first(deepening(StuckSettings(), per_metre=0.01)) is None
+
+
+def test_the_travel_parameter_says_how_early():
+    when = [first(deepening(StuckSettings(travel=travel))) for travel in (0.01, 0.3, 1.0)]
+    assert when[0] > when[1] + 3.0
+    assert when[1] > when[2]
+
+
+def test_two_wheels_of_six_that_dig_are_no_entrapment():
+    monitor, found = StuckMonitor(), []
+    for i in range(400):
+        sunk = wheel(0.4)._replace(sinkage=min(0.01 + 0.0006 * i, 0.1))
+        found.append(judge(monitor, 0.1 * i, 0.03, True, [sunk] * 2 + [wheel(0.4)] * 4))
+    assert first(found) is None
+
+
+def growing(settings, rate=0.004):
+    slips = [min(0.5 + rate * 0.1 * i, 0.79) for i in range(720)]
+    return first(
+        course(
+            [[wheel(s)._replace(slip_std=0.005)] * 6 for s in slips], monitor=StuckMonitor(settings)
+        )
+    )
+
+
+def test_the_horizon_parameter_says_how_far_the_trend_is_followed():
+    assert growing(StuckSettings(horizon=0.1)) is None
+    assert growing(StuckSettings(horizon=15.0)) is None
+    far = growing(StuckSettings(horizon=1e4))
+    assert far is not None
+    assert growing(StuckSettings(horizon=100.0)) >= far
+    quick = [growing(StuckSettings(horizon=h), rate=0.02) for h in (0.1, 15.0)]
+    assert quick[0] is None
+    assert quick[1] is not None
+
+
+def test_the_parameters_of_the_configuration_reach_the_warning():
+    keys = ['filter.stuck_horizon:=7.0', 'filter.stuck_travel:=0.1', 'filter.stuck_clear_slip:=0.4']
+    given = StuckSettings.from_configuration(reader.load(['frostyboy'], keys))
+    assert (given.horizon, given.travel, given.clear_slip, given.clear_time) == (7.0, 0.1, 0.4, 3.0)
+
+
+def test_a_sign_that_is_there_keeps_the_warning():
+    """Slip has fallen, but two wheels are still held near their torque limit."""
+    monitor = StuckMonitor()
+    cruise = [wheel(0.2, rim=1.0, torque=0.3)] * 4
+    held = [wheel(0.2, rim=1.0, torque=0.3)] * 2 + [
+        wheel(0.0, rim=0.1, known=False, torque=0.95)
+    ] * 2
+    found = [judge(monitor, 0.1 * i, 0.0, False, cruise) for i in range(50)]
+    found += [judge(monitor, 5.0 + 0.1 * i, 0.0, False, held) for i in range(100)]
+    assert found[-1].stuck
+    free = [judge(monitor, 15.0 + 0.1 * i, 0.0, False, cruise) for i in range(60)]
+    cleared = next(i for i, a in enumerate(free) if not a.stuck)
+    assert 30 <= cleared <= 32
+
+
+def test_held_wheels_beside_one_that_stands_are_an_entrapment():
+    """One wheel stalls, two slip: no other sign sees it."""
+
+    def raised(speed):
+        monitor = StuckMonitor()
+        rolling = [wheel(0.2, rim=0.5, torque=0.2)] * 4
+        stands = wheel(0.0, rim=0.0, known=False, torque=0.95)
+        held = [stands, wheel(0.7, rim=0.5, torque=0.1), wheel(0.7, rim=0.5, torque=0.1)]
+        held.append(wheel(0.1, rim=0.17, torque=0.1))
+        found = [judge(monitor, 0.1 * i, 0.4, True, rolling) for i in range(30)]
+        found += [judge(monitor, 3.0 + 0.1 * i, speed, True, held) for i in range(20)]
+        return found[-1]
+
+    assert raised(0.15).stuck
+    assert 'others held' in raised(0.15).reason
+    assert 'others held' not in raised(0.3).reason  # the rover makes way
+
+
+def test_every_sign_has_its_own_name_and_words():
+    assert len({sign.name for sign in SIGNS}) == len(SIGNS)
+    assert all(sign.hold > 0.0 for sign in SIGNS)

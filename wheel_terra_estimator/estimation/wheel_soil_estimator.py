@@ -60,8 +60,8 @@ from wheel_terra_estimator.estimation.judgement.slip import BodyMotion, SlipJudg
 from wheel_terra_estimator.estimation.judgement.stuck.monitor import (
     StuckAssessment,
     StuckMonitor,
-    StuckSettings,
 )
+from wheel_terra_estimator.estimation.judgement.stuck.settings import StuckSettings
 from wheel_terra_estimator.estimation.judgement.stuck.situation import (
     RoverMotion,
     WheelMotion,

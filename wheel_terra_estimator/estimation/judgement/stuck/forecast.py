@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -22,10 +23,6 @@ class ForecastTuning:
 
     least_trend: float = 1e-4  # [1/s]
     least_slip: float = 0.3  # from which a growing slip leads to an entrapment
-    least_deepening: float = 0.02  # sinkage per rim travel that counts as digging
-    deepening_slip: float = 0.2
-    deep: float = 0.25
-    """Sinkage over the radius from which lugs do not climb out."""
     least_travel: float = 0.05  # [m]; 0 is said of wheels that are entrapped
     digging_slip: float = 0.8
     certain: float = 0.9
@@ -41,7 +38,7 @@ class WheelForecast(NamedTuple):
 
 
 def forecast(
-    s: Situation, horizon: float, *, warned: bool, tuning: ForecastTuning = ForecastTuning()
+    s: Situation, *, warned: bool, tuning: ForecastTuning = ForecastTuning()
 ) -> tuple[WheelForecast, ...]:
     """Return the outlook of each wheel.
 
@@ -49,8 +46,6 @@ def forecast(
     ----------
     s : Situation
         At present.
-    horizon : float
-        Time within which the probability is that of an entrapment [s].
     warned : bool
         Whether the stuck warning stands.
     tuning : ForecastTuning
@@ -58,10 +53,8 @@ def forecast(
     """
     return tuple(
         [
-            _of_wheel(wheel, stands, deepening.growth, s.trend, horizon, warned, tuning)
-            for wheel, stands, deepening in zip(
-                s.motion.wheels, s.stalled, s.observed.deepening, strict=True
-            )
+            _of_wheel(wheel, stands, room, s, warned, tuning)
+            for wheel, stands, room in zip(s.motion.wheels, s.stalled, s.climbing_room, strict=True)
         ]
     )
 
@@ -69,9 +62,8 @@ def forecast(
 def _of_wheel(
     wheel: WheelMotion,
     stalled: bool,
-    growth: float,
-    trend: float,
-    horizon: float,
+    room: float,
+    s: Situation,
     warned: bool,
     tuning: ForecastTuning,
 ) -> WheelForecast:
@@ -80,19 +72,16 @@ def _of_wheel(
     elif not wheel.known or wheel.slip <= 0.0:
         probability, time = 0.0, LONGEST_TIME
     else:
-        ahead = wheel.slip + max(trend, 0.0) * horizon
+        ahead = wheel.slip + max(s.trend, 0.0) * s.settings.horizon
         probability = exceedance_probability(ahead, wheel.slip_std, ENTRAPPED_SLIP)
-        time = _time_left(wheel.slip, trend, tuning)
+        time = _time_left(wheel.slip, s.trend, tuning)
     if warned and (probability > 0.5 or wheel.slip > tuning.digging_slip):
         probability = max(probability, tuning.certain)
     travel = NO_ENTRAPMENT_IN_SIGHT
     if time < LONGEST_TIME:
         travel = min(time * abs(wheel.rim_speed), travel)
-    if growth > tuning.least_deepening and wheel.known and wheel.slip > tuning.deepening_slip:
-        # It sinks as it turns: travel until it is in too deep for its lugs to climb out.
-        room = max(tuning.deep * wheel.radius - wheel.sinkage, 0.0)
-        least = tuning.least_travel if time > 0.0 else 0.0
-        travel = min(travel, max(room / growth, least))
+    if room < math.inf:
+        travel = min(travel, max(room, tuning.least_travel if time > 0.0 else 0.0))
     return WheelForecast(probability, time, travel)
 
 

@@ -5,18 +5,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from math import isnan
 from typing import NamedTuple
 
-from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.judgement.stuck.forecast import WheelForecast, forecast
+from wheel_terra_estimator.estimation.judgement.stuck.settings import StuckSettings
 from wheel_terra_estimator.estimation.judgement.stuck.signs import (
     SIGNS,
     Sign,
     SignTuning,
-    held_back,
     needs_met,
 )
 from wheel_terra_estimator.estimation.judgement.stuck.situation import (
@@ -28,28 +26,7 @@ from wheel_terra_estimator.estimation.judgement.stuck.situation import (
 from wheel_terra_estimator.estimation.scalars import NAN
 
 _TIME_ROUNDING = 1e-9  # [s]
-_TUNING = SignTuning()
-
-
-@dataclass(frozen=True)
-class StuckSettings:
-    """The keys ``filter.stuck_*``."""
-
-    horizon: float = 15.0  # [s]
-    travel: float = 0.3  # [m]
-    clear_slip: float = 0.6
-    clear_time: float = 3.0  # [s]
-
-    @classmethod
-    def from_configuration(cls, configuration: Configuration) -> StuckSettings:
-        """Take them from a configuration."""
-        figures = configuration.filter
-        return cls(
-            horizon=float(figures.stuck_horizon),
-            travel=float(figures.stuck_travel),
-            clear_slip=float(figures.stuck_clear_slip),
-            clear_time=float(figures.stuck_clear_time),
-        )
+_SETTINGS, _TUNING = StuckSettings(), SignTuning()
 
 
 class StuckAssessment(NamedTuple):
@@ -84,11 +61,11 @@ class StuckMonitor(Component[StuckState]):
 
     def __init__(
         self,
-        settings: StuckSettings = StuckSettings(),
+        settings: StuckSettings = _SETTINGS,
         signs: Sequence[Sign] = SIGNS,
         tuning: SignTuning = _TUNING,
     ) -> None:
-        self._observer = SituationObserver()
+        self._observer = SituationObserver(settings)
         super().__init__(StuckState(self._observer.state, (NAN,) * len(signs)))
         self._settings, self._signs, self._tuning = settings, tuple(signs), tuning
 
@@ -108,11 +85,11 @@ class StuckMonitor(Component[StuckState]):
             reason = reason if stuck else raised[0].words(situation, self._tuning)
             stuck = True
         elif stuck:
-            clear_since = self._clear_since(time, situation)
+            clear_since = self._clear_since(time, situation, since)
             if time - clear_since >= self._settings.clear_time:
                 stuck, reason, clear_since = False, '', NAN
         self.state = StuckState(situation.observed, since, stuck, reason, clear_since)
-        wheels = forecast(situation, self._settings.horizon, warned=stuck)
+        wheels = forecast(situation, warned=stuck)
         return StuckAssessment(stuck, reason, wheels, situation.stalled)
 
     def _signs_at(self, time: float, situation: Situation) -> tuple[tuple[float, ...], list[Sign]]:
@@ -130,10 +107,12 @@ class StuckMonitor(Component[StuckState]):
                 raised.append(sign)
         return tuple(since), raised
 
-    def _clear_since(self, time: float, situation: Situation) -> float:
-        """Return since when the rover seems to be free [s], nan = it does not."""
+    def _clear_since(self, time: float, situation: Situation, since: tuple[float, ...]) -> float:
+        """Return since when the rover seems to be free [s], nan = it does not.
+
+        A sign that is there counts, whether or not it has been for long enough to raise a warning.
+        """
         slipping = not situation.typical_magnitude < self._settings.clear_slip
-        labouring = not situation.motion.turning and held_back(situation, self._tuning)
-        if slipping or labouring:
+        if slipping or not all(isnan(begun) for begun in since):
             return NAN
         return time if isnan(self.state.clear_since) else self.state.clear_since

@@ -36,11 +36,12 @@ class SignTuning:
     trend_doubt: float = 0.45
     """Taken off the trend, over the deviation of the slip [1/s]: 1.5 deviations of the slope of
     five references in five seconds, 1.5 / (5 s / sqrt(12) sqrt(5))."""
-    ahead_time: float = 10.0  # [s]
     ahead_slip: float = 0.65
+    """Typical slip above which its trend is followed over the whole ``filter.stuck_horizon``."""
     sudden_time: float = 4.0  # [s]
-    sudden_slip: float = 0.45
+    sudden_slip: float = 0.45  # above which it is followed for so long
     ahead_std: float = 0.2  # of the slip
+    least_deepening: int = 2  # wheels that dig themselves in
     spare_margin: float = 0.045  # of the load: with more left, no entrapment is near
     exhausted_margin: float = 0.015
     exhausted_slip: float = 0.6
@@ -118,15 +119,40 @@ def _exhausted(s: Situation, t: SignTuning) -> bool:
     return s.motion.margin < t.exhausted_margin and s.typical_slip > t.exhausted_slip
 
 
-def _ahead(s: Situation, t: SignTuning) -> bool:
-    """Find that the median slip passes 0.9 soon; the higher it stands, the farther this looks."""
-    slip = s.typical_slip
+def _time_to_entrapment(s: Situation, t: SignTuning) -> float:
+    """Return after which time the median slip passes 0.9 with a probability of one half [s].
+
+    The trend counts less what the slip's own wandering makes of it.
+    """
+    growth = s.trend - t.trend_doubt * s.typical_std
+    lacking = ENTRAPPED_SLIP - s.typical_slip
+    return max(lacking, 0.0) / growth if growth > 0.0 else (math.inf if lacking >= 0.0 else 0.0)
+
+
+def _slip_is_told(s: Situation, t: SignTuning) -> bool:
+    """Say whether the slip is known well enough to follow its trend."""
     if not s.speed_known and s.motion.margin > t.spare_margin:
         return False  # without a speed the slip is half a guess: the soil must be near its limit
-    growth = s.trend - t.trend_doubt * s.typical_std
-    soon = slip > t.ahead_slip and slip + t.ahead_time * growth > ENTRAPPED_SLIP
-    at_once = slip > t.sudden_slip and slip + t.sudden_time * growth > ENTRAPPED_SLIP
-    return (soon or at_once) and s.typical_std < t.ahead_std
+    return s.typical_std < t.ahead_std
+
+
+def _within_horizon(s: Situation, t: SignTuning) -> bool:
+    """Find that the median slip passes 0.9 soon; the higher it stands, the farther this looks."""
+    horizon = s.settings.horizon
+    if s.typical_slip <= t.ahead_slip:
+        horizon = min(horizon, t.sudden_time)
+    soon = s.typical_slip > t.sudden_slip and _time_to_entrapment(s, t) < horizon
+    return soon and _slip_is_told(s, t)
+
+
+def _within_travel(s: Situation, t: SignTuning) -> bool:
+    """Find that the median slip passes 0.9, or half of the wheels dig in, within the rim travel."""
+    travel = s.settings.travel
+    digging = sum(room < travel for room in s.climbing_room)
+    if digging >= t.least_deepening and 2 * digging >= len(s.climbing_room):
+        return True
+    soon = s.typical_slip > t.sudden_slip and _time_to_entrapment(s, t) * s.fastest < travel
+    return soon and s.settled and _slip_is_told(s, t)
 
 
 def _lost_share(s: Situation) -> float:
@@ -170,7 +196,7 @@ def _stalling(s: Situation, t: SignTuning) -> bool:
     return count >= t.least_stalled and 2 * count >= len(s.stalled)
 
 
-def held_back(s: Situation, t: SignTuning) -> bool:
+def _held_back(s: Situation, t: SignTuning) -> bool:
     """Find two wheels near their limit and slower than the fastest, the rover slower still."""
     if not s.moving:
         return False
@@ -184,7 +210,7 @@ def held_back(s: Situation, t: SignTuning) -> bool:
 def _labouring(s: Situation, t: SignTuning) -> bool:
     """Find wheels near their limit that turn slower than in the last seconds."""
     slowed = s.typical_rim < t.labour_ratio * s.cruise_rim
-    return slowed and s.rolling_time >= s.tuning.pull_away_time and held_back(s, t)
+    return slowed and s.rolling_time >= s.tuning.pull_away_time and _held_back(s, t)
 
 
 SIGNS: tuple[Sign, ...] = (
@@ -205,12 +231,23 @@ SIGNS: tuple[Sign, ...] = (
         lambda s, t: f'soil gives {s.motion.margin:.3f} of the load more than is asked',
     ),
     Sign(
-        'ahead',
+        'within_horizon',
         1.0,
         Need.NOTHING,
         False,
-        _ahead,
+        _within_horizon,
         lambda s, t: f'median slip {s.typical_slip:.2f} grows by {s.trend:.3f} per second',
+    ),
+    Sign(
+        'within_travel',
+        1.0,
+        Need.NOTHING,
+        False,
+        _within_travel,
+        lambda s, t: (
+            f'digging in within {s.settings.travel:g} m of rim travel, median slip '
+            f'{s.typical_slip:.2f}'
+        ),
     ),
     Sign(
         'held',

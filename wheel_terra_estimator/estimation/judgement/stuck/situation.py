@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -11,6 +12,7 @@ from math import isnan
 from typing import NamedTuple
 
 from wheel_terra_estimator.estimation.component import Component
+from wheel_terra_estimator.estimation.judgement.stuck.settings import StuckSettings
 from wheel_terra_estimator.estimation.judgement.stuck.windows import (
     Window,
     appended,
@@ -50,6 +52,10 @@ class SituationTuning:
     stopping_share: float = 0.8  # of the fastest rim speed in it
     strained_torque: float = 0.5  # of the limit: two such wheels are held by the soil
     cruise_window: float = 5.0  # [s]
+    least_deepening: float = 0.02  # sinkage per rim travel that counts as digging
+    deepening_slip: float = 0.2
+    deep: float = 0.25
+    """Sinkage over the radius from which lugs do not climb out."""
 
 
 class WheelMotion(NamedTuple):
@@ -117,7 +123,28 @@ class Situation:
     stopping: bool
     """The wheels are being stopped: a late or early reference then shows slip that is none."""
     rolling_time: float  # [s] since the rover pulled away, nan = it did not
+    settings: StuckSettings
     tuning: SituationTuning
+
+    @cached_property
+    def climbing_room(self) -> tuple[float, ...]:
+        """Rim travel after which each wheel is in too deep for its lugs to climb out [m].
+
+        It sinks as it turns, as over its last travel; infinite where it does not.
+        """
+        t = self.tuning
+        return tuple(
+            [
+                max(t.deep * wheel.radius - wheel.sinkage, 0.0) / deepening.growth
+                if deepening.growth > t.least_deepening
+                and wheel.known
+                and wheel.slip > t.deepening_slip
+                else math.inf
+                for wheel, deepening in zip(
+                    self.motion.wheels, self.observed.deepening, strict=True
+                )
+            ]
+        )
 
     @property
     def speed_known(self) -> bool:
@@ -173,9 +200,11 @@ class Situation:
 class SituationObserver(Component[Observed]):
     """Turns the motion of the rover into the situation that the signs judge."""
 
-    def __init__(self, tuning: SituationTuning = SituationTuning()) -> None:
+    def __init__(
+        self, settings: StuckSettings, tuning: SituationTuning = SituationTuning()
+    ) -> None:
         super().__init__(Observed())
-        self._tuning = tuning
+        self._settings, self._tuning = settings, tuning
 
     def forget_trend(self) -> None:
         """Begin the trend anew: the level of the slip was wrong, which is no growth."""
@@ -222,6 +251,7 @@ class SituationObserver(Component[Observed]):
             settled=settled,
             stopping=self._stopping(motion.wheels, fastest, rims),
             rolling_time=time - rolling_since,
+            settings=self._settings,
             tuning=tuning,
         )
 
