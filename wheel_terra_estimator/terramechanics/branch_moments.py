@@ -18,8 +18,9 @@ from numpy.typing import NDArray
 
 from wheel_terra_estimator.terramechanics.contact import Contact
 
-# Skid beyond pure rolling, v/(w R) - 1, over which the nodes take over from the centroid.
-_TAKE_OVER = 0.05
+# Skid beyond pure rolling, v/(w R) - 1, from which and over which the nodes take over from the
+# centroid; below the first, one place per side is within 1.3 % of the load.
+_TAKE_OVER_AT, _TAKE_OVER = 0.07, 0.1
 # Gauss-Legendre nodes and weights on (0, 1), squared towards 0, where the stress starts like v^N.
 _NODES = tuple(
     (0.25 * (x + 1.0) ** 2, 0.5 * w * (x + 1.0))
@@ -139,7 +140,8 @@ class BranchForces:
     def set_speed(self, velocity_ratio: Any) -> None:
         """Change v/w [m]; all else stays as it is."""
         self._roll = velocity_ratio / self._modulus
-        share = (velocity_ratio / self._shear_radius - 1.0) / _TAKE_OVER
+        skid = velocity_ratio / self._shear_radius - 1.0
+        share = (skid - _TAKE_OVER_AT) / _TAKE_OVER
         if self._maths is np:
             share = np.minimum(np.maximum(share, 0.0), 1.0)
             self._skidding = bool(np.any(share > 0.0))

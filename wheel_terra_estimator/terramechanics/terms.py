@@ -39,23 +39,25 @@ class Terms:
 
     def __init__(self, settings: EffectSettings) -> None:
         known = catalogue()
-        chosen = [(known[key], values) for key, values in by_variant(settings).items()]
-        self.stages: dict[str, list[tuple[Term, SimpleNamespace]]] = {s: [] for s in STAGES}
+        soil: list[tuple[Effect, SimpleNamespace]] = []
+        instruments: list[tuple[Effect, SimpleNamespace]] = []
+        for key, values in sorted(by_variant(settings).items()):
+            effect = known[key]
+            kind = instruments if effect.instrument else soil
+            kind.append((effect, SimpleNamespace(**values)))
+        self.stages: dict[str, list[tuple[Term, SimpleNamespace]]] = {}
         for stage in STAGES:
-            for effect, values in sorted(chosen, key=lambda item: _rank(item[0], stage)):
-                term = getattr(effect, stage)
-                if term is not None:
-                    self.stages[stage].append((term, SimpleNamespace(**values)))
+            order = instruments + soil if stage == 'on_inputs' else soil + instruments
+            self.stages[stage] = [
+                (term, values)
+                for effect, values in order
+                if (term := getattr(effect, stage)) is not None
+            ]
 
     def apply(self, stage: str, contact: Contact, maths: Any = np) -> None:
         """Run all terms of a stage on the contact."""
         for term, parameters in self.stages[stage]:
             term(contact, parameters, maths)
-
-
-def _rank(effect: Effect, stage: str) -> tuple[bool, str]:
-    """Place of an effect within a stage."""
-    return (effect.instrument == (stage != 'on_inputs'), effect.name)
 
 
 def build_contact(
