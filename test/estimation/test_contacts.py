@@ -10,11 +10,12 @@ from parts import SAND, Parts
 
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.estimation.contacts.contact_age import ContactAge
-from wheel_terra_estimator.estimation.contacts.contact_changes import DemandChange, TorqueChange
+from wheel_terra_estimator.estimation.contacts.demand import Demand
 from wheel_terra_estimator.estimation.contacts.linearisation import Linearisation, traction_slope
 from wheel_terra_estimator.estimation.contacts.loads import LoadState, WheelLoads
 from wheel_terra_estimator.estimation.contacts.pulls import Pulls
 from wheel_terra_estimator.estimation.contacts.stationary_wheels import StationaryWheels
+from wheel_terra_estimator.estimation.contacts.torque_change import TorqueChange
 from wheel_terra_estimator.estimation.contacts.turning import Turning
 from wheel_terra_estimator.estimation.contacts.unloaded_wheels import UnloadedWheels
 from wheel_terra_estimator.estimation.contacts.wheel_models import WheelState
@@ -108,19 +109,24 @@ def test_a_reversal_begins_a_new_contact(parts):
     assert age.shear_variance > 100.0 * late
 
 
-# -- Changes of what the wheels must give -----------------------------------------------------
+# -- What the ground asks -----------------------------------------------------------------------
 
 
-def test_a_change_of_slope_may_change_the_slip_by_it_over_the_traction_curve(parts):
-    demand = DemandChange(parts.rover, parts.sensors)
-    assert demand.update(0.0, 5, 0.1, 0.5) == 0.0
-    assert demand.update(0.0, 5, 0.1, 0.5) == 0.0
-    assert demand.update(0.1, 5, 0.1, 0.5) == pytest.approx(0.1 / 0.5, rel=0.1)
-    assert demand.update(0.1, 5, 0.1, 0.0) == 0.0  # the curve is not known
-    for _ in range(100):
-        demand.update(0.1, 5, 0.1, 0.5)
-    assert demand.state == pytest.approx(0.1, rel=0.01)
-    assert demand.update(0.1, 5, 0.1, 0.5) == 0.0
+def test_the_demand_gives_its_changes_and_nothing_but_them():
+    demand = Demand()
+    assert demand.update(0.05, 0.1, settled=True) == 0.0  # the level is no change
+    changes = [demand.update(0.15, 0.1, settled=True) for _ in range(40)]
+    assert changes[0] > changes[1] > 0.0
+    assert sum(changes) == pytest.approx(0.10, rel=1e-3)
+
+
+def test_a_start_is_no_change_of_the_demand():
+    demand = Demand()
+    demand.update(0.05, 0.1, settled=True)
+    assert demand.update(0.30, 0.1, settled=False) == 0.0
+    assert demand.update(0.30, 0.1, settled=True) == 0.0
+    assert demand.update(NAN, 0.1, settled=True) == 0.0
+    assert demand.state == 0.30
 
 
 def test_a_jump_of_all_torques_may_change_the_slip(parts):

@@ -88,6 +88,19 @@ def test_references_that_agree_with_one_another_are_believed_after_their_count(p
         assert fresh.mean[SPEED] == pytest.approx(0.02, abs=0.003)
 
 
+def test_models_are_doubted_while_the_references_lean_one_way(parts, ekf):
+    """Each of these is within its gate; six of them one way are none by chance (0.4 %)."""
+    rng = np.random.default_rng(7)
+    speeds = {'white': rng.normal(0.045, 0.003, 6), 'leaning': np.full(6, 0.049)}
+    doubt = {}
+    for name, values in speeds.items():
+        fresh = parts.filter()
+        fresh.set(SPEED, 0.045, 1e-8)
+        doubt[name] = references(parts, fresh, values)[0].model_doubt
+    assert doubt['leaning'] > 5.0
+    assert doubt['white'] < 2.0
+
+
 def test_references_beyond_the_fastest_wheel_hardly_count(parts, ekf):
     _, opened = references(parts, ekf, [0.045] * 10 + [0.5] * 3)
     assert not any(opened)

@@ -81,7 +81,8 @@ def odometry(rate, torque):
 
 @pytest.fixture
 def wheels():
-    return WheelOdometryInput(Parts(reader.load(SAND)).rover)
+    parts = Parts(reader.load(SAND))
+    return WheelOdometryInput(parts.rover, parts.sensors)
 
 
 def test_torques_are_means_and_the_last_one_is_held(wheels):
@@ -115,6 +116,18 @@ def test_fast_odometry_is_smoothed_and_slow_is_not(wheels):
     assert wheels.state.rim_speed[0] == pytest.approx(
         0.8 * Parts(reader.load(SAND)).rover.slip_radius[0]
     )
+
+
+def test_a_ramp_goes_on_to_the_stamp_of_a_reference_between_two_messages(wheels):
+    """A reference velocity halfway through a ramp belongs to the rim speed of its own stamp."""
+    radius = Parts(reader.load(SAND)).rover.slip_radius[0]
+    for i in range(10):
+        wheels.update(0.1 * i, odometry([0.1 * i] * 6, [NAN] * 6))
+    assert wheels.rim_speeds(0.95)[0] == pytest.approx(0.95 * radius, rel=0.01)
+    # A constant rate that scatters by its noise stays what it is.
+    for i in range(10, 40):
+        wheels.update(0.1 * i, odometry([0.9 + 0.002 * (-1) ** i] * 6, [NAN] * 6))
+    assert wheels.rim_speeds(3.95) == wheels.state.rim_speed
 
 
 def test_sinkage_and_leaving_angle_are_kept_wheel_by_wheel():

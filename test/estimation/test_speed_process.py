@@ -7,8 +7,13 @@ import pytest
 from parts import SAND, Parts
 
 from wheel_terra_estimator.configuration import reader
-from wheel_terra_estimator.estimation.filter.speed_process import RimSpeeds, SpeedProcess
-from wheel_terra_estimator.estimation.filter.state import SPEED
+from wheel_terra_estimator.estimation.filter.prediction import Prediction
+from wheel_terra_estimator.estimation.filter.speed_process import (
+    RimSpeeds,
+    SpeedProcess,
+    SpeedStep,
+)
+from wheel_terra_estimator.estimation.filter.state import SLIP_PER_DEMAND, SPEED
 from wheel_terra_estimator.estimation.inputs.inertial import InertialWindow
 
 NAN = float('nan')
@@ -126,6 +131,38 @@ def test_the_slip_walks_as_the_demand_over_the_slope_of_the_traction_curve():
     made = process([0.05] * 6)
     walks = []
     for slope in (0.001, 0.4, 10.0):
-        made.follow_traction_curve(slope)
+        made.follow_traction_curve(slope, travel=10.0)
         walks.append(made.state.ratio_walk)
     assert walks == pytest.approx([0.13, 0.025 / 0.4, 0.03])
+
+
+def test_a_rover_that_must_pull_more_slips_more_at_once():
+    """At a slip per demand of 2, a demand that grows by 0.05 takes a tenth of the rim speed."""
+    parts = Parts(reader.load(SAND))
+    made, mean = process([0.05] * 6), parts.filter().mean.copy()
+    mean[[SPEED, SLIP_PER_DEMAND]] = 0.04, 2.0
+    given = {'rim': 0.05, 'demand_change': 0.05}
+    climbing = Prediction.unchanged(mean)
+    made.predict(climbing, SpeedStep(1.0, 0.0, 0.0, 1e-9), 0.1, **given)
+    assert climbing.mean[SPEED] == pytest.approx(0.04 - 0.1 * 0.05)
+    assert climbing.F[SPEED, SLIP_PER_DEMAND] == pytest.approx(-0.05 * 0.05)
+    # Backwards the speed is negative, and loses as much of its size.
+    mean[SPEED] = -0.04
+    back = Prediction.unchanged(mean)
+    given['rim'] = -0.05
+    made.predict(back, SpeedStep(1.0, 0.0, 0.0, 1e-9), 0.1, **given)
+    assert back.mean[SPEED] == pytest.approx(-0.035)
+    # A speed that rests on the accelerometer alone is not changed by it.
+    alone = Prediction.unchanged(mean)
+    made.predict(alone, SpeedStep(1.0, 0.0, 0.0, 1e-9, wheel_weight=0.0), 0.1, **given)
+    assert alone.mean[SPEED] == -0.04
+
+
+def test_the_slip_of_a_start_walks_farther():
+    made = process([0.05] * 6)
+    walks = []
+    for travel in (0.0, 0.1, 10.0):
+        made.follow_traction_curve(0.5, travel)
+        walks.append(made.state.ratio_walk)
+    assert walks[0] > 2.0 * walks[2]
+    assert walks[0] > walks[1] > walks[2]

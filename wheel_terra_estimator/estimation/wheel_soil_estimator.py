@@ -15,7 +15,7 @@ from typing import Any, NamedTuple, Protocol
 
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.contacts.contact_age import ContactAge
-from wheel_terra_estimator.estimation.contacts.contact_changes import DemandChange, TorqueChange
+from wheel_terra_estimator.estimation.contacts.demand import Demand
 from wheel_terra_estimator.estimation.contacts.linearisation import (
     ContactForces,
     Linearisation,
@@ -27,6 +27,7 @@ from wheel_terra_estimator.estimation.contacts.stationary_wheels import (
     StationaryPull,
     StationaryWheels,
 )
+from wheel_terra_estimator.estimation.contacts.torque_change import TorqueChange
 from wheel_terra_estimator.estimation.contacts.turning import Turning
 from wheel_terra_estimator.estimation.contacts.unloaded_wheels import UnloadedWheels
 from wheel_terra_estimator.estimation.contacts.wheel_models import WheelModels
@@ -120,6 +121,7 @@ class _Cycle(NamedTuple):
     turns: tuple[bool, ...]
     """Wheels for which the contact models hold: they turn under a load."""
     reference_known: bool  # of late, before this cycle
+    demand_change: float  # by how much more the ground asks than at the last cycle [-]
 
 
 class WheelSoilEstimator:
@@ -139,7 +141,7 @@ class WheelSoilEstimator:
         models = WheelModels(configuration)
         # Readings between two cycles.
         self._inertial = InertialInput(rover.gravity)
-        self._wheels = WheelOdometryInput(rover)
+        self._wheels = WheelOdometryInput(rover, sensors)
         self._sinkages = SinkageInput(rover.wheel_count)
         self._leaving_angles = LeavingAngleInput(rover.wheel_count)
         # Wheels on the ground.
@@ -148,7 +150,7 @@ class WheelSoilEstimator:
         level = self._loads.state.load
         self._contact_age = ContactAge(rover)
         self._unloaded = UnloadedWheels(rover, sensors)
-        self._demand_change = DemandChange(rover, sensors)
+        self._demand = Demand()
         self._torque_change = TorqueChange(rover, sensors)
         angle_std = sensors.leaving_angle_std * self._leaving_angles.noise_share
         self._linearisation = Linearisation(rover, layout, models, angle_std)
@@ -179,7 +181,7 @@ class WheelSoilEstimator:
             self._loads,
             self._contact_age,
             self._unloaded,
-            self._demand_change,
+            self._demand,
             self._torque_change,
             self._linearisation,
             self._pulls,
@@ -322,12 +324,6 @@ class WheelSoilEstimator:
             window, pulls.model_pull, pulls.torque, self._unloaded.state.unloaded
         )
         speed.inflate(turning.speed_change)
-        if window.readings:
-            change = self._demand_change.update(
-                loads.slope_share, window.readings, dt, speed.state.traction_slope
-            )
-            if self._contact_age.settled:
-                speed.inflate(change * fastest)
         rims = self._wheels.rim_speeds(time)
         unturned = RimSpeeds.of(rims, turning.yaw_rate, rover.lateral)
         reference_known = self._reference.known(time)
@@ -338,6 +334,11 @@ class WheelSoilEstimator:
         if event.new_direction:
             direction = self._contact_age.state.direction
             speed.forget_ratio(direction, loads.slope_share, turned_back=event.reversed)
+        demand_change = self._demand.update(
+            self._contact_age.state.direction * loads.slope_share if window.readings else NAN,
+            dt,
+            settled=self._contact_age.settled,
+        )
         speed.begin(ekf, unturned)
         speed.note_change(time, unturned)
         heard = known(rims)
@@ -353,6 +354,7 @@ class WheelSoilEstimator:
             loads=loads,
             turns=self._linearisation.turning(rims, loads.load),
             reference_known=reference_known,
+            demand_change=demand_change,
         )
 
     def _predict(self, cycle: _Cycle) -> None:
@@ -370,7 +372,13 @@ class WheelSoilEstimator:
                 direction=self._contact_age.state.direction,
                 slope_share=cycle.loads.slope_share,
             )
-        self._speed.predict(prediction, step, cycle.dt)
+        self._speed.predict(
+            prediction,
+            step,
+            cycle.dt,
+            rim=cycle.unturned.typical,
+            demand_change=cycle.demand_change if cycle.reference_known else 0.0,
+        )
         if not cycle.still and cycle.dt > 0.0:
             travel = self._sinkage_process.predict(
                 prediction,
@@ -457,7 +465,7 @@ class WheelSoilEstimator:
                 for rim, turns in zip(cycle.rims, cycle.turns, strict=True)
             ]
         )
-        repeats = repetitions(cycle.rims, cycle.dt)
+        repeats = repetitions(cycle.rims, cycle.dt) * self._reference.model_doubt
         rows = self._torque.update(
             ekf,
             forces,
@@ -466,7 +474,9 @@ class WheelSoilEstimator:
             model_variance=model_variance,
             repeats=repeats,
         )
-        self._speed.follow_traction_curve(traction_slope(forces, cycle.rims, loads))
+        self._speed.follow_traction_curve(
+            traction_slope(forces, cycle.rims, loads), self._contact_age.state.travel
+        )
         if not cycle.window.readings:
             return forces, None, rows
         curvature = self._turning.curvature(float(x[SPEED]))

@@ -41,7 +41,7 @@ class PullTuning:
     """Of the load at slip 1: soil piled up by a wheel that hardly moves is in no model."""
     piled_slip: float = 0.6  # where it begins
     most_torque: float = 1.2  # of load times radius
-    most_drag: float = 1.2  # of the load
+    most_drag: float = 2.0  # of the load
     excess_gain: float = 0.2  # smoothing of reading less model, per cycle
     shrinkage: float = 2.0
     """Noise variances taken off the square of an excess (James and Stein 1961): nothing below its

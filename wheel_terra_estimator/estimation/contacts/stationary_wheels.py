@@ -32,7 +32,7 @@ class StationaryTuning:
 
     sliding_ratio: float = 3.0
     """v/(r w) taken for a locked wheel: its shear is saturated long before [-]."""
-    most_drag: float = 1.2  # of the load: friction and the soil pushed ahead
+    most_drag: float = 2.0  # of the load: friction and the soil pushed ahead
     straight: float = 0.1
     """Lateral motion above which a torque against the drag is no sign of a jammed drive [-]."""
     dragged_doubt: float = 0.1

@@ -19,6 +19,7 @@ from wheel_terra_estimator.estimation.filter.state import (
     MOUND,
     SHEAR_MODULUS,
     SHEAR_STRENGTH,
+    SLIP_PER_DEMAND,
     SLIP_SINKAGE,
     SPEED,
     StateLayout,
@@ -41,6 +42,10 @@ class PriorTuning:
     centroid_std: float = 0.06  # [-]
     mound_mean: float = 0.05  # where the configured soil knows no mound [-]
     mound_std: float = 0.1
+    slip_per_demand_mean: float = 1.5
+    """Slip for each share of the load that is asked: traction curves of wheels in loose soil give 1
+    to 2 below s = 0.5 (Ding et al. 2010; NASA VIPER slip and slope, docs/models/validation.md)."""
+    slip_per_demand_std: float = 1.0
     sinkage_share: float = 0.5  # of the sinkage at rest
     sinkage_floor: float = 0.005  # [m]
     own_stiffness_share: float = 0.5
@@ -57,6 +62,7 @@ class PriorTuning:
     most_slip_sinkage: float = 0.8
     most_centroid: float = 0.3
     most_mound: float = 0.6
+    most_slip_per_demand: float = 8.0  # near the top of the traction curve
     most_stiffness: float = 3.0  # [ln]
     most_shear_error: float = 1.5  # [ln]
     highest: float = 0.02  # a wheel above the surface, of the radius
@@ -138,11 +144,13 @@ def initial_filter(
         SLIP_SINKAGE: tuning.slip_sinkage_std,
         CENTROID: tuning.centroid_std,
         MOUND: tuning.mound_std,
+        SLIP_PER_DEMAND: tuning.slip_per_demand_std,
     }
     P = np.zeros((layout.size, layout.size))
     for index, std in deviations.items():
         P[index, index] = std**2
     mean[MOUND] = 0.0 if 'soil_mound' in configuration.effects else tuning.mound_mean
+    mean[SLIP_PER_DEMAND] = tuning.slip_per_demand_mean
     z = [resting_sinkage(models, i, loads[i], rover.rim_radius[i]) for i in range(n)]
     mean[layout.sinkage] = z
     spread = tuning.sinkage_share * np.array(z) + tuning.sinkage_floor
@@ -160,11 +168,13 @@ def bounds(rover: Rover, layout: StateLayout, tuning: PriorTuning) -> tuple[Floa
     upper[[SHEAR_STRENGTH, SHEAR_MODULUS]] = tuning.most_strength, tuning.most_shear_modulus
     upper[SLIP_SINKAGE] = tuning.most_slip_sinkage
     upper[[CENTROID, MOUND]] = tuning.most_centroid, tuning.most_mound
+    upper[SLIP_PER_DEMAND] = tuning.most_slip_per_demand
     upper[layout.stiffness], upper[layout.shear_error] = (
         tuning.most_stiffness,
         tuning.most_shear_error,
     )
     lower = -upper
+    lower[SLIP_PER_DEMAND] = 0.0
     upper[layout.sinkage] = rover.rim_radius
     lower[layout.sinkage] = [-tuning.highest * r for r in rover.rim_radius]
     return lower, upper
@@ -175,6 +185,7 @@ def with_soil_of(
 ) -> FilterMemory:
     """Return the start of a run that keeps soil and biases of an old one, widened."""
     kept = [GRAVITY_BIAS, SHEAR_STRENGTH, SHEAR_MODULUS, SLIP_SINKAGE, CENTROID, MOUND]
+    kept.append(SLIP_PER_DEMAND)
     kept += range(layout.size)[layout.stiffness]
     block = np.ix_(kept, kept)
     covariance, mean = start.covariance.copy(), start.mean.copy()

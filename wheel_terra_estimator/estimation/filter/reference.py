@@ -15,6 +15,7 @@ from wheel_terra_estimator.estimation.filter.ekf import GatedFilter, chi_square_
 from wheel_terra_estimator.estimation.filter.state import SPEED
 from wheel_terra_estimator.estimation.measurements import ReferenceVelocity
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
+from wheel_terra_estimator.estimation.scalars import clipped
 
 
 @dataclass(frozen=True)
@@ -31,9 +32,10 @@ class ReferenceTuning:
     moving_rest: float = 2.0  # times ``rest_speed``
     slide_gaps: float = 2.0  # gaps for which a slide on standing wheels is believed
     shortest_slide: float = 1.0  # [s]
-    fair_nis: float = 3.0
-    """Normalised innovation squared above which a reference is more than chance: the prediction was
-    too sure of itself and is widened."""
+    lean_count: float = 6.0
+    """References over which their innovations' mean is taken."""
+    most_lean: float = 3.0  # deviations that one reference counts for in it
+    most_doubt: float = 100.0
     beyond_rim: float = 1.5  # times the fastest rim speed: no rover drives faster than its wheels
     beyond_std: float = 5.0
     same_std: float = 4.0  # deviations within which two references disagree by the same amount
@@ -57,6 +59,8 @@ class ReferenceState(NamedTuple):
     rejected_in_a_row: int = 0
     last_rejected: float = 0.0  # innovation of the last rejected one [m/s]
     nis: float | None = None  # running mean; None = none came yet
+    lean: float = 0.0
+    """Running mean of the innovations, each over its deviation."""
 
 
 class ReferenceUpdate(Component[ReferenceState]):
@@ -84,6 +88,18 @@ class ReferenceUpdate(Component[ReferenceState]):
     def keep_count(self, rejected: int) -> None:
         """Go on with the count of rejected references of an old run."""
         self.state = self.state._replace(rejected=rejected)
+
+    @property
+    def model_doubt(self) -> float:
+        """Factor on the variance of the wheel-soil models [-]: 1 while the references scatter.
+
+        Innovations of a filter that is right are white. Where they lean one way for several
+        references, the models hold the speed against them; a gate on single ones cannot see it.
+        The running mean of white innovations has variance 1 / (2 n - 1) over n.
+        """
+        tuning = self._tuning
+        excess = self.state.lean**2 * (2.0 * tuning.lean_count - 1.0)
+        return clipped(excess * excess, 1.0, tuning.most_doubt)
 
     def believes(self, agreeing: int, *, beyond: bool, witnessed: bool) -> bool:
         """Say whether so many references in a row that disagree by the same amount are right."""
@@ -130,7 +146,9 @@ class ReferenceUpdate(Component[ReferenceState]):
         residual = reference.forward - float(ekf.mean[SPEED])
         total = float(ekf.covariance[SPEED, SPEED]) + variance
         nis = residual * residual / total
-        state = self.state._replace(nis=smoothed_nis(self.state.nis, nis))
+        score = clipped(residual / math.sqrt(total), -tuning.most_lean, tuning.most_lean)
+        lean = self.state.lean + (score - self.state.lean) / tuning.lean_count
+        state = self.state._replace(nis=smoothed_nis(self.state.nis, nis), lean=lean)
         opened = False
         if nis > self._gate:
             beyond = abs(reference.forward) > (
@@ -152,9 +170,6 @@ class ReferenceUpdate(Component[ReferenceState]):
             )
         else:
             state = state._replace(rejected_in_a_row=0)
-            if nis > tuning.fair_nis:
-                # More than chance, less than an outlier: the prediction was too sure of itself.
-                ekf.widen(SPEED, residual * residual / tuning.fair_nis - total)
         ekf.fuse_entry(SPEED, reference.forward, variance)
         self.state = state
         return opened

@@ -5,8 +5,9 @@
 Two predictions of the change of speed over a step, each with its own variance, are combined by
 their inverse variances:
 
-* with the wheels: v / rim speed changes only with the terrain, a random walk per rim travel. Exact
-  through ramps, stops and restarts of a slow rover; poor where a fast rover's wheels spin up.
+* with the wheels: v / rim speed changes only with the terrain: by what the ground asks more, times
+  the learned slip per demand, and by a random walk per rim travel. Exact through ramps, stops and
+  restarts of a slow rover; poor where a fast rover's wheels spin up.
 * with the accelerometer: dv = (f_x - g_x - bias) dt. Good for fractions of a second; its error per
   second is nothing to 1 m/s and everything to 5 cm/s.
 
@@ -24,7 +25,7 @@ from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.filter.ekf import GatedFilter
 from wheel_terra_estimator.estimation.filter.prediction import Prediction
-from wheel_terra_estimator.estimation.filter.state import GRAVITY_BIAS, SPEED
+from wheel_terra_estimator.estimation.filter.state import GRAVITY_BIAS, SLIP_PER_DEMAND, SPEED
 from wheel_terra_estimator.estimation.inputs.inertial import InertialWindow
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
 from wheel_terra_estimator.estimation.scalars import NAN, clipped, known, median
@@ -54,6 +55,11 @@ class SpeedTuning:
     rim_change: float = 0.2
     """Error of a change of rim speed as a change of speed, over that change [-]."""
     floor_walk: float = 1e-8  # [(m/s)^2/s]
+    start_walk: float = 0.6
+    """Random walk of v / rim speed at a start [1/sqrt(m)]: ruts form and the slip settles."""
+    start_walk_travel: float = 0.2  # [m] with which it decays
+    demand_error: float = 0.3  # of what the demand changes, over that change [-]
+    slip_per_demand_walk: float = 0.2  # [1/sqrt(m)]
     inflation_rate: float = 2.0
     """Process noise of a change of speed, over its square, per second [1/s]: it may come within
     half a second."""
@@ -94,6 +100,8 @@ class SpeedStep(NamedTuple):
     bias_gain: float
     constant: float
     variance: float
+    wheel_weight: float = 1.0
+    """Share of the prediction with the wheels in it."""
 
 
 class RimSpeeds(NamedTuple):
@@ -183,14 +191,17 @@ class SpeedProcess(Component[SpeedState]):
         if changed or state.inflation > tuning.restless_share * abs(rim):
             self.state = state._replace(change_time=time)
 
-    def follow_traction_curve(self, slope: float) -> None:
+    def follow_traction_curve(self, slope: float, travel: float) -> None:
         """Let the slip walk as what the ground asks does, over the slope of the traction curve.
 
         Where the curve is steep, a change of demand changes the slip little; on the plateau the
-        same change makes the rover dig in.
+        same change makes the rover dig in. After a start it walks farther, over some `travel` [m].
         """
-        slope = max(slope, self._tuning.least_slope)
-        walk = clipped(self._demand_walk / slope, self._least_walk, self._most_walk)
+        tuning = self._tuning
+        slope = max(slope, tuning.least_slope)
+        walk = self._demand_walk / slope
+        start = tuning.start_walk * math.exp(-travel / tuning.start_walk_travel)
+        walk = max(clipped(walk, self._least_walk, self._most_walk), start)
         self.state = self.state._replace(traction_slope=slope, ratio_walk=walk)
 
     # -- Prediction ------------------------------------------------------------------------------
@@ -223,8 +234,30 @@ class SpeedProcess(Component[SpeedState]):
         )
         return self.combined(by_wheels, self.since_cycle(time), window)
 
-    def predict(self, prediction: Prediction, step: SpeedStep, dt: float) -> None:
-        """Add speed and gravity bias to a prediction over `dt` [s]."""
+    def predict(
+        self,
+        prediction: Prediction,
+        step: SpeedStep,
+        dt: float,
+        *,
+        rim: float,
+        demand_change: float,
+    ) -> None:
+        """Add speed, gravity bias and slip per demand to a prediction.
+
+        Parameters
+        ----------
+        prediction : Prediction
+            Is filled in.
+        step : SpeedStep
+            How the speed goes on.
+        dt : float
+            Length of the cycle [s].
+        rim : float
+            Typical rim speed [m/s]; nan = unknown.
+        demand_change : float
+            By how much more the ground asks, as a share of the load [-].
+        """
         mean, F, Q = prediction
         mean[SPEED] = (
             step.speed_gain * mean[SPEED] + step.bias_gain * mean[GRAVITY_BIAS] + step.constant
@@ -233,6 +266,15 @@ class SpeedProcess(Component[SpeedState]):
         F[SPEED, GRAVITY_BIAS] = step.bias_gain
         Q[SPEED, SPEED] = step.variance
         Q[GRAVITY_BIAS, GRAVITY_BIAS] = self._bias_walk * dt
+        if demand_change and not isnan(rim):
+            # v = (1 - s) rim, and ds = slip_per_demand times the change of the demand.
+            gain = -step.wheel_weight * rim * demand_change
+            lost = gain * float(mean[SLIP_PER_DEMAND])
+            mean[SPEED] += lost
+            F[SPEED, SLIP_PER_DEMAND] = gain
+            Q[SPEED, SPEED] += (self._tuning.demand_error * lost) ** 2
+            walk = self._tuning.slip_per_demand_walk**2
+            Q[SLIP_PER_DEMAND, SLIP_PER_DEMAND] = walk * abs(rim) * dt
 
     def by_wheels(self, dt: float, rims: RimSpeeds, inflation: float) -> SpeedStep:
         """Return the prediction with the wheels alone over `dt` [s]."""
@@ -267,6 +309,7 @@ class SpeedProcess(Component[SpeedState]):
             -(1.0 - weight) * dt,
             weight * step.constant + (1.0 - weight) * accelerated,
             step.variance * noise / (step.variance + noise),
+            weight,
         )
 
     def disagreement(self, rims: RimSpeeds) -> float:
@@ -324,7 +367,7 @@ class SpeedProcess(Component[SpeedState]):
         speed, variance = float(x[SPEED]), float(P[SPEED, SPEED])
         if self.since_cycle(time) < self._tuning.present:
             return speed, variance
-        a, b, constant, noise = self.step(time, rims, window, inflated=inflated)
+        a, b, constant, noise, _ = self.step(time, rims, window, inflated=inflated)
         carried = a * speed + b * float(x[GRAVITY_BIAS]) + constant
         return carried, (
             a * a * variance

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.measurements import WheelOdometry
-from wheel_terra_estimator.estimation.rover import Rover
+from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
 from wheel_terra_estimator.estimation.scalars import NAN
 
 Floats = tuple[float, ...]
@@ -26,6 +26,12 @@ class WheelOdometryTuning:
     of the rim speed needs."""
     longest_smoothed: float = 0.06
     """Odometry that is this slow [s between messages] is not smoothed."""
+    slope_gain: float = 0.5  # smoothing of the rim speeds' rate of change, per message
+    longest_carried: float = 0.15
+    """Time [s] over which a rim speed is carried on at its rate of change, to the stamp of a
+    reference velocity or of an IMU reading between two messages."""
+    longest_gap: float = 0.3  # between messages from which a rate of change is taken [s]
+    slope_noise: float = 3.0  # deviations of the rates within which a rim speed is constant
     torque_age: float = 2.0
     """A torque that is no older [s] counts as known."""
 
@@ -36,6 +42,7 @@ class WheelOdometryState(NamedTuple):
     time: float  # of the last message [s], -inf = none yet
     rim_speed: Floats  # [m/s], nan = never known
     rate_time: Floats  # [s]
+    rim_slope: Floats  # rate of change of the rim speeds, smoothed [m/s^2]
     torque_time: float
     torque_sum: Floats  # since the last cycle
     torque_count: tuple[int, ...]
@@ -45,15 +52,30 @@ class WheelOdometryState(NamedTuple):
 class WheelOdometryInput(Component[WheelOdometryState]):
     """Keeps the newest rim speeds, sums torques."""
 
-    def __init__(self, rover: Rover, tuning: WheelOdometryTuning = WheelOdometryTuning()) -> None:
+    def __init__(
+        self,
+        rover: Rover,
+        sensors: SensorFigures,
+        tuning: WheelOdometryTuning = WheelOdometryTuning(),
+    ) -> None:
         n = rover.wheel_count
         never = -math.inf
         start = WheelOdometryState(
-            never, (NAN,) * n, (never,) * n, never, (0.0,) * n, (0,) * n, (NAN,) * n
+            never,
+            (NAN,) * n,
+            (never,) * n,
+            (0.0,) * n,
+            never,
+            (0.0,) * n,
+            (0,) * n,
+            (NAN,) * n,
         )
         super().__init__(start)
         self._radius = rover.slip_radius
         self._silence = rover.silence
+        # A constant rim speed whose readings scatter seems to change by this much a second.
+        noise = tuning.slope_noise * sensors.wheel_rate_std * max(rover.slip_radius)
+        self._least_slope = noise / tuning.smoothing_time
         self._tuning = tuning
 
     def update(self, time: float, odometry: WheelOdometry) -> None:
@@ -62,9 +84,15 @@ class WheelOdometryInput(Component[WheelOdometryState]):
         dt = time - state.time
         keep = 0.0 if dt >= tuning.longest_smoothed else math.exp(-dt / tuning.smoothing_time)
         rim_speed, rate_time = list(state.rim_speed), list(state.rate_time)
+        rim_slope = list(state.rim_slope)
         for i, rate in enumerate(odometry.rate.tolist()):
             if not isnan(rate):
                 rim, old = rate * self._radius[i], rim_speed[i]
+                gap = time - rate_time[i]
+                if 0.0 < gap < tuning.longest_gap:
+                    rim_slope[i] += tuning.slope_gain * ((rim - old) / gap - rim_slope[i])
+                else:
+                    rim_slope[i] = 0.0
                 rim_speed[i] = rim if isnan(old) else keep * old + (1.0 - keep) * rim
                 rate_time[i] = time
         torque_time = state.torque_time
@@ -78,6 +106,7 @@ class WheelOdometryInput(Component[WheelOdometryState]):
             time,
             tuple(rim_speed),
             tuple(rate_time),
+            tuple(rim_slope),
             torque_time,
             tuple(torque_sum),
             tuple(torque_count),
@@ -104,12 +133,22 @@ class WheelOdometryInput(Component[WheelOdometryState]):
     def rim_speeds(self, time: float) -> Floats:
         """Return the rim speeds [m/s], nan where the rate is unknown or too old."""
         state, silence = self.state, self._silence
-        if time - min(state.rate_time) <= silence:
+        if min(state.rate_time) == time:
             return state.rim_speed
         return tuple(
-            rim if time - when <= silence else NAN
-            for rim, when in zip(state.rim_speed, state.rate_time, strict=True)
+            [
+                self._carried(rim, slope, time - when) if time - when <= silence else NAN
+                for rim, slope, when in zip(
+                    state.rim_speed, state.rim_slope, state.rate_time, strict=True
+                )
+            ]
         )
+
+    def _carried(self, rim: float, slope: float, age: float) -> float:
+        """Return a rim speed carried on over its age [s]: a ramp goes on between two messages."""
+        if abs(slope) <= self._least_slope or age > self._tuning.longest_carried:
+            return rim
+        return rim + slope * age
 
     def fastest(self) -> float:
         """Return the greatest known rim speed, whatever its direction or age [m/s]; 0 = none."""

@@ -1,8 +1,9 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Changes of what the wheels must give: the slip follows them before the next reference tells.
+"""Sudden changes of the torques: the slip may change before the next reference tells.
 
-Each says by how much the body's speed may change. That widens the prediction of the speed with the
+A wheel that locks or comes free makes the others work. By how much the body's speed may change
+widens the prediction of the speed with the
 wheels (process-noise inflation), not the covariance, so that the accelerometer still bounds the
 speed of a fast rover.
 """
@@ -23,12 +24,9 @@ Floats = tuple[float, ...]
 
 
 @dataclass(frozen=True)
-class ChangeTuning:
+class TorqueChangeTuning:
     """Tuned on simulated drives, seeds 1000 to 1019."""
 
-    demand_time: float = 1.0  # over which a demand must change to count as new [s]
-    demand_noise: float = 1.5  # deviations of the mean specific force that are no change
-    most_demand_slip: float = 0.3  # change of slip that one change of the demand may bring
     effort_fast: float = 0.15  # time constants of the torques' two means [s]
     effort_slow: float = 1.0
     effort_noise: float = 1.5
@@ -37,42 +35,6 @@ class ChangeTuning:
     effort_gain: float = 0.5  # of the change of torque that is one of slip
     most_effort_slip: float = 0.4
     least_slope: float = 0.1  # of the traction curve, over which a change is taken [-]
-
-
-class DemandChange(Component[float]):
-    """Notes a change of the specific force along the body; keeps its mean over a second [-]."""
-
-    def __init__(
-        self, rover: Rover, sensors: SensorFigures, tuning: ChangeTuning = ChangeTuning()
-    ) -> None:
-        super().__init__(NAN)
-        self._tuning = tuning
-        self._noise = sensors.specific_force_std
-        self._gravity = rover.gravity
-
-    def update(self, demand: float, readings: int, dt: float, traction_slope: float) -> float:
-        """Return the change of slip that a change of the demand may bring [-].
-
-        Parameters
-        ----------
-        demand : float
-            What the ground asks, as a share of the load [-].
-        readings : int
-            IMU readings in it.
-        dt : float
-            Length of the cycle [s].
-        traction_slope : float
-            Of the traction curve [-]; 0 = unknown.
-        """
-        tuning = self._tuning
-        mean = demand if isnan(self.state) else self.state
-        change = demand - mean
-        self.state = mean + gain_of(dt, tuning.demand_time) * change
-        noise = self._noise / math.sqrt(readings) / self._gravity
-        excess = abs(change) - tuning.demand_noise * noise
-        if excess <= 0.0 or traction_slope <= 0.0:
-            return 0.0
-        return min(excess / max(traction_slope, tuning.least_slope), tuning.most_demand_slip)
 
 
 class EffortState(NamedTuple):
@@ -87,7 +49,10 @@ class TorqueChange(Component[EffortState]):
     """Notes a sudden change of the torques of all wheels that carry."""
 
     def __init__(
-        self, rover: Rover, sensors: SensorFigures, tuning: ChangeTuning = ChangeTuning()
+        self,
+        rover: Rover,
+        sensors: SensorFigures,
+        tuning: TorqueChangeTuning = TorqueChangeTuning(),
     ) -> None:
         super().__init__(EffortState())
         self._radius, self._tuning = rover.shear_radius, tuning
