@@ -30,7 +30,7 @@ def run(estimator, seconds, wheels, up=9.8, gap=0.1, rate=0.4):
         given = StepInputs(
             wheel_odometry=WheelOdometry(stamp, np.full(wheels, rate), np.full(wheels, 2.0)),
             inertial=InertialReading(stamp, np.array([0.1, 0.0, up]), np.zeros(3), None),
-            reference=ReferenceVelocity(stamp, 0.04, 1e-6) if i % 10 == 5 else None,
+            reference=ReferenceVelocity(stamp, 0.04, 1e-6) if gap > 1.0 or i % 10 == 5 else None,
         )
         estimator.step(stamp, given)
         sets.append(estimator.estimates())

@@ -42,9 +42,9 @@ class PriorTuning:
     centroid_std: float = 0.06  # [-]
     mound_mean: float = 0.05  # where the configured soil knows no mound [-]
     mound_std: float = 0.1
-    slip_per_demand_mean: float = 1.5
-    """Slip for each share of the load that is asked: traction curves of wheels in loose soil give 1
-    to 2 below s = 0.5 (Ding et al. 2010; NASA VIPER slip and slope, docs/models/validation.md)."""
+    slip_per_demand_mean: float = 1.0
+    """Slip for each share of the load that is asked: the inverse slope of a traction curve. Wheels in
+    loose soil have 0.5 on firm ground to 3 near the greatest pull (docs/models/validation.md)."""
     slip_per_demand_std: float = 1.0
     sinkage_share: float = 0.5  # of the sinkage at rest
     sinkage_floor: float = 0.005  # [m]
