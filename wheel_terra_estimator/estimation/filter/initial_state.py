@@ -43,8 +43,8 @@ class PriorTuning:
     mound_mean: float = 0.05  # where the configured soil knows no mound [-]
     mound_std: float = 0.1
     slip_per_demand_mean: float = 1.0
-    """Slip for each share of the load that is asked: the inverse slope of a traction curve. Wheels in
-    loose soil have 0.5 on firm ground to 3 near the greatest pull (docs/models/validation.md)."""
+    """Slip for each share of the load that is asked: the inverse slope of a traction curve. Wheels
+    have 0.5 on firm ground to 3 near the greatest pull (docs/models/validation.md)."""
     slip_per_demand_std: float = 1.0
     sinkage_share: float = 0.5  # of the sinkage at rest
     sinkage_floor: float = 0.005  # [m]
