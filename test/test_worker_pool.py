@@ -74,11 +74,12 @@ def test_an_interrupted_bench_keeps_and_says_what_it_has(
         if len(done) == 2:
             raise KeyboardInterrupt
         done.append(seed)
-        return [SimpleNamespace(world=world, kind=kind, seed=seed, mode='reference')]
+        return [SimpleNamespace(world=world, kind=kind, seed=seed, mode='reference', health={})]
 
     monkeypatch.setattr(bench, 'score_drive', score)
     monkeypatch.setattr(tables, 'report', lambda results, modes: f'{len(results.drives)} rows')
     out = tmp_path / 'r.md'
     assert main(['evaluate', '--kinds', 'cruise', '--seeds', '5', '-o', str(out)]) == 130
-    assert out.read_text() == '2 rows\n\ninterrupted: 2 of 5 drives\n'
+    assert out.read_text().startswith('2 rows\n\nThe filter was started anew 0 times in 2 runs.')
+    assert out.read_text().endswith('interrupted: 2 of 5 drives\n')
     assert 'interrupted: 2 of 5 drives' in capsys.readouterr().out

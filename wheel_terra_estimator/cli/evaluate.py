@@ -115,6 +115,8 @@ def run(arguments: argparse.Namespace) -> int:
             )
         write = tables.pooled_report if arguments.pooled else tables.report
         text = write(results, arguments.modes)
+        restarts = sum(drive.health.get('filter_restarts', 0) for drive in results.drives)
+        text += f'\n\nThe filter was started anew {restarts} times in {len(results.drives)} runs.'
         if results.interrupted:
             text += f'\n\n{results.interrupted}'
             status = INTERRUPTED

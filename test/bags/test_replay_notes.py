@@ -1,0 +1,63 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""What a replay says of stamps that stand still and of a filter that fails."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from wheel_terra_estimator.bags.replay import replay
+from wheel_terra_estimator.bags.storage import open_bag
+from wheel_terra_estimator.cli.main import main
+from wheel_terra_estimator.estimation.wheel_soil_estimator import WheelSoilEstimator
+
+
+def test_stamps_that_stand_still_are_counted(
+    make_bag: Any, factory: Any, rover: Any, tmp_path: Path, capsys: Any
+) -> None:
+    header = factory.header(1_700_000_000_000_000_000)
+    rows = [
+        ('/joint_states', factory.joint_state(header, ('left', 'right'), velocity=(2.0, -2.0)), i)
+        for i in range(50)
+    ]
+    rover.write(tmp_path / 'rover.yaml')
+    bag = make_bag(messages=rows)
+    assert main(['replay', str(bag), '--config', str(tmp_path / 'rover.yaml')]) == 0
+    assert re.search(r'joint_states +50 +49 x stamp repeated, merged', capsys.readouterr().out)
+
+
+def test_a_failing_filter_is_said_in_summary_and_diagnostics(
+    make_bag: Any, rover: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    usual, calls = WheelSoilEstimator.estimates, []
+
+    def failing(self: Any) -> Any:
+        calls.append(1)
+        if len(calls) == 10:
+            raise ZeroDivisionError
+        return usual(self)
+
+    with open_bag(make_bag()) as bag:
+        result = replay(bag, rover, {})
+        assert result.counters['filter_restarts'] == 0
+        assert not any('started anew' in note for note in result.notes)
+        monkeypatch.setattr(WheelSoilEstimator, 'estimates', failing)
+        result = replay(bag, rover, {}, tmp_path / 'out')
+    assert result.counters['filter_restarts'] == 1
+    assert any('filter failed and was started anew 1 times' in note for note in result.notes)
+    assert b'filter_restarts' in next((tmp_path / 'out').glob('*.mcap')).read_bytes()
+
+
+def test_a_measured_drive_never_restarts_the_filter() -> None:
+    from wheel_terra_estimator.cli.demo import DRIVES
+    from wheel_terra_estimator.configuration import reader, shipped
+
+    drive = next(drive for drive in DRIVES if drive.name == 'pathfinder')
+    remaps = dict(remap.split(':=') for remap in drive.remaps)
+    with open_bag(shipped.demo_recording(drive.name)) as bag:
+        result = replay(bag, reader.load(drive.configuration), remaps)
+    assert result.counters['filter_restarts'] == 0
