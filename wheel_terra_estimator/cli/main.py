@@ -30,6 +30,7 @@ COMMANDS = (
     'init',
     'config',
     'compare',
+    'convert',
     'replay',
     'predict',
     'diagnose',

@@ -1,0 +1,81 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""``wheel-terra convert``: units, signs and gaps of a table, read back from the bag."""
+
+import math
+
+import numpy as np
+import pytest
+import yaml
+
+from wheel_terra_estimator.bags.series_reader import read_series
+from wheel_terra_estimator.bags.storage import open_bag
+from wheel_terra_estimator.cli.main import main
+
+HEADER = 'time,rpm_fl,rpm_fr,torque_fl,torque_fr,ax,ay,az,gx,gy,gz,sinkage_fl,gps_speed'
+ROWS = [
+    '100.0,60,-60,1.5,-1.5,0,0,1,0,0,90,12,0.5',
+    '100.1,30,,1.0,,0,0,1,0,0,0,,',
+]
+
+
+@pytest.fixture
+def files(tmp_path, capsys):
+    assert main(['convert', '--example']) == 0
+    (tmp_path / 'map.yaml').write_text(capsys.readouterr().out)
+    (tmp_path / 'log.csv').write_text('\n'.join([HEADER, *ROWS]))
+    return tmp_path
+
+
+def command(folder):
+    table, columns, out = (str(folder / n) for n in ('log.csv', 'map.yaml', 'bag'))
+    return ['convert', table, '--columns', columns, '-o', out]
+
+
+def test_the_example_converts_units_and_signs(files):
+    assert main(command(files)) == 0
+    with open_bag(files / 'bag') as bag:
+        told = read_series(bag, {}, 'bag')
+    assert told.joints.names == ('front_left', 'front_right')
+    assert np.allclose(told.joints.rate[0], 2.0 * math.pi)  # 60 rpm, the right one turned round
+    assert told.joints.rate[1, 0] == pytest.approx(math.pi) and np.isnan(told.joints.rate[1, 1])
+    assert np.allclose(told.joints.torque[0], 1.5)
+    assert told.imu.force[0, 2] == pytest.approx(9.80665)
+    assert told.imu.rate[0, 2] == pytest.approx(math.pi / 2.0)
+    assert told.sinkage.sinkage.tolist() == [[0.012]]
+    assert told.reference.velocity[:, 0].tolist() == [0.5]
+    assert np.diff(told.joints.stamp).tolist() == [100_000_000]
+    assert main(command(files)) == 2  # nothing is overwritten
+
+
+@pytest.mark.parametrize(
+    ('old', 'new', 'words'),
+    [
+        ('unit: rpm,', 'unit: rpn,', "unit 'rpn' is none of rad/s, deg/s, rpm, rev/s"),
+        ('column: ax', 'column: axx', "no column 'axx'"),
+        ('sinkage:', 'sinkages:', "nearest: 'sinkage'"),
+        (', sign: -1}', ', sign: 2}', 'sign must be 1 or -1'),
+    ],
+)
+def test_a_map_that_cannot_be_used(files, capsys, old, new, words):
+    text = (files / 'map.yaml').read_text()
+    assert old in text
+    (files / 'map.yaml').write_text(text.replace(old, new, 1))
+    assert main(command(files)) == 2
+    assert words in capsys.readouterr().err
+
+
+def test_a_cell_that_is_no_number(files, capsys):
+    (files / 'log.csv').write_text('\n'.join([HEADER, ROWS[0], ROWS[1].replace('30', 'abc')]))
+    assert main(command(files)) == 2
+    assert "log.csv: row 3: rpm_fl: 'abc' is no number" in capsys.readouterr().err
+
+
+def test_the_example_is_plain_yaml(files):
+    assert set(yaml.safe_load((files / 'map.yaml').read_text())) == {
+        'time',
+        'joint_states',
+        'imu/data',
+        'sinkage',
+        'reference_odom',
+    }

@@ -1,0 +1,276 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""A table of logged values as a rosbag2, row by row: for rovers that do not speak ROS.
+
+A map says which column is what, in which unit and with which sign (`EXAMPLE`).
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from wheel_terra_estimator.bags.bag_file import BagFile
+from wheel_terra_estimator.configuration.parameters import nearest
+from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.input_file import check_regular, read_text
+from wheel_terra_estimator.messages.convert import INPUT_TYPES
+
+EXAMPLE = """\
+# Which column of the table is what. Units: see below; sign: -1 turns a value round.
+time: {column: time, unit: s}             # s, ms, us or ns; any zero
+joint_states:                             # one entry per wheel, as in wheels.names
+  front_left:
+    velocity: {column: rpm_fl, unit: rpm} # rad/s, deg/s, rpm or rev/s
+    effort: {column: torque_fl, unit: N m}  # N m or N mm; leave it out if there is none
+  front_right:
+    velocity: {column: rpm_fr, unit: rpm, sign: -1}
+    effort: {column: torque_fr, unit: N m, sign: -1}
+imu/data:                                 # leave out what there is not
+  linear_acceleration.x: {column: ax, unit: g}   # m/s^2 or g, with gravity
+  linear_acceleration.y: {column: ay, unit: g}
+  linear_acceleration.z: {column: az, unit: g}
+  angular_velocity.x: {column: gx, unit: deg/s}  # rad/s or deg/s
+  angular_velocity.y: {column: gy, unit: deg/s}
+  angular_velocity.z: {column: gz, unit: deg/s}
+sinkage:
+  front_left: {column: sinkage_fl, unit: mm}     # m, cm or mm
+reference_odom:
+  linear.x: {column: gps_speed, unit: m/s}       # m/s or km/h
+"""
+
+UNITS: dict[str, dict[str, float]] = {
+    'time': {'s': 1.0, 'ms': 1e-3, 'us': 1e-6, 'ns': 1e-9},
+    'rate': {'rad/s': 1.0, 'deg/s': math.pi / 180, 'rpm': math.pi / 30, 'rev/s': 2 * math.pi},
+    'torque': {'N m': 1.0, 'N mm': 1e-3},
+    'acceleration': {'m/s^2': 1.0, 'g': 9.80665},
+    'length': {'m': 1.0, 'cm': 1e-2, 'mm': 1e-3},
+    'speed': {'m/s': 1.0, 'km/h': 1 / 3.6, 'mm/s': 1e-3},
+    'number': {'-': 1.0},
+}
+_AXES = 'xyz'
+_IMU = {
+    **{f'linear_acceleration.{axis}': 'acceleration' for axis in _AXES},
+    **{f'angular_velocity.{axis}': 'rate' for axis in _AXES},
+    **{f'orientation.{axis}': 'number' for axis in (*_AXES, 'w')},
+}
+_REFERENCE = {'linear.x': 'speed', 'variance': 'number'}
+_WHEEL = {'velocity': 'rate', 'effort': 'torque'}
+_TOPICS = ('joint_states', 'imu/data', 'sinkage', 'reference_odom')
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of the table: its index, and the factor to SI units with the sign."""
+
+    name: str
+    index: int
+    factor: float
+
+
+@dataclass(frozen=True)
+class ColumnMap:
+    """Columns by what they mean; joints and sinkage by wheel."""
+
+    time: Column
+    joints: dict[str, dict[str, Column]]
+    imu: dict[str, Column]
+    sinkage: dict[str, Column]
+    reference: dict[str, Column]
+
+
+def convert(table: Path, columns: Path, output: Path, overwrite: bool = False) -> BagFile:
+    """Write the rows of a CSV file as messages.
+
+    Returns
+    -------
+    BagFile
+        The closed bag, for its counts.
+
+    Raises
+    ------
+    UserError
+        Map or table cannot be used; names file, row, column and cure.
+    """
+    check_regular(table)
+    try:
+        with table.open(newline='', encoding='utf-8-sig') as file:
+            rows = csv.reader(file)
+            header = [cell.strip() for cell in next(rows, [])]
+            layout = _read_map(columns, header, table)
+            topics = {f'/{name}': INPUT_TYPES[name] for name in _used(layout)}
+            with BagFile(output, topics, overwrite=overwrite, inputs=[table, columns]) as bag:
+                sender = _Sender(bag, layout, table)
+                for number, row in enumerate(rows, start=2):
+                    if any(cell.strip() for cell in row):
+                        sender.send(number, row)
+                if not sender.sent:
+                    raise UserError(f'{table}: no rows below the header')
+            return bag
+    except UnicodeDecodeError:
+        raise UserError(f'{table}: not a UTF-8 text; save it as CSV (UTF-8)') from None
+    except csv.Error as error:
+        raise UserError(f'{table}: not a CSV table: {error}') from None
+
+
+def _used(layout: ColumnMap) -> list[str]:
+    there = (layout.joints, layout.imu, layout.sinkage, layout.reference)
+    return [name for name, columns in zip(_TOPICS, there, strict=True) if columns]
+
+
+def _read_map(path: Path, header: list[str], table: Path) -> ColumnMap:
+    try:
+        document = yaml.safe_load(read_text(path))
+    except yaml.YAMLError as error:
+        raise UserError(f'{path}: not valid YAML: {str(error).splitlines()[0]}') from None
+    if not isinstance(document, Mapping):
+        raise UserError(f'{path}: not a map of columns; see wheel-terra convert --example')
+    known = ('time', *_TOPICS)
+    for key in document:
+        if key not in known:
+            raise UserError(f"{path}: unknown entry '{key}'; nearest: '{nearest(str(key), known)}'")
+    reader = _MapReader(path, header, table)
+    if 'time' not in document or 'joint_states' not in document:
+        raise UserError(
+            f'{path}: time and joint_states are needed; see wheel-terra convert --example'
+        )
+    joints = {
+        str(wheel): reader.group(f'joint_states.{wheel}', entry, _WHEEL)
+        for wheel, entry in reader.mapping('joint_states', document['joint_states']).items()
+    }
+    for wheel, found in joints.items():
+        if 'velocity' not in found:
+            raise UserError(f'{path}: joint_states.{wheel}: velocity is missing')
+    sinkage = {
+        str(wheel): reader.column(f'sinkage.{wheel}', entry, 'length')
+        for wheel, entry in reader.mapping('sinkage', document.get('sinkage') or {}).items()
+    }
+    imu = reader.group('imu/data', document.get('imu/data') or {}, _IMU)
+    reference = reader.group('reference_odom', document.get('reference_odom') or {}, _REFERENCE)
+    time = reader.column('time', document['time'], 'time')
+    return ColumnMap(time, joints, imu, sinkage, reference)
+
+
+class _MapReader:
+    """Reads entries of the map against the header of the table."""
+
+    def __init__(self, path: Path, header: list[str], table: Path) -> None:
+        self.path, self.header, self.table = path, header, table
+
+    def mapping(self, where: str, entry: Any) -> Mapping[Any, Any]:
+        if not isinstance(entry, Mapping):
+            raise UserError(f'{self.path}: {where}: must be entries, one a line')
+        return entry
+
+    def group(self, where: str, entry: Any, kinds: Mapping[str, str]) -> dict[str, Column]:
+        found = {}
+        for key, value in self.mapping(where, entry).items():
+            if key not in kinds:
+                raise UserError(
+                    f"{self.path}: {where}: unknown '{key}'; nearest: '{nearest(str(key), kinds)}'"
+                )
+            found[str(key)] = self.column(f'{where}.{key}', value, kinds[key])
+        return found
+
+    def column(self, where: str, entry: Any, kind: str) -> Column:
+        entry = self.mapping(where, entry)
+        units = UNITS[kind]
+        unknown = set(entry) - {'column', 'unit', 'sign'}
+        if unknown or 'column' not in entry:
+            raise UserError(f'{self.path}: {where}: give column, unit and, if turned round, sign')
+        name, unit = str(entry['column']), str(entry.get('unit', next(iter(units))))
+        if unit not in units:
+            raise UserError(f"{self.path}: {where}: unit '{unit}' is none of {', '.join(units)}")
+        if name not in self.header:
+            raise UserError(
+                f"{self.table}: no column '{name}' ({self.path}: {where}); nearest: "
+                f"'{nearest(name, self.header) if self.header else ''}'"
+            )
+        sign = entry.get('sign', 1)
+        if sign not in (1, -1):
+            raise UserError(f'{self.path}: {where}: sign must be 1 or -1')
+        return Column(name, self.header.index(name), sign * units[unit])
+
+
+class _Sender:
+    """Writes the messages of each row, at its own stamp."""
+
+    def __init__(self, bag: BagFile, layout: ColumnMap, table: Path) -> None:
+        self.bag, self.layout, self.table = bag, layout, table
+        self.make = bag.messages
+        self.sent = 0
+
+    def send(self, number: int, row: list[str]) -> None:
+        seconds = self.value(number, row, self.layout.time)
+        if not math.isfinite(seconds) or not 0.0 <= seconds < 9e9:
+            column = self.layout.time.name
+            raise UserError(f'{self.table}: row {number}: {column}: no time from 0 on')
+        stamp = max(round(seconds * 1e9), 1)  # 0 is no stamp
+        header = self.make.header(stamp)
+        wheels = self.layout.joints
+        rates = [self.value(number, row, w['velocity']) for w in wheels.values()]
+        torques = [self.value(number, row, w.get('effort')) for w in wheels.values()]
+        told = [t for t in torques if not math.isnan(t)]
+        if any(not math.isnan(rate) for rate in rates):
+            message = self.make.joint_state(
+                header, list(wheels), velocity=rates, effort=torques if told else ()
+            )
+            self.bag.write('/joint_states', message, stamp)
+        self._imu(number, row, stamp)
+        self._sinkage(number, row, stamp)
+        self._reference(number, row, stamp)
+        self.sent += 1
+
+    def value(self, number: int, row: list[str], column: Column | None) -> float:
+        if column is None or column.index >= len(row):
+            return math.nan
+        cell = row[column.index].strip()
+        if not cell:
+            return math.nan
+        try:
+            return column.factor * float(cell)
+        except ValueError:
+            raise UserError(
+                f"{self.table}: row {number}: {column.name}: '{cell}' is no number; leave the cell "
+                'empty where nothing was measured'
+            ) from None
+
+    def _imu(self, number: int, row: list[str], stamp: int) -> None:
+        columns = self.layout.imu
+        values = {name: self.value(number, row, column) for name, column in columns.items()}
+        if not values or any(math.isnan(value) for value in values.values()):
+            return
+        force, rate = (
+            [values.get(f'{name}.{axis}', 0.0) for axis in _AXES]
+            for name in ('linear_acceleration', 'angular_velocity')
+        )
+        quaternion = [values.get(f'orientation.{axis}') for axis in (*_AXES, 'w')]
+        whole = all(part is not None for part in quaternion)
+        orientation = [float(part or 0.0) for part in quaternion] if whole else None
+        message = self.make.imu(self.make.header(stamp), force, rate, orientation)
+        self.bag.write('/imu/data', message, stamp)
+
+    def _sinkage(self, number: int, row: list[str], stamp: int) -> None:
+        columns = self.layout.sinkage
+        depths = [self.value(number, row, column) for column in columns.values()]
+        if any(not math.isnan(depth) for depth in depths):
+            message = self.make.joint_state(self.make.header(stamp), list(columns), position=depths)
+            self.bag.write('/sinkage', message, stamp)
+
+    def _reference(self, number: int, row: list[str], stamp: int) -> None:
+        columns = self.layout.reference
+        speed = self.value(number, row, columns.get('linear.x'))
+        if math.isnan(speed):
+            return
+        variance = self.value(number, row, columns.get('variance'))
+        covariance = [0.0] * 36
+        covariance[0] = 0.0 if math.isnan(variance) else variance  # 0: the rover file decides
+        twist = self.make.twist_with_covariance(speed, 0.0, covariance)
+        message = self.make.odometry(self.make.header(stamp, 'odom'), twist)
+        self.bag.write('/reference_odom', message, stamp)

@@ -1,0 +1,48 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""``wheel-terra convert``."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from wheel_terra_estimator.errors import UserError
+
+SUMMARY = 'write a table of logged values (CSV) as a rosbag2'
+EXAMPLES = (
+    'wheel-terra convert --example',
+    'wheel-terra convert log.csv --columns columns.yaml -o drive',
+)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of the command."""
+    parser.add_argument('table', nargs='?', type=Path, metavar='LOG.csv', help='one row per time')
+    parser.add_argument(
+        '--columns', type=Path, metavar='MAP.yaml', help='which column is what (see --example)'
+    )
+    parser.add_argument('-o', dest='output', type=Path, metavar='DIR', help='rosbag2 folder (MCAP)')
+    parser.add_argument('--example', action='store_true', help='print a map of columns and stop')
+    parser.add_argument('--overwrite', action='store_true', help='replace an earlier output')
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Run the command."""
+    from wheel_terra_estimator.bags.table_to_bag import EXAMPLE, convert
+
+    if arguments.example:
+        print(EXAMPLE, end='')
+        return 0
+    for value, name in (
+        (arguments.table, 'LOG.csv'),
+        (arguments.columns, '--columns MAP.yaml'),
+        (arguments.output, '-o DIR'),
+    ):
+        if value is None:
+            raise UserError(f'{name} is missing; a map of columns: wheel-terra convert --example')
+    bag = convert(arguments.table, arguments.columns, arguments.output, arguments.overwrite)
+    counts = ', '.join(f'{topic} {count}' for topic, count in bag.counts.items())
+    print(f'bag: {arguments.output} ({counts})')
+    print(f'next: wheel-terra check {arguments.output} --config ROVER')
+    return 0
