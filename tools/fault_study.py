@@ -257,7 +257,10 @@ def outcome(fault: Fault, case: Case, before: CheckReport) -> str:
     wheel = case.rover.wheels.names[0] if fault.first_wheel else None
     old = {(f.kind, f.topic, f.wheel) for f in before.findings}
     for finding in report.findings:
-        fresh = (finding.kind, finding.topic, finding.wheel) not in old or fault.kinds == ('gain',)
+        fresh = (finding.kind, finding.topic, finding.wheel) not in old or fault.kinds[0] in (
+            'gain',
+            'covariance',
+        )
         right = finding.kind in fault.kinds and (wheel is None or finding.wheel == wheel)
         if right and fresh and finding.cure:
             return 'found'

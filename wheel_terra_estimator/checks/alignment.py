@@ -36,7 +36,7 @@ def check_gyro_unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     yaw, difference = evidence.gyro[:, 2], evidence.side_difference
     rows = evidence.moving & np.isfinite(difference)
     if rows.sum() < 60 or abs(correlation(yaw[rows], difference[rows])) < 0.7:
-        return [], evidence
+        return [NotChecked('unit', 'gyro: no clear turn in it; drive a circle')], evidence
     track = facts.lateral[facts.side > 0].mean() - facts.lateral[facts.side < 0].mean()
     ratio = block_fit(yaw[rows][:, None], difference[rows])[0].value / track
     if not GYRO_DEGREES[0] < abs(ratio) < GYRO_DEGREES[1]:

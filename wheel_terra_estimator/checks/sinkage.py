@@ -109,6 +109,8 @@ def _sign_and_zero(
     if np.nanmedian(middle) < -limit:
         return _reversed_or_zero(evidence, table, float(np.nanmedian(middle)))
     found: list[Outcome] = []
+    if np.nanmedian(np.abs(middle)) < limit:
+        found.append(NotChecked('sign', 'sinkage: hardly any in it; drive where it is soft'))
     for index, name in enumerate(names):
         others = np.delete(middle, index)
         if others.size < 2 or not np.isfinite(middle[index]):

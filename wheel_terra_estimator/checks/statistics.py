@@ -125,6 +125,8 @@ def averaged(time: FloatArray, values: FloatArray, at: FloatArray, width: float)
     return np.where(count > 0, mean, middle)
 
 
+ALIKE = 0.05
+"""Parts of a record that fit this much worse than the whole say nothing of the lag."""
 LAG_GAIN = 1.5
 """By how much the unlike part has to shrink for a lag to count."""
 
@@ -176,6 +178,6 @@ def lag(time: FloatArray, first: FloatArray, second: FloatArray, limit: float) -
         for i in range(3)
         if third > 3 * reach
     ]
-    good = [part[0] for part in parts if part[1] > 0.5 * fit]
+    good = [part[0] for part in parts if part[1] > fit - ALIKE]
     std = float(np.std(good, ddof=1) / math.sqrt(len(good))) if len(good) > 1 else step
     return Lag(value, max(std, 0.2 * step), fit, fit_at_zero)

@@ -120,7 +120,10 @@ def _scale(evidence: Evidence, figures: dict[str, Any]) -> tuple[list[Outcome], 
         )
         return [outcome], evidence.with_rate(evidence.rate, evidence.torque * 1e-3)
     if traction > MOST_TRACTION or traction < LEAST_TRACTION:
-        return [_off_scale(evidence, traction)], evidence
+        return [
+            _off_scale(evidence, traction),
+            NotChecked('mass', 'torques have no credible scale'),
+        ], evidence
     return [], evidence
 
 

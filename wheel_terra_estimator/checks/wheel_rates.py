@@ -231,9 +231,9 @@ def check_signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     turns = _turning_rows(evidence)
     chosen = _best_signs(evidence, there, rows)
     found: list[Outcome] = []
-    if chosen is None or not facts.has_sides() or turns.sum() < 40:
+    if chosen is None or chosen.track == 0.0:
         reason = 'no turn in it, or no IMU: left and right not checked; drive a circle both ways'
-        found.append(NotChecked('swapped_sides', reason))
+        found += [NotChecked(kind, reason) for kind in ('swapped_sides', 'exchanged_wheels')]
     signs = np.ones(len(facts.names))
     if chosen is not None:
         signs[there] = chosen.signs
@@ -244,7 +244,9 @@ def check_signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     flip = False
     if told.reference is not None and told.reference < 0.0:
         # One of the two is backwards: with the turns on their side it is not the wheels.
-        if turn_known:
+        if 2 * int(np.sum(signs[there] < 0.0)) >= there.size:
+            flip = True  # the other half counts backwards
+        elif turn_known:
             flip = not turn_agrees
             reversed_reference = turn_agrees
         elif told.force is not None:
@@ -357,7 +359,9 @@ def _best_signs(
             trials.append(_Signs(float(np.mean(spread / size)), (1, *signs), turn))
     best = min(trials, key=lambda t: t.cost)
     # With (signs, turn) goes (-signs, -turn): the pair with fewer reversed wheels is meant.
-    if sum(s < 0 for s in best.signs) > there.size / 2.0:
+    reversed_wheels = sum(s < 0 for s in best.signs)
+    half = reversed_wheels == there.size / 2.0
+    if reversed_wheels > there.size / 2.0 or (half and best.track < 0.0):
         best = _Signs(best.cost, tuple(-s for s in best.signs), -best.track)
     straight = next(t for t in trials if t.signs == (1,) * there.size and t.track == 0.0)
     as_told = min(
@@ -509,7 +513,7 @@ def _exchanged(evidence: Evidence, turns: NDArray[np.bool_]) -> tuple[list[Outco
 def check_noise(evidence: Evidence, figures: dict[str, Any]) -> list[Outcome]:
     """Compare the noise of the rates with what the rover file states."""
     configuration, joints = evidence.facts.configuration, evidence.recording.joints
-    rows = evidence.steady
+    rows = evidence.moving
     if configuration is None or joints is None or rows.sum() < 60:
         return []
     stated = float(configuration.sensors.wheel_rate_std)
