@@ -105,7 +105,15 @@ MAY_USE = {
     'simulation': ({'configuration', 'terramechanics', 'estimation'}, {'numpy'}),
     'bags': (
         {'configuration', 'terramechanics', 'estimation', 'messages', 'simulation', 'checks'},
-        {'numpy', 'yaml', 'rosbags', 'lz4', 'compression', 'backports', 'tqdm'},  # zstd by Python version
+        {
+            'numpy',
+            'yaml',
+            'rosbags',
+            'lz4',
+            'compression',
+            'backports',
+            'tqdm',
+        },  # zstd by Python version
     ),
     'reporting': (
         {'configuration', 'terramechanics', 'estimation', 'bags'},

@@ -127,7 +127,7 @@ def averaged(time: FloatArray, values: FloatArray, at: FloatArray, width: float)
 
 ALIKE = 0.05
 """Parts of a record that fit this much worse than the whole say nothing of the lag."""
-LAG_GAIN = 1.5
+LAG_GAIN = 1.15
 """By how much the unlike part has to shrink for a lag to count."""
 
 
