@@ -24,6 +24,8 @@ LEAST_YAW = math.radians(25.0)
 YAW_SIGMAS = 4.0
 GYRO_DEGREES = (0.004, 0.07)
 """Effective over stated track that a gyro in degrees per second gives [-]."""
+LAG_GAIN = 1.5
+"""By how much the unlike part has to shrink for a lag to count."""
 LEAST_DELAY = 0.3
 """Delays below this [s] are those of chassis, soil and filters of encoders."""
 
@@ -106,7 +108,7 @@ def check_clock(evidence: Evidence, figures: dict[str, Any]) -> list[Outcome]:
     figures['imu.delay_s'] = round(float(found.value), 3)
     figures['imu.delay_std_s'] = round(found.std, 3)
     limit = max(LEAST_DELAY, 1.5 * evidence.period, 5.0 * found.std)
-    if abs(found.value) < limit or not found.clear:
+    if abs(found.value) < limit or not found.clear(LAG_GAIN):
         return []
     return [
         Finding(

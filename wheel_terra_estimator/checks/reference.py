@@ -24,6 +24,8 @@ JUMP_SHARE = 0.005
 """Share of jumps that is a fault of the source, not a single wild reading."""
 LEAST_JUMP = 0.3
 """A jump is also larger than this share of the speed."""
+LAG_GAIN = 1.15
+"""By how much the unlike part has to shrink for a lag to count; a slow reference is ragged."""
 LEAST_DELAY = 0.25
 """Delays below this [s] are left to jitter and filters of encoders."""
 COVARIANCE_FACTOR = 6.0
@@ -220,7 +222,9 @@ def _delay(evidence: Evidence, reference: VelocitySeries, figures: dict[str, Any
         return [NotChecked('delay', 'reference: does not follow the wheels closely enough')]
     figures['reference.delay_s'] = round(float(found.value), 3)
     figures['reference.delay_std_s'] = round(found.std, 3)
-    if abs(found.value) < max(LEAST_DELAY, 0.4 * period, 3.0 * found.std) or not found.clear:
+    if abs(found.value) < max(LEAST_DELAY, 0.4 * period, 3.0 * found.std) or not found.clear(
+        LAG_GAIN
+    ):
         return []
     return [
         Finding(

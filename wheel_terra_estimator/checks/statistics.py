@@ -127,8 +127,6 @@ def averaged(time: FloatArray, values: FloatArray, at: FloatArray, width: float)
 
 ALIKE = 0.05
 """Parts of a record that fit this much worse than the whole say nothing of the lag."""
-LAG_GAIN = 1.15
-"""By how much the unlike part has to shrink for a lag to count."""
 
 
 class Lag(NamedTuple):
@@ -139,10 +137,9 @@ class Lag(NamedTuple):
     fit: float
     fit_at_zero: float
 
-    @property
-    def clear(self) -> bool:
-        """Whether the lag explains a good part of what is unlike without it."""
-        return 1.0 - self.fit_at_zero > LAG_GAIN * (1.0 - self.fit)
+    def clear(self, least: float) -> bool:
+        """Whether what is unlike without the lag is so many times what is unlike with it."""
+        return 1.0 - self.fit_at_zero > least * (1.0 - self.fit)
 
 
 def lag(time: FloatArray, first: FloatArray, second: FloatArray, limit: float) -> Lag | None:

@@ -31,6 +31,8 @@ LEAST_SLOPE_STD = 0.25
 """Scatter of the specific force along the drive that a scale needs [m/s^2]."""
 GAIN_MODEL_STD = 0.05
 """What rolling resistance, larger uphill, adds to the scale (firm drives of the simulator)."""
+SMOOTH_ROWS = 20
+"""Rows over which slopes are averaged."""
 LEAST_GAIN_ERROR = 0.15
 ZERO_FACTOR = 6.0
 
@@ -152,18 +154,23 @@ def _slope_fit(evidence: Evidence) -> Estimate | None:
     """Return thrust over mass times specific force: torque gain times true over stated mass."""
     assert evidence.force is not None
     rows = evidence.straight
-    along = evidence.force[rows, 0]
-    if rows.sum() < 3 * LEAST_MOVING_ROWS or float(np.std(_smooth(along))) < LEAST_SLOPE_STD:
+    # Noise of a regressor makes a slope look flat: both sides are means over the same time.
+    kernel = np.ones(SMOOTH_ROWS) / SMOOTH_ROWS
+    if rows.sum() < 3 * LEAST_MOVING_ROWS:
+        return None
+    along = np.convolve(evidence.force[:, 0], kernel, mode='same')[rows]
+    pushed = np.convolve(thrust(evidence), kernel, mode='same')[rows]
+    if float(np.std(along)) < LEAST_SLOPE_STD:
         return None
     sense = np.sign(evidence.rim[rows])
     columns = [evidence.facts.mass * along, sense]
     if (sense > 0).any() and (sense < 0).any():
         columns.append(np.ones(along.size))
-    return block_fit(np.column_stack(columns), thrust(evidence)[rows])[0]
+    return block_fit(np.column_stack(columns), pushed)[0]
 
 
 def _smooth(values: FloatArray) -> FloatArray:
-    width = min(20, values.size)
+    width = min(SMOOTH_ROWS, values.size)
     return np.asarray(np.convolve(values, np.ones(width) / width, mode='valid'))
 
 
