@@ -73,6 +73,7 @@ def mcap_case(dice: random.Random, folder: Path) -> None:
     found, notes = _read(path)
     if missing := intact - found:
         raise FaultError(f'{missing.total()} of {intact.total()} intact messages missing: {layout}')
+    # A name damaged in its only copy, without a checksum, is another name: nothing is lost.
     if found.total() < len(samples) and not notes:
         raise FaultError(f'{len(samples) - found.total()} messages lost without a word: {layout}')
 
@@ -222,7 +223,7 @@ def run(kind: str, dice: random.Random, folder: Path) -> str:
 def _read(path: Path) -> tuple[Counter[Any], list[str]]:
     try:
         with open_bag(path) as bag:
-            found = Counter((m.log_time, m.topic, m.data) for m in bag.messages(list(TYPES)))
+            found = Counter((m.log_time, m.topic, m.data) for m in bag.messages(tuple(bag.topics)))
             return found, bag.notes
     except UserError as error:
         if '\n' in str(error):
