@@ -15,6 +15,7 @@ from typing import Any, NamedTuple, Protocol
 from wheel_terra_estimator.estimation.estimates import EstimateSet
 from wheel_terra_estimator.estimation.measurements import Measurement, StepInputs
 from wheel_terra_estimator.estimation.timing.input_checks import (
+    CHANNELS,
     INERTIAL,
     REFERENCE,
     WHEEL_ODOMETRY,
@@ -75,7 +76,7 @@ class Entry:
 
     def __init__(self, stamp: int, channel: int, measurement: Measurement) -> None:
         self.stamp = stamp
-        self.parts: list[Any] = [None] * 5
+        self.parts: list[Any] = [None] * len(CHANNELS)
         self.parts[channel] = measurement
         self.kept: _Kept | None = None  # state after this entry
 
@@ -114,8 +115,8 @@ class InputLog:
         self.entries: list[Entry] = []
         self.stamps: list[int] = []
         self.counts = {'steps': 0, 'reruns': 0, 'steps_repeated': 0}
-        self.repeated = [0] * 5
-        self.contradicted = [0] * 5
+        self.repeated = [0] * len(CHANNELS)
+        self.contradicted = [0] * len(CHANNELS)
         self._reference_period = reference_period
         self._merger = StepMerger()
         self._pristine = estimator.snapshot()
@@ -246,7 +247,7 @@ class InputLog:
             # Thinned out here, in the order of stamps, so that the order of arrival is nothing.
             due = self._next_reference(stamp)
             if due is None:
-                parts = [*parts[:REFERENCE], None]
+                parts = [*parts[:REFERENCE], None, *parts[REFERENCE + 1 :]]
                 ends = ends and any(part is not None for part in parts)
             else:
                 after = after._replace(next_reference=due)
