@@ -26,8 +26,6 @@ if TYPE_CHECKING:
 
 SUMMARY = 'run the estimator over two shipped drives and report'
 EXAMPLES = ('wheel-terra demo', 'wheel-terra demo --no-node -o /tmp/demo --overwrite')
-UNITS = {'slip': (1.0, ''), 'sinkage': (1e3, ' mm'), 'drawbar_pull': (1.0, ' N')}
-"""Quantity -> factor from SI to what is printed, its unit."""
 
 
 class DemoDrive(NamedTuple):
@@ -139,7 +137,7 @@ def _environment() -> dict[str, str]:
 
 
 def _key_numbers(drive: DemoDrive, output: Path) -> None:
-    """Print how the estimates compare with the truth in the recording."""
+    """Draw the drive, and say whether the warning came before the true entrapment."""
     from wheel_terra_estimator.bags.history import read_estimates
     from wheel_terra_estimator.bags.storage import open_bag
     from wheel_terra_estimator.bags.truth import read_truth
@@ -147,7 +145,6 @@ def _key_numbers(drive: DemoDrive, output: Path) -> None:
     from wheel_terra_estimator.configuration.shipped import demo_recording
     from wheel_terra_estimator.reporting.drive_pictures import overview
     from wheel_terra_estimator.reporting.style import picture_style
-    from wheel_terra_estimator.reporting.truth_errors import SETTLED, truth_errors
     from wheel_terra_estimator.simulation.truth import entrapped
 
     configuration = reader.load(drive.configuration)
@@ -159,11 +156,6 @@ def _key_numbers(drive: DemoDrive, output: Path) -> None:
         overview(history, truth).savefig(output / f'{drive.name}.png', dpi=110)
     if truth is None or truth.slip is None:
         return
-    print(f'\nAgainst the truth in the recording, after the first {SETTLED:g} s:')
-    for error in truth_errors(history, truth):
-        scale, unit = UNITS[error.quantity]
-        words = error.quantity.replace('_', ' ')
-        print(f'  {words:13s} rms error {scale * error.rms:.3g}{unit}')
     stuck = entrapped(truth.slip.stamp, truth.slip.value)
     warnings = [_seconds(truth, np.array([w.start]))[0] for w in history.warnings]
     if stuck.any():

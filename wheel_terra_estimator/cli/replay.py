@@ -129,6 +129,7 @@ def run(arguments: argparse.Namespace) -> int:
             configuration,
             overwrite=arguments.overwrite,
             findings=checked.findings,
+            errors=errors,
         )
     written = {
         'table': arguments.table,

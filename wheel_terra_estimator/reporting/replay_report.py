@@ -18,7 +18,7 @@ from wheel_terra_estimator.reporting.drive_summary import DriveSummary
 from wheel_terra_estimator.reporting.html import picture, render, write_page
 from wheel_terra_estimator.reporting.interactive import drive_figure, plotly_script
 from wheel_terra_estimator.reporting.style import BAND, CLASS_COLOURS
-from wheel_terra_estimator.reporting.truth_errors import SETTLED, TruthError, truth_errors
+from wheel_terra_estimator.reporting.truth_scores import QuantityError, TruthErrors
 
 
 def write_replay_report(
@@ -29,6 +29,7 @@ def write_replay_report(
     configuration: Configuration,
     overwrite: bool = False,
     findings: Sequence[Any] = (),
+    errors: TruthErrors | None = None,
 ) -> None:
     """Write the report of a drive.
 
@@ -46,6 +47,8 @@ def write_replay_report(
         Whether an earlier report is replaced.
     findings : sequence, optional
         What a check of the recording found (``words``, ``wheel``, ``cure``), shown at the top.
+    errors : TruthErrors, optional
+        How far the estimates are from a truth that may judge them.
     """
     from wheel_terra_estimator.terramechanics.effects import catalogue
 
@@ -65,8 +68,7 @@ def write_replay_report(
         figure=drive_figure(history, truth) if summary.sets else '',
         library=plotly_script() if summary.sets else '',
         findings=findings,
-        errors=[_error_row(error) for error in truth_errors(history, truth)],
-        settled=SETTLED,
+        errors=[_error_row(error) for error in errors.quantities] if errors else [],
         truth_source=truth.source if truth else '',
         provenance=configuration.provenance,
         parameters=[(key, values[key]) for key in values if key in configuration.stated],
@@ -76,18 +78,14 @@ def write_replay_report(
         write_page(fresh, page)
 
 
-def _error_row(error: TruthError) -> dict[str, str]:
-    scale, unit = {
-        'slip': (1.0, ''),
-        'sinkage': (1e3, ' mm'),
-        'drawbar_pull': (1.0, ' N'),
-    }[error.quantity]
+def _error_row(error: QuantityError) -> dict[str, str]:
+    scale, unit = (1e3, 'mm') if error.unit == 'm' else (1.0, error.unit)
     return {
-        'quantity': error.quantity.replace('_', ' '),
-        'rms': f'{scale * error.rms:.3g}{unit}',
-        'worst': f'{scale * error.worst:.3g}{unit}',
-        'wheel': error.worst_wheel,
-        'coverage': f'{100 * error.coverage:.0f} %',
+        'quantity': f'{error.name.replace("_", " ")} [{unit}]',
+        'rms': f'{scale * error.rms:.3g}',
+        'bias': f'{scale * error.bias:+.2g}',
+        'worst': f'{scale * error.worst:.3g}',
+        'within': f'{100 * error.within_two_std:.0f} %',
     }
 
 

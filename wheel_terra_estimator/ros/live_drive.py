@@ -48,6 +48,7 @@ from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.messages.convert import JOINT_OUTPUTS, stamp_of
 from wheel_terra_estimator.output_folder import check_file, check_folder
+from wheel_terra_estimator.reporting import truth_scores
 from wheel_terra_estimator.reporting.drive_summary import as_text, summarise
 from wheel_terra_estimator.reporting.replay_report import write_replay_report
 from wheel_terra_estimator.ros.lifecycle_node import MESSAGE_TYPES
@@ -341,7 +342,11 @@ def _run(arguments: argparse.Namespace) -> None:
     title = f'{arguments.bag.resolve().name}, live'
     notes = [f'not in the bag: {", ".join(reader.absent)}'] if reader.absent else []
     summary = summarise(title, history, reader.topics, counts, {}, notes)
-    print(as_text(summary))
+    # A truth that the node was given as its reference is none to judge it by.
+    judged = truth if truth and truth.source not in reader.topics.values() else None
+    thresholds = configuration.filter.class_thresholds
+    errors = truth_scores.truth_errors(history, judged, thresholds) if judged else None
+    print('\n'.join([as_text(summary), *(truth_scores.as_lines(errors) if errors else ())]))
     print(f'estimates: {arguments.output}')
     if arguments.report:
         write_replay_report(
@@ -351,6 +356,7 @@ def _run(arguments: argparse.Namespace) -> None:
             truth,
             configuration,
             overwrite=arguments.overwrite,
+            errors=errors,
         )
         print(f'report: {arguments.report}')
 
