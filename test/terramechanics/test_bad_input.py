@@ -38,7 +38,7 @@ from wheel_terra_estimator.terramechanics.wheel import Wheel
         (lambda: points(0.1, pass_number=0), r'pass number is 0'),
         (lambda: points(0.1, slip_radius='hub'), r"slip radius is 'hub'"),
         (lambda: replace(SAND, cohesion=-1.0), r'cohesion is -1 Pa; allowed is \[0, inf\) Pa'),
-        (lambda: replace(SAND, shear_modulus=0.0), r'shear modulus is 0 m'),
+        (lambda: replace(SAND, shear_modulus=0.0), r'shear deformation modulus is 0 m'),
         (lambda: replace(SAND, leaving_angle_ratio=0.3), r'leaving angle ratio is 0\.3'),
         (lambda: replace(SAND, pressure_law='clay'), r"pressure law is 'clay'"),
         (lambda: WheelSoilModel(SAND, method='guess'), r"method is 'guess'"),

@@ -68,7 +68,7 @@ def test_frictionless_soil_gives_minus_the_compaction_resistance() -> None:
     assert answer.drawbar_pull == pytest.approx(-resistance, rel=2e-3)
 
 
-def test_static_sinkage_is_bekker_s() -> None:
+def test_sinkage_at_rest_is_bekker_s() -> None:
     # A large stiff wheel: small sinkage, where Bekker's expansion of the circle holds.
     soil = Soil(0.0, 5e7, 1.0, 0.0, 0.0, 0.01, 0.0, 0.0)
     wheel = Wheel(0.5, 0.2)
@@ -79,7 +79,7 @@ def test_static_sinkage_is_bekker_s() -> None:
 
 
 def test_plate_is_the_limit_without_curvature() -> None:
-    assert stresses.static_sinkage(200.0, 0.01, 2e6, 1.0) == pytest.approx(0.01)
+    assert stresses.plate_sinkage(200.0, 0.01, 2e6, 1.0) == pytest.approx(0.01)
 
 
 def test_forces_scale_with_size() -> None:

@@ -65,7 +65,7 @@ class Forces(NamedTuple):
 class ConditionedForces(ScalarWheels):
     """Torque and pull given slip, sinkage and load, with analytic derivatives.
 
-    Parameters are those of ``ScalarWheels``; cohesion, friction and shear modulus of the soil are
+    Parameters are those of ``ScalarWheels``; cohesion, friction and K of the soil are
     given anew with each call.
     """
 

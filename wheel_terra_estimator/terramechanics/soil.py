@@ -67,7 +67,7 @@ class Soil:
         check_range('sinkage exponent', self.sinkage_exponent, 0.0, 4.0, open_lower=True)
         check_range('cohesion', self.cohesion, 0.0, unit='Pa')
         check_range('friction angle', self.friction_angle, 0.0, np.pi / 3, unit='rad')
-        check_range('shear modulus', self.shear_modulus, 0.0, unit='m', open_lower=True)
+        check_range('shear deformation modulus', self.shear_modulus, 0.0, unit='m', open_lower=True)
         check_range('peak stress ratio', self.peak_stress_ratio, 0.0, 1.0)
         check_range('leaving angle ratio', self.leaving_angle_ratio, -1.5, 0.0)
         check_range('density', self.density, 0.0, unit='kg/m^3')

@@ -38,7 +38,7 @@ def bearing_law(
     return bekker_modulus(cohesive, frictional, width), 1.0
 
 
-def static_sinkage(load: Any, area: Any, modulus: Any, exponent: Any) -> Any:
+def plate_sinkage(load: Any, area: Any, modulus: Any, exponent: Any) -> Any:
     """Sinkage of a plate, (p/k)^(1/n) [m] (Bekker); the limit of a wheel without curvature."""
     return (load / (area * modulus)) ** (1.0 / exponent)
 
