@@ -26,6 +26,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 import numpy as np  # noqa: E402
 from campaigns import make_campaign, scoring  # noqa: E402
 from campaigns.groups import GROUPS  # noqa: E402
+from scipy.special import expit  # noqa: E402
 
 from wheel_terra_estimator.discrepancy.selection import confidence  # noqa: E402
 
@@ -80,15 +81,23 @@ def run(file: Path, per_group: int, processes: int) -> None:
             stream.flush()
 
 
-def logistic(features: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """Return ridge-penalised logistic coefficients (Newton)."""
-    weights = np.zeros(features.shape[1])
-    for _ in range(40):
-        p = 1.0 / (1.0 + np.exp(-features @ weights))
-        gradient = features.T @ (right - p) - RIDGE * weights
+def logistic(features: np.ndarray, right: np.ndarray, centre: np.ndarray) -> np.ndarray:
+    """Return logistic coefficients with a ridge around ``centre`` (Newton, steps halved)."""
+
+    def loss(weights: np.ndarray) -> float:
+        margin = features @ weights
+        misfit = np.logaddexp(0.0, margin) - right * margin
+        return float(misfit.sum() + 0.5 * RIDGE * ((weights - centre) ** 2).sum())
+
+    weights = centre.copy()
+    for _ in range(60):
+        p = expit(features @ weights)
+        gradient = features.T @ (right - p) - RIDGE * (weights - centre)
         hessian = (features * (p * (1.0 - p))[:, None]).T @ features
         step = np.linalg.solve(hessian + RIDGE * np.eye(len(weights)), gradient)
-        weights += step
+        while loss(weights + step) > loss(weights) and np.abs(step).max() > 1e-9:
+            step *= 0.5
+        weights = weights + step
         if np.abs(step).max() < 1e-8:
             break
     return weights
@@ -105,8 +114,16 @@ def calibration_error(p: np.ndarray, right: np.ndarray, bins: int = 10) -> float
     )
 
 
-def fit(file: Path) -> None:
-    """Fit the map, print its errors on designs left out, write it."""
+def fit(file: Path, around: Path | None) -> None:
+    """Fit the map, print its errors on designs left out, write it.
+
+    Parameters
+    ----------
+    around : Path or None
+        Map from more campaigns of an earlier state, in whose neighbourhood the new one is sought;
+        None: around zero.
+    """
+    known = json.loads(around.read_text()) if around else {'features': []}
     records = [json.loads(line) for line in file.read_text().splitlines()]
     records = [record for record in records if 'features' in record]
     x = np.array([[record['features'][name] for name in confidence.FEATURES] for record in records])
@@ -114,10 +131,14 @@ def fit(file: Path) -> None:
     result: dict[str, object] = {'features': list(confidence.FEATURES), 'names': len(records)}
     for key, target in (('name', 'right'), ('set', 'in_set')):
         right = np.array([float(record[target]) for record in records])
+        before = dict(zip(known['features'], known.get(key, []), strict=True))
+        centre = np.array([before.get(name, 0.0) for name in confidence.FEATURES])
         left_out = np.empty(len(right))
         for one in np.unique(design):
             mine = design == one
-            left_out[mine] = 1.0 / (1.0 + np.exp(-x[mine] @ logistic(x[~mine], right[~mine])))
+            left_out[mine] = 1.0 / (
+                1.0 + np.exp(-x[mine] @ logistic(x[~mine], right[~mine], centre))
+            )
         sure = left_out > 0.9
         print(
             f'{key}: {len(right)} names, {right.mean():.3f} right; calibration error '
@@ -130,7 +151,7 @@ def fit(file: Path) -> None:
                 f'  kind left out: {out.sum()} names, {np.mean(left_out[out] > 0.8):.3f} said '
                 f'above 0.8, {np.mean(left_out[out] > 0.9):.3f} above 0.9'
             )
-        result[key] = [round(float(w), 4) for w in logistic(x, right)]
+        result[key] = [round(float(w), 4) for w in logistic(x, right, centre)]
     MAP.write_text(json.dumps(result, indent=1) + '\n')
 
 
@@ -146,11 +167,12 @@ def main() -> None:
     runner.add_argument('--processes', type=int, default=1)
     fitter = commands.add_parser('fit')
     fitter.add_argument('file', type=Path)
+    fitter.add_argument('--around', type=Path, help='map of an earlier state to start from')
     arguments = parser.parse_args()
     if arguments.command == 'run':
         run(arguments.file, arguments.per_group, arguments.processes)
     else:
-        fit(arguments.file)
+        fit(arguments.file, arguments.around)
 
 
 if __name__ == '__main__':

@@ -30,6 +30,5 @@ EFFECT = Effect(
     },
     validity='constant over the table; acts before a zero error',
     source='instrument model',
-    candidate=False,
     on_outputs=_gain,
 )

@@ -28,6 +28,5 @@ EFFECT = Effect(
     },
     validity='constant over the table; does not change sign in reverse',
     source='instrument model',
-    candidate=False,
     on_outputs=_offset,
 )

@@ -51,7 +51,6 @@ EFFECT = Effect(
     'circle is that of the rigid wheel without slip',
     source='substitute circle of a flattened wheel (Bekker; Schmid 1995, J. Terramech. 32): the '
     'chord that both circles share, 2 r (z + f) = 2 r* z; z0 after Bekker 1969',
-    candidate=False,
     on_inputs=_flatten,
     on_outputs=_arm,
 )
