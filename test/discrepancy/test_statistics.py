@@ -310,8 +310,9 @@ def test_confidence_follows_what_speaks_for_a_name():
         return confidence.confidence(values).of_name
 
     assert len(confidence._weights()['name']) == len(confidence.FEATURES)
-    assert of_name() > 0.97
-    assert of_name(margin=-1.0) < 0.6 < of_name(margin=1.0) < of_name()
+    assert of_name() > 0.95
+    behind = of_name(margin=-1.0, margin_of_set=-0.5)
+    assert behind < 0.6 < of_name(margin=1.0) < of_name()
     # A structural error, a second effect and a remainder each leave several times the doubt.
     for change in ({'floor': 1.0}, {'two': 1.0}, {'remainder': 1.0}):
         assert 1.0 - of_name(**change) > 2.0 * (1.0 - of_name())

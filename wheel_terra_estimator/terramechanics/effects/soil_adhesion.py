@@ -46,6 +46,7 @@ EFFECT = Effect(
     },
     validity='an even layer; the recorded slip keeps the configured radius',
     source='geometry of a coated wheel; sticking soil: Bekker 1969',
+    candidate=False,
     on_inputs=_layer,
     on_outputs=_below_the_rim,
     other_forms=(
