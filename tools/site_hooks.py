@@ -16,6 +16,7 @@ CONTRIBUTING = 'development/contributing.md'
 """Page that shows ``CONTRIBUTING.md`` of the repository."""
 
 _FORMULA = re.compile(r'<(span|div) class="arithmatex">\\[(\[](.*?)\\[)\]]</\1>', re.DOTALL)
+_OUTSIDE = re.compile(r'\[([^\]]+)\]\((?!docs/|https?:)([^)\s]+)\)')
 _LINK = re.compile(r'(?<!!)\[([^\]]+)\]\(((?:\.\./)+[^)#\s]+)(#[^)\s]*)?\)')
 
 
@@ -24,7 +25,7 @@ def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
     if page.file.src_uri == CONTRIBUTING:
         root = Path(page.file.abs_src_path).parents[2]
         markdown = (root / 'CONTRIBUTING.md').read_text(encoding='utf-8')
-        markdown = markdown.replace('](docs/', '](../')
+        markdown = _OUTSIDE.sub(r'\1 (`\2`)', markdown).replace('](docs/', '](../')
     depth = len(PurePosixPath(page.file.src_uri).parts) - 1
 
     def plain(match: re.Match[str]) -> str:
