@@ -74,7 +74,7 @@ class SlipClassifier:
         current, candidate, since = state
         target = self._target(current, slip, slip_std, sliding_back)
         if current == SlipClass.UNKNOWN:
-            return ClassState(target, target, time)
+            return self._first_class(state, time, target)
         if target == current:
             return ClassState(current, target, time)
         if target != candidate:
@@ -85,6 +85,18 @@ class SlipClassifier:
         if time - since >= self._dwell - _TIME_ROUNDING:
             return ClassState(target, target, time)
         return ClassState(current, target, since)
+
+    def _first_class(self, state: ClassState, time: float, target: int) -> ClassState:
+        """Return the first class of a wheel: the highest one only after the dwell time.
+
+        Where wheels begin to turn, the first rim speed comes before the body's speed has followed,
+        which looks like spinning on the spot.
+        """
+        if target < len(self._borders):
+            return ClassState(target, target, time)
+        since = state.since if state.candidate == target else time
+        proven = time - since >= self._dwell - _TIME_ROUNDING
+        return ClassState(target if proven else int(SlipClass.UNKNOWN), target, since)
 
     def _target(self, current: int, slip: float, slip_std: float, sliding_back: bool) -> int:
         top = len(self._borders)
