@@ -60,7 +60,7 @@ def test_gate_brings_an_outlier_to_its_border():
     assert chi_square_gate(1.0, 4.0, 9.0) == 0.0
 
 
-def day(steps):
+def day(steps, every=500):
     kalman, _ = make(25)
     rng = np.random.default_rng(2)
     F = np.eye(25)
@@ -74,7 +74,7 @@ def day(steps):
     for i in range(steps):
         kalman.predict(F @ kalman.mean, F, Q)
         kalman.update(noise[i % 200] * 1e-2, H[i % 200], R)
-        if i % 500 == 0:
+        if i % every == 0:
             P = kalman.covariance
             assert (P == P.T).all()
             worst = min(worst, float(np.linalg.eigvalsh(P).min()))
@@ -82,7 +82,7 @@ def day(steps):
 
 
 def test_covariance_stays_symmetric_and_positive():
-    assert day(5000) > -1e-15
+    assert day(600, every=20) > -1e-15
 
 
 @pytest.mark.slow

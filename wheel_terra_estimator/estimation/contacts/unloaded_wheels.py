@@ -81,12 +81,8 @@ class UnloadedWheels(Component[UnloadedState]):
         unloaded, since = list(state.unloaded), list(state.since)
         for i in rolling:
             share = torque[i] / typical if telling else 1.0
-            if unloaded[i]:
-                free = not telling or share < tuning.loaded_share
-            else:
-                free = telling and abs(share) < tuning.free_share
-                free = free and middle_rim != 0.0
-                free = free and rim_speed[i] / middle_rim > tuning.least_rim_share
+            pace = rim_speed[i] / middle_rim if middle_rim else 0.0
+            free = self._seems_free(share, pace, telling=telling, unloaded=unloaded[i])
             if free == unloaded[i]:
                 since[i] = NAN
             elif isnan(since[i]):
@@ -95,3 +91,10 @@ class UnloadedWheels(Component[UnloadedState]):
                 unloaded[i], since[i] = free, NAN
         self.state = UnloadedState(tuple(unloaded), tuple(since))
         return self.state
+
+    def _seems_free(self, share: float, pace: float, *, telling: bool, unloaded: bool) -> bool:
+        """Say whether a wheel with a share of the typical torque and rim speed carries nothing."""
+        tuning = self._tuning
+        if unloaded:
+            return not telling or share < tuning.loaded_share
+        return telling and abs(share) < tuning.free_share and pace > tuning.least_rim_share
