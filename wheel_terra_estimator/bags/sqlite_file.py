@@ -27,6 +27,8 @@ from wheel_terra_estimator.bags.raw_messages import RawMessage, Topic
 from wheel_terra_estimator.errors import UserError
 
 _LAST_ROW = 2**63 - 1
+# Damaged text may stand in the library's own message, which is decoded as UTF-8.
+_UNREADABLE = (sqlite3.Error, UnicodeDecodeError, MemoryError, OverflowError)
 _AT_A_TIME = 500  # rows fetched by number
 
 
@@ -49,7 +51,7 @@ class SqliteFile:
         self._ordered = True
         try:
             described = self._read_topics()
-        except sqlite3.Error as error:
+        except _UNREADABLE as error:
             raise UserError(
                 f'{path}: cannot be read ({error}); try `sqlite3 {path.name} .recover`'
             ) from None
@@ -166,7 +168,7 @@ class SqliteFile:
                 row = run(
                     'SELECT topic_id, timestamp, data FROM messages WHERE id = ?', (number,)
                 ).fetchone()
-            except (sqlite3.Error, MemoryError):
+            except _UNREADABLE:
                 continue
             if row is not None and _is_message(row[0], row[1]) and isinstance(row[2], bytes):
                 yield row
@@ -195,7 +197,7 @@ def _rows(connection: sqlite3.Connection, text: str, on_gap: Any) -> Iterator[tu
                 last = row[0]
                 yield row[1:]
             return
-        except (sqlite3.Error, MemoryError, OverflowError):
+        except _UNREADABLE:
             pass
         # The cursor runs ahead: what stands before the damage comes one by one.
         while (found := _row(connection, text, last + 1)) is not None:
@@ -213,7 +215,7 @@ def _row(connection: sqlite3.Connection, text: str, number: int) -> tuple[Any, .
     try:
         cursor = connection.execute(f'{text} WHERE id >= ? ORDER BY id LIMIT 1', (number,))
         found: tuple[Any, ...] | None = cursor.fetchone()
-    except (sqlite3.Error, MemoryError, OverflowError):
+    except _UNREADABLE:
         return None
     return found
 
