@@ -46,6 +46,12 @@ def ekf(parts):
     return found
 
 
+def window(force_x, force_z, readings=5, noise=0.0):
+    """Return IMU readings of a tenth of a second with this mean specific force."""
+    sums = (readings * force_x, 0.0, readings * force_z)
+    return InertialWindow(readings, *sums, duration=0.1, noise_density=noise)
+
+
 # -- Reference velocity -----------------------------------------------------------------------
 
 
@@ -330,7 +336,7 @@ def test_the_error_of_a_measured_leaving_angle_weakens_torque_and_balance(parts,
         rows = TorqueUpdate(parts.configuration, parts.rover, parts.sensors).update(
             ekf, found, torque=tuple(found.torque.tolist()), turning=(True,) * 6, **given
         )
-        total = balance.sum_of_pulls((0.0, 0.0, 9.8), 5, loads, 0.0)
+        total = balance.sum_of_pulls(window(0.0, 9.8), loads, 0.0)
         along = total._replace(along=float(found.pull.sum()))
         row = balance.update(ekf, found, along, stationary=[None] * 6, loads=loads, **given)
         variances.append((rows[0].variance, row.variance))
@@ -360,7 +366,7 @@ def test_the_balance_of_forces_on_a_slope(parts, ekf):
     found, loads = forces(parts, ekf)
     ekf.mean[parts.layout.sinkage] = 0.03  # even ruts: the body lies along the ground
     along = float(found.pull.sum()) + 12.0
-    total = balance.sum_of_pulls((along / parts.rover.mass, 0.0, 9.6), 5, loads, 0.0)
+    total = balance.sum_of_pulls(window(along / parts.rover.mass, 9.6), loads, 0.0)
     given = {'loads': loads, 'model_variance': (0.0,) * 6, 'repeats': 1.0}
     row = balance.update(ekf, found, total, stationary=[None] * 6, **given)
     assert row.residual == pytest.approx(12.0, abs=1e-6)
@@ -395,3 +401,13 @@ def test_what_is_not_seen_is_considered_and_not_learned(parts):
     one = entries(unread=[2])
     assert one == {layout.sinkage.start + 2, layout.stiffness.start + 2}
     assert SLIP_SINKAGE in entries(unread=list(range(6)))
+
+
+def test_a_vibrating_accelerometer_weakens_the_balance(parts):
+    """Noise of 1 m/s^2 at 100 Hz is a density of 0.01: over 0.1 s a variance of 0.1."""
+    balance = ForceBalance(parts.configuration, parts.rover, parts.sensors, parts.layout)
+    loads = (parts.rover.mass * 9.8 / 6,) * 6
+    calm = balance.sum_of_pulls(window(0.0, 9.8), loads, 0.0)
+    shaken = balance.sum_of_pulls(window(0.0, 9.8, noise=0.01), loads, 0.0)
+    added = parts.rover.mass**2 * (0.1 - parts.sensors.specific_force_std**2 / 5)
+    assert shaken.variance - calm.variance == pytest.approx(added)

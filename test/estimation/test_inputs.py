@@ -67,6 +67,20 @@ def test_a_gap_of_the_imu_is_not_integrated_over():
     assert imu.take().speed_change == pytest.approx(0.1)
 
 
+def test_the_noise_of_a_vibrating_accelerometer_is_seen_raw_and_in_means():
+    """A density is the same for readings at 100 Hz and for their means at 20 Hz."""
+    raw = np.random.default_rng(3).normal(0.0, 1.0, 4000)
+    seen = {}
+    for rate, force in ((100.0, raw), (20.0, raw.reshape(-1, 5).mean(axis=1))):
+        imu = InertialInput(GRAVITY)
+        for i, value in enumerate(force):
+            imu.update(i / rate, reading(force=(value, 0.0, GRAVITY)), GyroZero())
+        seen[rate] = imu.take().noise_density
+        assert imu.take().noise_density == seen[rate]  # it outlives the window
+    assert seen[100.0] == pytest.approx(0.01, rel=0.25)
+    assert seen[20.0] == pytest.approx(0.01, rel=0.5)
+
+
 def test_the_zero_of_the_gyro_is_taken_off():
     imu = InertialInput(GRAVITY)
     imu.update(0.0, reading(rate=(0.0, 0.03, 0.05)), GyroZero(yaw=0.01, pitch=0.02))

@@ -335,3 +335,14 @@ def test_held_wheels_beside_one_that_stands_are_an_entrapment():
 def test_every_sign_has_its_own_name_and_words():
     assert len({sign.name for sign in SIGNS}) == len(SIGNS)
     assert all(sign.hold > 0.0 for sign in SIGNS)
+
+
+def test_an_accelerometer_alone_raises_nothing():
+    """Slip without reference, torque or sinkage may be the drift of an accelerometer."""
+    for told in (True, False):
+        monitor = StuckMonitor()
+        found = [
+            judge(monitor, 0.1 * i, 0.0, False, [wheel(0.98)] * 6, slip_told=told)
+            for i in range(200)
+        ]
+        assert (first(found) is not None) == told

@@ -14,6 +14,7 @@ from wheel_terra_estimator.estimation.contacts.stationary_wheels import Stationa
 from wheel_terra_estimator.estimation.filter.ekf import GatedFilter, Row
 from wheel_terra_estimator.estimation.filter.state import StateLayout
 from wheel_terra_estimator.estimation.filter.torque import ForceRows
+from wheel_terra_estimator.estimation.inputs.inertial import InertialWindow
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
 
 Floats = tuple[float, ...]
@@ -49,17 +50,19 @@ class ForceBalance(ForceRows):
         super().__init__(configuration)
         self._rover, self._sensors, self._layout, self._tuning = rover, sensors, layout, tuning
 
-    def sum_of_pulls(
-        self, force: tuple[float, float, float], readings: int, loads: Floats, curvature: float
-    ) -> SumOfPulls:
-        """Return what the specific force [m/s^2], a mean of `readings`, says of the pulls.
+    def sum_of_pulls(self, window: InertialWindow, loads: Floats, curvature: float) -> SumOfPulls:
+        """Return what the mean specific force of a window says of the pulls.
 
         On curved ground (slope per travel, [rad/m]) the wheels' own slopes differ from the body's.
         """
         rover, sensors = self._rover, self._sensors
+        force = window.mean_force()
         weight = rover.mass * force[2]
         uphill = curvature * sum(w * x for w, x in zip(loads, rover.longitudinal, strict=True))
-        noise = sensors.specific_force_std**2 / readings + sensors.specific_force_bias_std**2
+        noise = sensors.specific_force_std**2 / window.readings
+        if window.duration > 0.0:
+            noise = max(noise, window.noise_density / window.duration)
+        noise += sensors.specific_force_bias_std**2
         variance = rover.mass**2 * noise + (self._tuning.weight_std * weight) ** 2
         return SumOfPulls(rover.mass * force[0] + uphill, weight, variance)
 

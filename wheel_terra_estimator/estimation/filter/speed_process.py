@@ -154,10 +154,10 @@ class SpeedProcess(Component[SpeedState]):
         self._rover, self._tuning = rover, tuning
         rate = max(sensors.imu_rate, 1.0)
         attitude = rover.gravity * sensors.orientation_std
-        self.acceleration_noise = math.sqrt(
-            sensors.specific_force_std**2 / rate + attitude**2 * tuning.attitude_time
-        )
-        """White noise density of the accelerometer and the attitude [m/s^2 sqrt(s)]."""
+        self._stated_noise = sensors.specific_force_std**2 / rate
+        self._attitude_noise = attitude**2 * tuning.attitude_time
+        self.acceleration_noise = math.sqrt(self._stated_noise + self._attitude_noise)
+        """White noise density of accelerometer and attitude as stated [m/s^2 sqrt(s)]."""
         # The residual of gravity changes as the rover drives over rough ground.
         leak = tuning.leaking_share * attitude
         self._bias_walk = tuning.bias_walk**2 + leak**2 * tuning.leak_rate
@@ -302,7 +302,9 @@ class SpeedProcess(Component[SpeedState]):
             return step
         # A stretch that the IMU left out is filled with its mean.
         accelerated = window.speed_change * dt / covered
-        noise = self.acceleration_noise**2 * dt
+        # A vibrating rover is as noisy as it is seen to be, whatever its file states.
+        noise = max(self._stated_noise, window.noise_density) + self._attitude_noise
+        noise *= dt
         weight = noise / (noise + step.variance)  # of the wheels
         return SpeedStep(
             weight * step.speed_gain + (1.0 - weight),

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.measurements import InertialReading
-from wheel_terra_estimator.estimation.scalars import clipped
+from wheel_terra_estimator.estimation.scalars import NAN, clipped, gain_of
 
 
 @dataclass(frozen=True)
@@ -19,6 +19,8 @@ class InertialTuning:
 
     longest_gap: float = 0.25
     """Time over which one reading is held [s]; a longer gap is not integrated over."""
+    noise_time: float = 2.0
+    """Time constant with which the seen noise of the accelerometer is smoothed [s]."""
     lean_time: float = 5.0
     """Time constant with which an attitude without orientation follows the specific force [s]: a
     rover's mean acceleration over longer than a start or a stop is nothing."""
@@ -42,6 +44,9 @@ class InertialWindow(NamedTuple):
     pitch_rate: float = 0.0
     speed_change: float = 0.0  # integral of f_x - g_x [m/s]
     duration: float = 0.0  # [s] covered by that integral
+    noise_density: float = 0.0
+    """Square of the white noise density that the specific force along the body is seen to have,
+    vibration included [(m/s^2)^2 s]."""
 
     def mean_force(self) -> tuple[float, float, float]:
         """Return the mean specific force [m/s^2]; the window is not empty."""
@@ -63,6 +68,7 @@ class InertialState(NamedTuple):
     time: float = -math.inf  # of the last reading [s]
     window: InertialWindow = InertialWindow()
     attitude: Attitude = Attitude()
+    force_x: float = NAN  # of the last reading [m/s^2]
 
 
 class InertialInput(Component[InertialState]):
@@ -81,13 +87,18 @@ class InertialInput(Component[InertialState]):
 
     def update(self, time: float, reading: InertialReading, zero: GyroZero) -> None:
         """Take a reading at a time [s]."""
-        before, window, attitude = self.state
+        before, window, attitude, last_force = self.state
         dt = time - before if before > -math.inf else 0.0
         attitude = self.attitude_after(attitude, reading, dt)
         force_x, force_y, force_z = reading.specific_force.tolist()
         _, pitch_rate, yaw_rate = reading.angular_rate.tolist()
         speed_change, duration = window.speed_change, window.duration
+        noise = window.noise_density
         if 0.0 < dt <= self._tuning.longest_gap:
+            # Readings of a white noise differ by twice its variance; times dt it is a density, the
+            # same for raw readings and for means of several.
+            seen = 0.5 * (force_x - last_force) ** 2 * dt
+            noise += gain_of(dt, self._tuning.noise_time) * (seen - noise)
             speed_change += (force_x - self._gravity * attitude.sine_up) * dt
             duration += dt
         window = InertialWindow(
@@ -99,13 +110,15 @@ class InertialInput(Component[InertialState]):
             window.pitch_rate + (pitch_rate - zero.pitch),
             speed_change,
             duration,
+            noise,
         )
-        self.state = InertialState(time, window, attitude)
+        self.state = InertialState(time, window, attitude, force_x)
 
     def take(self) -> InertialWindow:
         """Return the sums since the last call, and begin new ones."""
         window = self.state.window
-        self.state = self.state._replace(window=InertialWindow())
+        empty = InertialWindow(noise_density=window.noise_density)
+        self.state = self.state._replace(window=empty)
         return window
 
     def attitude_after(self, attitude: Attitude, reading: InertialReading, dt: float) -> Attitude:

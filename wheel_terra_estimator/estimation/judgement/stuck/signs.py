@@ -64,6 +64,7 @@ class Need(Flag):
     NOTHING = 0
     SPEED = auto()  # the speed rests on a reference
     NO_SPEED = auto()  # it does not
+    SLIP_TOLD = auto()  # a reference, a torque or a sinkage tells of the slip
     STRAIGHT = auto()  # the rover does not turn sharply: a spin in place is commanded
     PULLED_AWAY = auto()  # the wheels have turned at their own cruise since they stood
 
@@ -99,6 +100,8 @@ class Sign:
 def needs_met(s: Situation) -> Need:
     """Return what of the needs of signs holds."""
     met = Need.SPEED if s.speed_known else Need.NO_SPEED
+    if s.motion.slip_told:
+        met |= Need.SLIP_TOLD
     if not s.motion.turning:
         met |= Need.STRAIGHT
     if not isnan(s.rolling_time):
@@ -217,7 +220,7 @@ SIGNS: tuple[Sign, ...] = (
     Sign(
         'digging',
         1.5,
-        Need.NOTHING,
+        Need.SLIP_TOLD,
         False,
         _digging,
         lambda s, t: f'median slip {s.typical_slip:.2f}: digging in',
@@ -225,7 +228,7 @@ SIGNS: tuple[Sign, ...] = (
     Sign(
         'exhausted',
         6.0,
-        Need.NO_SPEED,
+        Need.NO_SPEED | Need.SLIP_TOLD,
         False,
         _exhausted,
         lambda s, t: f'soil gives {s.motion.margin:.3f} of the load more than is asked',
@@ -233,7 +236,7 @@ SIGNS: tuple[Sign, ...] = (
     Sign(
         'within_horizon',
         1.0,
-        Need.NOTHING,
+        Need.SLIP_TOLD,
         False,
         _within_horizon,
         lambda s, t: f'median slip {s.typical_slip:.2f} grows by {s.trend:.3f} per second',
@@ -241,7 +244,7 @@ SIGNS: tuple[Sign, ...] = (
     Sign(
         'within_travel',
         1.0,
-        Need.NOTHING,
+        Need.SLIP_TOLD,
         False,
         _within_travel,
         lambda s, t: (

@@ -77,6 +77,8 @@ class RoverMotion(NamedTuple):
     speed_known: bool
     """Whether the speed rests on more than a guess."""
     wheels: tuple[WheelMotion, ...]
+    slip_told: bool = True
+    """Whether a reference, a torque or a sinkage tells of the slip, not an accelerometer alone."""
     turning: bool = False
     """Sharply: slip that comes from turning says nothing of what is ahead."""
     margin: float = NAN
