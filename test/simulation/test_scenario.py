@@ -105,3 +105,13 @@ def test_degrees_become_radians() -> None:
 def test_every_scenario_file_is_listed() -> None:
     found = [key for key in shipped.files() if key.startswith('scenarios/')]
     assert len(found) == len(NAMES)
+
+
+def test_another_rover_in_a_shipped_scenario():
+    stalled = scenarios.load('stalled_wheel', rover='frostyboy')
+    assert stalled.configuration.wheels.count == 4
+    assert stalled.configuration.rover.mass == 90.0
+    own = scenarios.load('stalled_wheel')
+    assert stalled.configuration.soil == own.configuration.soil
+    assert all(fault.wheel is None or fault.wheel < 4 for fault in stalled.faults)
+    assert len(stalled.faults) == len(own.faults)

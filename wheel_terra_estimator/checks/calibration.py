@@ -23,8 +23,6 @@ WORTH_CHANGING = 0.2
 """Relative change of a noise or a rate below which the rover file keeps its number [-]."""
 NOISE_STD = 0.1
 """Relative deviation of a noise that a drive tells [-]."""
-CLEAREST_MOUNTING = math.radians(1.0)
-"""A mounting is only changed where its deviation is below this [rad]."""
 
 
 @dataclass(frozen=True)
@@ -99,7 +97,7 @@ def _mounting(evidence: Evidence, report: CheckReport) -> list[Change]:
     assert configuration is not None
     rotation, std, source = evidence.rotation, None, 'mean specific force'
     tilt = imu.small_tilt(evidence)
-    if tilt is not None and max(tilt.roll.std, tilt.pitch.std) < CLEAREST_MOUNTING:
+    if tilt is not None and max(tilt.roll.std, tilt.pitch.std) < imu.EVEN_GROUND_STD:
         seen = max(tilt.roll.sigmas_from(0.0), tilt.pitch.sigmas_from(0.0)) > 1.0
         if seen:
             rotation = imu.tilt_rotation(tilt.roll.value, tilt.pitch.value) @ rotation

@@ -41,6 +41,8 @@ LEAST_TURN = 4.5
 """Heading that a drive has to cover for the mounting to be told from a slope [rad]."""
 FLAT_TURN_STD = math.radians(0.1)
 """Part of the mounting that unevenness of the ground leaves open [rad]."""
+EVEN_GROUND_STD = math.radians(0.8)
+"""Deviation of a tilt [rad] above which the ground was no plane."""
 NOISE_FACTOR = 4.0
 """Noise above so many times the stated one is a finding."""
 BIAS_FACTOR = 6.0
@@ -443,6 +445,9 @@ def check_mounting(evidence: Evidence, figures: dict[str, Any]) -> tuple[list[Ou
     figures['imu.tilt_roll_deg'] = round(math.degrees(tilt.roll.value), 3)
     figures['imu.tilt_pitch_deg'] = round(math.degrees(tilt.pitch.value), 3)
     figures['imu.tilt_std_deg'] = round(math.degrees(max(tilt.roll.std, tilt.pitch.std)), 3)
+    if max(tilt.roll.std, tilt.pitch.std) > EVEN_GROUND_STD:
+        reason = 'the circles lie on uneven ground or on the edge of a slope; drive them on a plane'
+        return [NotChecked('mounting', reason)], rotation
     sigmas = max(tilt.roll.sigmas_from(0.0), tilt.pitch.sigmas_from(0.0))
     size = math.hypot(tilt.roll.value, tilt.pitch.value)
     if size < LEAST_MOUNTING or sigmas < 4.0:

@@ -274,7 +274,7 @@ def load(
         duration=checked['duration'],
         profile=_profile(name, checked),
         patches=_patches(name, checked),
-        faults=_faults(name, checked, configuration.wheels.names),
+        faults=_faults(name, _on_rover(checked, rover, configuration), configuration.wheels.names),
         drive=Section(checked, 'drive.'),
         slope=_slope(name, checked),
         variation=Section(checked, 'variation.'),
@@ -292,6 +292,21 @@ def _with_rover(files: Sequence[str], rover: str | Path | None) -> list[str | Pa
     if rover is None:
         return list(files)
     return [rover, *(f for f in files if 'wheels.names' not in ros_yaml.read(shipped.find(f)))]
+
+
+def _on_rover(
+    checked: dict[str, Any], rover: str | Path | None, configuration: Configuration
+) -> dict[str, Any]:
+    """Return the keys with the wheels of the faults moved to another rover, place by place."""
+    if rover is None:
+        return checked
+    own = reader.load(checked['configuration'], checked['parameters']).wheels.names
+    there = configuration.wheels.names
+    moved = [
+        there[min(own.index(wheel), len(there) - 1)] if wheel in own else wheel
+        for wheel in checked['faults.wheel']
+    ]
+    return {**checked, 'faults.wheel': moved}
 
 
 def shipped_scenarios() -> dict[str, str]:
