@@ -383,25 +383,3 @@ def test_the_zero_of_the_pitch_gyro_does_not_reach_the_pulls():
     straight, biased = (estimate(r) for r in (run, with_inertial(run, turned)))
     pulls = [np.array([s.drawbar_pull for s in sets[80:]]) for sets in (straight, biased)]
     assert np.ptp(pulls, axis=0).max() < 0.02 * run.truth.normal_load.mean()
-
-
-def test_vibration_without_torque_and_reference_is_no_entrapment():
-    """A rover on wheels and a shaking IMU alone, as a ten-line rover file gives it."""
-    run, rng = drive(), np.random.default_rng(5)
-
-    def shaken(reading, time):
-        force = np.asarray(reading.specific_force) + rng.normal(0.1, 2.0, 3)
-        return replace(reading, specific_force=force)
-
-    arrivals = [
-        a._replace(
-            measurement=replace(a.measurement, torque=np.full_like(a.measurement.torque, np.nan))
-        )
-        if isinstance(a.measurement, WheelOdometry)
-        else a
-        for a in with_inertial(run, shaken).arrivals
-        if not isinstance(a.measurement, SinkageReading)
-    ]
-    sets = estimate(replace(run, arrivals=arrivals), 'no_reference')
-    assert not any(s.stuck for s in sets)
-    assert max(float(s.slip.max()) for s in sets[40:]) < 0.6

@@ -7,8 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from wheel_terra_estimator.bags.reader import read
+from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.evaluation import real_drives
+from wheel_terra_estimator.evaluation.runner import run_estimator
 
+HUSKY_PLACES = ('front_left', 'front_right', 'rear_left', 'rear_right')
 MEASURED = Path(__file__).parents[2].parent / 'shared' / 'measured'
 pytestmark = [
     pytest.mark.shared,
@@ -43,3 +47,26 @@ def test_all_snow_events_are_warned_without_any_speed():
 def test_firm_ground_raises_no_warning(rate):
     bag = MEASURED / 'bags' / 'wvu_pathfinder_test17_mcap'
     assert not real_drives.pathfinder_record(bag, rate).stuck.any()
+
+
+HUSKY = {
+    'rover.mass': 50.0,
+    'wheels.names': [f'{place}_wheel' for place in HUSKY_PLACES],
+    'wheels.radius': [0.1651] * 4,
+    'wheels.width': [0.125] * 4,
+    'wheels.x': [0.256, 0.256, -0.256, -0.256],
+    'wheels.y': [0.2854, -0.2854, 0.2854, -0.2854],
+}
+
+
+def test_a_shaking_husky_on_firm_ground_is_not_stuck():
+    """Wheel rates and an IMU of 1 m/s^2 of vibration are all that tells: no slip is told."""
+    configuration = reader.from_parameters(HUSKY)
+    bag = MEASURED / 'bags' / 'boreal_husky_flooring_00_mcap'
+    measurements = [m for _, m in read(bag, {}, configuration)]
+    end = measurements[0].stamp + 100 * 10**9
+    sets, _ = run_estimator(configuration, [m for m in measurements if m.stamp < end])
+    assert len(sets) > 600
+    assert not any(s.stuck for s in sets)
+    high = np.isin(np.array([s.slip_class for s in sets]), (2, 3))
+    assert high.mean() < 0.01
