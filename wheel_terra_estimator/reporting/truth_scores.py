@@ -182,8 +182,9 @@ def as_lines(errors: TruthErrors) -> list[str]:
             shares = ''.join(f'{100 * share:9.1f}%' for share in row)
             lines.append(f'    {name:18}{shares}')
     for warning in errors.warnings:
-        told = f'slip passed 0.75 {warning.lead:+.1f} s from it'
-        lead = told if warning.right else 'no such slip came'
+        lead = f'the median slip did not pass {WARNED_SLIP:g} within {WARNING_HORIZON:g} s'
+        if warning.lead is not None:
+            lead = f'slip passed {WARNED_SLIP:g} {warning.lead:+.1f} s from it'
         lines.append(f'    warning at {warning.start:.1f} s: {lead}')
     if errors.first_stuck is not None and not errors.warnings:
         lines.append(f'    no warning, though the slip passed 0.75 at {errors.first_stuck:.1f} s')
