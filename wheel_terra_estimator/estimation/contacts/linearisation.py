@@ -148,15 +148,15 @@ class Linearisation(Component[SlopeState]):
             rim = abs(rims[i])
             direction = 1.0 if rims[i] > 0.0 else -1.0
             wheel = WheelState(
-                direction * (speed - yaw_rate * rover.lateral[i]) / rim,
-                float(x[layout.sinkage.start + i]),
-                loads[i],
-                float(strength + x[layout.shear_error.start + i]),
-                modulus,
-                centroid,
-                mound,
-                rim,
-                leaving_angles[i],
+                speed_ratio=direction * (speed - yaw_rate * rover.lateral[i]) / rim,
+                sinkage=float(x[layout.sinkage.start + i]),
+                load=loads[i],
+                strength=float(strength + x[layout.shear_error.start + i]),
+                shear_modulus=modulus,
+                centroid=centroid,
+                mound=mound,
+                rim_speed=rim,
+                leaving_angle=leaving_angles[i],
             )
             forces = self._models.forces(i, wheel)
             if not isnan(wheel.leaving_angle):

@@ -102,15 +102,15 @@ class InertialInput(Component[InertialState]):
             speed_change += (force_x - self._gravity * attitude.sine_up) * dt
             duration += dt
         window = InertialWindow(
-            window.readings + 1,
-            window.force_x + force_x,
-            window.force_y + force_y,
-            window.force_z + force_z,
-            window.yaw_rate + (yaw_rate - zero.yaw),
-            window.pitch_rate + (pitch_rate - zero.pitch),
-            speed_change,
-            duration,
-            noise,
+            readings=window.readings + 1,
+            force_x=window.force_x + force_x,
+            force_y=window.force_y + force_y,
+            force_z=window.force_z + force_z,
+            yaw_rate=window.yaw_rate + (yaw_rate - zero.yaw),
+            pitch_rate=window.pitch_rate + (pitch_rate - zero.pitch),
+            speed_change=speed_change,
+            duration=duration,
+            noise_density=noise,
         )
         self.state = InertialState(time, window, attitude, force_x)
 

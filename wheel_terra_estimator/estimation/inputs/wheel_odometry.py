@@ -103,14 +103,14 @@ class WheelOdometryInput(Component[WheelOdometryState]):
                 torque_count[i] += 1
                 torque_time = time
         self.state = WheelOdometryState(
-            time,
-            tuple(rim_speed),
-            tuple(rate_time),
-            tuple(rim_slope),
-            torque_time,
-            tuple(torque_sum),
-            tuple(torque_count),
-            state.torque,
+            time=time,
+            rim_speed=tuple(rim_speed),
+            rate_time=tuple(rate_time),
+            rim_slope=tuple(rim_slope),
+            torque_time=torque_time,
+            torque_sum=tuple(torque_sum),
+            torque_count=tuple(torque_count),
+            torque=state.torque,
         )
 
     def take_torque(self) -> Floats:

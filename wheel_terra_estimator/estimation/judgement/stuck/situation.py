@@ -230,16 +230,16 @@ class SituationObserver(Component[Observed]):
         slips, trend = self._trend(time, typical, follow=settled and not motion.turning)
         rims = appended(old.fastest, time, fastest, tuning.stopping_window)
         observed = Observed(
-            time,
-            rolling_since,
-            cruise,
-            rim_travel,
-            slips,
-            trend,
-            self._speeds(time, motion),
-            rims,
-            self._typical_rims(time, motion, moving),
-            self._deepened(motion.wheels, dt, fresh=rim_travel < tuning.settling_travel),
+            time=time,
+            rolling_since=rolling_since,
+            cruise=cruise,
+            rim_travel=rim_travel,
+            slips=slips,
+            trend=trend,
+            speeds=self._speeds(time, motion),
+            fastest=rims,
+            typical=self._typical_rims(time, motion, moving),
+            deepening=self._deepened(motion.wheels, dt, fresh=rim_travel < tuning.settling_travel),
         )
         self.state = observed
         return Situation(
