@@ -133,7 +133,7 @@ def test_descent_skids_and_a_locked_wheel_is_dragged(plant: MakePlant) -> None:
     assert (truth.slip < -0.03).all()
     assert (truth.drawbar_pull < 0.0).all()
     rover_plant.faults.rate_factor[0] = 0.0
-    truth = drive(rover_plant, 20.0)
+    truth = drive(rover_plant, 1.5)  # before the locked wheel has dug in so far that it holds all
     assert truth.slip[0] == -1.0
     assert truth.torque[0] < 0.0
     assert truth.drawbar_pull[0] < truth.drawbar_pull[1:].min()
