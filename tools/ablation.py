@@ -39,6 +39,8 @@ from wheel_terra_estimator.evaluation.tables import table  # noqa: E402
 AS_IT_IS = 'as it is'
 ALLOWED = 0.02
 """Loss of slip or pull RMSE that a treatment must save, beyond two standard errors, to stay."""
+LATER = 0.05
+"""By so much a warning may come later [s] without that anybody asks why."""
 FIRST_SEED = TEST_SEEDS.start + 500  # seeds of no other study
 OWN_OVER_RIVAL = 1.7
 """Duration of the drives of the own world, which are cut, over those of the rival's, which are
@@ -111,13 +113,22 @@ def report(rows: Rows) -> str:
         cells = [_percent(*pair) for pair in loss.values()]
         cells.append(f'{100 * (_coverage(found, names) - _coverage(base, names)):+.1f}')
         cells += [f'{_more(base, found, names, key):+.0f}' for key in ('false', 'missed')]
+        warned = [n for n in names if base[n].get('lead') and found[n].get('lead')]
+        sooner = _more(base, found, warned, 'lead') / len(warned) if warned else float('nan')
+        cells.append('-' if np.isnan(sooner) else f'{sooner:+.1f}')
         worst, name = _worst(base, found, names)
         cells.append(f'{name} {100 * worst:+.0f} %' if name else '-')
         lines.append((worst, (treatment.group, treatment.name, *cells, verdict)))
     lines.sort(key=lambda pair: -pair[0])
     head = (
         *('kind', 'treatment', 'slip [%]', *(f'{w} [%]' for w in _WORLDS), 'pull [%]'),
-        *('coverage [points]', 'false warnings', 'missed', 'slip of the drive hit most'),
+        *(
+            'coverage [points]',
+            'false warnings',
+            'missed',
+            'lead [s]',
+            'slip of the drive hit most',
+        ),
         'earns its place',
     )
     count = Counter(row['world'] for row in base.values())
@@ -136,7 +147,8 @@ def report(rows: Rows) -> str:
 _VERDICTS = {
     'yes': f'Earns its place (a loss above {ALLOWED:.0%} plus two standard errors in slip or pull, '
     'or a warning gets worse)',
-    'open': f'Open (within that, but some drive loses more than {ALLOWED:.0%}: more drives needed)',
+    'open': f'Open (within that, but some drive loses more than {ALLOWED:.0%} or is warned '
+    'later: more drives needed)',
     'no': f'Worth nothing on these drives (no drive loses more than {ALLOWED:.0%})',
     'did not act': 'Changed nothing at all, so nothing is known',
 }
@@ -161,6 +173,8 @@ def _verdict(
         return 'yes'
     if all(_same(base[n], found[n]) for n in names):
         return 'did not act'
+    if any(found[n].get('lead', 0.0) < base[n].get('lead', 0.0) - LATER for n in names):
+        return 'open'
     each = [_change(base, found, [n], what)[0] for n in names for what in ('slip', 'pull')]
     return 'open' if any(value > ALLOWED for value in each) else 'no'
 

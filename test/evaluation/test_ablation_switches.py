@@ -3,6 +3,7 @@
 """Each treatment of the ablation study can be switched off, and is on again afterwards."""
 
 import importlib
+import inspect
 import sys
 from pathlib import Path
 
@@ -44,6 +45,8 @@ def test_sign_is_gone_for_the_monitor_and_comes_back():
     signs, monitor = module('judgement.stuck.signs'), module('judgement.stuck.monitor')
     with without_sign('stall')():
         assert 'stall' not in {sign.name for sign in monitor.SIGNS}
+        taken = inspect.signature(monitor.StuckMonitor).parameters['signs'].default
+        assert 'stall' not in {sign.name for sign in taken}
     assert monitor.SIGNS is signs.SIGNS
     with pytest.raises(LookupError), without_sign('no_such')():
         pass

@@ -34,8 +34,8 @@ def tuned(place: str, **values: Any) -> Switch:
     @contextlib.contextmanager
     def switched() -> Iterator[None]:
         kind = _object(place)
-        old = [_swap(holder, kind, values) for holder in _holders()]
-        undo = [u for found in old for u in found]
+        swap = _swapping(lambda v: replace(v, **values) if isinstance(v, kind) else v)
+        undo = [u for holder in _holders() for u in swap(holder)]
         if not undo:
             raise LookupError(f'{place}: no default holds an instance of it')
         try:
@@ -76,14 +76,13 @@ def without_sign(name: str) -> Switch:
         left = tuple(sign for sign in signs if sign.name != name)
         if len(left) == len(signs):
             raise LookupError(f'no sign {name!r}')
-        holders = [m for m in _modules() if getattr(m, 'SIGNS', None) is signs]
-        for module in holders:
-            module.SIGNS = left
+        swap = _swapping(lambda value: left if value is signs else value)
+        undo = [u for holder in _holders() for u in swap(holder)]
         try:
             yield
         finally:
-            for module in holders:
-                module.SIGNS = signs
+            for restore in reversed(undo):
+                restore()
 
     return switched
 
@@ -113,23 +112,24 @@ def _holders() -> tuple[Any, ...]:
     return (*_modules(), *(f for f in functions if inspect.isfunction(f)))
 
 
-def _swap(holder: Any, kind: type, values: dict[str, Any]) -> list[Callable[[], None]]:
-    """Replace the instances of a class that a holder has; return what undoes it."""
+def _swapping(other: Callable[[Any], Any]) -> Callable[[Any], list[Callable[[], None]]]:
+    """Return what replaces the defaults or names of a holder, and gives what undoes it."""
 
-    def other(value: Any) -> Any:
-        return replace(value, **values) if isinstance(value, kind) else value
-
-    undo: list[Callable[[], None]] = []
-    if inspect.isfunction(holder):
-        defaults, by_name = holder.__defaults__ or (), holder.__kwdefaults__ or {}
-        if any(isinstance(v, kind) for v in (*defaults, *by_name.values())):
-            undo.append(lambda: setattr(holder, '__defaults__', defaults or None))
-            undo.append(lambda: setattr(holder, '__kwdefaults__', by_name or None))
-            holder.__defaults__ = tuple(map(other, defaults)) or None
-            holder.__kwdefaults__ = {k: other(v) for k, v in by_name.items()} or None
+    def swap(holder: Any) -> list[Callable[[], None]]:
+        undo: list[Callable[[], None]] = []
+        if inspect.isfunction(holder):
+            defaults, by_name = holder.__defaults__ or (), holder.__kwdefaults__ or {}
+            if any(other(v) is not v for v in (*defaults, *by_name.values())):
+                undo.append(lambda: setattr(holder, '__defaults__', defaults or None))
+                undo.append(lambda: setattr(holder, '__kwdefaults__', by_name or None))
+                holder.__defaults__ = tuple(map(other, defaults)) or None
+                holder.__kwdefaults__ = {k: other(v) for k, v in by_name.items()} or None
+            return undo
+        for name, value in list(vars(holder).items()):
+            new = other(value)
+            if new is not value:
+                undo.append(functools.partial(setattr, holder, name, value))
+                setattr(holder, name, new)
         return undo
-    for name, value in list(vars(holder).items()):
-        if isinstance(value, kind):
-            undo.append(lambda name=name, value=value: setattr(holder, name, value))
-            setattr(holder, name, other(value))
-    return undo
+
+    return swap
