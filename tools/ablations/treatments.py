@@ -26,6 +26,10 @@ def _nothing(*_: Any, **__: Any) -> None:
     return None
 
 
+def _none_of_it(*_: Any, **__: Any) -> float:
+    return 0.0
+
+
 def _plain_row(self: Any, ekf: Any, row: Any) -> Any:
     return row
 
@@ -50,21 +54,32 @@ def _soil(**values: Any) -> Switch:
     return tuned('filter.soil_process:SoilTuning', **values)
 
 
-def _changes(**values: Any) -> Switch:
-    return tuned('contacts.contact_changes:ChangeTuning', **values)
-
-
 def _sinkage(**values: Any) -> Switch:
     return tuned('filter.sinkage_process:SinkageTuning', **values)
 
 
-SIGNS = ('digging', 'exhausted', 'ahead', 'held', 'bogging', 'stall', 'labour')
+SIGNS = (
+    'digging',
+    'exhausted',
+    'within_horizon',
+    'within_travel',
+    'held',
+    'bogging',
+    'stall',
+    'labour',
+)
 _OPENING, _GATE, _HOLD = 'process opening', 'gate rule', 'hold'
 _AFTER, _MODEL, _SIGN = 'correction after the update', 'model of a special case', 'stuck sign'
 
 TREATMENTS: tuple[Treatment, ...] = (
-    Treatment('opening on a change of demand', _OPENING, _changes(most_demand_slip=0.0)),
-    Treatment('opening on a change of torque', _OPENING, _changes(most_effort_slip=0.0)),
+    Treatment(
+        'slip follows the demand', _OPENING, patched('contacts.demand:Demand.update', _none_of_it)
+    ),
+    Treatment(
+        'opening on a change of torque',
+        _OPENING,
+        tuned('contacts.torque_change:TorqueChangeTuning', most_effort_slip=0.0),
+    ),
     Treatment('opening on a change of turning', _OPENING, _turning(speed_change=0.0)),
     Treatment('opening where wheels disagree', _OPENING, _speed(rate_noise=NEVER)),
     Treatment('noise with a change of rim speed', _OPENING, _speed(rim_change=0.0)),
@@ -72,7 +87,7 @@ TREATMENTS: tuple[Treatment, ...] = (
     Treatment(
         'wider strength at a start', _OPENING, patched('wheel_soil_estimator:_START_STD', 0.0)
     ),
-    Treatment('wider when a reference is too far off', _OPENING, _reference(fair_nis=NEVER)),
+    Treatment('models doubted while references lean', _OPENING, _reference(most_doubt=1.0)),
     Treatment('soft ground is weak', _OPENING, _soil(soft_is_weak=0.0)),
     Treatment('own stiffness of each wheel', _OPENING, _soil(own_stiffness_walk=0.01)),
     Treatment(
