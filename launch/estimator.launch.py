@@ -20,17 +20,20 @@ ARGUMENTS = {
     'namespace': ('', 'namespace of the node and its topics'),
     'use_sim_time': ('false', 'take the time from /clock'),
     'log_level': ('info', 'debug, info, warn, error, fatal'),
+    'soil_file': ('', 'file that keeps what was learned over a restart'),
+    'autostart': ('true', 'false: a life cycle manager configures and activates the node'),
     'record_arrival': ('', 'file that logs the order in which inputs arrive'),
 }
+
+TRUE = ('true', '1', 'yes', 'on')
 
 
 def start(context):
     """Make the node, once the arguments are known."""
     values = {name: LaunchConfiguration(name).perform(context) for name in ARGUMENTS}
     files = [str(shipped.find(name.strip())) for name in values['params_file'].split(',')]
-    own = {'use_sim_time': values['use_sim_time'].lower() in ('true', '1', 'yes', 'on')}
-    if values['record_arrival']:
-        own['record_arrival'] = values['record_arrival']
+    own = {name: values[name].lower() in TRUE for name in ('use_sim_time', 'autostart')}
+    own |= {name: values[name] for name in ('soil_file', 'record_arrival') if values[name]}
     return [
         Node(
             package='wheel_terra_estimator',

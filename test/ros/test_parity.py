@@ -64,7 +64,10 @@ def piece(source, target, seconds):
 
 REPLAY = {
     'pathfinder': ['--config', 'pathfinder', '--remap', 'reference_odom:=/truth/odometry'],
-    'entrapment': ['--config', 'generic_six_wheel', '--config', 'test_sand'],
+    'entrapment': [
+        *('--config', 'generic_six_wheel', '--config', 'test_sand'),
+        *('-p', 'output_rate:=0', '-p', 'max_lag:=0'),
+    ],
 }
 
 

@@ -56,6 +56,7 @@ from wheel_terra_estimator.ros.lifecycle_node import MESSAGE_TYPES
 QUEUE = 5000
 PATIENCE = 5.0  # [s] until the next message is sent though the node has not heard the last one
 DISCOVERY_TIMEOUT = 60.0  # [s]
+SETTLING = 1.5  # [s] after discovery
 QUIET = 3.0  # [s] without an output after the last input: the node is done
 
 OUTPUT_MESSAGES = {
@@ -198,6 +199,8 @@ class _Player(Node):
 
         if not self._spin_until(ready, DISCOVERY_TIMEOUT):
             raise UserError(f'the node was not found within {DISCOVERY_TIMEOUT:.0f} s')
+        # The node finds its listeners on its own, a little later; what it sends before is lost.
+        self._spin_until(lambda: False, SETTLING)
 
     def play(
         self,
