@@ -78,3 +78,11 @@ def test_compare(drive, tmp_path, capsys):
     assert told['errors']['a']['quantities']['slip']['rms'] > 0.0
     assert '<img' in page.read_text()
     assert main(['compare', pair[0], str(drive)]) == 2
+
+
+def test_a_report_is_a_page_and_a_remap_leads_to_an_input(drive, tmp_path, capsys):
+    assert main(['replay', str(drive), *CONFIG, '--report', str(tmp_path / 'r.pdf')]) == 2
+    assert 'ends in .html' in capsys.readouterr().err
+    wrong = ['--remap', 'sinkage:=/nothing']
+    assert main(['replay', str(drive), *CONFIG, *wrong]) == 2
+    assert '--remap sinkage:=/ground_truth' not in capsys.readouterr().err

@@ -28,6 +28,10 @@ def read(
         yield from MeasurementReader(bag, remaps, configuration).measurements()
 
 
+NO_INPUTS = ('/wheel_terra_estimator/', '/ground_truth/')
+"""Topics that look like inputs and are estimates or truth."""
+
+
 class MeasurementReader:
     """Reads the input topics of the estimator out of an open bag; no other topic is unpacked.
 
@@ -128,7 +132,13 @@ class MeasurementReader:
         """Say what is there and how to use it."""
         there = self.bag.topics.values()
         listed = ', '.join(f'{topic.name} ({topic.type})' for topic in there)
-        fitting = [t.name for t in there if t.type == INPUT_TYPES[name] and t.message_count]
+        fitting = [
+            topic.name
+            for topic in there
+            if topic.type == INPUT_TYPES[name]
+            and topic.message_count
+            and not topic.name.startswith(NO_INPUTS)
+        ]
         cure = f'name the right one with --remap {name}:={fitting[0] if fitting else "/TOPIC"}'
         if name == 'joint_states' and not fitting:
             odometry = [t.name for t in there if t.type == INPUT_TYPES['odom'] and t.message_count]

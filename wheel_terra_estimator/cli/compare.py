@@ -38,9 +38,11 @@ def run(arguments: argparse.Namespace) -> int:
         compare,
         write_comparison,
     )
+    from wheel_terra_estimator.reporting.html import check_page
 
     inputs = [arguments.first, arguments.second]
     if arguments.report:
+        check_page(arguments.report)
         check_file(arguments.report, arguments.overwrite, inputs)
     histories = []
     for path in inputs:

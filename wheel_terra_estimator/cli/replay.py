@@ -71,12 +71,14 @@ def run(arguments: argparse.Namespace) -> int:
     from wheel_terra_estimator.output_folder import check_file, check_folder, new_file
     from wheel_terra_estimator.reporting import estimates_table, truth_scores
     from wheel_terra_estimator.reporting.drive_summary import as_dict, as_text, summarise
+    from wheel_terra_estimator.reporting.html import check_page
     from wheel_terra_estimator.reporting.replay_report import write_replay_report
 
     configuration = configuration_reader.from_arguments(arguments)
     remaps = parse_remaps(arguments.remap)
     inputs = [arguments.bag, *([arguments.arrival] if arguments.arrival else [])]
     if arguments.report:
+        check_page(arguments.report)
         check_file(arguments.report, arguments.overwrite, inputs)
     if arguments.table:
         estimates_table.check_table(arguments.table)

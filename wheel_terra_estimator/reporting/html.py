@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from wheel_terra_estimator import __version__
+from wheel_terra_estimator.errors import UserError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -48,6 +49,12 @@ def render(template: str, folder: Path = TEMPLATES, **context: Any) -> str:
 def write_page(path: Path, page: str) -> None:
     """Write a page."""
     path.write_text(page, encoding='utf-8')
+
+
+def check_page(path: Path) -> None:
+    """Refuse, before anything is computed, a page whose name promises another format."""
+    if path.suffix.lower() not in ('.html', '.htm'):
+        raise UserError(f'{path}: a report is an HTML page; give it a name that ends in .html')
 
 
 def picture(figure: Figure) -> str:
