@@ -12,7 +12,7 @@ from wheel_terra_estimator.bags.truth import Truth, WheelTruth
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.reporting.comparison import compare
 from wheel_terra_estimator.reporting.estimates_table import write_table
-from wheel_terra_estimator.reporting.truth_scores import truth_errors
+from wheel_terra_estimator.reporting.truth_scores import as_lines, truth_errors
 
 STAMP = 10**12 + np.arange(100, dtype=np.int64) * 100_000_000
 THRESHOLDS = np.array([0.3, 0.6, 0.9])
@@ -62,6 +62,8 @@ def test_lead_of_a_warning_and_one_that_was_wrong():
     assert errors.first_stuck == pytest.approx(6.0)
     calm = truth_errors(history(true, warnings=(right,)), truth(0.0 * true), THRESHOLDS)
     assert not calm.warnings[0].right and calm.first_stuck is None
+    assert 'did not pass' in as_lines(calm)[-1]
+    assert '+2.0 s' in as_lines(errors)[-1]
 
 
 def test_comparison():
