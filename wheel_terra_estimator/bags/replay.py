@@ -63,7 +63,6 @@ def replay(
     overwrite: bool = False,
     arrival: Path | None = None,
     every_set: bool = False,
-    distrust: str = '',
 ) -> Replay:
     """Run the estimator over an open bag.
 
@@ -83,8 +82,6 @@ def replay(
         Log of a live node (parameter ``record_arrival``): hear the messages in that order.
     every_set : bool
         Whether the history holds every set of a long drive, whatever memory that takes.
-    distrust : str
-        What makes slip meaningless, see `Pipeline`.
 
     Raises
     ------
@@ -92,7 +89,7 @@ def replay(
         Input that cannot be used, an output path that is taken.
     """
     reader = MeasurementReader(bag, remaps, configuration)
-    pipeline = Pipeline(configuration, distrust=distrust)
+    pipeline = Pipeline(configuration)
     recorder = HistoryRecorder(pipeline.names, None if every_set else MOST_ROWS)
     messages = _in_order_of(arrival, reader) if arrival else reader.messages()
     with ExitStack() as stack:

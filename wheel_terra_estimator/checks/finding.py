@@ -32,9 +32,6 @@ KINDS = (
 )
 """All kinds of findings."""
 
-SPOILS_SLIP = frozenset({'sign', 'swapped_sides', 'exchanged_wheels', 'unit', 'frozen', 'mounting'})
-"""Kinds that make slip meaningless."""
-
 
 @dataclass(frozen=True)
 class Finding:

@@ -27,13 +27,10 @@ from wheel_terra_estimator.checks import (
     wheel_rates,
 )
 from wheel_terra_estimator.checks.evidence import LEAST_MOVING_ROWS, Evidence, gather
-from wheel_terra_estimator.checks.finding import SPOILS_SLIP, CheckReport, Finding, NotChecked
+from wheel_terra_estimator.checks.finding import CheckReport, NotChecked
 from wheel_terra_estimator.checks.rover_facts import RoverFacts
 from wheel_terra_estimator.checks.series import Recording
 from wheel_terra_estimator.configuration.configuration import Configuration
-
-SURE = 0.9
-"""Confidence from which a finding counts against the estimates."""
 
 
 def check_recording(
@@ -186,9 +183,3 @@ def _rest(evidence: Evidence, report: CheckReport) -> Evidence:
     report.take(geometry.check_radius(evidence, figures))
     report.take(geometry.check_track(evidence, figures))
     return evidence
-
-
-def spoils_slip(finding: Finding) -> bool:
-    """Return whether slip classes are worth nothing until this is mended."""
-    concerns_motion = not finding.topic.endswith('sinkage')
-    return finding.kind in SPOILS_SLIP and concerns_motion and finding.confidence >= SURE

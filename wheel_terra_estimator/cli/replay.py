@@ -67,7 +67,7 @@ def run(arguments: argparse.Namespace) -> int:
     from wheel_terra_estimator.bags.series_reader import read_series
     from wheel_terra_estimator.bags.storage import open_bag
     from wheel_terra_estimator.bags.truth import read_truth
-    from wheel_terra_estimator.checks.run import check_recording, spoils_slip
+    from wheel_terra_estimator.checks.run import check_recording
     from wheel_terra_estimator.output_folder import check_file, check_folder, new_file
     from wheel_terra_estimator.reporting import estimates_table, truth_scores
     from wheel_terra_estimator.reporting.drive_summary import as_dict, as_text, summarise
@@ -99,7 +99,6 @@ def run(arguments: argparse.Namespace) -> int:
             overwrite=arguments.overwrite,
             arrival=arguments.arrival,
             every_set=bool(arguments.table),
-            distrust='; '.join(f'{f.words}: {f.cure}' for f in checked.findings if spoils_slip(f)),
         )
         truth = read_truth(bag, remaps, configuration)
     # A truth that the estimator was given as its reference is none to judge it by.

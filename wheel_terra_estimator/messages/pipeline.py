@@ -9,14 +9,11 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
-
-import numpy as np
 
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.core import EstimatorCore
-from wheel_terra_estimator.estimation.estimates import EstimateSet, SlipClass
+from wheel_terra_estimator.estimation.estimates import EstimateSet
 from wheel_terra_estimator.messages.convert import InputConverter, finite, input_layout
 from wheel_terra_estimator.messages.diagnostics import NODE, Diagnostics
 
@@ -36,9 +33,6 @@ class Pipeline:
         Rover, soil, sensors, filter.
     node_name : str
         Name of the node with its namespace, for diagnostics.
-    distrust : str
-        What is wrong with the inputs so that slip means nothing, in words: classes are unknown
-        and no stuck warning is raised while it stands. Empty: nothing.
 
     Attributes
     ----------
@@ -51,11 +45,8 @@ class Pipeline:
         Says what ``/diagnostics`` is to say, and when.
     """
 
-    def __init__(
-        self, configuration: Configuration, node_name: str = NODE, distrust: str = ''
-    ) -> None:
+    def __init__(self, configuration: Configuration, node_name: str = NODE) -> None:
         self.configuration = configuration
-        self.distrust = distrust
         self.names = configuration.wheels.names
         self.converter = InputConverter(input_layout(configuration))
         self.core = EstimatorCore(configuration)
@@ -114,8 +105,6 @@ class Pipeline:
 
     def _out(self, sets: list[EstimateSet]) -> list[EstimateSet]:
         sets = [finite(estimates) for estimates in sets]
-        if self.distrust:
-            sets = [without_judgement(estimates, self.distrust) for estimates in sets]
         self._published += len(sets)
         return sets
 
@@ -138,15 +127,3 @@ class Pipeline:
             if 0 <= stamp - since < FAULT_MEMORY
         }
         return {**refused, **self.transport_faults}
-
-
-def without_judgement(estimates: EstimateSet, reason: str) -> EstimateSet:
-    """Return the set with classes unknown and no stuck warning, and say why."""
-    return replace(
-        estimates,
-        slip_class=np.full_like(estimates.slip_class, SlipClass.UNKNOWN),
-        stuck=False,
-        stuck_probability=np.zeros_like(estimates.stuck_probability),
-        reasons=(f'not judged: {reason}',) * len(estimates.reasons),
-        faults={**estimates.faults, 'check': reason},
-    )
