@@ -54,8 +54,10 @@ class SituationTuning:
     cruise_window: float = 5.0  # [s]
     least_deepening: float = 0.02  # sinkage per rim travel that counts as digging
     deepening_slip: float = 0.2
-    deep: float = 0.25
-    """Sinkage over the radius from which lugs do not climb out."""
+    deep: float = 0.5
+    """Sinkage over the radius from which a wheel does not climb out: its entrance angle is 60
+    degrees there, and the normal stress, centred at about half of it, leans back by 30 degrees, as
+    much as the friction of loose soil pulls forward."""
 
 
 class WheelMotion(NamedTuple):
