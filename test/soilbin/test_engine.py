@@ -188,7 +188,8 @@ def test_output_folder_is_complete(coarse_run):
     output, cache = coarse_run
     names = {path.name for path in output.iterdir()}
     assert names == {
-        'summary.json', 'time_series.csv', 'time_series.png', 'rows.csv', 'bed.png', 'film.gif'
+        'summary.json', 'time_series.csv', 'time_series.png', 'rows.csv', 'bed.png', 'film.gif',
+        '.wheel-terra.json',
     }  # fmt: skip
     assert (output / 'film.gif').read_bytes()[:3] == b'GIF'
     assert len(list(cache.glob('settled-*'))) == len(list(cache.glob('turned-*'))) == 1

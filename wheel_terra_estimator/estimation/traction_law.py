@@ -38,8 +38,8 @@ class TractionLimits:
     comfortable_slip: float = 0.3
     critical_slip: float = 0.6
     creep_scale: float = 0.3
-    stop_rim_travel: float = 0.3
-    slow_rim_travel: float = 1.0
+    stop_rim_travel: float = 0.6
+    slow_rim_travel: float = 1.4
 
 
 @dataclass(frozen=True)
