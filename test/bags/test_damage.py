@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import random
 import re
 import shutil
 import sqlite3
@@ -144,6 +145,50 @@ def test_damaged_names_are_no_traceback(tmp_path: Path) -> None:
     assert 'messages of channels that are not described' in notes[0]
 
 
+def test_loose_messages_are_read_behind_a_damaged_beginning(tmp_path: Path) -> None:
+    whole = samples()
+    made = make(whole, TYPES, Layout(chunk_size=0, closed=False))
+    path = tmp_path / 'a.mcap'
+    path.write_bytes(b'?' + made.content)
+    assert read(path)[0] == [RawMessage(*sample) for sample in whole]
+
+
+def test_a_chunk_that_seems_to_end_with_the_file_hides_nothing(tmp_path: Path) -> None:
+    """Bytes are missing, by chance just so many that the chunk seems to hold all the rest."""
+    dice = random.Random(1)
+    whole = [sample._replace(data=dice.randbytes(200)) for sample in samples()]
+    made = make(whole, TYPES, Layout(codec='lz4', checksums=False, definitions=False))
+    begin, end, _ = made.parts[-1]
+    inside, missing = begin + 80, len(made.content) - 8 - end
+    assert inside + missing <= made.definitions[0][0]
+    path = tmp_path / 'a.mcap'
+    path.write_bytes(made.content[:inside] + made.content[inside + missing :])
+    found = Counter(read(path)[0])
+    assert all(RawMessage(*s) in found for _, _, part in made.parts[:-1] for s in part)
+
+
+def test_two_copies_of_a_channel_that_differ_are_said(tmp_path: Path) -> None:
+    """No checksum tells which of them is right."""
+    made = make(samples(), TYPES, Layout(checksums=False))
+    content = made.content.replace(b'/joint_states', b'/joint_statas', 1)
+    path = tmp_path / 'a.mcap'
+    path.write_bytes(content)
+    found, notes = read(path)
+    assert len(found) == 90
+    assert 'copies of channel 1 differ: /joint_statas or /joint_states' in notes[0]
+
+
+@pytest.mark.parametrize('codec', ['zstd', 'lz4'])
+def test_a_channel_in_a_chunk_that_unpacks_decides(tmp_path: Path, codec: str) -> None:
+    made = make(samples(), TYPES, Layout(codec=codec, checksums=False))
+    at = made.content.rindex(b'/joint_states')
+    content = made.content[:at] + b'/joint_statas' + made.content[at + 13 :]
+    path = tmp_path / 'a.mcap'
+    path.write_bytes(content)
+    found, _ = read(path)
+    assert found == [RawMessage(*sample) for sample in samples()]
+
+
 def test_the_index_alone_decides_nothing(tmp_path: Path) -> None:
     """A chunk index entry that points elsewhere, in a file without checksums."""
     made = make(samples(), TYPES, Layout(900, checksums=False))
@@ -218,6 +263,31 @@ def test_rows_behind_damaged_pages_of_sqlite_are_read(tmp_path: Path) -> None:
     assert len(found) > len(whole) - 200
     assert 'is damaged' in notes[0]
     assert 'from 19.' in notes[0] or 'from 20.' in notes[0]
+
+
+def test_an_sqlite_file_cut_off_gives_the_rows_before_the_cut(tmp_path: Path) -> None:
+    path, whole = big_sqlite(tmp_path)
+    content = path.read_bytes()
+    path.write_bytes(content[: content.index(whole[2000].data)])
+    found, notes = read(path)
+    assert (Counter(found) - Counter(whole)).total() <= 1  # that on which the cut lies
+    assert len(found) > 1800
+    assert 'is damaged' in notes[0]
+
+
+def test_rows_between_two_damaged_pages_of_sqlite_are_read(tmp_path: Path) -> None:
+    path, whole = big_sqlite(tmp_path)
+    content = path.read_bytes()
+    pages = [content.index(message.data) // 4096 for message in whole]
+    first, kept, last = list(dict.fromkeys(pages))[5:8]
+    spoilt = bytearray(content)
+    for page in (first, last):
+        spoilt[page * 4096 : (page + 1) * 4096] = bytes(4096)
+    path.write_bytes(spoilt)
+    found = Counter(read(path)[0])
+    between = [message for message, page in zip(whole, pages, strict=True) if page == kept]
+    assert between
+    assert all(message in found for message in between)
 
 
 def test_an_index_of_sqlite_that_lies_hides_no_row(tmp_path: Path) -> None:

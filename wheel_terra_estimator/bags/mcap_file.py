@@ -36,6 +36,7 @@ _IN_CHUNK = (mcap.SCHEMA, mcap.CHANNEL, mcap.MESSAGE)
 _LONGEST_STRETCH = 4 * MEGABYTE  # of messages outside of chunks that are read at once
 _FORGET_AFTER = 32 * MEGABYTE  # of the file that was looked at
 _SOUND = 3  # votes of a definition in a chunk whose checksum is right
+_UNPACKED = 2  # in a compressed chunk that unpacked without an error
 _TOPIC = re.compile(r'[/~A-Za-z_][A-Za-z0-9_/~{}.-]*')
 _TYPE = re.compile(r'[A-Za-z][A-Za-z0-9_]*(/|::)[A-Za-z0-9_/:.-]+')
 
@@ -119,6 +120,7 @@ class McapFile:
         elif not self._read_index():
             self._survey()
         self.channels = self._definitions.channels()
+        self.losses.left_out += self._definitions.undecided()
         if self._pieces:
             self.losses.start = min(piece.start for piece in self._pieces)
             self.losses.last = max(piece.last for piece in self._pieces)
@@ -151,7 +153,7 @@ class McapFile:
         assert self._map is not None
         if self._map[-len(mcap.MAGIC) :] == mcap.MAGIC:
             return True
-        near = mcap.Possible(opcodes=(mcap.CHUNK,))
+        near = mcap.Possible(opcodes=(mcap.CHUNK, mcap.SCHEMA, mcap.CHANNEL))
         end = min(self._size, 2 * MEGABYTE)
         return any(isinstance(item, mcap.Record) for item in mcap.records(self._map, 0, end, near))
 
@@ -282,8 +284,7 @@ class McapFile:
         if not again:
             for record in reading.definitions:
                 try:
-                    votes = _SOUND if content.sound else 1
-                    self._definitions.add(content.data, record, votes)
+                    self._definitions.add(content.data, record, _votes(piece, content))
                 except ValueError:
                     whole = False
             if not whole:
@@ -506,8 +507,30 @@ class _Definitions:
             found[number] = (topic, self._chosen(names, str) if names else '')
         return found
 
+    def undecided(self) -> list[str]:
+        """Return in words the channels of which as many copies state one topic as another."""
+        found = []
+        for number, votes in sorted(self._channels.items()):
+            weight = self._weights(votes, lambda definition: definition[1])
+            best = {topic for (_, topic), w in weight.items() if w == max(weight.values())}
+            if len(best) > 1:
+                found.append(f'copies of channel {number} differ: {" or ".join(sorted(best))}')
+        return found
+
     def _chosen(self, votes: Counter[Any], name: Any) -> Any:
-        return max(votes, key=lambda d: votes[d] + (f': {name(d)}\n' in self._text))
+        weight = self._weights(votes, name)
+        return max(weight, key=lambda definition: weight[definition])
+
+    def _weights(self, votes: Counter[Any], name: Any) -> dict[Any, int]:
+        return {d: count + (f': {name(d)}\n' in self._text) for d, count in votes.items()}
+
+
+def _votes(piece: Piece, content: Content) -> int:
+    """Return how much a definition in a piece is to be relied on."""
+    if content.sound:
+        return _SOUND
+    packed = piece.head is not None and bool(piece.head.codec)
+    return _UNPACKED if packed and not content.damage else 1
 
 
 def _size(rows: list[Row]) -> int:

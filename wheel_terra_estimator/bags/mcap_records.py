@@ -155,7 +155,9 @@ def _record(content: Buffer, at: int, end: int, possible: Possible) -> Record | 
     opcode, length = _RECORD.unpack_from(content, at)
     after = at + HEAD + length
     record = Record(opcode, at + HEAD, min(after, end))
-    if after == end or (after < end and _fits(content, after, end, possible)):
+    if after < end and _fits(content, after, end, possible):
+        return record
+    if after == end and opcode != CHUNK:  # no closed file ends with a chunk
         return record
     # What follows is damaged, or bytes are missing here: then other records stand inside.
     if opcode == CHUNK:

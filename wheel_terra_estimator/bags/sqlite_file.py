@@ -29,7 +29,7 @@ from wheel_terra_estimator.errors import UserError
 _LAST_ROW = 2**63 - 1
 # Damaged text may stand in the library's own message, which is decoded as UTF-8.
 _UNREADABLE = (sqlite3.Error, UnicodeDecodeError, MemoryError, OverflowError)
-_AT_A_TIME = 500  # rows fetched by number
+_ONE_BY_ONE = 1000  # numbers tried behind damage before the search takes longer steps
 
 
 class SqliteFile:
@@ -110,6 +110,7 @@ class SqliteFile:
         """Return number -> name, type."""
         run = self._connection.execute
         run('PRAGMA trusted_schema=OFF')
+        run('PRAGMA writable_schema=ON')  # else a file that is cut off is refused as a whole
         tables = {
             name: text or b''
             for name, text in run("SELECT name, sql FROM sqlite_master WHERE type = 'table'")
@@ -222,7 +223,11 @@ def _row(connection: sqlite3.Connection, text: str, number: int) -> tuple[Any, .
 
 def _number_behind(connection: sqlite3.Connection, text: str, last: int) -> int | None:
     """Return the number of the first row behind damage that can be read, None if there is none."""
-    low, step = last + 1, 1  # the row from `low` on cannot be read
+    # Rows between two damaged pages would be jumped over: at first no number is left out.
+    for number in range(last + 2, last + 2 + _ONE_BY_ONE):
+        if (found := _row(connection, text, number)) is not None:
+            return int(found[0])
+    low, step = last + 1 + _ONE_BY_ONE, 1  # the row from `low` on cannot be read
     while (found := _row(connection, text, low + step)) is None:
         low += step
         step *= 2
