@@ -99,7 +99,7 @@ MAY_USE = {
     'terramechanics': (set(), {'numpy'}),
     'configuration': ({'terramechanics'}, {'numpy', 'yaml'}),
     'estimation': ({'configuration', 'terramechanics'}, {'numpy', 'filterpy'}),
-    'messages': ({'configuration', 'estimation'}, {'numpy'}),
+    'messages': ({'configuration', 'estimation', 'checks'}, {'numpy'}),
     'checks': ({'configuration', 'estimation'}, {'numpy'}),
     # Sensors of the simulated rover give the estimator's typed measurements.
     'simulation': ({'configuration', 'terramechanics', 'estimation'}, {'numpy'}),

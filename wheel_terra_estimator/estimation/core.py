@@ -9,6 +9,7 @@ in nothing but who calls ``add``, and the same calls give the same numbers.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -44,10 +45,18 @@ class EstimatorCore:
         Rover, soil, sensors, filter.
     estimator : Estimator, optional
         What runs through the inputs; default: ``WheelSoilEstimator``.
+    watched_by : callable, optional
+        Puts a watch over the inputs around an estimator.
     """
 
-    def __init__(self, configuration: Configuration, estimator: Estimator | None = None) -> None:
-        self._estimator = estimator or _estimator(configuration)
+    def __init__(
+        self,
+        configuration: Configuration,
+        estimator: Estimator | None = None,
+        watched_by: Callable[[Configuration, Estimator], Estimator] | None = None,
+    ) -> None:
+        self._watched_by = watched_by
+        self._estimator = self._watched(configuration, estimator or _estimator(configuration))
         self._settings = _time_settings(configuration)
         self._lags = LagLearner(_max_lag(configuration))
         self._clock_step = _nanoseconds(configuration.filter.clock_step)
@@ -95,7 +104,7 @@ ReferenceVelocity
 
         What is held back is released first. Wheels, sensors and soil must be the same.
         """
-        self._estimator = _estimator(configuration)
+        self._estimator = self._watched(configuration, _estimator(configuration))
         self._settings = _time_settings(configuration)
         self._lags.fixed = _max_lag(configuration)
         self._clock_step = _nanoseconds(configuration.filter.clock_step)
@@ -148,6 +157,9 @@ ReferenceVelocity
         # The filter starts itself anew, or the core does it: both count.
         own['filter_restarts'] = own.get('filter_restarts', 0) + result['filter_restarts']
         return result | own
+
+    def _watched(self, configuration: Configuration, estimator: Estimator) -> Estimator:
+        return estimator if self._watched_by is None else self._watched_by(configuration, estimator)
 
     def _new_watch(self) -> ClockWatch:
         settings = self._settings

@@ -1,0 +1,227 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Faults put into a simulated drive are told while driving, and nothing is judged meanwhile."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from estimate_sets import some_estimates
+
+from wheel_terra_estimator.checks.online import CAP, OnlineChecks, Rule, Tally
+from wheel_terra_estimator.checks.watched_estimator import WatchedEstimator
+from wheel_terra_estimator.estimation.core import EstimatorCore
+from wheel_terra_estimator.estimation.estimates import SlipClass
+from wheel_terra_estimator.estimation.measurements import (
+    InertialReading,
+    ReferenceVelocity,
+    StepInputs,
+    WheelOdometry,
+)
+from wheel_terra_estimator.simulation import scenario
+from wheel_terra_estimator.simulation.drive import simulate
+
+REST, STRAIGHT, END = 3.0, 17.0, 32.0  # [s]
+PROFILE = {
+    'drive.time': [0.0, REST, REST, STRAIGHT, STRAIGHT],
+    'drive.forward': [0.0, 0.0, 0.08, 0.08, 0.06],
+    'drive.turn_rate': [0.0, 0.0, 0.0, 0.0, 0.25],
+}
+SIX, FOUR = None, 'frostyboy'
+
+
+def drive_of(rover):
+    changes = {key.replace('.', '__'): value for key, value in PROFILE.items()}
+    source = scenario.load('calibration_drive', rover=rover, duration=END, **changes)
+    return simulate(source, seed=7)
+
+
+@pytest.fixture(scope='module')
+def drives():
+    return {rover: drive_of(rover) for rover in (SIX, FOUR)}
+
+
+def on_wheels(rate=1.0, torque=1.0):
+    """Return a fault that multiplies rates and torques, per wheel or all."""
+
+    def fault(m):
+        if not isinstance(m, WheelOdometry):
+            return m
+        return replace(m, rate=m.rate * rate, torque=m.torque * torque)
+
+    return fault
+
+
+def on_imu(force=1.0, rate=1.0):
+    def fault(m):
+        if not isinstance(m, InertialReading):
+            return m
+        return replace(
+            m,
+            specific_force=m.specific_force * force,
+            angular_rate=m.angular_rate * rate,
+            orientation=None,
+        )
+
+    return fault
+
+
+def swap_sides(m):
+    """Left and right wheels exchanged: in the files they come in pairs, left first."""
+    if not isinstance(m, WheelOdometry):
+        return m
+    order = np.arange(len(m.rate)).reshape(-1, 2)[:, ::-1].ravel()
+    return replace(m, rate=m.rate[order], torque=m.torque[order])
+
+
+def reverse_reference(m):
+    return replace(m, forward=-m.forward) if isinstance(m, ReferenceVelocity) else m
+
+
+FIRST_BACKWARDS = np.array([-1.0, 1.0, 1.0, 1.0, 1.0, 1.0])
+LEFT_BACKWARDS = np.array([-1.0, 1.0] * 3)
+UPSIDE_DOWN = np.array([1.0, -1.0, -1.0])
+FAULTS = {
+    # name: (fault, kind, topic, in the cure, when its motion begins [s])
+    'one_wheel': (on_wheels(FIRST_BACKWARDS), 'sign', 'joint_states', '[-1, 1, 1, 1, 1, 1]', REST),
+    'one_wheel_with_torque': (
+        on_wheels(FIRST_BACKWARDS, FIRST_BACKWARDS),
+        *('sign', 'joint_states', '[-1, 1, 1, 1, 1, 1]', REST),
+    ),
+    'left_side': (
+        on_wheels(LEFT_BACKWARDS, LEFT_BACKWARDS),
+        *('sign', 'joint_states', '[-1, 1, -1, 1, -1, 1]', REST),
+    ),
+    'sides': (swap_sides, 'swapped_sides', 'joint_states', 'wheels.names', STRAIGHT),
+    'rpm': (on_wheels(30.0 / np.pi), 'unit', 'joint_states', '0.10472', REST),
+    'degrees': (on_wheels(180.0 / np.pi), 'unit', 'joint_states', '0.0174533', REST),
+    'thousand': (on_wheels(200.0 / 0.5), 'unit', 'joint_states', 'rad/s', REST),
+    'upside_down': (on_imu(UPSIDE_DOWN, UPSIDE_DOWN), 'mounting', 'imu/data', '180', 0.0),
+    'g': (on_imu(1.0 / 9.80665), 'unit', 'imu/data', '9.80', 0.0),
+    'no_gravity': (on_imu(np.array([1.0, 1.0, 0.02])), 'gravity', 'imu/data', 'REP 145', 0.0),
+    'gyro_degrees': (on_imu(1.0, 180.0 / np.pi), 'unit', 'imu/data', '0.0174533', STRAIGHT),
+    'torques': (on_wheels(1.0, -1.0), 'sign', 'joint_states', 'negate effort', REST),
+    'one_torque': (on_wheels(1.0, FIRST_BACKWARDS), 'sign', 'joint_states', 'negate effort', REST),
+    'reference': (reverse_reference, 'sign', 'reference_odom', 'negate twist.linear.x', REST),
+}
+LONGEST = 11.0
+"""Seconds of the motion that shows a fault after which it is told."""
+
+
+class AlwaysStuck:
+    """An estimator that takes every wheel for stuck, as the real one does of a wrong rate."""
+
+    def __init__(self, wheels):
+        self.wheels, self.stamp = wheels, 0
+
+    def step(self, stamp, inputs):
+        self.stamp = stamp
+
+    def estimates(self):
+        classes = np.full(self.wheels, SlipClass.STUCK, dtype=np.uint8)
+        return some_estimates(self.wheels, stamp=self.stamp, slip_class=classes, stuck=True)
+
+    def snapshot(self):
+        return self.stamp
+
+    def restore(self, snapshot):
+        self.stamp = snapshot
+
+    def begin_run(self, stamp, keep_soil):
+        self.stamp = stamp
+
+
+def sets_of(drive, fault, seconds=END):
+    core = EstimatorCore(
+        drive.configuration,
+        AlwaysStuck(drive.configuration.wheels.count),
+        watched_by=WatchedEstimator,
+    )
+    begin = drive.arrivals[0].arrival
+    sets = []
+    for arrival in drive.arrivals:
+        if arrival.arrival - begin < seconds * 1e9:
+            sets += core.add(fault(arrival.measurement))
+    return sets + core.flush()
+
+
+def told(estimates):
+    return {key: words for key, words in estimates.faults.items() if key.startswith('check of ')}
+
+
+@pytest.mark.parametrize('name', FAULTS)
+def test_a_fault_is_told_with_its_cure_and_nothing_is_judged(drives, name):
+    fault, kind, topic, cure, begins = FAULTS[name]
+    drive = drives[SIX]
+    sets = sets_of(drive, fault, begins + LONGEST + 2.0)
+    found = [s for s in sets if told(s)]
+    assert found, f'{kind} was not found'
+    start = sets[0].stamp
+    assert (found[0].stamp - start) * 1e-9 < begins + LONGEST
+    assert set(told(found[-1])) == {f'check of {topic}'}
+    assert cure in told(found[-1])[f'check of {topic}']
+    for estimates in found:
+        assert set(estimates.slip_class) == {SlipClass.UNKNOWN} and not estimates.stuck
+    assert found[-1] is sets[-1], 'it stands'
+
+
+@pytest.mark.parametrize('rover', [SIX, FOUR])
+def test_a_drive_without_fault_is_silent(drives, rover):
+    sets = sets_of(drives[rover], lambda m: m)
+    assert not any(told(s) for s in sets)
+    assert all(s.stuck for s in sets), 'what the estimator says passes'
+
+
+def test_kinds_are_those_of_the_checks_of_a_recording(drives):
+    from wheel_terra_estimator.checks.finding import KINDS
+
+    for name, (fault, kind, topic, _, begins) in FAULTS.items():
+        if name not in ('g', 'no_gravity', 'upside_down'):
+            continue
+        checks = checks_over(drives[SIX], fault, begins + LONGEST)
+        assert [(f.kind, f.topic) for f in checks.findings] == [(kind, topic)]
+        assert kind in KINDS and 0.8 < checks.findings[0].confidence < 1.0
+
+
+def checks_over(drive, fault, seconds):
+    checks = OnlineChecks(drive.configuration)
+    inertial = [a.measurement for a in drive.arrivals if isinstance(a.measurement, InertialReading)]
+    for m in inertial:
+        if m.stamp - inertial[0].stamp < seconds * 1e9:
+            checks.step(m.stamp, StepInputs(inertial=fault(m)))
+    return checks
+
+
+def test_a_kept_state_gives_the_same_verdict(drives):
+    """Late inputs are run again from kept states: what came between leaves no trace."""
+    fault = on_imu(1.0 / 9.80665)
+    drive = drives[SIX]
+    checks = checks_over(drive, fault, 2.5)
+    kept = checks.state
+    begin = kept.sums.begin
+    force = np.array([0.0, 0.0, 1.0])
+    reading = InertialReading(begin + 1_100_000_000, force, np.zeros(3), None)
+    checks.step(reading.stamp, StepInputs(inertial=reading))
+    after = checks.state
+    assert after.findings and not kept.findings
+    checks.state = kept
+    checks.step(reading.stamp, StepInputs(inertial=reading))
+    assert checks.state == after
+
+
+def test_a_finding_comes_and_goes_with_hysteresis():
+    rule, tally = Rule(needed=3, memory=5), Tally()
+    for _ in range(2):
+        tally = rule.after(tally, True)
+    assert not tally.stands
+    tally = rule.after(tally, True)
+    assert tally.stands
+    tally = rule.after(rule.after(tally, False), False)
+    assert tally.stands and tally.score == 1
+    assert not rule.after(tally, False).stands
+    for _ in range(100):
+        tally = rule.after(tally, True)
+    assert tally.score == CAP
+    for _ in range(100):
+        tally = rule.after(tally, False)
+    assert tally.score == -5

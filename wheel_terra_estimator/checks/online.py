@@ -1,0 +1,626 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Faults of set-up that make slip meaningless, found while driving.
+
+The steps of the estimator are gathered into windows of one second. A window speaks for a fault,
+against it, or not at all; a tally per fault decides. Wrong signs and units are there from the
+start, so windows that speak against one count for long. Thresholds come from simulated drives.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from statistics import median
+from typing import NamedTuple
+
+from wheel_terra_estimator.checks.finding import Finding
+from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.estimation.measurements import (
+    InertialReading,
+    ReferenceVelocity,
+    StepInputs,
+    WheelOdometry,
+)
+
+Floats = tuple[float, ...]
+
+WINDOW = 1_000_000_000
+"""Length of a window [ns of stamps]."""
+GREATEST_SURE = 0.99
+CAP = 12
+"""Agreeing windows beyond this many count no more."""
+STANDARD_GRAVITY = 9.80665  # [m/s^2]
+
+LEAST_RIM_SPEED = 0.005
+"""Rim speed [m/s] below which a window says nothing of the wheels."""
+UNSTEADY = 0.4
+"""Change of the rim speed within a window, as a share of it, that is a start or a stop."""
+STRAIGHT = 0.15
+"""Rim speed from yawing over rim speed below which a window is straight."""
+GRAVITY_SHARE = 0.2
+"""Share by which the mean specific force may differ from gravity."""
+GRAVITY_OFF = 0.3
+"""Specific force over gravity below which gravity was taken off."""
+UPRIGHT = math.cos(math.radians(50.0))
+"""Upward share of the specific force that no rover drives below."""
+GREATEST_RIM_SPEED = 15.0
+"""Rim speed [m/s] that no rover of this kind drives."""
+RATE_UNITS = {
+    'revolutions per minute': 30.0 / math.pi,
+    'degrees per second': 180.0 / math.pi,
+    'thousandths of rad/s': 1000.0,
+}
+"""Wheel rates in another unit: how many times too fast they read."""
+UNIT_BAND = (0.85, 1.5)
+"""Rim speed over reference speed of a rolling wheel, slip included."""
+ORDINARY_RATIO = (0.3, 5.0)
+"""The same, of wheels in the right unit that still make way."""
+LEAST_YAW_RATE = 0.02
+"""Yaw rate [rad/s] below which a window says nothing of a turn."""
+CLEAR_TURN = 0.1
+"""Rim speed from yawing over rim speed above which sides are compared."""
+ORDINARY_TRACKS = (0.3, 6.0)
+"""Effective over geometric track of wheels and gyro in the right units."""
+TOO_FAST_TRACK = 8.0
+"""The same, above which wheel rates are in another unit."""
+IMPOSSIBLE_YAW = 3.0
+"""Rim speed from yawing over the fastest rim speed that no wheel gives."""
+UNLIKE_SIDES = 0.6
+"""Slower over faster side for sides that seem to turn against each other on the spot."""
+LEVEL = -0.01
+"""Specific force along the drive over gravity above which wheels must drive."""
+LEAST_TRACTION = 0.02
+"""Sum of T/r over the weight that tells its sign."""
+
+
+class Tally(NamedTuple):
+    """How often windows spoke for a fault."""
+
+    score: int = 0  # agreeing less contrary windows
+    stands: bool = False
+
+
+class Rule(NamedTuple):
+    """When a tally becomes a finding."""
+
+    needed: int  # agreeing windows
+    memory: int  # contrary windows that are remembered
+
+    def after(self, tally: Tally, agrees: bool) -> Tally:
+        """Return the tally with one more window; a finding goes when the tally is back at 0."""
+        score = min(tally.score + 1, CAP) if agrees else max(tally.score - 1, -self.memory)
+        return Tally(score, score >= self.needed or (tally.stands and score > 0))
+
+
+RULES = {
+    'gravity': Rule(3, 3),
+    'mounting': Rule(3, 3),
+    'gyro_unit': Rule(3, 6),
+    'sides': Rule(3, 20),
+    'backwards': Rule(3, 20),
+    'one_side_backwards': Rule(4, 20),
+    'reference_sign': Rule(4, 30),
+    'rate_unit': Rule(4, 60),
+    'rate_unit_in_turns': Rule(4, 30),
+    'absurd_rate': Rule(2, 2),
+    'torque': Rule(5, 20),
+    'torque_of_wheel': Rule(8, 20),
+}
+
+Suspicion = tuple[str, int]
+"""A name of RULES, and the wheel (-1: all)."""
+
+
+class _Sums(NamedTuple):
+    """What came since the window began."""
+
+    begin: int | None = None  # [ns]
+    rims: Floats = ()  # [m/s]
+    torques: Floats = ()  # [N m]
+    odometry: int = 0
+    slowest: float = math.inf  # typical size of the rim speeds
+    fastest: float = 0.0
+    force: tuple[float, float, float] = (0.0, 0.0, 0.0)  # [m/s^2]
+    yaw_rate: float = 0.0
+    inertial: int = 0
+    reference: float = 0.0
+    reference_variance: float = 0.0
+    references: int = 0
+
+
+class _State(NamedTuple):
+    sums: _Sums
+    tallies: dict[Suspicion, Tally]  # replaced, never changed
+    figures: dict[Suspicion, float]  # what the last agreeing window showed
+    findings: tuple[Finding, ...]
+
+
+@dataclass(frozen=True)
+class _Window:
+    """Means of one window."""
+
+    rims: Floats  # [m/s], nan: unknown
+    torques: Floats  # [N m]
+    steady: bool
+    force: tuple[float, float, float] | None
+    yaw_rate: float  # [rad/s], nan: unknown
+    reference: float  # [m/s], nan: none or lost in its noise
+
+    @property
+    def typical(self) -> float:
+        """Median rim speed, signed; nan where no wheel is known."""
+        known = [rim for rim in self.rims if rim == rim]
+        return median(known) if known else math.nan
+
+    @property
+    def size(self) -> float:
+        """Median size of the rim speeds; 0 where no wheel is known."""
+        known = [abs(rim) for rim in self.rims if rim == rim]
+        return median(known) if known else 0.0
+
+
+Evidence = tuple[str, int, bool, float]
+"""Name of the rule, wheel, whether the window agrees, figure."""
+
+
+class OnlineChecks:
+    """Judge of a stream of steps; deterministic, driven by stamps alone.
+
+    Parameters
+    ----------
+    configuration : Configuration
+        What the measurements are judged against.
+    """
+
+    def __init__(self, configuration: Configuration) -> None:
+        wheels, rover = configuration.wheels, configuration.rover
+        self._names = wheels.names
+        self._odometry_topic = configuration.wheel_odometry
+        self._radius: list[float] = wheels.slip_radius.tolist()
+        self._direction: list[float] = wheels.direction.tolist()
+        lateral = wheels.y.tolist()
+        self._left = [i for i, y in enumerate(lateral) if y > 0.0]
+        self._right = [i for i, y in enumerate(lateral) if y < 0.0]
+        self._track = 0.0
+        if self._left and self._right:
+            self._track = sum(lateral[i] for i in self._left) / len(self._left) - sum(
+                lateral[i] for i in self._right
+            ) / len(self._right)
+        self._lateral = lateral
+        self._gravity = float(rover.gravity)
+        self._weight = float(rover.mass) * self._gravity
+        self._reference_std = float(configuration.sensors.reference_std)
+        self._nothing = _State(self._empty(), {}, {}, ())
+        self.state = self._nothing
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """What stands now; empty: nothing."""
+        return self.state.findings
+
+    def reset(self) -> None:
+        """Forget everything."""
+        self.state = self._nothing
+
+    def step(self, stamp: int, inputs: StepInputs) -> None:
+        """Take all inputs of a stamp [ns], later than the one before."""
+        sums = self.state.sums
+        if sums.begin is None:
+            sums = sums._replace(begin=stamp)
+        if inputs.wheel_odometry is not None:
+            sums = self._with_odometry(sums, inputs.wheel_odometry)
+        if inputs.inertial is not None:
+            sums = _with_inertial(sums, inputs.inertial)
+        if inputs.reference is not None:
+            sums = self._with_reference(sums, inputs.reference)
+        assert sums.begin is not None
+        if stamp - sums.begin < WINDOW:
+            self.state = self.state._replace(sums=sums)
+            return
+        self._judge(self._window(sums))
+        self.state = self.state._replace(sums=self._empty()._replace(begin=stamp))
+
+    # -- Windows --------------------------------------------------------------------------------
+
+    def _empty(self) -> _Sums:
+        zeros = (0.0,) * len(self._radius)
+        return _Sums(rims=zeros, torques=zeros)
+
+    def _with_odometry(self, sums: _Sums, odometry: WheelOdometry) -> _Sums:
+        rims = [r * w for r, w in zip(self._radius, odometry.rate.tolist(), strict=True)]
+        sizes = sorted(abs(rim) for rim in rims if rim == rim)
+        if not sizes:
+            return sums
+        size = sizes[len(sizes) // 2]
+        torques = odometry.torque.tolist()
+        return sums._replace(
+            rims=tuple(a + b for a, b in zip(sums.rims, rims, strict=True)),
+            torques=tuple(a + b for a, b in zip(sums.torques, torques, strict=True)),
+            odometry=sums.odometry + 1,
+            slowest=min(sums.slowest, size),
+            fastest=max(sums.fastest, size),
+        )
+
+    def _with_reference(self, sums: _Sums, reference: ReferenceVelocity) -> _Sums:
+        variance = reference.variance if reference.variance > 0.0 else self._reference_std**2
+        return sums._replace(
+            reference=sums.reference + reference.forward,
+            reference_variance=sums.reference_variance + variance,
+            references=sums.references + 1,
+        )
+
+    def _window(self, sums: _Sums) -> _Window:
+        count = max(sums.odometry, 1)
+        reference = math.nan
+        if sums.references:
+            reference = sums.reference / sums.references
+            std = math.sqrt(sums.reference_variance) / sums.references
+            if abs(reference) < max(3.0 * std, LEAST_RIM_SPEED):
+                reference = math.nan
+        x, y, z = sums.force
+        inertial = sums.inertial
+        return _Window(
+            rims=tuple(rim / count if sums.odometry else math.nan for rim in sums.rims),
+            torques=tuple(t / count if sums.odometry else math.nan for t in sums.torques),
+            steady=sums.odometry > 0
+            and sums.slowest > LEAST_RIM_SPEED
+            and sums.fastest - sums.slowest < UNSTEADY * sums.fastest,
+            force=(x / inertial, y / inertial, z / inertial) if inertial else None,
+            yaw_rate=sums.yaw_rate / inertial if inertial else math.nan,
+            reference=reference,
+        )
+
+    # -- Judgement ------------------------------------------------------------------------------
+
+    def _judge(self, window: _Window) -> None:
+        tallies, figures = dict(self.state.tallies), dict(self.state.figures)
+        for name, wheel, agrees, figure in self._evidence(window):
+            key = name, wheel
+            tallies[key] = RULES[name].after(tallies.get(key, Tally()), agrees)
+            if agrees:
+                figures[key] = figure
+        changed = tallies != self.state.tallies
+        self.state = self.state._replace(tallies=tallies, figures=figures)
+        if changed:
+            self.state = self.state._replace(findings=tuple(self._findings()))
+
+    def _evidence(self, window: _Window) -> Iterator[Evidence]:
+        if window.force is not None:
+            yield from self._of_gravity(window.force)
+        if not window.steady:
+            return
+        yield 'absurd_rate', -1, window.size > GREATEST_RIM_SPEED, window.size
+        yield from self._of_turning(window)
+        yield from self._of_single_wheels(window)
+        yield from self._of_the_reference(window)
+        yield from self._of_torque(window)
+
+    def _of_gravity(self, force: tuple[float, float, float]) -> Iterator[Evidence]:
+        size = math.sqrt(sum(f * f for f in force))
+        share = size / self._gravity
+        yield 'gravity', -1, abs(share - 1.0) > GRAVITY_SHARE, size
+        if share > GRAVITY_OFF:
+            yield 'mounting', -1, force[2] < UPRIGHT * size, force[2] / size
+
+    def _of_turning(self, window: _Window) -> Iterator[Evidence]:
+        """Rolling without slip, right less left rim speed is yaw rate times track."""
+        yaw_rate = window.yaw_rate
+        if not self._track or yaw_rate != yaw_rate:
+            return
+        left = _mean(window.rims, self._left)
+        right = _mean(window.rims, self._right)
+        difference, turn = right - left, yaw_rate * self._track
+        if difference != difference:
+            return
+        fastest = max(abs(rim) for rim in window.rims if rim == rim)
+        slower, faster = sorted((abs(left), abs(right)))
+        if left * right < 0.0 and slower > UNLIKE_SIDES * faster:
+            if abs(turn) < 0.1 * abs(difference):
+                yield 'one_side_backwards', -1, True, window.reference
+            elif turn * difference > 0.0:
+                yield 'one_side_backwards', -1, False, 0.0
+        elif left * right > 0.0:
+            yield 'one_side_backwards', -1, False, 0.0
+        if abs(yaw_rate) < LEAST_YAW_RATE or 0.5 * abs(turn) < CLEAR_TURN * window.size:
+            return
+        yield 'gyro_unit', -1, 0.5 * abs(turn) > IMPOSSIBLE_YAW * fastest, yaw_rate
+        ratio = difference / turn
+        if ORDINARY_TRACKS[0] < abs(ratio) < ORDINARY_TRACKS[1]:
+            yield 'sides', -1, ratio < 0.0, ratio
+        if ORDINARY_TRACKS[0] < ratio < ORDINARY_TRACKS[1]:
+            yield 'rate_unit_in_turns', -1, False, ratio
+        elif ratio > TOO_FAST_TRACK:
+            yield 'rate_unit_in_turns', -1, True, ratio
+
+    def _straight(self, window: _Window) -> bool:
+        turn = window.yaw_rate * 0.5 * self._track
+        return not abs(turn) > STRAIGHT * window.size  # a rover without gyro counts as straight
+
+    def _of_single_wheels(self, window: _Window) -> Iterator[Evidence]:
+        if len(window.rims) < 3 or not self._straight(window):
+            return
+        found = []
+        for i, rim in enumerate(window.rims):
+            others = [r for j, r in enumerate(window.rims) if j != i and r == r]
+            if rim != rim or len(others) < 2:
+                continue
+            beside = median(others)
+            if abs(beside) > LEAST_RIM_SPEED:
+                found.append((i, rim / beside))
+        backwards = [i for i, ratio in found if ratio < -0.5]
+        if 2 * len(backwards) >= len(window.rims):
+            return
+        for i, ratio in found:
+            if abs(ratio) > 0.3:
+                yield 'backwards', i, i in backwards, ratio
+
+    def _of_the_reference(self, window: _Window) -> Iterator[Evidence]:
+        typical, reference = window.typical, window.reference
+        if reference != reference or abs(typical) < LEAST_RIM_SPEED:
+            return
+        if not self._straight(window):
+            return
+        ratio = typical / reference
+        yield 'reference_sign', -1, -2.0 < ratio < 0.0, reference
+        if ORDINARY_RATIO[0] < abs(ratio) < ORDINARY_RATIO[1]:
+            yield 'rate_unit', -1, False, abs(ratio)
+        elif _unit(abs(ratio)) is not None:
+            yield 'rate_unit', -1, True, abs(ratio)
+
+    def _of_torque(self, window: _Window) -> Iterator[Evidence]:
+        """On the level or uphill driven wheels take torque; a flipped one mirrors the others."""
+        force, torques, typical = window.force, window.torques, window.typical
+        if force is None or any(t != t for t in torques) or abs(typical) < LEAST_RIM_SPEED:
+            return
+        sense = math.copysign(1.0, typical)
+        if force[0] * sense < LEVEL * self._gravity or not self._straight(window):
+            return
+        thrusts = [sense * t / r for t, r in zip(torques, self._radius, strict=True)]
+        total = sum(thrusts) / self._weight
+        if abs(total) > LEAST_TRACTION:
+            yield 'torque', -1, total < 0.0, total
+        if len(thrusts) < 3:
+            return
+        least = LEAST_TRACTION * self._weight / len(thrusts)
+        for i, thrust in enumerate(thrusts):
+            beside = median(t for j, t in enumerate(thrusts) if j != i)
+            if beside > least and abs(thrust) > 0.3 * beside:
+                yield 'torque_of_wheel', i, thrust < 0.0, thrust / beside
+
+    # -- Words ----------------------------------------------------------------------------------
+
+    def _findings(self) -> Iterator[Finding]:
+        """Word what stands; what follows from another finding is left out."""
+        standing = self._standing()
+        names = {name for name, _ in standing}
+        left_out: set[str] = set()
+        for name, consequences in _CONSEQUENCES.items():
+            if name in names:
+                left_out |= consequences
+        for (name, wheel), score in standing.items():
+            if name in left_out:
+                continue
+            sure = min(1.0 - 0.5 ** (score + 1), GREATEST_SURE)
+            yield _WORDS[name](self, self.state.figures[name, wheel], wheel, sure)
+
+    def _gravity_words(self, figure: float, wheel: int, sure: float) -> Finding:
+        seen = f'mean specific force {figure:.3g} m/s^2 where gravity is {self._gravity:.4g}: '
+        for unit, factor in (('g', STANDARD_GRAVITY), ('mg', STANDARD_GRAVITY / 1000.0)):
+            if abs(figure * factor / self._gravity - 1.0) < GRAVITY_SHARE:
+                cure = f'multiply linear_acceleration by {factor:.5g} in the driver (m/s^2)'
+                words = f'{seen}linear_acceleration is in {unit}'
+                return self._finding('unit', 'imu/data', None, None, factor, sure, words, cure)
+        if figure < GRAVITY_OFF * self._gravity:
+            cure = 'publish the specific force with gravity (+g on z at rest, REP 145)'
+            words = f'{seen}gravity was taken off'
+            return self._finding('gravity', 'imu/data', None, None, None, sure, words, cure)
+        words = f'{seen}another planet, or another scale'
+        cure = f'rover.gravity: {figure:.3g}, or the right scale in the driver'
+        return self._finding(
+            'gravity', 'imu/data', None, 'rover.gravity', figure, sure, words, cure
+        )
+
+    def _mounting_words(self, figure: float, wheel: int, sure: float) -> Finding:
+        tilt = math.degrees(math.acos(max(-1.0, min(1.0, figure))))
+        return self._finding(
+            'mounting',
+            'imu/data',
+            None,
+            'sensors.imu_mounting_roll_deg',
+            None,
+            sure,
+            f'gravity points {tilt:.0f} degrees off straight down',
+            'sensors.imu_mounting_roll_deg: 180.0'
+            if tilt > 150.0
+            else 'state sensors.imu_mounting_*_deg (wheel-terra check has the angles)',
+        )
+
+    def _gyro_unit_words(self, figure: float, wheel: int, sure: float) -> Finding:
+        return self._finding(
+            'unit',
+            'imu/data',
+            None,
+            None,
+            math.pi / 180.0,
+            sure,
+            'angular_velocity.z is many times what the wheels allow: degrees per second',
+            'multiply angular_velocity by 0.0174533 in the driver (rad/s, REP 103)',
+        )
+
+    def _sides_words(self, figure: float, wheel: int, sure: float) -> Finding:
+        mirrored = ', '.join(f'{-y:g}' for y in self._lateral)
+        return self._finding(
+            'swapped_sides',
+            self._odometry_topic,
+            None,
+            'wheels.names',
+            None,
+            sure,
+            'left and right wheels turn against the gyro: the sides are swapped, all wheels count '
+            'backwards, or the gyro counts yaw to the right',
+            f'exchange left and right in wheels.names, or wheels.y: [{mirrored}]; or negate '
+            'angular_velocity.z in the driver',
+        )
+
+    def _directions(self, flipped: list[int]) -> str:
+        listed = (int(-d if i in flipped else d) for i, d in enumerate(self._direction))
+        return f'wheels.direction: [{", ".join(str(d) for d in listed)}]'
+
+    def _backwards_words(self, figure: float, wheel: int, sure: float) -> Finding:
+        flipped = [w for name, w in self._standing() if name == 'backwards']
+        return self._finding(
+            'sign',
+            self._odometry_topic,
+            wheel,
+            'wheels.direction',
+            -self._direction[wheel],
+            sure,
+            'counts backwards when the rover drives forward',
+            self._directions(flipped),
+        )
+
+    def _one_side_words(self, figure: float, wheel: int, sure: float) -> Finding:
+        cures = (self._directions(self._left), self._directions(self._right))
+        return self._finding(
+            'sign',
+            self._odometry_topic,
+            None,
+            'wheels.direction',
+            -1.0,
+            sure,
+            'left and right wheels turn against each other while the gyro sees no turn: one side '
+            'counts backwards',
+            f'{cures[0]} if the left side is the one, {cures[1].partition(": ")[2]} if the right',
+        )
+
+    def _reference_words(self, figure: float, wheel: int, sure: float) -> Finding:
+        everyone = list(range(len(self._names)))
+        return self._finding(
+            'sign',
+            'reference_odom',
+            None,
+            None,
+            -1.0,
+            sure,
+            'linear.x runs against the wheels',
+            'negate twist.linear.x in its driver, or turn its frame into base_link; if all wheels '
+            f'count backwards, {self._directions(everyone)}',
+        )
+
+    def _rate_unit_words(self, figure: float, wheel: int, sure: float) -> Finding:
+        unit = _unit(figure)
+        assert unit is not None
+        return self._rate_unit_finding(unit, sure, f'rim speed {figure:.3g} times the reference')
+
+    def _turn_unit_words(self, figure: float, wheel: int, sure: float) -> Finding:
+        unit = next((u for u, f in RATE_UNITS.items() if figure < 3.0 * f), 'thousandths of rad/s')
+        return self._rate_unit_finding(unit, sure, f'turns {figure:.3g} times those of the gyro')
+
+    def _absurd_words(self, figure: float, wheel: int, sure: float) -> Finding:
+        return self._finding(
+            'unit',
+            self._odometry_topic,
+            None,
+            None,
+            None,
+            sure,
+            f'rim speed {figure:.3g} m/s: velocity is not in rad/s',
+            'publish rad/s (REP 103): revolutions per minute times 0.10472, degrees per second '
+            'times 0.0174533',
+        )
+
+    def _rate_unit_finding(self, unit: str, sure: float, how: str) -> Finding:
+        factor = 1.0 / RATE_UNITS[unit]
+        return self._finding(
+            'unit',
+            self._odometry_topic,
+            None,
+            None,
+            factor,
+            sure,
+            f'velocity is in {unit} ({how})',
+            f'multiply velocity by {factor:.6g} in the driver (rad/s, REP 103)',
+        )
+
+    def _torque_words(self, figure: float, wheel: int, sure: float) -> Finding:
+        name = self._names[wheel] if wheel >= 0 else 'all wheels'
+        return self._finding(
+            'sign',
+            self._odometry_topic,
+            wheel if wheel >= 0 else None,
+            None,
+            -1.0,
+            sure,
+            'torque brakes where the wheels drive on the level or uphill',
+            f'negate effort of {name} in the driver (wheels.direction flips rate and torque '
+            'together)',
+        )
+
+    def _standing(self) -> dict[Suspicion, int]:
+        return {key: tally.score for key, tally in self.state.tallies.items() if tally.stands}
+
+    def _finding(
+        self,
+        kind: str,
+        topic: str,
+        wheel: int | None,
+        parameter: str | None,
+        value: float | None,
+        sure: float,
+        words: str,
+        cure: str,
+    ) -> Finding:
+        name = None if wheel is None else self._names[wheel]
+        return Finding(kind, topic, name, parameter, value, None, sure, words, cure)
+
+
+_WORDS: dict[str, Callable[[OnlineChecks, float, int, float], Finding]] = {
+    'gravity': OnlineChecks._gravity_words,
+    'mounting': OnlineChecks._mounting_words,
+    'gyro_unit': OnlineChecks._gyro_unit_words,
+    'sides': OnlineChecks._sides_words,
+    'backwards': OnlineChecks._backwards_words,
+    'one_side_backwards': OnlineChecks._one_side_words,
+    'reference_sign': OnlineChecks._reference_words,
+    'rate_unit': OnlineChecks._rate_unit_words,
+    'rate_unit_in_turns': OnlineChecks._turn_unit_words,
+    'absurd_rate': OnlineChecks._absurd_words,
+    'torque': OnlineChecks._torque_words,
+    'torque_of_wheel': OnlineChecks._torque_words,
+}
+
+_CONSEQUENCES = {
+    'mounting': {'gyro_unit', 'sides', 'one_side_backwards', 'torque', 'torque_of_wheel'},
+    'gravity': {'torque', 'torque_of_wheel'},
+    'rate_unit': {'absurd_rate', 'rate_unit_in_turns', 'one_side_backwards'},
+    'rate_unit_in_turns': {'absurd_rate', 'one_side_backwards'},
+    'backwards': {'torque', 'torque_of_wheel', 'sides', 'one_side_backwards'},
+    'one_side_backwards': {'torque', 'torque_of_wheel', 'sides', 'reference_sign'},
+    'torque': {'torque_of_wheel'},
+}
+"""Fault -> what it makes other windows say."""
+
+
+def _with_inertial(sums: _Sums, reading: InertialReading) -> _Sums:
+    x, y, z = reading.specific_force.tolist()
+    force = sums.force
+    return sums._replace(
+        force=(force[0] + x, force[1] + y, force[2] + z),
+        yaw_rate=sums.yaw_rate + float(reading.angular_rate[2]),
+        inertial=sums.inertial + 1,
+    )
+
+
+def _mean(values: Floats, indices: list[int]) -> float:
+    known = [values[i] for i in indices if values[i] == values[i]]
+    return sum(known) / len(known) if known else math.nan
+
+
+def _unit(ratio: float) -> str | None:
+    """Return the unit in which wheels read so many times too fast; None: none."""
+    for unit, factor in RATE_UNITS.items():
+        if UNIT_BAND[0] < ratio / factor < UNIT_BAND[1]:
+            return unit
+    return None
