@@ -93,7 +93,7 @@ def test_the_configuration_is_read_without_the_heavy_libraries():
 
 # Folder -> (folders of the package, libraries beyond the standard one) that its modules may
 # import, at the top or inside a function. A new folder needs a line here.
-COMMON = {'errors', 'input_file', 'output_folder', 'worker_pool', '__version__'}
+COMMON = {'errors', 'input_file', 'output_folder', 'scheduler', 'worker_pool', '__version__'}
 PICTURES = {'matplotlib', 'jinja2'}
 MAY_USE = {
     'terramechanics': (set(), {'numpy'}),
@@ -116,8 +116,13 @@ MAY_USE = {
         },  # zstd by Python version
     ),
     'reporting': (
-        {'configuration', 'terramechanics', 'estimation', 'bags'},
+        {'configuration', 'terramechanics', 'estimation', 'bags', 'checks'},
         {'numpy'} | PICTURES,
+    ),
+    # Replay of whole recordings, one or many.
+    'fleet': (
+        {'configuration', 'terramechanics', 'bags', 'checks', 'reporting'},
+        {'tqdm'},
     ),
     # It has a report of its own, and the wheel loads of its drives are those of the estimator.
     'discrepancy': (

@@ -25,13 +25,16 @@ Errors of the disk inside the blocks become a `UserError` of one line.
 from __future__ import annotations
 
 import errno
+import glob
 import json
 import os
 import shutil
 import tempfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path, PurePosixPath
+from types import MappingProxyType
+from typing import Any
 
 from wheel_terra_estimator import __version__
 from wheel_terra_estimator.errors import UserError
@@ -175,7 +178,13 @@ def new_file(path: Path, overwrite: bool = False, inputs: Iterable[Path] = ()) -
             shutil.rmtree(beside, ignore_errors=True)
 
 
-def working_folder(path: Path, overwrite: bool, resume: bool, entries: Iterable[str]) -> None:
+def working_folder(
+    path: Path,
+    overwrite: bool,
+    resume: bool,
+    entries: Iterable[str],
+    inputs: Iterable[Path] = (),
+) -> None:
     """Make a folder that a command fills in place, so that an interrupted run can go on.
 
     Parameters
@@ -186,6 +195,8 @@ def working_folder(path: Path, overwrite: bool, resume: bool, entries: Iterable[
         Whether to go on with a folder as it is.
     entries : iterable of str
         All names that the command may write there, as in `mark`.
+    inputs : iterable of Path
+        As in `check_folder`.
 
     Raises
     ------
@@ -193,13 +204,13 @@ def working_folder(path: Path, overwrite: bool, resume: bool, entries: Iterable[
         See `check_folder`.
     """
     if resume and path.exists():
-        _refuse_place(path, ())
+        _refuse_place(path, inputs)
     elif path.exists() and not overwrite:
         raise UserError(
             f'{path}: exists already; --resume goes on with it, --overwrite replaces it'
         )
     else:
-        check_folder(path, overwrite)
+        check_folder(path, overwrite, inputs)
     try:
         if path.exists() and not resume:
             _remove_own_files(path)
@@ -209,7 +220,11 @@ def working_folder(path: Path, overwrite: bool, resume: bool, entries: Iterable[
         raise cannot_write(path, error) from None
 
 
-def mark(folder: Path, entries: Iterable[str] | None = None) -> None:
+def mark(
+    folder: Path,
+    entries: Iterable[str] | None = None,
+    facts: Mapping[str, Any] | None = None,
+) -> None:
     """List files in the marker of a folder.
 
     Parameters
@@ -219,11 +234,32 @@ def mark(folder: Path, entries: Iterable[str] | None = None) -> None:
     entries : iterable of str, optional
         Names relative to the folder, added to those listed already; a name that ends in ``/``
         stands for a folder with all that it holds. Default: everything that is there now.
+    facts : mapping, optional
+        What the command wants to know when it meets the folder again, see `facts_of`.
     """
     if entries is None:
         entries = (name for name in _files(folder) if name != MARKER)
     earlier = _listed(folder) if (folder / MARKER).is_file() else ()
-    _write_marker(folder, {*earlier, *entries})
+    _write_marker(folder, {*earlier, *entries}, facts or {})
+
+
+def facts_of(folder: Path) -> dict[str, Any]:
+    """Return what a command noted in the marker of a folder that is whole, else nothing."""
+    if not is_ours(folder):
+        return {}
+    try:
+        listed = _listed(folder)
+    except UserError:
+        return {}
+    whole = all(name.endswith('/') or (folder / name).is_file() for name in listed)
+    return _noted(folder / MARKER) if whole else {}
+
+
+def remove_leftovers(folder: Path, name: str) -> None:
+    """Remove what a killed run left of ``folder/name`` beside its place."""
+    for left in folder.glob(f'.{glob.escape(name)}.wheel-terra-*'):
+        if left.is_dir() and not left.is_symlink():
+            shutil.rmtree(left, ignore_errors=True)
 
 
 def is_ours(folder: Path) -> bool:
@@ -308,6 +344,14 @@ def _listed(folder: Path) -> set[str]:
     return set(names)
 
 
+def _noted(marker: Path) -> dict[str, Any]:
+    """Return the facts in a marker that has been looked at, or is not there yet."""
+    if not marker.is_file():
+        return {}
+    facts = json.loads(marker.read_text(encoding='utf-8')).get('facts')
+    return facts if isinstance(facts, dict) else {}
+
+
 def _stays_inside(name: str) -> bool:
     parts = PurePosixPath(name)
     return bool(parts.parts) and not parts.is_absolute() and '..' not in parts.parts
@@ -369,9 +413,13 @@ def _put_in_place(fresh: Path, path: Path, beside: Path) -> None:
         raise
 
 
-def _write_marker(folder: Path, names: Iterable[str]) -> None:
+def _write_marker(
+    folder: Path, names: Iterable[str], facts: Mapping[str, Any] = MappingProxyType({})
+) -> None:
     marker = folder / MARKER
     part = folder / f'{MARKER}.part'
-    content = {'program': f'wheel-terra {__version__}', 'files': sorted(names)}
+    content: dict[str, Any] = {'program': f'wheel-terra {__version__}', 'files': sorted(names)}
+    if known := {**_noted(marker), **facts}:
+        content['facts'] = known
     part.write_text(json.dumps(content, indent=1) + '\n', encoding='utf-8')
     part.replace(marker)

@@ -63,6 +63,7 @@ def replay(
     overwrite: bool = False,
     arrival: Path | None = None,
     every_set: bool = False,
+    progress: bool = True,
 ) -> Replay:
     """Run the estimator over an open bag.
 
@@ -82,6 +83,8 @@ def replay(
         Log of a live node (parameter ``record_arrival``): hear the messages in that order.
     every_set : bool
         Whether the history holds every set of a long drive, whatever memory that takes.
+    progress : bool
+        Whether a long drive shows its progress on a terminal.
 
     Raises
     ------
@@ -92,6 +95,8 @@ def replay(
     pipeline = Pipeline(configuration)
     recorder = HistoryRecorder(pipeline.names, None if every_set else MOST_ROWS)
     messages = _in_order_of(arrival, reader) if arrival else reader.messages()
+    if progress:
+        messages = _progress(messages, reader)
     with ExitStack() as stack:
         writer = None
         if output is not None:
@@ -101,7 +106,7 @@ def replay(
             )
         interrupted = stack.enter_context(_until_interrupted())
         log_time = 0
-        for count, (log_time, name, message) in enumerate(_progress(messages, reader)):
+        for count, (log_time, name, message) in enumerate(messages):
             if writer is not None and count == 0:
                 writer.clear_stuck(log_time)
             if name == RESET:

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.scheduler import add_jobs_argument
 
 INTERRUPTED = 130
 SUMMARY = 'score the estimator against ground truth and baselines'
@@ -54,7 +55,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--pooled', action='store_true', help='one row per mode in place of one per kind'
     )
-    parser.add_argument('--processes', type=int, default=1, metavar='N', help='in parallel')
+    add_jobs_argument(parser, '--processes', words='drives at a time')
     parser.add_argument(
         '--measured',
         type=Path,
@@ -110,7 +111,7 @@ def run(arguments: argparse.Namespace) -> int:
                 chosen,
                 seeds,
                 arguments.modes,
-                arguments.processes,
+                arguments.jobs,
                 lambda _: bar.update(),
             )
         write = tables.pooled_report if arguments.pooled else tables.report

@@ -6,39 +6,62 @@ from __future__ import annotations
 
 import argparse
 import json
+from dataclasses import asdict
 from pathlib import Path
 
 from wheel_terra_estimator.configuration import reader as configuration_reader
+from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.scheduler import add_jobs_argument
 
 SUMMARY = 'run the estimator over a rosbag2, without ROS'
-QUICK_MESSAGES = 60_000
-"""Messages of a topic that the checks before a replay look at."""
+SOME_FAILED = 1
+INTERRUPTED = 130
 EXAMPLES = (
     'wheel-terra replay my_bag --config my_rover.yaml -o estimates --report report.html',
     'wheel-terra replay drive.mcap --config pathfinder --remap reference_odom:=/truth/odometry',
+    'wheel-terra replay bags/* --config my_rover.yaml -o estimates --jobs 4 --report report.html',
 )
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
     parser.add_argument(
-        'bag', type=Path, metavar='BAG', help='rosbag2 folder, or a single .mcap or .db3 file'
+        'bags',
+        type=Path,
+        nargs='+',
+        metavar='BAG',
+        help='rosbag2 folder, or a single .mcap or .db3 file; of several, each gets a folder of '
+        'its own below -o, and a run that was interrupted goes on where it was',
     )
     parser.add_argument(
         '-o',
         dest='output',
         type=Path,
         metavar='DIR',
-        help='rosbag2 folder (MCAP) for the estimates, under the names that the node has',
+        help='rosbag2 folder (MCAP) for the estimates, under the names that the node has; with '
+        'several recordings a folder of such folders, with summary.csv and summary.html',
     )
     parser.add_argument(
         '--table',
         type=Path,
         metavar='F.csv|F.parquet',
-        help='table of the estimates, one row per set and wheel, units in the header',
+        help='table of the estimates, one row per set and wheel, units in the header; with several '
+        'recordings a name, for one in the folder of each',
     )
     parser.add_argument('--json', action='store_true', help='print the summary as JSON')
-    parser.add_argument('--report', type=Path, metavar='F.html', help='report with pictures')
+    parser.add_argument(
+        '--report',
+        type=Path,
+        metavar='F.html',
+        help='report with pictures; with several recordings a name, for one in the folder of each',
+    )
+    add_jobs_argument(parser, words='recordings at a time')
+    parser.add_argument(
+        '--scheduler',
+        default='',
+        metavar='ADDRESS',
+        help='Dask scheduler whose workers take the recordings, over files that all of them see',
+    )
     configuration_reader.add_arguments(parser)
     parser.add_argument(
         '--remap',
@@ -62,21 +85,27 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the command."""
-    from wheel_terra_estimator.bags.reader import parse_remaps
-    from wheel_terra_estimator.bags.replay import replay
-    from wheel_terra_estimator.bags.series_reader import read_series
-    from wheel_terra_estimator.bags.storage import open_bag
-    from wheel_terra_estimator.bags.truth import read_truth
-    from wheel_terra_estimator.checks.run import check_recording
-    from wheel_terra_estimator.output_folder import check_file, check_folder, new_file
-    from wheel_terra_estimator.reporting import estimates_table, truth_scores
-    from wheel_terra_estimator.reporting.drive_summary import as_dict, as_text, summarise
-    from wheel_terra_estimator.reporting.html import check_page
-    from wheel_terra_estimator.reporting.replay_report import write_replay_report
+    return _run_one(arguments) if len(arguments.bags) == 1 else _run_several(arguments)
 
+
+def _run_one(arguments: argparse.Namespace) -> int:
+    from wheel_terra_estimator.bags.reader import parse_remaps
+    from wheel_terra_estimator.checks.finding import CheckReport
+    from wheel_terra_estimator.fleet.drive import replay_drive
+    from wheel_terra_estimator.output_folder import check_file, check_folder
+    from wheel_terra_estimator.reporting import estimates_table, truth_scores
+    from wheel_terra_estimator.reporting.drive_summary import as_dict, as_text
+    from wheel_terra_estimator.reporting.html import check_page
+
+    def print_findings(checked: CheckReport) -> None:
+        if not arguments.json:
+            for finding in checked.findings:
+                print(f'finding: {finding}')
+
+    (bag,) = arguments.bags
     configuration = configuration_reader.from_arguments(arguments)
     remaps = parse_remaps(arguments.remap)
-    inputs = [arguments.bag, *([arguments.arrival] if arguments.arrival else [])]
+    inputs = [bag, *([arguments.arrival] if arguments.arrival else [])]
     if arguments.report:
         check_page(arguments.report)
         check_file(arguments.report, arguments.overwrite, inputs)
@@ -85,53 +114,29 @@ def run(arguments: argparse.Namespace) -> int:
         check_file(arguments.table, arguments.overwrite, inputs)
     if arguments.output:
         check_folder(arguments.output, arguments.overwrite, inputs)
-    with open_bag(arguments.bag) as bag:
-        recording = read_series(bag, remaps, arguments.bag.name, QUICK_MESSAGES)
-        checked = check_recording(recording, configuration, tuple(remaps))
-        if not arguments.json:
-            for finding in checked.findings:
-                print(f'finding: {finding}')
-        result = replay(
-            bag,
-            configuration,
-            remaps,
-            arguments.output,
-            overwrite=arguments.overwrite,
-            arrival=arguments.arrival,
-            every_set=bool(arguments.table),
-        )
-        truth = read_truth(bag, remaps, configuration)
-    # A truth that the estimator was given as its reference is none to judge it by.
-    judged = truth if truth and truth.source not in result.topics.values() else None
-    errors = None
-    if judged:
-        thresholds = configuration.filter.class_thresholds
-        errors = truth_scores.truth_errors(result.history, judged, thresholds)
-    title = arguments.bag.resolve().name
-    summary = summarise(
-        title, result.history, result.topics, result.heard, result.rejected, result.notes
+    drive = replay_drive(
+        bag,
+        configuration,
+        remaps,
+        arguments.output,
+        overwrite=arguments.overwrite,
+        arrival=arguments.arrival,
+        every_set=bool(arguments.table),
+        on_checked=print_findings,
     )
+    errors = drive.errors
     if arguments.json:
-        told = as_dict(summary)
-        told['findings'] = checked.as_dict()['findings']
+        told = as_dict(drive.summary)
+        told['findings'] = drive.checked.as_dict()['findings']
         told['truth'] = truth_scores.as_dict(errors) if errors else None
         print(json.dumps(told, indent=2))
     else:
-        print('\n'.join([as_text(summary), *(truth_scores.as_lines(errors) if errors else ())]))
+        lines = truth_scores.as_lines(errors) if errors else ()
+        print('\n'.join([as_text(drive.summary), *lines]))
     if arguments.table:
-        with new_file(arguments.table, arguments.overwrite) as path:
-            estimates_table.write_table(result.history, path)
+        drive.write_table(arguments.table, arguments.overwrite)
     if arguments.report:
-        write_replay_report(
-            arguments.report,
-            summary,
-            result.history,
-            truth,
-            configuration,
-            overwrite=arguments.overwrite,
-            findings=checked.findings,
-            errors=errors,
-        )
+        drive.write_report(arguments.report, arguments.overwrite)
     written = {
         'table': arguments.table,
         'estimates': arguments.output,
@@ -141,4 +146,61 @@ def run(arguments: argparse.Namespace) -> int:
         for what, path in written.items():
             if path:
                 print(f'{what}: {path}')
-    return 130 if result.interrupted else 0
+    return INTERRUPTED if drive.result.interrupted else 0
+
+
+def _run_several(arguments: argparse.Namespace) -> int:
+    from wheel_terra_estimator.bags.reader import parse_remaps
+    from wheel_terra_estimator.fleet.several_bags import SUMMARY_PAGE, Settings, replay_bags
+    from wheel_terra_estimator.reporting import estimates_table
+    from wheel_terra_estimator.reporting.html import check_page
+
+    if not arguments.output:
+        raise UserError('several recordings need a folder for their outputs: add -o DIR')
+    if arguments.arrival:
+        raise UserError('--arrival: belongs to one recording; replay that one by itself')
+    if arguments.report:
+        check_page(arguments.report)
+    if arguments.table:
+        estimates_table.check_table(arguments.table)
+    settings = Settings(
+        configuration_reader.from_arguments(arguments),
+        parse_remaps(arguments.remap),
+        arguments.output,
+        _plain_name('--report', arguments.report),
+        _plain_name('--table', arguments.table),
+    )
+    rows = replay_bags(
+        arguments.bags,
+        settings,
+        overwrite=arguments.overwrite,
+        jobs=arguments.jobs,
+        scheduler=arguments.scheduler,
+    )
+    failed = [row for row in rows if row.error]
+    if arguments.json:
+        print(
+            json.dumps({'drives': [asdict(row) for row in rows], 'failed': len(failed)}, indent=2)
+        )
+    else:
+        for row in rows:
+            if not row.error:
+                print(row.as_line)
+        print(f'summary: {arguments.output / SUMMARY_PAGE}')
+        if failed:
+            print(f'{len(failed)} of {len(rows)} recordings failed:')
+        for row in failed:
+            print(f'  {row.as_line}')
+    return SOME_FAILED if failed else 0
+
+
+def _plain_name(option: str, path: Path | None) -> str:
+    """Return the name of a file that stands in the folder of each recording."""
+    if path is None:
+        return ''
+    if path != Path(path.name):
+        raise UserError(
+            f'{option} {path}: with several recordings it stands in the folder of each; '
+            f'give a plain name such as {path.name}'
+        )
+    return path.name

@@ -1,0 +1,166 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""``wheel-terra replay BAG BAG ...``: the numbers of one replay, failures, restarts, summary."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from wheel_terra_estimator.cli.main import main
+from wheel_terra_estimator.output_folder import MARKER
+
+
+@pytest.fixture
+def config(tmp_path: Path, rover: Any) -> list[str]:
+    rover.write(tmp_path / 'rover.yaml')
+    return ['--config', str(tmp_path / 'rover.yaml')]
+
+
+@pytest.fixture
+def bags(make_bag: Any, drive: Any) -> list[str]:
+    """Drives of three lengths, and what is none."""
+    paths = [make_bag(drive[: len(drive) * k // 3], name=f'drive{k}') for k in (3, 2, 1)]
+    broken = paths[0].parent / 'broken.mcap'
+    broken.write_bytes(b'none')
+    return [str(path) for path in (paths[0], broken, *paths[1:])]
+
+
+def estimates(folder: Path) -> bytes:
+    (file,) = folder.glob('*.mcap')
+    return file.read_bytes()
+
+
+def test_several_are_what_each_is_alone(
+    bags: list[str], config: list[str], tmp_path: Path, capsys: Any
+) -> None:
+    out = tmp_path / 'out'
+    arguments = ['replay', *bags, *config, '-o', str(out), '--jobs', '2', '--report', 'r.html']
+    assert main(arguments) == 1
+    said = capsys.readouterr().out.splitlines()
+    assert said[-2] == '1 of 4 recordings failed:'
+    assert said[-1].startswith(f'  {bags[1]}: the bag holds no messages')
+    for name in ('drive3', 'drive2', 'drive1'):
+        alone = tmp_path / 'alone' / name
+        assert main(['replay', str(tmp_path / name), *config, '-o', str(alone)]) == 0
+        assert estimates(out / name) == estimates(alone)
+        assert (out / name / 'r.html').is_file()
+    with (out / 'summary.csv').open() as file:
+        rows = list(csv.DictReader(file))
+    assert [row['bag'] for row in rows] == bags
+    assert [bool(row['error']) for row in rows] == [False, True, False, False]
+    lengths = [float(row['duration [s]']) for row in rows if not row['error']]
+    assert lengths == sorted(lengths, reverse=True)
+    page = (out / 'summary.html').read_text()
+    assert 'href="drive3/r.html"' in page and 'broken.mcap' in page
+
+
+def test_a_restart_passes_over_what_is_done_by_content(
+    bags: list[str], config: list[str], tmp_path: Path
+) -> None:
+    out = tmp_path / 'out'
+    good = [bags[0], *bags[2:]]
+    assert main(['replay', *good[:2], *config, '-o', str(out)]) == 0
+
+    def written() -> dict[str, int]:
+        return {p.parent.name: p.stat().st_mtime_ns for p in out.glob('*/*.mcap')}
+
+    first = written()
+    summary = (out / 'summary.csv').read_bytes()
+    assert main(['replay', *good[:2], *config, '-o', str(out)]) == 0
+    assert written() == first and (out / 'summary.csv').read_bytes() == summary
+    renamed = Path(good[0]).with_name('renamed')  # same content under another name
+    os.rename(good[0], renamed)
+    assert main(['replay', str(renamed), *good[1:], *config, '-o', str(out)]) == 0
+    then = written()
+    assert set(then) == {'drive3', 'drive2', 'drive1'}
+    assert {name: then[name] for name in first} == first
+    other = ['-p', 'rover.mass:=41.0']  # another configuration: nothing is done
+    assert main(['replay', *good[1:], *config, *other, '-o', str(out)]) == 0
+    assert written()['drive3'] == first['drive3'] and written()['drive2'] != first['drive2']
+
+
+def test_an_output_that_has_lost_a_file_is_made_anew(
+    bags: list[str], config: list[str], tmp_path: Path
+) -> None:
+    out = tmp_path / 'out'
+    arguments = ['replay', bags[2], bags[3], *config, '-o', str(out)]
+    assert main(arguments) == 0
+    (file,) = (out / 'drive1').glob('*.mcap')
+    kept = file.read_bytes()
+    file.unlink()
+    assert main(arguments) == 0
+    assert estimates(out / 'drive1') == kept
+
+
+def test_bags_of_one_name_get_folders_of_their_own(
+    bags: list[str], config: list[str], tmp_path: Path, capsys: Any
+) -> None:
+    (tmp_path / 'other').mkdir()
+    os.rename(bags[2], tmp_path / 'other' / 'drive3')
+    out = tmp_path / 'out'
+    given = [bags[0], str(tmp_path / 'other' / 'drive3')]
+    assert main(['replay', *given, *config, '-o', str(out), '--json']) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert [drive['folder'] for drive in told['drives']] == ['drive3', 'drive3_2']
+    assert [drive['bag'] for drive in told['drives']] == given
+
+
+@pytest.mark.parametrize(
+    ('more', 'words'),
+    [
+        ([], 'add -o DIR'),
+        (['-o', 'taken'], 'choose another path or give --overwrite'),
+        (['-o', 'o', '--report', 'there/r.html'], 'give a plain name such as r.html'),
+        (['-o', 'o', '--jobs', '0'], 'give 1 or more'),
+        (['-o', 'o', '--arrival', 'log'], 'belongs to one recording'),
+    ],
+)
+def test_what_cannot_be_done_is_said_first(
+    bags: list[str], config: list[str], tmp_path: Path, monkeypatch: Any, capsys: Any,
+    more: list[str], words: str,
+) -> None:  # fmt: skip
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / 'taken').mkdir()
+    (tmp_path / 'taken' / 'note.txt').touch()
+    try:
+        status = main(['replay', *bags, *config, *more])
+    except SystemExit as end:
+        status = int(str(end.code))
+    assert status == 2
+    assert words in capsys.readouterr().err
+    assert not (tmp_path / 'o').exists()
+
+
+def test_ctrl_c_leaves_whole_outputs_and_the_next_run_goes_on(
+    make_bag: Any, make_drive: Any, config: list[str], tmp_path: Path
+) -> None:
+    long = make_bag(make_drive(3000), name='long')
+    short = make_bag(name='short')
+    out = tmp_path / 'out'
+    program = [sys.executable, '-m', 'wheel_terra_estimator.cli.main']
+    command = [*program, 'replay', str(short), str(long), *config, '-o', str(out)]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
+        deadline = time.monotonic() + 60.0
+        while not (out / 'short' / MARKER).is_file() and time.monotonic() < deadline:
+            time.sleep(0.02)
+        while not list(out.glob('.long.*')) and time.monotonic() < deadline:
+            time.sleep(0.02)
+        process.send_signal(signal.SIGINT)
+        _, said = process.communicate(timeout=60)
+    assert process.returncode == 130 and re.search('interrupted', said)
+    assert sorted(p.name for p in out.iterdir()) == [MARKER, 'short']
+    before = estimates(out / 'short')
+    assert main(command[3:]) == 0
+    assert estimates(out / 'short') == before and (out / 'long').is_dir()
+    assert main([*command[3:], '--overwrite']) == 0

@@ -1,0 +1,72 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Tasks side by side: a worker that dies takes no other task along."""
+
+from __future__ import annotations
+
+import os
+import signal
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.scheduler import finished
+
+
+def root(number: float) -> float:
+    if number == -1.0:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return float(number) ** 0.5 if number >= 0 else (_ for _ in ()).throw(ValueError(str(number)))
+
+
+def killed_once(mark: str) -> int:
+    try:
+        Path(mark).touch(exist_ok=False)
+    except FileExistsError:
+        return os.getpid()
+    os.kill(os.getpid(), signal.SIGKILL)
+    return 0
+
+
+def test_results_and_errors_by_index() -> None:
+    found = dict(finished(root, [4.0, -4.0, 9.0], jobs=2))
+    assert found[0] == 2.0 and found[2] == 3.0
+    assert isinstance(found[1], ValueError)
+
+
+def test_a_killed_worker_costs_its_own_task_alone() -> None:
+    found = dict(finished(root, [1.0, -1.0, 4.0, 9.0, 16.0], jobs=2))
+    assert isinstance(found.pop(1), UserError)
+    assert found == {0: 1.0, 2: 2.0, 3: 3.0, 4: 4.0}
+
+
+def test_a_task_whose_worker_was_killed_is_run_again(tmp_path: Path) -> None:
+    ((_, process),) = finished(killed_once, [str(tmp_path / 'mark')])
+    assert isinstance(process, int) and process not in (0, os.getpid())
+
+
+def test_a_scheduler_that_does_not_answer_is_said(monkeypatch: Any) -> None:
+    from wheel_terra_estimator import scheduler
+
+    monkeypatch.setattr(scheduler, 'CONNECT_TIMEOUT', 1)
+    with pytest.raises(UserError, match='--scheduler'):
+        next(finished(root, [1.0], address='tcp://127.0.0.1:9'))
+
+
+def test_a_cluster_that_loses_a_worker_ends_all_tasks(tmp_path: Path) -> None:
+    distributed = pytest.importorskip('dask.distributed')
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, dashboard_address=None
+    ) as cluster:
+        address = cluster.scheduler_address
+        here = Path(__file__).parent
+        with distributed.Client(address) as client:
+            client.run(lambda: __import__('sys').path.insert(0, str(here)))
+        tasks = [str(tmp_path / str(i)) for i in range(3)]
+        for task in tasks[1:]:
+            Path(task).touch()  # only the first kills its worker, once
+        found = dict(finished(killed_once, tasks, address=address))
+        assert sorted(found) == [0, 1, 2]
+        assert all(isinstance(process, int) for process in found.values()), found

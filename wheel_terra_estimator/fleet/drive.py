@@ -1,0 +1,110 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""One recording from beginning to end: checks, estimates, errors against a truth, summary."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from wheel_terra_estimator.bags.replay import Replay, replay
+from wheel_terra_estimator.bags.series_reader import read_series
+from wheel_terra_estimator.bags.storage import open_bag
+from wheel_terra_estimator.bags.truth import Truth, read_truth
+from wheel_terra_estimator.checks.finding import CheckReport
+from wheel_terra_estimator.checks.run import check_recording
+from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.output_folder import new_file
+from wheel_terra_estimator.reporting import estimates_table, truth_scores
+from wheel_terra_estimator.reporting.drive_summary import DriveSummary, summarise
+from wheel_terra_estimator.reporting.replay_report import write_replay_report
+
+QUICK_MESSAGES = 60_000
+"""Messages of a topic that the checks before a replay look at."""
+
+
+@dataclass(frozen=True)
+class Drive:
+    """What is known of a recording after its replay."""
+
+    configuration: Configuration
+    checked: CheckReport
+    result: Replay
+    truth: Truth | None
+    errors: truth_scores.TruthErrors | None
+    summary: DriveSummary
+
+    def write_table(self, path: Path, overwrite: bool) -> None:
+        """Write the estimates as a table."""
+        with new_file(path, overwrite) as fresh:
+            estimates_table.write_table(self.result.history, fresh)
+
+    def write_report(self, path: Path, overwrite: bool) -> None:
+        """Write the page with pictures."""
+        write_replay_report(
+            path,
+            self.summary,
+            self.result.history,
+            self.truth,
+            self.configuration,
+            overwrite=overwrite,
+            findings=self.checked.findings,
+            errors=self.errors,
+        )
+
+
+def replay_drive(
+    path: Path,
+    configuration: Configuration,
+    remaps: Mapping[str, str],
+    output: Path | None,
+    *,
+    overwrite: bool = False,
+    arrival: Path | None = None,
+    every_set: bool = False,
+    progress: bool = True,
+    on_checked: Callable[[CheckReport], None] = lambda checked: None,
+) -> Drive:
+    """Check a recording, run the estimator over it and sum it up.
+
+    Parameters
+    ----------
+    path : Path
+        rosbag2 folder or file.
+    configuration, remaps, output, overwrite, arrival, every_set, progress
+        See `bags.replay.replay`.
+    on_checked : callable, optional
+        Called with what the checks found, before the replay begins.
+
+    Raises
+    ------
+    UserError
+        Input that cannot be used, an output path that is taken.
+    """
+    with open_bag(path) as bag:
+        recording = read_series(bag, remaps, path.name, QUICK_MESSAGES)
+        checked = check_recording(recording, configuration, tuple(remaps))
+        on_checked(checked)
+        result = replay(
+            bag,
+            configuration,
+            remaps,
+            output,
+            overwrite=overwrite,
+            arrival=arrival,
+            every_set=every_set,
+            progress=progress,
+        )
+        truth = read_truth(bag, remaps, configuration)
+    # A truth that the estimator was given as its reference is none to judge it by.
+    judged = truth if truth and truth.source not in result.topics.values() else None
+    errors = None
+    if judged:
+        thresholds = configuration.filter.class_thresholds
+        errors = truth_scores.truth_errors(result.history, judged, thresholds)
+    title = path.resolve().name
+    summary = summarise(
+        title, result.history, result.topics, result.heard, result.rejected, result.notes
+    )
+    return Drive(configuration, checked, result, truth, errors, summary)

@@ -1,0 +1,265 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Many recordings side by side: one folder each, a summary over all, interrupted runs go on.
+
+The folder of a recording notes in its marker a digest of all that its content follows from
+(recording, configuration, remaps, version of the program) and the row of the summary. A later run
+passes over recordings whose digest is there already, whatever their names.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import sys
+from collections.abc import Generator, Iterator, Mapping, Sequence
+from contextlib import closing
+from dataclasses import asdict, dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from wheel_terra_estimator import __version__
+from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.fleet.drive import replay_drive
+from wheel_terra_estimator.output_folder import (
+    cannot_write,
+    facts_of,
+    is_ours,
+    mark,
+    new_file,
+    remove_leftovers,
+    working_folder,
+)
+from wheel_terra_estimator.reporting.fleet_summary import (
+    DriveRow,
+    write_summary_page,
+    write_table,
+)
+from wheel_terra_estimator.scheduler import finished
+from wheel_terra_estimator.terramechanics.effects import load_file
+
+SUMMARY_TABLE = 'summary.csv'
+SUMMARY_PAGE = 'summary.html'
+HOLDS = {'holds': 'replays of several recordings'}
+"""Note in the marker of the folder that holds the folders of the recordings."""
+
+DIGEST_SIZE = 20
+"""Bytes of a digest: no two recordings have the same."""
+READ_AT_ONCE = 2**20
+"""Bytes of a recording that are read at a time for its digest."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What is the same for all recordings.
+
+    ``report`` and ``table`` are names of files in the folder of each recording, empty for none.
+    """
+
+    configuration: Configuration
+    remaps: Mapping[str, str]
+    output: Path
+    report: str = ''
+    table: str = ''
+
+
+@dataclass(frozen=True)
+class _Task:
+    path: Path
+    digest: str
+    folder: str
+
+
+def replay_bags(
+    bags: Sequence[Path],
+    settings: Settings,
+    *,
+    overwrite: bool = False,
+    jobs: int = 1,
+    scheduler: str = '',
+) -> list[DriveRow]:
+    """Replay recordings into one folder each and write the summary over all.
+
+    Parameters
+    ----------
+    bags : sequence of Path
+        The recordings.
+    settings : Settings
+        What is the same for all.
+    overwrite : bool
+        Whether an earlier output is replaced; else a folder of an earlier run is continued.
+    jobs, scheduler
+        See `scheduler.finished`.
+
+    Returns
+    -------
+    list of DriveRow
+        In the order of `bags`; one that failed has its error.
+
+    Raises
+    ------
+    UserError
+        The output folder cannot be used.
+    """
+    output = settings.output
+    _open_folder(output, bags, overwrite)
+    rows: dict[int, DriveRow] = {}
+    paths = [path.absolute() for path in bags]
+    settings = replace(settings, output=output.absolute())
+    digests: dict[int, str] = {}
+    for i, digest in _shown(
+        finished(partial(_digest, settings), paths, jobs, scheduler), len(bags), 'compared'
+    ):
+        if isinstance(digest, Exception):
+            rows[i] = DriveRow(str(bags[i]), error=_words(digest, paths[i]))
+        else:
+            digests[i] = digest
+    tasks = _tasks(paths, digests, output, rows)
+    numbers = list(tasks)
+    try:
+        for k, row in _shown(
+            finished(partial(_replay, settings), list(tasks.values()), jobs, scheduler),
+            len(tasks),
+            'replayed',
+        ):
+            i = numbers[k]
+            rows[i] = (
+                DriveRow(str(bags[i]), error=_words(row, paths[i])) if isinstance(row, Exception) else row
+            )
+    finally:
+        for task in tasks.values():
+            remove_leftovers(output, task.folder)
+    told = [replace(rows[i], bag=str(bag)) for i, bag in enumerate(bags)]
+    with new_file(output / SUMMARY_TABLE, overwrite=True) as path:
+        write_table(told, path)
+    with new_file(output / SUMMARY_PAGE, overwrite=True) as path:
+        write_summary_page(told, path, settings.report)
+    return told
+
+
+def _open_folder(output: Path, bags: Sequence[Path], overwrite: bool) -> None:
+    """Make the folder, or go on with one that an earlier run of this kind has begun."""
+    ours = is_ours(output) and facts_of(output).items() >= HOLDS.items()
+    if output.exists() and not ours and not overwrite:
+        raise UserError(
+            f'{output}: exists and holds no replays of several recordings; choose another path '
+            'or give --overwrite'
+        )
+    if ours:
+        for left in output.glob('.*.wheel-terra-*'):
+            remove_leftovers(output, left.name[1:].rpartition('.wheel-terra-')[0])
+    working_folder(output, overwrite, ours and not overwrite, [SUMMARY_TABLE, SUMMARY_PAGE], bags)
+    try:
+        mark(output, [], HOLDS)
+    except OSError as error:
+        raise cannot_write(output, error) from None
+
+
+def _tasks(
+    paths: Sequence[Path], digests: Mapping[int, str], output: Path, rows: dict[int, DriveRow]
+) -> dict[int, _Task]:
+    """Return what is left to do, by number of the recording; rows that are there go to `rows`."""
+    done = {}
+    for folder in sorted(output.iterdir()):
+        facts = facts_of(folder) if folder.is_dir() else {}
+        if isinstance(facts.get('digest'), str) and isinstance(facts.get('row'), dict):
+            done[facts['digest']] = replace(DriveRow.from_json(facts['row']), folder=folder.name)
+    taken = {done[digest].folder for digest in digests.values() if digest in done}
+    tasks = {}
+    for i, digest in digests.items():
+        if digest in done:
+            rows[i] = done[digest]
+            continue
+        name = _free_name(paths[i], taken)
+        taken.add(name)
+        tasks[i] = _Task(paths[i], digest, name)
+    mark(output, [f'{task.folder}/' for task in tasks.values()])
+    return tasks
+
+
+def _free_name(path: Path, taken: set[str]) -> str:
+    path = path.resolve()
+    stem = path.name if path.is_dir() else path.stem
+    name, number = stem, 1
+    while name in taken or name in (SUMMARY_TABLE, SUMMARY_PAGE):
+        number += 1
+        name = f'{stem}_{number}'
+    return name
+
+
+def _digest(settings: Settings, path: Path) -> str:
+    """Return the digest of all that the output of a recording follows from, but its name."""
+    configuration = settings.configuration
+    values = configuration.flat()
+    stated = {
+        'version': __version__,
+        'values': values,
+        'stated': sorted(configuration.stated),
+        'remaps': dict(settings.remaps),
+        'files': [settings.report, settings.table],
+    }
+    digest = hashlib.blake2b(digest_size=DIGEST_SIZE)
+    digest.update(json.dumps(stated, sort_keys=True, default=str).encode())
+    files = [Path(str(values['effect_file']))] if values.get('effect_file') else []
+    try:
+        if path.is_dir():
+            files += sorted(p for p in path.iterdir() if p.is_file())
+        else:
+            files += [path, *(p for p in [path.with_name(f'{path.name}-wal')] if p.is_file())]
+        for file in files:
+            _add_file(digest, file)
+    except OSError as error:
+        raise UserError(f'{path}: cannot be read ({error.strerror or error})') from None
+    return digest.hexdigest()
+
+
+def _add_file(digest: Any, file: Path) -> None:
+    if not file.is_file():
+        raise UserError(f'{file}: there is no such recording')
+    digest.update(f'{file.suffix} {file.stat().st_size}\n'.encode())
+    with file.open('rb') as stream:
+        while block := stream.read(READ_AT_ONCE):
+            digest.update(block)
+
+
+def _replay(settings: Settings, task: _Task) -> DriveRow:
+    """Replay a recording in a worker; the digest is noted last, when everything is there."""
+    configuration = settings.configuration
+    if effect_file := configuration.flat().get('effect_file'):
+        load_file(str(effect_file))  # its reader has allowed it; this may be another machine
+    output = settings.output / task.folder
+    drive = replay_drive(
+        task.path,
+        configuration,
+        settings.remaps,
+        output,
+        overwrite=True,
+        every_set=bool(settings.table),
+        progress=False,
+    )
+    if settings.table:
+        drive.write_table(output / settings.table, overwrite=True)
+    if settings.report:
+        drive.write_report(output / settings.report, overwrite=True)
+    row = DriveRow.from_drive(str(task.path), drive.summary, drive.checked)
+    row = replace(row, folder=task.folder)
+    mark(output, [], {'digest': task.digest, 'row': asdict(row)})
+    return row
+
+
+def _words(error: Exception, path: Path) -> str:
+    words = ' '.join(str(error).split())
+    if isinstance(error, UserError):
+        return words.removeprefix(f'{path}: ')
+    return f'error of the program ({type(error).__name__}: {words})'
+
+
+def _shown(outcomes: Iterator[tuple[int, Any]], total: int, what: str) -> Iterator[tuple[int, Any]]:
+    """Show the rate and the time left on a terminal; end the workers when the loop is left."""
+    from tqdm import tqdm
+
+    quiet = not sys.stderr.isatty()
+    with closing(outcomes):
+        yield from tqdm(outcomes, total=total, unit='bag', desc=what, disable=quiet)

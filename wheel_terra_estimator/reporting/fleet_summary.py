@@ -1,0 +1,139 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Many drives in one table and on one page, the worst first."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import Any
+
+from wheel_terra_estimator.checks.finding import CheckReport
+from wheel_terra_estimator.estimation.estimates import SlipClass
+from wheel_terra_estimator.reporting.drive_summary import DriveSummary
+from wheel_terra_estimator.reporting.html import render, write_page
+from wheel_terra_estimator.reporting.style import CLASS_COLOURS
+
+CLASSES = tuple(c.name.lower() for c in SlipClass)
+
+
+@dataclass(frozen=True)
+class DriveRow:
+    """A drive among many; a drive that failed has an `error` and nothing else."""
+
+    bag: str
+    folder: str = ''  # below the output folder
+    error: str = ''
+    verdict: str = ''
+    duration: float = 0.0  # [s]
+    sets: int = 0
+    stuck_warnings: int = 0
+    first_warning: float | None = None  # [s] since the first set
+    seconds: Mapping[str, float] = field(default_factory=dict)  # by class, mean of the wheels
+    longest_stuck: float = 0.0  # [s], of the wheel that was longest in the class stuck
+    max_slip: float = 0.0
+    max_sinkage: float = 0.0  # [m]
+    findings: tuple[str, ...] = ()
+
+    @classmethod
+    def from_drive(cls, bag: str, summary: DriveSummary, checked: CheckReport) -> DriveRow:
+        """Return the row of a drive."""
+        wheels = summary.wheels
+        return cls(
+            bag=bag,
+            verdict=summary.verdict,
+            duration=summary.duration,
+            sets=summary.sets,
+            stuck_warnings=len(summary.warnings),
+            first_warning=summary.warnings[0].start if summary.warnings else None,
+            seconds={c: sum(w.seconds[c] for w in wheels) / max(len(wheels), 1) for c in CLASSES},
+            longest_stuck=max((w.seconds['stuck'] for w in wheels), default=0.0),
+            max_slip=max((w.max_slip for w in wheels), default=0.0),
+            max_sinkage=max((w.max_sinkage for w in wheels), default=0.0),
+            findings=tuple(str(finding) for finding in checked.findings),
+        )
+
+    @classmethod
+    def from_json(cls, kept: Mapping[str, Any]) -> DriveRow:
+        """Return the row that was written with `dataclasses.asdict`."""
+        known = {f.name for f in fields(cls)} & set(kept)
+        return cls(**{**{k: kept[k] for k in known}, 'findings': tuple(kept.get('findings', ()))})
+
+    @property
+    def as_line(self) -> str:
+        """The drive in a line."""
+        if self.error:
+            return f'{self.bag}: {self.error}'
+        plural = '' if len(self.findings) == 1 else 's'
+        found = f' {len(self.findings)} finding{plural}.' if self.findings else ''
+        return f'{self.bag}: {self.duration:.1f} s. {self.verdict}{found}'
+
+    @property
+    def tone(self) -> str:
+        """Colour of the drive on the page."""
+        if self.error or self.stuck_warnings or not self.sets:
+            return 'bad'
+        return 'warn' if self.seconds['high'] + self.seconds['stuck'] > 0.0 else 'good'
+
+
+def worst_first(rows: Sequence[DriveRow]) -> list[DriveRow]:
+    """Sort by stuck warnings, time stuck, time in the class high, slip; failed ones last."""
+
+    def badness(row: DriveRow) -> tuple[float, ...]:
+        high = row.seconds.get('high', 0.0)
+        return (-bool(row.error), row.stuck_warnings, row.longest_stuck, high, row.max_slip)
+
+    return sorted(rows, key=badness, reverse=True)
+
+
+def write_table(rows: Sequence[DriveRow], path: Path) -> None:
+    """Write ``summary.csv``: one row per recording in the order given, units in the header."""
+    header = ['bag', 'folder', 'duration [s]', 'sets', 'stuck_warnings', 'first_warning [s]']
+    header += [f'{c} [s]' for c in CLASSES]
+    header += ['longest_stuck [s]', 'max_slip', 'max_sinkage [m]', 'findings', 'error']
+    with path.open('w', newline='', encoding='utf-8') as file:
+        writer = csv.writer(file)
+        writer.writerow(header)
+        for row in rows:
+            figures: list[Any] = [''] * (len(header) - 4)
+            if not row.error:
+                first = '' if row.first_warning is None else f'{row.first_warning:.3f}'
+                figures = [f'{row.duration:.3f}', row.sets, row.stuck_warnings, first]
+                figures += [f'{row.seconds[c]:.3f}' for c in CLASSES]
+                figures += [f'{row.longest_stuck:.3f}', f'{row.max_slip:.4f}']
+                figures += [f'{row.max_sinkage:.4f}']
+            findings = '; '.join(row.findings)
+            writer.writerow([row.bag, row.folder, *figures, findings, row.error])
+
+
+def write_summary_page(rows: Sequence[DriveRow], path: Path, report: str = '') -> None:
+    """Write the page over all drives.
+
+    Parameters
+    ----------
+    rows : sequence of DriveRow
+        One per recording.
+    path : Path
+        HTML file in the folder that holds the folders of the drives.
+    report : str, optional
+        Name of the report in the folder of each drive, to be linked.
+    """
+    drives = [row for row in rows if not row.error]
+    warned = sum(bool(row.stuck_warnings) for row in drives)
+    page = render(
+        'fleet.html',
+        drives=worst_first(drives),
+        failed=[row for row in rows if row.error],
+        cards=[
+            (str(len(drives)), 'drives replayed'),
+            (f'{sum(row.duration for row in drives) / 3600:.2f} h', 'of driving'),
+            (str(warned), 'drives with a stuck warning'),
+            (str(sum(bool(row.findings) for row in drives)), 'drives with findings'),
+            (str(len(rows) - len(drives)), 'recordings that failed'),
+        ],
+        classes=[(c.name.lower(), colour) for c, colour in CLASS_COLOURS.items()],
+        report=report,
+    )
+    write_page(path, page)

@@ -1,0 +1,131 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Independent tasks side by side: in processes of this machine, or on a Dask cluster."""
+
+from __future__ import annotations
+
+import argparse
+from collections import deque
+from collections.abc import Callable, Generator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, wait
+from concurrent.futures.process import BrokenProcessPool
+from typing import Any, TypeVar
+
+from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.worker_pool import worker_pool
+
+Task = TypeVar('Task')
+Result = TypeVar('Result')
+
+CONNECT_TIMEOUT = 10
+"""Time [s] in which a Dask scheduler has to answer."""
+
+
+def add_jobs_argument(
+    parser: argparse.ArgumentParser, *aliases: str, default: int = 1, words: str = 'in parallel'
+) -> None:
+    """Declare ``--jobs``, the same for every command; aliases are not shown in the help."""
+    parser.add_argument('--jobs', type=_count, default=default, metavar='N', help=words)
+    for alias in aliases:
+        parser.add_argument(alias, dest='jobs', type=_count, help=argparse.SUPPRESS)
+
+
+def finished(
+    function: Callable[[Task], Result], tasks: Sequence[Task], jobs: int = 1, address: str = ''
+) -> Generator[tuple[int, Result | Exception], None, None]:
+    """Run a function on tasks and yield (index, result or exception) in the order of finishing.
+
+    A worker that dies (killed, out of memory) takes no other task along: those that it may have
+    worked on are run once more.
+
+    Parameters
+    ----------
+    function : callable
+        One at the top of a module, so that it can be sent to another process.
+    tasks : sequence
+        Its arguments, which can be pickled.
+    jobs : int
+        Processes on this machine.
+    address : str
+        Of a Dask scheduler; its workers are used in place of processes of this machine.
+
+    Raises
+    ------
+    UserError
+        Dask is not installed or its scheduler does not answer.
+    """
+    if address:
+        return _on_cluster(function, tasks, address)
+    return _on_this_machine(function, tasks, jobs)
+
+
+def _on_this_machine(
+    function: Callable[[Task], Result], tasks: Sequence[Task], jobs: int
+) -> Generator[tuple[int, Result | Exception], None, None]:
+    waiting = deque(range(len(tasks)))
+    suspects: list[int] = []
+    while waiting:
+        with worker_pool(min(jobs, len(waiting))) as pool:
+            running: dict[Future[Result], int] = {}
+            broken = False
+            while (waiting or running) and not broken:
+                while waiting and len(running) < jobs and not broken:
+                    try:
+                        running[pool.submit(function, tasks[waiting[0]])] = waiting[0]
+                        waiting.popleft()
+                    except BrokenProcessPool:
+                        broken = True
+                for future in wait(running, return_when=FIRST_COMPLETED).done:
+                    index = running.pop(future)
+                    outcome = _outcome(future)
+                    if isinstance(outcome, BrokenProcessPool):
+                        suspects.append(index)
+                        broken = True
+                    else:
+                        yield index, outcome
+            suspects += running.values()
+    for index in suspects:
+        with worker_pool(1) as pool:
+            outcome = _outcome(pool.submit(function, tasks[index]))
+        if isinstance(outcome, BrokenProcessPool):
+            outcome = UserError('its process was killed twice; is there enough memory?')
+        yield index, outcome
+
+
+def _on_cluster(
+    function: Callable[[Task], Result], tasks: Sequence[Task], address: str
+) -> Generator[tuple[int, Result | Exception], None, None]:
+    try:
+        from dask.distributed import Client, as_completed
+    except ImportError as error:
+        raise UserError(
+            f"--scheduler: Dask is missing; pip install 'wheel_terra_estimator[cluster]' ({error})"
+        ) from None
+    try:
+        client = Client(address, timeout=CONNECT_TIMEOUT)
+    except (OSError, ValueError) as error:
+        raise UserError(
+            f'--scheduler {address}: no Dask scheduler answers there ({error}); '
+            'start one with: dask scheduler'
+        ) from None
+    with client:
+        futures = client.map(function, tasks, pure=False)
+        index = {future.key: i for i, future in enumerate(futures)}
+        try:
+            for future in as_completed(futures):
+                yield index[future.key], _outcome(future)
+        except BaseException:
+            client.cancel(futures)
+            raise
+
+
+def _outcome(future: Any) -> Any:
+    """Return the result of a future (of either kind), or the exception that it ended with."""
+    error = future.exception()
+    return future.result() if error is None else error
+
+
+def _count(text: str) -> int:
+    if not text.isdecimal() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"'{text}' is no number of processes; give 1 or more")
+    return int(text)
