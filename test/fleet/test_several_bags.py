@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import csv
 import json
-import os
 import re
 import signal
 import subprocess
@@ -45,7 +44,7 @@ def test_several_are_what_each_is_alone(
     bags: list[str], config: list[str], tmp_path: Path, capsys: Any
 ) -> None:
     out = tmp_path / 'out'
-    arguments = ['replay', *bags, *config, '-o', str(out), '--jobs', '2', '--report', 'r.html']
+    arguments = ['replay', *bags, *config, '-o', str(out), '--jobs', '2', '--table', 't.csv']
     assert main(arguments) == 1
     said = capsys.readouterr().out.splitlines()
     assert said[-2] == '1 of 4 recordings failed:'
@@ -54,7 +53,7 @@ def test_several_are_what_each_is_alone(
         alone = tmp_path / 'alone' / name
         assert main(['replay', str(tmp_path / name), *config, '-o', str(alone)]) == 0
         assert estimates(out / name) == estimates(alone)
-        assert (out / name / 'r.html').is_file()
+        assert (out / name / 't.csv').is_file()
     with (out / 'summary.csv').open() as file:
         rows = list(csv.DictReader(file))
     assert [row['bag'] for row in rows] == bags
@@ -62,7 +61,7 @@ def test_several_are_what_each_is_alone(
     lengths = [float(row['duration [s]']) for row in rows if not row['error']]
     assert lengths == sorted(lengths, reverse=True)
     page = (out / 'summary.html').read_text()
-    assert 'href="drive3/r.html"' in page and 'broken.mcap' in page
+    assert '<td>drive3</td>' in page and 'broken.mcap' in page
 
 
 def test_a_restart_passes_over_what_is_done_by_content(
@@ -80,7 +79,7 @@ def test_a_restart_passes_over_what_is_done_by_content(
     assert main(['replay', *good[:2], *config, '-o', str(out)]) == 0
     assert written() == first and (out / 'summary.csv').read_bytes() == summary
     renamed = Path(good[0]).with_name('renamed')  # same content under another name
-    os.rename(good[0], renamed)
+    Path(good[0]).rename(renamed)
     assert main(['replay', str(renamed), *good[1:], *config, '-o', str(out)]) == 0
     then = written()
     assert set(then) == {'drive3', 'drive2', 'drive1'}
@@ -94,20 +93,27 @@ def test_an_output_that_has_lost_a_file_is_made_anew(
     bags: list[str], config: list[str], tmp_path: Path
 ) -> None:
     out = tmp_path / 'out'
-    arguments = ['replay', bags[2], bags[3], *config, '-o', str(out)]
-    assert main(arguments) == 0
+    arguments = ['replay', bags[1], bags[3], *config, '-o', str(out), '--report', 'r.html']
+    assert main(arguments) == 1
+    assert (out / 'drive1' / 'r.html').is_file()
+    assert 'href="drive1/r.html"' in (out / 'summary.html').read_text()
     (file,) = (out / 'drive1').glob('*.mcap')
     kept = file.read_bytes()
     file.unlink()
-    assert main(arguments) == 0
+    assert main(arguments) == 1
     assert estimates(out / 'drive1') == kept
+    (out / 'note.txt').touch()  # of somebody else: nothing is removed
+    assert main([*arguments, '--overwrite']) == 2
+    (out / 'note.txt').unlink()
+    assert main(['replay', bags[1], bags[1], *config, '-o', str(out), '--overwrite']) == 1
+    assert not (out / 'drive1').exists()
 
 
 def test_bags_of_one_name_get_folders_of_their_own(
     bags: list[str], config: list[str], tmp_path: Path, capsys: Any
 ) -> None:
     (tmp_path / 'other').mkdir()
-    os.rename(bags[2], tmp_path / 'other' / 'drive3')
+    Path(bags[2]).rename(tmp_path / 'other' / 'drive3')
     out = tmp_path / 'out'
     given = [bags[0], str(tmp_path / 'other' / 'drive3')]
     assert main(['replay', *given, *config, '-o', str(out), '--json']) == 0
@@ -145,7 +151,7 @@ def test_what_cannot_be_done_is_said_first(
 def test_ctrl_c_leaves_whole_outputs_and_the_next_run_goes_on(
     make_bag: Any, make_drive: Any, config: list[str], tmp_path: Path
 ) -> None:
-    long = make_bag(make_drive(3000), name='long')
+    long = make_bag(make_drive(500), name='long')
     short = make_bag(name='short')
     out = tmp_path / 'out'
     program = [sys.executable, '-m', 'wheel_terra_estimator.cli.main']
@@ -163,4 +169,3 @@ def test_ctrl_c_leaves_whole_outputs_and_the_next_run_goes_on(
     before = estimates(out / 'short')
     assert main(command[3:]) == 0
     assert estimates(out / 'short') == before and (out / 'long').is_dir()
-    assert main([*command[3:], '--overwrite']) == 0

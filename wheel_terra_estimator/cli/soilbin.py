@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.scheduler import add_jobs_argument
 
 if TYPE_CHECKING:
     from wheel_terra_estimator.soilbin.case import Case
@@ -86,7 +87,12 @@ def _common(parser: argparse.ArgumentParser, studies: bool) -> None:
     parser.add_argument('--cache', type=Path, metavar='DIR', help='where settled beds are kept')
     parser.add_argument('--no-cache', action='store_true', help='settle every bed anew')
     if studies:
-        parser.add_argument('--workers', type=int, default=0, metavar='N', help='0: all cores')
+        add_jobs_argument(
+            parser,
+            '--workers',
+            default=0,
+            words='engine processes at a time (default: one per core)',
+        )
         parser.add_argument(
             '--dask', default='', metavar='ADDRESS', help="a Dask scheduler, or 'local'"
         )

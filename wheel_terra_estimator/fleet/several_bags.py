@@ -105,29 +105,25 @@ def replay_bags(
     """
     output = settings.output
     _open_folder(output, bags, overwrite)
-    rows: dict[int, DriveRow] = {}
     paths = [path.absolute() for path in bags]
     settings = replace(settings, output=output.absolute())
+    rows: dict[int, DriveRow] = {}
     digests: dict[int, str] = {}
-    for i, digest in _shown(
-        finished(partial(_digest, settings), paths, jobs, scheduler), len(bags), 'compared'
-    ):
+    compared = finished(partial(_digest, settings), paths, jobs, scheduler)
+    for i, digest in _shown(compared, len(paths), 'compared'):
         if isinstance(digest, Exception):
             rows[i] = DriveRow(str(bags[i]), error=_words(digest, paths[i]))
         else:
             digests[i] = digest
     tasks = _tasks(paths, digests, output, rows)
     numbers = list(tasks)
+    replayed = finished(partial(_replay, settings), list(tasks.values()), jobs, scheduler)
     try:
-        for k, row in _shown(
-            finished(partial(_replay, settings), list(tasks.values()), jobs, scheduler),
-            len(tasks),
-            'replayed',
-        ):
+        for k, row in _shown(replayed, len(tasks), 'replayed'):
             i = numbers[k]
-            rows[i] = (
-                DriveRow(str(bags[i]), error=_words(row, paths[i])) if isinstance(row, Exception) else row
-            )
+            if isinstance(row, Exception):
+                row = DriveRow(str(bags[i]), error=_words(row, paths[i]))
+            rows[i] = row
     finally:
         for task in tasks.values():
             remove_leftovers(output, task.folder)
@@ -163,7 +159,7 @@ def _tasks(
     """Return what is left to do, by number of the recording; rows that are there go to `rows`."""
     done = {}
     for folder in sorted(output.iterdir()):
-        facts = facts_of(folder) if folder.is_dir() else {}
+        facts = facts_of(folder, only_whole=True) if folder.is_dir() else {}
         if isinstance(facts.get('digest'), str) and isinstance(facts.get('row'), dict):
             done[facts['digest']] = replace(DriveRow.from_json(facts['row']), folder=folder.name)
     taken = {done[digest].folder for digest in digests.values() if digest in done}
@@ -256,7 +252,9 @@ def _words(error: Exception, path: Path) -> str:
     return f'error of the program ({type(error).__name__}: {words})'
 
 
-def _shown(outcomes: Iterator[tuple[int, Any]], total: int, what: str) -> Iterator[tuple[int, Any]]:
+def _shown(
+    outcomes: Generator[tuple[int, Any], None, None], total: int, what: str
+) -> Iterator[tuple[int, Any]]:
     """Show the rate and the time left on a terminal; end the workers when the loop is left."""
     from tqdm import tqdm
 

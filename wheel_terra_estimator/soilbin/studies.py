@@ -40,7 +40,7 @@ def run(arguments: argparse.Namespace, cache: Path | None) -> int:
         (module.TABLE, *module.PAGES, 'series/', WORK),
     )
     jobs: list[Job] = module.jobs(arguments)
-    workers = 0 if arguments.report_only else arguments.workers or os.cpu_count() or 1
+    workers = 0 if arguments.report_only else arguments.jobs or os.cpu_count() or 1
     rows = run_study(jobs, table, folder / '.work', cache, workers, arguments.dask)
     module.report(arguments, rows, folder)
     return 0
