@@ -158,7 +158,7 @@ def test_interrupted_replay_leaves_a_readable_bag(
     deadline = time.monotonic() + 60.0
     # The output grows beside its place and is put there when it is whole.
     while time.monotonic() < deadline and not any(
-        file.stat().st_size > 2**20 for file in tmp_path.glob('.out*/*.mcap')
+        file.stat().st_size > 2**20 for file in tmp_path.glob('.out*/**/*.mcap')
     ):
         time.sleep(0.1)
     process.send_signal(signal.SIGINT)
