@@ -124,6 +124,11 @@ MAY_USE = {
         {'configuration', 'terramechanics', 'bags', 'checks', 'reporting'},
         {'tqdm'},
     ),
+    # The plain ways that the package is timed against need scipy's quadrature.
+    'benchmarks': (
+        {'configuration', 'terramechanics', 'estimation', 'simulation', 'bags'},
+        {'numpy', 'scipy'},
+    ),
     # It has a report of its own, and the wheel loads of its drives are those of the estimator.
     'discrepancy': (
         {'configuration', 'terramechanics', 'estimation', 'reporting', 'bags'},

@@ -38,6 +38,7 @@ COMMANDS = (
     'effects',
     'soilbin',
     'evaluate',
+    'bench',
     'demo',
 )
 
