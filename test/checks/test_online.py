@@ -27,6 +27,7 @@ PROFILE = {
     'drive.forward': [0.0, 0.0, 0.08, 0.08, 0.06],
     'drive.turn_rate': [0.0, 0.0, 0.0, 0.0, 0.25],
 }
+ZEROS = np.zeros(3)
 SIX, FOUR = None, 'frostyboy'
 
 
@@ -197,16 +198,19 @@ def test_a_kept_state_gives_the_same_verdict(drives):
     fault = on_imu(1.0 / 9.80665)
     drive = drives[SIX]
     checks = checks_over(drive, fault, 2.5)
-    kept = checks.state
-    begin = kept.sums.begin
-    force = np.array([0.0, 0.0, 1.0])
-    reading = InertialReading(begin + 1_100_000_000, force, np.zeros(3), None)
+    assert not checks.findings
+    kept = checks.snapshot()
+    first = next(a.measurement for a in drive.arrivals)
+    reading = InertialReading(first.stamp + 4_000_000_000, np.array([0.0, 0.0, 1.0]), ZEROS, None)
     checks.step(reading.stamp, StepInputs(inertial=reading))
-    after = checks.state
-    assert after.findings and not kept.findings
-    checks.state = kept
+    after, said = checks.snapshot(), checks.findings
+    assert said
+    checks.restore(kept)
+    assert not checks.findings
     checks.step(reading.stamp, StepInputs(inertial=reading))
-    assert checks.state == after
+    assert checks.snapshot() == after and checks.findings == said
+    checks.restore(kept)
+    assert checks.snapshot() == kept
 
 
 def test_a_finding_comes_and_goes_with_hysteresis():

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from statistics import median
 from typing import NamedTuple
 
@@ -113,26 +113,34 @@ Suspicion = tuple[str, int]
 """A name of RULES, and the wheel (-1: all)."""
 
 
-class _Sums(NamedTuple):
-    """What came since the window began."""
+@dataclass
+class _Sums:
+    """What came since the window began; written into, so that a step costs little."""
 
+    rims: list[float]  # [m/s]
+    torques: list[float]  # [N m]
     begin: int | None = None  # [ns]
-    rims: Floats = ()  # [m/s]
-    torques: Floats = ()  # [N m]
     odometry: int = 0
     slowest: float = math.inf  # typical size of the rim speeds
     fastest: float = 0.0
-    force: tuple[float, float, float] = (0.0, 0.0, 0.0)  # [m/s^2]
+    force_x: float = 0.0  # [m/s^2]
+    force_y: float = 0.0
+    force_z: float = 0.0
     yaw_rate: float = 0.0
     inertial: int = 0
     reference: float = 0.0
     reference_variance: float = 0.0
     references: int = 0
 
+    def copy(self) -> _Sums:
+        """Return sums that later steps leave alone."""
+        return replace(self, rims=list(self.rims), torques=list(self.torques))
 
-class _State(NamedTuple):
-    sums: _Sums
-    tallies: dict[Suspicion, Tally]  # replaced, never changed
+
+class _Verdicts(NamedTuple):
+    """What the windows so far said; replaced, never changed."""
+
+    tallies: dict[Suspicion, Tally]
     figures: dict[Suspicion, float]  # what the last agreeing window showed
     findings: tuple[Finding, ...]
 
@@ -192,64 +200,84 @@ class OnlineChecks:
         self._gravity = float(rover.gravity)
         self._weight = float(rover.mass) * self._gravity
         self._reference_std = float(configuration.sensors.reference_std)
-        self._nothing = _State(self._empty(), {}, {}, ())
-        self.state = self._nothing
+        self._sums = self._empty()
+        self._verdicts = _Verdicts({}, {}, ())
 
     @property
     def findings(self) -> tuple[Finding, ...]:
         """What stands now; empty: nothing."""
-        return self.state.findings
+        return self._verdicts.findings
 
     def reset(self) -> None:
         """Forget everything."""
-        self.state = self._nothing
+        self._sums = self._empty()
+        self._verdicts = _Verdicts({}, {}, ())
+
+    def snapshot(self) -> tuple[_Sums, _Verdicts]:
+        """Return the state in a form that later steps leave alone."""
+        return self._sums.copy(), self._verdicts
+
+    def restore(self, snapshot: tuple[_Sums, _Verdicts]) -> None:
+        """Return to a kept state."""
+        sums, self._verdicts = snapshot
+        self._sums = sums.copy()
 
     def step(self, stamp: int, inputs: StepInputs) -> None:
         """Take all inputs of a stamp [ns], later than the one before."""
-        sums = self.state.sums
+        sums = self._sums
         if sums.begin is None:
-            sums = sums._replace(begin=stamp)
+            sums.begin = stamp
         if inputs.wheel_odometry is not None:
-            sums = self._with_odometry(sums, inputs.wheel_odometry)
+            self._add_odometry(inputs.wheel_odometry)
         if inputs.inertial is not None:
-            sums = _with_inertial(sums, inputs.inertial)
+            self._add_inertial(inputs.inertial)
         if inputs.reference is not None:
-            sums = self._with_reference(sums, inputs.reference)
-        assert sums.begin is not None
-        if stamp - sums.begin < WINDOW:
-            self.state = self.state._replace(sums=sums)
-            return
-        self._judge(self._window(sums))
-        self.state = self.state._replace(sums=self._empty()._replace(begin=stamp))
+            self._add_reference(inputs.reference)
+        if stamp - sums.begin >= WINDOW:
+            self._judge(self._window(sums))
+            self._sums = self._empty()
+            self._sums.begin = stamp
 
     # -- Windows --------------------------------------------------------------------------------
 
     def _empty(self) -> _Sums:
-        zeros = (0.0,) * len(self._radius)
-        return _Sums(rims=zeros, torques=zeros)
+        zeros = [0.0] * len(self._radius)
+        return _Sums(zeros, list(zeros))
 
-    def _with_odometry(self, sums: _Sums, odometry: WheelOdometry) -> _Sums:
-        rims = [r * w for r, w in zip(self._radius, odometry.rate.tolist(), strict=True)]
-        sizes = sorted(abs(rim) for rim in rims if rim == rim)
+    def _add_odometry(self, odometry: WheelOdometry) -> None:
+        sums, rims, torques = self._sums, self._sums.rims, self._sums.torques
+        sizes = []
+        for i, (rate, torque) in enumerate(
+            zip(odometry.rate.tolist(), odometry.torque.tolist(), strict=True)
+        ):
+            rim = rate * self._radius[i]
+            if rim == rim:
+                sizes.append(abs(rim))
+            rims[i] += rim  # nan stays: the wheel is not known in this window
+            torques[i] += torque
+        sums.odometry += 1
         if not sizes:
-            return sums
+            return
+        sizes.sort()
         size = sizes[len(sizes) // 2]
-        torques = odometry.torque.tolist()
-        return sums._replace(
-            rims=tuple(a + b for a, b in zip(sums.rims, rims, strict=True)),
-            torques=tuple(a + b for a, b in zip(sums.torques, torques, strict=True)),
-            odometry=sums.odometry + 1,
-            slowest=min(sums.slowest, size),
-            fastest=max(sums.fastest, size),
-        )
+        sums.slowest = min(sums.slowest, size)
+        sums.fastest = max(sums.fastest, size)
 
-    def _with_reference(self, sums: _Sums, reference: ReferenceVelocity) -> _Sums:
+    def _add_inertial(self, reading: InertialReading) -> None:
+        sums = self._sums
+        x, y, z = reading.specific_force.tolist()
+        sums.force_x += x
+        sums.force_y += y
+        sums.force_z += z
+        sums.yaw_rate += float(reading.angular_rate[2])
+        sums.inertial += 1
+
+    def _add_reference(self, reference: ReferenceVelocity) -> None:
+        sums = self._sums
         variance = reference.variance if reference.variance > 0.0 else self._reference_std**2
-        return sums._replace(
-            reference=sums.reference + reference.forward,
-            reference_variance=sums.reference_variance + variance,
-            references=sums.references + 1,
-        )
+        sums.reference += reference.forward
+        sums.reference_variance += variance
+        sums.references += 1
 
     def _window(self, sums: _Sums) -> _Window:
         count = max(sums.odometry, 1)
@@ -259,15 +287,17 @@ class OnlineChecks:
             std = math.sqrt(sums.reference_variance) / sums.references
             if abs(reference) < max(3.0 * std, LEAST_RIM_SPEED):
                 reference = math.nan
-        x, y, z = sums.force
         inertial = sums.inertial
+        force = (sums.force_x, sums.force_y, sums.force_z)
         return _Window(
             rims=tuple(rim / count if sums.odometry else math.nan for rim in sums.rims),
             torques=tuple(t / count if sums.odometry else math.nan for t in sums.torques),
             steady=sums.odometry > 0
             and sums.slowest > LEAST_RIM_SPEED
             and sums.fastest - sums.slowest < UNSTEADY * sums.fastest,
-            force=(x / inertial, y / inertial, z / inertial) if inertial else None,
+            force=(force[0] / inertial, force[1] / inertial, force[2] / inertial)
+            if inertial
+            else None,
             yaw_rate=sums.yaw_rate / inertial if inertial else math.nan,
             reference=reference,
         )
@@ -275,16 +305,16 @@ class OnlineChecks:
     # -- Judgement ------------------------------------------------------------------------------
 
     def _judge(self, window: _Window) -> None:
-        tallies, figures = dict(self.state.tallies), dict(self.state.figures)
+        tallies, figures = dict(self._verdicts.tallies), dict(self._verdicts.figures)
         for name, wheel, agrees, figure in self._evidence(window):
             key = name, wheel
             tallies[key] = RULES[name].after(tallies.get(key, Tally()), agrees)
             if agrees:
                 figures[key] = figure
-        changed = tallies != self.state.tallies
-        self.state = self.state._replace(tallies=tallies, figures=figures)
+        changed = tallies != self._verdicts.tallies
+        self._verdicts = self._verdicts._replace(tallies=tallies, figures=figures)
         if changed:
-            self.state = self.state._replace(findings=tuple(self._findings()))
+            self._verdicts = self._verdicts._replace(findings=tuple(self._findings()))
 
     def _evidence(self, window: _Window) -> Iterator[Evidence]:
         if window.force is not None:
@@ -403,7 +433,7 @@ class OnlineChecks:
             if name in left_out:
                 continue
             sure = min(1.0 - 0.5 ** (score + 1), GREATEST_SURE)
-            yield _WORDS[name](self, self.state.figures[name, wheel], wheel, sure)
+            yield _WORDS[name](self, self._verdicts.figures[name, wheel], wheel, sure)
 
     def _gravity_words(self, figure: float, wheel: int, sure: float) -> Finding:
         seen = f'mean specific force {figure:.3g} m/s^2 where gravity is {self._gravity:.4g}: '
@@ -559,7 +589,7 @@ class OnlineChecks:
         )
 
     def _standing(self) -> dict[Suspicion, int]:
-        return {key: tally.score for key, tally in self.state.tallies.items() if tally.stands}
+        return {key: tally.score for key, tally in self._verdicts.tallies.items() if tally.stands}
 
     def _finding(
         self,
@@ -601,16 +631,6 @@ _CONSEQUENCES = {
     'torque': {'torque_of_wheel'},
 }
 """Fault -> what it makes other windows say."""
-
-
-def _with_inertial(sums: _Sums, reading: InertialReading) -> _Sums:
-    x, y, z = reading.specific_force.tolist()
-    force = sums.force
-    return sums._replace(
-        force=(force[0] + x, force[1] + y, force[2] + z),
-        yaw_rate=sums.yaw_rate + float(reading.angular_rate[2]),
-        inertial=sums.inertial + 1,
-    )
 
 
 def _mean(values: Floats, indices: list[int]) -> float:

@@ -52,12 +52,13 @@ class WatchedEstimator:
 
     def snapshot(self) -> Any:
         """Return both states."""
-        return self._estimator.snapshot(), self._checks.state
+        return self._estimator.snapshot(), self._checks.snapshot()
 
     def restore(self, snapshot: Any) -> None:
         """Return to a kept state."""
-        state, self._checks.state = snapshot
-        self._estimator.restore(state)
+        estimator, checks = snapshot
+        self._estimator.restore(estimator)
+        self._checks.restore(checks)
 
     def begin_run(self, stamp: int, keep_soil: bool) -> None:
         """Start anew."""
