@@ -351,12 +351,15 @@ class OnlineChecks:
                 yield 'one_side_backwards', -1, True, window.reference
             elif turn * difference > 0.0:
                 yield 'one_side_backwards', -1, False, 0.0
-        elif left * right > 0.0:
+        elif left * right > 0.0 and self._straight(window):
             yield 'one_side_backwards', -1, False, 0.0
         if abs(yaw_rate) < LEAST_YAW_RATE or 0.5 * abs(turn) < CLEAR_TURN * window.size:
             return
-        yield 'gyro_unit', -1, 0.5 * abs(turn) > IMPOSSIBLE_YAW * fastest, yaw_rate
         ratio = difference / turn
+        if 0.5 * abs(turn) > IMPOSSIBLE_YAW * fastest:
+            yield 'gyro_unit', -1, True, yaw_rate
+        elif ORDINARY_TRACKS[0] < ratio < ORDINARY_TRACKS[1]:
+            yield 'gyro_unit', -1, False, yaw_rate
         if ORDINARY_TRACKS[0] < abs(ratio) < ORDINARY_TRACKS[1]:
             yield 'sides', -1, ratio < 0.0, ratio
         if ORDINARY_TRACKS[0] < ratio < ORDINARY_TRACKS[1]:
