@@ -6,6 +6,8 @@ from __future__ import annotations
 
 import errno
 import json
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -220,3 +222,33 @@ def test_commands_refuse_folders_of_others(tmp_path: Path, capsys: pytest.Captur
         assert 'is not overwritten' in said
         assert said.count('\n') == 1
     assert len(contents(z)) == 5
+
+
+def test_what_a_killed_run_left_is_removed_by_the_next_and_a_running_one_is_left_alone(
+    tmp_path: Path,
+) -> None:
+    out = tmp_path / 'out'
+    code = (
+        'import sys, time\n'
+        'from pathlib import Path\n'
+        'from wheel_terra_estimator.output_folder import new_folder\n'
+        'with new_folder(Path(sys.argv[1])) as folder:\n'
+        "    (folder / 'half.mcap').write_bytes(b'half')\n"
+        "    print('there', flush=True)\n"
+        '    time.sleep(60)\n'
+    )
+    with subprocess.Popen(
+        [sys.executable, '-c', code, str(out)], stdout=subprocess.PIPE, text=True
+    ) as running:
+        assert running.stdout is not None
+        assert running.stdout.readline() == 'there\n'
+        (hidden,) = tmp_path.glob('.out.wheel-terra-*')
+        with new_folder(out) as folder:
+            (folder / 'whole').write_text('whole')
+        assert (hidden / 'out' / 'half.mcap').is_file()
+        running.kill()
+    assert hidden.is_dir()
+    with new_folder(out, overwrite=True) as folder:
+        (folder / 'again').write_text('again')
+    assert not hidden.exists()
+    assert [p.name for p in tmp_path.iterdir()] == ['out']

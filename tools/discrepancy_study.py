@@ -23,7 +23,6 @@ import os
 import sys
 import time
 from collections.abc import Iterator
-from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 for _name in ('OMP_NUM_THREADS', 'OPENBLAS_NUM_THREADS'):
@@ -33,6 +32,8 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from campaigns import make_campaign, scoring, summary  # noqa: E402
 from campaigns.groups import GROUPS  # noqa: E402
+
+from wheel_terra_estimator.worker_pool import worker_pool  # noqa: E402
 
 SCORING_SEEDS = 11_000_000
 Task = tuple[str, str, int]
@@ -88,7 +89,7 @@ def _results(todo: list[Task], processes: int) -> Iterator[dict[str, object]]:
     if processes <= 1:
         yield from map(one, todo)
         return
-    with ProcessPoolExecutor(processes) as pool:
+    with worker_pool(processes) as pool:
         yield from pool.map(one, todo)
 
 

@@ -15,7 +15,6 @@ import argparse
 import json
 import os
 import sys
-from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 for _name in ('OMP_NUM_THREADS', 'OPENBLAS_NUM_THREADS'):
@@ -29,6 +28,7 @@ from campaigns.groups import GROUPS  # noqa: E402
 from scipy.special import expit  # noqa: E402
 
 from wheel_terra_estimator.discrepancy.selection import confidence  # noqa: E402
+from wheel_terra_estimator.worker_pool import worker_pool  # noqa: E402
 
 FIRST_SEED = 50_000  # below 100,000: not for scoring
 LEFT_OUT = ', kind left out'
@@ -75,7 +75,7 @@ def run(file: Path, per_group: int, processes: int) -> None:
         for design in GROUPS[group.partition(LEFT_OUT)[0]].designs
         if f'{group} {design} {FIRST_SEED + i}' not in done
     ]
-    with ProcessPoolExecutor(processes) as pool, file.open('a') as stream:
+    with worker_pool(processes) as pool, file.open('a') as stream:
         for records in pool.map(names_of, todo):
             stream.writelines(json.dumps(record) + '\n' for record in records)
             stream.flush()

@@ -6,7 +6,7 @@
 
 Every case has a number, from which it follows entirely: ``--only 4711`` runs one again. Exit
 status 1 if a case raised anything but an error of one line, lost an intact message, or took more
-than the limits.
+than the limits. Ctrl-C ends it with what is done: go on with the seed behind the last case.
 """
 
 from __future__ import annotations
@@ -40,7 +40,10 @@ def main() -> int:
     if arguments.only is not None:
         first, count = arguments.only, 1
     done, faults = fuzz(first, count, arguments.kind)
-    print(f'{count} cases from {first}: ' + ', '.join(f'{n} {kind}' for kind, n in done.items()))
+    print(
+        f'{done.total()} cases from {first}: '
+        + ', '.join(f'{n} {kind}' for kind, n in done.items())
+    )
     print(f'{len(faults)} faults')
     return 1 if faults else 0
 
@@ -64,7 +67,10 @@ def fuzz(first: int, count: int, kind: str | None = None) -> tuple[Counter[str],
             chosen = dice.choice(kinds)
             chosen = kind or chosen
             begun = time.process_time()
-            wrong = run(chosen, dice, Path(folder))
+            try:
+                wrong = run(chosen, dice, Path(folder))
+            except KeyboardInterrupt:
+                break
             used = time.process_time() - begun
             if not wrong and used > SLOWEST:
                 wrong = f'took {used:.1f} s'

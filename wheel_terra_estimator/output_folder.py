@@ -123,7 +123,9 @@ def new_folder(
     path = _absolute(path)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
+        _remove_left_behind(path)
         beside = Path(tempfile.mkdtemp(dir=path.parent, prefix=f'.{path.name}.wheel-terra-'))
+        held = _hold(beside)
     except OSError as error:
         raise cannot_write(path, error) from None
     kept = False
@@ -147,6 +149,8 @@ def new_folder(
         raise UserError(f'{cannot_write(path, error)}{words}') from None
     finally:
         shutil.rmtree(beside, ignore_errors=True)
+        if held is not None:
+            os.close(held)
 
 
 @contextmanager
@@ -304,6 +308,36 @@ def _refuse_place(path: Path, inputs: Iterable[Path]) -> None:
                 f'{path}: is, or lies in, or holds {given}, which the command reads; '
                 'choose another path'
             )
+
+
+def _remove_left_behind(path: Path) -> None:
+    """Remove the hidden folders of earlier runs that were killed while they wrote ``path``."""
+    for found in path.parent.glob(f'.{glob.escape(path.name)}.wheel-terra-*'):
+        if found.is_dir() and not found.is_symlink():
+            held = _hold(found)
+            if held is not None:
+                shutil.rmtree(found, ignore_errors=True)
+                os.close(held)
+
+
+def _hold(folder: Path) -> int | None:
+    """Lock a folder as long as the returned descriptor is open, at most until the process ends.
+
+    None if another process holds it, or where folders cannot be locked.
+    """
+    try:
+        import fcntl
+    except ImportError:  # not a POSIX system
+        return None
+    descriptor = -1
+    try:
+        descriptor = os.open(folder, os.O_RDONLY)
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        if descriptor >= 0:
+            os.close(descriptor)
+        return None
+    return descriptor
 
 
 def _home() -> Path | None:

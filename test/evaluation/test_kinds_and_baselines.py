@@ -153,3 +153,16 @@ def test_worlds_and_kinds_of_the_command():
         ('rival', 'climb'),
     ]
     assert ('own', 'firm') not in evaluate._chosen('own', None)
+
+
+def test_a_filter_that_failed_on_a_drive_ends_evaluate_with_status_1(monkeypatch, capsys):
+    from wheel_terra_estimator.evaluation import bench, tables
+
+    health = {'filter_restarts': 2}
+    drive = bench.DriveScore('climb', 1, 'reference', None, None, health)
+    monkeypatch.setattr(bench, 'run', lambda *_: bench.Results([drive]))
+    monkeypatch.setattr(tables, 'report', lambda *_: 'tables')
+    assert main(['evaluate', '--kinds', 'climb', '--seeds', '1']) == 1
+    assert 'The filter was started anew 2 times in 1 runs.' in capsys.readouterr().out
+    health['filter_restarts'] = 0
+    assert main(['evaluate', '--kinds', 'climb', '--seeds', '1']) == 0

@@ -211,6 +211,8 @@ def output_case(dice: random.Random, folder: Path) -> None:
     said, out = io.StringIO(), io.StringIO()
     with redirect_stderr(said), redirect_stdout(out):
         status = main(['replay', str(path), '--config', str(folder / 'rover.yaml')])
+    if status == 130:  # the command took the Ctrl-C that was for the fuzzing
+        raise KeyboardInterrupt
     if status not in (0, 2) or (status == 2 and said.getvalue().count('\n') != 1):
         raise FaultError(f'status {status}: {said.getvalue()[:300]}')
 

@@ -11,6 +11,8 @@ from pathlib import Path
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.scheduler import add_jobs_argument
 
+FILTER_FAILED = 1
+"""Exit status where the filter failed on a drive; none of them should make it."""
 INTERRUPTED = 130
 SUMMARY = 'score the estimator against ground truth and baselines'
 EXAMPLES = (
@@ -118,6 +120,7 @@ def run(arguments: argparse.Namespace) -> int:
         text = write(results, arguments.modes)
         restarts = sum(drive.health.get('filter_restarts', 0) for drive in results.drives)
         text += f'\n\nThe filter was started anew {restarts} times in {len(results.drives)} runs.'
+        status = FILTER_FAILED if restarts else 0
         if results.interrupted:
             text += f'\n\n{results.interrupted}'
             status = INTERRUPTED
