@@ -10,6 +10,7 @@ import pytest
 import rolling_rover as rolling
 
 from wheel_terra_estimator.checks.calibration import as_file, calibrate
+from wheel_terra_estimator.checks.run import check_recording
 from wheel_terra_estimator.configuration import reader
 
 WRONG = {
@@ -40,7 +41,25 @@ def test_the_scale_of_the_torques():
     joints = rolling.recording().joints
     calibration, _ = calibrated(joints=replace(joints, torque=1.2 * joints.torque))
     gain = next(c for c in calibration.changes if c.key == 'sensors.torque_gain')
-    assert abs(gain.after[0] - 1.0 / 1.2) < 2.0 * gain.std
+    assert abs(gain.after[0] - 1.2) < 2.0 * gain.std
+
+
+def test_the_written_gain_is_found_no_more(tmp_path):
+    joints = rolling.recording().joints
+    wrong = replace(rolling.recording(), joints=replace(joints, torque=1.4 * joints.torque))
+    path = tmp_path / 'rover.yaml'
+    rover = rolling.rover()
+    path.write_text(as_file(calibrate(wrong, rover), rover, 'drive'))
+    mended = reader.load([path])
+    assert mended.sensors.torque_gain[0] == pytest.approx(1.4, rel=0.1)
+    assert mended.sensors.torque_gain_std < 0.2
+    assert 'gain' in {finding.kind for finding in check_recording(wrong, rover).findings}
+    assert not {'gain', 'mass'} & {f.kind for f in check_recording(wrong, mended).findings}
+    again = {change.key: change.after for change in calibrate(wrong, mended).changes}
+    gain = again.get('sensors.torque_gain', list(mended.sensors.torque_gain))
+    assert gain[0] == pytest.approx(mended.sensors.torque_gain[0], rel=0.02)
+    zero = again['sensors.torque_zero']
+    np.testing.assert_allclose(zero, mended.sensors.torque_zero, atol=0.02)
 
 
 def test_what_the_recording_cannot_tell_stays():
@@ -53,7 +72,7 @@ def test_what_the_recording_cannot_tell_stays():
 
 def test_the_file_is_accepted_and_says_where_numbers_come_from(tmp_path):
     calibration, configuration = calibrated()
-    text, _ = as_file(calibration, configuration, 'drive')
+    text = as_file(calibration, configuration, 'drive')
     path = tmp_path / 'rover.yaml'
     path.write_text(text)
     radius = reader.load([path]).wheels.radius

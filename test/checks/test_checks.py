@@ -138,7 +138,7 @@ def test_torque_scale_is_a_gain_or_a_mass():
     report = checked(joints=joints)
     assert kinds(report) == {('gain', None), ('mass', None)}
     gain = next(f for f in report.findings if f.kind == 'gain')
-    assert gain.value == pytest.approx(1.0 / 1.5, abs=3.0 * gain.std)
+    assert gain.value == pytest.approx(1.5, abs=3.0 * gain.std)
 
 
 def test_torque_sign_of_one_wheel():

@@ -18,6 +18,8 @@ import pytest
 from wheel_terra_estimator.bags.history import EstimateHistory, read_estimates
 from wheel_terra_estimator.bags.storage import open_bag
 from wheel_terra_estimator.cli.main import main
+from wheel_terra_estimator.configuration import reader
+from wheel_terra_estimator.configuration.soil_file import read_values
 from wheel_terra_estimator.estimation.estimates import SlipClass
 
 REAL = ('--remap', 'odom:=/wheel/odometry', '--remap', 'reference_odom:=/truth/odometry')
@@ -67,6 +69,28 @@ def test_same_input_gives_the_same_bytes(make_bag: Any, config: list[str], tmp_p
         (file,) = (tmp_path / name / 'out').glob('*.mcap')
         found.append(file.read_bytes())
     assert found[0] == found[1]
+
+
+def test_what_was_learned_is_a_further_config_of_every_command(
+    make_bag: Any, config: list[str], tmp_path: Path, capsys: Any
+) -> None:
+    bag, kept = str(make_bag()), tmp_path / 'learned.yaml'
+    stated = ['-p', 'sensors.torque_zero:=[0.5, -0.25]']
+    assert main(['replay', bag, *config, *stated, '--save-soil', str(kept)]) == 0
+    assert f'soil: {kept}' in capsys.readouterr().out
+    values = read_values(kept)
+    assert values['sensors.torque_zero'] == [0.5, -0.25]
+    assert {'soil.cohesion', 'soil.cohesion_std', 'sensors.angular_rate_bias_std'} <= set(values)
+    from_node = reader.from_parameters(reader.load([config[1], kept]).flat())
+    assert {key: from_node.flat()[key] for key in values} == values
+    again = [*config, '--config', str(kept)]
+    assert main(['replay', bag, *again]) == 0
+    assert main(['predict', *again, '--slip', '0.1:0.3:3', '--load', '100']) == 0
+    assert main(['replay', bag, *config, '--save-soil', str(kept)]) == 2
+    assert 'exists already' in capsys.readouterr().err
+    assert read_values(kept) == values
+    assert main(['replay', bag, *config, '--save-soil', str(kept), '--overwrite']) == 0
+    assert read_values(kept)['sensors.torque_zero'] == [0.0, 0.0]
 
 
 def test_existing_output_is_refused_unless_overwrite(

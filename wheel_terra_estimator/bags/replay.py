@@ -52,6 +52,7 @@ class Replay:
     counters: dict[str, Any]
     notes: tuple[str, ...]
     interrupted: bool
+    learned: dict[str, Any]  # configuration key -> value, see `EstimatorCore.learned`
 
 
 def replay(
@@ -133,6 +134,7 @@ def replay(
         counters=pipeline.counters(),
         notes=tuple(_notes(bag, reader, pipeline, interrupted.is_set())),
         interrupted=interrupted.is_set(),
+        learned=pipeline.core.learned(),
     )
 
 

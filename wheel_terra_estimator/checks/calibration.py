@@ -126,7 +126,8 @@ def _biases(evidence: Evidence) -> list[Change]:
         return []
     key = 'sensors.angular_rate_bias'
     worst = float(np.max(std))
-    after = [round(float(value), 6) for value in bias]
+    whole = bias + configuration.sensors.angular_rate_bias
+    after = [round(float(value), 6) for value in whole]
     return [Change(key, _before(configuration, key), after, worst, f'mean of the gyro {where}')]
 
 
@@ -195,20 +196,31 @@ def _torques(evidence: Evidence, report: CheckReport) -> list[Change]:
         return []
     changes = []
     gain = torque.torque_gain(evidence, report.figures)
-    count = len(evidence.facts.names)
     if not isinstance(gain, NotChecked) and gain.value > 0.0 and gain.sigmas_from(1.0) > 1.0:
-        key, factor = 'sensors.torque_gain', round(1.0 / gain.value, 4)
-        std = gain.std / gain.value**2
+        whole = torque.whole_gain(evidence, gain.value)
+        std = float(np.max(whole)) * gain.std / gain.value
         source = 'sum of T/r against mass times specific force on slopes; the mass taken as stated'
-        changes.append(Change(key, _before(configuration, key), [factor] * count, std, source))
+        after = [round(float(one), 4) for one in whole]
+        changes += _with_deviation(configuration, 'sensors.torque_gain', after, std, source)
     zeros = torque.torque_zeros(evidence)
     if zeros is not None:
-        key = 'sensors.torque_zero'
+        zeros = torque.whole_zeros(evidence, zeros)
         after = [round(zero.value, 3) for zero in zeros]
         std = max(zero.std for zero in zeros)
         source = 'straight stretches driven both ways'
-        changes.append(Change(key, _before(configuration, key), after, std, source))
+        changes += _with_deviation(configuration, 'sensors.torque_zero', after, std, source)
     return changes
+
+
+def _with_deviation(
+    configuration: Configuration, key: str, after: Value, std: float, source: str
+) -> list[Change]:
+    """Return a change and that of its deviation, which the estimator goes by."""
+    stated, told = f'{key}_std', float(f'{std:.3g}')
+    return [
+        Change(key, _before(configuration, key), after, std, source),
+        Change(stated, _before(configuration, stated), told, None, f'deviation of {key}'),
+    ]
 
 
 def _track(evidence: Evidence) -> list[Change]:
@@ -225,23 +237,16 @@ def _track(evidence: Evidence) -> list[Change]:
     return [Change('wheels.y', _before(configuration, 'wheels.y'), after, std, source)]
 
 
-def as_file(
-    calibration: Calibration, configuration: Configuration, recording: str
-) -> tuple[str, list[Change]]:
-    """Return the rover file as text, and the changes that its format has no parameter for."""
+def as_file(calibration: Calibration, configuration: Configuration, recording: str) -> str:
+    """Return the rover file as text."""
     from wheel_terra_estimator.configuration import ros_yaml
-    from wheel_terra_estimator.configuration.parameters import declared
 
-    known = declared()
-    changes = {change.key: change for change in calibration.changes if change.key in known}
-    homeless = [change for change in calibration.changes if change.key not in known]
+    changes = {change.key: change for change in calibration.changes}
     values = configuration.flat()
     keys = [key for key in values if key in configuration.stated or key in changes]
     lines = [f'# Calibrated from the recording {recording}.', '#']
     lines += ['# Not seen in it, and left as it was:'] if calibration.not_seen else []
     lines += [f'#   {entry.kind}: {entry.reason}' for entry in calibration.not_seen]
-    for change in homeless:
-        lines.append(f'# Seen, no parameter here: {change.key}: {_in_words(change)}')
     lines += ['/**:', '  ros__parameters:']
     for key in keys:
         told = changes.get(key)
@@ -249,7 +254,7 @@ def as_file(
         if told is not None:
             lines.append(f'    # {_in_words(told)}')
         lines.append(f'    {key}: {ros_yaml.format_value(_as_declared(value, values.get(key)))}')
-    return '\n'.join(lines) + '\n', homeless
+    return '\n'.join(lines) + '\n'
 
 
 def _as_declared(value: Value, before: Value | None) -> Value:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from wheel_terra_estimator.checks.rover_facts import RoverFacts
 from wheel_terra_estimator.checks.series import Recording, VelocitySeries
 from wheel_terra_estimator.checks.statistics import averaged, robust_std
+from wheel_terra_estimator.estimation.sensor_errors import SensorErrors
 
 FloatArray = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -40,7 +41,8 @@ class Evidence:
     time : numpy.ndarray
         (k,) stamps of the wheel odometry since the first one [s], increasing.
     rate, torque : numpy.ndarray
-        (k, n) per wheel of ``facts.names``, positive forward; nan where not there.
+        (k, n) per wheel of ``facts.names``, positive forward; nan where not there. Torques, forces
+        and angular rates are without the errors that the rover file states.
     force, gyro : numpy.ndarray or None
         (k, 3) specific force and angular rate in ``base_link`` as the rover file has it, averaged
         over the period of the wheel odometry.
@@ -195,6 +197,9 @@ def gather(recording: Recording, facts: RoverFacts, rotation: FloatArray) -> Evi
             column = joints.names.index(name)
             rate[:, index] = facts.direction[index] * joints.rate[rows, column]
             torque[:, index] = facts.direction[index] * joints.torque[rows, column]
+    errors = SensorErrors(facts.configuration) if facts.configuration is not None else None
+    if errors is not None:
+        torque = errors.torque.true(torque)
     force = gyro = None
     imu = recording.imu
     if imu is not None and imu.stamp.size > 1 and time.size > 1:
@@ -202,6 +207,9 @@ def gather(recording: Recording, facts: RoverFacts, rotation: FloatArray) -> Evi
         width = float(np.median(np.diff(time)))
         force = averaged(at, np.nan_to_num(imu.force) @ rotation.T, time, width)
         gyro = averaged(at, np.nan_to_num(imu.rate) @ rotation.T, time, width)
+        if errors is not None:
+            force = force - errors.specific_force_bias
+            gyro = gyro - errors.angular_rate_bias
     return Evidence(recording, facts, time, rate, torque, force, gyro, rotation)
 
 

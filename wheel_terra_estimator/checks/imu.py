@@ -533,14 +533,15 @@ def check_noise_and_zero(evidence: Evidence, figures: dict[str, Any]) -> list[Ou
     limit = max(BIAS_FACTOR * sensors.angular_rate_bias_std, LEAST_GYRO_BIAS)
     worst = int(np.argmax(np.abs(bias)))
     if abs(bias[worst]) > limit:
-        listed = ', '.join(f'{value:.5f}' for value in bias)
+        whole = bias + sensors.angular_rate_bias
+        listed = ', '.join(f'{value:.5f}' for value in whole)
         found.append(
             Finding(
                 'zero',
                 imu.topic,
                 None,
                 'sensors.angular_rate_bias',
-                float(f'{bias[worst]:.4g}'),
+                float(f'{whole[worst]:.4g}'),
                 float(std[worst]),
                 0.99,
                 f'angular_velocity.{"xyz"[worst]} reads {bias[worst]:.3g} rad/s {where}',

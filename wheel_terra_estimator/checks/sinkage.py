@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from wheel_terra_estimator.checks.evidence import Evidence
 from wheel_terra_estimator.checks.finding import Finding, NotChecked, Outcome
 from wheel_terra_estimator.checks.statistics import robust_std
+from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.estimation.sensor_errors import LinearErrors, SensorErrors
 
 FloatArray = NDArray[np.float64]
 
@@ -55,11 +57,30 @@ def check_sinkage(evidence: Evidence, figures: dict[str, Any]) -> list[Outcome]:
         return [*found, NotChecked('zero', 'hardly any sinkage readings')]
     unit, table = _unit(evidence, table)
     found += unit
+    if facts.configuration is not None:
+        table = _without_stated_errors(facts.configuration, names, table)
     middle = np.array([_median(column) for column in table.T])
     figures['sinkage.median_m'] = [round(float(m), 4) for m in middle]
     found += _sign_and_zero(evidence, names, table, middle)
     found += _noise(evidence, table, figures)
     return found
+
+
+def _without_stated_errors(
+    configuration: Configuration, names: list[str], table: FloatArray
+) -> FloatArray:
+    errors = SensorErrors(configuration).sinkage
+    rows = [configuration.wheels.names.index(name) for name in names]
+    return LinearErrors(errors.zero[rows], errors.gain[rows]).true(table)
+
+
+def _whole_zero(evidence: Evidence, name: str, left: float) -> float:
+    """Return the zero of a reading [m] of which ``left`` remains behind the one stated."""
+    configuration = evidence.facts.configuration
+    if configuration is None:
+        return left
+    errors, index = SensorErrors(configuration).sinkage, configuration.wheels.names.index(name)
+    return float(errors.zero[index] + errors.gain[index] * left)
 
 
 def _median(column: FloatArray) -> float:
@@ -107,7 +128,7 @@ def _sign_and_zero(
     lugs = float(np.max(configuration.wheels.lug_height)) if configuration else 0.0
     limit = BELOW_ZERO + lugs
     if np.nanmedian(middle) < -limit:
-        return _reversed_or_zero(evidence, table, float(np.nanmedian(middle)))
+        return _reversed_or_zero(evidence, names, table, float(np.nanmedian(middle)))
     found: list[Outcome] = []
     if np.nanmedian(np.abs(middle)) < limit:
         found.append(NotChecked('sign', 'sinkage: hardly any in it; drive where it is soft'))
@@ -122,16 +143,19 @@ def _sign_and_zero(
             typical = float(np.nanmedian(others))
             mirrored = abs(-middle[index] - typical) < 0.6 * typical
             kind = 'sign' if mirrored and _skew(reading) <= 0.0 else 'zero'
-            found.append(_one_wheel(sinkage.topic, name, kind, middle[index], typical))
+            found.append(_one_wheel(evidence, name, kind, middle[index], typical))
         elif abs(far) > max(ODD_ZERO, 3.0 * spread):
             found.append(
-                _one_wheel(sinkage.topic, name, 'zero', middle[index], float(np.nanmedian(others)))
+                _one_wheel(evidence, name, 'zero', middle[index], float(np.nanmedian(others)))
             )
     return found
 
 
-def _one_wheel(topic: str, name: str, kind: str, reading: float, typical: float) -> Finding:
+def _one_wheel(evidence: Evidence, name: str, kind: str, reading: float, typical: float) -> Finding:
+    assert evidence.recording.sinkage is not None
+    topic = evidence.recording.sinkage.topic
     off = reading - typical
+    zero = _whole_zero(evidence, name, off)
     if kind == 'sign':
         return Finding(
             'sign',
@@ -149,15 +173,17 @@ def _one_wheel(topic: str, name: str, kind: str, reading: float, typical: float)
         topic,
         name,
         'sensors.sinkage_zero',
-        round(off, 4),
+        round(zero, 4),
         None,
         0.9,
         f'reads {1000 * off:+.0f} mm off the other wheels all the time',
-        f'take {off:.4f} m off sinkage of {name} (sensors.sinkage_zero)',
+        f'sensors.sinkage_zero: {zero:.4f} in the place of {name}',
     )
 
 
-def _reversed_or_zero(evidence: Evidence, table: FloatArray, middle: float) -> list[Outcome]:
+def _reversed_or_zero(
+    evidence: Evidence, names: list[str], table: FloatArray, middle: float
+) -> list[Outcome]:
     """Tell a reversed sign (deep spells go down) from a zero error (deep spells go up)."""
     sinkage = evidence.recording.sinkage
     assert sinkage is not None
@@ -177,14 +203,15 @@ def _reversed_or_zero(evidence: Evidence, table: FloatArray, middle: float) -> l
                 'negate position in the driver (sinkage is positive down)',
             )
         ]
-    listed = ', '.join([f'{middle:.4f}'] * table.shape[1])
+    zeros = [_whole_zero(evidence, name, middle) for name in names]
+    listed = ', '.join(f'{zero:.4f}' for zero in zeros)
     return [
         Finding(
             'zero',
             sinkage.topic,
             None,
             'sensors.sinkage_zero',
-            round(middle, 4),
+            round(float(np.mean(zeros)), 4),
             None,
             0.8,
             f'median sinkage {1000 * middle:.0f} mm: the wheels would float',

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from wheel_terra_estimator.checks.evidence import LEAST_MOVING_ROWS, Evidence
 from wheel_terra_estimator.checks.finding import Finding, NotChecked, Outcome
 from wheel_terra_estimator.checks.statistics import Estimate, block_fit, confidence, correlation
+from wheel_terra_estimator.estimation.sensor_errors import SensorErrors
 
 FloatArray = NDArray[np.float64]
 
@@ -133,8 +134,11 @@ def _off_scale(evidence: Evidence, traction: float) -> Finding:
     joints = evidence.recording.joints
     assert joints is not None
     fit = _slope_fit(evidence)
-    value, std = (1.0 / fit.value, fit.std / fit.value**2) if fit else (None, None)
-    gain = ', '.join([f'{value:.3g}'] * len(evidence.facts.names)) if value else '...'
+    gain, value, std = '...', None, None
+    if fit is not None and fit.value > 0.0:
+        whole = whole_gain(evidence, fit.value)
+        gain = ', '.join(f'{one:.3g}' for one in whole)
+        value, std = float(np.mean(whole)), float(np.mean(whole)) * fit.std / fit.value
     return Finding(
         'gain',
         joints.topic,
@@ -174,6 +178,25 @@ def _smooth(values: FloatArray) -> FloatArray:
     return np.asarray(np.convolve(values, np.ones(width) / width, mode='valid'))
 
 
+def whole_gain(evidence: Evidence, left: float) -> FloatArray:
+    """Return the gains (n,) of which a factor ``left`` remains behind those stated."""
+    configuration = evidence.facts.configuration
+    stated = 1.0 if configuration is None else SensorErrors(configuration).torque.gain
+    return np.full(len(evidence.facts.names), left) * stated
+
+
+def whole_zeros(evidence: Evidence, left: list[Estimate]) -> list[Estimate]:
+    """Return the zeros [N m] of which ``left`` remains behind those stated."""
+    configuration = evidence.facts.configuration
+    if configuration is None:
+        return left
+    errors = SensorErrors(configuration).torque
+    return [
+        Estimate(float(zero + gain * one.value), float(gain) * one.std)
+        for one, zero, gain in zip(left, errors.zero, errors.gain, strict=True)
+    ]
+
+
 def torque_gain(evidence: Evidence, figures: dict[str, Any]) -> Estimate | NotChecked:
     """Return the scale of the torques against mass times specific force, model error included."""
     fit = _slope_fit(evidence)
@@ -199,8 +222,9 @@ def _gain(evidence: Evidence, figures: dict[str, Any]) -> list[Outcome]:
     sigmas = abs(gain.value - 1.0) / math.hypot(gain.std, stated)
     if sigmas < 3.0 or abs(gain.value - 1.0) < LEAST_GAIN_ERROR or gain.value <= 0.0:
         return []
-    factor = 1.0 / gain.value
-    listed = ', '.join([f'{factor:.3f}'] * len(facts.names))
+    whole = whole_gain(evidence, gain.value)
+    listed = ', '.join(f'{one:.3f}' for one in whole)
+    middle = float(np.mean(whole))
     mass = facts.mass * gain.value
     words = f'slopes cost {gain.value:.2f} +- {gain.std:.2f} of what weight and torque say'
     return [
@@ -209,8 +233,8 @@ def _gain(evidence: Evidence, figures: dict[str, Any]) -> list[Outcome]:
             joints.topic,
             None,
             'sensors.torque_gain',
-            round(factor, 4),
-            round(gain.std / gain.value**2, 4),
+            round(middle, 4),
+            round(middle * gain.std / gain.value, 4),
             0.5 * confidence(sigmas),
             f'{words}: the torque has another scale, or the mass is another',
             f'sensors.torque_gain: [{listed}]',
@@ -270,7 +294,8 @@ def _zeros(evidence: Evidence, figures: dict[str, Any]) -> list[Outcome]:
         limit = max(ZERO_FACTOR * stated, 0.5 * driving, 5.0 * zero.std)
         if abs(zero.value) > limit:
             wrong.append((name, zero))
-    listed = ', '.join(f'{zero.value:.2f}' for zero in zeros)
+    whole = dict(zip(facts.names, whole_zeros(evidence, zeros), strict=True))
+    listed = ', '.join(f'{zero.value:.2f}' for zero in whole.values())
     for name, zero in wrong:
         found.append(
             Finding(
@@ -278,8 +303,8 @@ def _zeros(evidence: Evidence, figures: dict[str, Any]) -> list[Outcome]:
                 joints.topic,
                 name,
                 'sensors.torque_zero',
-                round(zero.value, 3),
-                round(zero.std, 3),
+                round(whole[name].value, 3),
+                round(whole[name].std, 3),
                 confidence(zero.sigmas_from(0.0)),
                 f'torque reads {zero.value:.2f} N m off zero, {where}',
                 f'sensors.torque_zero: [{listed}]',

@@ -53,12 +53,10 @@ def run(arguments: argparse.Namespace) -> int:
         name = arguments.bag.resolve().name
         recording = read_series(bag, parse_remaps(arguments.remap), name)
     calibration = calibrate(recording, configuration)
-    text, homeless = as_file(calibration, configuration, name)
+    text = as_file(calibration, configuration, name)
     with new_file(arguments.output, arguments.overwrite) as path:
         path.write_text(text, encoding='utf-8')
     print(f'{name}: {len(calibration.changes)} parameters told')
     print('\n'.join(summary(calibration)))
-    for change in homeless:
-        print(f'  to be applied in the driver, no parameter here: {change.key}')
     print(f'rover file: {arguments.output}')
     return 0

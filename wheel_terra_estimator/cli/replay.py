@@ -10,6 +10,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 from wheel_terra_estimator.configuration import reader as configuration_reader
+from wheel_terra_estimator.configuration import soil_file
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.scheduler import add_jobs_argument
 
@@ -47,6 +48,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='F.csv|F.parquet',
         help='table of the estimates, one row per set and wheel, units in the header; with several '
         'recordings a name, for one in the folder of each',
+    )
+    parser.add_argument(
+        '--save-soil',
+        type=Path,
+        metavar='F.yaml',
+        help='parameter file with the soil and the sensor biases that were learned, a further '
+        '--config for the next drive of this rover; of one recording',
     )
     parser.add_argument('--json', action='store_true', help='print the summary as JSON')
     parser.add_argument(
@@ -92,7 +100,7 @@ def _run_one(arguments: argparse.Namespace) -> int:
     from wheel_terra_estimator.bags.reader import parse_remaps
     from wheel_terra_estimator.checks.finding import CheckReport
     from wheel_terra_estimator.fleet.drive import replay_drive
-    from wheel_terra_estimator.output_folder import check_file, check_folder
+    from wheel_terra_estimator.output_folder import check_file, check_folder, new_file
     from wheel_terra_estimator.reporting import estimates_table, truth_scores
     from wheel_terra_estimator.reporting.drive_summary import as_dict, as_text
     from wheel_terra_estimator.reporting.html import check_page
@@ -112,6 +120,8 @@ def _run_one(arguments: argparse.Namespace) -> int:
     if arguments.table:
         estimates_table.check_table(arguments.table)
         check_file(arguments.table, arguments.overwrite, inputs)
+    if arguments.save_soil:
+        check_file(arguments.save_soil, arguments.overwrite, inputs)
     if arguments.output:
         check_folder(arguments.output, arguments.overwrite, inputs)
     drive = replay_drive(
@@ -135,17 +145,23 @@ def _run_one(arguments: argparse.Namespace) -> int:
         print('\n'.join([as_text(drive.summary), *lines]))
     if arguments.table:
         drive.write_table(arguments.table, arguments.overwrite)
+    if arguments.save_soil:
+        if not drive.result.learned:
+            raise UserError(f'{bag}: no estimates, so nothing for {arguments.save_soil}')
+        with new_file(arguments.save_soil, arguments.overwrite, inputs) as path:
+            soil_file.write_values(path, drive.result.learned)
     if arguments.report:
         drive.write_report(arguments.report, arguments.overwrite)
     written = {
         'table': arguments.table,
+        'soil': arguments.save_soil,
         'estimates': arguments.output,
         'report': arguments.report,
     }
     if not arguments.json:
-        for what, path in written.items():
-            if path:
-                print(f'{what}: {path}')
+        for what, written_path in written.items():
+            if written_path:
+                print(f'{what}: {written_path}')
     return INTERRUPTED if drive.result.interrupted else 0
 
 
@@ -159,6 +175,8 @@ def _run_several(arguments: argparse.Namespace) -> int:
         raise UserError('several recordings need a folder for their outputs: add -o DIR')
     if arguments.arrival:
         raise UserError('--arrival: belongs to one recording; replay that one by itself')
+    if arguments.save_soil:
+        raise UserError('--save-soil: belongs to one recording; replay that one by itself')
     if arguments.report:
         check_page(arguments.report)
     if arguments.table:

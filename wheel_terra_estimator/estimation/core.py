@@ -2,9 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """The estimator core: typed measurements in, sets of estimates out; no ROS, no file format.
 
-A measurement passes the checks of its values, then the watch over the clock, then the timeline,
-which runs the filter in the order of stamps; sets pass the guard. The node and the replay differ
-in nothing but who calls ``add``, and the same calls give the same numbers.
+A measurement loses the stated errors of its sensor, passes the checks of its values, then the watch
+over the clock, then the timeline, which runs the filter in the order of stamps; sets pass the
+guard. The node and the replay differ in nothing but who calls ``add``, and the same calls give the
+same numbers.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from wheel_terra_estimator.configuration import Configuration
 from wheel_terra_estimator.estimation.estimates import EstimateSet, SlipClass
 from wheel_terra_estimator.estimation.measurements import Measurement
 from wheel_terra_estimator.estimation.output_guard import OutputGuard
+from wheel_terra_estimator.estimation.sensor_errors import SensorErrors
 from wheel_terra_estimator.estimation.timing.clock_watch import (
     Arrival,
     ClockWatch,
@@ -60,6 +62,7 @@ class EstimatorCore:
         self._settings = _time_settings(configuration)
         self._lags = LagLearner(_max_lag(configuration))
         self._clock_step = _nanoseconds(configuration.filter.clock_step)
+        self._errors = SensorErrors(configuration)
         self._checks = InputChecks(configuration)
         self._guard = OutputGuard(configuration)
         self._timeline = Timeline(self._estimator, self._settings, self._finish)
@@ -83,7 +86,7 @@ ReferenceVelocity
         """
         channel = CHANNELS[type(measurement)]
         self._received[channel] += 1
-        checked = self._checks.check(channel, measurement)
+        checked = self._checks.check(channel, self._errors.corrected(measurement))
         if checked is None:
             return []
         return self._follow(self._watch.judge(channel, checked))
@@ -115,19 +118,9 @@ ReferenceVelocity
 
         Empty where there were no estimates yet.
         """
-        if hasattr(self._estimator, 'learned'):
-            return dict(self._estimator.learned())
-        latest = self._latest
-        found: dict[str, Any] = {}
-        if latest is not None:
-            rows = zip(
-                latest.soil_names, latest.soil.tolist(), latest.soil_std.tolist(), strict=True
-            )
-            for key, value, std in rows:
-                name, degrees = key.removesuffix('_deg'), key.endswith('_deg')
-                found[key] = value
-                found[f'{name}_std{"_deg" if degrees else ""}'] = std
-        return found
+        if self._latest is None:
+            return {}
+        return dict(getattr(self._estimator, 'learned', dict)())
 
     @property
     def last_reasons(self) -> dict[str, str]:

@@ -67,6 +67,7 @@ from wheel_terra_estimator.estimation.judgement.stuck.situation import (
     RoverMotion,
     WheelMotion,
 )
+from wheel_terra_estimator.estimation.learned import Learned
 from wheel_terra_estimator.estimation.measurements import ReferenceVelocity, StepInputs
 from wheel_terra_estimator.estimation.outputs import MissingInputs, Outputs, Sources
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
@@ -171,6 +172,9 @@ class WheelSoilEstimator:
         self._margin = PullMargin(sensors, layout, models)
         self._stuck = StuckMonitor(StuckSettings.from_configuration(configuration))
         self._outputs = Outputs(configuration, rover, sensors, layout)
+        self._learned = Learned(
+            configuration, layout, self._ekf.covariance, self._outputs.learned_soil
+        )
         self._clock = _Clock()
         self._parts: tuple[Part, ...] = (
             self._inertial,
@@ -625,6 +629,11 @@ class WheelSoilEstimator:
             reference=not self._reference.known(time),
         )
         return self._outputs.estimate_set(given, missing)
+
+    def learned(self) -> dict[str, Any]:
+        """Return what was learned: configuration key -> value, deviations ``_std`` too."""
+        ekf = self._ekf
+        return self._learned.values(ekf.mean, ekf.covariance, self._zero_velocity.state.zero)
 
     def health(self) -> dict[str, Any]:
         """Return counters and consistency figures for diagnostics."""

@@ -3,7 +3,7 @@
 """Sensors of the simulated rover: truth in, typed measurements with arrival times out.
 
 Noise, zero errors and rates are those of the rover file (``sensors.*``): each seed draws its own
-zeros, gains and biases with these standard deviations.
+zeros, gains and biases with these standard deviations, on top of those that the file states.
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ from wheel_terra_estimator.estimation.measurements import (
     SinkageReading,
     WheelOdometry,
 )
+from wheel_terra_estimator.estimation.sensor_errors import SensorErrors
 from wheel_terra_estimator.simulation.scenario import Fault, Scenario
 from wheel_terra_estimator.simulation.truth import Truth
 
@@ -61,6 +62,7 @@ class SensorSuite:
         self._configuration: Configuration = configuration
         self._there = scenario.sensors
         self._figures = figures = configuration.sensors
+        self._errors = SensorErrors(configuration)
         self._random = random
         self._faults = faults
         n = configuration.wheels.count
@@ -118,7 +120,7 @@ class SensorSuite:
         for time, name in sorted(found):
             part = min(max((time - before.time) / span, 0.0), 1.0)
             for measurement in getattr(self, f'_{name}')(before, truth, part, time):
-                arrivals.append(self._sent(measurement, name, time))
+                arrivals.append(self._sent(self._errors.as_read(measurement), name, time))
         return arrivals
 
     # One sensor each; part: position between two truths ------------------------------------------

@@ -42,6 +42,7 @@ from wheel_terra_estimator.discrepancy.tables.steady_table import SteadyTable
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.estimation.measurements import Measurement
 from wheel_terra_estimator.estimation.rover import Rover
+from wheel_terra_estimator.estimation.sensor_errors import SensorErrors
 from wheel_terra_estimator.terramechanics.kinematics import slip_ratio
 
 FloatArray = NDArray[np.float64]
@@ -178,7 +179,8 @@ def rows_from_measurements(
 ) -> DriveRows:
     """Return the steady rows of a drive; see `rows_from_bag`."""
     wheels = configuration.wheels
-    series = collect(measurements, wheels.count, name)
+    corrected = map(SensorErrors(configuration).corrected, measurements)
+    series = collect(corrected, wheels.count, name)
     finder = _WindowFinder(series, configuration)
     windows = _with_deviations(finder.search(), configuration)
     if not windows:

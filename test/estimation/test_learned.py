@@ -1,0 +1,138 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""What a drive taught, as the next drive starts from it."""
+
+import numpy as np
+import pytest
+from fake_estimator import SECOND
+
+from wheel_terra_estimator.configuration import reader
+from wheel_terra_estimator.configuration.soil_file import read_values, write_values
+from wheel_terra_estimator.estimation.core import EstimatorCore
+from wheel_terra_estimator.estimation.measurements import (
+    InertialReading,
+    ReferenceVelocity,
+    WheelOdometry,
+)
+from wheel_terra_estimator.simulation.drive import simulate
+from wheel_terra_estimator.simulation.scenario import load
+
+START = 100 * SECOND
+SOIL = ('friction_angle_deg', 'cohesion', 'shear_modulus', 'frictional_modulus', 'cohesive_modulus')
+LEVEL = np.array([0.0, 0.0, 0.0, 1.0])
+GRAVITY = 9.80665
+OVERRIDES = {'sensors.specific_force_bias_std': 0.1, 'sensors.orientation_std_deg': 0.05}
+
+
+def run(configuration, measurements):
+    core = EstimatorCore(configuration)
+    sets = [s for m in measurements for s in core.add(m)] + core.flush()
+    return core, sets
+
+
+def deviation(key):
+    return key.replace('_deg', '') + ('_std_deg' if key.endswith('_deg') else '_std')
+
+
+@pytest.fixture(scope='module')
+def drive():
+    scenario = {'configuration': ['generic_six_wheel', 'dry_sand_ding2015'], 'duration': 40.0}
+    return simulate(load(scenario | {'slope.angle_deg': [8.0]}), 3)
+
+
+@pytest.fixture(scope='module')
+def driven(drive):
+    return run(drive.configuration, (a.measurement for a in drive.arrivals))
+
+
+def standing(duration, rate, force=(0.0, 0.0, GRAVITY)):
+    """A rover that stands; the IMU reads these."""
+    stamps = range(START, START + round(duration * SECOND), SECOND // 50)
+    for i, stamp in enumerate(stamps):
+        yield InertialReading(stamp, np.array(force), np.array(rate), LEVEL)
+        if i % 5 == 0:
+            yield WheelOdometry(stamp, np.zeros(4), np.zeros(4))
+
+
+def test_soil_is_that_of_the_topic_and_its_deviations_hold_elsewhere(drive, driven):
+    core, sets = driven
+    learned = core.learned()
+    last = dict(zip(sets[-1].soil_names, sets[-1].soil.tolist(), strict=True))
+    std = dict(zip(sets[-1].soil_names, sets[-1].soil_std.tolist(), strict=True))
+    start = dict(zip(sets[0].soil_names, sets[0].soil_std.tolist(), strict=True))
+    assert set(last) == {f'soil.{name}' for name in SOIL}
+    for key, value in last.items():
+        assert learned[key] == pytest.approx(value, rel=1e-12)
+        assert learned[deviation(key)] >= 0.999 * std[key]
+    key = 'soil.friction_angle_deg'
+    assert std[key] < 0.9 * start[key]  # something was learned
+    phi = np.radians(last[key])
+    of_tangent = np.radians(learned[deviation(key)]) / (np.sin(phi) * np.cos(phi))
+    assert 0.1 <= of_tangent <= 0.2  # sand from place to place: 12 %
+
+
+def test_where_nothing_was_learned_restarts_do_not_add_up(drive):
+    configuration = drive.configuration
+    first = next(a.measurement for a in drive.arrivals if isinstance(a.measurement, WheelOdometry))
+    found = []
+    for _ in range(3):
+        core, _ = run(configuration, [first])
+        found.append(core.learned())
+        configuration = configuration.replace(found[-1])
+    for key, value in found[0].items():
+        assert found[2][key] == pytest.approx(value, rel=1e-6), key
+
+
+def test_the_second_drive_begins_where_the_first_one_ended(driven, drive, tmp_path):
+    core, sets = driven
+    learned = core.learned()
+    path = tmp_path / 'learned.yaml'
+    write_values(path, learned)
+    assert read_values(path) == learned  # to the last bit
+    again = drive.configuration.replace(read_values(path))
+    _, second = run(again, (a.measurement for a in drive.arrivals[:200]))
+    np.testing.assert_allclose(second[0].soil, sets[-1].soil, rtol=1e-6)
+    away = [abs(sets_[0].soil[0] - sets[-1].soil[0]) for sets_ in (second, sets)]
+    assert away[0] < 1e-4 < away[1]  # friction angle [deg]
+
+
+def test_zeros_of_the_gyro_are_learned_at_rest_on_top_of_those_stated():
+    rover = reader.load(['frostyboy', 'dry_sand_ding2015'])
+    rate = (0.004, -0.006, 0.01)
+    core, before = run(rover, standing(20.0, rate))
+    learned = core.learned()['sensors.angular_rate_bias']
+    np.testing.assert_allclose(learned, [0.0, -0.006, 0.01], atol=2e-4)
+    again = rover.replace({'sensors.angular_rate_bias': learned})
+    moved = tuple(r + 0.002 for r in rate)
+    core, sets = run(again, standing(20.0, moved))
+    assert max(abs(s.yaw_rate) for s in sets) < 0.0021
+    assert max(abs(s.yaw_rate) for s in before) > 0.005
+    np.testing.assert_allclose(
+        core.learned()['sensors.angular_rate_bias'], [0.0, -0.004, 0.012], atol=4e-4
+    )
+
+
+def test_the_bias_of_the_accelerometer_has_the_sign_of_the_sensor():
+    rover = reader.load(['generic_six_wheel', 'dry_sand_ding2015']).replace(OVERRIDES)
+    rim_rate = 0.1 / float(rover.wheels.slip_radius[0])
+
+    def driving():
+        for i in range(50 * 20):
+            stamp = START + i * SECOND // 50
+            yield InertialReading(stamp, np.array([0.08, 0.0, GRAVITY]), np.zeros(3), LEVEL)
+            if i % 5 == 0:
+                yield WheelOdometry(stamp, np.full(6, rim_rate), np.full(6, np.nan))
+            if i % 25 == 0:
+                yield ReferenceVelocity(stamp, 0.1, 1e-6)
+
+    core, _ = run(rover, driving())
+    first = core.learned()['sensors.specific_force_bias']
+    np.testing.assert_allclose(first, [0.08, 0.0, 0.0], atol=0.005)
+    again = rover.replace({'sensors.specific_force_bias': first})
+    core, _ = run(again, driving())
+    second = core.learned()['sensors.specific_force_bias']
+    np.testing.assert_allclose(second, [0.08, 0.0, 0.0], atol=0.002)
+
+
+def test_nothing_before_the_first_set():
+    assert EstimatorCore(reader.load(['frostyboy'])).learned() == {}

@@ -1,0 +1,127 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Stated zeros, gains and biases are taken off once, wherever readings enter."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from test_core_with_filter import START, drive
+
+from wheel_terra_estimator.configuration import reader
+from wheel_terra_estimator.estimation.core import EstimatorCore
+from wheel_terra_estimator.estimation.measurements import (
+    InertialReading,
+    SinkageReading,
+    WheelOdometry,
+)
+from wheel_terra_estimator.estimation.sensor_errors import SensorErrors
+from wheel_terra_estimator.simulation.drive import simulate
+from wheel_terra_estimator.simulation.scenario import load
+
+FORCE_BIAS, RATE_BIAS = np.array([0.05, -0.02, 0.1]), np.array([0.001, -0.002, 0.003])
+STATED = {
+    'sensors.torque_gain': [1.2] * 4,
+    'sensors.torque_zero': [2.0, -1.0, 0.0, 3.0],
+    'sensors.sinkage_gain': [0.9] * 4,
+    'sensors.sinkage_zero': [0.004] * 4,
+    'sensors.specific_force_bias': FORCE_BIAS,
+    'sensors.angular_rate_bias': RATE_BIAS,
+}
+
+
+@pytest.fixture(scope='module')
+def rover():
+    return reader.load(['frostyboy', 'dry_sand_ding2015'], ['sensors.torque_gain_std:=0.05'])
+
+
+def misread(measurement):
+    """Return a reading of sensors with these errors, written out."""
+    if isinstance(measurement, WheelOdometry):
+        torque = 1.2 * measurement.torque + np.array([2.0, -1.0, 0.0, 3.0])
+        return replace(measurement, torque=torque)
+    if isinstance(measurement, SinkageReading):
+        return replace(measurement, sinkage=0.9 * measurement.sinkage + 0.004)
+    if isinstance(measurement, InertialReading):
+        return replace(
+            measurement,
+            specific_force=measurement.specific_force + FORCE_BIAS,
+            angular_rate=measurement.angular_rate + RATE_BIAS,
+        )
+    return measurement
+
+
+def estimates(configuration, stream):
+    core = EstimatorCore(configuration)
+    sets = [s for m in stream for s in core.add(m)] + core.flush()
+    return {
+        name: np.array([getattr(s, name) for s in sets], dtype=float)
+        for name in ('slip', 'slip_std', 'drawbar_pull', 'sinkage', 'normal_load', 'soil')
+    }
+
+
+def test_a_drive_with_stated_errors_gives_the_estimates_of_the_clean_one(rover):
+    clean = drive(1)
+    wrong = [misread(measurement) for measurement in clean]
+    expected = estimates(rover, clean)
+    corrected = estimates(rover.replace(STATED), wrong)
+    left = estimates(rover, wrong)
+    for name, values in expected.items():
+        np.testing.assert_allclose(corrected[name], values, rtol=1e-6, atol=1e-9, err_msg=name)
+    for name in ('drawbar_pull', 'sinkage'):
+        assert np.abs(left[name] - expected[name]).max() > 1e-3, name
+
+
+def test_each_kind_of_reading(rover):
+    errors = SensorErrors(rover.replace(STATED))
+    truth = WheelOdometry(START, np.full(4, 3.0), np.array([10.0, -5.0, np.nan, 0.0]))
+    back = errors.corrected(misread(truth))
+    np.testing.assert_allclose(back.torque, truth.torque, atol=1e-12)
+    assert back.rate is truth.rate
+    for reading in (misread(truth), misread(SinkageReading(START, np.full(4, 0.02)))):
+        again = errors.as_read(errors.corrected(reading))
+        field = 'torque' if isinstance(reading, WheelOdometry) else 'sinkage'
+        np.testing.assert_allclose(getattr(again, field), getattr(reading, field), atol=1e-12)
+
+
+def test_what_the_checks_are_to_refuse_is_left_to_them(rover):
+    configuration = rover.replace(STATED)
+    core = EstimatorCore(configuration)
+    core.add(WheelOdometry(START, np.zeros(2), np.zeros(2)))
+    core.add(InertialReading(START, np.zeros(3), np.zeros(3), None))
+    health = core.health()
+    assert health['joint_states_rejected: wrong number of wheels'] == 1
+    assert health['imu/data_rejected: specific force exactly zero (sensor not running)'] == 1
+
+
+def test_nothing_stated_changes_nothing(rover):
+    errors = SensorErrors(rover)
+    for measurement in drive(2, duration=1.0):
+        assert errors.corrected(measurement) is measurement
+        assert errors.as_read(measurement) is measurement
+
+
+def test_simulated_sensors_have_the_stated_errors():
+    level = {'configuration': ['generic_six_wheel', 'test_sand'], 'duration': 3.0}
+    stated = {
+        'torque_gain': [1.2] * 6,
+        'torque_zero': [2.0] * 6,
+        'sinkage_zero': [0.003] * 6,
+        'angular_rate_bias': [0.0, 0.0, 0.01],
+    }
+    keys = [f'sensors.{name}:={values}' for name, values in stated.items()]
+    true, read = (simulate(load(level, parameters=given), 4) for given in ([], keys))
+    errors = SensorErrors(read.configuration)
+    for clean, wrong in zip(true.arrivals, read.arrivals, strict=True):
+        expected, found = clean.measurement, errors.corrected(wrong.measurement)
+        assert wrong.arrival == clean.arrival
+        for name in ('torque', 'sinkage', 'angular_rate', 'specific_force'):
+            if hasattr(expected, name):
+                np.testing.assert_allclose(
+                    getattr(found, name), getattr(expected, name), atol=1e-12, err_msg=name
+                )
+    wheels = [a.measurement for a in read.arrivals if isinstance(a.measurement, WheelOdometry)]
+    clean_wheels = [
+        a.measurement for a in true.arrivals if isinstance(a.measurement, WheelOdometry)
+    ]
+    np.testing.assert_allclose(wheels[-1].torque, 1.2 * clean_wheels[-1].torque + 2.0)

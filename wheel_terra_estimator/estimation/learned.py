@@ -1,0 +1,131 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""What a drive taught of soil and sensors, as parameters that the next drive starts from."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.estimation.filter.initial_state import PriorTuning
+from wheel_terra_estimator.estimation.filter.state import (
+    GRAVITY_BIAS,
+    SHEAR_MODULUS,
+    SHEAR_STRENGTH,
+    StateLayout,
+)
+from wheel_terra_estimator.estimation.inputs.inertial import GyroZero
+
+FloatArray = NDArray[np.float64]
+NamedSoil = Callable[[FloatArray, FloatArray], tuple[tuple[str, ...], FloatArray, FloatArray]]
+
+
+@dataclass(frozen=True)
+class PlaceToPlace:
+    """By how much soil varies from place to place, one standard deviation of the logarithm [-].
+
+    Mean coefficients of variation of sand within a site (Phoon and Kulhawy 1999, Canadian
+    Geotechnical Journal 36, tables 1 and 3): friction angle 9 %, cone resistance 38 %. The first is
+    12 % of the tangent at 37.6 degrees; the second stands for the stiffness, and for want of a
+    source of its own for the shear deformation modulus too.
+    """
+
+    strength: float = 0.12
+    shear_modulus: float = 0.38
+    stiffness: float = 0.38
+
+
+class Learned:
+    """Writes what was learned as parameters of the configuration.
+
+    Parameters
+    ----------
+    configuration : Configuration
+        That the drive started with.
+    layout : StateLayout
+        Of the filter.
+    start : numpy.ndarray
+        Covariance of the filter at the start of a run.
+    named_soil : callable
+        Mean and covariance of the filter -> keys, values and deviations of the soil.
+    spread : PlaceToPlace
+        What is added to the deviations of the soil.
+    """
+
+    def __init__(
+        self,
+        configuration: Configuration,
+        layout: StateLayout,
+        start: FloatArray,
+        named_soil: NamedSoil,
+        spread: PlaceToPlace = PlaceToPlace(),
+    ) -> None:
+        self._configuration, self._layout = configuration, layout
+        self._start, self._named_soil, self._spread = start.copy(), named_soil, spread
+
+    def values(self, mean: FloatArray, covariance: FloatArray, zero: GyroZero) -> dict[str, Any]:
+        """Return configuration key -> value, with the deviations ``_std``.
+
+        Soil: the values of ``~/soil``, with deviations widened to hold in another place. Biases:
+        those stated plus what was learned; torques and sinkages: as stated, since a zero of theirs
+        is not told from the soil. The deviations of sensors are those stated: a start may bring
+        another bias of the same kind.
+        """
+        found: dict[str, Any] = {}
+        names, soil, stds = self._named_soil(mean, self._widened(covariance))
+        for key, value, std in zip(names, soil.tolist(), stds.tolist(), strict=True):
+            found[key] = value
+            found[_deviation(key)] = std
+        sensors = self._configuration.sensors
+        force = sensors.specific_force_bias + np.array([self._force_bias(mean), 0.0, 0.0])
+        rate = sensors.angular_rate_bias + np.array([0.0, zero.pitch, zero.yaw])
+        for name, values in (
+            ('torque_zero', sensors.torque_zero),
+            ('torque_gain', sensors.torque_gain),
+            ('sinkage_zero', sensors.sinkage_zero),
+            ('specific_force_bias', force),
+            ('angular_rate_bias', rate),
+        ):
+            found[f'sensors.{name}'] = values.tolist()
+            found[f'sensors.{name}_std'] = float(getattr(sensors, f'{name}_std'))
+        return found
+
+    def _force_bias(self, mean: FloatArray) -> float:
+        """Return the part of the state's bias that is the accelerometer's [m/s^2].
+
+        The rest leaks in through the attitude; the two share it as their variances stand.
+        """
+        own = float(self._configuration.sensors.specific_force_bias_std) ** 2
+        both = float(self._start[GRAVITY_BIAS, GRAVITY_BIAS])
+        return float(mean[GRAVITY_BIAS]) * own / both if both > 0.0 else 0.0
+
+    def _widened(self, covariance: FloatArray) -> FloatArray:
+        """Return the covariance with what soil varies from place to place.
+
+        Never wider than at the start of the drive for this alone: no place was left where nothing
+        was learned, and restarts in one place do not add up.
+        """
+        wide, stiffness = covariance.copy(), self._layout.stiffness
+        for entry, spread in (
+            ((SHEAR_STRENGTH, SHEAR_STRENGTH), self._spread.strength),
+            ((SHEAR_MODULUS, SHEAR_MODULUS), self._spread.shear_modulus),
+            ((stiffness, stiffness), self._spread.stiffness),
+        ):
+            learned, before = float(covariance[entry].mean()), float(self._start[entry].mean())
+            wide[entry] = max(learned, min(learned + spread**2, before))
+        # What wheels have of their own a start adds again.
+        wide[stiffness, stiffness] /= (
+            1.0 + PriorTuning().own_stiffness_share ** 2 / self._layout.wheel_count
+        )
+        return wide
+
+
+def _deviation(key: str) -> str:
+    """Return the key of the standard deviation of a key."""
+    name = key.removesuffix('_deg')
+    return f'{name}_std_deg' if name != key else f'{key}_std'

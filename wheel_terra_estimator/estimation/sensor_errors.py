@@ -1,0 +1,102 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Known errors of the sensors: the zeros, gains and biases that the configuration states.
+
+A sensor reads ``gain * true + zero``; an IMU reads its bias on top, in ``base_link``. Readings are
+corrected once, where they enter the estimator core or the rows of a drive; the simulator makes
+readings the other way round. An instrument effect in a model (``torque_gain``, ``sinkage_offset``)
+is what is left after this correction.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.estimation.measurements import (
+    FloatArray,
+    InertialReading,
+    Measurement,
+    SinkageReading,
+    WheelOdometry,
+)
+
+
+@dataclass(frozen=True)
+class LinearErrors:
+    """Zero and gain of one kind of sensor: (n,) each, in the order of the wheels."""
+
+    zero: FloatArray
+    gain: FloatArray
+
+    @property
+    def none(self) -> bool:
+        """Whether the readings are true."""
+        return not self.zero.any() and bool((self.gain == 1.0).all())
+
+    def true(self, reading: FloatArray) -> FloatArray:
+        """Return what was there: (reading - zero) / gain."""
+        return (reading - self.zero) / self.gain
+
+    def reading(self, true: FloatArray) -> FloatArray:
+        """Return what the sensor says: gain * true + zero."""
+        return self.gain * true + self.zero
+
+
+class SensorErrors:
+    """Stated errors of the sensors of one rover.
+
+    Parameters
+    ----------
+    configuration : Configuration
+        ``sensors.torque_zero`` [N m], ``torque_gain`` [-], ``sinkage_zero`` [m], ``sinkage_gain``
+        [-], ``specific_force_bias`` [m/s^2] and ``angular_rate_bias`` [rad/s].
+    """
+
+    def __init__(self, configuration: Configuration) -> None:
+        sensors = configuration.sensors
+        self._count = configuration.wheels.count
+        self.torque = LinearErrors(sensors.torque_zero, sensors.torque_gain)
+        self.sinkage = LinearErrors(sensors.sinkage_zero, sensors.sinkage_gain)
+        self.specific_force_bias: FloatArray = sensors.specific_force_bias
+        self.angular_rate_bias: FloatArray = sensors.angular_rate_bias
+        self._biased = bool(self.specific_force_bias.any() or self.angular_rate_bias.any())
+
+    def corrected(self, measurement: Measurement) -> Measurement:
+        """Return a measurement without the stated errors; itself where none is stated.
+
+        A message with the wrong number of wheels, and an accelerometer that is not running, are
+        returned as they are, for the checks of the inputs to refuse.
+        """
+        if isinstance(measurement, WheelOdometry):
+            if self.torque.none or len(measurement.torque) != self._count:
+                return measurement
+            return replace(measurement, torque=self.torque.true(measurement.torque))
+        if isinstance(measurement, SinkageReading):
+            if self.sinkage.none or len(measurement.sinkage) != self._count:
+                return measurement
+            return replace(measurement, sinkage=self.sinkage.true(measurement.sinkage))
+        if isinstance(measurement, InertialReading):
+            return self._with_bias(measurement, -1.0)
+        return measurement
+
+    def as_read(self, measurement: Measurement) -> Measurement:
+        """Return a true measurement as these sensors would read it."""
+        if isinstance(measurement, WheelOdometry) and not self.torque.none:
+            return replace(measurement, torque=self.torque.reading(measurement.torque))
+        if isinstance(measurement, SinkageReading) and not self.sinkage.none:
+            return replace(measurement, sinkage=self.sinkage.reading(measurement.sinkage))
+        if isinstance(measurement, InertialReading):
+            return self._with_bias(measurement, 1.0)
+        return measurement
+
+    def _with_bias(self, reading: InertialReading, sign: float) -> InertialReading:
+        if not self._biased or not np.any(reading.specific_force):
+            return reading
+        return replace(
+            reading,
+            specific_force=reading.specific_force + sign * self.specific_force_bias,
+            angular_rate=reading.angular_rate + sign * self.angular_rate_bias,
+        )
