@@ -69,6 +69,10 @@ class WatchedEstimator:
         """Return what the estimator says of itself."""
         return dict(getattr(self._estimator, 'health', dict)())
 
+    def learned(self) -> dict[str, Any]:
+        """Return what the estimator learned of soil and sensors."""
+        return dict(getattr(self._estimator, 'learned', dict)())
+
 
 def without_judgement(estimates: EstimateSet, findings: tuple[Finding, ...]) -> EstimateSet:
     """Return the set with classes unknown, no stuck warning, and the findings in words."""
