@@ -107,6 +107,15 @@ def test_models_are_doubted_while_the_references_lean_one_way(parts, ekf):
     assert doubt['white'] < 2.0
 
 
+def test_a_run_of_references_to_one_side_opens_the_speed(parts):
+    """Slip that jumps within the gate: followed after three references, not after ten."""
+    fresh = parts.filter()
+    fresh.set(SPEED, 0.045, 0.001**2)
+    _, opened = references(parts, fresh, [0.045] * 5 + [0.037] * 4)
+    assert not any(opened)
+    assert fresh.mean[SPEED] == pytest.approx(0.037, abs=0.0015)
+
+
 def test_references_beyond_the_fastest_wheel_hardly_count(parts, ekf):
     _, opened = references(parts, ekf, [0.045] * 10 + [0.5] * 3)
     assert not any(opened)

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.component import Component
-from wheel_terra_estimator.estimation.filter.consistency import smoothed_nis
+from wheel_terra_estimator.estimation.filter.consistency import CONSISTENT, smoothed_nis
 from wheel_terra_estimator.estimation.filter.ekf import GatedFilter, chi_square_gate
 from wheel_terra_estimator.estimation.filter.state import SPEED
 from wheel_terra_estimator.estimation.measurements import ReferenceVelocity
@@ -36,6 +36,8 @@ class ReferenceTuning:
     """References over which their innovations' mean is taken."""
     most_lean: float = 3.0  # deviations that one reference counts for in it
     most_doubt: float = 100.0
+    run_excess: float = 4.0
+    """Square of that mean over its variance above which the references run to one side."""
     beyond_rim: float = 1.5  # times the fastest rim speed: no rover drives faster than its wheels
     beyond_std: float = 5.0
     same_std: float = 4.0  # deviations within which two references disagree by the same amount
@@ -97,9 +99,11 @@ class ReferenceUpdate(Component[ReferenceState]):
         references, the models hold the speed against them; a gate on single ones cannot see it.
         The running mean of white innovations has variance 1 / (2 n - 1) over n.
         """
-        tuning = self._tuning
-        excess = self.state.lean**2 * (2.0 * tuning.lean_count - 1.0)
-        return clipped(excess * excess, 1.0, tuning.most_doubt)
+        return clipped(self._excess(self.state.lean) ** 2, 1.0, self._tuning.most_doubt)
+
+    def _excess(self, lean: float) -> float:
+        """Return the square of a mean of innovations over the variance of white ones [-]."""
+        return lean * lean * (2.0 * self._tuning.lean_count - 1.0)
 
     def believes(self, agreeing: int, *, beyond: bool, witnessed: bool) -> bool:
         """Say whether so many references in a row that disagree by the same amount are right."""
@@ -170,6 +174,9 @@ class ReferenceUpdate(Component[ReferenceState]):
             )
         else:
             state = state._replace(rejected_in_a_row=0)
+            if self._excess(lean) > tuning.run_excess and nis > CONSISTENT:
+                # One more of a run to one side: the prediction is too sure of itself.
+                ekf.widen(SPEED, residual * residual / CONSISTENT - total)
         ekf.fuse_entry(SPEED, reference.forward, variance)
         self.state = state
         return opened
