@@ -116,7 +116,8 @@ def examples():
 
 @pytest.mark.parametrize('line', list(examples()))
 def test_examples_of_the_help_parse(line):
-    program, *arguments = shlex.split(line)
+    own, _, _ = line.partition(' > ')  # what follows is the shell's
+    program, *arguments = shlex.split(own)
     assert program == 'wheel-terra'
     if '--help' not in arguments:
         main.build_parser().parse_args(arguments)
