@@ -63,6 +63,7 @@ SIGNS = (
     'exhausted',
     'within_horizon',
     'within_travel',
+    'deepening',
     'held',
     'bogging',
     'stall',

@@ -149,13 +149,17 @@ def _within_horizon(s: Situation, t: SignTuning) -> bool:
 
 
 def _within_travel(s: Situation, t: SignTuning) -> bool:
-    """Find that the median slip passes 0.9, or half of the wheels dig in, within the rim travel."""
-    travel = s.settings.travel
-    digging = sum(room < travel for room in s.climbing_room)
-    if digging >= t.least_deepening and 2 * digging >= len(s.climbing_room):
-        return True
-    soon = s.typical_slip > t.sudden_slip and _time_to_entrapment(s, t) * s.fastest < travel
+    """Find that a high median slip passes 0.9 within the rim travel."""
+    soon = s.typical_slip > t.ahead_slip and (
+        _time_to_entrapment(s, t) * s.fastest < s.settings.travel
+    )
     return soon and s.settled and _slip_is_told(s, t)
+
+
+def _deepening(s: Situation, t: SignTuning) -> bool:
+    """Find half of the wheels so deep within the rim travel that they do not climb out."""
+    count = sum(room < s.settings.travel for room in s.climbing_room)
+    return count >= t.least_deepening and 2 * count >= len(s.climbing_room)
 
 
 def _lost_share(s: Situation) -> float:
@@ -248,8 +252,18 @@ SIGNS: tuple[Sign, ...] = (
         False,
         _within_travel,
         lambda s, t: (
-            f'digging in within {s.settings.travel:g} m of rim travel, median slip '
-            f'{s.typical_slip:.2f}'
+            f'median slip {s.typical_slip:.2f} passes {ENTRAPPED_SLIP:g} within '
+            f'{s.settings.travel:g} m of rim travel'
+        ),
+    ),
+    Sign(
+        'deepening',
+        4.0,  # wheels that enter a patch sink as fast, over a contact length
+        Need.SLIP_TOLD,
+        False,
+        _deepening,
+        lambda s, t: (
+            f'wheels dig in: too deep to climb out within {s.settings.travel:g} m of rim travel'
         ),
     ),
     Sign(
