@@ -42,19 +42,6 @@ def robust_std(values: FloatArray) -> float:
     return float(MAD_TO_STD * np.median(np.abs(values - np.median(values))))
 
 
-def robust_fit(design: FloatArray, target: FloatArray) -> FloatArray:
-    """Return the coefficients of a least-squares fit that outliers hardly move (Huber 1964).
-
-    Parameters
-    ----------
-    design : numpy.ndarray
-        (k, p) regressors.
-    target : numpy.ndarray
-        (k,) what is to be explained.
-    """
-    return _huber(design, target)[0]
-
-
 def block_fit(design: FloatArray, target: FloatArray) -> list[Estimate]:
     """Return a robust fit whose deviations come from leaving out one block of time at a time.
 

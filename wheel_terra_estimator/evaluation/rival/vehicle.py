@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,10 +48,6 @@ class Vehicle:
     def weight(self) -> float:
         """Weight [N]."""
         return self.mass * self.gravity
-
-    def with_mass(self, mass: float) -> Vehicle:
-        """Return the rover with another mass, of the same shape."""
-        return replace(self, mass=mass, yaw_inertia=self.yaw_inertia * mass / self.mass)
 
 
 @dataclass(frozen=True)
