@@ -70,7 +70,7 @@ def test_an_interrupted_bench_keeps_and_says_what_it_has(
 ) -> None:
     done = []
 
-    def score(world: str, kind: str, seed: int, modes: Any) -> list[Any]:
+    def score(world: str, kind: str, seed: int, modes: Any, rover: str | None) -> list[Any]:
         if len(done) == 2:
             raise KeyboardInterrupt
         done.append(seed)

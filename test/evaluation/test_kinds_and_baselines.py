@@ -15,7 +15,7 @@ from wheel_terra_estimator.estimation.measurements import (
     ReferenceVelocity,
     WheelOdometry,
 )
-from wheel_terra_estimator.evaluation import baselines, kinds
+from wheel_terra_estimator.evaluation import baselines, kinds, worlds
 from wheel_terra_estimator.evaluation.runner import inputs_of_mode
 from wheel_terra_estimator.evaluation.two_state_filters import slip_course
 from wheel_terra_estimator.simulation.scenario import load
@@ -33,6 +33,31 @@ def test_every_kind_is_a_scenario(name):
 def test_tuning_and_test_seeds_are_apart():
     assert not set(kinds.TUNING_SEEDS) & set(kinds.TEST_SEEDS)
     assert len(kinds.TEST_SEEDS) >= 20
+
+
+@pytest.mark.parametrize('kind', ['wheel_faults', 'scenarios/stalled_wheel'])
+def test_another_rover_drives_any_kind_and_any_scenario_of_the_own_world(kind):
+    drive = worlds.WORLDS['own'].simulate(kind, 1000, 1.0, 'frostyboy')
+    assert drive.configuration.wheels.count == 4
+    assert drive.configuration.rover.mass == reader.load(['frostyboy']).rover.mass
+    assert drive.truth.slip.shape[1] == 4
+    own = worlds.WORLDS['own'].simulate(kind, 1000, 1.0, None)
+    assert drive.configuration.soil == own.configuration.soil
+
+
+@pytest.mark.parametrize(
+    ('options', 'words'),
+    [
+        (['--rover', 'hit_lss1'], 'not a rover file'),
+        (['--rover', 'frosty'], 'frostyboy'),
+        (['--rover', 'frostyboy', '--world', 'rival', '--kinds', 'climb'], '--world own'),
+        (['--rover', 'frostyboy', '--limiter'], '--limiter'),
+        (['--kinds', 'scenarios/stalled'], 'stalled_wheel'),
+    ],
+)
+def test_what_is_no_rover_and_no_scenario_is_refused_before_the_first_drive(options, words, capsys):
+    assert main(['evaluate', '--seeds', '1', *options]) == 2
+    assert words in capsys.readouterr().err
 
 
 def test_baselines_between_fixes():

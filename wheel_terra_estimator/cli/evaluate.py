@@ -17,6 +17,7 @@ INTERRUPTED = 130
 SUMMARY = 'score the estimator against ground truth and baselines'
 EXAMPLES = (
     'wheel-terra evaluate --kinds climb turns --seeds 4',
+    'wheel-terra evaluate --rover my_rover.yaml --kinds climb scenarios/slow_entrapment --seeds 2',
     'wheel-terra evaluate --limiter --seeds 10 -o limiter.md',
 )
 
@@ -39,7 +40,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs='+',
         metavar='KIND',
         help=f'kinds of simulated drives (default: all but firm of the own world). own: '
-        f'{", ".join((*own.kinds, *own.more_kinds))}; rival: {", ".join(rival.kinds)}',
+        f'{", ".join((*own.kinds, *own.more_kinds))}, or scenarios/NAME, a shipped scenario; '
+        f'rival: {", ".join(rival.kinds)}',
+    )
+    parser.add_argument(
+        '--rover',
+        metavar='F',
+        help="rover file, or the bare name of a shipped one, in place of the kinds' own rover "
+        '(own world)',
     )
     parser.add_argument(
         '--seeds', type=int, default=20, metavar='N', help='drives of each kind (default 20)'
@@ -95,6 +103,8 @@ def run(arguments: argparse.Namespace) -> int:
             check_file(picture, arguments.overwrite)
     first = (kinds.TUNING_SEEDS if arguments.tuning else kinds.TEST_SEEDS).start
     seeds = range(first, first + arguments.seeds)
+    if arguments.rover and (arguments.measured or arguments.limiter):
+        raise UserError('--rover goes with simulated kinds, not with --measured or --limiter')
     if arguments.measured:
         text = real_drives.report(arguments.measured)
     elif arguments.limiter:
@@ -105,6 +115,8 @@ def run(arguments: argparse.Namespace) -> int:
                 closed_loop.picture(drives[0], fresh)
     else:
         chosen = _chosen(arguments.world, arguments.kinds)
+        if arguments.rover:
+            _check_rover(arguments.rover, arguments.world)
         _check_names(arguments.modes, runner.MODES, 'mode')
         from tqdm import tqdm
 
@@ -115,11 +127,14 @@ def run(arguments: argparse.Namespace) -> int:
                 arguments.modes,
                 arguments.jobs,
                 lambda _: bar.update(),
+                arguments.rover,
             )
         write = tables.pooled_report if arguments.pooled else tables.report
         text = write(results, arguments.modes)
         restarts = sum(drive.health.get('filter_restarts', 0) for drive in results.drives)
         text += f'\n\nThe filter was started anew {restarts} times in {len(results.drives)} runs.'
+        if arguments.rover:
+            text += f'\n\nRover in place of that of the kinds: {arguments.rover}.'
         status = FILTER_FAILED if restarts else 0
         if results.interrupted:
             text += f'\n\n{results.interrupted}'
@@ -139,8 +154,20 @@ def _chosen(world: str, kinds: list[str] | None) -> list[tuple[str, str]]:
     if kinds is None:
         return [(w.name, kind) for w in worlds for kind in w.kinds]
     known = {kind: None for w in worlds for kind in (*w.kinds, *w.more_kinds)}
-    _check_names(kinds, tuple(known), 'kind')
-    return [(w.name, kind) for w in worlds for kind in kinds if kind in (*w.kinds, *w.more_kinds)]
+    strange = [kind for kind in kinds if not any(w.has(kind) for w in worlds)]
+    _check_names(strange, tuple(known), 'kind')
+    return [(w.name, kind) for w in worlds for kind in kinds if w.has(kind)]
+
+
+def _check_rover(rover: str, world: str) -> None:
+    """Refuse what is no rover file before the first drive."""
+    from wheel_terra_estimator.configuration import reader, ros_yaml, shipped
+
+    if world != 'own':
+        raise UserError(f'--rover needs --world own: the rovers of {world!r} are not files')
+    if 'wheels.names' not in ros_yaml.read(shipped.find(rover)):
+        raise UserError(f'--rover {rover}: wheels.names is missing: not a rover file')
+    reader.load([rover])
 
 
 def _check_names(given: Sequence[str], known: Sequence[str], what: str) -> None:

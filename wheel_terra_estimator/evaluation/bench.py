@@ -52,9 +52,11 @@ class Results:
         return dict(found)
 
 
-def score_drive(world: str, kind: str, seed: int, modes: Sequence[str]) -> list[DriveScore]:
+def score_drive(
+    world: str, kind: str, seed: int, modes: Sequence[str], rover: str | None = None
+) -> list[DriveScore]:
     """Simulate one drive and score the estimator on it in each mode."""
-    drive = WORLDS[world].simulate(kind, seed, None)
+    drive = WORLDS[world].simulate(kind, seed, None, rover)
     return [score_mode(world, kind, seed, mode, drive) for mode in modes]
 
 
@@ -101,8 +103,9 @@ def run(
     modes: Sequence[str],
     processes: int = 1,
     progress: Callable[[str], object] | None = None,
+    rover: str | None = None,
 ) -> Results:
-    """Run the bench over pairs of world and kind.
+    """Run the bench over pairs of world and kind, with a rover file in place of the kinds' own.
 
     Drives come in the order in which they finish, results do not depend on it. Interrupted, it
     returns the drives that are done.
@@ -111,7 +114,7 @@ def run(
     tasks = [(world, kind, seed) for seed in seeds for world, kind in chosen]
     done = 0
     try:
-        for scores_of_drive, words in _scored(tasks, modes, processes):
+        for scores_of_drive, words in _scored(tasks, modes, processes, rover):
             results.drives += scores_of_drive
             done += 1
             if progress:
@@ -125,16 +128,20 @@ def run(
 
 
 def _scored(
-    tasks: Sequence[tuple[str, str, int]], modes: Sequence[str], processes: int
+    tasks: Sequence[tuple[str, str, int]],
+    modes: Sequence[str],
+    processes: int,
+    rover: str | None,
 ) -> Iterator[tuple[list[DriveScore], str]]:
     """Yield the scores of each drive and its name."""
     if processes == 1:
         for task in tasks:
-            yield score_drive(*task, modes), ' '.join(map(str, task))
+            yield score_drive(*task, modes, rover), ' '.join(map(str, task))
         return
     with worker_pool(processes) as pool:
         waiting = {
-            pool.submit(score_drive, *task, modes): ' '.join(map(str, task)) for task in tasks
+            pool.submit(score_drive, *task, modes, rover): ' '.join(map(str, task))
+            for task in tasks
         }
         for future in as_completed(waiting):
             yield future.result(), waiting[future]

@@ -11,12 +11,16 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from wheel_terra_estimator.configuration import shipped
 from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.estimation.measurements import Measurement
 from wheel_terra_estimator.evaluation import kinds as own_kinds
 from wheel_terra_estimator.evaluation.rival import kinds as rival_kinds
 
 FloatArray = NDArray[np.float64]
+SCENARIO = 'scenarios/'
+"""Begins the name of a kind that is a shipped scenario."""
 
 
 class TimedMeasurement(Protocol):
@@ -64,27 +68,40 @@ class BenchDrive:
 
 @dataclass(frozen=True)
 class World:
-    """A simulator: its kinds of drives, those made to entrap, and how to make one."""
+    """A simulator: its kinds of drives, those made to entrap, and how to make one.
+
+    ``simulate`` takes kind, seed, greatest duration [s] and a rover file in place of the kind's
+    own rover (None: that of the kind).
+    """
 
     name: str
     kinds: tuple[str, ...]
     more_kinds: tuple[str, ...]  # run only when named
     entrapments: tuple[str, ...]
-    simulate: Callable[[str, int, float | None], BenchDrive]
+    simulate: Callable[[str, int, float | None, str | None], BenchDrive]
+    takes_scenarios: bool = False  # a kind may be `scenarios/NAME`, a shipped scenario
+
+    def has(self, kind: str) -> bool:
+        """Return whether the world makes drives of a kind."""
+        if self.takes_scenarios and kind.startswith(SCENARIO):
+            return shipped.find(kind).is_file()
+        return kind in self.kinds or kind in self.more_kinds
 
 
-def _own(kind: str, seed: int, duration: float | None) -> BenchDrive:
+def _own(kind: str, seed: int, duration: float | None, rover: str | None) -> BenchDrive:
     from wheel_terra_estimator.simulation.drive import simulate
     from wheel_terra_estimator.simulation.scenario import load
 
-    scenario = dict(own_kinds.FIRM if kind == 'firm' else own_kinds.KINDS[kind])
-    if duration is not None:
-        scenario['duration'] = min(duration, scenario['duration'])
-    drive = simulate(load(scenario), seed)
+    kinds = {**own_kinds.KINDS, 'firm': own_kinds.FIRM}
+    scenario = load(kinds.get(kind, kind), rover=rover)
+    longest = scenario.duration if duration is None else min(duration, scenario.duration)
+    drive = simulate(scenario, seed, longest)
     return BenchDrive(drive.configuration, drive.arrivals, drive.truth)
 
 
-def _rival(kind: str, seed: int, duration: float | None) -> BenchDrive:
+def _rival(kind: str, seed: int, duration: float | None, rover: str | None) -> BenchDrive:
+    if rover is not None:
+        raise UserError('the rival world has rovers of its own: another rover needs the own world')
     from wheel_terra_estimator.evaluation.rival.drive import simulate
 
     drive = simulate(kind, seed, duration)
@@ -92,7 +109,7 @@ def _rival(kind: str, seed: int, duration: float | None) -> BenchDrive:
 
 
 WORLDS = {
-    'own': World('own', tuple(own_kinds.KINDS), ('firm',), own_kinds.ENTRAPMENTS, _own),
+    'own': World('own', tuple(own_kinds.KINDS), ('firm',), own_kinds.ENTRAPMENTS, _own, True),
     'rival': World('rival', tuple(rival_kinds.KINDS), (), rival_kinds.ENTRAPMENTS, _rival),
 }
 """The simulator of the package, and a second one that was written apart from it."""
