@@ -20,9 +20,11 @@ SECTIONS = (
     'closed_forms',
     'hit_wheels',
     'ding_statements',
+    'equivalent_circle',
     'grc3_wheel',
     'cmu_wheel',
     'small_wheels',
+    'transfer',
     'speed',
 )
 HEAD = """# Validation of the wheel-soil models

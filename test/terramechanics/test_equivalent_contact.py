@@ -4,6 +4,9 @@
 
 from __future__ import annotations
 
+import csv
+from pathlib import Path
+
 import numpy as np
 import pytest
 from terra_tools import WHEEL
@@ -99,3 +102,27 @@ def test_bad_measurements_are_named() -> None:
         equivalent_contact(WHEEL, 0.001, 0.0, 0.4, 0.002)
     with pytest.raises(ValueError, match=r'rear height is 0\.3 m'):
         equivalent_contact(WHEEL, 0.01, 0.3, 0.4)
+
+
+def test_measured_lugged_wheel(shared: Path) -> None:
+    """Lugged wheel of Ding et al. 2011, slip 0.1 to 0.6: pull from torque within the stated 10 %.
+
+    Nothing is fitted: c1 and c3 are usual values, the radius is that of rim and half a lug.
+    """
+    table = shared.parent / 'reference' / 'measured_single_wheel.csv'
+    with table.open(encoding='utf-8') as stream:
+        rows = [
+            row
+            for row in csv.DictReader(stream)
+            if row['series'] == 'HIT_Wh32_lug10' and float(row['slip']) >= 0.05
+        ]
+    load, sinkage, torque, pull = (
+        np.array([float(row[name]) for row in rows])
+        for name in ('load_N', 'sinkage_m', 'torque_Nm', 'drawbar_pull_N')
+    )
+    wheel = Wheel(float(rows[0]['radius_m']), float(rows[0]['width_m']), 0.010, 30)
+    entrance = np.arccos(1.0 - sinkage / wheel.radius)
+    rear = wheel.radius * (1.0 - np.cos(-0.2 * entrance))
+    found = equivalent_contact(wheel, sinkage, rear, 0.45).drawbar_pull(torque, load)
+    assert len(rows) == 5
+    np.testing.assert_allclose(found, pull, rtol=0.10)

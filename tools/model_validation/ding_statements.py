@@ -10,10 +10,15 @@ import numpy as np
 
 from model_validation import hit_wheels
 from model_validation.fitting import FloatArray, Free, Model, fit, listed
+from model_validation.pictures import save
+from wheel_terra_estimator.reporting.style import picture_style
 from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
 from wheel_terra_estimator.terramechanics.wheel import Wheel
 
 LOAD = 80.0
+LUG_NUMBERS = (30, 24, 15, 8)
+STATED = np.array([[0.0, 5.0], [0.6, 30.0]])  # slip, sinkage of Wh3 [mm]
+CROSSING = 0.4  # slip at which the order of the lug heights turns round
 WHEELS = {'Wh1': (0.135, 0.165), 'Wh2': (0.135, 0.110), 'Wh3': (0.1574, 0.165)}
 PRINTED = {'Wh2': (0.93, 0.54), 'Wh3': (0.84, 0.72)}
 SUPPORT = {0.0: 0.0, 0.005: 0.0, 0.010: 0.0015, 0.015: 0.003}
@@ -58,8 +63,45 @@ def crossover(model: Model, low: float, high: float) -> float:
     return float(SLIPS[k - 1] + share * (SLIPS[k] - SLIPS[k - 1]))
 
 
+def draw(model: Model, path: Path) -> None:
+    """Draw the ten curves of the paper's figures 3 to 5, and what its text says of them."""
+    from matplotlib.figure import Figure
+
+    panels = {
+        'figure 3: number of lugs (Wh3, 10 mm)': {
+            f'{count} lugs': sinkage(model, 'Wh3', 0.010, count) for count in LUG_NUMBERS
+        },
+        'figure 4: height of lugs (Wh3, 30 lugs)': {
+            f'{1e3 * height:.0f} mm': sinkage(model, 'Wh3', height)
+            for height in SUPPORT
+            if height > 0.0
+        },
+        'figure 5: dimensions (10 mm, 30 lugs)': {
+            f'{name}: {1e3 * r:.0f} mm x {1e3 * b:.0f} mm': sinkage(model, name, 0.010)
+            for name, (r, b) in WHEELS.items()
+        },
+    }
+    with picture_style():
+        figure = Figure(figsize=(9.6, 3.2))
+        axes = figure.subplots(1, 3, sharey=True)
+        for axis, (title, curves) in zip(axes, panels.items(), strict=True):
+            for i, (label, values) in enumerate(curves.items()):
+                # The curves of figure 3 lie on one another: each a little thinner than the last.
+                width = 3.5 - 0.7 * i if axis is axes[0] else 1.4
+                axis.plot(SLIPS, values, '-o', ms=3, lw=width, label=label)
+            axis.set_title(title, fontsize=8)
+            axis.set_xlabel('slip [-]')
+            axis.legend(fontsize=7)
+        axes[0].plot(*STATED.T, 'k_', ms=14, mew=2, label='stated: 5 and 30 mm')
+        axes[0].legend(fontsize=7)
+        axes[1].axvline(CROSSING, color='k', ls=':', lw=1)
+        axes[0].set_ylabel('sinkage [mm]')
+        axes[0].invert_yaxis()
+        save(figure, path)
+
+
 def section(shared: Path, figures: Path) -> str:
-    """Return the section."""
+    """Return the section and draw its picture."""
     fitted = hit_wheels.fitted_soil(shared)
     printed_start = fitted.with_values(
         {
@@ -81,6 +123,7 @@ def section(shared: Path, figures: Path) -> str:
         {k: v for k, v in compromise.effects.items() if not k.startswith('lug_')},
     )
     models = {'printed n0, n1': compromise, 'fitted to the 2011 rows': fitted}
+    draw(compromise, figures / 'ding.svg')
     rows: list[tuple[str, str, list[str], str]] = []
 
     def add(statement: str, said: str, of: list[str], test: str = 'yes') -> None:
@@ -176,6 +219,12 @@ def section(shared: Path, figures: Path) -> str:
             '| statement | paper | ' + ' | '.join(models) + ' | can fail |',
             '|---|---|' + '---|' * (len(models) + 1),
             *lines,
+            '',
+            '![The ten curves of figures 3 to 5](figures/ding.svg)',
+            '',
+            'The ten curves of figures 3 to 5 with the first model; the paper shows its own as '
+            'pictures only, so what its text says of them is drawn in: the two sinkages of figure '
+            '3, the slip of 0.4 at which the order of the lug heights turns round.',
             '',
             'They cannot all hold at once. With z = r (1 - cos t1) + h s - dz4 the crossing of two '
             'heights lies where the heights times s make up for the support, s = 0.3 for 10 and '

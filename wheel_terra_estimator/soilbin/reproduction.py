@@ -1,6 +1,10 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Reproduction of Nakashima et al. 2010: tables 6 and 7, figures 11 to 16, section 6."""
+"""Reproduction of Nakashima et al. 2010: tables 6 and 7, figures 11 to 16, section 6.
+
+The calibrated case turns its wheels eight times as fast as the paper's; the part `paper_speed`
+runs a choice of the same cases at the paper's own speed, eight times the cost.
+"""
 
 from __future__ import annotations
 
@@ -18,8 +22,12 @@ from wheel_terra_estimator.soilbin.study import Job
 TABLE = 'reproduction.csv'
 PAGES = ('comparison.md',)
 PARTS = ('table7', 'table6', 'loads', 'moon')
+PAPER_SPEED = 'paper_speed'
+"""Part that runs only where it is asked for: some half an hour per case and core."""
+SLOPES_PAPER_SPEED = (25.0, 15.0, 0.0, 20.0, 10.0)  # of wheel 2, the most telling ones first
 WHEELS = range(1, 10)
 SLOPES_TABLE6 = (0.0, 5.0, 10.0, 15.0)
+TABLE7_SLOPE = 25.0  # [deg]
 MOON = EARTH_GRAVITY / 6
 MOON_PULLS = (0.0, 0.1, 0.2, 0.3)  # P/W on the level
 MOON_SLOPES = (10.0, 15.0, 21.0, 25.0)
@@ -65,6 +73,7 @@ def _job(case: Case, part: str, wheel: int, slope_deg: float, **labels: object) 
         'pull_ratio': 0.0,
         'grain_scale': case.bed.grain_scale,
         'seed': case.bed.seed,
+        'speed_factor': case.operation.speed_factor,
     }
     return Job(case, base | labels)
 
@@ -97,7 +106,28 @@ def jobs(arguments: argparse.Namespace) -> list[Job]:
                     found.append(_job(case, 'loads', 2, slope))
         if 'moon' in parts:
             found += _moon(seed, scale)
+        if PAPER_SPEED in parts:
+            found += _paper_speed(seed, scale)
     return found
+
+
+def _paper_speed(seed: int, scale: float) -> list[Job]:
+    """Wheel 2 over the slopes on every bed, the wheels of table 7 on the first."""
+    cases = [(2, slope) for slope in SLOPES_PAPER_SPEED]
+    if seed == 1:
+        cases += [(wheel, 25.0) for wheel in WHEELS if wheel != 2]
+    return [
+        _job(
+            wheel_case(wheel, slope, seed, scale).replace(
+                name=f"wheel {wheel}, {slope:g} deg, bed {seed}, paper's speed",
+                operation__speed_factor=1.0,
+            ),
+            PAPER_SPEED,
+            wheel,
+            slope,
+        )
+        for wheel, slope in cases
+    ]
 
 
 def _moon(seed: int, scale: float) -> list[Job]:
@@ -139,7 +169,7 @@ def report(arguments: argparse.Namespace, rows: Sequence[Row], folder: Path) -> 
         'Written by `wheel-terra soilbin reproduce`.'
     )
     parts += ['', *table7_lines(rows), '', *table6_lines(rows), '', *figure_lines(rows)]
-    parts += ['', *load_lines(rows), '', *moon_lines(rows)]
+    parts += ['', *load_lines(rows), '', *moon_lines(rows), '', *paper_speed_lines(rows)]
     failed = [row for row in rows if row.get('stopped')]
     if failed:
         parts += ['', '## Runs that stopped early', '']
@@ -311,3 +341,36 @@ def moon_lines(rows: Sequence[Row]) -> list[str]:
                      value(*sinkage), why])  # fmt: skip
     head = ['gravity', 'slope [deg]', 'P/W', 'slip paper [%]', 'slip ours [%]', 'z_a ours [cm]', '']
     return ['## Section 6: wheel 5, W 14.7 N, bed of 15 cm', '', *table(head, body)]
+
+
+def paper_speed_lines(rows: Sequence[Row]) -> list[str]:
+    """Return the cases at the paper's rim speed beside the same ones eight times as fast."""
+    from wheel_terra_estimator.soilbin.tables import table, value
+
+    paper = metrics.published('table7')
+    body = []
+    for wheel, slope in dict.fromkeys(
+        (int(row['wheel']), float(row['slope_deg'])) for row in of(rows, PAPER_SPEED)
+    ):
+        slow = [r for r in of(rows, PAPER_SPEED, wheel) if float(r['slope_deg']) == slope]
+        beds = {row['seed'] for row in slow}
+        fast = [
+            r
+            for r in table6_rows(rows, wheel)
+            if float(r['slope_deg']) == slope and r['seed'] in beds
+        ]
+        cells = [str(wheel), f'{slope:g}', str(len(beds))]
+        for key, unit in (('slip', 100.0), ('gross_traction', 1.0), ('sinkage_average', 100.0)):
+            stated = f'{unit * paper[wheel][key]:.3g}' if slope == TABLE7_SLOPE else '-'
+            cells.append(stated)
+            for part in (slow, fast):
+                mean, deviation = metrics.spread(unit * metrics.number(r, key) for r in part)
+                cells.append(value(mean, deviation))
+        body.append(cells)
+    names = ('slip [%]', 'H [N]', 'z_a [cm]')
+    head = ['wheel', 'slope [deg]', 'beds']
+    head += [f'{name} {who}' for name in names for who in ('paper', 'its speed', '8 x its speed')]
+    title = "## At the paper's rim speed: W 19.6 N"
+    if not body:
+        return [title, '', 'Not computed yet.']
+    return [title, '', *table(head, body), '', 'The same beds at both speeds.']
