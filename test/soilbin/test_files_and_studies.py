@@ -3,9 +3,11 @@
 """Case files, kept beds and resumable studies, without the engine."""
 
 import argparse
+import csv
 import hashlib
 import json
 import math
+from pathlib import Path
 
 import pytest
 
@@ -14,6 +16,7 @@ from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.soilbin import (
     calibration,
     files,
+    reproduced_figures,
     reproduction,
     sensitivity,
     snapshots,
@@ -164,8 +167,22 @@ def test_comparison_page_tells_misses(tmp_path):
     reproduction.report(arguments, rows, tmp_path)
     page = (tmp_path / 'comparison.md').read_text()
     assert 'slip 5.0 points, H 0 %, R_r 0 %, z_a 100 %' in page
-    assert 'NOT seen' in page  # all power numbers equal
+    assert '| **no** |' in page  # all power numbers equal
     assert 'slip 1.00, H 1.00' in page
+
+
+def test_statements_of_the_papers_figures_hold_and_can_fail():
+    """The published rows do what the paper's text says; with two wheels exchanged they do not."""
+    table = Path(__file__).parents[2] / 'docs' / 'soilbin' / 'reproduction.csv'
+    with table.open(newline='') as stream:
+        rows = list(csv.DictReader(stream))
+    assert all(figure.holds(figure, rows) for figure in reproduced_figures.FIGURES)
+    swapped = [
+        row | {'wheel': {'2': '6', '6': '2'}.get(row['wheel'], row['wheel'])} for row in rows
+    ]
+    failing = {f.name for f in reproduced_figures.FIGURES if not f.holds(f, swapped)}
+    assert failing >= {'11', '13', '14', '15'}
+    assert all(figure.holds(figure, []) is None for figure in reproduced_figures.FIGURES)
 
 
 def test_calibration_misfit_is_zero_on_the_papers_numbers():

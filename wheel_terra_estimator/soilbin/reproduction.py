@@ -11,16 +11,15 @@ from __future__ import annotations
 import argparse
 import math
 from collections.abc import Sequence
-from itertools import pairwise
 from pathlib import Path
 
-from wheel_terra_estimator.soilbin import files, metrics
+from wheel_terra_estimator.soilbin import files, metrics, reproduced_figures
 from wheel_terra_estimator.soilbin.case import EARTH_GRAVITY, Case
 from wheel_terra_estimator.soilbin.metrics import Row
 from wheel_terra_estimator.soilbin.study import Job
 
 TABLE = 'reproduction.csv'
-PAGES = ('comparison.md',)
+PAGES = ('comparison.md', reproduced_figures.PICTURE)
 PARTS = ('table7', 'table6', 'loads', 'moon')
 PAPER_SPEED = 'paper_speed'
 """Part that runs only where it is asked for: some half an hour per case and core."""
@@ -37,14 +36,6 @@ FIGURES_TABLE7 = {
     'H': 'gross_traction',
     'R_r': 'motion_resistance',
     'z_a': 'sinkage_average',
-}
-# The wheels that each figure compares, and how its power number should order them.
-FIGURES = {
-    'figure 11, diameter: 250 < 200 < 150 mm at 25 deg': (5, 2, 4),
-    'figure 13, width: 150 < 100 < 50 mm at 25 deg': (3, 2, 1),
-    'figure 14, lug height: 20 < 10 < 5 mm at 25 deg': (8, 2, 6),
-    'figure 15, number of lugs: 18 < 36 at 25 deg': (2, 7),
-    'figure 16, lug thickness: 5 < 10 mm at 25 deg': (2, 9),
 }
 
 
@@ -168,13 +159,14 @@ def report(arguments: argparse.Namespace, rows: Sequence[Row], folder: Path) -> 
         f'{len(rows)} runs, grain scale {", ".join(scales) or "-"}; mean (deviation between beds). '
         'Written by `wheel-terra soilbin reproduce`.'
     )
-    parts += ['', *table7_lines(rows), '', *table6_lines(rows), '', *figure_lines(rows)]
+    parts += ['', *table7_lines(rows), '', *table6_lines(rows), '', *reproduced_figures.lines(rows)]
     parts += ['', *load_lines(rows), '', *moon_lines(rows), '', *paper_speed_lines(rows)]
     failed = [row for row in rows if row.get('stopped')]
     if failed:
         parts += ['', '## Runs that stopped early', '']
         parts += [f'- {row["name"]}: {row["stopped"]}' for row in failed]
     page(folder / 'comparison.md', parts)
+    reproduced_figures.draw(rows, folder / reproduced_figures.PICTURE)
 
 
 def of(rows: Sequence[Row], part: str, wheel: int | None = None) -> list[Row]:
@@ -277,21 +269,6 @@ def table6_lines(rows: Sequence[Row]) -> list[str]:
             f'Smallest sum of ranks: wheel {best} (paper: wheel 5); rank correlation of the sums '
             f'{agreement:.2f}.'
         )
-    return lines
-
-
-def figure_lines(rows: Sequence[Row]) -> list[str]:
-    """Say which trends of figures 11 to 16 are there at 25 deg."""
-    lines = ['## Figures 11 to 16 as trends', '']
-    ours = {w: metrics.spread(metrics.number(r, 'power_number') for r in of(rows, 'table7', w))[0]
-            for w in WHEELS}  # fmt: skip
-    for title, wheels in FIGURES.items():
-        values = [ours[w] for w in wheels]
-        if any(math.isnan(v) for v in values):
-            continue
-        seen = all(a < b for a, b in pairwise(values))
-        numbers = ', '.join(f'{v:.2f}' for v in values)
-        lines.append(f'- {title}: {"seen" if seen else "NOT seen"} (ours: {numbers})')
     return lines
 
 
