@@ -190,16 +190,14 @@ def draw(rows: Sequence[Row], path: Path) -> None:
     """Draw our curves of each figure over the slope."""
     from matplotlib.figure import Figure as Canvas
 
-    from wheel_terra_estimator.reporting.style import picture_style
-
     names = {POWER: 'power number [-]', SLIP: 'slip [-]', 'torque_coefficient': 'T/(W r) [-]'}
-    with picture_style():
-        canvas = Canvas(figsize=(9.6, 8.4))
-        for axis, figure in zip(np.ravel(canvas.subplots(3, 3)), FIGURES, strict=True):
-            for curve in figure.curves:
-                axis.plot(*curve.points(rows, figure.quantity), '-o', ms=3, label=curve.label)
-            axis.set_title(f'figure {figure.name}', fontsize=8)
-            axis.set_ylabel(names[figure.quantity])
-            axis.set_xlabel('slope [deg]')
-            axis.legend(fontsize=7)
-        canvas.savefig(path, metadata={'Date': None})
+    canvas = Canvas(figsize=(9.6, 8.4), layout='constrained')
+    for axis, figure in zip(np.ravel(canvas.subplots(3, 3)), FIGURES, strict=True):
+        for curve in figure.curves:
+            axis.plot(*curve.points(rows, figure.quantity), '-o', ms=3, label=curve.label)
+        axis.set_title(f'figure {figure.name}', fontsize='small')
+        axis.set_ylabel(names[figure.quantity])
+        axis.set_xlabel('slope [deg]')
+        axis.legend(fontsize='x-small')
+        axis.grid(alpha=0.3)
+    canvas.savefig(path, metadata={'Date': None})
