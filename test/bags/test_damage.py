@@ -185,8 +185,46 @@ def test_a_channel_in_a_chunk_that_unpacks_decides(tmp_path: Path, codec: str) -
     content = made.content[:at] + b'/joint_statas' + made.content[at + 13 :]
     path = tmp_path / 'a.mcap'
     path.write_bytes(content)
-    found, _ = read(path)
+    found, notes = read(path)
     assert found == [RawMessage(*sample) for sample in samples()]
+    # Damaged bytes may unpack as well: without a checksum it is no proof.
+    assert 'copies of channel 1 differ: /joint_statas or /joint_states' in notes[0]
+
+
+def test_a_channel_in_a_chunk_with_a_wrong_checksum_yields(tmp_path: Path) -> None:
+    made = make(samples(), TYPES, Layout(900, 'lz4'))
+    content = bytearray(made.content.replace(b'/joint_states', b'/joint_statas', 1))
+    content[-20] ^= 1  # in the footer: the index is not relied on, its definitions are read
+    path = tmp_path / 'a.mcap'
+    path.write_bytes(content)
+    found, notes = read(path)
+    assert found == [RawMessage(*sample) for sample in samples()]
+    assert 'copies of channel 1 differ' in notes[0]
+
+
+def left_out(tmp_path: Path, begin: int, end: int, content: bytes) -> tuple[int, list[str]]:
+    path = tmp_path / 'a.mcap'
+    path.write_bytes(content[:begin] + content[end:])
+    found, notes = read(path)
+    assert not Counter(found) - Counter(RawMessage(*sample) for sample in samples())
+    return len(found), notes
+
+
+def test_messages_whose_chunk_lost_its_head_are_said(tmp_path: Path) -> None:
+    """Bytes are missing, by chance so many that a record ends where another begins."""
+    made = make(samples(), TYPES, Layout(900, checksums=False, summary=False))
+    begin, _, part = made.parts[2]
+    third = made.content.index(part[2].data) - 31
+    count, notes = left_out(tmp_path, begin, third, made.content)
+    assert count == 88
+    assert 'lost from' in notes[0]
+
+
+def test_an_index_of_messages_that_are_not_there_is_said(tmp_path: Path) -> None:
+    made = make(samples(), TYPES, Layout(900, checksums=False, summary=False))
+    count, notes = left_out(tmp_path, made.parts[2][1], made.parts[3][1], made.content)
+    assert count == 90 - len(made.parts[3][2])
+    assert 'lost from' in notes[0]
 
 
 def test_the_index_alone_decides_nothing(tmp_path: Path) -> None:
@@ -288,6 +326,25 @@ def test_rows_between_two_damaged_pages_of_sqlite_are_read(tmp_path: Path) -> No
     between = [message for message, page in zip(whole, pages, strict=True) if page == kept]
     assert between
     assert all(message in found for message in between)
+
+
+def test_a_damaged_row_number_of_sqlite_hides_no_row_behind(tmp_path: Path) -> None:
+    """The rows of a page have great numbers and no data, the last of them cannot be read."""
+    path, whole = big_sqlite(tmp_path)
+    content = bytearray(path.read_bytes())
+    begin = content.index(whole[2000].data) // 4096 * 4096
+    count = int.from_bytes(content[begin + 3 : begin + 5], 'big')
+    places = [int.from_bytes(content[begin + 8 + 2 * i :][:2], 'big') for i in range(count)]
+    pages = [content.index(message.data) // 4096 * 4096 for message in whole]
+    for place in places:  # length 2, number 12343, a head of 2 bytes, nothing
+        content[begin + place : begin + place + 5] = b'\x02\xe0\x37\x02\x00'
+    content[begin + places[-1] : begin + places[-1] + 9] = b'\xff' * 9
+    path.write_bytes(content)
+    found, notes = read(path)
+    assert Counter(found) == Counter(
+        message for message, page in zip(whole, pages, strict=True) if page != begin
+    )
+    assert 'is damaged' in notes[0]
 
 
 def test_an_index_of_sqlite_that_lies_hides_no_row(tmp_path: Path) -> None:

@@ -35,8 +35,12 @@ _FOOTER = mcap.HEAD + 20 + len(mcap.MAGIC)  # [byte], with the closing magic
 _IN_CHUNK = (mcap.SCHEMA, mcap.CHANNEL, mcap.MESSAGE)
 _LONGEST_STRETCH = 4 * MEGABYTE  # of messages outside of chunks that are read at once
 _FORGET_AFTER = 32 * MEGABYTE  # of the file that was looked at
-_SOUND = 3  # votes of a definition in a chunk whose checksum is right
-_UNPACKED = 2  # in a compressed chunk that unpacked without an error
+# Votes of a copy of a definition, by where it stands:
+_SOUND = 100  # in a chunk whose checksum is right: no number of others outvotes it
+_UNPACKED = 3  # in a compressed chunk without checksum that unpacked without an error
+_LISTED = 2  # in the recorder's own list of topics
+_PLAIN = 2
+_DAMAGED = 1  # in a chunk whose checksum is wrong, or that cannot be unpacked to its end
 _TOPIC = re.compile(r'[/~A-Za-z_][A-Za-z0-9_/~{}.-]*')
 _TYPE = re.compile(r'[A-Za-z][A-Za-z0-9_]*(/|::)[A-Za-z0-9_/:.-]+')
 
@@ -51,6 +55,7 @@ class Piece:
     start: int
     last: int
     channels: frozenset[int] | None = None  # None: may be any
+    listed: int = 0  # messages that the index behind a chunk lists; 0: there is none
 
 
 class Content(NamedTuple):
@@ -229,12 +234,18 @@ class McapFile:
                     statistics = mcap.channel_counts(content, item)
                 except ValueError:
                     gaps.append(mcap.Gap(item.begin, item.end))
+            elif item.opcode == mcap.MESSAGE_INDEX:
+                self._add_message_index(item, gaps)
             else:
                 self._define(item, gaps)
         damaged = [piece for piece in self._pieces if not self._count(piece, again=False)]
         for piece in damaged:  # now every channel is known
             self._count(piece, again=True)
         self._pieces = [piece for piece in self._pieces if piece.start <= piece.last]
+        if any(piece.head for piece in self._pieces):
+            # Recorders put messages into chunks or do not: these have lost the head of theirs.
+            loose = (piece for piece in self._pieces if not piece.head)
+            gaps += [mcap.Gap(piece.begin, piece.begin) for piece in loose]
         self._add_gaps(gaps)
         if statistics is not None:
             self._declare(statistics)
@@ -245,6 +256,19 @@ class McapFile:
         head = mcap.chunk_head(self._map, at, self._size)
         assert head is not None
         self._pieces.append(Piece(at, record.end, head, head.start, head.end))
+
+    def _add_message_index(self, record: mcap.Record, gaps: list[mcap.Gap]) -> None:
+        """Add to what the last chunk should hold; an index of other messages is a damage."""
+        assert self._map is not None
+        head = self._pieces[-1].head if self._pieces else None
+        try:
+            times = mcap.indexed_times(self._map, record)
+        except ValueError:
+            times = [0]
+        if head is None or not all(head.start <= time <= head.end for time in times):
+            gaps.append(mcap.Gap(record.begin, record.end))
+        else:
+            self._pieces[-1].listed += len(times)
 
     def _add_loose(self, record: mcap.Record) -> None:
         """Lengthen the last stretch of messages, or begin a new one."""
@@ -291,6 +315,8 @@ class McapFile:
                 return False
         self._counts += reading.counts
         self._note_damage(piece, content, reading)
+        if piece.listed and piece.listed != reading.counts.total():
+            self.losses.spans.setdefault(piece.begin, _span(piece, reading.start, reading.last))
         # The index and the head of a chunk may lie; its messages do not.
         piece.start, piece.last = reading.start, reading.last
         return True
@@ -480,7 +506,7 @@ class _Definitions:
         self._channels: dict[int, Counter[tuple[int, str]]] = defaultdict(Counter)
         self._text = ''
 
-    def add(self, content: Any, record: mcap.Record, votes: int = 1) -> None:
+    def add(self, content: Any, record: mcap.Record, votes: int = _PLAIN) -> None:
         """Count a definition; ``ValueError`` if it is damaged."""
         if record.opcode == mcap.SCHEMA:
             number, name = mcap.schema(content, record)
@@ -508,13 +534,16 @@ class _Definitions:
         return found
 
     def undecided(self) -> list[str]:
-        """Return in words the channels of which as many copies state one topic as another."""
+        """Return in words the channels whose copies differ while no checksum says which is right.
+
+        Flipped bits may leave packed bytes that still unpack, so a majority is no proof.
+        """
         found = []
         for number, votes in sorted(self._channels.items()):
             weight = self._weights(votes, lambda definition: definition[1])
-            best = {topic for (_, topic), w in weight.items() if w == max(weight.values())}
-            if len(best) > 1:
-                found.append(f'copies of channel {number} differ: {" or ".join(sorted(best))}')
+            topics = sorted({topic for _, topic in weight})
+            if len(topics) > 1 and max(weight.values()) < _SOUND:
+                found.append(f'copies of channel {number} differ: {" or ".join(topics)}')
         return found
 
     def _chosen(self, votes: Counter[Any], name: Any) -> Any:
@@ -522,15 +551,16 @@ class _Definitions:
         return max(weight, key=lambda definition: weight[definition])
 
     def _weights(self, votes: Counter[Any], name: Any) -> dict[Any, int]:
-        return {d: count + (f': {name(d)}\n' in self._text) for d, count in votes.items()}
+        return {d: n + _LISTED * (f': {name(d)}\n' in self._text) for d, n in votes.items()}
 
 
 def _votes(piece: Piece, content: Content) -> int:
     """Return how much a definition in a piece is to be relied on."""
     if content.sound:
         return _SOUND
-    packed = piece.head is not None and bool(piece.head.codec)
-    return _UNPACKED if packed and not content.damage else 1
+    if content.damage or content.wrong_checksum:
+        return _DAMAGED
+    return _UNPACKED if piece.head is not None and piece.head.codec else _PLAIN
 
 
 def _size(rows: list[Row]) -> int:

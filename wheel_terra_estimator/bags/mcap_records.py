@@ -295,6 +295,14 @@ def channel_counts(content: Buffer, record: Record) -> dict[int, int]:
     return dict(struct.iter_unpack('<HQ', bytes(content[at : record.end])))
 
 
+def indexed_times(content: Buffer, record: Record) -> list[int]:
+    """Return the log times [ns] of the messages that a message index record lists."""
+    at = record.begin + 6
+    if record.end < at or _uint32(content, at - 4) != record.end - at or (record.end - at) % 16:
+        raise ValueError('a message index record is damaged')
+    return [time for time, _ in struct.iter_unpack('<QQ', bytes(content[at : record.end]))]
+
+
 class IndexedChunk(NamedTuple):
     """A chunk as the index knows it: where it stands, its length, the channels in it."""
 

@@ -12,8 +12,9 @@ import shutil
 import sqlite3
 from array import array
 from collections import Counter
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import ExitStack
+from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -49,6 +50,7 @@ class SqliteFile:
         self._number = array('q')  # of the row, and its log time: only where the order differs
         self._time = array('q')
         self._ordered = True
+        self._size = 0  # of all messages [byte]
         try:
             described = self._read_topics()
         except _UNREADABLE as error:
@@ -77,7 +79,13 @@ class SqliteFile:
     def messages(self, topics: Collection[str]) -> Iterator[RawMessage]:
         """Yield the messages of some topics in the order of their log times."""
         wanted = {number: name for number, name in self._topic.items() if name in topics}
-        fetch = self._in_rows() if self._ordered else self._by_number()
+        if self._ordered:
+            fetch = self._in_rows()
+        elif self.losses.spans and self._size <= self._limits.held:
+            # A row on a damaged page need not be found by its number.
+            fetch = iter(sorted(self._in_rows(), key=lambda row: row[1]))
+        else:
+            fetch = self._by_number()
         for topic, time, data in fetch:
             if topic in wanted:
                 yield RawMessage(time, wanted[topic], data)
@@ -119,10 +127,10 @@ class SqliteFile:
             if table not in tables or b'virtual' in tables[table].lower()[:32]:
                 raise sqlite3.DatabaseError(f'no table {table.decode()}')
         found = {}
-        for number, name, kind in _rows(
-            self._connection, 'SELECT id, id, name, type FROM topics', self._note_gap
-        ):
-            if isinstance(name, bytes) and isinstance(kind, bytes) and isinstance(number, int):
+        text = 'SELECT id, id, name, type FROM topics'
+        rows = _Table(self._connection, text, _is_topic, self._note_gap).rows()
+        for number, name, kind in rows:
+            if _is_topic((number, name, kind)):
                 found[number] = (name.decode('utf-8', 'replace'), kind.decode('utf-8', 'replace'))
         return found
 
@@ -131,13 +139,15 @@ class SqliteFile:
         counts: Counter[int] = Counter()
         last = -1
         text = 'SELECT id, id, topic_id, timestamp, length(data), typeof(data) FROM messages'
-        for number, topic, time, size, kind in _rows(self._connection, text, self._note_gap):
+        rows = _Table(self._connection, text, _is_survey_row, self._note_gap).rows()
+        for number, topic, time, size, kind in rows:
             if not (_is_message(topic, time) and kind == b'blob' and size <= self._limits.chunk):
                 self._damaged_rows += 1
                 continue
             counts[topic] += 1
             self._ordered = self._ordered and time >= last
             last = time
+            self._size += size
             self._number.append(number)
             self._time.append(time)
             losses = self.losses
@@ -157,7 +167,7 @@ class SqliteFile:
             'SELECT id, topic_id, timestamp, typeof(data), '
             f'CASE WHEN length(data) <= {self._limits.chunk} THEN data END FROM messages'
         )
-        for topic, time, kind, data in _rows(self._connection, text, lambda number: None):
+        for topic, time, kind, data in _Table(self._connection, text, _is_data_row).rows():
             if _is_message(topic, time) and kind == b'blob' and data is not None:
                 yield topic, time, data
 
@@ -179,66 +189,108 @@ def _is_message(topic: Any, time: Any) -> bool:
     return isinstance(topic, int) and isinstance(time, int) and time >= 0
 
 
-def _rows(connection: sqlite3.Connection, text: str, on_gap: Any) -> Iterator[tuple[Any, ...]]:
-    """Yield the rows of a table in the order of their numbers, those behind damage too.
+def _is_topic(row: tuple[Any, ...]) -> bool:
+    number, name, kind = row
+    return isinstance(name, bytes) and isinstance(kind, bytes) and isinstance(number, int)
 
-    Parameters
+
+def _is_survey_row(row: tuple[Any, ...]) -> bool:
+    _, topic, time, _, kind = row
+    return _is_message(topic, time) and kind == b'blob'
+
+
+def _is_data_row(row: tuple[Any, ...]) -> bool:
+    topic, time, kind, _ = row
+    return _is_message(topic, time) and kind == b'blob'
+
+
+@dataclass
+class _Table:
+    """A table whose rows are read in the order of their numbers, those behind damage too.
+
+    Attributes
     ----------
     connection : sqlite3.Connection
         The file.
     text : str
-        A ``SELECT`` whose first column is the number of the row; it is not yielded.
+        A ``SELECT`` whose first column is the number of the row; `rows` leaves it out.
+    is_whole : callable
+        Whether the other columns can be a row: the number of another one may be damaged as well,
+        so nothing is concluded from it.
     on_gap : callable
         Told the last number before each damage.
     """
-    last = -1
-    while True:
+
+    connection: sqlite3.Connection
+    text: str
+    is_whole: Callable[[tuple[Any, ...]], bool]
+    on_gap: Callable[[int], None] = lambda number: None
+
+    def rows(self) -> Iterator[tuple[Any, ...]]:
+        """Yield the rows."""
+        # A damaged number may be too great: what it seems to jump over is looked for afterwards.
+        jumped = [(-1, _LAST_ROW)]
+        while jumped:
+            yield from self._between(*jumped.pop(), jumped)
+
+    def _between(
+        self, last: int, end: int, jumped: list[tuple[int, int]]
+    ) -> Iterator[tuple[Any, ...]]:
+        """Yield the rows behind number ``last`` and before ``end``; note where numbers jump."""
+        run = self.connection.execute
+        text = f'{self.text} WHERE id > ? AND id < ? ORDER BY id'
+        while True:
+            before = last
+            try:
+                for row in run(text, (last, end)):
+                    before, last = last, row[0]
+                    yield row[1:]
+                return
+            except _UNREADABLE:
+                pass
+            if last > before + 1:
+                jumped.append((before, last))
+            # The cursor runs ahead: what stands before the damage comes one by one.
+            while (found := self._row(last + 1, end)) is not None:
+                if found[0] > last + 1:
+                    jumped.append((last, found[0]))
+                last = found[0]
+                yield found[1:]
+            self.on_gap(last)
+            behind = self._number_behind(last, end)
+            if behind is None:
+                return
+            jumped.append((last, behind))
+            last = behind - 1
+
+    def _row(self, number: int, end: int) -> tuple[Any, ...] | None:
+        """Return the first row from a number on; None if none is there, or it cannot be read."""
+        text = f'{self.text} WHERE id >= ? AND id < ? ORDER BY id LIMIT 1'
         try:
-            for row in connection.execute(f'{text} WHERE id > ? ORDER BY id', (last,)):
-                last = row[0]
-                yield row[1:]
-            return
+            cursor = self.connection.execute(text, (number, end))
+            found: tuple[Any, ...] | None = cursor.fetchone()
         except _UNREADABLE:
-            pass
-        # The cursor runs ahead: what stands before the damage comes one by one.
-        while (found := _row(connection, text, last + 1)) is not None:
-            last = found[0]
-            yield found[1:]
-        on_gap(last)
-        behind = _number_behind(connection, text, last)
-        if behind is None:
-            return
-        last = behind - 1
-
-
-def _row(connection: sqlite3.Connection, text: str, number: int) -> tuple[Any, ...] | None:
-    """Return the first row from a number on; None if there is none, or it cannot be read."""
-    try:
-        cursor = connection.execute(f'{text} WHERE id >= ? ORDER BY id LIMIT 1', (number,))
-        found: tuple[Any, ...] | None = cursor.fetchone()
-    except _UNREADABLE:
-        return None
-    return found
-
-
-def _number_behind(connection: sqlite3.Connection, text: str, last: int) -> int | None:
-    """Return the number of the first row behind damage that can be read, None if there is none."""
-    # Rows between two damaged pages would be jumped over: at first no number is left out.
-    for number in range(last + 2, last + 2 + _ONE_BY_ONE):
-        if (found := _row(connection, text, number)) is not None:
-            return int(found[0])
-    low, step = last + 1 + _ONE_BY_ONE, 1  # the row from `low` on cannot be read
-    while (found := _row(connection, text, low + step)) is None:
-        low += step
-        step *= 2
-        if low + step >= _LAST_ROW:
             return None
-    high, number = low + step, int(found[0])
-    while high - low > 1:
-        middle = (low + high) // 2
-        nearer = _row(connection, text, middle)
-        if nearer is None:
-            low = middle
-        else:
-            high, number = middle, int(nearer[0])
-    return number
+        return found if found is not None and self.is_whole(found[1:]) else None
+
+    def _number_behind(self, last: int, end: int) -> int | None:
+        """Return the number of the first row behind damage that can be read, None without one."""
+        # Rows between two damaged pages would be jumped over: at first no number is left out.
+        for number in range(last + 2, min(last + 2 + _ONE_BY_ONE, end)):
+            if (found := self._row(number, end)) is not None:
+                return int(found[0])
+        low, step = last + 1 + _ONE_BY_ONE, 1  # the row from `low` on cannot be read
+        while low + step < end and (found := self._row(low + step, end)) is None:
+            low += step
+            step *= 2
+        if low + step >= end or found is None:
+            return None
+        high, number = low + step, int(found[0])
+        while high - low > 1:
+            middle = (low + high) // 2
+            nearer = self._row(middle, end)
+            if nearer is None:
+                low = middle
+            else:
+                high, number = middle, int(nearer[0])
+        return number
