@@ -193,13 +193,14 @@ def test_a_channel_in_a_chunk_that_unpacks_decides(tmp_path: Path, codec: str) -
 
 def test_a_channel_in_a_chunk_with_a_wrong_checksum_yields(tmp_path: Path) -> None:
     made = make(samples(), TYPES, Layout(900, 'lz4'))
-    content = bytearray(made.content.replace(b'/joint_states', b'/joint_statas', 1))
+    content = bytearray(made.content.replace(b'imu/data', b'imu/datc', 1))
+    assert content.index(b'imu/datc') < made.parts[0][1]
     content[-20] ^= 1  # in the footer: the index is not relied on, its definitions are read
     path = tmp_path / 'a.mcap'
     path.write_bytes(content)
     found, notes = read(path)
     assert found == [RawMessage(*sample) for sample in samples()]
-    assert 'copies of channel 1 differ' in notes[0]
+    assert 'copies of channel 2 differ' in notes[0]
 
 
 def left_out(tmp_path: Path, begin: int, end: int, content: bytes) -> tuple[int, list[str]]:

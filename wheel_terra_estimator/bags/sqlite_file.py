@@ -240,16 +240,19 @@ class _Table:
         run = self.connection.execute
         text = f'{self.text} WHERE id > ? AND id < ? ORDER BY id'
         while True:
-            before = last
+            jump: tuple[int, int] | None = None
             try:
                 for row in run(text, (last, end)):
-                    before, last = last, row[0]
+                    if self.is_whole(row[1:]):
+                        if row[0] > last + 1:
+                            jump = last, row[0]
+                        last = row[0]
                     yield row[1:]
                 return
             except _UNREADABLE:
                 pass
-            if last > before + 1:
-                jumped.append((before, last))
+            if jump:
+                jumped.append(jump)
             # The cursor runs ahead: what stands before the damage comes one by one.
             while (found := self._row(last + 1, end)) is not None:
                 if found[0] > last + 1:
