@@ -160,7 +160,8 @@ class SqliteFile:
     def _note_gap(self, number: int) -> None:
         """Remember that rows behind a number cannot be read; the log times around say when."""
         time = self._time[-1] if self._time else None
-        self.losses.spans[number] = None if time is None else (time, time)
+        # Looked through again behind a jump of numbers, a place keeps its time.
+        self.losses.spans.setdefault(number, None if time is None else (time, time))
 
     def _in_rows(self) -> Iterator[tuple[int, int, bytes]]:
         text = (
