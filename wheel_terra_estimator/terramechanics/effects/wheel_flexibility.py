@@ -48,8 +48,8 @@ EFFECT = Effect(
         'hard_layer': 'deflection on a hard floor; a penetrometer',
     },
     validity='deflection below the sinkage; exponent below 1.3; the sinkage z0 that sets the '
-    'circle is that of the rigid wheel without slip; torque added by drive friction or carried soil '
-    'takes the same arm, r/r* of it (1 % off at most)',
+    'circle is that of the rigid wheel without slip; torque added by drive friction or by soil '
+    'carried round takes the same arm (1 % of it off at most)',
     source='substitute circle of a flattened wheel (Bekker; Schmid 1995, J. Terramech. 32): the '
     'chord that both circles share, 2 r (z + f) = 2 r* z; z0 after Bekker 1969',
     on_inputs=_flatten,
