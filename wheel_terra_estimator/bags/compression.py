@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from wheel_terra_estimator.bags.limits import LIMITS, MEGABYTE, Limits
+from wheel_terra_estimator.bags.limits import LIMITS, MEGABYTE, Limits, in_words
 from wheel_terra_estimator.errors import UserError
 
 ZSTD_MAGIC = b'\x28\xb5\x2f\xfd'
@@ -40,9 +40,7 @@ def unpack(codec: str, packed: bytes | memoryview, size: int, limits: Limits = L
         Nothing above ``limits.chunk`` is unpacked.
     """
     if size > limits.chunk:
-        return Unpacked(
-            b'', f'a chunk of {size / MEGABYTE:.0f} MB is above {limits.chunk / MEGABYTE:.0f} MB'
-        )
+        return Unpacked(b'', f'a chunk of {in_words(size)} is above {in_words(limits.chunk)}')
     if codec not in CODECS:
         return Unpacked(b'', f'the compression {codec!r} is not known')
     if not codec:

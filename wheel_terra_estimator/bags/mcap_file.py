@@ -26,7 +26,7 @@ from zlib import crc32
 
 from wheel_terra_estimator.bags import mcap_records as mcap
 from wheel_terra_estimator.bags.compression import unpack
-from wheel_terra_estimator.bags.limits import LIMITS, MEGABYTE, Limits
+from wheel_terra_estimator.bags.limits import LIMITS, MEGABYTE, Limits, in_words
 from wheel_terra_estimator.bags.losses import Losses
 from wheel_terra_estimator.bags.raw_messages import RawMessage, Topic
 from wheel_terra_estimator.errors import UserError
@@ -440,9 +440,9 @@ class McapFile:
                     allowed -= end - begin + _ROW_SIZE
                     if allowed < 0:
                         raise UserError(
-                            f'{self.path}: more than {self._limits.held / MEGABYTE:.0f} MB of '
-                            'messages would be held to bring them into order; sort it first '
-                            '(ros2 bag convert)'
+                            f'{self.path}: more than {in_words(self._limits.held)} of messages '
+                            'would be held to bring them into order; sort it first (ros2 bag '
+                            'convert), or allow more with --most-held'
                         )
             else:
                 found.definitions.append(item)

@@ -9,6 +9,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from wheel_terra_estimator.bags.limits import LIMITS, Limits, in_words
 from wheel_terra_estimator.bags.storage import Bag, open_bag
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.configuration.parameters import nearest
@@ -18,13 +19,16 @@ from wheel_terra_estimator.messages.convert import INPUT_TYPES, InputConverter, 
 
 
 def read(
-    path: str | Path, remaps: Mapping[str, str], configuration: Configuration
+    path: str | Path,
+    remaps: Mapping[str, str],
+    configuration: Configuration,
+    limits: Limits = LIMITS,
 ) -> Iterator[tuple[int, Measurement]]:
     """Yield (log time [ns], measurement) of all used topics of a bag, in the order of log times.
 
     See `MeasurementReader` for the parameters and errors.
     """
-    with open_bag(path) as bag:
+    with open_bag(path, limits) as bag:
         yield from MeasurementReader(bag, remaps, configuration).measurements()
 
 
@@ -104,6 +108,9 @@ class MeasurementReader:
 
     def unpack(self, data: bytes, name: str) -> Any | None:
         """Return the message in CDR bytes of an input topic; None, counted, if it is damaged."""
+        if len(data) > (largest := self.bag.limits.message):
+            self.rejected[name, f'above {in_words(largest)}'] += 1
+            return None
         try:
             return self._store.deserialize_cdr(data, INPUT_TYPES[name])
         except Exception:  # the library lets many kinds through on damaged bytes

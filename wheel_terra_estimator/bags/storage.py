@@ -46,10 +46,15 @@ class Bag:
     ----------
     topics : dict of str to Topic
         All topics, by name.
+    limits : Limits
+        What is unpacked and held.
     """
 
-    def __init__(self, path: Path, sources: list[_Source], notes: list[str]) -> None:
+    def __init__(
+        self, path: Path, sources: list[_Source], notes: list[str], limits: Limits = LIMITS
+    ) -> None:
         self.path = path
+        self.limits = limits
         self._notes = notes
         self._sources = sources
         counts: Counter[str] = Counter()
@@ -77,7 +82,7 @@ class Bag:
         merged = sources[0] if len(sources) == 1 else heapq.merge(*sources, key=lambda m: m[0])
         for message in merged:
             if message.data[:4] == ZSTD_MAGIC:  # compressed message by message
-                message = message._replace(data=unpack_message(message.data))
+                message = message._replace(data=unpack_message(message.data, self.limits))
             yield message
 
 
@@ -102,7 +107,7 @@ def open_bag(path: str | Path, limits: Limits = LIMITS) -> Iterator[Bag]:
     path = Path(path)
     notes: list[str] = []
     with ExitStack() as stack:
-        bag = Bag(path, _open_sources(path, notes, stack, limits), notes)
+        bag = Bag(path, _open_sources(path, notes, stack, limits), notes, limits)
         try:
             if not bag.message_count:
                 raise UserError(

@@ -7,6 +7,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from wheel_terra_estimator.bags import limits as bag_limits
 from wheel_terra_estimator.configuration import reader as configuration_reader
 
 SUMMARY = 'write a rover file with what a recording tells: radius, mounting, zeros, noise'
@@ -36,6 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='FROM:=TO',
         help="the estimator's topic, then the bag's; may be given several times",
     )
+    bag_limits.add_arguments(parser)
     parser.add_argument('--overwrite', action='store_true', help='replace an earlier file')
 
 
@@ -49,10 +51,10 @@ def run(arguments: argparse.Namespace) -> int:
 
     configuration = configuration_reader.from_arguments(arguments)
     check_file(arguments.output, arguments.overwrite, [arguments.bag])
-    with open_bag(arguments.bag) as bag:
+    with open_bag(arguments.bag, bag_limits.from_arguments(arguments)) as bag:
         name = arguments.bag.resolve().name
         recording = read_series(bag, parse_remaps(arguments.remap), name)
-    calibration = calibrate(recording, configuration)
+        calibration = calibrate(recording, configuration)
     text = as_file(calibration, configuration, name)
     with new_file(arguments.output, arguments.overwrite) as path:
         path.write_text(text, encoding='utf-8')

@@ -9,6 +9,7 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from wheel_terra_estimator.bags import limits as bag_limits
 from wheel_terra_estimator.configuration import reader as configuration_reader
 
 if TYPE_CHECKING:
@@ -35,6 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='FROM:=TO',
         help="the estimator's topic, then the bag's; may be given several times",
     )
+    bag_limits.add_arguments(parser)
     parser.add_argument('--json', action='store_true', help='print findings and figures as JSON')
 
 
@@ -49,14 +51,14 @@ def run(arguments: argparse.Namespace) -> int:
     given = bool(arguments.config or arguments.parameters)
     configuration = configuration_reader.from_arguments(arguments) if given else None
     remaps = parse_remaps(arguments.remap)
-    with open_bag(arguments.bag) as bag:
+    with open_bag(arguments.bag, bag_limits.from_arguments(arguments)) as bag:
         recording = read_series(bag, remaps, arguments.bag.resolve().name)
-    if recording.joints is None and recording.wheel_odometry is None:
-        listed = ', '.join(f'{name} ({kind})' for name, kind, _ in recording.topics)
-        raise UserError(
-            f'{arguments.bag}: neither joint states nor odometry in it; there are: {listed}; name '
-            'the wheel rates with --remap joint_states:=/TOPIC, or record them'
-        )
+        if recording.joints is None and recording.wheel_odometry is None:
+            listed = ', '.join(f'{name} ({kind})' for name, kind, _ in recording.topics)
+            raise UserError(
+                f'{arguments.bag}: neither joint states nor odometry in it; there are: {listed}; '
+                'name the wheel rates with --remap joint_states:=/TOPIC, or record them'
+            )
     report = check_recording(recording, configuration, tuple(remaps))
     if arguments.json:
         print(json.dumps(report.as_dict(), indent=2))

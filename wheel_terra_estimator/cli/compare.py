@@ -8,6 +8,8 @@ import argparse
 import json
 from pathlib import Path
 
+from wheel_terra_estimator.bags import limits as bag_limits
+
 SUMMARY = 'put two bags of estimates side by side, against the truth where there is one'
 EXAMPLES = (
     'wheel-terra compare estimates_a estimates_b',
@@ -22,6 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--truth', type=Path, metavar='BAG', help='recording with ground truth')
     parser.add_argument('--json', action='store_true', help='print the differences as JSON')
     parser.add_argument('--report', type=Path, metavar='F.html', help='page with both overlaid')
+    bag_limits.add_arguments(parser)
     parser.add_argument('--overwrite', action='store_true', help='replace an earlier report')
 
 
@@ -44,13 +47,14 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.report:
         check_page(arguments.report)
         check_file(arguments.report, arguments.overwrite, inputs)
+    limits = bag_limits.from_arguments(arguments)
     histories = []
     for path in inputs:
-        with open_bag(path) as bag:
+        with open_bag(path, limits) as bag:
             histories.append(read_estimates(bag))
     truth = None
     if arguments.truth:
-        with open_bag(arguments.truth) as bag:
+        with open_bag(arguments.truth, limits) as bag:
             truth = read_simulated_truth(bag, histories[0].names)
         if truth is None:
             raise UserError(

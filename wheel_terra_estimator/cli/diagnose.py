@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from wheel_terra_estimator.bags import limits as bag_limits
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.output_folder import check_folder, new_folder
 
@@ -80,6 +81,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--no-pictures', action='store_true', help='write report.json and model.yaml only'
     )
+    bag_limits.add_arguments(parser)
     parser.add_argument('--overwrite', action='store_true', help='replace DIR if it exists')
     reader.add_arguments(parser)
 
@@ -109,10 +111,10 @@ def run(arguments: argparse.Namespace) -> int:
         )
     own = _load_effects(arguments.effects)
     configuration = reader.from_arguments(arguments, complete=False)
-    table = together([_read(data, arguments.remap, configuration) for data in arguments.data])
+    table = together([_read(data, arguments, configuration) for data in arguments.data])
     reference = None
     if arguments.reference:
-        reference = _read(arguments.reference, arguments.remap, configuration)
+        reference = _read(arguments.reference, arguments, configuration)
     options = Options(tuple(arguments.only) or None, arguments.floor, arguments.allowed_error)
     diagnosis = diagnose(table, configuration, reference, options)
     diagnosis = _with_effect_file(diagnosis, own)
@@ -167,14 +169,15 @@ def _is_bag(path: Path) -> bool:
     return path.is_dir() or path.name.endswith(STORAGE_SUFFIXES)
 
 
-def _read(data: str, remaps: list[str], configuration: Configuration) -> SteadyTable:
+def _read(data: str, arguments: argparse.Namespace, configuration: Configuration) -> SteadyTable:
     """Read a table, or extract the steady windows of a drive."""
     path = Path(data)
     if _is_bag(path):
         from wheel_terra_estimator.bags.reader import parse_remaps
         from wheel_terra_estimator.discrepancy.drives.windows import rows_from_bag
 
-        return rows_from_bag(path, configuration, parse_remaps(remaps)).table()
+        remaps, limits = parse_remaps(arguments.remap), bag_limits.from_arguments(arguments)
+        return rows_from_bag(path, configuration, remaps, limits=limits).table()
     from wheel_terra_estimator.discrepancy.tables.parsing import read_table
 
     return read_table(path)

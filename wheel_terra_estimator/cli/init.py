@@ -10,9 +10,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from wheel_terra_estimator.bags import limits as bag_limits
 from wheel_terra_estimator.errors import UserError
 
 if TYPE_CHECKING:
+    from wheel_terra_estimator.bags.limits import Limits
     from wheel_terra_estimator.configuration.rover_template import RoverSketch
 
 SUMMARY = 'write a new rover file from a URDF, from a recording, or from a few questions'
@@ -37,6 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     for name, unit, meaning in _MEASURES:
         parser.add_argument(f'--{name}', type=_positive, metavar=unit, help=meaning)
     parser.add_argument('--name', default='', metavar='TEXT', help='name of the rover, for reports')
+    bag_limits.add_arguments(parser)
     parser.add_argument('--overwrite', action='store_true', help='replace an earlier file')
 
 
@@ -95,21 +98,21 @@ def _sketch(arguments: argparse.Namespace) -> RoverSketch:
             sketch = replace(sketch, mass=arguments.mass, guessed=guessed)
         return replace(sketch, name=arguments.name or sketch.name)
     if arguments.bag:
-        wheels = wheels or _wheels_of(arguments.bag)
+        wheels = wheels or _wheels_of(arguments.bag, bag_limits.from_arguments(arguments))
     elif not wheels:
         wheels = _ask_wheels()
     return _from_measures(arguments, wheels)
 
 
-def _wheels_of(path: Path) -> list[str]:
+def _wheels_of(path: Path, limits: Limits) -> list[str]:
     from wheel_terra_estimator.bags.series_reader import read_series
     from wheel_terra_estimator.bags.storage import open_bag
     from wheel_terra_estimator.checks.rover_facts import wheel_names
 
-    with open_bag(path) as bag:
+    with open_bag(path, limits) as bag:
         recording = read_series(bag, {}, path.name)
-    if recording.joints is None:
-        raise UserError(f'{path}: no joint states in it; name the wheels with --wheels')
+        if recording.joints is None:
+            raise UserError(f'{path}: no joint states in it; name the wheels with --wheels')
     return list(wheel_names(recording.joints.names))
 
 

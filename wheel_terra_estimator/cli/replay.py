@@ -9,6 +9,7 @@ import json
 from dataclasses import asdict
 from pathlib import Path
 
+from wheel_terra_estimator.bags import limits as bag_limits
 from wheel_terra_estimator.configuration import reader as configuration_reader
 from wheel_terra_estimator.configuration import soil_file
 from wheel_terra_estimator.errors import UserError
@@ -79,6 +80,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="the estimator's topic, then the bag's (reference_odom:=/truth/odometry); may be "
         'given several times',
     )
+    bag_limits.add_arguments(parser)
     parser.add_argument(
         '--arrival',
         type=Path,
@@ -132,6 +134,7 @@ def _run_one(arguments: argparse.Namespace) -> int:
         overwrite=arguments.overwrite,
         arrival=arguments.arrival,
         every_set=bool(arguments.table),
+        limits=bag_limits.from_arguments(arguments),
         on_checked=print_findings,
     )
     errors = drive.errors
@@ -187,6 +190,7 @@ def _run_several(arguments: argparse.Namespace) -> int:
         arguments.output,
         _plain_name('--report', arguments.report),
         _plain_name('--table', arguments.table),
+        bag_limits.from_arguments(arguments),
     )
     rows = replay_bags(
         arguments.bags,

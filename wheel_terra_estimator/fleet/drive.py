@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from wheel_terra_estimator.bags.limits import LIMITS, Limits
 from wheel_terra_estimator.bags.replay import Replay, replay
 from wheel_terra_estimator.bags.series_reader import read_series
 from wheel_terra_estimator.bags.storage import open_bag
@@ -64,6 +65,7 @@ def replay_drive(
     arrival: Path | None = None,
     every_set: bool = False,
     progress: bool = True,
+    limits: Limits = LIMITS,
     on_checked: Callable[[CheckReport], None] = lambda checked: None,
 ) -> Drive:
     """Check a recording, run the estimator over it and sum it up.
@@ -74,6 +76,8 @@ def replay_drive(
         rosbag2 folder or file.
     configuration, remaps, output, overwrite, arrival, every_set, progress
         See `bags.replay.replay`.
+    limits : Limits
+        What of the recording is unpacked and held.
     on_checked : callable, optional
         Called with what the checks found, before the replay begins.
 
@@ -82,7 +86,7 @@ def replay_drive(
     UserError
         Input that cannot be used, an output path that is taken.
     """
-    with open_bag(path) as bag:
+    with open_bag(path, limits) as bag:
         recording = read_series(bag, remaps, path.name, QUICK_MESSAGES)
         checked = check_recording(recording, configuration, tuple(remaps))
         on_checked(checked)

@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from wheel_terra_estimator import __version__
+from wheel_terra_estimator.bags.limits import LIMITS, Limits
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.fleet.drive import replay_drive
@@ -63,6 +64,7 @@ class Settings:
     output: Path
     report: str = ''
     table: str = ''
+    limits: Limits = LIMITS
 
 
 @dataclass(frozen=True)
@@ -195,6 +197,7 @@ def _digest(settings: Settings, path: Path) -> str:
         'stated': sorted(configuration.stated),
         'remaps': dict(settings.remaps),
         'files': [settings.report, settings.table],
+        'limits': asdict(settings.limits),
     }
     digest = hashlib.blake2b(digest_size=DIGEST_SIZE)
     digest.update(json.dumps(stated, sort_keys=True, default=str).encode())
@@ -233,6 +236,7 @@ def _replay(settings: Settings, task: _Task) -> DriveRow:
         output,
         overwrite=True,
         every_set=bool(settings.table),
+        limits=settings.limits,
         progress=False,
     )
     if settings.table:

@@ -31,6 +31,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,6 +45,9 @@ from wheel_terra_estimator.estimation.measurements import Measurement
 from wheel_terra_estimator.estimation.rover import Rover
 from wheel_terra_estimator.estimation.sensor_errors import SensorErrors
 from wheel_terra_estimator.terramechanics.kinematics import slip_ratio
+
+if TYPE_CHECKING:
+    from wheel_terra_estimator.bags.limits import Limits
 
 FloatArray = NDArray[np.float64]
 
@@ -150,7 +154,10 @@ class DriveRows:
 
 
 def rows_from_bag(
-    path: str | Path, configuration: Configuration, remaps: Mapping[str, str] | None = None
+    path: str | Path,
+    configuration: Configuration,
+    remaps: Mapping[str, str] | None = None,
+    limits: Limits | None = None,
 ) -> DriveRows:
     """Return the steady rows of a rosbag2.
 
@@ -162,6 +169,8 @@ def rows_from_bag(
         Wheels, mass and load model.
     remaps : mapping, optional
         Estimator's topic -> the bag's.
+    limits : bags.limits.Limits, optional
+        What of the recording is unpacked and held.
 
     Raises
     ------
@@ -169,8 +178,10 @@ def rows_from_bag(
         If the bag cannot be read, lacks a sensor, or holds no steady window.
     """
     from wheel_terra_estimator.bags import reader
+    from wheel_terra_estimator.bags.limits import LIMITS
 
-    measurements = (item for _, item in reader.read(path, remaps or {}, configuration))
+    read = reader.read(path, remaps or {}, configuration, limits or LIMITS)
+    measurements = (item for _, item in read)
     return rows_from_measurements(measurements, configuration, str(path))
 
 
