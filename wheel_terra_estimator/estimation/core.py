@@ -66,6 +66,7 @@ class EstimatorCore:
         self._checks = InputChecks(configuration)
         self._guard = OutputGuard(configuration)
         self._timeline = Timeline(self._estimator, self._settings, self._finish)
+        self._contradicted = self._timeline.contradicted  # counts as it goes on
         self._watch = self._new_watch()
         self._received = [0] * len(CHANNELS)
         self._late = [0] * len(CHANNELS)
@@ -184,10 +185,12 @@ ReferenceVelocity
 
     def _insert(self, arrival: Arrival) -> list[EstimateSet]:
         channel, measurement = arrival
-        contradicted = self._timeline.contradicted[channel]
+        contradicted = self._contradicted[channel]
         fate, sets = self._timeline.insert(channel, measurement)
-        if self._timeline.contradicted[channel] != contradicted:
+        if self._contradicted[channel] != contradicted:
             self._checks.reject(channel, 'stamp repeated with other numbers (the newer ones count)')
+        if fate is Fate.IN_ORDER:
+            return sets
         if fate in (Fate.LATE, Fate.DEFERRED):
             self._late[channel] += 1
             if fate is Fate.DEFERRED:

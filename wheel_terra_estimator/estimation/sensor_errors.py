@@ -11,6 +11,7 @@ is what is left after this correction.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -31,7 +32,7 @@ class LinearErrors:
     zero: FloatArray
     gain: FloatArray
 
-    @property
+    @cached_property
     def none(self) -> bool:
         """Whether the readings are true."""
         return not self.zero.any() and bool((self.gain == 1.0).all())

@@ -226,7 +226,7 @@ class ConditionedForces(ScalarWheels):
             u + du, further, cohesion + d_cohesion, friction + d_friction, modulus + d_modulus
         )  # fmt: skip
         angle, _ = self._inputs(index, moved, sinkage)
-        self._set_angles(contact, angle, leaving)
+        set_angles(contact, angle, leaving, self._terms, ScalarMaths)
         ratio_after, load_after = contact.velocity_ratio, contact.normal_load
         cohesion_after, friction_after = contact.cohesion, contact.tan_friction
         modulus_after, exponent_after = contact.shear_modulus, contact.sinkage_exponent

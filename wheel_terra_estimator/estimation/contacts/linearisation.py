@@ -139,9 +139,10 @@ class Linearisation(Component[SlopeState]):
         pull, torque, pull_noise, torque_noise = np.zeros((4, rover.wheel_count))
         rows = np.zeros((2, rover.wheel_count, layout.size))
         torque_slopes, pull_slopes = list(self.state.torque), list(self.state.pull)
-        speed, strength = float(x[SPEED]), x[SHEAR_STRENGTH]
-        modulus, centroid = float(x[SHEAR_MODULUS]), float(x[CENTROID])
-        mound = float(x[MOUND])
+        entries = x.tolist()
+        speed, strength, modulus = entries[SPEED], entries[SHEAR_STRENGTH], entries[SHEAR_MODULUS]
+        centroid, mound = entries[CENTROID], entries[MOUND]
+        sinkage, error = entries[layout.sinkage], entries[layout.shear_error]
         for i in range(rover.wheel_count):
             if not turns[i]:
                 continue
@@ -149,9 +150,9 @@ class Linearisation(Component[SlopeState]):
             direction = 1.0 if rims[i] > 0.0 else -1.0
             wheel = WheelState(
                 speed_ratio=direction * (speed - yaw_rate * rover.lateral[i]) / rim,
-                sinkage=float(x[layout.sinkage.start + i]),
+                sinkage=sinkage[i],
                 load=loads[i],
-                strength=float(strength + x[layout.shear_error.start + i]),
+                strength=strength + error[i],
                 shear_modulus=modulus,
                 centroid=centroid,
                 mound=mound,
@@ -221,7 +222,8 @@ def smoothed_slopes(old: Floats | None, new: Floats, keep: float) -> Floats:
     """Return derivatives of which the share `keep` is that of the cycle before."""
     if old is None:
         return new
-    return tuple(keep * a + (1.0 - keep) * b for a, b in zip(old, new, strict=True))
+    gain = 1.0 - keep
+    return tuple([keep * a + gain * b for a, b in zip(old, new, strict=True)])
 
 
 def traction_slope(forces: ContactForces, rims: Floats, loads: Floats) -> float:

@@ -2,19 +2,22 @@
 # SPDX-License-Identifier: Apache-2.0
 """filterpy's extended Kalman filter with gates, kept symmetric, positive and finite.
 
-filterpy does the algebra (covariance in Joseph form); innovation, its covariance and the gate are
-our own, before each update, so that a bad reading never touches the state. ``h`` and ``H`` come
-from one pass over the models and are handed in as they are.
+filterpy holds the state and predicts; the update is its own (covariance in Joseph form) with a
+gain that leaves considered entries alone and one factorisation in place of an inverse. Innovation,
+its covariance and the gate come before each update, so that a bad reading never touches the state.
+``h`` and ``H`` come from one pass over the models and are handed in as they are.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from filterpy.kalman import ExtendedKalmanFilter
 from numpy.typing import NDArray
+from scipy.linalg.lapack import dposv
 
 FloatArray = NDArray[np.float64]
 _LEAST_VARIANCE = 1e-30  # of an innovation, in its own unit squared
@@ -38,14 +41,34 @@ class FilterMemory(NamedTuple):
     restarts: int
 
 
-class _KnownPrediction(ExtendedKalmanFilter):
-    """filterpy's filter with a nonlinear prediction of the mean, worked out by the caller."""
+class _SchmidtFilter(ExtendedKalmanFilter):
+    """filterpy's filter with a prediction worked out by the caller, and considered entries."""
 
     predicted: FloatArray
 
     def predict_x(self, u: float = 0) -> None:
         """Take the predicted mean."""
         self.x = self.predicted
+
+    def fuse(
+        self,
+        residual: FloatArray,
+        H: FloatArray,
+        HP: FloatArray,
+        noise: FloatArray,
+        considered: Sequence[int],
+    ) -> None:
+        """Fuse m readings with independent noise: z - h(x) (m,), H, H P (m, n), variances (m,)."""
+        S = HP @ H.T
+        S.flat[:: len(noise) + 1] += noise
+        _, gain, fails = dposv(S, HP)
+        K = gain.T if not fails else np.linalg.solve(S, HP).T
+        if considered:
+            K[considered] = 0.0
+        rest = self._I - K @ H
+        self.x = self.x + K @ residual
+        self.P = rest @ self.P @ rest.T + (K * noise) @ K.T
+        self.y, self.S, self.K = residual, S, K
 
 
 class GatedFilter:
@@ -63,7 +86,7 @@ class GatedFilter:
         self, mean: FloatArray, covariance: FloatArray, lower: FloatArray, upper: FloatArray
     ) -> None:
         size = len(mean)
-        self._ekf = _KnownPrediction(dim_x=size, dim_z=1)
+        self._ekf = _SchmidtFilter(dim_x=size, dim_z=1)
         self._ekf.x = mean.copy()
         self._ekf.P = covariance.copy()
         self._start = FilterMemory(mean.copy(), covariance.copy(), 0)
@@ -92,10 +115,6 @@ class GatedFilter:
         self._ekf.predict()
         self._keep_sound()
 
-    def innovation_variance(self, H: FloatArray, noise: FloatArray) -> FloatArray:
-        """Return the (m,) diagonal of H P H^T + R."""
-        return ((H @ self._ekf.P) * H).sum(axis=1) + noise
-
     def update(
         self,
         residual: FloatArray,
@@ -108,20 +127,16 @@ class GatedFilter:
         Entries that are `considered` (Schmidt) keep mean and variance: their uncertainty counts,
         but these readings must not teach them.
         """
-        ekf = self._ekf
-        before, P = ekf.x, ekf.P
         # In units of its own deviation each innovation has variance 1: whatever the readings, the
         # inverse of their covariance exists. A share below the floor is lost in rounding.
-        scale = 1.0 / np.sqrt(np.maximum(self.innovation_variance(H, noise), _LEAST_VARIANCE))
-        residual, H = residual * scale, H * scale[:, None]
-        R = np.diag(np.maximum(noise * scale * scale, _LEAST_SHARE))
-        ekf.update(residual, lambda _: H, lambda _: 0.0, R=R)
-        if considered:
-            gain = ekf.K
-            gain[list(considered)] = 0.0
-            rest = np.eye(len(before)) - gain @ H
-            ekf.x = before + gain @ residual
-            ekf.P = rest @ P @ rest.T + gain @ R @ gain.T
+        HP = H @ self._ekf.P
+        variance = np.einsum('ij,ij->i', HP, H) + noise
+        scale = 1.0 / np.sqrt(np.maximum(variance, _LEAST_VARIANCE))
+        column = scale[:, None]
+        share = np.maximum(noise * scale * scale, _LEAST_SHARE)
+        ekf = self._ekf
+        ekf.fuse(residual * scale, H * column, HP * column, share, considered)
+        ekf.P = 0.5 * (ekf.P + ekf.P.T)
         self._keep_sound()
 
     def fuse(self, rows: Sequence[Row], considered: Sequence[int] = ()) -> None:
@@ -159,18 +174,18 @@ class GatedFilter:
         self._ekf.x, self._ekf.P = mean.copy(), covariance.copy()
 
     def _keep_sound(self) -> None:
+        """Keep mean and covariance finite, within their bounds and positive."""
         ekf = self._ekf
-        # One sum finds nan and inf in either.
-        if not np.isfinite(ekf.x.sum() + ekf.P.sum()):
-            ekf.x = np.where(np.isfinite(ekf.x), ekf.x, 0.0)
+        x, entries = ekf.x, ekf.P.ravel('K')
+        # One sum of squares finds nan and inf in either.
+        if not math.isfinite(x.dot(x) + entries.dot(entries)):
+            ekf.x = x = np.where(np.isfinite(x), x, 0.0)
             ekf.P = self._start.covariance.copy()
+            entries = ekf.P.ravel('K')
             self.restarts += 1
-        np.clip(ekf.x, self._lower, self._upper, out=ekf.x)
-        P = ekf.P
-        P += P.T.copy()
-        P *= 0.5
-        diagonal = np.einsum('ii->i', P)
-        if diagonal.min() <= 0.0:
+        np.minimum(np.maximum(x, self._lower, out=x), self._upper, out=x)
+        diagonal = entries[:: len(x) + 1]
+        if np.minimum.reduce(diagonal) <= 0.0:
             np.maximum(diagonal, _LEAST_DIAGONAL, out=diagonal)
 
 

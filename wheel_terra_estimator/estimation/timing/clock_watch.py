@@ -86,7 +86,7 @@ class ClockWatch:
         arrival = Arrival(channel, measurement)
         suspicion = self._suspect(channel, stamp)
         if suspicion is None:
-            strays = self._drop_held()
+            strays = self._drop_held() if self._held else ()
             self._accept(arrival)
             return Judgement([arrival], strays=strays)
         strays = ()

@@ -23,8 +23,9 @@ from wheel_terra_estimator.estimation.timing.input_checks import (
 from wheel_terra_estimator.estimation.timing.merging import StepMerger, merge_wheels, same
 from wheel_terra_estimator.estimation.timing.step_grid import LONGEST_STEP, StepGrid
 
-KEPT_STATE_SPACING = 250_000_000
-"""Distance of kept states [ns]: what a late input costs, against what keeping costs."""
+KEPT_STATE_SPACING = 50_000_000
+"""Least distance of kept states [ns]: a state is a few references and two small arrays, so keeping
+it costs a twentieth of the step that a late input would make again without it."""
 DENSE_SPAN = 100_000_000
 """Inputs that come so little [ns] after a step that would have used them make them denser."""
 DENSE_DURATION = 2_000_000_000

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import isnan, nan
 from typing import Any, TypeVar
 
 import numpy as np
@@ -57,17 +58,16 @@ def _newer(before: FloatArray, after: FloatArray) -> tuple[FloatArray, bool]:
 
 
 class StepMerger:
-    """Merges what came between two steps.
+    """Merges what came between two steps; plain floats, which beat numpy for a few readings.
 
     Attributes
     ----------
-    heard : numpy.ndarray
-        (n,) stamp of the last rate of each wheel [ns]; a rate is the mean since then.
-        Replaced, never written into, so that kept states may share it.
+    heard : tuple of int or None
+        Stamp of the last rate of each wheel [ns], None = none yet; a rate is the mean since then.
     """
 
     def __init__(self) -> None:
-        self.heard: Any = None
+        self.heard: tuple[int, ...] | None = None
 
     def merged(self, stamp: int, parts: Sequence[list[Any]]) -> StepInputs:
         """Return the inputs of a step.
@@ -99,21 +99,22 @@ class StepMerger:
     def _odometry(self, stamp: int, readings: list[WheelOdometry]) -> WheelOdometry | None:
         if not readings:
             return None
-        first = readings[0]
-        before = np.zeros(len(first.rate), dtype=np.int64) if self.heard is None else self.heard
+        count = len(readings[0].rate)
+        heard = list(self.heard or (0,) * count)
+        total, weighted = [0] * count, [0.0] * count
+        for reading in readings:
+            now = reading.stamp
+            for i, rate in enumerate(reading.rate.tolist()):
+                if not isnan(rate):
+                    weight = min(max(now - heard[i], 1), LONGEST_INTERVAL)
+                    total[i] += weight
+                    weighted[i] += weight * rate
+                    heard[i] = now
+        self.heard = tuple(heard)
         if len(readings) == 1:
-            self.heard = np.where(np.isnan(first.rate), before, first.stamp)
-            return first
-        rates = np.stack([reading.rate for reading in readings])
-        valid = ~np.isnan(rates)
-        stamps = np.array([[reading.stamp] for reading in readings])
-        last = np.maximum.accumulate(np.vstack([before[None], np.where(valid, stamps, 0)]), axis=0)
-        self.heard = last[-1]
-        weight = np.clip(stamps - last[:-1], 1, LONGEST_INTERVAL) * valid
-        total = weight.sum(axis=0)
-        mean = (weight * np.where(valid, rates, 0.0)).sum(axis=0) / np.maximum(total, 1)
-        rate = np.where(total > 0, mean, np.nan)
-        return WheelOdometry(stamp, rate, _mean([reading.torque for reading in readings]))
+            return readings[0]
+        mean = [w / t if t else nan for w, t in zip(weighted, total, strict=True)]
+        return WheelOdometry(stamp, np.array(mean), _mean([reading.torque for reading in readings]))
 
 
 def _single(measurements: list[_Some]) -> _Some | None:
@@ -122,20 +123,22 @@ def _single(measurements: list[_Some]) -> _Some | None:
 
 def _inertial(stamp: int, readings: list[InertialReading]) -> InertialReading:
     """Return mean specific force and rate, and the newest attitude."""
-    count = len(readings)
     orientations = [r.orientation for r in readings if r.orientation is not None]
     return InertialReading(
         stamp,
-        np.add.reduce([reading.specific_force for reading in readings]) / count,
-        np.add.reduce([reading.angular_rate for reading in readings]) / count,
+        _mean([reading.specific_force for reading in readings]),
+        _mean([reading.angular_rate for reading in readings]),
         orientations[-1] if orientations else None,
     )
 
 
 def _mean(rows: list[FloatArray]) -> FloatArray:
     """Return the mean of each column without nan, nan where there is nothing else."""
-    values = np.stack(rows)
-    valid = ~np.isnan(values)
-    count = valid.sum(axis=0)
-    mean = np.where(valid, values, 0.0).sum(axis=0) / np.maximum(count, 1)
-    return np.where(count > 0, mean, np.nan)
+    size = len(rows[0])
+    count, total = [0] * size, [0.0] * size
+    for row in rows:
+        for i, value in enumerate(row.tolist()):
+            if not isnan(value):
+                count[i] += 1
+                total[i] += value
+    return np.array([t / c if c else nan for t, c in zip(total, count, strict=True)])

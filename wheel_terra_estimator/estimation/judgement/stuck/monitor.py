@@ -68,6 +68,7 @@ class StuckMonitor(Component[StuckState]):
         self._observer = SituationObserver(settings)
         super().__init__(StuckState(self._observer.state, (NAN,) * len(signs)))
         self._settings, self._signs, self._tuning = settings, tuple(signs), tuning
+        self._needs = tuple([sign.needs.value for sign in self._signs])
 
     def forget_trend(self) -> None:
         """Begin the trend anew: the level of the slip was wrong, which is no growth."""
@@ -94,10 +95,10 @@ class StuckMonitor(Component[StuckState]):
 
     def _signs_at(self, time: float, situation: Situation) -> tuple[tuple[float, ...], list[Sign]]:
         """Return since when each sign is there, and the signs that have been for long enough."""
-        met = needs_met(situation)
+        lacking = ~needs_met(situation)
         since, raised = [], []
-        for sign, before in zip(self._signs, self.state.since, strict=True):
-            if sign.needs & ~met or not sign.present(situation, self._tuning):
+        for sign, needs, before in zip(self._signs, self._needs, self.state.since, strict=True):
+            if needs & lacking or not sign.present(situation, self._tuning):
                 since.append(NAN)
                 continue
             begun = time if isnan(before) else before

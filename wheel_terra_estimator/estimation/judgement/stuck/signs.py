@@ -69,6 +69,13 @@ class Need(Flag):
     PULLED_AWAY = auto()  # the wheels have turned at their own cruise since they stood
 
 
+# Plain numbers: arithmetic of flags is slow, and this is done at every stamp.
+_SPEED, _NO_SPEED, _SLIP_TOLD, _STRAIGHT, _PULLED_AWAY = (
+    need.value
+    for need in (Need.SPEED, Need.NO_SPEED, Need.SLIP_TOLD, Need.STRAIGHT, Need.PULLED_AWAY)
+)
+
+
 @dataclass(frozen=True)
 class Sign:
     """One sign of entrapment.
@@ -97,15 +104,15 @@ class Sign:
     words: Callable[[Situation, SignTuning], str]
 
 
-def needs_met(s: Situation) -> Need:
-    """Return what of the needs of signs holds."""
-    met = Need.SPEED if s.speed_known else Need.NO_SPEED
+def needs_met(s: Situation) -> int:
+    """Return what of the needs of signs holds, as the value of a `Need`."""
+    met = _SPEED if s.speed_known else _NO_SPEED
     if s.motion.slip_told:
-        met |= Need.SLIP_TOLD
+        met |= _SLIP_TOLD
     if not s.motion.turning:
-        met |= Need.STRAIGHT
+        met |= _STRAIGHT
     if not isnan(s.rolling_time):
-        met |= Need.PULLED_AWAY
+        met |= _PULLED_AWAY
     return met
 
 
@@ -216,8 +223,11 @@ def _held_back(s: Situation, t: SignTuning) -> bool:
 
 def _labouring(s: Situation, t: SignTuning) -> bool:
     """Find wheels near their limit that turn slower than in the last seconds."""
-    slowed = s.typical_rim < t.labour_ratio * s.cruise_rim
-    return slowed and s.rolling_time >= s.tuning.pull_away_time and _held_back(s, t)
+    return (
+        s.rolling_time >= s.tuning.pull_away_time
+        and _held_back(s, t)
+        and s.typical_rim < t.labour_ratio * s.cruise_rim
+    )
 
 
 SIGNS: tuple[Sign, ...] = (
