@@ -98,7 +98,8 @@ PICTURES = {'matplotlib', 'jinja2'}
 MAY_USE = {
     'terramechanics': (set(), {'numpy'}),
     'configuration': ({'terramechanics'}, {'numpy', 'yaml'}),
-    'estimation': ({'configuration', 'terramechanics'}, {'numpy', 'filterpy'}),
+    # filterpy brings scipy in any case; its Cholesky solver costs less than an inverse.
+    'estimation': ({'configuration', 'terramechanics'}, {'numpy', 'filterpy', 'scipy'}),
     'messages': ({'configuration', 'estimation', 'checks'}, {'numpy'}),
     'checks': ({'configuration', 'estimation'}, {'numpy'}),
     # Sensors of the simulated rover give the estimator's typed measurements.
