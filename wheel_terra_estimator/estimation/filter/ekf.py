@@ -44,6 +44,8 @@ class FilterMemory(NamedTuple):
 class _SchmidtFilter(ExtendedKalmanFilter):
     """filterpy's filter with a prediction worked out by the caller, and considered entries."""
 
+    x: FloatArray
+    P: FloatArray
     predicted: FloatArray
 
     def predict_x(self, u: float = 0) -> None:
