@@ -17,6 +17,7 @@ from wheel_terra_estimator.terramechanics.soil import Soil
 from wheel_terra_estimator.terramechanics.wheel import Wheel
 from wheel_terra_estimator.trials.designs import random_rows, random_soil
 from wheel_terra_estimator.trials.detectability import Ruler
+from wheel_terra_estimator.trials.forms import FORMS
 from wheel_terra_estimator.trials.hidden import LISTED, OTHER, OUTSIDE, SmoothError
 from wheel_terra_estimator.trials.truth import OUTPUTS, TrueSoil, solve
 
@@ -42,6 +43,26 @@ PARAMETERS = {
     'wheel_radius_bias': 'bias',
     'sinkage_offset': 'offset',
     'pitch_bias': 'bias',
+}
+FORM_PARAMETERS = {
+    'slip_sinkage_exponent:lyasko': 'gain',
+    'slip_sinkage_exponent:load': 'nw',
+    'lug_digging:saturating': 'kd',
+    'lug_support:by_height': 'share',
+    'bulldozing:terzaghi': 'kb',
+    'multipass:rut': 'rut',
+    'hard_layer:bearing': 'stiffness',
+    'stress_peak_shift:backward': 'retreat',
+    'drivetrain_friction:proportional': 'share',
+    'drivetrain_friction:viscous': 'damping',
+    'grouser_thrust': 'share',
+    'grouser_thrust:textbook': 'share',
+    'rim_friction': 'loss',
+    'wheel_flexibility': 'compliance',
+    'soil_adhesion': 'thickness',
+    'soil_adhesion:tension': 'tension',
+    'soil_transport': 'fill',
+    'shear_deformation:pressure': 'growth',
 }
 
 
@@ -148,6 +169,24 @@ def test_package_agrees_with_each_effect(name):
     # The package blends the top of the layer over a millimetre and saturates the mound below the
     # hub; the campaigns do neither.
     share = {'hard_layer': 1e-2, 'soil_mound': 2e-3}.get(name, 3e-4)
+    assert_close(with_it, package(rows, soil, {name: values}), rows, share)
+
+
+@pytest.mark.parametrize('key', sorted(FORMS))
+def test_package_agrees_with_each_form(key):
+    rng = np.random.default_rng(5)
+    soil = random_soil(rng)
+    rows = random_rows('full56', rng, soil)
+    kind = FORMS[key]
+    size = kind.typical(rows, soil)
+    hidden = kind.make(size, 0.4, rows, soil)
+    name, _, form = key.partition(':')
+    base, with_it = solve(rows, soil), solve(rows, soil, (hidden,))
+    change = max(np.max(np.abs(with_it[key] - base[key])) for key in OUTPUTS)
+    assert change > 1e-4, 'the form does nothing'
+    values = {FORM_PARAMETERS[key]: size, **hidden.second, **({'form': form} if form else {})}
+    # The top of a layer is blended over a millimetre in the package alone.
+    share = {'hard_layer:bearing': 1e-2}.get(key, 1e-3)
     assert_close(with_it, package(rows, soil, {name: values}), rows, share)
 
 

@@ -13,7 +13,7 @@ from test_workflow import make
 
 from wheel_terra_estimator.cli.main import main
 from wheel_terra_estimator.configuration import reader
-from wheel_terra_estimator.discrepancy.report.model_file import write_model
+from wheel_terra_estimator.discrepancy.report.model_file import corrected, write_model
 from wheel_terra_estimator.discrepancy.tables.checks import check_table
 from wheel_terra_estimator.discrepancy.workflow import diagnose
 
@@ -64,3 +64,80 @@ def test_predict_with_the_written_model_gives_the_reported_error(hidden, design,
         assert error == pytest.approx(found.gap[quantity].after, rel=0.3)
     again = reader.load([tmp_path / 'base.yaml', tmp_path / 'model.yaml'], complete=False)
     assert diagnose(check_table('t.csv', table), again).verdict == 'agrees'
+
+
+def with_errors(table, factors, zeros):
+    """Return the table as sensors of this gain and zero read it."""
+    read = {key: table[key] * factors.get(key, 1.0) + zeros.get(key, 0.0) for key in QUANTITIES}
+    return {**table, **read}
+
+
+@pytest.mark.parametrize(
+    ('factors', 'zeros', 'keys'),
+    [
+        ({'sinkage': 0.7}, {}, {'sinkage_gain': 0.7}),
+        ({}, {'sinkage': 0.004}, {'sinkage_zero': 0.004}),
+        ({}, {'torque': 0.6}, {'torque_zero': 0.6}),
+        ({'torque': 1.3}, {'sinkage': -0.003}, {'torque_gain': 1.3, 'sinkage_zero': -0.003}),
+    ],
+)
+def test_errors_of_readings_are_written_once_where_the_node_takes_them_off(
+    factors, zeros, keys, tmp_path
+):
+    table, values, *_ = make('full56', seed=7)
+    table = with_errors(table, factors, zeros)
+    # One of two wheels states errors already: what is found comes on top.
+    before = {'sensors.torque_gain': [1.0], 'sensors.sinkage_zero': [0.0]}
+    configuration = reader.from_parameters({**values, **before}, complete=False)
+    found = diagnose(check_table('t.csv', table), configuration)
+    write_model(found, tmp_path / 'model.yaml')
+    model = reader.load([tmp_path / 'model.yaml'], complete=False)
+    for key, value in keys.items():
+        std = {'torque_gain': 0.06, 'sinkage_gain': 0.06, 'torque_zero': 0.15, 'sinkage_zero': 1e-3}
+        assert getattr(model.sensors, key)[0] == pytest.approx(value, abs=std[key])
+    assert not set(model.effects) & {
+        'torque_gain', 'sinkage_gain', 'sinkage_offset', 'drivetrain_friction',
+    }  # fmt: skip
+    rows = predicted(table, configuration, tmp_path, 'model.yaml')
+    for q, quantity in enumerate(QUANTITIES):
+        error = np.sqrt(np.mean((rows[:, q] - table[quantity]) ** 2))
+        assert error == pytest.approx(found.gap[quantity].fitted, rel=2e-3)
+    again = reader.load([tmp_path / 'base.yaml', tmp_path / 'model.yaml'], complete=False)
+    second = diagnose(check_table('t.csv', table), again)
+    assert second.verdict == 'agrees'
+    for quantity in QUANTITIES:
+        assert second.gap[quantity].before == pytest.approx(found.gap[quantity].fitted, rel=2e-3)
+
+
+def test_an_error_of_a_reading_that_was_an_effect_moves_to_the_sensors(tmp_path):
+    """Stated errors of the sensors and an effect on top: the written keys hold both, once."""
+    table, values, *_ = make('full56', seed=7)
+    table = with_errors(table, {'torque': 1.1 * 1.2}, {'torque': 0.3})
+    values |= {
+        'sensors.torque_gain': [1.1],
+        'sensors.torque_zero': [0.3],
+        'effects.torque_gain.enabled': True,
+        'effects.torque_gain.gain': 0.15,
+        'effects.torque_gain.gain_std': 0.1,
+    }
+    configuration = reader.from_parameters(values, complete=False)
+    found = diagnose(check_table('t.csv', table), configuration)
+    write_model(found, tmp_path / 'model.yaml')
+    rows = predicted(table, configuration, tmp_path, 'model.yaml')
+    both = reader.load([tmp_path / 'base.yaml', tmp_path / 'model.yaml'], complete=False)
+    assert 'torque_gain' not in both.effects
+    assert both.sensors.torque_gain[0] == pytest.approx(1.1 * 1.2, rel=0.05)
+    error = np.sqrt(np.mean((rows[:, 2] - table['torque']) ** 2))
+    assert error == pytest.approx(found.gap['torque'].fitted, rel=2e-3)
+
+
+def test_a_friction_of_rows_that_turn_both_ways_stays_a_friction():
+    table, values, *_ = make('full56', ('drivetrain_friction',), 2.0)
+    back = np.arange(len(table['slip'])) % 2 == 1
+    sign = np.where(back, -1.0, 1.0)
+    for key in ('angular_velocity', 'drawbar_pull', 'torque'):
+        table[key] = sign * table[key]
+    configuration = reader.from_parameters(values, complete=False)
+    model, _ = corrected(diagnose(check_table('t.csv', table), configuration))
+    assert model.effects['drivetrain_friction']['torque'] > 0.0
+    assert not model.sensors.torque_zero.any()

@@ -15,8 +15,10 @@ from numpy.typing import ArrayLike, NDArray
 from wheel_terra_estimator.api.frames import Columns, to_frame
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.configuration.readings import Readings
 from wheel_terra_estimator.terramechanics import soil as terramechanics_soil
 from wheel_terra_estimator.terramechanics.effects import EffectSettings
+from wheel_terra_estimator.terramechanics.effects.base import OUTPUTS
 from wheel_terra_estimator.terramechanics.model import OVERLOADED, WheelSoilModel
 from wheel_terra_estimator.terramechanics.operating_points import (
     STANDARD_GRAVITY,
@@ -231,6 +233,11 @@ class Model:
             name: np.where(carried, getattr(state, name), np.nan)
             for name in (f.name for f in fields(Curve)[3:])
         }
+        # As the sensors of the wheel would read them (``sensors.*`` of the configuration).
+        read = Readings.of(self.configuration).read(
+            np.column_stack([answers[name] for name in OUTPUTS])
+        )
+        answers |= dict(zip(OUTPUTS, read.T, strict=True))
         inputs = (np.array(values) for values in (points.slip, points.normal_load, points.slope))
         return Curve(*inputs, **answers)
 

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wheel_terra_estimator.configuration import reader as configuration_reader
+from wheel_terra_estimator.configuration.readings import Readings
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.input_file import LARGEST_TABLE, read_text
 from wheel_terra_estimator.output_folder import check_file, new_file
@@ -158,8 +159,12 @@ def run(arguments: argparse.Namespace) -> int:
     }
     if arguments.angles:
         result.pop('leaving_angle', None)
-    for name in (*OUTPUTS, *(ANGLES if arguments.angles else ())):
-        result[name] = np.where(overloaded, np.nan, getattr(state, name))
+    # As the sensors of the wheel would read them, like the tables of measurements.
+    readings = Readings.of(configuration, _wheel_index(arguments, configuration))
+    read = readings.read(np.column_stack([getattr(state, name) for name in OUTPUTS]))
+    answers = dict(zip(OUTPUTS, read.T, strict=True))
+    answers |= {name: getattr(state, name) for name in ANGLES if arguments.angles}
+    result |= {name: np.where(overloaded, np.nan, values) for name, values in answers.items()}
     if output is None:
         (_write_csv if arguments.table == 'csv' else _write_text)(result, sys.stdout)
         return 0

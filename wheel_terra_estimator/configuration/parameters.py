@@ -56,6 +56,8 @@ class Parameter:
         Other spellings that are accepted.
     required : bool
         Whether a complete configuration must state it.
+    one_for_all : bool
+        Whether a per-wheel list of one entry counts for all wheels.
     """
 
     key: str
@@ -71,6 +73,7 @@ class Parameter:
     choices: tuple[str, ...] = ()
     aliases: tuple[str, ...] = ()
     required: bool = False
+    one_for_all: bool = False
 
     @property
     def allowed(self) -> str:
@@ -83,7 +86,7 @@ class Parameter:
             plural = words if self.kind in ('flag', 'text') else f'{words}s'
             words = f'list of {plural}'
             if self.size == 'wheels':
-                words += ', one per wheel'
+                words += ', one per wheel' + (', or one for all' if self.one_for_all else '')
             elif self.size:
                 words = f'list of {self.size} {plural}'
         limits = []
@@ -109,6 +112,7 @@ def number(
     at_most: float | None = None,
     aliases: tuple[str, ...] = (),
     required: bool = False,
+    one_for_all: bool = False,
 ) -> Parameter:
     """Declare a finite number, or a list of such."""
     return Parameter(
@@ -124,6 +128,7 @@ def number(
         open_upper=below is not None,
         aliases=aliases,
         required=required,
+        one_for_all=one_for_all,
     )
 
 
@@ -510,6 +515,7 @@ DECLARED: tuple[Parameter, ...] = (
         'N m',
         'zero of each torque reading: reading = gain * torque + zero',
         size='wheels',
+        one_for_all=True,
     ),
     number(
         'sensors.torque_zero_std',
@@ -524,6 +530,7 @@ DECLARED: tuple[Parameter, ...] = (
         '-',
         'gain of each torque reading: reading = gain * torque + zero',
         size='wheels',
+        one_for_all=True,
         above=0.0,
     ),
     number(
@@ -608,6 +615,7 @@ DECLARED: tuple[Parameter, ...] = (
         'm',
         'zero of each sinkage reading: reading = gain * sinkage + zero',
         size='wheels',
+        one_for_all=True,
     ),
     number(
         'sensors.sinkage_zero_std',
@@ -622,6 +630,7 @@ DECLARED: tuple[Parameter, ...] = (
         '-',
         'gain of each sinkage reading: reading = gain * sinkage + zero',
         size='wheels',
+        one_for_all=True,
         above=0.0,
     ),
     number(

@@ -219,6 +219,8 @@ def checked_value(parameter: Parameter, stated: _Sourced, wheels: int) -> Any:
             raise refuse('is a list')
         items = [_scalar(parameter, item, refuse) for item in value]
         wanted = wheels if parameter.size == 'wheels' else parameter.size
+        if parameter.one_for_all and len(items) == 1:
+            items = items * wheels
         if not items or (wanted and len(items) != wanted):
             of = ' (as many as wheels.names)' if parameter.size == 'wheels' else ''
             raise refuse(f'has {len(items)} entries instead of {wanted or "at least 1"}{of}')

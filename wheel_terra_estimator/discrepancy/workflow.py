@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.configuration.readings import Readings
 from wheel_terra_estimator.discrepancy.assessment import next_measurement
 from wheel_terra_estimator.discrepancy.assessment.along import changed_stretch
 from wheel_terra_estimator.discrepancy.assessment.held_out import hold_out, log_scores, slip_groups
@@ -130,7 +131,10 @@ def diagnose(
     )
     known = catalogue()
     effects, not_tried = _effects_to_try(configuration, chosen, known)
-    forward = Forward(points, configuration.soil, configuration.effects, known, active=active)
+    readings = Readings.of(configuration).true_on(both.true_rows)
+    forward = Forward(
+        points, configuration.soil, configuration.effects, known, active=active, readings=readings
+    )
     configured = _check_soil_carries(both, forward, configuration)
     check_pull_against_model(both, configured[:, 1])
     nuisance = nuisance_coordinates(configuration, known)

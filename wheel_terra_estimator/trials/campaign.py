@@ -11,8 +11,10 @@ from pathlib import Path
 
 import numpy as np
 
+from wheel_terra_estimator.discrepancy.effect_keys import effect_of
 from wheel_terra_estimator.trials.designs import random_rows, random_soil
 from wheel_terra_estimator.trials.detectability import Ruler, listed_kinds, size_for
+from wheel_terra_estimator.trials.forms import FORMS
 from wheel_terra_estimator.trials.hidden import LISTED, OTHER, OUTSIDE, SmoothError
 from wheel_terra_estimator.trials.truth import (
     OUTPUTS,
@@ -71,6 +73,8 @@ class Plan:
         Hide these instead of some drawn by lot (``distance_left`` is then not measured).
     least : float
         Least d' that is asked for; 0: 2.5 for one effect, 4 for each of two.
+    forms : bool
+        Draw from all forms of all effects, not from the first form of some.
     """
 
     hide: str = 'one'
@@ -85,6 +89,7 @@ class Plan:
     drive: bool = False
     names: tuple[str, ...] = ()
     least: float = field(default=0.0, repr=False)  # no part of the seed
+    forms: bool = field(default=False, repr=False)
 
 
 @dataclass(frozen=True)
@@ -289,10 +294,11 @@ def _hide(
     if plan.hide == 'outside':
         catalogue, names = OUTSIDE, [*plan.names] or [str(rng.choice(sorted(OUTSIDE)))]
     else:
-        catalogue = OTHER if plan.other_formula else LISTED
+        catalogue = OTHER if plan.other_formula else {**LISTED, **FORMS}
+        drawn_from = {**LISTED, **FORMS} if plan.forms else LISTED
         possible = [
             name
-            for name, kind in listed_kinds(rows).items()
+            for name, kind in listed_kinds(rows, drawn_from).items()
             if not kind.requires or np.any(np.isfinite(measured[kind.requires]))
         ]
         count = 2 if plan.hide == 'two' else 1
@@ -314,7 +320,7 @@ def _hide(
         sizes.append(size)
         effects.append(effect)
         spices.append(spice)
-    return tuple(names), tuple(sizes), tuple(effects), tuple(spices)
+    return tuple(effect_of(name) for name in names), tuple(sizes), tuple(effects), tuple(spices)
 
 
 def _sizes_seen(

@@ -9,6 +9,8 @@ quadrature of `truth`, none of it with the code under test.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
+
 import numpy as np
 
 from wheel_terra_estimator.trials.hidden import LISTED, Kind, SmoothError
@@ -118,19 +120,24 @@ class Ruler:
         return residual
 
 
-def listed_kinds(rows: Rows) -> dict[str, Kind]:
-    """Return the catalogue effects that these rows could show at all."""
+_LUGS: Mapping[str, Callable[[FloatArray], bool]] = {
+    'lug_height': lambda height: bool(np.any(height > 0.0)),
+    'tall_lugs': lambda height: len(np.unique(height[height > _TALL])) > 1,
+    'bare_rim': lambda height: bool(np.any(height == 0.0)),
+}
+_TALL = 0.006  # [m]
+
+
+def listed_kinds(rows: Rows, kinds: Mapping[str, Kind] = LISTED) -> dict[str, Kind]:
+    """Return the effects that these rows could show at all."""
 
     def visible(kind: Kind) -> bool:
-        for column in kind.needs:
-            if column == 'lug_height':
-                if not np.any(rows['lug_height'] > 0):
-                    return False
-            elif np.ptp(rows[column]) == 0:
-                return False
-        return True
+        return all(
+            _LUGS[column](rows['lug_height']) if column in _LUGS else np.ptp(rows[column]) > 0
+            for column in kind.needs
+        )
 
-    return {name: kind for name, kind in LISTED.items() if visible(kind)}
+    return {name: kind for name, kind in kinds.items() if visible(kind)}
 
 
 def size_for(

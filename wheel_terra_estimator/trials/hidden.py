@@ -205,7 +205,7 @@ def _layer(size: float, depth: float, power: float) -> Hidden:
     return Change('hard_layer', prepare, depth=depth)
 
 
-def _layer_depth(spice: float, rows: Rows, soil: TrueSoil) -> float:
+def layer_depth(spice: float, rows: Rows, soil: TrueSoil) -> float:
     """Depth [m] of the layer: some rows reach it, others do not."""
     z = solve(rows, soil)['geometric_sinkage']
     low, high = np.nanquantile(z, 0.1), np.nanquantile(z, 0.95)
@@ -267,7 +267,7 @@ def _gain_kind(name: str, key: str, other: bool) -> Kind:
 
 def _pull_zero(size: float, with_load: float) -> Hidden:
     def shift(out: Rows, setup: Setup, rows: Rows) -> FloatArray:
-        return size * (1 + with_load * (rows['normal_load'] / _load(rows) - 1))
+        return size * (1 + with_load * (rows['normal_load'] / mean_load(rows) - 1))
 
     return Change('pull_zero', None, _pull(shift))
 
@@ -276,11 +276,13 @@ def _lug(rows: Rows) -> float:
     return float(np.max(rows['lug_height']))
 
 
-def _load(rows: Rows) -> float:
+def mean_load(rows: Rows) -> float:
+    """Mean load of the rows [N]."""
     return float(np.mean(rows['normal_load']))
 
 
-def _radius_of(rows: Rows) -> float:
+def mean_radius(rows: Rows) -> float:
+    """Mean rim radius of the rows [m]."""
     return float(np.mean(rows['wheel_radius']))
 
 
@@ -322,12 +324,12 @@ def _offset(size: float, gain: float) -> Hidden:
 
 
 def _layer_kind(power: float) -> Callable[[float, float, Rows, TrueSoil], Hidden]:
-    return lambda a, k, rows, soil: _layer(a, _layer_depth(k, rows, soil), power)
+    return lambda a, k, rows, soil: _layer(a, layer_depth(k, rows, soil), power)
 
 
-def _stiffness_near(rows: Rows, soil: TrueSoil) -> float:
+def stiffness_near(rows: Rows, soil: TrueSoil) -> float:
     """Slope of the bearing stress [Pa/m] at a depth of 5 % of the radius."""
-    z = 0.05 * _radius_of(rows)
+    z = 0.05 * mean_radius(rows)
     k = soil.cohesive_modulus / float(np.mean(rows['wheel_width'])) + soil.frictional_modulus
     return k * soil.sinkage_exponent * z ** (soil.sinkage_exponent - 1)
 
@@ -390,24 +392,24 @@ def _kinds(other: bool) -> dict[str, Kind]:
             signed=True,
             needs=('angular_velocity',),
         ),
-        'hard_layer': Kind(_layer_kind(p), _stiffness_near, 20, two_parameters=True),
+        'hard_layer': Kind(_layer_kind(p), stiffness_near, 20, two_parameters=True),
         'drivetrain_friction': Kind(
             lambda a, k, r, s: _friction(a, o),
-            lambda r, s: 0.04 * _load(r) * _radius_of(r),
+            lambda r, s: 0.04 * mean_load(r) * mean_radius(r),
             5,
             requires='torque',
         ),
         'wheel_radius_bias': Kind(lambda a, k, r, s: _radius(a, other), one(0.03), 3, signed=True),
         'sinkage_offset': Kind(
             lambda a, k, r, s: _offset(a, 0.02 if other else 0.0),
-            lambda r, s: 0.012 * _radius_of(r),
+            lambda r, s: 0.012 * mean_radius(r),
             4,
             signed=True,
             requires='sinkage',
         ),
         'pull_zero': Kind(
             lambda a, k, r, s: _pull_zero(a, 0.3 if other else 0.0),
-            lambda r, s: 0.03 * _load(r),
+            lambda r, s: 0.03 * mean_load(r),
             4,
             signed=True,
             requires='drawbar_pull',
@@ -495,10 +497,10 @@ def _side_drag(size: float, spice: float, rows: Rows, soil: TrueSoil) -> Hidden:
 
 def _side_drag_unit(rows: Rows, soil: TrueSoil) -> float:
     """Size at which the drag is 1 % of the load at a depth of 5 % of the radius."""
-    r = _radius_of(rows)
+    r = mean_radius(rows)
     z = 0.05 * r
     rub = soil.density * 9.81 * np.tan(soil.friction_angle) * z**2 * np.sqrt(2 * r * z)
-    return float(0.01 * _load(rows) / rub)
+    return float(0.01 * mean_load(rows) / rub)
 
 
 def _const(value: float) -> Callable[[Rows, TrueSoil], float]:
@@ -525,10 +527,10 @@ class SmoothError(Hidden):
             rows[key] / scale
             for key, scale in (
                 ('slip', 0.4),
-                ('normal_load', 0.7 * _load(rows)),
+                ('normal_load', 0.7 * mean_load(rows)),
                 ('slope', 0.3),
                 ('lug_height', 1.5 * max(_lug(rows), 1e-3)),
-                ('wheel_radius', _radius_of(rows)),
+                ('wheel_radius', mean_radius(rows)),
             )
         ]
         x = np.stack(columns, 1)

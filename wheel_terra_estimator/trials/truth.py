@@ -88,8 +88,13 @@ class Setup:
     width: FloatArray  # [m]
     advance: FloatArray  # v/w [m]
     density: float
+    rut: FloatArray  # depth that earlier passes left [m]
     leaving: list[Callable[[FloatArray, FloatArray], FloatArray]] = field(default_factory=list)
     extra_normal: list[Callable[[FloatArray], FloatArray]] = field(default_factory=list)
+    extra_bearing: list[Callable[[FloatArray], FloatArray]] = field(default_factory=list)
+    extra_by_angle: list[Callable[[FloatArray, FloatArray], FloatArray]] = field(
+        default_factory=list
+    )
 
 
 class Hidden:
@@ -140,6 +145,7 @@ def _setup(rows: Rows, soil: TrueSoil) -> Setup:
         width=rows['wheel_width'].copy(),
         advance=v_over_w(rows['slip'], tip),
         density=soil.density,
+        rut=0.0 * one,
     )
 
 
@@ -154,7 +160,10 @@ def _integrals(setup: Setup, t1: FloatArray) -> tuple[FloatArray, FloatArray, Fl
     u = _NODES[None, :]
     below = u * col(t1 - tm)  # t1 - equivalent angle
     drop = 2 * np.sin(col(t1) - below / 2) * np.sin(below / 2)  # cos te - cos t1
-    sigma = col(setup.stiffness) * (col(setup.radius) * drop) ** col(setup.exponent)
+    depth = col(setup.radius) * drop  # at the equivalent angle
+    sigma = col(setup.stiffness) * (depth + col(setup.rut)) ** col(setup.exponent)
+    if setup.extra_bearing:
+        sigma = sigma + sum(law(depth) for law in setup.extra_bearing)
     load = np.zeros_like(t1)
     pull = np.zeros_like(t1)
     torque = np.zeros_like(t1)
@@ -164,6 +173,8 @@ def _integrals(setup: Setup, t1: FloatArray) -> tuple[FloatArray, FloatArray, Fl
         if setup.extra_normal:
             depth = col(setup.radius) * (np.cos(theta) - np.cos(col(t1)))
             normal = sigma + sum(law(depth) for law in setup.extra_normal)
+        if setup.extra_by_angle:
+            normal = normal + sum(law(theta, col(t2)) for law in setup.extra_by_angle)
         j = col(setup.shear_radius) * (col(t1) - theta) - col(setup.advance) * (
             np.sin(col(t1)) - np.sin(theta)
         )

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from wheel_terra_estimator.configuration.readings import Readings
 from wheel_terra_estimator.discrepancy.fitting.coordinates import Coordinate
 from wheel_terra_estimator.terramechanics import quadrature
 from wheel_terra_estimator.terramechanics.contact import Contact
@@ -65,6 +66,7 @@ class Forward:
         catalogue: Mapping[str, Effect],
         nodes: int = NODES,
         active: NDArray[np.bool_] | None = None,
+        readings: Readings | None = None,
     ) -> None:
         self.points = points
         self.soil = soil
@@ -72,6 +74,7 @@ class Forward:
         self.catalogue = catalogue
         self.nodes = nodes
         self.active = active
+        self.readings = readings
         measured = np.asarray(points.leaving_angle, dtype=float)
         self._leaving_angle = None if np.isnan(measured).all() else measured
 
@@ -84,6 +87,7 @@ class Forward:
             self.catalogue,
             self.nodes,
             None if other_rows else self.active,
+            None if other_rows else self.readings,
         )
 
     def _contact(
@@ -139,6 +143,8 @@ class Forward:
         outputs[..., 0] = contact.sinkage
         outputs[..., 1] = contact.drawbar_pull
         outputs[..., 2] = contact.torque
+        if self.readings is not None:
+            outputs = self.readings.read(outputs)
         return load - contact.normal_load, outputs
 
     def _where_active(self, name: str, parameter: str, values: FloatArray) -> FloatArray:

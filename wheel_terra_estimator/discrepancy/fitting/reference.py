@@ -52,6 +52,7 @@ def join(table: SteadyTable, reference: SteadyTable) -> tuple[SteadyTable, NDArr
         np.concatenate([table.slip_std, reference.slip_std]),
         (*table.notes, f'{len(reference)} rows of {reference.name} as reference'),
         _both_angle_stds(table, reference),
+        np.concatenate([table.true_rows, reference.true_rows]),
     )
     return joined, np.arange(len(joined)) < len(table)
 

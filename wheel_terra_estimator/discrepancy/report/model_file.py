@@ -8,8 +8,11 @@ import math
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
+import numpy as np
+
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.discrepancy.effect_keys import effect_of
+from wheel_terra_estimator.discrepancy.report.sensor_keys import sensor_keys
 from wheel_terra_estimator.discrepancy.result import (
     Diagnosis,
     FittedParameter,
@@ -69,12 +72,25 @@ def _with(diagnosis: Diagnosis, changes: dict[str, object]) -> tuple[Configurati
     stated = diagnosis.configuration.flat()
     if stated.get('effect_file'):
         changes.setdefault('effect_file', stated['effect_file'])
+    fitted = diagnosis.configuration.replace(changes)  # type: ignore[arg-type]
+    errors, moved = sensor_keys(fitted, _turning(diagnosis))
+    off = {f'effects.{name}.enabled': False for name in moved if name in diagnosis.base_effects}
     kept = [
         key
-        for key in stated
-        if key.startswith('effects.') and key in diagnosis.configuration.stated
+        for key in (*stated, *changes)
+        if key in changes or (key.startswith('effects.') and key in diagnosis.configuration.stated)
+        if not any(key.startswith(f'effects.{name}.') for name in moved)
     ]
-    return diagnosis.configuration.replace(changes), [*kept, *changes]  # type: ignore[arg-type]
+    replaced = {**changes, **{f'effects.{name}.enabled': False for name in moved}, **errors}
+    whole = diagnosis.configuration.replace(replaced)  # type: ignore[arg-type]
+    return whole, [*dict.fromkeys(kept), *off, *errors]
+
+
+def _turning(diagnosis: Diagnosis) -> float:
+    """Return +1 where the wheel turned forward in all rows, -1 backward, 0 where it did both."""
+    rates = diagnosis.table.columns.get('angular_velocity', np.zeros(1))
+    backward = rates < 0.0
+    return 0.0 if backward.any() and not backward.all() else (-1.0 if backward.any() else 1.0)
 
 
 def _soil_keys(name: str, value: float, std: float, soil: Soil) -> dict[str, float]:

@@ -59,6 +59,7 @@ def averaged(table: SteadyTable, most: int) -> SteadyTable:
         of_mean(table.slip_std),
         table.notes,
         None if table.leaving_angle_std is None else of_mean(table.leaving_angle_std),
+        np.array([table.true_rows[cell].all() for cell in cells]),
     )
 
 

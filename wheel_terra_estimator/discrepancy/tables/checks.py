@@ -107,6 +107,7 @@ def check_table(
         table.slip_std,
         tuple(remarks),
         table.leaving_angle_std,
+        table.corrected,
     )
 
 

@@ -58,6 +58,9 @@ class SteadyTable:
         (N,) standard deviation of the recorded slip; 0 = exact.
     leaving_angle_std : numpy.ndarray or None
         (N,) standard deviation of the measured leaving angle [rad]; None = exact.
+    corrected : numpy.ndarray or None
+        (N,) rows whose readings the stated zeros and gains of the sensors (``sensors.*``) were
+        taken off before, as a drive's; None = none.
     notes : tuple of str
         What the reader found odd but usable.
     """
@@ -70,6 +73,7 @@ class SteadyTable:
     slip_std: FloatArray
     notes: tuple[str, ...] = ()
     leaving_angle_std: FloatArray | None = None
+    corrected: NDArray[np.bool_] | None = None
 
     def __len__(self) -> int:
         return len(self.lines)
@@ -82,6 +86,11 @@ class SteadyTable:
             for q, quantity in enumerate(QUANTITIES)
             if np.isfinite(self.measured[:, q]).any()
         )
+
+    @property
+    def true_rows(self) -> NDArray[np.bool_]:
+        """(N,) rows that hold true values instead of readings."""
+        return np.zeros(len(self), dtype=bool) if self.corrected is None else self.corrected
 
     def varying(self) -> tuple[str, ...]:
         """Return the input columns that hold more than one value."""
@@ -103,4 +112,5 @@ class SteadyTable:
             self.slip_std[rows],
             self.notes,
             None if self.leaving_angle_std is None else self.leaving_angle_std[rows],
+            None if self.corrected is None else self.corrected[rows],
         )

@@ -50,4 +50,5 @@ def together(tables: Sequence[SteadyTable]) -> SteadyTable:
                 for part, std in zip(parts, stds, strict=True)
             ]
         ),
+        np.concatenate([part.true_rows for part in parts]),
     )

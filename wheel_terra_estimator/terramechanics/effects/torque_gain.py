@@ -28,7 +28,7 @@ EFFECT = Effect(
         'drivetrain_friction': 'torque near zero; a known moment at the wheel',
         'lug_shear_radius': 'pull; a known moment at the wheel',
     },
-    validity='constant over the table; acts before a zero error',
+    validity='constant over the table; acts on what the drive loses as well',
     source='instrument model',
     on_outputs=_gain,
 )

@@ -1,0 +1,46 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""What the sensors of a wheel read where the model says what is true: ``gain * true + zero``."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wheel_terra_estimator.configuration.configuration import Configuration
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Readings:
+    """Stated gains and zeros of sinkage [m], drawbar pull [N] and torque [N m].
+
+    Attributes
+    ----------
+    gain, zero : numpy.ndarray
+        (3,), or (N, 3) where rows differ.
+    """
+
+    gain: FloatArray
+    zero: FloatArray
+
+    @classmethod
+    def of(cls, configuration: Configuration, wheel: int = 0) -> Readings:
+        """Return the errors that ``sensors.*`` states for one wheel; of the pull it states none."""
+        sensors = configuration.sensors
+        return cls(
+            np.array([sensors.sinkage_gain[wheel], 1.0, sensors.torque_gain[wheel]]),
+            np.array([sensors.sinkage_zero[wheel], 0.0, sensors.torque_zero[wheel]]),
+        )
+
+    def true_on(self, rows: NDArray[np.bool_]) -> Readings:
+        """Return (N, 3) errors, none on the given rows: theirs were taken off before."""
+        true = rows[:, None]
+        return Readings(np.where(true, 1.0, self.gain), np.where(true, 0.0, self.zero))
+
+    def read(self, true: FloatArray) -> FloatArray:
+        """Return the readings of true values; quantities on the last axis."""
+        return true * self.gain + self.zero
