@@ -134,7 +134,10 @@ def _proportional(size: float, spice: float, rows: Rows, soil: TrueSoil) -> Hidd
 
 
 def _viscous(size: float, spice: float, rows: Rows, soil: TrueSoil) -> Hidden:
-    return _adding('drivetrain_friction', 'torque', lambda o, s, rows: size * rows['angular_velocity'])
+    def lost(out: Rows, setup: Setup, rows: Rows) -> FloatArray:
+        return np.asarray(size * rows['angular_velocity'])
+
+    return _adding('drivetrain_friction', 'torque', lost)
 
 
 def _thrust(textbook: bool) -> Callable[[float, float, Rows, TrueSoil], Hidden]:
