@@ -24,7 +24,7 @@ from wheel_terra_estimator.discrepancy.report.page import SOIL_WORDS, number, wr
 class Page(HTMLParser):
     """Text, links and table rows of a page; complains about tags that do not close."""
 
-    VOID = ('meta', 'img', 'br', 'link', 'hr')
+    VOID = ('meta', 'img', 'br', 'link', 'hr', 'source')
 
     def __init__(self, text: str) -> None:
         super().__init__()
@@ -38,7 +38,7 @@ class Page(HTMLParser):
     def handle_starttag(self, tag, attributes):
         if tag not in self.VOID:
             self.open.append(tag)
-        self.sources += [value for key, value in attributes if key in ('src', 'href')]
+        self.sources += [value for key, value in attributes if key in ('src', 'href', 'srcset')]
         if tag == 'tr':
             self.rows.append([])
         elif tag in ('td', 'th') and self.rows:
@@ -106,15 +106,34 @@ def test_page_needs_nothing_from_elsewhere(page):
 
 def test_every_picture_is_in_the_page_and_beside_it(page):
     parsed, folder = page
-    embedded = {base64.b64decode(source.partition('base64,')[2]) for source in parsed.sources}
     files = {path.name: path.read_bytes() for path in folder.glob('*.png')}
-    assert set(files.values()) == embedded
+    assert len(parsed.sources) == 2 * len(files), 'each wide and for a phone'
     assert {'residuals_by_normal_load.png', 'residuals_by_slope.png', 'where.png'} <= set(files)
     assert {'measured_against_model.png', 'gap.png', 'signature.png'} <= set(files)
     assert 'curves_over_slip.png' in files, 'two loads on three slopes are six curves'
     for name, content in files.items():
         width, height, levels = grey_levels(content)
         assert width > 600 and height > 250 and levels > 100, f'{name} looks empty'
+
+
+POINT = 96.0 / 72.0  # [px]
+PHONE = 346.0  # [px], what a page leaves a figure on a phone of 390
+SMALLEST_TEXT = 11.0  # [px]
+
+
+def test_pictures_for_a_phone_are_as_narrow_with_text_that_can_be_read(page):
+    parsed, _ = page
+    narrow = 0
+    for source in parsed.sources:
+        drawn = base64.b64decode(source.partition('base64,')[2]).decode()
+        width = POINT * float(re.search(r'<svg [^>]*width="([\d.]+)pt"', drawn)[1])
+        sizes = [float(size) for size in re.findall(r'font(?:-size)?: ([\d.]+)px', drawn)]
+        assert sizes
+        if width < 500.0:
+            narrow += 1
+            assert width <= PHONE
+            assert POINT * min(sizes) >= SMALLEST_TEXT
+    assert narrow == len(parsed.sources) / 2
 
 
 def test_numbers_are_those_of_the_diagnosis(page, named):

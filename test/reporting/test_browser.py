@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import re
 import shutil
@@ -113,10 +114,13 @@ def test_an_hour_of_driving_stays_a_small_file_that_needs_nothing_else(report: P
     assert text.count('plotly.js (basic') == 1
     own = re.sub(r'<script>/\*\*.*?</script>', '', text, flags=re.S)
     assert not re.search(r'(src|href)="(https?:)?//', own)
-    data = json.loads(re.search(r'id="drive-data"[^>]*>(.*?)</script>', text, re.S)[1])
+    data = json.loads(re.search(r'id="figure-data"[^>]*>(.*?)</script>', text, re.S)[1])
     axes = {trace.get('xaxis', 'x') for trace in data['traces']}
     assert axes == {'x'}  # one time axis
-    slips = [t for t in data['traces'] if t['yaxis'] == 'y2' and t['meta']['kind'] == 'line']
+    shown = {switch['key'] for switch in data['switches'] if switch['on']}
+    slips = [
+        t for t in data['traces'] if t['yaxis'] == 'y2' and set(t['meta']['switches']) <= shown
+    ]
     assert len(slips) == 6
     assert all(trace['y'][0] is None for trace in slips)  # never known: not drawn as slip 1
     reasons = [a for a in data['layout']['annotations'] if a.get('name') == 'warning']
@@ -141,11 +145,41 @@ def diagnosis_report(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / 'report.html'
 
 
+@pytest.fixture(scope='module')
+def comparison_report(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    from wheel_terra_estimator.reporting.comparison import compare, write_comparison
+
+    first, truth = an_hour()
+    second = dataclasses.replace(
+        first, values={**first.values, 'slip': np.tanh(first.values['slip'] + 0.05)}
+    )
+    compared = compare(first, second, ['a', 'b'], truth)
+    path = tmp_path_factory.mktemp('comparison') / 'report.html'
+    write_comparison(path, compared, [first, second], truth, overwrite=False)
+    return path
+
+
+def test_two_runs_over_an_hour_on_one_time_axis(comparison_report: Path) -> None:
+    text = comparison_report.read_text(encoding='utf-8')
+    assert comparison_report.stat().st_size < LARGEST_FILE
+    data = json.loads(re.search(r'id="figure-data"[^>]*>(.*?)</script>', text, re.S)[1])
+    named = {switch['key'] for switch in data['switches']}
+    assert {'A', 'B', 'truth', 'wheel 0', 'wheel 5'} <= named
+    difference = [t for t in data['traces'] if t['name'] == 'left_a, B minus A']
+    assert len(difference) == 1
+    known = np.array([v for v in difference[0]['y'] if v is not None])
+    first, _ = an_hour()
+    slip = first.values['slip'][20:, 0]
+    expected = np.tanh(slip + 0.05) - slip
+    assert known.max() == pytest.approx(expected.max(), abs=1e-4)
+    assert known.min() == pytest.approx(expected.min(), abs=1e-4)
+
+
 @pytest.mark.slow
 @pytest.mark.skipif(BROWSER is None, reason='no Chromium')
 @pytest.mark.parametrize('scheme', ['light', 'dark'])
 @pytest.mark.parametrize('width', [1280, 390])
-@pytest.mark.parametrize('kind', ['report', 'diagnosis_report'])
+@pytest.mark.parametrize('kind', ['report', 'diagnosis_report', 'comparison_report'])
 def test_in_a_browser(
     request: pytest.FixtureRequest, tmp_path: Path, kind: str, width: int, scheme: str
 ) -> None:
@@ -182,6 +216,6 @@ def test_in_a_browser(
     assert found['dark'] == (scheme == 'dark')
     assert found['overflow'] <= 0
     assert found['small'] == []
-    assert found['paths'] >= 20 or kind != 'report'
+    assert found['paths'] >= {'report': 20, 'comparison_report': 10}.get(kind, 0)
     light = [int(v) for v in re.findall(r'\d+', found['ground'])[:3]]
     assert (sum(light) < 150) == (scheme == 'dark')

@@ -9,9 +9,10 @@ from types import SimpleNamespace
 import numpy as np
 
 from wheel_terra_estimator.estimation.estimates import SlipClass
+from wheel_terra_estimator.reporting.drive_style import CLASS_COLOURS, drawn_slip
 from wheel_terra_estimator.reporting.drive_summary import short_names
 from wheel_terra_estimator.reporting.html import picture, render
-from wheel_terra_estimator.reporting.style import CLASS_COLOURS, drawn_slip, picture_style, thin
+from wheel_terra_estimator.reporting.style import INK, for_dark_pages, picture_style, thin
 
 
 def test_a_thinned_line_keeps_ends_and_extremes() -> None:
@@ -91,3 +92,31 @@ def test_slip_that_was_never_known_is_not_drawn() -> None:
         values=values, slip_class=np.array([[255], [0], [255]], dtype=np.uint8)
     )
     np.testing.assert_array_equal(drawn_slip(history)[:, 0], [np.nan, 0.2, 0.3])
+
+
+def test_pictures_follow_the_dark_mode_of_the_reader() -> None:
+    """Every dark ink of a picture has a rule that makes it light; nothing else is touched."""
+    import re
+    from io import StringIO
+
+    from matplotlib.figure import Figure
+
+    with picture_style():
+        figure = Figure(figsize=(3, 2))
+        axis = figure.subplots()
+        axis.plot([0, 1], [0, 1], color=INK, label='a line')
+        axis.set(title='title', xlabel='x', ylabel='y')
+        axis.legend()
+        buffer = StringIO()
+        figure.savefig(buffer, format='svg')
+    drawn = buffer.getvalue()
+    used = set(re.findall(r'(?:fill|stroke): (#[0-9a-f]{6})', drawn))
+    dark = {colour for colour in used if lightness(colour) < 45.0}
+    assert INK in dark
+    sheet = re.search(r'<style>(@media screen.*?)</style>', for_dark_pages(drawn))[1]
+    rules = dict(re.findall(r'"fill: (#[0-9a-f]{6})"\]\{fill:(#[0-9a-f]{6})', sheet))
+    assert dark <= set(rules)
+    assert all(lightness(rules[colour]) > 60.0 for colour in dark)
+    texts = re.findall(r'<text style="([^"]*)"', drawn)
+    assert texts
+    assert all('fill: ' in style for style in texts)  # black by default would vanish

@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,14 +18,23 @@ from wheel_terra_estimator.configuration.parameters import declared
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.output_folder import new_file
 from wheel_terra_estimator.reporting import truth_scores
+from wheel_terra_estimator.reporting.drive_figure import SLIP_RANGE
+from wheel_terra_estimator.reporting.drive_style import drawn_slip
+from wheel_terra_estimator.reporting.drive_summary import short_names
 from wheel_terra_estimator.reporting.estimates_table import UNITS
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from wheel_terra_estimator.reporting.style import LINE_COLOURS, RIM_COLOUR
+from wheel_terra_estimator.reporting.time_figure import (
+    Panel,
+    Switch,
+    TimeFigure,
+    limits,
+    plotly_script,
+)
 
 FloatArray = NDArray[np.float64]
 
 COMPARED = ('slip', 'sinkage', 'drawbar_pull', 'normal_load', 'rim_travel_left', 'pull_margin')
+RUN_COLOURS = {'A': LINE_COLOURS[0], 'B': LINE_COLOURS[1]}
 NEAREST = 30_000_000
 """Sets of the two runs that lie this close together [ns] belong together."""
 
@@ -179,46 +188,102 @@ def write_comparison(
     overwrite: bool,
 ) -> None:
     """Write a page with both runs overlaid."""
-    from wheel_terra_estimator.reporting.html import picture, render, write_page
+    from wheel_terra_estimator.reporting.html import render, write_page
 
-    quantities = (('slip', 'slip'), ('sinkage', 'sinkage'), ('drawbar_pull', 'drawbar_pull'))
-    pictures = []
-    for name, attribute in quantities:
-        true = getattr(truth, attribute) if truth else None
-        pictures.append(
-            {
-                'title': f'{name} [{UNITS[name]}]',
-                'source': picture(_overlaid(name, histories, true)),
-            }
-        )
-    page = render('comparison.html', text=as_text(comparison), pictures=pictures)
+    page = render(
+        'comparison.html',
+        comparison=comparison,
+        cards=_cards(comparison),
+        differences=[_difference_row(d) for d in comparison.differences],
+        errors=_error_rows(comparison),
+        warnings=[
+            (letter, ', '.join(f'{start:.1f} s' for start in starts) or 'none')
+            for letter, starts in zip('AB', comparison.warnings, strict=True)
+        ],
+        figure=_figure(histories, truth),
+        library=plotly_script(),
+        truth_source=truth.source if truth else '',
+    )
     with new_file(path, overwrite) as target:
         write_page(target, page)
 
 
-def _overlaid(name: str, histories: Sequence[EstimateHistory], true: Any) -> Figure:
-    from matplotlib.figure import Figure
+def _cards(comparison: Comparison) -> list[tuple[str, str]]:
+    slip = next(d for d in comparison.differences if d.name == 'slip')
+    return [
+        (f'{100 * comparison.same_class:.1f} %', 'of the wheel time in the same slip class'),
+        (f'{slip.rms:.3g}', 'rms difference of slip'),
+        (f'{len(comparison.warnings[0])}; {len(comparison.warnings[1])}', 'stuck warnings of A; B'),
+        (str(comparison.common), 'sets in common'),
+    ]
 
-    from wheel_terra_estimator.reporting.style import LINE_COLOURS, TRUTH_COLOUR, thin
 
-    wheels = histories[0].names
-    figure = Figure(figsize=(9.0, 1.6 * len(wheels) + 0.6), layout='constrained')
-    axes = figure.subplots(len(wheels), 1, sharex=True, squeeze=False)[:, 0]
-    begin = int(histories[0].stamp[0])
-    for index, (axis, wheel) in enumerate(zip(axes, wheels, strict=True)):
-        for letter, history, colour in zip('AB', histories, LINE_COLOURS, strict=False):
+def _shown(unit: str) -> tuple[float, str]:
+    """Return factor and unit in which lengths of the ground are shown."""
+    return (1e3, 'mm') if unit == 'm' else (1.0, unit)
+
+
+def _difference_row(d: Difference) -> tuple[str, str, str, str, str]:
+    scale, unit = _shown(d.unit) if d.name == 'sinkage' else (1.0, d.unit)
+    label = f'{d.name.replace("_", " ")} [{unit}]'
+    mean, rms, greatest = (f'{scale * value:.3g}' for value in (d.mean, d.rms, d.greatest))
+    return label, mean, rms, greatest, d.where
+
+
+def _error_rows(comparison: Comparison) -> list[tuple[str, ...]]:
+    """Rows (quantity, rms of A, of B, within two deviations of A, of B) where truth is known."""
+    first, second = comparison.errors
+    if first is None or second is None:
+        return []
+    rows = []
+    for a, b in zip(first.quantities, second.quantities, strict=True):
+        scale, unit = _shown(a.unit)
+        label = f'{a.name.replace("_", " ")} [{unit}]'
+        rms = (f'{scale * e.rms:.3g}' for e in (a, b))
+        rows.append((label, *rms, *(f'{100 * e.within_two_std:.0f} %' for e in (a, b))))
+    return rows
+
+
+def _figure(histories: Sequence[EstimateHistory], truth: Truth | None) -> str:
+    """Draw both runs in the colours of the runs; of the wheels, the first is on."""
+    names, begin = short_names(histories[0].names), int(histories[0].stamp[0])
+    drawn = [drawn_slip(history) for history in histories]
+    panels = (
+        Panel('slip ratio [-]', 0.3, limits(*drawn, within=SLIP_RANGE)),
+        Panel('B minus A: slip ratio [-]', 0.2),
+        Panel('sinkage [mm]', 0.25),
+        Panel('drawbar pull [N]', 0.25),
+    )
+    switches = [Switch(f'wheel {i}', name, on=i == 0) for i, name in enumerate(names)]
+    switches += [Switch(run, run, colour=RUN_COLOURS[run]) for run in RUN_COLOURS]
+    if truth is not None:
+        switches.append(Switch('truth', 'truth'))
+    ends = [float((history.stamp[-1] - begin) * 1e-9) for history in histories]
+    figure = TimeFigure(panels, switches, max(ends), 'time since the first set of A [s]')
+    a, b = common_rows(histories[0].stamp, histories[1].stamp)
+    for wheel, name in enumerate(names):
+        switch = f'wheel {wheel}'
+        for history, slip, run in zip(histories, drawn, RUN_COLOURS, strict=True):
             seconds = np.asarray((history.stamp - begin) * 1e-9, dtype=np.float64)
-            axis.plot(
-                *thin(seconds, history.values[name][:, index]),
-                color=colour, linewidth=1.0, label=letter,
-            )  # fmt: skip
-        if true is not None:
-            seconds = np.asarray((true.stamp - begin) * 1e-9, dtype=np.float64)
-            axis.plot(
-                *thin(seconds, true.value[:, index]),
-                color=TRUTH_COLOUR, linewidth=0.8, linestyle='--', label='truth',
-            )  # fmt: skip
-        axis.set_ylabel(wheel)
-    axes[0].legend(loc='upper right', ncols=3)
-    axes[-1].set_xlabel('time [s]')
-    return figure
+            columns = (
+                slip[:, wheel],
+                1e3 * history.values['sinkage'][:, wheel],
+                history.values['drawbar_pull'][:, wheel],
+            )
+            for panel, values in zip((0, 2, 3), columns, strict=True):
+                label, colour = f'{name}, {run}', RUN_COLOURS[run]
+                figure.line(panel, seconds, values, label, colour, switch, run)
+        change = drawn[1][b, wheel] - drawn[0][a, wheel]
+        seconds = np.asarray((histories[0].stamp[a] - begin) * 1e-9, dtype=np.float64)
+        figure.line(1, seconds, change, f'{name}, B minus A', RIM_COLOUR, switch)
+        if truth is not None:
+            for panel, scale, known in (
+                (0, 1.0, truth.slip),
+                (2, 1e3, truth.sinkage),
+                (3, 1.0, truth.drawbar_pull),
+            ):
+                if known is not None:
+                    seconds = np.asarray((known.stamp - begin) * 1e-9, dtype=np.float64)
+                    true = scale * known.value[:, wheel]
+                    figure.truth(panel, seconds, true, f'{name}, truth', switch, 'truth')
+    return figure.as_json()

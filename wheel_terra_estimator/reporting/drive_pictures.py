@@ -13,14 +13,13 @@ from numpy.typing import NDArray
 from wheel_terra_estimator.bags.history import EstimateHistory
 from wheel_terra_estimator.bags.truth import Truth, WheelTruth
 from wheel_terra_estimator.estimation.estimates import SlipClass
+from wheel_terra_estimator.reporting.drive_style import BAND, CLASS_COLOURS, drawn_slip
 from wheel_terra_estimator.reporting.drive_summary import short_names
 from wheel_terra_estimator.reporting.style import (
-    BAND,
-    CLASS_COLOURS,
     LINE_COLOURS,
+    RIM_COLOUR,
     TRUTH_COLOUR,
     WARNING_COLOUR,
-    drawn_slip,
     picture_style,
     thin,
 )
@@ -135,7 +134,7 @@ def _velocity(axis: Axes, history: EstimateHistory, truth: Truth | None) -> None
     rim = velocity + history.values['slip_velocity'].mean(axis=1)
     axis.plot(
         *thin(history.seconds, rim, LINE_POINTS),
-        color='#9aa5b0',
+        color=RIM_COLOUR,
         linewidth=1.0,
         label='mean rim speed',
     )

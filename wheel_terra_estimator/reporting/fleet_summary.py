@@ -12,9 +12,9 @@ from typing import Any
 
 from wheel_terra_estimator.checks.finding import CheckReport
 from wheel_terra_estimator.estimation.estimates import SlipClass
+from wheel_terra_estimator.reporting.drive_style import CLASS_COLOURS
 from wheel_terra_estimator.reporting.drive_summary import DriveSummary
 from wheel_terra_estimator.reporting.html import render, write_page
-from wheel_terra_estimator.reporting.style import CLASS_COLOURS
 
 CLASSES = tuple(c.name.lower() for c in SlipClass)
 

@@ -9,7 +9,7 @@ A report has a template that extends ``base.html`` and fills its blocks ``title`
 from __future__ import annotations
 
 import base64
-from io import BytesIO
+from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -58,10 +58,14 @@ def check_page(path: Path) -> None:
 
 
 def picture(figure: Figure) -> str:
-    """Return a figure as the address of an image that lies in the page itself (SVG)."""
-    from wheel_terra_estimator.reporting.style import picture_style
+    """Return a figure as the address of an image that lies in the page itself.
 
-    buffer = BytesIO()
+    The image is an SVG; its colours follow the light or dark mode of the reader.
+    """
+    from wheel_terra_estimator.reporting.style import for_dark_pages, picture_style
+
+    buffer = StringIO()
     with picture_style():  # text as text, and the same bytes for the same picture
         figure.savefig(buffer, format='svg', metadata={'Date': None})
-    return 'data:image/svg+xml;base64,' + base64.b64encode(buffer.getvalue()).decode()
+    image = for_dark_pages(buffer.getvalue()).encode()
+    return 'data:image/svg+xml;base64,' + base64.b64encode(image).decode()

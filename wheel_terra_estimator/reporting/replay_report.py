@@ -14,10 +14,11 @@ from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.estimates import SlipClass
 from wheel_terra_estimator.output_folder import new_file
 from wheel_terra_estimator.reporting import drive_pictures
+from wheel_terra_estimator.reporting.drive_figure import drive_figure
+from wheel_terra_estimator.reporting.drive_style import BAND, CLASS_COLOURS
 from wheel_terra_estimator.reporting.drive_summary import DriveSummary
 from wheel_terra_estimator.reporting.html import picture, render, write_page
-from wheel_terra_estimator.reporting.interactive import drive_figure, plotly_script
-from wheel_terra_estimator.reporting.style import BAND, CLASS_COLOURS
+from wheel_terra_estimator.reporting.time_figure import plotly_script
 from wheel_terra_estimator.reporting.truth_scores import QuantityError, TruthErrors
 
 

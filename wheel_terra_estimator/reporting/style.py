@@ -1,6 +1,9 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""How all pictures look: colours that the colour-blind can tell apart, light frames, thin lines."""
+"""How all pictures look: colours that the colour-blind can tell apart, light frames, thin lines.
+
+Pictures are drawn for a light page; ``DARK`` says which of their colours follow a dark one.
+"""
 
 from __future__ import annotations
 
@@ -10,9 +13,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-
-from wheel_terra_estimator.bags.history import EstimateHistory
-from wheel_terra_estimator.estimation.estimates import SlipClass
 
 FloatArray = NDArray[np.float64]
 
@@ -27,38 +27,44 @@ LINE_COLOURS = (
     '#7B4FA3',
     '#6B6B6B',
 )
-CLASS_COLOURS = {
-    SlipClass.LOW: '#efe3a8',
-    SlipClass.MODERATE: '#e9a94b',
-    SlipClass.HIGH: '#c4552d',
-    SlipClass.STUCK: '#6b1238',
-    SlipClass.UNKNOWN: '#9aa5b0',
-}
-"""Darker is worse: they differ in grey and for every eye; unknown is drawn thinner."""
-BAND = 2.0
-"""Half width of the drawn bands in standard deviations."""
-NEVER_KNOWN = 1.0
-"""Standard deviation of a slip of which nothing is known [-]."""
+INK, SOFT, EDGE, RIM_COLOUR = '#1f2933', '#5b6875', '#8a949e', '#9aa5b0'
 TRUTH_COLOUR = '#111111'
 WARNING_COLOUR = '#b3261e'
+NOISE_COLOUR, GRID_COLOUR = '#e3e8ee', '#e6eaee'
+
+DARK = {
+    INK: '#e3e8ed',
+    TRUTH_COLOUR: '#f4f6f8',
+    SOFT: '#a3afba',
+    GRID_COLOUR: '#2d3741',
+    NOISE_COLOUR: '#2a333c',
+    LINE_COLOURS[0]: '#4ea8de',
+    LINE_COLOURS[6]: '#b08ad0',
+    LINE_COLOURS[7]: '#a9a9a9',
+    WARNING_COLOUR: '#f0776c',
+    '#ffffff': 'none',
+}
+"""Colour of a picture on a light page -> on a dark one; all others stay."""
 
 _SETTINGS: dict[Any, Any] = {
     'svg.fonttype': 'none',
     'svg.hashsalt': 'wheel_terra_estimator',  # the same picture is the same file
     'font.family': 'sans-serif',
     'font.size': 9.5,
-    'axes.edgecolor': '#8a949e',
-    'axes.labelcolor': '#1f2933',
+    'axes.edgecolor': EDGE,
+    'axes.labelcolor': INK,
+    'axes.titlecolor': INK,
+    'text.color': INK,
     'axes.spines.top': False,
     'axes.spines.right': False,
     'axes.grid': True,
     'axes.axisbelow': True,
     'axes.titlesize': 10,
     'axes.titlelocation': 'left',
-    'grid.color': '#e6eaee',
+    'grid.color': GRID_COLOUR,
     'grid.linewidth': 0.7,
-    'xtick.color': '#5b6875',
-    'ytick.color': '#5b6875',
+    'xtick.color': SOFT,
+    'ytick.color': SOFT,
     'legend.frameon': False,
     'legend.fontsize': 8.5,
     'lines.linewidth': 1.3,
@@ -75,11 +81,14 @@ def picture_style() -> Iterator[None]:
         yield
 
 
-def drawn_slip(history: EstimateHistory) -> FloatArray:
-    """Return the slip to draw, (k, n): nan where nothing is known of it."""
-    unknown = history.slip_class == SlipClass.UNKNOWN
-    unknown &= history.values['slip_std'] >= NEVER_KNOWN
-    return np.where(unknown, np.nan, history.values['slip'])
+def for_dark_pages(svg: str) -> str:
+    """Return a picture (SVG) whose colours follow the light or dark mode of its reader."""
+    rules = []
+    for light, dark in DARK.items():  # matplotlib writes them in lower case
+        for key in ('fill', 'stroke'):
+            rules.append(f'[style*="{key}: {light.lower()}"]{{{key}:{dark}!important}}')
+    sheet = '@media screen and (prefers-color-scheme:dark){' + ''.join(rules) + '}'
+    return svg.replace('<defs>', f'<style>{sheet}</style><defs>', 1)
 
 
 def thin(x: FloatArray, y: FloatArray, points: int = 1200) -> tuple[FloatArray, FloatArray]:

@@ -184,7 +184,8 @@ def as_lines(errors: TruthErrors) -> list[str]:
     for warning in errors.warnings:
         lead = f'the median slip did not pass {WARNED_SLIP:g} within {WARNING_HORIZON:g} s'
         if warning.lead is not None:
-            lead = f'slip passed {WARNED_SLIP:g} {warning.lead:+.1f} s from it'
+            side = 'before' if warning.lead < 0.0 else 'after'
+            lead = f'the median slip passed {WARNED_SLIP:g} {abs(warning.lead):.1f} s {side} it'
         lines.append(f'    warning at {warning.start:.1f} s: {lead}')
     if errors.first_stuck is not None and not errors.warnings:
         lines.append(f'    no warning, though the slip passed 0.75 at {errors.first_stuck:.1f} s')

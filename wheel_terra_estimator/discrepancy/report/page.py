@@ -4,9 +4,8 @@
 
 from __future__ import annotations
 
-import base64
 from collections.abc import Callable
-from io import BytesIO
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +16,7 @@ from wheel_terra_estimator.discrepancy.report.model_file import corrected
 from wheel_terra_estimator.discrepancy.report.words import STRONG_PULL, far_soil, in_words
 from wheel_terra_estimator.discrepancy.result import Diagnosis, FittedParameter, NextMeasurement
 from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES
-from wheel_terra_estimator.reporting.html import render, write_page
+from wheel_terra_estimator.reporting.html import picture, render, write_page
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -197,38 +196,42 @@ def _cards(diagnosis: Diagnosis) -> list[dict[str, str]]:
     return cards
 
 
+Drawn = dict[str, str]
+"""A picture as addresses of images in the page: ``wide``, and ``narrow`` for a phone."""
+
+
 def _figures(folder: Path, diagnosis: Diagnosis) -> dict[str, Any]:
-    """Draw, write and embed every picture that this diagnosis has."""
-    drawn: dict[str, Any] = {'residuals': []}
+    """Draw every picture that this diagnosis has; each is written as PNG and embedded twice."""
 
-    def keep(name: str, draw: Callable[[], Figure | None]) -> str | None:
-        figure = draw()
-        if figure is None:
+    def keep(name: str, draw: Callable[[bool], Figure | None]) -> Drawn | None:
+        figure, narrow = draw(False), draw(True)
+        if figure is None or narrow is None:
             return None
-        buffer = BytesIO()
-        figure.savefig(buffer, format='png', dpi=_RESOLUTION, metadata={'Software': None})
-        (folder / f'{name}.png').write_bytes(buffer.getvalue())
-        return 'data:image/png;base64,' + base64.b64encode(buffer.getvalue()).decode()
+        figure.savefig(folder / f'{name}.png', dpi=_RESOLUTION, metadata={'Software': None})
+        return {'wide': picture(figure), 'narrow': picture(narrow)}
 
-    drawn['curves'] = keep('curves_over_slip', lambda: pictures.curves_over_slip(diagnosis))
-    drawn['parity'] = keep(
-        'measured_against_model', lambda: pictures.measured_against_model(diagnosis)
-    )
-    for name in pictures.colour_inputs(diagnosis):
-        source = keep(
-            f'residuals_by_{name}',
-            lambda name=name: pictures.residuals(diagnosis, name),  # type: ignore[misc]
-        )
-        drawn['residuals'].append((pictures.words(name), source))
-    drawn['where'] = keep('where', lambda: pictures.where_map(diagnosis))
-    drawn['signature'] = keep('signature', lambda: pictures.signature(diagnosis))
-    drawn['gap'] = keep('gap', lambda: pictures.gap(diagnosis))
     proposed = next((m for m in diagnosis.next_measurement if m.rows is not None), None)
-    drawn['rivals'] = (
-        keep('next_measurement', lambda: pictures.rivals(proposed)) if proposed else None
-    )
-    drawn['rivals_title'] = proposed.what if proposed else ''
-    return drawn
+    residuals = [
+        (
+            pictures.words(name),
+            keep(f'residuals_by_{name}', partial(pictures.residuals, diagnosis, name)),
+        )
+        for name in pictures.colour_inputs(diagnosis)
+    ]
+    return {
+        'curves': keep('curves_over_slip', partial(pictures.curves_over_slip, diagnosis)),
+        'parity': keep(
+            'measured_against_model', partial(pictures.measured_against_model, diagnosis)
+        ),
+        'residuals': residuals,
+        'where': keep('where', partial(pictures.where_map, diagnosis)),
+        'signature': keep('signature', partial(pictures.signature, diagnosis)),
+        'gap': keep('gap', partial(pictures.gap, diagnosis)),
+        'rivals': keep('next_measurement', partial(pictures.rivals, proposed))
+        if proposed
+        else None,
+        'rivals_title': proposed.what if proposed else '',
+    }
 
 
 def _gap_row(name: str, item: Any) -> dict[str, str]:

@@ -1,6 +1,9 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Pictures of a diagnosis. Every function returns a figure and leaves no global state behind."""
+"""Pictures of a diagnosis. Every function returns a figure and leaves no global state behind.
+
+``narrow`` puts the panels under one another, at the width of a phone and with text at full size.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +16,7 @@ from numpy.typing import NDArray
 
 from wheel_terra_estimator.discrepancy.result import Diagnosis, NextMeasurement
 from wheel_terra_estimator.discrepancy.tables.steady_table import INPUT_UNITS, QUANTITIES
-from wheel_terra_estimator.reporting.style import LINE_COLOURS, picture_style
+from wheel_terra_estimator.reporting.style import INK, LINE_COLOURS, NOISE_COLOUR, picture_style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -38,6 +41,9 @@ _DISCRETE = ('#E69F00', '#009E73', '#0072B2', '#7B4FA3', '#111111', '#D55E00')
 _SHAPES = 'os^Dv<'
 _MOST_CURVES = 6
 _LEGEND_LINE, _LEGEND_SIZE = 0.28, 8.5  # [inch], [points]
+_LEGEND_MARK, _LEGEND_LETTER = 0.45, 0.072  # [inch], of an entry, at the usual size
+_PHONE = 3.6  # width of a narrow figure [inch]
+_LEFT = 0.72  # room for the labels of an axis [inch]
 
 
 def words(name: str) -> str:
@@ -55,11 +61,13 @@ def label(name: str, unit: str) -> str:
     return words(name) if unit == '-' else f'{words(name)} [{unit}]'
 
 
-def measured_against_model(diagnosis: Diagnosis) -> Figure:
+def measured_against_model(diagnosis: Diagnosis, narrow: bool = False) -> Figure:
     """Draw measured over modelled values, before and after, one panel per quantity."""
     curves, table = diagnosis.curves, diagnosis.table
     with _style():
-        figure, axes = _panels(1, table.quantities, height=2.7, legend=1)
+        names = ['as configured', _last(diagnosis)]
+        lines = _legend_lines(names, table.quantities, narrow)
+        figure, axes = _panels(1, table.quantities, height=2.7, legend=lines, narrow=narrow)
         for axis, name in zip(axes[0], table.quantities, strict=True):
             q, (scale, unit) = QUANTITIES.index(name), SHOWN[name]
             measured = scale * table.measured[:, q]
@@ -77,15 +85,15 @@ def measured_against_model(diagnosis: Diagnosis) -> Figure:
             axis.plot(after[good], measured[good], 'o', ms=4, color=BLUE, label=_last(diagnosis))
             values = np.concatenate([measured[good], after[good], scale * curves.before[good, q]])
             ends = np.array([values.min(), values.max()])
-            axis.plot(ends, ends, color='#1f2933', lw=0.8)
+            axis.plot(ends, ends, color=INK, lw=0.8)
             axis.set(xlabel=f'model [{unit}]', title=words(name))
             axis.set_ylabel(f'measured [{unit}]')
         handles, labels = axes[0][0].get_legend_handles_labels()
-        _legend(figure, handles, labels)
+        _legend(figure, handles, labels, lines=lines)
     return figure
 
 
-def curves_over_slip(diagnosis: Diagnosis) -> Figure | None:
+def curves_over_slip(diagnosis: Diagnosis, narrow: bool = False) -> Figure | None:
     """Draw measurement and model over slip, one curve for each setting of the other inputs.
 
     None where the table has no sweeps of slip, or too many to be told apart.
@@ -95,11 +103,14 @@ def curves_over_slip(diagnosis: Diagnosis) -> Figure | None:
     if not groups:
         return None
     slip = table.columns['slip']
+    others = [words(name) for name in table.varying() if name != 'slip']
+    texts = [*([f'{", ".join(others)}:'] if others else []), *(text for text, _ in groups)]
+    models = ['model as configured', f'model {_last(diagnosis)}']
     with _style():
-        entries = len(groups) + bool(len(table.varying()) > 1)
-        abreast = {1: 3, 2: 5}.get(len(table.quantities), 7)
-        lines_of_groups = -(-entries // abreast)
-        figure, axes = _panels(1, table.quantities, height=3.0, legend=1 + lines_of_groups)
+        below = _legend_lines(models, table.quantities, narrow)
+        lines_of_groups = _legend_lines(texts, table.quantities, narrow)
+        legend = below + lines_of_groups
+        figure, axes = _panels(1, table.quantities, height=3.0, legend=legend, narrow=narrow)
         for axis, name in zip(axes[0], table.quantities, strict=True):
             q, (scale, unit) = QUANTITIES.index(name), SHOWN[name]
             kept = np.isfinite(table.measured[:, q]) & ~_set_apart(diagnosis, q)
@@ -124,13 +135,11 @@ def curves_over_slip(diagnosis: Diagnosis) -> Figure | None:
             Line2D([], [], marker=shape, ms=5, ls='', color=colour)
             for _, colour, shape in zip(groups, _DISCRETE, _SHAPES, strict=False)
         ]
-        lines = [Line2D([], [], ls=style, color='#1f2933', lw=1.2) for style in (':', '-')]
-        others = [words(name) for name in table.varying() if name != 'slip']
-        texts = [text for text, _ in groups]
+        lines = [Line2D([], [], ls=style, color=INK, lw=1.2) for style in (':', '-')]
         if others:
-            marks, texts = [Line2D([], [], ls=''), *marks], [f'{", ".join(others)}:', *texts]
-        _legend(figure, marks, texts, below=1, lines=lines_of_groups)
-        _legend(figure, lines, ['model as configured', f'model {_last(diagnosis)}'])
+            marks = [Line2D([], [], ls=''), *marks]
+        _legend(figure, marks, texts, below=below, lines=lines_of_groups)
+        _legend(figure, lines, models, lines=below)
     return figure
 
 
@@ -157,7 +166,7 @@ def _sweeps(diagnosis: Diagnosis) -> list[tuple[str, NDArray[np.intp]]]:
     return found if len(found) <= _MOST_CURVES and 2 * covered > len(table) else []
 
 
-def residuals(diagnosis: Diagnosis, colour_by: str) -> Figure:
+def residuals(diagnosis: Diagnosis, colour_by: str, narrow: bool = False) -> Figure:
     """Draw measured minus model against slip, coloured by an input, before and after.
 
     Columns: as configured, soil refitted, effect added (the same again where nothing was named).
@@ -174,14 +183,17 @@ def residuals(diagnosis: Diagnosis, colour_by: str) -> Figure:
     slip, colour = table.columns['slip'], factor * table.columns[colour_by]
     few = np.unique(np.round(colour[np.isfinite(colour)], 9))
     discrete = len(few) <= 5
+    texts = [f'{words(colour_by)} {value:.3g} {unit}'.removesuffix(' -') for value in few]
+    lines = _legend_lines(texts, stages, narrow) if discrete else 0
     with _style():
         figure, axes = _panels(
             len(table.quantities),
             stages,
             height=1.95,
             bar=not discrete,
-            legend=int(discrete),
+            legend=lines,
             shared=True,
+            narrow=narrow,
         )
         drawn = None
         for row, name in zip(axes, table.quantities, strict=True):
@@ -206,12 +218,13 @@ def residuals(diagnosis: Diagnosis, colour_by: str) -> Figure:
                         vmax=np.nanmax(colour),
                     )
                 axis.plot(slip[outside], np.clip(residual[outside], -reach, reach), 'x', color=RED)
-                if name == table.quantities[0]:
+                if narrow or name == table.quantities[0]:
                     axis.set_title(title)
                 if name == table.quantities[-1]:
                     axis.set_xlabel('slip')
+                if narrow or axis is row[0]:
+                    axis.set_ylabel(f'{words(name)} [{quantity_unit}]')
             row[0].set_ylim(-reach, reach)
-            row[0].set_ylabel(f'{words(name)} [{quantity_unit}]')
         if discrete:
             from matplotlib.lines import Line2D
 
@@ -219,21 +232,20 @@ def residuals(diagnosis: Diagnosis, colour_by: str) -> Figure:
                 Line2D([], [], marker=shape, ms=5, ls='', color=c)
                 for c, shape in zip(_DISCRETE, _SHAPES, strict=True)
             ]
-            texts = [f'{words(colour_by)} {value:.3g} {unit}'.removesuffix(' -') for value in few]
-            _legend(figure, handles[: len(few)], texts)
+            _legend(figure, handles[: len(few)], texts, lines=lines)
         else:
             _colour_bar(figure, drawn, label(colour_by, unit))
     return figure
 
 
-def where_map(diagnosis: Diagnosis) -> Figure:
+def where_map(diagnosis: Diagnosis, narrow: bool = False) -> Figure:
     """Draw where the soil-refitted model and the measurement disagree, for every quantity."""
     table, curves, where = diagnosis.table, diagnosis.curves, diagnosis.where
     second = _second_input(diagnosis)
     factor, unit = shown_input(second)
     x, y = table.columns['slip'], factor * table.columns[second]
     with _style():
-        figure, axes = _panels(1, table.quantities, height=2.7, bar=True)
+        figure, axes = _panels(1, table.quantities, height=2.7, bar=True, narrow=narrow)
         drawn = None
         for axis, name in zip(axes[0], table.quantities, strict=True):
             q = QUANTITIES.index(name)
@@ -255,19 +267,24 @@ def where_map(diagnosis: Diagnosis) -> Figure:
             axis.set(title=words(name) + share_text, xlabel='slip')
             if name == where.quantity:
                 _box(axis, diagnosis, second)
-        axes[0][0].set_ylabel(label(second, unit))
+        for axis in axes[0] if narrow else axes[0][:1]:
+            axis.set_ylabel(label(second, unit))
         _colour_bar(figure, drawn, 'measured minus model [s.d.]')
     return figure
 
 
-def signature(diagnosis: Diagnosis) -> Figure | None:
+def signature(diagnosis: Diagnosis, narrow: bool = False) -> Figure | None:
     """Draw the signature of the named (or best) effect over what the soil refit left."""
     table, curves = diagnosis.table, diagnosis.curves
     if curves.signature is None:
         return None
     slip = table.columns['slip']
     with _style():
-        figure, axes = _panels(1, table.quantities, height=2.5, legend=1)
+        names = ['measured minus soil refit', words(curves.signature_name)]
+        if curves.rival_signature is not None:
+            names.append(f'next best: {words(curves.rival_name)}')
+        lines = _legend_lines(names, table.quantities, narrow)
+        figure, axes = _panels(1, table.quantities, height=2.5, legend=lines, narrow=narrow)
         for axis, name in zip(axes[0], table.quantities, strict=True):
             q, (scale, unit) = QUANTITIES.index(name), SHOWN[name]
             residual = scale * (table.measured[:, q] - curves.refit[:, q])
@@ -303,15 +320,15 @@ def signature(diagnosis: Diagnosis) -> Figure | None:
             axis.set(xlabel='slip', title=words(name))
             axis.set_ylabel(f'[{unit}]')
         handles, labels = axes[0][0].get_legend_handles_labels()
-        _legend(figure, handles, labels)
+        _legend(figure, handles, labels, lines=lines)
     return figure
 
 
-def gap(diagnosis: Diagnosis) -> Figure:
+def gap(diagnosis: Diagnosis, narrow: bool = False) -> Figure:
     """Draw the error on unseen rows: as configured, soil refitted, effect added, noise floor."""
     names = list(diagnosis.gap)
     with _style():
-        figure, axes = _panels(1, names, height=2.2)
+        figure, axes = _panels(1, names, height=2.2, narrow=narrow)
         for axis, name in zip(axes[0], names, strict=True):
             (scale, unit), item = SHOWN[name], diagnosis.gap[name]
             stages = [('as\nconfigured', item.before, GREY), ('soil\nrefitted', item.refit, PURPLE)]
@@ -321,7 +338,7 @@ def gap(diagnosis: Diagnosis) -> Figure:
             for i, (_, value, colour) in enumerate(stages):
                 axis.bar(i, scale * value, width=0.62, color=colour)
                 low, high = intervals[i]
-                axis.plot([i, i], [scale * low, scale * high], color='#1f2933', lw=1.2)
+                axis.plot([i, i], [scale * low, scale * high], color=INK, lw=1.2)
                 axis.annotate(
                     f'{scale * value:.3g}',
                     (i, scale * max(high, value)),
@@ -341,7 +358,7 @@ def gap(diagnosis: Diagnosis) -> Figure:
     return figure
 
 
-def rivals(item: NextMeasurement) -> Figure | None:
+def rivals(item: NextMeasurement, narrow: bool = False) -> Figure | None:
     """Draw what the rivals predict on proposed rows, for the quantities in which they part."""
     if item.rows is None or len(item.predictions) < 2:
         return None
@@ -350,7 +367,9 @@ def rivals(item: NextMeasurement) -> Figure | None:
     x = factor * np.asarray(item.rows[x_name], dtype=float)
     order = np.argsort(x, kind='stable')
     with _style():
-        figure, axes = _panels(1, QUANTITIES, height=2.2, legend=1)
+        names = [words(rival) for rival in item.predictions]
+        lines = _legend_lines(names, QUANTITIES, narrow)
+        figure, axes = _panels(1, QUANTITIES, height=2.2, legend=lines, narrow=narrow)
         for axis, name in zip(axes[0], QUANTITIES, strict=True):
             q, (scale, quantity_unit) = QUANTITIES.index(name), SHOWN[name]
             for (rival, values), colour, marker in zip(
@@ -368,7 +387,7 @@ def rivals(item: NextMeasurement) -> Figure | None:
             axis.set(title=words(name), xlabel=label(x_name, unit))
             axis.set_ylabel(f'predicted [{quantity_unit}]')
         handles, labels = axes[0][0].get_legend_handles_labels()
-        _legend(figure, handles, labels)
+        _legend(figure, handles, labels, lines=lines)
     return figure
 
 
@@ -402,29 +421,38 @@ def _panels(
     bar: bool = False,
     legend: int = 0,
     shared: bool = False,
+    narrow: bool = False,
 ) -> tuple[Figure, Any]:
-    """Return a figure with a grid of axes, margins in inches.
+    """Return a figure with (rows, columns) axes, margins in inches.
 
     Fixed margins: a layout engine would draw every figure three times over. ``bar`` leaves room
     for a colour bar on the right, ``legend`` for so many lines above; ``shared``: the axes of a row
-    have the same y axis.
+    have the same y axis. A narrow figure has all panels under one another, row by row.
     """
     from matplotlib.figure import Figure
 
     count = len(columns)
-    left, right = 0.72, 0.95 if bar else 0.12
+    left, right = _LEFT, 0.95 if bar else 0.12
     top, bottom = 0.34 + _LEGEND_LINE * legend, 0.5
+    down, abreast = (rows * count, 1) if narrow else (rows, count)
     # Panels that share an axis stand closer, but not so close that the last label of one meets
     # the first of the next.
-    between = 0.4 if shared else 0.72
-    cell = (2.73 if count > 2 else 3.4 if count == 2 else 5.6) + (0.32 if shared else 0.0)
-    width = left + right + count * cell + (count - 1) * between
-    gap = 0.28
-    total = top + bottom + rows * height + (rows - 1) * gap
+    between = 0.4 if shared else _LEFT
+    cell = _PHONE - left - right if narrow else _cell(count) + (0.32 if shared else 0.0)
+    width = left + right + abreast * cell + (abreast - 1) * between
+    gap = 0.72 if narrow else 0.28
+    total = top + bottom + down * height + (down - 1) * gap
     figure = Figure(figsize=(width, total), layout='none')  # type: ignore[arg-type]
-    axes = figure.subplots(
-        rows, count, squeeze=False, sharex=shared, sharey='row' if shared else False
-    )
+    if narrow:
+        axes = np.empty((rows, count), dtype=object)
+        for i in range(down):
+            row = divmod(i, count)[0]
+            beside = axes[row, 0] if shared and i % count else None
+            axes.flat[i] = figure.add_subplot(down, 1, i + 1, sharey=beside)
+    else:
+        axes = figure.subplots(
+            rows, count, squeeze=False, sharex=shared, sharey='row' if shared else False
+        )
     for axis in axes.flat:
         axis.locator_params(nbins=5)
     figure.subplots_adjust(
@@ -448,18 +476,30 @@ def _colour_bar(figure: Figure, drawn: Any, text: str) -> None:
     place.grid(visible=False)
 
 
+def _cell(count: int) -> float:
+    """Return the width [inch] of each of so many panels beside one another."""
+    return {1: 5.6, 2: 3.4}.get(count, 2.73)
+
+
+def _legend_lines(texts: Sequence[str], columns: Sequence[Any], narrow: bool) -> int:
+    """Return how many lines a legend above so many panels takes, its text at full size."""
+    count = len(columns)
+    room = _PHONE if narrow else count * (_cell(count) + _LEFT) - _LEFT
+    widest = max((_LEGEND_MARK + _LEGEND_LETTER * len(text) for text in texts), default=room)
+    return -(-len(texts) // max(1, int(room / widest)))
+
+
 def _legend(figure: Figure, handles: Any, labels: Any, *, below: int = 0, lines: int = 1) -> None:
     """Put a legend of so many lines above the panels, ``below`` lines from the top."""
     width, height = figure.get_size_inches()
-    # Width at the usual size [inch].
-    needed = 0.6 + sum(0.45 + 0.072 * len(text) for text in labels) / lines
+    left = 0.05 if width <= _PHONE else 0.6
     figure.legend(
         handles,
         labels,
         loc='upper left',
-        bbox_to_anchor=(0.6 / width, 1.0 - (0.02 + 0.9 * _LEGEND_LINE * below) / height),
+        bbox_to_anchor=(left / width, 1.0 - (0.02 + 0.9 * _LEGEND_LINE * below) / height),
         ncols=-(-len(labels) // lines),
-        fontsize=max(_LEGEND_SIZE * min(1.0, width / needed), 6.0),
+        fontsize=_LEGEND_SIZE,
         columnspacing=1.4,
         handletextpad=0.4,
     )
@@ -469,8 +509,8 @@ def _band(axis: Axes, slip: FloatArray, half: FloatArray) -> None:
     """Shade plus and minus ``half`` around zero."""
     order = np.argsort(slip)
     order = order[np.isfinite(half[order])]
-    axis.fill_between(slip[order], -half[order], half[order], color='#e3e8ee', lw=0, zorder=0)
-    axis.axhline(0.0, color='#1f2933', lw=0.8)
+    axis.fill_between(slip[order], -half[order], half[order], color=NOISE_COLOUR, lw=0, zorder=0)
+    axis.axhline(0.0, color=INK, lw=0.8)
 
 
 def _last(diagnosis: Diagnosis) -> str:
