@@ -93,19 +93,19 @@ def test_ground_that_curves_upwards_turns_the_nose_up(parts):
 
 def test_a_reversal_begins_a_new_contact(parts):
     age = ContactAge(parts.rover)
-    assert age.update(NAN) == (False, False, False)
-    assert age.update(0.0) == (False, False, False)
-    assert age.update(0.05) == (True, True, False)
+    assert age.update(NAN) == (False, False)
+    assert age.update(0.0) == (False, False)
+    assert age.update(0.05) == (True, False)
     age.advance(1.0)
     assert age.settled
-    assert age.update(0.05) == (False, False, False)
-    assert age.update(-0.05) == (False, True, True)
+    assert age.update(0.05) == (False, False)
+    assert age.update(-0.05) == (True, True)
     assert not age.settled
     age.advance(1.0)
     late = age.shear_variance
     age.stop()
     assert age.state.travel == 0.0
-    assert age.update(-0.05).started
+    assert age.update(-0.05) == (False, False)
     assert age.shear_variance > 100.0 * late
 
 

@@ -144,6 +144,16 @@ def test_a_ramp_goes_on_to_the_stamp_of_a_reference_between_two_messages(wheels)
     assert wheels.rim_speeds(3.95) == wheels.state.rim_speed
 
 
+def test_smoothing_does_not_put_a_ramp_behind(wheels):
+    """Odometry at 100 Hz is smoothed over 50 ms: 5 % of the speed a second after a start."""
+    radius = Parts(reader.load(SAND)).rover.slip_radius[0]
+    for i in range(101):
+        wheels.update(0.01 * i, odometry([0.01 * i] * 6, [NAN] * 6))
+    assert wheels.state.rim_speed[0] < 0.97 * radius
+    assert wheels.rim_speeds(1.0)[0] == pytest.approx(radius, rel=0.002)
+    assert wheels.acceleration() == pytest.approx(radius, rel=0.002)
+
+
 def test_sinkage_and_leaving_angle_are_kept_wheel_by_wheel():
     sinkage = SinkageInput(2)
     for value in (0.01, 0.03):

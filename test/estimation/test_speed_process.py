@@ -158,6 +158,15 @@ def test_a_rover_that_must_pull_more_slips_more_at_once():
     assert alone.mean[SPEED] == -0.04
 
 
+def test_a_reversal_carries_the_slip_over_by_what_is_asked_less():
+    """Up a slope of 0.1 the slip is 0.2; down it, at a slip per demand of 1.5, it is -0.1."""
+    made, ekf = process([0.05] * 6, ratio=0.8), Parts(reader.load(SAND)).filter()
+    ekf.set(SLIP_PER_DEMAND, 1.5, 0.5**2)
+    made.turn_back(ekf, demand_change=-0.2)
+    assert made.state.ratio == pytest.approx(1.1)
+    assert made.state.ratio_std == pytest.approx(np.hypot(0.1, 0.5 * 0.2))
+
+
 def test_the_slip_of_a_start_walks_farther():
     made = process([0.05] * 6)
     walks = []

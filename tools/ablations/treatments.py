@@ -85,9 +85,6 @@ TREATMENTS: tuple[Treatment, ...] = (
     Treatment('opening where wheels disagree', _OPENING, _speed(rate_noise=NEVER)),
     Treatment('noise with a change of rim speed', _OPENING, _speed(rim_change=0.0)),
     Treatment('all openings of the speed', _OPENING, _speed(inflation_rate=0.0)),
-    Treatment(
-        'wider strength at a start', _OPENING, patched('wheel_soil_estimator:_START_STD', 0.0)
-    ),
     Treatment('models doubted while references lean', _OPENING, _reference(most_doubt=1.0)),
     Treatment('soft ground is weak', _OPENING, _soil(soft_is_weak=0.0)),
     Treatment('own stiffness of each wheel', _OPENING, _soil(own_stiffness_walk=0.01)),

@@ -47,7 +47,7 @@ from wheel_terra_estimator.estimation.filter.sinkage import SinkageUpdate
 from wheel_terra_estimator.estimation.filter.sinkage_process import SinkageProcess
 from wheel_terra_estimator.estimation.filter.soil_process import SoilProcess
 from wheel_terra_estimator.estimation.filter.speed_process import RimSpeeds, SpeedProcess
-from wheel_terra_estimator.estimation.filter.state import SHEAR_STRENGTH, SPEED, StateLayout
+from wheel_terra_estimator.estimation.filter.state import SPEED, StateLayout
 from wheel_terra_estimator.estimation.filter.torque import TorqueUpdate
 from wheel_terra_estimator.estimation.filter.zero_velocity import ZeroVelocityUpdate
 from wheel_terra_estimator.estimation.inputs.contact_sensors import (
@@ -77,9 +77,6 @@ Floats = tuple[float, ...]
 _SECOND = 1e-9  # of a nanosecond
 _PERIOD_ROUNDING = 1e-4
 """A cycle is due this much before its period is over [s]: stamps jitter."""
-_START_STD = 0.3
-"""Deviation of the shear strength [ln] that a start adds: the contact forms anew, and with it what
-the shear model gets wrong. Tuned on simulated drives, seeds 1000 to 1019."""
 _SHARP_TURN = 0.3
 """Lateral motion above which slip comes from turning and says nothing of an entrapment [-]."""
 
@@ -332,17 +329,12 @@ class WheelSoilEstimator:
         unturned = RimSpeeds.of(rims, turning.yaw_rate, rover.lateral)
         reference_known = self._reference.known(time)
         event = self._contact_age.update(unturned.typical)
-        if event.started and reference_known:
-            # Reference velocities will settle the strength again.
-            ekf.widen(SHEAR_STRENGTH, _START_STD * _START_STD)
-        if event.new_direction:
-            direction = self._contact_age.state.direction
-            speed.forget_ratio(direction, loads.slope_share, turned_back=event.reversed)
-        demand_change = self._demand.update(
-            self._contact_age.state.direction * loads.slope_share if window.readings else NAN,
-            dt,
-            settled=self._contact_age.settled,
-        )
+        demand = self._contact_age.state.direction * loads.slope_share if window.readings else NAN
+        if event.reversed:
+            speed.turn_back(ekf, self._demand.until(demand))
+        elif event.new_direction:
+            speed.forget_ratio()
+        demand_change = self._demand.update(demand, dt, settled=self._contact_age.settled)
         speed.begin(ekf, unturned)
         speed.note_change(time, unturned)
         heard = known(rims)
@@ -425,6 +417,7 @@ class WheelSoilEstimator:
             reference,
             still=cycle.still,
             fastest_rim=self._wheels.fastest(),
+            rim_acceleration=self._wheels.acceleration(),
             last_change=self._speed.state.change_time,
             torque_known=self._wheels.torque_known(time),
         )

@@ -25,14 +25,11 @@ class ContactAgeState(NamedTuple):
 
     travel: float = 0.0  # [m] since the start or the last change of direction
     direction: float = 0.0  # of the drive: 1, -1, 0 = none yet
-    starting: bool = True
-    """The wheels stand, or have not turned since they stood."""
 
 
 class ContactEvent(NamedTuple):
     """What a cycle brought."""
 
-    started: bool = False
     new_direction: bool = False
     reversed: bool = False  # the direction is the opposite one of a drive before
 
@@ -48,11 +45,11 @@ class ContactAge(Component[ContactAgeState]):
         """Take the typical rim speed of a cycle [m/s], nan = unknown."""
         if not abs(rim_speed) >= self._rover.low_rim:
             return ContactEvent()
-        travel, before, starting = self.state
+        travel, before = self.state
         direction = 1.0 if rim_speed > 0.0 else -1.0
         turned = direction != before
-        self.state = ContactAgeState(0.0 if turned else travel, direction, starting=False)
-        return ContactEvent(starting, turned, turned and before != 0.0)
+        self.state = ContactAgeState(0.0 if turned else travel, direction)
+        return ContactEvent(turned, turned and before != 0.0)
 
     def advance(self, travel: float) -> None:
         """Add the travel of a cycle [m]."""
@@ -60,7 +57,7 @@ class ContactAge(Component[ContactAgeState]):
 
     def stop(self) -> None:
         """Note that the wheels stand."""
-        self.state = self.state._replace(travel=0.0, starting=True)
+        self.state = self.state._replace(travel=0.0)
 
     @property
     def settled(self) -> bool:

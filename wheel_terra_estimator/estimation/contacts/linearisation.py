@@ -39,8 +39,6 @@ class LinearisationTuning:
 
     slope_keep: float = 0.9
     """Share of the old derivatives kept in a cycle: they are means over about a second."""
-    first_speed_slope: float = 0.2
-    """Share of the first derivatives by speed after a start: the slip is known least there."""
     new_contact: float = 0.15
     """Change of a torque by strength, of load times radius, that is no noise of the state."""
     least_load: float = 1e-3  # [N]: a wheel with less is in the air
@@ -190,11 +188,7 @@ class Linearisation(Component[SlopeState]):
         """Return the smoothed derivatives of torque and pull; `moment`: load times radius [N m]."""
         tuning = self._tuning
         if old_torque is None or old_pull is None:
-            flat = tuning.first_speed_slope
-            return (
-                (flat * forces.d_torque[0], *forces.d_torque[1:]),
-                (flat * forces.d_pull[0], *forces.d_pull[1:]),
-            )
+            return forces.d_torque, forces.d_pull
         torque = smoothed_slopes(old_torque, forces.d_torque, tuning.slope_keep)
         pull = smoothed_slopes(old_pull, forces.d_pull, tuning.slope_keep)
         change = abs(forces.d_torque[_STRENGTH] - old_torque[_STRENGTH])

@@ -31,16 +31,17 @@ def considered_entries(
     reference_known : bool
         Without a reference velocity slip and shear strength are not told apart.
     settled : bool
-        Whether the contacts are those of a steady drive: the rut of a start is none.
+        Whether the contacts are those of a steady drive. The rut that forms at a start, or is left
+        behind after a spin on the spot, tells no speed.
     unread : sequence of int
         Wheels without a sinkage reading: their sinkage and the errors of their shear model are not
         told apart.
     """
     entries = []
+    if not settled:
+        entries.append(SPEED)
     if not reference_known:
         entries += [SHEAR_STRENGTH, SHEAR_MODULUS]
-        if not settled:
-            entries.append(SPEED)
     for part in (layout.sinkage, layout.stiffness):
         entries += [part.start + i for i in unread]
     if len(unread) == layout.wheel_count:

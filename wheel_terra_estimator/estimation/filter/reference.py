@@ -47,6 +47,9 @@ class ReferenceTuning:
     of slip shows in them unless the traction curve is flat."""
     count: int = 2  # where there is a witness, or no torque to ask
     witness_time: float = 2.5  # [s] for which a change of the contacts is a witness
+    timing_std: float = 0.1
+    """Doubt of when the wheels were as fast as they say, against the reference [s]: a ramp makes of
+    it a doubt of v / rim speed, great while the wheels are slow."""
     gate: float = 4.0  # to which an outlier is weakened (squared deviations)
     gate_beyond: float = 0.01
 
@@ -119,6 +122,7 @@ class ReferenceUpdate(Component[ReferenceState]):
         *,
         still: bool,
         fastest_rim: float,
+        rim_acceleration: float,
         last_change: float,
         torque_known: bool,
     ) -> bool:
@@ -136,6 +140,8 @@ class ReferenceUpdate(Component[ReferenceState]):
             Whether all wheels stand.
         fastest_rim : float
             Greatest rim speed [m/s].
+        rim_acceleration : float
+            Of the wheels at that time [m/s^2].
         last_change : float
             When torque, slope or rim speed last said that the slip may change [s].
         torque_known : bool
@@ -143,7 +149,7 @@ class ReferenceUpdate(Component[ReferenceState]):
         """
         tuning = self._tuning
         witnessed = not (torque_known and time - last_change > tuning.witness_time)
-        variance = self._variance(reference)
+        variance = self._variance(reference) + (tuning.timing_std * rim_acceleration) ** 2
         self._note_time(time)
         if still:
             self._note_slide(ekf, time, reference.forward, variance)

@@ -39,8 +39,6 @@ class SpeedTuning:
 
     first_ratio: float = 0.95  # v / rim speed before anything is known: level, loose soil
     first_ratio_std: float = 0.3
-    reversed_ratio: float = 0.9
-    """v / rim speed on level ground after a reversal; what the slope asks is taken off."""
     least_reversed_ratio: float = 0.2
     most_reversed_ratio: float = 1.1
     first_sight_share: float = 0.3
@@ -170,16 +168,27 @@ class SpeedProcess(Component[SpeedState]):
         if speed_change > self.state.inflation:
             self.state = self.state._replace(inflation=speed_change)
 
-    def forget_ratio(self, direction: float, slope_share: float, *, turned_back: bool) -> None:
-        """Forget v / rim speed where the drive changes its direction (up becomes down)."""
-        tuning, ratio = self._tuning, self.state.ratio
-        if turned_back:
-            ratio = clipped(
-                tuning.reversed_ratio - direction * slope_share,
-                tuning.least_reversed_ratio,
-                tuning.most_reversed_ratio,
-            )
-        self.state = self.state._replace(ratio=ratio, ratio_std=tuning.first_ratio_std)
+    def forget_ratio(self) -> None:
+        """Forget how well v / rim speed is known: the first drive in a direction begins."""
+        self.state = self.state._replace(ratio_std=self._tuning.first_ratio_std)
+
+    def turn_back(self, ekf: GatedFilter, demand_change: float) -> None:
+        """Carry v / rim speed over to the other direction: up becomes down.
+
+        The slip changes by the learned slip per demand times what is asked less (or more), as it
+        does where the slope changes.
+        """
+        state, tuning = self.state, self._tuning
+        ratio = state.ratio - float(ekf.mean[SLIP_PER_DEMAND]) * demand_change
+        gain_std = math.sqrt(float(ekf.covariance[SLIP_PER_DEMAND, SLIP_PER_DEMAND]))
+        self.state = state._replace(
+            ratio=clipped(ratio, tuning.least_reversed_ratio, tuning.most_reversed_ratio),
+            ratio_std=clipped(
+                math.hypot(state.ratio_std, gain_std * demand_change),
+                tuning.least_ratio_std,
+                tuning.first_ratio_std,
+            ),
+        )
 
     def note_change(self, time: float, rims: RimSpeeds) -> None:
         """Remember when contacts or commands last changed: a witness for references that jump."""

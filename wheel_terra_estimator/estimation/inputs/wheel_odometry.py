@@ -12,7 +12,7 @@ from typing import NamedTuple
 from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.measurements import WheelOdometry
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
-from wheel_terra_estimator.estimation.scalars import NAN
+from wheel_terra_estimator.estimation.scalars import NAN, median
 
 Floats = tuple[float, ...]
 
@@ -28,8 +28,8 @@ class WheelOdometryTuning:
     """Odometry that is this slow [s between messages] is not smoothed."""
     slope_gain: float = 0.5  # smoothing of the rim speeds' rate of change, per message
     longest_carried: float = 0.15
-    """Time [s] over which a rim speed is carried on at its rate of change, to the stamp of a
-    reference velocity or of an IMU reading between two messages."""
+    """Time [s] over which a rim speed is carried on at its rate of change: over the lag of its
+    smoothing, and to a stamp between two messages."""
     longest_gap: float = 0.3  # between messages from which a rate of change is taken [s]
     slope_noise: float = 3.0  # deviations of the rates within which a rim speed is constant
     torque_age: float = 2.0
@@ -43,6 +43,7 @@ class WheelOdometryState(NamedTuple):
     rim_speed: Floats  # [m/s], nan = never known
     rate_time: Floats  # [s]
     rim_slope: Floats  # rate of change of the rim speeds, smoothed [m/s^2]
+    lag: float  # by which the smoothed rim speeds are behind the readings [s]
     torque_time: float
     torque_sum: Floats  # since the last cycle
     torque_count: tuple[int, ...]
@@ -65,6 +66,7 @@ class WheelOdometryInput(Component[WheelOdometryState]):
             (NAN,) * n,
             (never,) * n,
             (0.0,) * n,
+            0.0,
             never,
             (0.0,) * n,
             (0,) * n,
@@ -89,11 +91,12 @@ class WheelOdometryInput(Component[WheelOdometryState]):
             if not isnan(rate):
                 rim, old = rate * self._radius[i], rim_speed[i]
                 gap = time - rate_time[i]
+                rim_speed[i] = rim if isnan(old) else keep * old + (1.0 - keep) * rim
                 if 0.0 < gap < tuning.longest_gap:
-                    rim_slope[i] += tuning.slope_gain * ((rim - old) / gap - rim_slope[i])
+                    slope = (rim_speed[i] - old) / gap
+                    rim_slope[i] += tuning.slope_gain * (slope - rim_slope[i])
                 else:
                     rim_slope[i] = 0.0
-                rim_speed[i] = rim if isnan(old) else keep * old + (1.0 - keep) * rim
                 rate_time[i] = time
         torque_time = state.torque_time
         torque_sum, torque_count = list(state.torque_sum), list(state.torque_count)
@@ -107,6 +110,7 @@ class WheelOdometryInput(Component[WheelOdometryState]):
             rim_speed=tuple(rim_speed),
             rate_time=tuple(rate_time),
             rim_slope=tuple(rim_slope),
+            lag=keep * dt / (1.0 - keep) if 0.0 < keep < 1.0 else 0.0,
             torque_time=torque_time,
             torque_sum=tuple(torque_sum),
             torque_count=tuple(torque_count),
@@ -133,11 +137,10 @@ class WheelOdometryInput(Component[WheelOdometryState]):
     def rim_speeds(self, time: float) -> Floats:
         """Return the rim speeds [m/s], nan where the rate is unknown or too old."""
         state, silence = self.state, self._silence
-        if min(state.rate_time) == time:
-            return state.rim_speed
+        lag = state.lag
         return tuple(
             [
-                self._carried(rim, slope, time - when) if time - when <= silence else NAN
+                self._carried(rim, slope, time - when + lag) if time - when <= silence else NAN
                 for rim, slope, when in zip(
                     state.rim_speed, state.rim_slope, state.rate_time, strict=True
                 )
@@ -145,10 +148,15 @@ class WheelOdometryInput(Component[WheelOdometryState]):
         )
 
     def _carried(self, rim: float, slope: float, age: float) -> float:
-        """Return a rim speed carried on over its age [s]: a ramp goes on between two messages."""
+        """Return a rim speed carried on over its age [s]: a ramp goes on, and smoothing lags."""
         if abs(slope) <= self._least_slope or age > self._tuning.longest_carried:
             return rim
         return rim + slope * age
+
+    def acceleration(self) -> float:
+        """Return the median rate of change of the rim speeds, 0 where it may be noise [m/s^2]."""
+        slope = median(list(self.state.rim_slope))
+        return slope if abs(slope) > self._least_slope else 0.0
 
     def fastest(self) -> float:
         """Return the greatest known rim speed, whatever its direction or age [m/s]; 0 = none."""
