@@ -179,15 +179,14 @@ def _replayed(path: Path, configuration: Configuration, remaps: Mapping[str, str
 def _estimated(measurements: Iterable[Measurement], configuration: Configuration) -> Any:
     from wheel_terra_estimator.bags.history import HistoryRecorder
     from wheel_terra_estimator.estimation.core import EstimatorCore
-    from wheel_terra_estimator.messages.convert import finite
 
     core = EstimatorCore(configuration)
     recorder = HistoryRecorder(configuration.wheels.names)
     for measurement in measurements:
         for estimates in core.add(measurement):
-            recorder.add(finite(estimates))
+            recorder.add(estimates)
     for estimates in core.flush():
-        recorder.add(finite(estimates))
+        recorder.add(estimates)
     return recorder.history()
 
 

@@ -40,6 +40,16 @@ _LEAST_FORCE_STD = 1e-4
 _NOTHING_AHEAD = WheelForecast(0.0, LONGEST_TIME, NO_ENTRAPMENT_IN_SIGHT)
 
 
+_LEARNED = (
+    'soil.friction_angle_deg',
+    'soil.cohesion',
+    'soil.shear_modulus',
+    'soil.frictional_modulus',
+    'soil.cohesive_modulus',
+)
+"""Names of what is learned of the soil, in the order of the values."""
+
+
 class Sources(NamedTuple):
     """What the estimator knows at a stamp."""
 
@@ -91,7 +101,11 @@ class Outputs:
         sensors: SensorFigures,
         layout: StateLayout,
     ) -> None:
-        self._soil = configuration.soil
+        soil = configuration.soil
+        self._tan_friction = math.tan(float(soil.friction_angle))
+        self._cohesion, self._modulus = float(soil.cohesion), float(soil.shear_modulus)
+        self._frictional = float(soil.frictional_modulus)
+        self._cohesive = float(soil.cohesive_modulus)
         self._rover, self._layout = rover, layout
         self._rim_std = tuple(sensors.wheel_rate_std * r for r in rover.slip_radius)
         self._sinkage_zero = sensors.sinkage_zero_std
@@ -105,25 +119,31 @@ class Outputs:
         names, soil, soil_std = self.learned_soil(given.mean, given.covariance)
         load_std, pull_std = self._force_deviations(given)
         ahead = given.assessment.wheels or (_NOTHING_AHEAD,) * n
+        per_wheel = {
+            'slip': [wheel.slip for wheel in given.slips],
+            'slip_std': [wheel.std for wheel in given.slips],
+            'slip_velocity': slip_velocity,
+            'slip_velocity_std': slip_velocity_std,
+            'drawbar_pull': given.pulls.pull,
+            'drawbar_pull_std': pull_std,
+            'sinkage_rate': given.sinkage.rate,
+            'sinkage_rate_std': given.sinkage.rate_std,
+            'normal_load': given.loads.load,
+            'normal_load_std': load_std,
+            'rim_travel_left': [wheel.travel for wheel in ahead],
+            'pull_margin': given.margin,
+            'stuck_probability': [wheel.probability for wheel in ahead],
+            'time_to_stuck': [wheel.time for wheel in ahead],
+        }
+        # One array for all of them: making fourteen small ones takes longer.
+        rows = np.array(list(per_wheel.values()))
         return EstimateSet(
             stamp=given.stamp,
-            slip=np.array([wheel.slip for wheel in given.slips]),
-            slip_std=np.array([wheel.std for wheel in given.slips]),
-            slip_velocity=np.array(slip_velocity),
-            slip_velocity_std=np.array(slip_velocity_std),
-            drawbar_pull=np.array(given.pulls.pull),
-            drawbar_pull_std=np.array(pull_std),
             sinkage=given.mean[layout.sinkage].copy(),
             sinkage_std=np.minimum(sinkage_std, rover.rim_radius),
-            sinkage_rate=np.array(given.sinkage.rate),
-            sinkage_rate_std=np.array(given.sinkage.rate_std),
-            normal_load=np.array(given.loads.load),
-            normal_load_std=np.array(load_std),
             slip_class=np.array(
                 [wheel.slip_class.current for wheel in given.slips], dtype=np.uint8
             ),
-            rim_travel_left=np.array([wheel.travel for wheel in ahead]),
-            pull_margin=np.array(given.margin),
             soil_names=names,
             soil=soil,
             soil_std=soil_std,
@@ -134,41 +154,38 @@ class Outputs:
                 given.yaw_rate_std**2 if given.loads.force_known else _UNKNOWN_YAW_VARIANCE
             ),
             stuck=given.assessment.stuck,
-            stuck_probability=np.array([wheel.probability for wheel in ahead]),
-            time_to_stuck=np.array([wheel.time for wheel in ahead]),
             reasons=reasons_in_words(given),
             faults=faults_in_words(missing),
+            **dict(zip(per_wheel, rows, strict=True)),
         )
 
     def learned_soil(
         self, mean: FloatArray, covariance: FloatArray
     ) -> tuple[tuple[str, ...], FloatArray, FloatArray]:
         """Return name, value and standard deviation of what was learned of the soil."""
-        soil, k = self._soil, self._layout.stiffness
+        k = self._layout.stiffness
         strength = math.exp(float(mean[SHEAR_STRENGTH]))
         strength_std = math.sqrt(float(covariance[SHEAR_STRENGTH, SHEAR_STRENGTH]))
-        tangent = math.tan(float(soil.friction_angle)) * strength
+        tangent = self._tan_friction * strength
         angle = math.degrees(math.atan(tangent))
         angle_std = math.degrees(tangent * strength_std / (1.0 + tangent * tangent))
-        cohesion = float(soil.cohesion) * strength
-        modulus = float(soil.shear_modulus) * math.exp(float(mean[SHEAR_MODULUS]))
+        cohesion = self._cohesion * strength
+        modulus = self._modulus * math.exp(float(mean[SHEAR_MODULUS]))
         modulus_std = math.sqrt(float(covariance[SHEAR_MODULUS, SHEAR_MODULUS]))
-        stiffness = math.exp(float(mean[k].mean()))
-        stiffness_std = math.sqrt(max(float(covariance[k, k].mean()), 0.0))
-        frictional = float(soil.frictional_modulus) * stiffness
-        cohesive = float(soil.cohesive_modulus) * stiffness
-        entries: tuple[tuple[str, float, float], ...] = (
-            ('soil.friction_angle_deg', angle, angle_std),
-            ('soil.cohesion', cohesion, cohesion * strength_std),
-            ('soil.shear_modulus', modulus, modulus * modulus_std),
-            ('soil.frictional_modulus', frictional, frictional * stiffness_std),
-            ('soil.cohesive_modulus', cohesive, abs(cohesive) * stiffness_std),
+        count = self._layout.wheel_count
+        stiffness = math.exp(float(np.add.reduce(mean[k])) / count)
+        spread = float(np.add.reduce(covariance[k, k], axis=None)) / (count * count)
+        stiffness_std = math.sqrt(max(spread, 0.0))
+        frictional, cohesive = self._frictional * stiffness, self._cohesive * stiffness
+        values = angle, cohesion, modulus, frictional, cohesive
+        deviations = (
+            angle_std,
+            cohesion * strength_std,
+            modulus * modulus_std,
+            frictional * stiffness_std,
+            abs(cohesive) * stiffness_std,
         )
-        return (
-            tuple(entry[0] for entry in entries),
-            np.array([entry[1] for entry in entries]),
-            np.array([entry[2] for entry in entries]),
-        )
+        return _LEARNED, np.array(values), np.array(deviations)
 
     def _force_deviations(self, given: Sources) -> tuple[list[float], list[float]]:
         """Return the deviations of load and pull of each wheel [N], never 0."""

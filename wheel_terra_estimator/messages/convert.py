@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -112,6 +112,7 @@ class InputConverter:
         self._strangers: dict[str, Sequence[str]] = {}  # topic -> names of a message without wheels
         self._columns: dict[tuple[str, ...], tuple[list[int], list[int]]] = {}
         self._index = {name: i for i, name in enumerate(layout.names)}
+        self._all = list(range(len(layout.names)))
         self._mounted = not np.allclose(layout.imu_mounting, (0.0, 0.0, 0.0, 1.0), atol=0.0)
         self._rotation = rotation_matrix(layout.imu_mounting)
         self._methods = {
@@ -125,8 +126,7 @@ class InputConverter:
 
     def convert(self, topic: str, message: Any) -> Measurement | None:
         """Return the measurement in a message of an input topic; None when it does not fit."""
-        with np.errstate(all='ignore'):  # absurd values are judged later, number by number
-            return self._methods[topic](message)
+        return self._methods[topic](message)
 
     def in_words(self, topic: str, reason: str) -> str:
         """Return a reason for a rejection, with the names where these are the reason."""
@@ -140,14 +140,15 @@ class InputConverter:
         values = self._wheel_values('joint_states', message.name, message.velocity, 'velocity')
         if values is None:
             return None
-        torque = np.full(len(self.layout.names), math.nan)
-        if len(message.effort):
-            if len(message.effort) == len(message.name):
-                source, target = self._columns_of(message.name)
-                torque[target] = np.asarray(message.effort)[source]
-            else:
+        effort = message.effort
+        if len(effort) == len(message.name):
+            torque = self._sorted(message.name, effort)
+        else:
+            torque = np.full(len(self.layout.names), math.nan)
+            if len(effort):
                 self.rejected['joint_states', 'effort and name differ in length'] += 1
-        if np.isnan(np.asarray(message.velocity)[self._columns_of(message.name)[0]]).any():
+        unknown = np.count_nonzero(np.isnan(values))
+        if unknown and unknown > len(values) - len(set(self._columns_of(message.name)[1])):
             self.rejected['joint_states', 'velocity of a wheel is nan (taken as unknown)'] += 1
         directions = self.layout.directions
         return WheelOdometry(stamp_of(message), values * directions, torque * directions)
@@ -155,14 +156,12 @@ class InputConverter:
     def odom(self, message: Any) -> WheelOdometry:
         """Wheel rates of a rover that publishes no joint states, from its wheel odometry."""
         twist = message.twist.twist
-        rim_speed = twist.linear.x - twist.angular.z * self.layout.lateral_positions
+        with np.errstate(all='ignore'):  # absurd values are judged later, number by number
+            rim_speed = twist.linear.x - twist.angular.z * self.layout.lateral_positions
+            rate = rim_speed / self.layout.slip_radius
         if np.isnan(rim_speed).any():
             self.rejected['odom', 'velocity is nan (taken as unknown)'] += 1
-        return WheelOdometry(
-            stamp_of(message),
-            rim_speed / self.layout.slip_radius,
-            np.full_like(rim_speed, math.nan),
-        )
+        return WheelOdometry(stamp_of(message), rate, np.full_like(rim_speed, math.nan))
 
     def imu(self, message: Any) -> InertialReading | None:
         """Specific force, angular rate and attitude, turned into ``base_link``."""
@@ -176,7 +175,8 @@ class InputConverter:
         if message.orientation_covariance[0] != -1.0:  # REP 145: -1 is "no orientation"
             orientation = self._orientation(message.orientation)
         if self._mounted:
-            force, rate = self._rotation @ force, self._rotation @ rate
+            with np.errstate(all='ignore'):
+                force, rate = self._rotation @ force, self._rotation @ rate
         return InertialReading(stamp_of(message), force, rate, orientation)
 
     def sinkage(self, message: Any) -> SinkageReading | None:
@@ -203,13 +203,20 @@ class InputConverter:
         if len(values) != len(names):
             self.rejected[topic, f'{label} and name differ in length'] += 1
             return None
-        source, target = self._columns_of(names)
-        if not source:
+        if not self._columns_of(names)[0]:
             self.rejected[topic, _NO_WHEEL] += 1
             self._strangers[topic] = names
             return None
-        result = np.full(len(self.layout.names), math.nan)
-        result[target] = np.asarray(values, dtype=np.float64)[source]
+        return self._sorted(names, values)
+
+    def _sorted(self, names: Sequence[str], values: Any) -> FloatArray:
+        """Return the values of a message in the order of the wheels, nan where there is none."""
+        source, target = self._columns_of(names)
+        given = np.array(values, dtype=np.float64)
+        if target == self._all and len(given) == len(target):
+            return given
+        result = np.full(len(self._all), math.nan)
+        result[target] = given[source]
         return result
 
     def _columns_of(self, names: Sequence[str]) -> tuple[list[int], list[int]]:
@@ -317,36 +324,3 @@ def twist_covariance(estimates: EstimateSet) -> list[float]:
     covariance = [0.0] * 36
     covariance[::7] = diagonal
     return covariance
-
-
-def finite(estimates: EstimateSet) -> EstimateSet:
-    """Return the set with 0 in place of any value that is not finite, and say so in its faults.
-
-    The core keeps its own promise of finite outputs; this is the last bar before a message.
-    """
-    bad = [
-        name
-        for name, value in _numbers(estimates).items()
-        if not (math.isfinite(value) if isinstance(value, float) else np.isfinite(value).all())
-    ]
-    if not bad:
-        return estimates
-    cleaned: dict[str, Any] = {
-        name: np.nan_to_num(getattr(estimates, name), nan=0.0, posinf=0.0, neginf=0.0)
-        for name in bad
-    }
-    for name in bad:
-        if isinstance(getattr(estimates, name), float):
-            cleaned[name] = float(cleaned[name])
-    faults = {**estimates.faults, 'outputs': f'not finite, sent as 0: {", ".join(bad)}'}
-    return replace(estimates, faults=faults, **cleaned)
-
-
-def _numbers(estimates: EstimateSet) -> dict[str, float | FloatArray]:
-    """Return the numeric fields of a set by name."""
-    return {name: getattr(estimates, name) for name in _NUMERIC_FIELDS}
-
-
-_NUMERIC_FIELDS = tuple(
-    field.name for field in fields(EstimateSet) if field.type in ('FloatArray', 'float')
-)

@@ -27,7 +27,7 @@ LEVEL_HOLD = 1_000_000_000
 SMALLEST = 1e-12
 """Smaller numbers are written as 0: no unit of this package makes them anything else."""
 
-_NEEDED = frozenset({'wheel_odometry', 'imu', 'outputs'})  # that no rover does without
+_NEEDED = frozenset({'wheel_odometry', 'imu'})  # that no rover does without
 
 _CLASS_WORDS = {
     SlipClass.LOW: (OK, 'low slip'),

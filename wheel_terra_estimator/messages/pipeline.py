@@ -15,7 +15,7 @@ from wheel_terra_estimator.checks.watched_estimator import WatchedEstimator
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.core import EstimatorCore
 from wheel_terra_estimator.estimation.estimates import EstimateSet
-from wheel_terra_estimator.messages.convert import InputConverter, finite, input_layout
+from wheel_terra_estimator.messages.convert import InputConverter, input_layout
 from wheel_terra_estimator.messages.diagnostics import NODE, Diagnostics
 
 FAULT_MEMORY = 5_000_000_000
@@ -105,7 +105,6 @@ class Pipeline:
         return result
 
     def _out(self, sets: list[EstimateSet]) -> list[EstimateSet]:
-        sets = [finite(estimates) for estimates in sets]
         self._published += len(sets)
         return sets
 

@@ -12,7 +12,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import MISSING, dataclass, fields
+from dataclasses import MISSING, fields
+from math import isnan
 from typing import NamedTuple, cast
 
 from wheel_terra_estimator.configuration.configuration import Configuration
@@ -65,8 +66,16 @@ class WheelForces(NamedTuple):
     """By v/(r w), sinkage, ln shear strength, ln K, centroid, mound."""
 
 
-@dataclass(frozen=True)
-class Bearing:
+class _Soil(NamedTuple):
+    """Soil under one wheel, what is learned of it included."""
+
+    bearing_modulus: float
+    cohesion: float  # [Pa]
+    tan_friction: float
+    shear_modulus: float  # [m]
+
+
+class Bearing(NamedTuple):
     """What the bearing law says at a sinkage."""
 
     load: float  # that it carries [N]
@@ -187,9 +196,31 @@ class WheelModels:
         state : WheelState
             Its state; centroid, mound and rim speed have no part in it.
         """
-        ratio, sinkage, load = state.speed_ratio, state.sinkage, state.load
-        c, m = self._contacts[wheel], ScalarMaths
+        soil = self._soil_under(wheel, state)
+        return self._bearing_at(wheel, state, state.speed_ratio, soil)
+
+    def bearing_and_slower(
+        self, wheel: int, state: WheelState, step: float
+    ) -> tuple[Bearing, Bearing]:
+        """Return `bearing` at a state, and where v/(r w) is less by a step."""
+        soil = self._soil_under(wheel, state)
+        return (
+            self._bearing_at(wheel, state, state.speed_ratio, soil),
+            self._bearing_at(wheel, state, state.speed_ratio - step, soil),
+        )
+
+    def _soil_under(self, wheel: int, state: WheelState) -> _Soil:
         factor = math.exp(state.strength)
+        return _Soil(
+            self._modulus[wheel] * math.exp(state.stiffness),
+            self._cohesion * factor,
+            self._tan_friction * factor,
+            self._shear_modulus * math.exp(state.shear_modulus),
+        )
+
+    def _bearing_at(self, wheel: int, state: WheelState, ratio: float, soil: _Soil) -> Bearing:
+        sinkage, load, leaving = state.sinkage, state.load, state.leaving_angle
+        c, m = self._contacts[wheel], ScalarMaths
         slip = slip_of_speed_ratio(ratio, m)
         c.slip, c.velocity_ratio = (
             slip,
@@ -198,10 +229,8 @@ class WheelModels:
         c.normal_load = c.stated_load = load
         c.rim_speed = math.nan
         c.radius = c.shear_radius = c.rim_radius
-        c.bearing_modulus = self._modulus[wheel] * math.exp(state.stiffness)
         c.sinkage_exponent = self._exponent + state.slip_sinkage * abs(slip)
-        c.cohesion, c.tan_friction = self._cohesion * factor, self._tan_friction * factor
-        c.shear_modulus = self._shear_modulus * math.exp(state.shear_modulus)
+        c.bearing_modulus, c.cohesion, c.tan_friction, c.shear_modulus = soil
         c.peak_ratio, c.leaving_ratio = self._peak_ratio, self._leaving_ratio
         stages = self._terms.stages
         for term, values in stages['on_inputs']:
@@ -211,7 +240,7 @@ class WheelModels:
             term(c, values, m)
         depth = min(max(sinkage - c.sinkage, 0.0), _MOST_SINKAGE * c.radius)
         entrance = max(math.acos(1.0 - depth / c.radius), 10.0 * SMALLEST_ANGLE)
-        set_angles(c, entrance, state.leaving_angle, self._terms, m)
+        set_angles(c, entrance, None if isnan(leaving) else leaving, self._terms, m)
         a, b, _ = coefficients(c.entrance_angle, c.peak_angle, c.leaving_angle, m)
         sigma, tau = peak_stresses(c, self._terms, m)
         peak_depth = c.radius * (math.cos(c.peak_angle) - math.cos(c.entrance_angle))

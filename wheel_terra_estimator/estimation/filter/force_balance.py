@@ -111,7 +111,8 @@ class ForceBalance(ForceRows):
             # Specific force along the ground: f_x - f_z * tilt (body pitched up by the ruts).
             jacobian[self._layout.sinkage.start + i] += total.weight * gain
         residual = total.along - (pull_sum + total.weight * tilt)
-        return self.row(ekf, Row(residual, jacobian, repeats * total.variance + open_variance))
+        prior = float(jacobian @ ekf.covariance @ jacobian)
+        return self.row(Row(residual, jacobian, repeats * total.variance + open_variance), prior)
 
 
 def rut_tilt(rover: Rover, layout: StateLayout, ekf: GatedFilter) -> float:

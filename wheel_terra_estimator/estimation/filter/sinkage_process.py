@@ -194,8 +194,7 @@ class SinkageProcess(Component[SinkageState]):
         )
         travel = (abs(speed) + tuning.spin_relaxation * abs(rim - speed)) * dt
         alpha = gain_of(travel, length)
-        bearing = self._models.bearing(i, wheel)
-        slower = self._models.bearing(i, wheel._replace(speed_ratio=ratio - tuning.ratio_step))
+        bearing, slower = self._models.bearing_and_slower(i, wheel, tuning.ratio_step)
         # One Newton step on log load over log sinkage, bounded: relaxation does the rest.
         power = bearing.exponent + tuning.pressure_power
         growth = clipped(

@@ -6,6 +6,8 @@ from __future__ import annotations
 
 from math import isnan
 
+import numpy as np
+
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.contacts.linearisation import ContactForces
@@ -27,10 +29,10 @@ class ForceRows(Component['float | None']):
         super().__init__(None)
         self._gate = float(configuration.filter.gate)
 
-    def row(self, ekf: GatedFilter, row: Row) -> Row:
-        """Return a row with the variance that its channel deserves."""
+    def row(self, row: Row, prior: float) -> Row:
+        """Return a row with the variance that its channel deserves; `prior`: that of h(x)."""
         residual, jacobian, variance = row
-        total = float(jacobian @ ekf.covariance @ jacobian) + variance
+        total = prior + variance
         self.state = mean = smoothed_nis(self.state, residual * residual / total)
         gate = chi_square_gate(residual, total, self._gate)
         return Row(residual, jacobian, distrusted(variance, mean) + gate)
@@ -72,12 +74,15 @@ class TorqueUpdate(ForceRows):
             Cycles that are one piece of information.
         """
         rows = []
+        H = forces.torque_rows
+        priors = np.einsum('ij,ij->i', H @ ekf.covariance, H).tolist()
+        models, noises = forces.torque.tolist(), forces.torque_noise.tolist()
         for i, reading in enumerate(torque):
             if isnan(reading) or not turning[i]:
                 continue
-            model = float(forces.torque[i])
+            model = models[i]
             noise = self._variance + (self._load_std * model) ** 2 + _FLOOR_VARIANCE
             variance = repeats * noise + model_variance[i] * model**2
-            variance += float(forces.torque_noise[i]) ** 2
-            rows.append(self.row(ekf, Row(reading - model, forces.torque_rows[i], variance)))
+            variance += noises[i] ** 2
+            rows.append(self.row(Row(reading - model, H[i], variance), priors[i]))
         return rows

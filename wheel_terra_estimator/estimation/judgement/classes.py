@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 from wheel_terra_estimator.estimation.estimates import SlipClass
 
+UNKNOWN = int(SlipClass.UNKNOWN)
 _TIME_ROUNDING = 1e-9  # [s]
 _KNOWN_STD = 0.05  # deviation up to which a slip is well known; tuned, seeds 1000 to 1019
 _BAND_PER_STD, _WIDEST_BAND = 0.25, 0.1  # band added for each deviation beyond, at most
@@ -23,8 +24,8 @@ _LEAST_STD = 1e-6
 class ClassState(NamedTuple):
     """What is remembered of one wheel's class."""
 
-    current: int = int(SlipClass.UNKNOWN)
-    candidate: int = int(SlipClass.UNKNOWN)
+    current: int = UNKNOWN
+    candidate: int = UNKNOWN
     since: float = 0.0  # [s], start of the candidate's run
 
 
@@ -73,7 +74,7 @@ class SlipClassifier:
         """
         current, candidate, since = state
         target = self._target(current, slip, slip_std, sliding_back)
-        if current == SlipClass.UNKNOWN:
+        if current == UNKNOWN:
             return self._first_class(state, time, target)
         if target == current:
             return ClassState(current, target, time)
@@ -96,13 +97,13 @@ class SlipClassifier:
             return ClassState(target, target, time)
         since = state.since if state.candidate == target else time
         proven = time - since >= self._dwell - _TIME_ROUNDING
-        return ClassState(target if proven else int(SlipClass.UNKNOWN), target, since)
+        return ClassState(target if proven else UNKNOWN, target, since)
 
     def _target(self, current: int, slip: float, slip_std: float, sliding_back: bool) -> int:
         top = len(self._borders)
         if sliding_back:
             return top
-        if current == SlipClass.UNKNOWN:
+        if current == UNKNOWN:
             return instantaneous_class(slip, self._borders)
         magnitude = abs(slip)
         # Far from knowing the slip, stay: the band grows with the deviation, up to half a class.

@@ -11,8 +11,11 @@ from typing import NamedTuple
 
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.component import Component
-from wheel_terra_estimator.estimation.estimates import SlipClass
-from wheel_terra_estimator.estimation.judgement.classes import ClassState, SlipClassifier
+from wheel_terra_estimator.estimation.judgement.classes import (
+    UNKNOWN,
+    ClassState,
+    SlipClassifier,
+)
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
 from wheel_terra_estimator.estimation.scalars import NAN
 
@@ -101,7 +104,7 @@ class SlipJudge(Component[tuple[WheelSlip, ...]]):
         slip, std = slip_and_deviation(rim, v, v_std, self._rim_std[i], rest)
         std = math.hypot(std, self._tuning.turning_std * body.lateral_motion)
         slip_class = before.slip_class
-        if std >= 1.0 and slip_class.current == SlipClass.UNKNOWN:
+        if std >= 1.0 and slip_class.current == UNKNOWN:
             slip_class = ClassState()  # nothing is known of it yet
         else:
             # Sliding back is told from standing still only where it is more than noise.
