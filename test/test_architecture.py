@@ -138,7 +138,7 @@ MAY_USE = {
     # The truth of a trial knows nothing of the models that are to find it.
     'trials': ({'configuration', 'discrepancy', 'reporting'}, {'numpy'} | PICTURES),
     'evaluation': (
-        {'configuration', 'terramechanics', 'estimation', 'simulation', 'bags'},
+        {'configuration', 'terramechanics', 'estimation', 'checks', 'simulation', 'bags'},
         {'numpy'} | PICTURES,
     ),
     # Discrete elements know nothing of the models that they are to judge.

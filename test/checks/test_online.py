@@ -9,12 +9,14 @@ import pytest
 from estimate_sets import some_estimates
 
 from wheel_terra_estimator.checks.online import CAP, OnlineChecks, Rule, Tally
-from wheel_terra_estimator.checks.watched_estimator import WatchedEstimator
+from wheel_terra_estimator.checks.watched_estimator import LONGEST_WAIT, WatchedEstimator
+from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.estimation.core import EstimatorCore
 from wheel_terra_estimator.estimation.estimates import SlipClass
 from wheel_terra_estimator.estimation.measurements import (
     InertialReading,
     ReferenceVelocity,
+    SinkageReading,
     StepInputs,
     WheelOdometry,
 )
@@ -103,6 +105,7 @@ FAULTS = {
     'gyro_degrees': (on_imu(1.0, 180.0 / np.pi), 'unit', 'imu/data', '0.0174533', STRAIGHT),
     'torques': (on_wheels(1.0, -1.0), 'sign', 'joint_states', 'negate effort', REST),
     'one_torque': (on_wheels(1.0, FIRST_BACKWARDS), 'sign', 'joint_states', 'negate effort', REST),
+    'torque_in_n_mm': (on_wheels(1.0, 1000.0), 'unit', 'joint_states', 'sensors.torque_gain', REST),
     'reference': (reverse_reference, 'sign', 'reference_odom', 'negate twist.linear.x', REST),
 }
 LONGEST = 11.0
@@ -171,6 +174,101 @@ def test_a_drive_without_fault_is_silent(drives, rover):
     sets = sets_of(drives[rover], lambda m: m)
     assert not any(told(s) for s in sets)
     assert all(s.stuck for s in sets), 'what the estimator says passes'
+
+
+class Wheels:
+    """Rates and sinkage at 20 Hz of a rover of six wheels, second by second."""
+
+    def __init__(self, rover='generic_six_wheel', **changes):
+        self.configuration = reader.load([rover]).replace(changes)
+        self.count = self.configuration.wheels.count
+        self.random = np.random.default_rng(3)
+
+    def inputs(self, k, depth=0.01, frozen=False):
+        rate = 0.5 + 0.01 * self.random.standard_normal(self.count)
+        if frozen:
+            rate[2] = 0.5
+        stamp = 1_000_000_000 + k * 50_000_000
+        return stamp, StepInputs(
+            wheel_odometry=WheelOdometry(stamp, rate, np.full(self.count, np.nan)),
+            sinkage=SinkageReading(stamp, depth + 0.001 * self.random.standard_normal(self.count)),
+        )
+
+    def checks_after(self, seconds, **what):
+        checks = OnlineChecks(self.configuration)
+        for k in range(20 * seconds):
+            checks.step(*self.inputs(k, **what))
+        return checks
+
+
+def test_sinkage_counted_upwards_is_told_and_a_small_one_is_not():
+    wheels = Wheels()
+    assert not wheels.checks_after(10, depth=0.02).findings
+    assert not wheels.checks_after(10, depth=-0.002).findings, 'within the zero error'
+    (finding,) = wheels.checks_after(10, depth=-0.02).findings
+    assert (finding.kind, finding.topic) == ('sign', 'sinkage')
+    assert '20 mm above' in finding.words and 'negate position' in finding.cure
+
+
+def test_sinkage_in_millimetres_and_a_variance_of_a_million_are_told_with_their_cure(drives):
+    def fault(m):
+        if isinstance(m, SinkageReading):
+            return replace(m, sinkage=1000.0 * (0.01 + m.sinkage))
+        return replace(m, variance=1e6) if isinstance(m, ReferenceVelocity) else m
+
+    faults = sets_of(drives[SIX], fault, seconds=8.0)[-1].faults
+    assert 'multiply position by 0.001' in faults['sinkage']
+    assert 'sensors.reference_std' in faults['reference_odom']
+
+
+def test_a_frozen_rate_is_told_and_noisy_ones_are_not():
+    wheels = Wheels()
+    assert not wheels.checks_after(10).findings
+    (finding,) = wheels.checks_after(10, frozen=True).findings
+    assert (finding.kind, finding.wheel) == ('frozen', wheels.configuration.wheels.names[2])
+
+
+class StuckAfter:
+    """An estimator whose warning stands from a stamp on, or between two."""
+
+    def __init__(self, begin, end=np.inf):
+        self.begin, self.end, self.stamp, self.stuck = begin, end, 0, False
+
+    def step(self, stamp, inputs):
+        self.stamp, self.stuck = stamp, self.begin <= stamp < self.end
+
+    def estimates(self):
+        return some_estimates(6, stamp=self.stamp, stuck=self.stuck)
+
+
+def raised(wheels, estimator, seconds=20, flip_from=None):
+    """Return when the published warning stood [s since the first stamp]."""
+    watched, found = WatchedEstimator(wheels.configuration, estimator), []
+    for k in range(20 * seconds):
+        depth = -0.02 if flip_from is not None and k >= 20 * flip_from else 0.02
+        stamp, inputs = wheels.inputs(k, depth=depth)
+        watched.step(stamp, inputs)
+        if watched.estimates().stuck:
+            found.append((stamp - 1_000_000_000) * 1e-9)
+    return found
+
+
+def at(seconds):
+    return 1_000_000_000 + round(seconds * 1e9)
+
+
+def test_a_warning_waits_while_its_inputs_are_on_trial_and_no_longer():
+    wheels = Wheels()
+    first_seconds = raised(wheels, StuckAfter(at(1.0)))
+    assert 1.0 < first_seconds[0] <= 1.0 + LONGEST_WAIT * 1e-9
+    assert first_seconds[-1] > 19.0, 'what waited comes and stays'
+    assert raised(wheels, StuckAfter(at(10.0)))[0] == pytest.approx(10.0), 'no wait later'
+    assert not raised(wheels, StuckAfter(at(1.0), at(3.0))), 'fell while it waited'
+
+
+def test_a_warning_waits_for_the_verdict_on_a_suspicion_and_never_comes_if_it_is_one():
+    # Three windows spoke for the sign before it flipped at 3 s: after 7 s more speak against it.
+    assert not raised(Wheels(), StuckAfter(at(7.0)), flip_from=3.0)
 
 
 def test_kinds_are_those_of_the_checks_of_a_recording(drives):

@@ -178,9 +178,10 @@ def _replayed(path: Path, configuration: Configuration, remaps: Mapping[str, str
 
 def _estimated(measurements: Iterable[Measurement], configuration: Configuration) -> Any:
     from wheel_terra_estimator.bags.history import HistoryRecorder
+    from wheel_terra_estimator.checks.watched_estimator import WatchedEstimator
     from wheel_terra_estimator.estimation.core import EstimatorCore
 
-    core = EstimatorCore(configuration)
+    core = EstimatorCore(configuration, watched_by=WatchedEstimator)
     recorder = HistoryRecorder(configuration.wheels.names)
     for measurement in measurements:
         for estimates in core.add(measurement):

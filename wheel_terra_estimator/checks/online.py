@@ -20,6 +20,7 @@ from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.measurements import (
     InertialReading,
     ReferenceVelocity,
+    SinkageReading,
     StepInputs,
     WheelOdometry,
 )
@@ -73,6 +74,18 @@ LEVEL = -0.01
 """Specific force along the drive over gravity above which wheels must drive."""
 LEAST_TRACTION = 0.02
 """Sum of T/r over the weight that tells its sign."""
+ORDINARY_TRACTION = 1.5
+"""The same, that wheels may give on any ground."""
+ABSURD_TRACTION = 3.0
+"""The same, that no ground carries: another unit, or a current."""
+ABOVE_GROUND = 0.003
+"""Mean sinkage [m] by which the readings of all wheels may lie above the surface."""
+BUSY = 5
+"""Changes of the other wheels' rates in a window beside which an unchanged one is frozen."""
+SAME = 1e-9
+"""Relative difference of two rates that are one reading, averaged differently."""
+TRIAL = 5
+"""Windows of motion in which wrong signs and units would show on a straight."""
 
 
 class Tally(NamedTuple):
@@ -107,6 +120,9 @@ RULES = {
     'absurd_rate': Rule(2, 2),
     'torque': Rule(5, 20),
     'torque_of_wheel': Rule(8, 20),
+    'torque_unit': Rule(4, 20),
+    'sinkage': Rule(5, 20),
+    'frozen': Rule(4, 2),
 }
 
 Suspicion = tuple[str, int]
@@ -119,6 +135,8 @@ class _Sums:
 
     rims: list[float]  # [m/s]
     torques: list[float]  # [N m]
+    changes: list[int]  # how often a wheel's rate was another than before
+    last: Floats  # rim speeds of the last wheel odometry [m/s], in whichever window
     begin: int | None = None  # [ns]
     odometry: int = 0
     slowest: float = math.inf  # typical size of the rim speeds
@@ -131,10 +149,14 @@ class _Sums:
     reference: float = 0.0
     reference_variance: float = 0.0
     references: int = 0
+    depth: float = 0.0  # mean sinkage of the wheels [m]
+    depths: int = 0
 
     def copy(self) -> _Sums:
         """Return sums that later steps leave alone."""
-        return replace(self, rims=list(self.rims), torques=list(self.torques))
+        return replace(
+            self, rims=list(self.rims), torques=list(self.torques), changes=list(self.changes)
+        )
 
 
 class _Verdicts(NamedTuple):
@@ -143,6 +165,7 @@ class _Verdicts(NamedTuple):
     tallies: dict[Suspicion, Tally]
     figures: dict[Suspicion, float]  # what the last agreeing window showed
     findings: tuple[Finding, ...]
+    in_motion: int = 0  # windows in which wheels turned
 
 
 @dataclass(frozen=True)
@@ -155,6 +178,9 @@ class _Window:
     force: tuple[float, float, float] | None
     yaw_rate: float  # [rad/s], nan: unknown
     reference: float  # [m/s], nan: none or lost in its noise
+    moving: bool
+    changes: tuple[int, ...]
+    depth: float  # [m], nan: none
 
     @property
     def typical(self) -> float:
@@ -200,6 +226,10 @@ class OnlineChecks:
         self._gravity = float(rover.gravity)
         self._weight = float(rover.mass) * self._gravity
         self._reference_std = float(configuration.sensors.reference_std)
+        sensors = configuration.sensors
+        self._above_ground = max(
+            ABOVE_GROUND, 2.0 * float(sensors.sinkage_zero_std), float(sensors.sinkage_std)
+        )
         self._sums = self._empty()
         self._verdicts = _Verdicts({}, {}, ())
 
@@ -207,6 +237,16 @@ class OnlineChecks:
     def findings(self) -> tuple[Finding, ...]:
         """What stands now; empty: nothing."""
         return self._verdicts.findings
+
+    @property
+    def undecided(self) -> str:
+        """What may yet turn out to be wrong, in words; empty: nothing that can be told soon."""
+        if self._verdicts.in_motion < TRIAL:
+            return 'the first seconds of motion show whether signs and units are right'
+        for (name, _), tally in self._verdicts.tallies.items():
+            if tally.score > 0 and not tally.stands:
+                return f'a fault of the inputs is not excluded yet ({name.replace("_", " ")})'
+        return ''
 
     def reset(self) -> None:
         """Forget everything."""
@@ -233,29 +273,35 @@ class OnlineChecks:
             self._add_inertial(inputs.inertial)
         if inputs.reference is not None:
             self._add_reference(inputs.reference)
+        if inputs.sinkage is not None:
+            self._add_sinkage(inputs.sinkage)
         if stamp - sums.begin >= WINDOW:
             self._judge(self._window(sums))
-            self._sums = self._empty()
+            self._sums = self._empty(sums.last)
             self._sums.begin = stamp
 
     # -- Windows --------------------------------------------------------------------------------
 
-    def _empty(self) -> _Sums:
-        zeros = [0.0] * len(self._radius)
-        return _Sums(zeros, list(zeros))
+    def _empty(self, last: Floats = ()) -> _Sums:
+        count = len(self._radius)
+        return _Sums([0.0] * count, [0.0] * count, [0] * count, last or (math.nan,) * count)
 
     def _add_odometry(self, odometry: WheelOdometry) -> None:
         sums, rims, torques = self._sums, self._sums.rims, self._sums.torques
-        sizes = []
+        changes, last = sums.changes, sums.last
+        sizes, heard = [], []
         for i, (rate, torque) in enumerate(
             zip(odometry.rate.tolist(), odometry.torque.tolist(), strict=True)
         ):
             rim = rate * self._radius[i]
+            heard.append(rim)
+            changes[i] += not abs(rim - last[i]) <= SAME * abs(rim)
             if rim == rim:
                 sizes.append(abs(rim))
             rims[i] += rim  # nan stays: the wheel is not known in this window
             torques[i] += torque
         sums.odometry += 1
+        sums.last = tuple(heard)
         if not sizes:
             return
         sizes.sort()
@@ -279,6 +325,12 @@ class OnlineChecks:
         sums.reference_variance += variance
         sums.references += 1
 
+    def _add_sinkage(self, reading: SinkageReading) -> None:
+        known = [z for z in reading.sinkage.tolist() if z == z]
+        if known:
+            self._sums.depth += sum(known) / len(known)
+            self._sums.depths += 1
+
     def _window(self, sums: _Sums) -> _Window:
         count = max(sums.odometry, 1)
         reference = math.nan
@@ -300,6 +352,9 @@ class OnlineChecks:
             else None,
             yaw_rate=sums.yaw_rate / inertial if inertial else math.nan,
             reference=reference,
+            moving=sums.fastest > LEAST_RIM_SPEED,
+            changes=tuple(sums.changes),
+            depth=sums.depth / sums.depths if sums.depths else math.nan,
         )
 
     # -- Judgement ------------------------------------------------------------------------------
@@ -312,13 +367,19 @@ class OnlineChecks:
             if agrees:
                 figures[key] = figure
         changed = tallies != self._verdicts.tallies
-        self._verdicts = self._verdicts._replace(tallies=tallies, figures=figures)
+        self._verdicts = self._verdicts._replace(
+            tallies=tallies, figures=figures, in_motion=self._verdicts.in_motion + window.moving
+        )
         if changed:
             self._verdicts = self._verdicts._replace(findings=tuple(self._findings()))
 
     def _evidence(self, window: _Window) -> Iterator[Evidence]:
         if window.force is not None:
             yield from self._of_gravity(window.force)
+        if window.moving:
+            yield from self._of_frozen_rates(window)
+            if abs(window.depth) > self._above_ground:
+                yield 'sinkage', -1, window.depth < 0.0, window.depth
         if not window.steady:
             return
         yield 'absurd_rate', -1, window.size > GREATEST_RIM_SPEED, window.size
@@ -389,6 +450,13 @@ class OnlineChecks:
             if abs(ratio) > 0.3:
                 yield 'backwards', i, i in backwards, ratio
 
+    def _of_frozen_rates(self, window: _Window) -> Iterator[Evidence]:
+        """A rate that stays the very same number while the others change."""
+        for i, (rim, changes) in enumerate(zip(window.rims, window.changes, strict=True)):
+            others = [n for j, n in enumerate(window.changes) if j != i]
+            if rim == rim and rim != 0.0 and len(others) > 1 and median(others) >= BUSY:
+                yield 'frozen', i, changes == 0, rim
+
     def _of_the_reference(self, window: _Window) -> Iterator[Evidence]:
         typical, reference = window.typical, window.reference
         if reference != reference or abs(typical) < LEAST_RIM_SPEED:
@@ -405,9 +473,17 @@ class OnlineChecks:
     def _of_torque(self, window: _Window) -> Iterator[Evidence]:
         """On the level or uphill driven wheels take torque; a flipped one mirrors the others."""
         force, torques, typical = window.force, window.torques, window.typical
-        if force is None or any(t != t for t in torques) or abs(typical) < LEAST_RIM_SPEED:
+        if any(t != t for t in torques) or abs(typical) < LEAST_RIM_SPEED:
             return
         sense = math.copysign(1.0, typical)
+        size = sum(abs(t) / r for t, r in zip(torques, self._radius, strict=True)) / self._weight
+        if size > ABSURD_TRACTION:
+            yield 'torque_unit', -1, True, size
+            return
+        if size < ORDINARY_TRACTION:
+            yield 'torque_unit', -1, False, size
+        if force is None:
+            return
         if force[0] * sense < LEVEL * self._gravity or not self._straight(window):
             return
         thrusts = [sense * t / r for t, r in zip(torques, self._radius, strict=True)]
@@ -591,6 +667,44 @@ class OnlineChecks:
             'together)',
         )
 
+    def _torque_unit_words(self, figure: float, wheel: int, sure: float) -> Finding:
+        return self._finding(
+            'unit',
+            self._odometry_topic,
+            None,
+            'sensors.torque_gain',
+            None,
+            sure,
+            f'sum of T/r is {figure:.3g} times the weight: N mm, a current or a motor torque',
+            'publish the torque at the wheel in N m (N mm times 0.001), or state its scale in '
+            'sensors.torque_gain (wheel-terra calibrate)',
+        )
+
+    def _sinkage_words(self, figure: float, wheel: int, sure: float) -> Finding:
+        return self._finding(
+            'sign',
+            'sinkage',
+            None,
+            'sensors.sinkage_zero',
+            -1.0,
+            sure,
+            f'the wheels seem to run {-1000.0 * figure:.0f} mm above the surface: counted upwards, '
+            'or the zero is off',
+            'negate position in the driver (positive down), or state sensors.sinkage_zero [m]',
+        )
+
+    def _frozen_words(self, figure: float, wheel: int, sure: float) -> Finding:
+        return self._finding(
+            'frozen',
+            self._odometry_topic,
+            wheel,
+            None,
+            None,
+            sure,
+            f'rim speed stays at exactly {figure:.4g} m/s while the other wheels change',
+            f'mend the encoder or driver of {self._names[wheel]}; until then leave it out of name',
+        )
+
     def _standing(self) -> dict[Suspicion, int]:
         return {key: tally.score for key, tally in self._verdicts.tallies.items() if tally.stands}
 
@@ -622,6 +736,9 @@ _WORDS: dict[str, Callable[[OnlineChecks, float, int, float], Finding]] = {
     'absurd_rate': OnlineChecks._absurd_words,
     'torque': OnlineChecks._torque_words,
     'torque_of_wheel': OnlineChecks._torque_words,
+    'torque_unit': OnlineChecks._torque_unit_words,
+    'sinkage': OnlineChecks._sinkage_words,
+    'frozen': OnlineChecks._frozen_words,
 }
 
 _CONSEQUENCES = {
@@ -632,6 +749,7 @@ _CONSEQUENCES = {
     'backwards': {'torque', 'torque_of_wheel', 'sides', 'one_side_backwards'},
     'one_side_backwards': {'torque', 'torque_of_wheel', 'sides', 'reference_sign'},
     'torque': {'torque_of_wheel'},
+    'torque_unit': {'torque', 'torque_of_wheel'},
 }
 """Fault -> what it makes other windows say."""
 

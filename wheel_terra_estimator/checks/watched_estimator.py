@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -22,6 +22,15 @@ from wheel_terra_estimator.estimation.timing.input_log import Estimator
 
 SUBJECT = 'check of '
 """Begins the subject of a finding among the faults of a set."""
+LONGEST_WAIT = 4_000_000_000
+"""A stuck warning waits no longer [ns of stamps] for the verdict on its inputs."""
+
+
+class _Warning(NamedTuple):
+    """The estimator's stuck warning: when it rose [ns], None = there is none; whether it waits."""
+
+    since: int | None = None
+    waits: bool = False
 
 
 class WatchedEstimator:
@@ -38,31 +47,49 @@ class WatchedEstimator:
     def __init__(self, configuration: Configuration, estimator: Estimator) -> None:
         self._estimator = estimator
         self._checks = OnlineChecks(configuration)
+        self._warning = _Warning()
 
     def step(self, stamp: int, inputs: StepInputs) -> None:
         """Bring both to `stamp` [ns], later than the one before."""
         self._checks.step(stamp, inputs)
         self._estimator.step(stamp, inputs)
+        self._warning = self._followed(stamp)
+
+    def _followed(self, stamp: int) -> _Warning:
+        """Return the warning after a step; one that has waited once is out until it falls."""
+        if not getattr(self._estimator, 'stuck', False):
+            return _Warning()
+        since, waited = self._warning
+        rises = since is None
+        begun = stamp if since is None else since
+        undecided = bool(self._checks.undecided) and stamp - begun < LONGEST_WAIT
+        return _Warning(begun, (rises or waited) and undecided)
 
     def estimates(self) -> EstimateSet:
         """Return the estimates; slip is not judged while a finding stands."""
         estimates = self._estimator.estimates()
         findings = self._checks.findings
-        return without_judgement(estimates, findings) if findings else estimates
+        if findings:
+            return without_judgement(estimates, findings)
+        if self._warning.waits:
+            reason = f'stuck warning waits: {self._checks.undecided}'
+            return replace(estimates, stuck=False, reasons=(reason,) * len(estimates.reasons))
+        return estimates
 
     def snapshot(self) -> Any:
-        """Return both states."""
-        return self._estimator.snapshot(), self._checks.snapshot()
+        """Return all states."""
+        return self._estimator.snapshot(), self._checks.snapshot(), self._warning
 
     def restore(self, snapshot: Any) -> None:
         """Return to a kept state."""
-        estimator, checks = snapshot
+        estimator, checks, self._warning = snapshot
         self._estimator.restore(estimator)
         self._checks.restore(checks)
 
     def begin_run(self, stamp: int, keep_soil: bool) -> None:
         """Start anew."""
         self._checks.reset()
+        self._warning = _Warning()
         self._estimator.begin_run(stamp, keep_soil)
 
     def health(self) -> dict[str, Any]:

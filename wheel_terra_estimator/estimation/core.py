@@ -27,7 +27,7 @@ from wheel_terra_estimator.estimation.timing.clock_watch import (
     Judgement,
     Suspicion,
 )
-from wheel_terra_estimator.estimation.timing.input_checks import CHANNELS, InputChecks
+from wheel_terra_estimator.estimation.timing.input_checks import CHANNELS, CURES, InputChecks
 from wheel_terra_estimator.estimation.timing.input_log import Estimator
 from wheel_terra_estimator.estimation.timing.lag import LagLearner
 from wheel_terra_estimator.estimation.timing.timeline import Fate, Timeline, TimeSettings
@@ -221,7 +221,8 @@ ReferenceVelocity
         for channel, reason in enumerate(checks.latest):
             if reason:
                 count = checks.rejected[channel][reason]
-                self._told[channel] = f'{reason} ({count} so far)', stamp
+                cure = f' -> {CURES[reason]}' if reason in CURES else ''
+                self._told[channel] = f'{reason} ({count} so far){cure}', stamp
                 checks.latest[channel] = ''
             told = self._told[channel]
             if told is not None and abs(stamp - told[1]) < FAULT_MEMORY:

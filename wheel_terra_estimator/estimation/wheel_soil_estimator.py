@@ -623,6 +623,11 @@ class WheelSoilEstimator:
         )
         return self._outputs.estimate_set(given, missing)
 
+    @property
+    def stuck(self) -> bool:
+        """Whether the stuck warning stands at the present stamp."""
+        return self._clock.assessment.stuck
+
     def learned(self) -> dict[str, Any]:
         """Return what was learned: configuration key -> value, deviations ``_std`` too."""
         ekf = self._ekf

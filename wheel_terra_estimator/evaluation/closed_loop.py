@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from wheel_terra_estimator.checks.watched_estimator import WatchedEstimator
 from wheel_terra_estimator.estimation.core import EstimatorCore
 from wheel_terra_estimator.estimation.traction_law import (
     TractionDecision,
@@ -50,7 +51,7 @@ def closed_loop(
     still below its wheels.
     """
     drive = Drive(scenario, seed)
-    core = EstimatorCore(drive.configuration)
+    core = EstimatorCore(drive.configuration, watched_by=WatchedEstimator)
     limits = limits or TractionLimits()
     decision = TractionDecision(1.0, False, 'command passes')
     pending: list[Arrival] = []

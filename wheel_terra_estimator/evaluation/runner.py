@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from wheel_terra_estimator.checks.watched_estimator import WatchedEstimator
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.estimates import EstimateSet
 from wheel_terra_estimator.estimation.measurements import (
@@ -84,10 +85,13 @@ def inputs_of_mode(arrivals: Iterable[TimedMeasurement], mode: str) -> Iterator[
 def run_estimator(
     configuration: Configuration, measurements: Iterable[Measurement]
 ) -> tuple[list[EstimateSet], dict[str, Any]]:
-    """Run the core over measurements in the order of arrival; return its sets and its health."""
+    """Run what node and replay run over measurements in the order of arrival.
+
+    Returns its sets and its health.
+    """
     from wheel_terra_estimator.estimation.core import EstimatorCore
 
-    core = EstimatorCore(configuration)
+    core = EstimatorCore(configuration, watched_by=WatchedEstimator)
     sets: list[EstimateSet] = []
     for measurement in measurements:
         sets += core.add(measurement)

@@ -44,6 +44,14 @@ CHANNELS: dict[type, int] = {
 
 WHEEL_ODOMETRY, INERTIAL, SINKAGE, LEAVING_ANGLE, REFERENCE = range(5)
 
+_TOO_DEEP = 'sinkage infinite or larger than the wheel radius'
+_VOID = 'variance says that nothing is known'
+CURES = {
+    _TOO_DEEP: 'millimetres? multiply position by 0.001 in the driver (m)',
+    _VOID: 'a placeholder? send the variance, or 0 and state sensors.reference_std',
+}
+"""Reason for leaving something out -> what mends it."""
+
 
 class InputChecks:
     """Judges measurements of one rover.
@@ -155,7 +163,7 @@ class InputChecks:
         if not deep and not high:
             return m
         if deep:
-            self.reject(SINKAGE, 'sinkage infinite or larger than the wheel radius')
+            self.reject(SINKAGE, _TOO_DEEP)
         if high:
             self.reject(SINKAGE, 'sinkage far above the surface')
         return SinkageReading(m.stamp, _without(m.sinkage, deep + high))
@@ -175,7 +183,7 @@ class InputChecks:
             self.refuse(REFERENCE, 'velocity not finite or absurd')
             return None
         if m.variance > GREATEST_VARIANCE:
-            self.refuse(REFERENCE, 'variance says that nothing is known')
+            self.refuse(REFERENCE, _VOID)
             return None
         if not m.variance >= 0.0:
             self.reject(REFERENCE, 'variance negative or nan (taken as not stated)')
