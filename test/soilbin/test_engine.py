@@ -189,6 +189,7 @@ def test_output_folder_is_complete(coarse_run):
     names = {path.name for path in output.iterdir()}
     assert names == {
         'summary.json', 'time_series.csv', 'time_series.png', 'rows.csv', 'bed.png', 'film.gif',
+        'report.html',
         '.wheel-terra.json',
     }  # fmt: skip
     assert (output / 'film.gif').read_bytes()[:3] == b'GIF'

@@ -7,8 +7,10 @@ import csv
 import hashlib
 import json
 import math
+import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from wheel_terra_estimator.cli.main import main
@@ -322,3 +324,26 @@ def test_ranks_wait_for_the_slopes_of_every_wheel(tmp_path):
     short = [row for row in rows if (row['wheel'], row['slope_deg']) != ('4', '5.0')]
     assert len(short) == len(rows) - 1
     assert 'Smallest sum' not in '\n'.join(reproduction.table6_lines(short))
+
+
+def test_pictures_of_a_run_share_the_clock_of_the_stated_tip_speed(tmp_path):
+    from wheel_terra_estimator.soilbin import pictures, report
+    from wheel_terra_estimator.soilbin.bookkeeping import SERIES
+
+    case = Case().replace(operation__speed_factor=8.0, operation__duration=12.0)
+    series = np.zeros((50, len(SERIES)))
+    series[:, SERIES.index('time')] = np.linspace(0.0, case.travel_time, 50)
+    series[:, SERIES.index('gross_traction')] = 7.0
+    series[:, SERIES.index('motion_resistance')] = 3.0
+    series[:, SERIES.index('height')] = np.linspace(0.2, 0.19, 50)
+    report.write_report(tmp_path, series, case, {'slip': '21 %'})
+    page = (tmp_path / 'report.html').read_text(encoding='utf-8')
+    data = json.loads(re.search(r'id="figure-data"[^>]*>(.*?)</script>', page, re.S)[1])
+    lines = {trace['name']: trace for trace in data['traces']}
+    assert lines['net traction H - R_r']['y'] == [4.0] * 50
+    sunk = lines['sinkage since the wheel began to turn']
+    assert sunk['y'][-1] == pytest.approx(10.0)  # [mm]
+    assert sunk['x'][-1] == pytest.approx(12.0)  # 1.5 s of simulation, eight times as fast
+    assert 'simulated in 0.125 s' in page
+    pictures.draw_series(series, case, tmp_path / 'series.png')
+    assert (tmp_path / 'series.png').stat().st_size > 10_000

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wheel_terra_estimator.reporting.style import thin
+from wheel_terra_estimator.reporting.style import DARK, LINE_COLOURS, thin
 
 FloatArray = NDArray[np.float64]
 
@@ -196,11 +196,12 @@ class TimeFigure:
         )
 
     def as_json(self) -> str:
-        """Return traces, layout and switches for the page's script."""
+        """Return traces, layout, switches and colours on dark pages for the page's script."""
         content = {
             'traces': self._traces,
             'layout': self._layout(),
             'switches': [vars(switch) for switch in self._switches],
+            'dark': {colour: DARK[colour] for colour in LINE_COLOURS if colour in DARK},
         }
         # Text that cannot end the script element in which it stands.
         text = json.dumps(content, separators=(',', ':'), allow_nan=False)

@@ -13,10 +13,10 @@ from pathlib import Path
 
 import numpy as np
 
+from wheel_terra_estimator.soilbin import report
 from wheel_terra_estimator.soilbin.bookkeeping import SERIES
 from wheel_terra_estimator.soilbin.case import Case, to_dict
 
-# INTERFACE: tables of steady measurements.
 ROW_COLUMNS = (
     'slip',
     'normal_load',
@@ -42,6 +42,7 @@ FILES = (
     'bed.png',
     'time_series.png',
     'film.gif',
+    'report.html',
     WORK,
 )
 """What a run may leave in its folder."""
@@ -103,6 +104,7 @@ def write_folder(
         pictures.draw_series(series, case, folder / 'time_series.png')
         if film:
             pictures.film(frames, case, summary, folder / 'film.gif')
+    report.write_report(folder, series, case, figures_of(summary))
     part = folder / 'summary.part'
     finite = {
         key: None if isinstance(value, float) and not math.isfinite(value) else value
@@ -121,22 +123,29 @@ def clean(work: Path) -> None:
     shutil.rmtree(work, ignore_errors=True)
 
 
-def as_text(summary: Mapping[str, object]) -> str:
-    """Return the main figures in a few lines."""
+def figures_of(summary: Mapping[str, object]) -> dict[str, str]:
+    """Return the main figures of a run: words -> value with unit."""
 
     def number(name: str) -> float:
         return float(str(summary[name]))
 
-    lines = [
-        f'slip {100 * number("slip"):.1f} % (second half {100 * number("slip_second_half"):.1f} %)',
-        f'H {number("gross_traction"):.2f} N, R_r {number("motion_resistance"):.2f} N, '
-        f'P_d {number("net_traction"):.2f} N (demanded {number("demanded_pull"):.2f} N)',
-        f'torque H r_w {number("torque_gross"):.3f} N m, on the body '
+    return {
+        'slip (second half)': f'{100 * number("slip"):.1f} % '
+        f'({100 * number("slip_second_half"):.1f} %)',
+        'gross traction H': f'{number("gross_traction"):.2f} N',
+        'motion resistance R_r': f'{number("motion_resistance"):.2f} N',
+        'net traction P_d (demanded)': f'{number("net_traction"):.2f} N '
+        f'({number("demanded_pull"):.2f} N)',
+        'torque H r_w; on the body': f'{number("torque_gross"):.3f} N m; '
         f'{number("torque_body"):.3f} N m',
-        f'sinkage {1000 * number("sinkage"):.1f} mm below the undisturbed surface '
+        'sinkage below the undisturbed surface': f'{1000 * number("sinkage"):.1f} mm '
         f'(static {1000 * number("sinkage_static"):.1f} mm, z_a '
         f'{1000 * number("sinkage_average"):.1f} mm)',
-        f'power number {number("power_number"):.3f}, pull coefficient '
-        f'{number("pull_coefficient"):.3f}',
-    ]
-    return '\n'.join(lines)
+        'power number': f'{number("power_number"):.3f}',
+        'pull coefficient': f'{number("pull_coefficient"):.3f}',
+    }
+
+
+def as_text(summary: Mapping[str, object]) -> str:
+    """Return the main figures, one a line."""
+    return '\n'.join(f'{words}: {value}' for words, value in figures_of(summary).items())

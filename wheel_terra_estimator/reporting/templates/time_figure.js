@@ -8,6 +8,8 @@
   const NARROW = 600;                                    // width of a phone [px]
   const on = Object.fromEntries(data.switches.map((entry) => [entry.key, entry.on]));
   const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+  const shade = (light) => (dark.matches && data.dark[light]) || light;
+  const keys = [];
   const isNarrow = () => window.innerWidth < NARROW;
   const panels = Object.keys(data.layout).filter((name) => /^yaxis/.test(name)).length;
 
@@ -15,7 +17,7 @@
     return data.traces.map((trace) => {
       const visible = trace.meta.switches.every((key) => on[key]);
       const copy = { type: 'scatter', ...trace, visible, line: { ...trace.line } };
-      if (trace.meta.ink) copy.line.color = colour('--ink');
+      copy.line.color = trace.meta.ink ? colour('--ink') : shade(copy.line.color);
       return copy;
     });
   }
@@ -59,6 +61,7 @@
   }
 
   function draw() {
+    for (const [key, light] of keys) key.style.background = shade(light);
     const buttons = isNarrow()
       ? [['zoomIn2d', 'zoomOut2d', 'pan2d', 'resetScale2d']]
       : [['zoom2d', 'pan2d', 'zoomIn2d', 'zoomOut2d', 'resetScale2d', 'toImage']];
@@ -78,7 +81,7 @@
     if (entry.colour) {
       const key = document.createElement('span');
       key.className = 'key';
-      key.style.background = entry.colour;
+      keys.push([key, entry.colour]);
       label.append(key);
     }
     label.append(entry.text);
