@@ -124,6 +124,10 @@ class BagFile:
             writer.storage = _ClosedFile(storage.path)
             self._writer.close()  # writes the metadata
 
+    def note(self, key: str, value: str) -> None:
+        """State something about the bag in the `custom_data` of its metadata."""
+        self._writer.set_custom_data(key, value)
+
     def write(self, topic: str, message: Any, log_time: int) -> None:
         """Append a message at a log time [ns]."""
         data = self.messages.store.serialize_cdr(message, self._topics[topic])

@@ -26,11 +26,12 @@ _LONGEST_NUMBER = 19  # digits
 
 @dataclass(frozen=True)
 class Metadata:
-    """Files and messages per topic, and what is wrong with the file in words."""
+    """Files and messages per topic, notes of the writer, what is wrong with the file in words."""
 
     files: tuple[str, ...] = ()
     counts: Mapping[str, int] = field(default_factory=dict)
     fault: str = ''
+    notes: Mapping[str, str] = field(default_factory=dict)
 
 
 def read(folder: Path) -> Metadata:
@@ -48,13 +49,22 @@ def read(folder: Path) -> Metadata:
             name = _mapping(_mapping(entry)['topic_metadata'])['name']
             counts[_text(name)] += _number(_mapping(entry)['message_count'])
         files = _list(_mapping(information)['relative_file_paths'])
-        return Metadata(tuple(PurePath(_text(file)).name for file in files), dict(counts))
+        names = tuple(PurePath(_text(file)).name for file in files)
+        return Metadata(names, dict(counts), notes=_notes(information))
     except KeyError as error:
         return Metadata(fault=f'{NAME} was set aside (it has no {error.args[0]})')
     except UserError as error:
         return Metadata(fault=f'{NAME} was set aside ({str(error).removeprefix(f"{path}: ")})')
     except (bounded_yaml.YAMLError, ValueError, TypeError, RecursionError):
         return Metadata(fault=f'{NAME} was set aside (it cannot be understood)')
+
+
+def _notes(information: Any) -> dict[str, str]:
+    """Return key -> value of the custom data; what is no text is left out."""
+    custom = information.get('custom_data')
+    if not isinstance(custom, Mapping):
+        return {}
+    return {k: v for k, v in custom.items() if isinstance(k, str) and isinstance(v, str)}
 
 
 def _mapping(value: Any) -> Mapping[str, Any]:

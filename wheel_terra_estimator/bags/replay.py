@@ -105,6 +105,7 @@ def replay(
             writer = stack.enter_context(
                 EstimateBagWriter(output, pipeline.names, overwrite, pipeline.diagnostics, inputs)
             )
+            writer.state_origin(configuration, bag.path.resolve().name)
         interrupted = stack.enter_context(_until_interrupted())
         log_time = 0
         for count, (log_time, name, message) in enumerate(messages):

@@ -4,10 +4,16 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
+from wheel_terra_estimator import __version__
+from wheel_terra_estimator.bags import bag_metadata
 from wheel_terra_estimator.bags.bag_file import BagFile
+from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.estimates import EstimateSet
 from wheel_terra_estimator.messages import diagnostics
 from wheel_terra_estimator.messages.convert import (
@@ -24,6 +30,47 @@ TOPICS = {
     DIAGNOSTICS: 'diagnostic_msgs/msg/DiagnosticArray',
 }
 """Full default name of every output and its type."""
+
+
+_VERSION, _SETTINGS, _RECORDING = (
+    f'{diagnostics.NODE}.{key}' for key in ('version', 'settings', 'recording')
+)
+
+
+@dataclass(frozen=True)
+class Origin:
+    """How estimates were made.
+
+    Attributes
+    ----------
+    version : str
+        Version of the package; empty: not stated.
+    settings : dict
+        Configuration key -> value, defaults included.
+    recording : str
+        Name of the recording.
+    """
+
+    version: str = ''
+    settings: dict[str, Any] = field(default_factory=dict)
+    recording: str = ''
+
+
+def read_origin(path: Path) -> Origin:
+    """Return how the estimates of a bag (folder or file in it) were made, as far as it says."""
+    metadata = bag_metadata.read(path if path.is_dir() else path.parent)
+    if not path.is_dir() and path.name not in metadata.files:
+        return Origin()
+    notes = metadata.notes
+    try:
+        settings = json.loads(notes.get(_SETTINGS, '{}'))
+    except (ValueError, RecursionError):
+        settings = {}
+    return Origin(
+        notes.get(_VERSION, ''),
+        settings if isinstance(settings, dict) else {},
+        notes.get(_RECORDING, ''),
+    )
 
 
 class EstimateBagWriter(BagFile):
@@ -60,6 +107,12 @@ class EstimateBagWriter(BagFile):
         self.names = names
         self._diagnostics = statuses or diagnostics.Diagnostics(names)
         self._stuck: bool | None = None
+
+    def state_origin(self, configuration: Configuration, recording: str) -> None:
+        """State version, settings and recording in the metadata of the bag."""
+        self.note(_VERSION, __version__)
+        self.note(_SETTINGS, json.dumps(configuration.flat(), separators=(',', ':')))
+        self.note(_RECORDING, recording)
 
     def clear_stuck(self, log_time: int) -> None:
         """Write what the node sends at its start and after a reset: no stuck warning."""

@@ -33,6 +33,7 @@ def run(arguments: argparse.Namespace) -> int:
     from wheel_terra_estimator.bags.history import read_estimates
     from wheel_terra_estimator.bags.storage import open_bag
     from wheel_terra_estimator.bags.truth import read_simulated_truth
+    from wheel_terra_estimator.bags.writer import read_origin
     from wheel_terra_estimator.errors import UserError
     from wheel_terra_estimator.output_folder import check_file
     from wheel_terra_estimator.reporting.comparison import (
@@ -61,7 +62,9 @@ def run(arguments: argparse.Namespace) -> int:
                 f'{arguments.truth}: no truth in it: neither /ground_truth/twist nor '
                 '/truth/odometry'
             )
-    comparison = compare(histories[0], histories[1], [str(path) for path in inputs], truth)
+    origins = read_origin(inputs[0]), read_origin(inputs[1])
+    names = [str(path) for path in inputs]
+    comparison = compare(histories[0], histories[1], names, truth, origins)
     print(json.dumps(as_dict(comparison), indent=2) if arguments.json else as_text(comparison))
     if arguments.report:
         write_comparison(arguments.report, comparison, histories, truth, arguments.overwrite)

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 
 from wheel_terra_estimator.bags.history import EstimateHistory
 from wheel_terra_estimator.bags.truth import Truth
+from wheel_terra_estimator.bags.writer import Origin
 from wheel_terra_estimator.configuration.parameters import declared
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.output_folder import new_file
@@ -62,10 +64,25 @@ class Comparison:
     same_class: float
     warnings: tuple[tuple[float, ...], tuple[float, ...]]
     errors: tuple[truth_scores.TruthErrors | None, truth_scores.TruthErrors | None]
+    origins: tuple[Origin, Origin] = (Origin(), Origin())
+
+    @property
+    def unlike_settings(self) -> dict[str, tuple[Any, Any]]:
+        """Configuration key -> its values in A and B where they differ; None: not stated."""
+        first, second = (origin.settings for origin in self.origins)
+        if not first or not second:
+            return {}
+        keys = sorted(first.keys() | second.keys())
+        pairs = {key: (first.get(key), second.get(key)) for key in keys}
+        return {key: (a, b) for key, (a, b) in pairs.items() if a != b}
 
 
 def compare(
-    first: EstimateHistory, second: EstimateHistory, names: Sequence[str], truth: Truth | None
+    first: EstimateHistory,
+    second: EstimateHistory,
+    names: Sequence[str],
+    truth: Truth | None,
+    origins: tuple[Origin, Origin] = (Origin(), Origin()),
 ) -> Comparison:
     """Compare two runs over the same drive.
 
@@ -97,6 +114,7 @@ def compare(
             truth_scores.truth_errors(first, truth, thresholds) if truth else None,
             truth_scores.truth_errors(second, truth, thresholds) if truth else None,
         ),
+        origins=origins,
     )
 
 
@@ -150,6 +168,7 @@ def as_text(comparison: Comparison) -> str:
     for letter, starts in zip('AB', c.warnings, strict=True):
         told = ', '.join(f'{start:.1f} s' for start in starts) or 'none'
         lines.append(f'stuck warnings of {letter}: {told}')
+    lines += _origin_lines(c)
     lines += ['', f'  {"B minus A":24}{"mean":>11}{"rms":>11}{"greatest":>11}   where']
     for d in c.differences:
         label = f'{d.name} [{d.unit}]'
@@ -158,6 +177,22 @@ def as_text(comparison: Comparison) -> str:
         if errors:
             lines += ['', f'{letter}:', *truth_scores.as_lines(errors)]
     return '\n'.join(lines)
+
+
+def _origin_lines(comparison: Comparison) -> list[str]:
+    versions = [origin.version or 'not stated' for origin in comparison.origins]
+    lines = [f'version of A: {versions[0]}, of B: {versions[1]}']
+    if not all(origin.settings for origin in comparison.origins):
+        return [*lines, 'settings: not stated in both (a bag that was not written by replay)']
+    unlike = comparison.unlike_settings
+    lines.append(f'settings: {len(unlike) or "none"} differ')
+    return lines + [
+        f'  {key}: A {_shown_value(a)}, B {_shown_value(b)}' for key, (a, b) in unlike.items()
+    ]
+
+
+def _shown_value(value: Any) -> str:
+    return 'not stated' if value is None else json.dumps(value)
 
 
 def as_dict(comparison: Comparison) -> dict[str, Any]:
@@ -169,6 +204,10 @@ def as_dict(comparison: Comparison) -> dict[str, Any]:
         'sets': list(c.sets),
         'common': c.common,
         'same_class': c.same_class,
+        'versions': {letter: o.version for letter, o in zip('ab', c.origins, strict=True)},
+        'settings': {key: {'a': a, 'b': b} for key, (a, b) in c.unlike_settings.items()}
+        if all(origin.settings for origin in c.origins)
+        else None,
         'stuck_warnings': {'a': list(c.warnings[0]), 'b': list(c.warnings[1])},
         'differences': {
             d.name: {k: v for k, v in vars(d).items() if k != 'name'} for d in c.differences
@@ -200,6 +239,12 @@ def write_comparison(
             (letter, ', '.join(f'{start:.1f} s' for start in starts) or 'none')
             for letter, starts in zip('AB', comparison.warnings, strict=True)
         ],
+        versions=[origin.version or 'not stated' for origin in comparison.origins],
+        settings=[
+            (key, _shown_value(a), _shown_value(b))
+            for key, (a, b) in comparison.unlike_settings.items()
+        ],
+        settings_known=all(origin.settings for origin in comparison.origins),
         figure=_figure(histories, truth),
         library=plotly_script(),
         truth_source=truth.source if truth else '',
