@@ -75,6 +75,7 @@ class Wheels(Section):
     direction: FloatArray  # +1 or -1
     torque_limit: FloatArray  # [N m], 0 = not known
     passes: FloatArray  # pass number of the soil
+    wrench_frame: tuple[str, ...]  # of the wrenches that the node publishes, empty text = none
 
     def __init__(self, values: Mapping[str, Value]) -> None:
         super().__init__(values, 'wheels.')

@@ -267,6 +267,11 @@ DECLARED: tuple[Parameter, ...] = (
         choices=('events', 'single_threaded'),
     ),
     flag(
+        'publish_markers',
+        False,
+        'whether the node publishes ~/markers for RViz: slip class as colour, sinkage, pull',
+    ),
+    flag(
         'autostart',
         True,
         'configure and activate the node at its start; false: a life cycle manager does',
@@ -352,6 +357,13 @@ DECLARED: tuple[Parameter, ...] = (
         'greatest drive torque, for the stall test; 0 = not known',
         size='wheels',
         at_least=0.0,
+    ),
+    text(
+        'wheels.wrench_frame',
+        '',
+        'frame of ~/wrench/<wheel> (x forward, z up, at the hub, not turning with the rim); empty '
+        '= not published',
+        size='wheels',
     ),
     integer(
         'wheels.passes',

@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterable
 from functools import partial
 from inspect import signature
 from pathlib import Path
-from typing import Any, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
 
 from nav_msgs.msg import Odometry
 from rcl_interfaces.msg import SetParametersResult
@@ -48,6 +48,9 @@ from wheel_terra_estimator.ros.input_watch import InputWatch
 from wheel_terra_estimator.ros.outputs import EstimatePublisher, time_message
 from wheel_terra_estimator.ros.qos import OVERRIDABLE, input_profile
 from wheel_terra_estimator.ros.stuck_memory import StuckMemory
+
+if TYPE_CHECKING:
+    from wheel_terra_estimator.ros.live_views import LiveViews
 
 MESSAGE_TYPES = {
     'joint_states': JointState,
@@ -102,6 +105,7 @@ class EstimatorNode(LifecycleNode):
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._pipeline: Pipeline | None = None
         self._publisher: EstimatePublisher | None = None
+        self._views: LiveViews | None = None
         self._subscriptions_made: list[Subscription] = []
         self._timers_made: list[Timer] = []
         self._active = False
@@ -187,6 +191,7 @@ class EstimatorNode(LifecycleNode):
         self._pipeline.transport_values = self._transport_values
         self._publisher = EstimatePublisher(self, self._pipeline.names)
         self._publisher.publish_stuck(self._stuck.state.stuck)
+        self._views = self._live_views(configuration)
         self._listen()
         self._timers_made = [
             self.create_timer(period, callback, clock=self._steady)
@@ -213,10 +218,12 @@ class EstimatorNode(LifecycleNode):
         self._timers_made, self._subscriptions_made = [], []
         if self._publisher is not None:
             self._publisher.destroy()
+        if self._views is not None:
+            self._views.destroy()
         if self._arrival is not None:
             self._arrival.close()
             self._arrival = None
-        self._pipeline = self._publisher = None
+        self._pipeline = self._publisher = self._views = None
 
     # -- Inputs ---------------------------------------------------------------------------------
 
@@ -267,6 +274,8 @@ class EstimatorNode(LifecycleNode):
         if not (self._active and self._enabled):
             return
         self._publisher.publish(estimates)
+        if self._views is not None:
+            self._views.publish(estimates)
         if statuses := self._pipeline.diagnostics.due(estimates):
             self._say(time_message(estimates.stamp), statuses, now)
 
@@ -522,6 +531,15 @@ class EstimatorNode(LifecycleNode):
                 return SetParametersResult(successful=False, reason=str(error))
             self._given.update(values)
         return SetParametersResult(successful=True)
+
+    def _live_views(self, configuration: Configuration) -> LiveViews | None:
+        """Return the outputs for looking at; imported where they are asked for only."""
+        values = configuration.flat()
+        if not values['publish_markers'] and not any(configuration.wheels.wrench_frame):
+            return None
+        from wheel_terra_estimator.ros.live_views import LiveViews
+
+        return LiveViews(self, configuration)
 
     def _open_arrival_log(self, configuration: Configuration) -> TextIO | None:
         name = str(configuration.flat()['record_arrival'])
