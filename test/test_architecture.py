@@ -149,7 +149,8 @@ MAY_USE = {
     'ros': (
         {'configuration', 'estimation', 'messages', 'bags', 'reporting'},
         {'numpy', 'rclpy', 'rcl_interfaces', 'builtin_interfaces', 'diagnostic_msgs'}
-        | {'geometry_msgs', 'nav_msgs', 'sensor_msgs', 'std_msgs', 'std_srvs', 'visualization_msgs'},
+        | {'geometry_msgs', 'nav_msgs', 'sensor_msgs', 'std_msgs', 'std_srvs'}
+        | {'visualization_msgs'},
     ),
     # The public Python interface: all but the node.
     'api': (None, {'numpy', 'pandas', 'matplotlib'}),
