@@ -2,22 +2,28 @@
 # SPDX-License-Identifier: Apache-2.0
 """Mutants of the package: whether tests notice a changed sign, comparison, constant, statement.
 
-    python tools/mutation.py run mutants.jsonl --count 200     # some hours; stop and go on at will
-    python tools/mutation.py run mutants.jsonl --folders terramechanics --count 30
-    python tools/mutation.py show mutants.jsonl                # share caught, and the survivors
+    python tools/mutation.py map calls.jsonl                  # which test calls what; 5 minutes
+    python tools/mutation.py run mutants.jsonl --map calls.jsonl --count 240  # resumable
+    python tools/mutation.py show mutants.jsonl               # share caught, and the survivors
 
-Each mutant is made in a copy of the package, and the tests of its folder run on the copy: first
-the files that import the mutated module, then the rest of the folder, until one fails. Mutants are
-spread over the files by their number of places; the same seed gives the same ones.
+Each mutant is made in a copy of the package, and on the copy run those tests that call the mutated
+function (any function of the file, where it stands outside of one), the cheapest first, until one
+fails or `TESTS_LIMIT` seconds of tests are spent. Mutants are spread over the files by their number
+of places; the same seed gives the same ones. `again` judges the survivors once more, after tests
+were added (make a new map before).
 """
 
 from __future__ import annotations
 
 import argparse
 import ast
+import compileall
+import importlib
 import json
 import os
+import py_compile
 import random
+import resource
 import shutil
 import subprocess
 import sys
@@ -26,11 +32,31 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
+
+import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = 'wheel_terra_estimator'
 FOLDERS = ('terramechanics', 'estimation', 'discrepancy')
-TIME_LIMIT = 240.0  # [s] for the tests of one mutant; what hangs counts as caught
+LEFT_OUT = ('discrepancy/report/pictures.py',)  # places and sizes in pictures are looked at
+TESTS_LIMIT = 8.0  # [s] of tests, as the map has them, that one mutant is shown
+TIME_LIMIT = 60  # [s] of processor time for one mutant; what hangs counts as caught
+NICENESS = 10
+LIBRARIES = (  # loaded once for all mutants
+    'numpy',
+    'scipy.optimize',
+    'scipy.special',
+    'scipy.stats',
+    'filterpy.kalman',
+    'hypothesis',
+    'rosbags.rosbag2',
+    'rosbags.typesys.stores.ros2_jazzy',
+    'matplotlib.figure',
+    'jinja2',
+    'yaml',
+)
+PYTEST = (sys.executable, '-m', 'pytest', '-q', '-n', '0')
 
 _COMPARISONS = {'<': '>=', '<=': '>', '>': '<=', '>=': '<', '==': '!=', '!=': '=='}
 _SIGNS = {'+': '-', '-': '+', '*': '/', '/': '*', '**': '*'}
@@ -49,6 +75,8 @@ class Mutant:
     end: int
     old: str
     new: str
+    function: int = 0
+    """First line of the function around it; 0 outside of functions."""
 
     @property
     def key(self) -> tuple[str, int, str]:
@@ -66,6 +94,14 @@ class _Places(ast.NodeVisitor):
             self._lines.append(self._lines[-1] + len(line))
         self._raw = text.splitlines(keepends=True)
         self.found: list[Mutant] = []
+        self._function = 0
+
+    def visit_FunctionDef(self, node: ast.FunctionDef) -> None:
+        outer = self._function
+        self._function = min([node.lineno, *(d.lineno for d in node.decorator_list)])
+        for part in node.body:
+            self.visit(part)
+        self._function = outer
 
     def _offset(self, line: int, column: int) -> int:
         """Return the offset of a place; columns of ast count bytes."""
@@ -81,7 +117,7 @@ class _Places(ast.NodeVisitor):
 
     def _add(self, kind: str, line: int, start: int, end: int, new: str) -> None:
         old = self._text[start:end]
-        self.found.append(Mutant(self._file, line, kind, start, end, old, new))
+        self.found.append(Mutant(self._file, line, kind, start, end, old, new, self._function))
 
     def _between(self, kind: str, left: ast.expr, right: ast.expr, swaps: dict[str, str]) -> None:
         start, end = self._span(left)[1], self._span(right)[0]
@@ -113,8 +149,7 @@ class _Places(ast.NodeVisitor):
         if isinstance(value, bool):
             self._add('constant', node.lineno, *self._span(node), str(not value))
         elif isinstance(value, (int, float)):
-            other = 1 if value == 0 else (2 * value if isinstance(value, float) else value + 1)
-            self._add('constant', node.lineno, *self._span(node), repr(other))
+            self._add('constant', node.lineno, *self._span(node), repr(_another(value)))
 
     def visit_Expr(self, node: ast.Expr) -> None:
         if isinstance(node.value, ast.Call):
@@ -134,6 +169,11 @@ class _Places(ast.NodeVisitor):
             self.visit(node.value)  # annotations are not run
 
 
+def _another(value: float) -> float:
+    """Return the number plus one, as mutmut and cosmic-ray do, or twice a large one."""
+    return 2 * value if isinstance(value, float) and abs(value) > 1.0 else value + 1
+
+
 def places(file: Path) -> list[Mutant]:
     """Return all mutants of a file."""
     text = file.read_text(encoding='utf-8')
@@ -145,7 +185,7 @@ def places(file: Path) -> list[Mutant]:
 def chosen(folders: list[str], count: int, seed: int) -> list[Mutant]:
     """Return mutants spread over the files by their number of places, in random order."""
     files = [f for folder in folders for f in sorted((ROOT / PACKAGE / folder).rglob('*.py'))]
-    found = {file: places(file) for file in files}
+    found = {file: places(file) for file in files if not file.as_posix().endswith(LEFT_OUT)}
     total = sum(map(len, found.values()))
     generator = random.Random(seed)
     picked = []
@@ -157,49 +197,113 @@ def chosen(folders: list[str], count: int, seed: int) -> list[Mutant]:
     return picked
 
 
-def tests_of(file: str) -> list[str]:
-    """Return the tests of the folder of a file, those that name its module first."""
-    folder = Path(file).parts[1]
-    stem = Path(file).stem
-    tests = sorted((ROOT / 'test' / folder).rglob('test_*.py'))
-    near = [t for t in tests if stem in t.read_text(encoding='utf-8')]
-    return [str(t.relative_to(ROOT)) for t in (*near, *(t for t in tests if t not in near))]
+class CallMap:
+    """Which tests call which function, and what they cost."""
+
+    def __init__(self, path: Path) -> None:
+        self._rows = sorted(_read(path), key=lambda row: row['seconds'])
+        self._calls = [set(row['functions']) for row in self._rows]
+        self._files = [{call.rpartition(':')[0] for call in calls} for calls in self._calls]
+
+    def tests(self, mutant: Mutant) -> list[str]:
+        """Return the tests that reach a mutant, cheapest first, within the limit."""
+        key = f'{mutant.file}:{mutant.function}'
+        chosen, spent = [], 0.0
+        for row, calls, files in zip(self._rows, self._calls, self._files, strict=True):
+            if key in calls if mutant.function else mutant.file in files:
+                spent += row['seconds']
+                if spent > TESTS_LIMIT:
+                    break
+                chosen.append(row['test'])
+        return chosen
 
 
-def verdict(mutant: Mutant, copy: Path) -> str:
+def make_map(arguments: argparse.Namespace) -> None:
+    """Run the tests of the folders once and note what each of them calls."""
+    arguments.file.unlink(missing_ok=True)
+    subprocess.run(
+        [*PYTEST, '-m', 'not slow', '-p', 'call_map', *(f'test/{f}' for f in arguments.folders)],
+        cwd=ROOT,
+        env={
+            **os.environ,
+            'PYTHONPATH': os.pathsep.join((str(ROOT), str(ROOT / 'tools'))),
+            'CALL_MAP': str(arguments.file.resolve()),
+        },
+        preexec_fn=lambda: os.nice(NICENESS),
+        check=True,
+    )
+
+
+def verdict(mutant: Mutant, copy: Path, tests: list[str]) -> str:
     """Make a mutant in the copy, run its tests there, mend the copy."""
+    if not tests:
+        return _SURVIVED
     target = copy / mutant.file
-    text = (ROOT / mutant.file).read_text(encoding='utf-8')
+    text = target.read_text(encoding='utf-8')  # of the copy: ROOT may be edited meanwhile
     target.write_text(text[: mutant.start] + mutant.new + text[mutant.end :], encoding='utf-8')
-    command = [sys.executable, '-m', 'pytest', '-q', '-x', '-n', '0', '-m', 'not slow']
     try:
-        result = subprocess.run(
-            [*command, '-p', 'no:cacheprovider', *tests_of(mutant.file)],
-            cwd=copy,
-            env={**os.environ, 'PYTHONPATH': str(copy), 'PYTHONDONTWRITEBYTECODE': '1'},
-            capture_output=True,
-            timeout=TIME_LIMIT,
-            check=False,
-        )
-        return _SURVIVED if result.returncode == 0 else _CAUGHT
-    except subprocess.TimeoutExpired:
-        return _CAUGHT
+        child = os.fork()  # the libraries are there already; the package is not
+        if child == 0:
+            _run_tests(copy, tests)
+        return _SURVIVED if os.waitpid(child, 0)[1] == 0 else _CAUGHT
     finally:
         target.write_text(text, encoding='utf-8')
+
+
+def _run_tests(copy: Path, tests: list[str]) -> None:
+    """Run tests on the copy and end the process with their status."""
+    status = 1
+    try:
+        resource.setrlimit(resource.RLIMIT_CPU, (TIME_LIMIT, TIME_LIMIT))
+        os.chdir(copy)
+        sys.path.insert(0, str(copy))
+        nowhere = os.open(os.devnull, os.O_RDWR)
+        for stream in (0, 1, 2):
+            os.dup2(nowhere, stream)
+        status = int(pytest.main(['-q', '-x', '-p', 'no:cacheprovider', *tests]))
+    finally:
+        os._exit(status)
 
 
 def run(arguments: argparse.Namespace) -> None:
     """Judge the mutants that are not in the file yet."""
     done = {(row['file'], row['start'], row['new']) for row in _read(arguments.file)}
     mutants = chosen(arguments.folders, arguments.count, arguments.seed)
+    judge([m for m in mutants if m.key not in done], arguments)
+
+
+def again(arguments: argparse.Namespace) -> None:
+    """Judge the survivors of a file once more; what is caught now is noted as caught."""
+    rows = list(_read(arguments.file))
+    fields = Mutant.__dataclass_fields__
+    survivors = [
+        Mutant(**{key: row[key] for key in fields}) for row in rows if row['verdict'] == _SURVIVED
+    ]
+    for mutant in survivors:
+        text = (ROOT / mutant.file).read_text(encoding='utf-8')
+        if text[mutant.start : mutant.end] != mutant.old:
+            sys.exit(f'{mutant.file} has changed since; run it anew')
+    kept = [json.dumps(row) + '\n' for row in rows if row['verdict'] != _SURVIVED]
+    arguments.file.write_text(''.join(kept), encoding='utf-8')
+    judge(survivors, arguments)
+
+
+def judge(mutants: list[Mutant], arguments: argparse.Namespace) -> None:
+    """Judge mutants one after the other and write each verdict at once."""
+    os.nice(NICENESS)
+    for library in LIBRARIES:
+        importlib.import_module(library)
+    call_map = CallMap(arguments.map)
     with tempfile.TemporaryDirectory() as folder, arguments.file.open('a') as stream:
         copy = Path(folder) / ROOT.name
+        os.environ['PYTHONPATH'] = str(copy)  # for processes that tests start
         shutil.copytree(ROOT, copy, ignore=shutil.ignore_patterns('.git', '__pycache__', 'site'))
         _link_neighbours(Path(folder))
+        # By content, not by time: a mutant is written and mended within a second.
+        mode = py_compile.PycInvalidationMode.CHECKED_HASH
+        compileall.compile_dir(copy / PACKAGE, quiet=1, invalidation_mode=mode)
         for number, mutant in enumerate(mutants, 1):
-            if mutant.key in done:
-                continue
-            row = {**asdict(mutant), 'verdict': verdict(mutant, copy)}
+            row = {**asdict(mutant), 'verdict': verdict(mutant, copy, call_map.tests(mutant))}
             stream.write(json.dumps(row) + '\n')
             stream.flush()
             print(f'{number}/{len(mutants)} {row["verdict"]}: {_words(row)}', flush=True)
@@ -229,12 +333,12 @@ def show(arguments: argparse.Namespace) -> None:
         print(f'  {_words(row)}')
 
 
-def _words(row: dict[str, object]) -> str:
+def _words(row: dict[str, Any]) -> str:
     old, new = (' '.join(str(row[key]).split())[:60] for key in ('old', 'new'))
     return f'{row["file"]}:{row["line"]} {row["kind"]}: {old!r} -> {new!r}'
 
 
-def _read(path: Path) -> Iterator[dict[str, object]]:
+def _read(path: Path) -> Iterator[dict[str, Any]]:
     if path.is_file():
         for line in path.read_text(encoding='utf-8').splitlines():
             yield json.loads(line)
@@ -244,12 +348,19 @@ def main() -> None:
     """Run the command."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     commands = parser.add_subparsers(required=True)
+    maps = commands.add_parser('map', help='note which test calls which function')
+    maps.set_defaults(command=make_map)
     runs = commands.add_parser('run', help='judge mutants that are not in the file yet')
-    runs.add_argument('file', type=Path)
-    runs.add_argument('--count', type=int, default=200)
+    runs.add_argument('--count', type=int, default=240)
     runs.add_argument('--seed', type=int, default=1)
-    runs.add_argument('--folders', nargs='+', default=list(FOLDERS))
     runs.set_defaults(command=run)
+    repeats = commands.add_parser('again', help='judge the survivors once more')
+    repeats.set_defaults(command=again)
+    for command in (maps, runs, repeats):
+        command.add_argument('file', type=Path)
+        command.add_argument('--folders', nargs='+', default=list(FOLDERS))
+    for command in (runs, repeats):
+        command.add_argument('--map', type=Path, required=True, help='file that `map` wrote')
     shows = commands.add_parser('show', help='share caught, and survivors')
     shows.add_argument('file', type=Path)
     shows.set_defaults(command=show)

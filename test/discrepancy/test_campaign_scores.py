@@ -1,10 +1,11 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Sixty campaigns with something (or nothing) hidden: the workflow stays within its bands.
+"""Campaigns with something (or nothing) hidden: the workflow stays within its bands.
 
-The slow study (``tools/discrepancy_study.py``) measures the figures; sixty campaigns can only say
-that nothing has broken. Bands are set so that a workflow which meets the targets passes with a
-probability above 99 %, and one that names by chance, or always, or never, does not.
+The slow study (``tools/discrepancy_study.py``) measures the figures; twenty campaigns, or the
+sixty of ``-m slow``, can only say that nothing has broken. Bands are set so that a workflow which
+meets the targets passes sixty with a probability above 99 %, and one that names by chance, or
+always, or never, passes neither.
 """
 
 from __future__ import annotations
@@ -14,30 +15,39 @@ import pytest
 from campaigns import make_campaign, scoring, summary
 from campaigns.groups import GROUPS
 
-pytestmark = pytest.mark.timeout(900)  # one fixture makes all sixty
-
 FIRST_SEED = 3_000_000  # neither the seeds of tuning nor those of the study
 # Group -> campaigns per design. The heavier designs have fewer.
-PLAN = {
+TWENTY = {
+    'one': {'basic16': 6, 'sweep40': 1, 'lugs48': 1},
+    'none': {'basic16': 4, 'sweep40': 1},
+    'other formula': {'basic16': 2},
+    'outliers': {'sweep40': 1},
+    'two': {'basic16': 3},
+    'outside': {'basic16': 2},
+}
+SIXTY = {
     'one': {'basic16': 14, 'sweep40': 4, 'lugs48': 4},
     'none': {'basic16': 16, 'sweep40': 4},
     'other formula': {'basic16': 6},
     'outliers': {'sweep40': 3},
-    'two': {'lugs48': 3},
+    'two': {'basic16': 9},
     'outside': {'basic16': 6},
 }
+PLANS = [
+    pytest.param(TWENTY, id='twenty'),
+    pytest.param(SIXTY, id='sixty', marks=[pytest.mark.slow, pytest.mark.timeout(900)]),
+]
 
 
-@pytest.fixture(scope='module')
-def records():
-    found = []
-    for group, designs in PLAN.items():
-        for design, count in designs.items():
-            for seed in range(FIRST_SEED, FIRST_SEED + count):
-                campaign = make_campaign(seed, design, GROUPS[group].plan)
-                found.append(scoring.score(group, campaign, scoring.diagnose(campaign)))
-    assert len(found) == 60
-    return found
+@pytest.fixture(scope='module', params=PLANS)
+def records(request):
+    return [
+        scoring.score(group, campaign, scoring.diagnose(campaign))
+        for group, designs in request.param.items()
+        for design, count in designs.items()
+        for seed in range(FIRST_SEED, FIRST_SEED + count)
+        for campaign in [make_campaign(seed, design, GROUPS[group].plan)]
+    ]
 
 
 def of(records, group, least=0.0, most=float('inf')):
@@ -49,7 +59,7 @@ def of(records, group, least=0.0, most=float('inf')):
 
 def test_hidden_effects_are_named_first(records):
     seen = of(records, 'one', 5.0)
-    assert len(seen) >= 8
+    assert len(seen) >= 6
     right = summary.share(seen, summary.first)
     assert right.value >= 0.75, right
     assert summary.share(seen, summary.in_set).value >= 0.85
@@ -62,17 +72,19 @@ def test_nothing_hidden_nothing_claimed(records):
 
 def test_other_formulas_and_outliers_do_not_mislead(records):
     seen = of(records, 'other formula', 5.0) + of(records, 'outliers', 5.0)
-    assert len(seen) >= 4
+    assert len(seen) >= 2
     assert summary.share(seen, summary.in_set).value >= 0.6
 
 
 def test_one_of_two_effects_comes_first(records):
     two = [r for r in of(records, 'two') if min(r['distance'], r['distance_second']) > 5]
+    assert len(two) >= 2
     assert sum(summary.first(r) for r in two) >= len(two) - 1
 
 
 def test_a_stranger_is_not_named_with_certainty(records):
     far = [r for r in of(records, 'outside') if r['distance_left'] > 13]
+    assert far
     sure = [r for r in far if r['verdict'] == 'named' and not r['remainder']]
     assert len(sure) <= 1 + len(far) // 4
 

@@ -208,7 +208,7 @@ def test_interrupted_run_goes_on_and_leaves_no_half_result(coarse_run, tmp_path,
     output = tmp_path / 'out'
     # Eight times slower, so that the interrupt comes before the end on a fast machine too.
     command = ['soilbin', 'run', 'quick', '--wheel', '2', '-o', str(output), '--cache', str(cache),
-               *SMALL, '-p', 'operation.speed_factor:=1.0', '--duration', '10']  # fmt: skip
+               *SMALL, '-p', 'operation.speed_factor:=1.0', '--duration', '6']  # fmt: skip
     process = subprocess.Popen(
         [sys.executable, '-m', 'wheel_terra_estimator.cli.main', *command],
         stderr=subprocess.PIPE, text=True,
@@ -217,7 +217,7 @@ def test_interrupted_run_goes_on_and_leaves_no_half_result(coarse_run, tmp_path,
     )  # fmt: skip
     while b'travel' not in (line := process.stderr.buffer.read1(200)):
         assert line, 'ended before the travel'
-    time.sleep(0.7)
+    time.sleep(0.4)
     process.send_signal(signal.SIGINT)
     said = process.communicate(timeout=60)[1]
     assert process.returncode == 2
