@@ -31,6 +31,14 @@ def shared() -> Path:
     return folder
 
 
+@pytest.fixture
+def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pictures are made, but not drawn (half a second each): for tests of words."""
+    from matplotlib.figure import Figure
+
+    monkeypatch.setattr(Figure, 'savefig', lambda self, file, **_: file.write(b'picture'))
+
+
 @pytest.fixture(scope='session')
 def factory() -> MessageFactory:
     return MessageFactory()

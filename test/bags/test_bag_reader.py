@@ -85,9 +85,10 @@ def test_damaged_and_unknown_messages_are_counted_and_the_rest_is_used(
     """Types that nobody knows are never unpacked; a damaged message costs itself alone."""
     from rosbags.interfaces import ConnectionExtRosbag2
     from rosbags.rosbag2 import StoragePlugin, Writer
-    from rosbags.typesys import Stores, get_typestore
 
-    store = get_typestore(Stores.ROS2_JAZZY)
+    from wheel_terra_estimator.bags.message_types import jazzy_types
+
+    store = jazzy_types()
     path = tmp_path / 'odd'
     with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
         joints = writer.add_connection(

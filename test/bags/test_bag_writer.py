@@ -45,9 +45,9 @@ def bag(tmp_path: Path) -> Path:
 
 
 def messages(path: Path) -> list[tuple[int, str, Any]]:
-    from rosbags.typesys import Stores, get_typestore
+    from wheel_terra_estimator.bags.message_types import jazzy_types
 
-    store = get_typestore(Stores.ROS2_JAZZY)
+    store = jazzy_types()
     with open_bag(path) as bag:
         return [
             (m.log_time, m.topic, store.deserialize_cdr(m.data, bag.topics[m.topic].type))

@@ -82,7 +82,9 @@ def test_a_refusal_says_what_is_missing(tmp_path: Path, capsys: Any) -> None:
 
 
 @pytest.mark.shared
-def test_measured_drive_with_a_lost_sector(shared: Path, tmp_path: Path, capsys: Any) -> None:
+def test_measured_drive_with_a_lost_sector(
+    shared: Path, tmp_path: Path, capsys: Any, undrawn: None
+) -> None:
     bag = damaged(tmp_path, shared / 'bags' / 'frostyboy_event_1_6_mcap', 30_000)
     remap = ['--remap', 'reference_odom:=/truth/odometry']
     report = tmp_path / 'r.html'

@@ -94,13 +94,13 @@ def test_places_that_cannot_be_written_are_one_line_before_anything_is_computed(
 
 
 def test_full_disk_of_the_real_command(make_bag: Any, make_drive: Any, rover: Any, tmp_path: Path):
-    """From the shell: a drive of ten minutes onto a disk with room for two megabytes."""
+    """From the shell: a drive of three minutes onto a disk with room for little more than one."""
     rover.write(tmp_path / 'rover.yaml')
-    bag = make_bag(messages=make_drive(3000), name='long')
+    bag = make_bag(messages=make_drive(2000), name='long')
     out = tmp_path / 'out'
     code = (
         'import resource, sys; from wheel_terra_estimator.cli.main import main; '
-        'resource.setrlimit(resource.RLIMIT_FSIZE, (2200000, 2200000)); sys.exit(main())'
+        'resource.setrlimit(resource.RLIMIT_FSIZE, (1400000, 1400000)); sys.exit(main())'
     )
     command = ['replay', str(bag), '--config', str(tmp_path / 'rover.yaml'), '-o', str(out)]
     done = subprocess.run(

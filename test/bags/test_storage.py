@@ -49,9 +49,10 @@ def test_unreadable_metadata_is_set_aside(make_bag: Any, whole: list[RawMessage]
 @pytest.mark.parametrize('mode', ['FILE', 'MESSAGE', 'STORAGE'])
 def test_compressed_bags(tmp_path: Path, drive: Any, whole: list[RawMessage], mode: str) -> None:
     from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
-    from rosbags.typesys import Stores, get_typestore
 
-    store = get_typestore(Stores.ROS2_JAZZY)
+    from wheel_terra_estimator.bags.message_types import jazzy_types
+
+    store = jazzy_types()
     writer = Writer(tmp_path / 'bag', version=9, storage_plugin=StoragePlugin.MCAP)
     writer.set_compression(CompressionMode[mode], CompressionFormat.ZSTD)
     with writer:
@@ -101,9 +102,10 @@ def test_damaged_chunk_is_left_out_and_said(
 ) -> None:
     """A compressed bag of several chunks with rubbish in one: the others are read."""
     from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
-    from rosbags.typesys import Stores, get_typestore
 
-    store = get_typestore(Stores.ROS2_JAZZY)
+    from wheel_terra_estimator.bags.message_types import jazzy_types
+
+    store = jazzy_types()
     writer = Writer(tmp_path / 'bag', version=9, storage_plugin=StoragePlugin.MCAP)
     writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
     with writer:

@@ -23,16 +23,16 @@ CONFIG = ['--config', 'generic_six_wheel', '--config', 'test_sand']
 @pytest.fixture(scope='module')
 def drive(tmp_path_factory):
     path = tmp_path_factory.mktemp('drive') / 'drive'
-    write_simulated_drive(simulate(scenario.load('turns'), seed=5, duration=40.0), path)
+    write_simulated_drive(simulate(scenario.load('turns'), seed=5, duration=15.0), path)
     return path
 
 
 @pytest.fixture(scope='module')
 def upside_down(drive, tmp_path_factory):
     """The same drive with the IMU on its back."""
-    from rosbags.typesys import Stores, get_typestore
+    from wheel_terra_estimator.bags.message_types import jazzy_types
 
-    store = get_typestore(Stores.ROS2_JAZZY)
+    store = jazzy_types()
     path = tmp_path_factory.mktemp('fault') / 'drive'
     topics = {f'/{name}': kind for name, kind in INPUT_TYPES.items()}
     with open_bag(drive) as bag, BagFile(path, topics) as file:
@@ -69,7 +69,7 @@ def test_findings_come_before_anything_else(upside_down, tmp_path, capsys):
     assert said.startswith('finding: mounting') and 'imu_mounting_roll_deg: 180' in said
 
 
-def test_compare(drive, tmp_path, capsys):
+def test_compare(drive, tmp_path, capsys, undrawn):
     for name, extra in (('a', []), ('b', ['-p', 'soil.cohesion:=900.0'])):
         assert main(['replay', str(drive), *CONFIG, *extra, '-o', str(tmp_path / name)]) == 0
     capsys.readouterr()

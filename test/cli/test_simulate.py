@@ -67,9 +67,9 @@ def test_truth_in_the_bag_is_that_of_the_drive(bag_path: Path) -> None:
 
 
 def test_log_times_are_arrivals(bag_path: Path) -> None:
-    from rosbags.typesys import Stores, get_typestore
+    from wheel_terra_estimator.bags.message_types import jazzy_types
 
-    store = get_typestore(Stores.ROS2_JAZZY)
+    store = jazzy_types()
     with open_bag(bag_path) as bag:
         late = [
             m.log_time - stamp_of(store.deserialize_cdr(m.data, 'nav_msgs/msg/Odometry'))

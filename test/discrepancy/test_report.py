@@ -16,7 +16,6 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 from campaigns import Plan, make_campaign, scoring
-from matplotlib.figure import Figure
 
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.discrepancy.report.model_file import write_model
@@ -101,12 +100,6 @@ def written(named, tmp_path_factory):
 def page(written):
     folder, _ = written
     return Page((folder / 'report.html').read_text(encoding='utf-8')), folder
-
-
-@pytest.fixture
-def undrawn(monkeypatch):
-    """Pictures are made, but not drawn: for tests of words."""
-    monkeypatch.setattr(Figure, 'savefig', lambda self, file, **_: file.write(b'picture'))
 
 
 def test_page_needs_nothing_from_elsewhere(page):

@@ -84,6 +84,18 @@ def start():
         process.kill()
 
 
+@pytest.fixture(scope='class')
+def running_estimator(tmp_path_factory):
+    """One estimator node for the tests of a class, in their order."""
+    from wheel_terra_estimator.configuration import reader
+
+    path = tmp_path_factory.mktemp('estimator') / 'rover.yaml'
+    reader.load(['pathfinder']).write(path)
+    process = NodeProcess('estimator_node', ['--ros-args', '--params-file', str(path)])
+    yield process
+    process.kill()
+
+
 @pytest.fixture
 def listener():
     """Return a node in this process and a function that spins until a condition holds."""

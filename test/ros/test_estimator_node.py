@@ -45,37 +45,94 @@ def hear(node, kind, topic, profile=10):
     return heard
 
 
-def test_topics_types_and_stuck_for_those_who_come_late(start, parameters, listener):
-    from std_msgs.msg import Bool
+@pytest.mark.usefixtures('running_estimator')
+class TestOneNode:
+    """One node for all, in this order: it has heard nothing before the last."""
 
-    node, until = listener
-    start('estimator_node', *ROVER, parameters)
-    expected = {
-        'slip': 'sensor_msgs/msg/JointState',
-        'sinkage': 'sensor_msgs/msg/JointState',
-        'slip_stddev': 'sensor_msgs/msg/JointState',
-        'sinkage_stddev': 'sensor_msgs/msg/JointState',
-        'mobility': 'sensor_msgs/msg/JointState',
-        'soil': 'sensor_msgs/msg/JointState',
-        'slip_class': 'std_msgs/msg/UInt8MultiArray',
-        'twist': 'geometry_msgs/msg/TwistWithCovarianceStamped',
-        'stuck': 'std_msgs/msg/Bool',
-    }
+    def test_silence_is_said_in_diagnostics(self, listener):
+        from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 
-    def offered():
-        return {name: types[0] for name, types in node.get_topic_names_and_types()}
+        node, until = listener
+        diagnostics = hear(node, DiagnosticArray, '/diagnostics')
+        until(lambda: diagnostics)
+        statuses = diagnostics[-1].status
+        assert len(statuses) == 5, 'one per wheel and one for the node'
+        assert all(s.level == DiagnosticStatus.STALE for s in statuses)
+        assert any('never heard' in s.message for s in statuses)
 
-    until(lambda: all(f'{NODE}/{t}' in offered() for t in expected))
-    for topic, kind in expected.items():
-        assert offered()[f'{NODE}/{topic}'] == kind
-        (info,) = node.get_publishers_info_by_topic(f'{NODE}/{topic}')
-        assert info.qos_profile.reliability.name == 'RELIABLE'
-    for topic in ('joint_states', 'odom', 'imu/data', 'sinkage', 'leaving_angle', 'reference_odom'):
-        if subscribers := node.get_subscriptions_info_by_topic(f'/{topic}'):
-            assert subscribers[0].qos_profile.reliability.name == 'BEST_EFFORT', topic
-    stuck = hear(node, Bool, f'{NODE}/stuck', latched())
-    until(lambda: stuck)
-    assert [m.data for m in stuck] == [False]
+    def test_topics_types_and_stuck_for_those_who_come_late(self, listener):
+        from std_msgs.msg import Bool
+
+        node, until = listener
+        expected = {
+            'slip': 'sensor_msgs/msg/JointState',
+            'sinkage': 'sensor_msgs/msg/JointState',
+            'slip_stddev': 'sensor_msgs/msg/JointState',
+            'sinkage_stddev': 'sensor_msgs/msg/JointState',
+            'mobility': 'sensor_msgs/msg/JointState',
+            'soil': 'sensor_msgs/msg/JointState',
+            'slip_class': 'std_msgs/msg/UInt8MultiArray',
+            'twist': 'geometry_msgs/msg/TwistWithCovarianceStamped',
+            'stuck': 'std_msgs/msg/Bool',
+        }
+
+        def offered():
+            return {name: types[0] for name, types in node.get_topic_names_and_types()}
+
+        until(lambda: all(f'{NODE}/{t}' in offered() for t in expected))
+        for topic, kind in expected.items():
+            assert offered()[f'{NODE}/{topic}'] == kind
+            (info,) = node.get_publishers_info_by_topic(f'{NODE}/{topic}')
+            assert info.qos_profile.reliability.name == 'RELIABLE'
+        for topic in (
+            'joint_states',
+            'odom',
+            'imu/data',
+            'sinkage',
+            'leaving_angle',
+            'reference_odom',
+        ):
+            if subscribers := node.get_subscriptions_info_by_topic(f'/{topic}'):
+                assert subscribers[0].qos_profile.reliability.name == 'BEST_EFFORT', topic
+        stuck = hear(node, Bool, f'{NODE}/stuck', latched())
+        until(lambda: stuck)
+        assert [m.data for m in stuck] == [False]
+
+    def test_parameters_are_described_and_read_only(self, listener):
+        from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
+        from rcl_interfaces.srv import DescribeParameters, SetParameters
+
+        node, until = listener
+        describe = node.create_client(DescribeParameters, f'{NODE}/describe_parameters')
+        change = node.create_client(SetParameters, f'{NODE}/set_parameters')
+        until(lambda: describe.service_is_ready() and change.service_is_ready())
+        future = describe.call_async(DescribeParameters.Request(names=['rover.mass']))
+        until(future.done)
+        (descriptor,) = future.result().descriptors
+        assert '[kg]' in descriptor.description
+        value = ParameterValue(type=ParameterType.PARAMETER_DOUBLE, double_value=1.0)
+        request = SetParameters.Request(parameters=[Parameter(name='rover.mass', value=value)])
+        future = change.call_async(request)
+        until(future.done)
+        (result,) = future.result().results
+        assert not result.successful
+        assert 'read-only' in result.reason
+
+    def test_messages_that_give_no_estimate_are_explained(self, listener):
+        from diagnostic_msgs.msg import DiagnosticArray
+        from sensor_msgs.msg import JointState
+
+        node, until = listener
+        diagnostics = hear(node, DiagnosticArray, '/diagnostics')
+        wheels = node.create_publisher(JointState, 'joint_states', 10)
+
+        def said_after(message, *words):
+            wheels.publish(message)
+            return any(all(w in m.status[0].message for w in words) for m in diagnostics)
+
+        mast = wheel_message(['mast'], 100.0)
+        until(lambda: said_after(mast, 'it but mast; wheels.names: front_left_wheel_joint'))
+        until(lambda: said_after(wheel_message(['front_left_wheel_joint'], 0.0), 'stamp is zero'))
 
 
 def test_set_of_a_message_reset_and_a_clean_end(start, parameters, listener):
@@ -135,37 +192,6 @@ def test_set_of_a_message_reset_and_a_clean_end(start, parameters, listener):
     assert 'Traceback' not in said
 
 
-def test_silence_is_said_in_diagnostics(start, parameters, listener):
-    from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-
-    node, until = listener
-    diagnostics = hear(node, DiagnosticArray, '/diagnostics')
-    start('estimator_node', *ROVER, parameters)
-    until(lambda: diagnostics)
-    statuses = diagnostics[-1].status
-    assert len(statuses) == 5, 'one per wheel and one for the node'
-    assert all(s.level == DiagnosticStatus.STALE for s in statuses)
-    assert any('never heard' in s.message for s in statuses)
-
-
-def test_messages_that_give_no_estimate_are_explained(start, parameters, listener):
-    from diagnostic_msgs.msg import DiagnosticArray
-    from sensor_msgs.msg import JointState
-
-    node, until = listener
-    diagnostics = hear(node, DiagnosticArray, '/diagnostics')
-    wheels = node.create_publisher(JointState, 'joint_states', 10)
-    start('estimator_node', *ROVER, parameters)
-
-    def said_after(message, *words):
-        wheels.publish(message)
-        return any(all(w in m.status[0].message for w in words) for m in diagnostics)
-
-    mast = wheel_message(['mast'], 100.0)
-    until(lambda: said_after(mast, 'it but mast; wheels.names: front_left_wheel_joint'))
-    until(lambda: said_after(wheel_message(['front_left_wheel_joint'], 0.0), 'stamp is zero'))
-
-
 def test_publisher_of_another_type_or_quality_is_named(start, parameters, listener):
     from diagnostic_msgs.msg import DiagnosticArray
     from geometry_msgs.msg import Twist
@@ -185,28 +211,6 @@ def test_publisher_of_another_type_or_quality_is_named(start, parameters, listen
 
     until(lambda: said('geometry_msgs/msg/Twist comes there, needed is sensor_msgs/msg/JointState'))
     until(lambda: said('/reference_odom: a publisher offers another RELIABILITY'))
-
-
-def test_parameters_are_described_and_read_only(start, parameters, listener):
-    from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
-    from rcl_interfaces.srv import DescribeParameters, SetParameters
-
-    node, until = listener
-    start('estimator_node', *ROVER, parameters)
-    describe = node.create_client(DescribeParameters, f'{NODE}/describe_parameters')
-    change = node.create_client(SetParameters, f'{NODE}/set_parameters')
-    until(lambda: describe.service_is_ready() and change.service_is_ready())
-    future = describe.call_async(DescribeParameters.Request(names=['rover.mass']))
-    until(future.done)
-    (descriptor,) = future.result().descriptors
-    assert '[kg]' in descriptor.description
-    value = ParameterValue(type=ParameterType.PARAMETER_DOUBLE, double_value=1.0)
-    request = SetParameters.Request(parameters=[Parameter(name='rover.mass', value=value)])
-    future = change.call_async(request)
-    until(future.done)
-    (result,) = future.result().results
-    assert not result.successful
-    assert 'read-only' in result.reason
 
 
 @pytest.mark.parametrize(

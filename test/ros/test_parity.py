@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A recording over DDS through the real node gives the numbers of a replay, to the bit."""
 
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -17,9 +15,9 @@ DEMO = Path(__file__).resolve().parents[2] / 'data' / 'demo'
 
 def numbers(folder):
     """Return (topic, stamp or index) -> all fields of the message, of a bag of estimates."""
-    from rosbags.typesys import Stores, get_typestore
+    from wheel_terra_estimator.bags.message_types import jazzy_types
 
-    store = get_typestore(Stores.ROS2_JAZZY)
+    store = jazzy_types()
     found = {}
     with open_bag(folder) as bag:
         # Diagnostics also run on the clock of the wall while nothing is heard.
@@ -44,9 +42,10 @@ def fields(message):
 def piece(source, target, seconds):
     """Write the beginning of a recording as a bag of its own."""
     from rosbags.rosbag2 import StoragePlugin, Writer
-    from rosbags.typesys import Stores, get_typestore
 
-    store = get_typestore(Stores.ROS2_JAZZY)
+    from wheel_terra_estimator.bags.message_types import jazzy_types
+
+    store = jazzy_types()
     with (
         open_bag(source) as bag,
         Writer(target, version=9, storage_plugin=StoragePlugin.MCAP) as writer,
@@ -72,9 +71,9 @@ REPLAY = {
 
 
 def run_live(source, live, *options):
-    program = [sys.executable, '-m', 'wheel_terra_estimator.ros.live_drive', str(source)]
-    command = [*program, '-o', str(live), *options]
-    subprocess.run(command, check=True, timeout=240, stdout=subprocess.DEVNULL)
+    from wheel_terra_estimator.ros import live_drive
+
+    assert live_drive.main([str(source), '-o', str(live), *options]) == 0
 
 
 def assert_same_bits(live, again, least):
@@ -87,7 +86,7 @@ def assert_same_bits(live, again, least):
         assert ours[topic] == messages, topic
 
 
-@pytest.mark.parametrize('bag', REPLAY)
+@pytest.mark.parametrize('bag', ['entrapment', pytest.param('pathfinder', marks=pytest.mark.slow)])
 def test_live_and_replayed_numbers_are_the_same_bits(bag, tmp_path):
     """Above its pace a recording gets out of order; the log of arrivals knows how.
 
@@ -95,7 +94,7 @@ def test_live_and_replayed_numbers_are_the_same_bits(bag, tmp_path):
     """
     live, again, arrival = tmp_path / 'live', tmp_path / 'again', tmp_path / 'arrival.txt'
     source = tmp_path / 'source'
-    piece(DEMO / bag, source, 15.0)
+    piece(DEMO / bag, source, 10.0)
     logged = ['--arrival', str(arrival), *REPLAY[bag]]
     run_live(source, live, '--rate', '4', *logged)
     assert main(['replay', str(source), '-o', str(again), *logged]) == 0
@@ -105,7 +104,7 @@ def test_live_and_replayed_numbers_are_the_same_bits(bag, tmp_path):
 def test_as_fast_as_it_goes_is_in_the_order_of_the_bag(tmp_path):
     """A frequent topic does not fall behind the others, so no log of arrivals is needed."""
     live, again, source = tmp_path / 'live', tmp_path / 'again', tmp_path / 'source'
-    piece(DEMO / 'pathfinder', source, 15.0)
+    piece(DEMO / 'pathfinder', source, 10.0)
     run_live(source, live, *REPLAY['pathfinder'])
     assert main(['replay', str(source), '-o', str(again), *REPLAY['pathfinder']]) == 0
-    assert_same_bits(live, again, least=140)
+    assert_same_bits(live, again, least=90)

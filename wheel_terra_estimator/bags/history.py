@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from wheel_terra_estimator.bags.message_types import jazzy_types
 from wheel_terra_estimator.bags.storage import Bag
 from wheel_terra_estimator.bags.thinning import ThinnedRows
 from wheel_terra_estimator.errors import UserError
@@ -229,9 +230,7 @@ def read_estimates(bag: Bag, namespace: str = f'/{NODE}') -> EstimateHistory:
     UserError
         The bag holds no estimates.
     """
-    from rosbags.typesys import Stores, get_typestore
-
-    store = get_typestore(Stores.ROS2_JAZZY)
+    store = jazzy_types()
     types = {f'{namespace}/{topic}': kind for topic, kind in OUTPUT_TYPES.items()}
     types['/diagnostics'] = 'diagnostic_msgs/msg/DiagnosticArray'
     if f'{namespace}/slip' not in bag.topics:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from wheel_terra_estimator.bags.message_types import jazzy_types
 from wheel_terra_estimator.messages.convert import BASE_FRAME, JOINT_STATE
 from wheel_terra_estimator.messages.diagnostics import Status
 
@@ -18,9 +19,7 @@ class MessageFactory:
     """Builds messages that rosbags can serialise; stamps are integer nanoseconds."""
 
     def __init__(self) -> None:
-        from rosbags.typesys import Stores, get_typestore
-
-        self.store = get_typestore(Stores.ROS2_JAZZY)
+        self.store = jazzy_types()
 
     def make(self, kind: str, **values: Any) -> Any:
         """Return a message of a type such as ``std_msgs/msg/Bool``."""

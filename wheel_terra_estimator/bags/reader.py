@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from wheel_terra_estimator.bags.limits import LIMITS, Limits, in_words
+from wheel_terra_estimator.bags.message_types import jazzy_types
 from wheel_terra_estimator.bags.storage import Bag, open_bag
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.configuration.parameters import nearest
@@ -65,12 +66,10 @@ class MeasurementReader:
     """
 
     def __init__(self, bag: Bag, remaps: Mapping[str, str], configuration: Configuration) -> None:
-        from rosbags.typesys import Stores, get_typestore
-
         self.bag = bag
         self.converter = InputConverter(input_layout(configuration))
         # Standard types only, so that a bag without message definitions is read as well.
-        self._store = get_typestore(Stores.ROS2_JAZZY)
+        self._store = jazzy_types()
         self.topics: dict[str, str] = {}
         self.absent: list[str] = []
         for name in self.converter.layout.topics:

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from wheel_terra_estimator.bags.message_types import jazzy_types
 from wheel_terra_estimator.bags.storage import Bag
 from wheel_terra_estimator.checks.series import (
     ImuSeries,
@@ -86,9 +87,7 @@ def read_series(
     most : int
         Messages of a topic that are kept; the rest of a longer recording is not looked at.
     """
-    from rosbags.typesys import Stores, get_typestore
-
-    store = get_typestore(Stores.ROS2_JAZZY)
+    store = jazzy_types()
     chosen = choose_topics(bag, remaps)
     by_topic = {topic: own for own, topic in chosen.items()}
     collectors: dict[str, _Collector] = {

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from wheel_terra_estimator.bags.message_types import jazzy_types
 from wheel_terra_estimator.bags.reader import MeasurementReader
 from wheel_terra_estimator.bags.storage import Bag
 from wheel_terra_estimator.bags.thinning import ThinnedRows
@@ -122,9 +123,7 @@ def _slip_from_velocity(
 
 
 def _messages(bag: Bag, topic: str) -> Iterator[Any]:
-    from rosbags.typesys import Stores, get_typestore
-
-    store = get_typestore(Stores.ROS2_JAZZY)
+    store = jazzy_types()
     if topic in bag.topics and bag.topics[topic].type == _TYPES[topic]:
         for _, _, data in bag.messages((topic,)):
             yield store.deserialize_cdr(data, _TYPES[topic])
