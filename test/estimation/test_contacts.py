@@ -15,6 +15,7 @@ from wheel_terra_estimator.estimation.contacts.linearisation import Linearisatio
 from wheel_terra_estimator.estimation.contacts.loads import LoadState, WheelLoads
 from wheel_terra_estimator.estimation.contacts.pulls import Pulls
 from wheel_terra_estimator.estimation.contacts.stationary_wheels import StationaryWheels
+from wheel_terra_estimator.estimation.contacts.steering import headings, straight_headings
 from wheel_terra_estimator.estimation.contacts.torque_change import TorqueChange
 from wheel_terra_estimator.estimation.contacts.turning import Turning
 from wheel_terra_estimator.estimation.contacts.unloaded_wheels import UnloadedWheels
@@ -47,7 +48,7 @@ def window(yaw=0.0, pitch=0.0, force=(0.0, 0.0, 9.8), readings=5):
 def turned(parts, yaw, seconds=10.0, pitch=0.0, speed=0.05):
     turning = Turning(parts.rover, parts.sensors)
     for _ in range(round(10 * seconds)):
-        turning.update(window(yaw, pitch), 0.1, speed, 0.05)
+        turning.update(window(yaw, pitch), 0.1, speed, 0.05, straight_headings(parts.rover))
     return turning
 
 
@@ -63,7 +64,10 @@ def test_a_steady_turn_weakens_the_shear_models_by_its_lateral_motion(parts):
 
 def test_a_change_of_the_turning_may_change_the_speed_for_a_second(parts):
     turning = turned(parts, 0.0)
-    changes = [turning.update(window(0.05), 0.1, 0.05, 0.05).speed_change for _ in range(60)]
+    changes = [
+        turning.update(window(0.05), 0.1, 0.05, 0.05, straight_headings(parts.rover)).speed_change
+        for _ in range(60)
+    ]
     side = 0.05 * parts.rover.curvature_length / 0.05
     assert max(changes) == pytest.approx(1.5 * (side - 0.05) * 0.05, rel=0.2)
     assert changes[-1] == 0.0
@@ -72,12 +76,12 @@ def test_a_change_of_the_turning_may_change_the_speed_for_a_second(parts):
 def test_the_contacts_form_anew_over_a_contact_length(parts):
     turning = turned(parts, 0.0)
     for _ in range(3):
-        turning.update(window(0.05), 0.1, 0.05, 0.05)
+        turning.update(window(0.05), 0.1, 0.05, 0.05, straight_headings(parts.rover))
     before = turning.state.transient
     assert before > 0.1
     cycles = round(3.0 * parts.rover.contact_length / 0.005)
     for _ in range(cycles):
-        turning.update(window(0.05), 0.1, 0.05, 0.05)
+        turning.update(window(0.05), 0.1, 0.05, 0.05, straight_headings(parts.rover))
     assert turning.state.transient < 0.4 * before
 
 
@@ -107,6 +111,59 @@ def test_a_reversal_begins_a_new_contact(parts):
     assert age.state.travel == 0.0
     assert age.update(-0.05) == (False, False)
     assert age.shear_variance > 100.0 * late
+
+
+# -- Steering -----------------------------------------------------------------------------------
+
+
+def rigid_body(rover, angles, speed, side, yaw_rate):
+    """Return the speed of each hub along and across its wheel, from the cross product."""
+    hubs = np.column_stack([rover.longitudinal, rover.lateral, np.zeros(rover.wheel_count)])
+    velocity = np.array([speed, side, 0.0]) + np.cross([0.0, 0.0, yaw_rate], hubs)
+    ahead = np.column_stack([np.cos(angles), np.sin(angles)])
+    left = np.column_stack([-np.sin(angles), np.cos(angles)])
+    return (velocity[:, :2] * ahead).sum(axis=1), (velocity[:, :2] * left).sum(axis=1)
+
+
+def test_wheels_that_follow_ackermann_are_not_pushed_sideways(parts):
+    """All axles steer about a point 2 m to the left: rim speeds are the distances from it."""
+    rover, yaw_rate = parts.rover, 0.03
+    distance = 2.0 - np.array(rover.lateral)
+    angles = np.arctan2(rover.longitudinal, distance)
+    found = headings(rover, angles.tolist())
+    expected = yaw_rate * np.hypot(rover.longitudinal, distance)
+    speeds = [found.speed(i, 2.0 * yaw_rate, yaw_rate) for i in range(6)]
+    assert speeds == pytest.approx(expected)
+    assert found.side_speeds(2.0 * yaw_rate, yaw_rate) == pytest.approx([0.0] * 6, abs=1e-12)
+
+
+def test_a_rover_whose_wheels_all_head_aside_moves_aside(parts):
+    found = headings(parts.rover, [0.3] * 6)
+    assert found.by_speed == pytest.approx([1.0 / math.cos(0.3)] * 6)
+    assert found.side_by_speed == pytest.approx([0.0] * 6)
+
+
+def test_any_steering_is_that_of_a_rigid_body_which_slides_least(parts):
+    rng = np.random.default_rng(3)
+    angles, speed, yaw_rate = rng.uniform(-0.6, 0.6, 6), 0.05, 0.04
+    found = headings(parts.rover, angles.tolist())
+    drifts = np.linspace(-0.1, 0.1, 20001)
+    across = [
+        (rigid_body(parts.rover, angles, speed, v, yaw_rate)[1] ** 2).sum() for v in drifts[::100]
+    ]
+    coarse = drifts[::100][int(np.argmin(across))]
+    fine = coarse + np.linspace(-1e-3, 1e-3, 2001)
+    across = [(rigid_body(parts.rover, angles, speed, v, yaw_rate)[1] ** 2).sum() for v in fine]
+    along, aside = rigid_body(parts.rover, angles, speed, fine[int(np.argmin(across))], yaw_rate)
+    speeds = [found.speed(i, speed, yaw_rate) for i in range(6)]
+    assert speeds == pytest.approx(along.tolist(), abs=1e-5)
+    assert found.side_speeds(speed, yaw_rate) == pytest.approx(aside.tolist(), abs=1e-5)
+
+
+def test_angles_of_nought_are_those_of_a_rover_that_does_not_steer(parts):
+    found, straight = headings(parts.rover, [0.0] * 6), straight_headings(parts.rover)
+    for gains, expected in zip(found[:-1], straight[:-1], strict=True):
+        assert gains == pytest.approx(expected)
 
 
 # -- What the ground asks -----------------------------------------------------------------------
@@ -189,11 +246,12 @@ def test_wheels_that_turn_against_each_other_have_no_middle_rim_speed(parts):
 
 def test_the_load_of_an_unloaded_wheel_goes_to_the_others(parts):
     loads, zero = WheelLoads(parts.rover), (0.0,) * 6
-    level = loads.update(window(), zero, zero, (False,) * 6)
-    without = loads.update(window(), zero, zero, (True, *(False,) * 5))
+    straight = straight_headings(parts.rover)
+    level = loads.update(window(), zero, zero, (False,) * 6, straight)
+    without = loads.update(window(), zero, zero, (True, *(False,) * 5), straight)
     assert without.load[0] == 0.0
     assert sum(without.load) == pytest.approx(sum(level.load))
-    assert loads.update(InertialWindow(), zero, zero, (False,) * 6) == without  # held
+    assert loads.update(InertialWindow(), zero, zero, (False,) * 6, straight) == without  # held
 
 
 # -- Wheels that stand ------------------------------------------------------------------------
@@ -203,7 +261,9 @@ def standing_pull(parts, torque, speed, lateral_motion=0.0):
     x = parts.filter().mean.copy()
     x[SPEED] = speed
     wheels = StationaryWheels(parts.rover, parts.sensors, parts.layout, parts.models)
-    return wheels.pull(0, x, torque, 60.0, yaw_rate=0.0, lateral_motion=lateral_motion)
+    headings = straight_headings(parts.rover)
+    given = {'yaw_rate': 0.0, 'headings': headings, 'lateral_motion': lateral_motion}
+    return wheels.pull(0, x, torque, 60.0, **given)
 
 
 @pytest.mark.parametrize('torque', [-8.0, 20.0])
@@ -242,6 +302,7 @@ def forces_at(parts, slip, strength=0.0):
             ekf.mean,
             turns=turns,
             yaw_rate=0.0,
+            headings=straight_headings(parts.rover),
             rims=FORWARD,
             loads=loads,
             leaving_angles=(NAN,) * 6,
@@ -295,6 +356,7 @@ def test_the_residual_of_the_sum_is_distributed_as_least_squares_does(parts):
     found = Pulls(parts.rover, parts.sensors, (300.0,) * 6).distributed(
         pulls.tolist(),
         covariance.sum(axis=1),
+        np.ones(6),
         SumOfPulls(total, 1800.0, variance),
         (300.0,) * 6,
         0.0,
@@ -319,6 +381,7 @@ def published_pull(parts, excess, lateral_motion=0.0):
             forces,
             None,
             loads=LoadState(loads, (0.0, 0.0, 9.8), force_known=True),
+            headings=straight_headings(parts.rover),
             turning=(True,) * 6,
             readings=tuple((forces.torque + excess).tolist()),
             slips=(0.3,) * 6,

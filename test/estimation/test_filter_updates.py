@@ -10,6 +10,7 @@ from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.estimation.contacts.linearisation import Linearisation
 from wheel_terra_estimator.estimation.contacts.loads import WheelLoads
 from wheel_terra_estimator.estimation.contacts.stationary_wheels import StationaryPull
+from wheel_terra_estimator.estimation.contacts.steering import straight_headings
 from wheel_terra_estimator.estimation.filter.force_balance import ForceBalance
 from wheel_terra_estimator.estimation.filter.observability import considered_entries
 from wheel_terra_estimator.estimation.filter.prediction import Prediction
@@ -229,6 +230,7 @@ def relaxed(parts, ekf, seconds, loads=None, reference_known=True, speed=0.05, s
             rims=FORWARD,
             loads=loads,
             yaw_rate=0.0,
+            headings=straight_headings(parts.rover),
             leaving_angles=(NAN,) * 6,
             reference_known=reference_known,
         )
@@ -305,6 +307,7 @@ def forces(parts, ekf):
         ekf.mean,
         turns=(True,) * 6,
         yaw_rate=0.0,
+        headings=straight_headings(parts.rover),
         rims=FORWARD,
         loads=loads,
         leaving_angles=(NAN,) * 6,
@@ -347,6 +350,7 @@ def test_the_error_of_a_measured_leaving_angle_weakens_torque_and_balance(parts,
             ekf.mean,
             turns=(True,) * 6,
             yaw_rate=0.0,
+            headings=straight_headings(parts.rover),
             rims=FORWARD,
             loads=loads,
             leaving_angles=(angle,) * 6,
@@ -357,7 +361,10 @@ def test_the_error_of_a_measured_leaving_angle_weakens_torque_and_balance(parts,
         )
         total = balance.sum_of_pulls(window(0.0, 9.8), loads, 0.0)
         along = total._replace(along=float(found.pull.sum()))
-        row = balance.update(ekf, found, along, stationary=[None] * 6, loads=loads, **given)
+        straight = straight_headings(parts.rover)
+        row = balance.update(
+            ekf, found, along, stationary=[None] * 6, headings=straight, loads=loads, **given
+        )
         variances.append((rows[0].variance, row.variance))
         torques.append(float(found.torque[0]))
         pulls.append(found.pull)
@@ -387,16 +394,17 @@ def test_the_balance_of_forces_on_a_slope(parts, ekf):
     along = float(found.pull.sum()) + 12.0
     total = balance.sum_of_pulls(window(along / parts.rover.mass, 9.6), loads, 0.0)
     given = {'loads': loads, 'model_variance': (0.0,) * 6, 'repeats': 1.0}
-    row = balance.update(ekf, found, total, stationary=[None] * 6, **given)
+    straight = straight_headings(parts.rover)
+    row = balance.update(ekf, found, total, stationary=[None] * 6, headings=straight, **given)
     assert row.residual == pytest.approx(12.0, abs=1e-6)
     rear = int(np.argmin(parts.rover.longitudinal))
     ekf.mean[parts.layout.sinkage.start + rear] += 0.01  # the nose points up by it
-    tilted = balance.update(ekf, found, total, stationary=[None] * 6, **given)
+    tilted = balance.update(ekf, found, total, stationary=[None] * 6, headings=straight, **given)
     tilt = 0.01 * parts.rover.rut_tilt[rear]
     assert tilt > 0.0
     assert tilted.residual == pytest.approx(12.0 - parts.rover.mass * 9.6 * tilt)
     standing = [StationaryPull(NAN, 5.0, 20.0), *[None] * 5]
-    held = balance.update(ekf, found, total, stationary=standing, **given)
+    held = balance.update(ekf, found, total, stationary=standing, headings=straight, **given)
     assert held.residual - tilted.residual == pytest.approx(float(found.pull[0]) - 5.0)
 
 

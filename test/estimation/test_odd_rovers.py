@@ -7,6 +7,7 @@ import pytest
 from parts import SAND, Parts
 
 from wheel_terra_estimator.configuration import reader
+from wheel_terra_estimator.estimation.contacts.steering import straight_headings
 from wheel_terra_estimator.estimation.contacts.turning import Turning
 from wheel_terra_estimator.estimation.inputs.inertial import InertialWindow
 from wheel_terra_estimator.estimation.measurements import (
@@ -41,7 +42,9 @@ def test_a_rover_with_one_axle_has_no_curvature_before_it_has_moved():
     parts = Parts(reader.load(ONE_WHEEL))
     turning = Turning(parts.rover, parts.sensors)
     assert turning.curvature(0.05) == 0.0
-    turning.update(InertialWindow(5, 0.0, 0.0, 49.0), 0.1, 0.0, 0.05)
+    turning.update(
+        InertialWindow(5, 0.0, 0.0, 49.0), 0.1, 0.0, 0.05, straight_headings(parts.rover)
+    )
     assert turning.curvature(0.05) == 0.0
 
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from parts import SAND
 
+from wheel_terra_estimator.estimation.core import EstimatorCore
 from wheel_terra_estimator.estimation.estimates import SlipClass
 from wheel_terra_estimator.estimation.measurements import (
     InertialReading,
@@ -391,3 +392,24 @@ def test_the_zero_of_the_pitch_gyro_does_not_reach_the_pulls():
     straight, biased = (estimate(r) for r in (run, with_inertial(run, turned)))
     pulls = [np.array([s.drawbar_pull for s in sets[80:]]) for sets in (straight, biased)]
     assert np.ptp(pulls, axis=0).max() < 0.02 * run.truth.normal_load.mean()
+
+
+def test_a_steered_rover_is_judged_along_its_wheels():
+    """On an arc the inner wheels of a steered rover are slow because they are on inner circles."""
+    drive = simulate(load('steered_turns'), 4, duration=50.0)
+    truth, configuration = drive.truth, drive.configuration
+    turning = np.abs(truth.yaw_rate) > 0.03
+    assert turning.sum() > 100
+    errors = []
+    for told in (True, False):
+        core, found = EstimatorCore(configuration), {}
+        for arrival in drive.arrivals:
+            measurement = arrival.measurement
+            if isinstance(measurement, WheelOdometry) and not told:
+                measurement = replace(measurement, steering=None)
+            found.update((s.stamp, s.slip) for s in core.add(measurement))
+        rows = [i for i in np.flatnonzero(turning) if int(truth.stamp[i]) in found]
+        error = [found[int(truth.stamp[i])] - truth.slip[i] for i in rows]
+        errors.append(float(np.sqrt(np.mean(np.square(error)))))
+    assert errors[0] < 0.06
+    assert errors[0] < 0.4 * errors[1]

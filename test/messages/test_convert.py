@@ -258,3 +258,45 @@ def test_twist_covariance_is_row_major_and_positive() -> None:
     assert matrix[5, 5] == e.yaw_rate_variance
     assert (np.diag(matrix) > 0.0).all()
     assert np.count_nonzero(matrix - np.diag(np.diag(matrix))) == 0
+
+
+@pytest.fixture
+def steered(rover: Any) -> InputConverter:
+    """The left wheel steers; the right one does not."""
+    return InputConverter(input_layout(rover.replace({'wheels.steering_joints': ['turn', '']})))
+
+
+def test_steering_angles_come_in_the_position_of_their_joints(
+    steered: InputConverter, factory: Any
+) -> None:
+    message = factory.joint_state(
+        factory.header(STAMP),
+        ('turn', 'right', 'left'),
+        position=(0.2, 7.0, 8.0),
+        velocity=(0.0, -3.0, 2.0),
+    )
+    measured = steered.convert('joint_states', message)
+    assert measured.rate.tolist() == [2.0, 3.0]
+    np.testing.assert_array_equal(measured.steering, [0.2, math.nan])
+
+
+def test_a_message_of_steering_joints_alone_is_no_fault(
+    steered: InputConverter, factory: Any
+) -> None:
+    message = factory.joint_state(factory.header(STAMP), ('turn',), position=(-0.1,))
+    measured = steered.convert('joint_states', message)
+    assert np.isnan(measured.rate).all()
+    assert measured.steering[0] == -0.1
+    assert not steered.rejected
+    message = factory.joint_state(factory.header(STAMP), ('turn', 'left'), velocity=(0.0, 2.0))
+    assert steered.convert('joint_states', message).steering is None
+    assert steered.rejected == {('joint_states', 'position of steering joints missing'): 1}
+
+
+def test_without_steering_joints_positions_are_not_looked_at(
+    converter: InputConverter, factory: Any
+) -> None:
+    message = factory.joint_state(
+        factory.header(STAMP), ('left',), position=(math.nan,), velocity=(2.0,)
+    )
+    assert converter.convert('joint_states', message).steering is None

@@ -212,3 +212,40 @@ def test_wheels_sink_one_after_the_other_in_a_patch(plant: MakePlant) -> None:
     # Hubs at 0.61, 0 and -0.61 m: the border at 1 m comes after 0.39, 1.0, 1.61 m.
     np.testing.assert_allclose(entered[[0, 2, 4]], [0.39, 1.0, 1.61], atol=0.25)
     assert entered[0] < entered[2] < entered[4]
+
+
+CORNERS = "[front_left_steer, front_right_steer, '', '', rear_left_steer, rear_right_steer]"
+
+
+def test_a_steered_rover_turns_about_its_middle_axle_without_scrub(plant: MakePlant) -> None:
+    """Ackermann: radius v / w, wheels on their circles, no lateral motion of the middle axle."""
+    steered = plant(rover(f'wheels.steering_joints:={CORNERS}'))
+    skidding = plant()
+    drive(steered, 3.0)
+    truth, other = drive(steered, 15.0, 0.05, 0.05), drive(skidding, 18.0, 0.05, 0.05)
+    wheels = rover().wheels
+    expected = np.arctan2(0.05 * wheels.x, 0.05 - 0.05 * wheels.y)
+    inner = np.abs(expected) < 1.2  # the others are at their limit
+    assert truth.steering[inner] == pytest.approx(expected[inner], abs=1e-6)
+    assert truth.yaw_rate > 0.8 * 0.05
+    assert truth.yaw_rate > 1.2 * other.yaw_rate
+    # Slip is that of each wheel along its heading, from the motion of a rigid body.
+    hub = np.stack(
+        [
+            truth.forward_velocity - truth.yaw_rate * wheels.y,
+            truth.lateral_velocity + truth.yaw_rate * wheels.x,
+        ]
+    )
+    along = np.cos(truth.steering) * hub[0] + np.sin(truth.steering) * hub[1]
+    np.testing.assert_allclose(truth.slip_velocity, truth.wheel_rate * wheels.slip_radius - along)
+
+
+def test_the_forces_of_steered_wheels_add_up_in_the_body(plant: MakePlant) -> None:
+    truth = drive(plant(rover(f'wheels.steering_joints:={CORNERS}')), 12.0, 0.05, 0.03)
+    cosine, sine = np.cos(truth.steering), np.sin(truth.steering)
+    along = (truth.drawbar_pull * cosine - truth.side_force * sine).sum()
+    across = (truth.drawbar_pull * sine + truth.side_force * cosine).sum()
+    mass = rover().rover.mass
+    # A steady circle: the soil turns the speed, and holds nothing else.
+    assert across == pytest.approx(mass * truth.yaw_rate * truth.forward_velocity, abs=1.0)
+    assert along == pytest.approx(0.0, abs=1.0)

@@ -32,7 +32,7 @@ FloatArray = NDArray[np.float64]
 
 NANOSECONDS = 1_000_000_000
 AXES = ('x', 'y', 'z')
-PER_WHEEL = ('rate', 'torque', 'sinkage', 'leaving_angle')
+PER_WHEEL = ('rate', 'torque', 'sinkage', 'leaving_angle', 'steering')
 WHOLE = (
     'time',
     *(f'specific_force.{axis}' for axis in AXES),
@@ -61,10 +61,10 @@ def estimate(
         A rosbag2 (folder, ``.mcap``, ``.db3``); what `simulate` gave; or logged values, one row per
         instant in order of time, nan where a sensor said nothing: ``time`` [s]; per wheel
         ``rate.<wheel>`` [rad/s], ``torque.<wheel>`` [N m], ``sinkage.<wheel>`` [m],
-        ``leaving_angle.<wheel>`` [rad]; ``specific_force.x`` (y, z) [m/s^2], ``angular_rate.x``
-        (y, z) [rad/s], ``orientation.x`` (y, z, w); ``reference_velocity`` [m/s] and
-        ``reference_velocity_std``, in the row of the instant of measurement. Vectors are
-        in ``base_link``; rates are positive forward.
+        ``leaving_angle.<wheel>`` [rad], ``steering.<wheel>`` [rad]; ``specific_force.x`` (y, z)
+        [m/s^2], ``angular_rate.x`` (y, z) [rad/s], ``orientation.x`` (y, z, w);
+        ``reference_velocity`` [m/s] and ``reference_velocity_std``, in the row of the instant of
+        measurement. Vectors are in ``base_link``; rates are positive forward.
     rover : str, path, sequence or Configuration
         Configuration files, or bare names of shipped ones; not needed for a simulated drive.
     parameters : sequence of str
@@ -229,7 +229,9 @@ def _measurements(
     def block(names: Iterable[str]) -> FloatArray:
         return np.column_stack([columns.get(name, blank) for name in names])
 
-    rate, torque, sinkage, leaving = (block(f'{f}.{w}' for w in wheels) for f in PER_WHEEL)
+    rate, torque, sinkage, leaving, steering = (
+        block(f'{f}.{w}' for w in wheels) for f in PER_WHEEL
+    )
     force = block(f'specific_force.{axis}' for axis in AXES)
     turn = block(f'angular_rate.{axis}' for axis in AXES)
     attitude = block(f'orientation.{axis}' for axis in (*AXES, 'w'))
@@ -249,4 +251,5 @@ def _measurements(
             stated = deviation[k] ** 2 if np.isfinite(deviation[k]) else 0.0
             yield ReferenceVelocity(stamp, float(velocity[k]), float(stated))
         if np.isfinite(rate[k]).any():
-            yield WheelOdometry(stamp, rate[k], torque[k])
+            angles = steering[k] if np.isfinite(steering[k]).any() else None
+            yield WheelOdometry(stamp, rate[k], torque[k], angles)

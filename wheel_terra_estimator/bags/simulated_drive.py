@@ -96,12 +96,24 @@ class _Sender:
 
     def _wheel_odometry(self, odometry: WheelOdometry, log_time: int) -> None:
         wheels, header = self._wheels, self._make.header(odometry.stamp)
-        message = self._make.joint_state(
-            header,
-            wheels.names,
-            velocity=odometry.rate * wheels.direction,
-            effort=odometry.torque * wheels.direction,
-        )
+        rate, torque = odometry.rate * wheels.direction, odometry.torque * wheels.direction
+        if odometry.steering is None:
+            message = self._make.joint_state(header, wheels.names, velocity=rate, effort=torque)
+        else:
+            # Joints of drives and of steering in one message, as joint_state_broadcaster sends it.
+            angles = {
+                joint: odometry.steering[i]
+                for i, joint in enumerate(wheels.steering_joints)
+                if joint
+            }
+            none = np.full(len(angles), np.nan)
+            message = self._make.joint_state(
+                header,
+                (*wheels.names, *angles),
+                np.concatenate([np.full(wheels.count, np.nan), list(angles.values())]),
+                np.concatenate([rate, none]),
+                np.concatenate([torque, none]),
+            )
         self._bag.write('/joint_states', message, log_time)
         rim = odometry.rate * wheels.slip_radius
         known = ~np.isnan(rim)

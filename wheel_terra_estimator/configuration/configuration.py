@@ -73,6 +73,7 @@ class Wheels(Section):
     y: FloatArray
     z: FloatArray
     direction: FloatArray  # +1 or -1
+    steering_joints: tuple[str, ...]  # that steer each wheel, '' = not steered
     torque_limit: FloatArray  # [N m], 0 = not known
     passes: FloatArray  # pass number of the soil
     wrench_frame: tuple[str, ...]  # of the wrenches that the node publishes, empty text = none
@@ -93,6 +94,11 @@ class Wheels(Section):
 
     slip_radius: FloatArray  # radius that the slip ratio refers to [m]
     wheel: Wheel
+
+    @property
+    def steered(self) -> tuple[bool, ...]:
+        """Which wheels steer."""
+        return tuple(bool(joint) for joint in self.steering_joints)
 
     @property
     def count(self) -> int:

@@ -350,6 +350,13 @@ DECLARED: tuple[Parameter, ...] = (
         at_least=-1,
         at_most=1,
     ),
+    text(
+        'wheels.steering_joints',
+        '',
+        'joint that steers each wheel: its angle [rad, positive left] comes in `position` of '
+        'joint_states; one joint may steer several wheels; empty text = not steered',
+        size='wheels',
+    ),
     number(
         'wheels.torque_limit',
         0.0,

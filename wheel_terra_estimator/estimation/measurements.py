@@ -30,11 +30,15 @@ class WheelOdometry:
         where the message did not hold the wheel.
     torque : numpy.ndarray
         (n,) drive torque, positive when it drives the wheel forward [N m]; nan where unknown.
+    steering : numpy.ndarray or None
+        (n,) steering angle, positive left [rad]; nan where the message did not hold it or the wheel
+        is not steered; None where it held none.
     """
 
     stamp: int
     rate: FloatArray
     torque: FloatArray
+    steering: FloatArray | None = None
 
 
 @dataclass(frozen=True)

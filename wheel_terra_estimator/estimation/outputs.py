@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.contacts.loads import LoadState
 from wheel_terra_estimator.estimation.contacts.pulls import PullState
+from wheel_terra_estimator.estimation.contacts.steering import Headings
 from wheel_terra_estimator.estimation.estimates import NO_ENTRAPMENT_IN_SIGHT, EstimateSet
 from wheel_terra_estimator.estimation.filter.sinkage_process import SinkageState
 from wheel_terra_estimator.estimation.filter.state import (
@@ -60,6 +61,7 @@ class Sources(NamedTuple):
     speed_variance: float
     yaw_rate: float  # [rad/s]
     yaw_rate_std: float
+    headings: Headings
     rims: Floats  # [m/s], nan = unknown
     slips: tuple[WheelSlip, ...]
     loads: LoadState
@@ -206,14 +208,16 @@ class Outputs:
     def _slip_velocity(self, given: Sources) -> tuple[list[float], list[float]]:
         """Return r w - v of each wheel and its deviation [m/s]."""
         velocity, deviation = [], []
-        for rim, y, rim_std in zip(given.rims, self._rover.lateral, self._rim_std, strict=True):
+        headings = given.headings
+        for i, (rim, rim_std) in enumerate(zip(given.rims, self._rim_std, strict=True)):
             if isnan(rim):
                 velocity.append(0.0)
                 deviation.append(_UNKNOWN_STD)
                 continue
-            velocity.append(rim - (given.speed - given.yaw_rate * y))
-            turning = (given.yaw_rate_std * y) ** 2
-            std = math.sqrt(max(given.speed_variance, 0.0) + turning)
+            velocity.append(rim - headings.speed(i, given.speed, given.yaw_rate))
+            turning = (given.yaw_rate_std * headings.by_yaw_rate[i]) ** 2
+            variance = headings.by_speed[i] ** 2 * max(given.speed_variance, 0.0)
+            std = math.sqrt(variance + turning)
             deviation.append(math.hypot(std, rim_std))
         return velocity, deviation
 

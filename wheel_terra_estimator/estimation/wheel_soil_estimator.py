@@ -27,6 +27,7 @@ from wheel_terra_estimator.estimation.contacts.stationary_wheels import (
     StationaryPull,
     StationaryWheels,
 )
+from wheel_terra_estimator.estimation.contacts.steering import Steering
 from wheel_terra_estimator.estimation.contacts.torque_change import TorqueChange
 from wheel_terra_estimator.estimation.contacts.turning import Turning
 from wheel_terra_estimator.estimation.contacts.unloaded_wheels import UnloadedWheels
@@ -143,6 +144,7 @@ class WheelSoilEstimator:
         self._sinkages = SinkageInput(rover.wheel_count)
         self._leaving_angles = LeavingAngleInput(rover.wheel_count)
         # Wheels on the ground.
+        self._steering = Steering(rover)
         self._turning = Turning(rover, sensors)
         self._loads = WheelLoads(rover)
         level = self._loads.state.load
@@ -178,6 +180,7 @@ class WheelSoilEstimator:
             self._wheels,
             self._sinkages,
             self._leaving_angles,
+            self._steering,
             self._turning,
             self._loads,
             self._contact_age,
@@ -250,6 +253,8 @@ class WheelSoilEstimator:
             self._leaving_angles.update(time, inputs.leaving_angle)
         if inputs.wheel_odometry is not None:
             self._wheels.update(time, inputs.wheel_odometry)
+            if inputs.wheel_odometry.steering is not None:
+                self._steering.update(inputs.wheel_odometry.steering)
 
     def _cycle_is_due(self, time: float) -> bool:
         before = self._speed.state.cycle_time
@@ -306,6 +311,7 @@ class WheelSoilEstimator:
             forces,
             total,
             loads=cycle.loads,
+            headings=self._steering.state.headings,
             turning=cycle.turns,
             readings=self._wheels.state.torque,
             slips=tuple([wheel.slip for wheel in self._slips.state]),
@@ -319,14 +325,15 @@ class WheelSoilEstimator:
         dt = speed.since_cycle(time)
         window = self._inertial.take()
         fastest = self._wheels.fastest()
-        turning = self._turning.update(window, dt, float(ekf.mean[SPEED]), fastest)
+        headings = self._steering.state.headings
+        turning = self._turning.update(window, dt, float(ekf.mean[SPEED]), fastest, headings)
         pulls = self._pulls.state
         loads = self._loads.update(
-            window, pulls.model_pull, pulls.torque, self._unloaded.state.unloaded
+            window, pulls.model_pull, pulls.torque, self._unloaded.state.unloaded, headings
         )
         speed.inflate(turning.speed_change)
         rims = self._wheels.rim_speeds(time)
-        unturned = RimSpeeds.of(rims, turning.yaw_rate, rover.lateral)
+        unturned = RimSpeeds.of(rims, turning.yaw_rate, headings)
         reference_known = self._reference.known(time)
         event = self._contact_age.update(unturned.typical)
         demand = self._contact_age.state.direction * loads.slope_share if window.readings else NAN
@@ -386,6 +393,7 @@ class WheelSoilEstimator:
                 rims=cycle.rims,
                 loads=cycle.loads.load,
                 yaw_rate=self._turning.state.yaw_rate,
+                headings=self._steering.state.headings,
                 leaving_angles=cycle.leaving_angles,
                 reference_known=cycle.reference_known,
             )
@@ -462,6 +470,7 @@ class WheelSoilEstimator:
             x,
             turns=cycle.turns,
             yaw_rate=motion.yaw_rate,
+            headings=self._steering.state.headings,
             rims=cycle.rims,
             loads=loads,
             leaving_angles=cycle.leaving_angles,
@@ -495,6 +504,7 @@ class WheelSoilEstimator:
             forces,
             total,
             stationary=stationary,
+            headings=self._steering.state.headings,
             loads=loads,
             model_variance=model_variance,
             repeats=repeats,
@@ -517,6 +527,7 @@ class WheelSoilEstimator:
                     cycle.torque[i],
                     load,
                     yaw_rate=motion.yaw_rate,
+                    headings=self._steering.state.headings,
                     lateral_motion=motion.lateral_motion,
                 )
             expectation = self._stationary.expectation(pull, load, share, motion.lateral_motion)
@@ -540,6 +551,7 @@ class WheelSoilEstimator:
                 math.sqrt(max(variance, 0.0)),
                 motion.yaw_rate,
                 self._turning.yaw_rate_std,
+                self._steering.state.headings,
                 motion.lateral_motion,
                 stopped=self._zero_velocity.standing()
                 and time >= self._reference.state.sliding_until,
@@ -583,7 +595,7 @@ class WheelSoilEstimator:
         return self._speed.present(
             self._ekf,
             time,
-            RimSpeeds.of(rims, self._turning.state.yaw_rate, self._rover.lateral),
+            RimSpeeds.of(rims, self._turning.state.yaw_rate, self._steering.state.headings),
             self._trusted(self._inertial.state.window, time),
             inflated=self._reference.known(time),
         )
@@ -603,6 +615,7 @@ class WheelSoilEstimator:
             speed_variance=variance,
             yaw_rate=self._turning.state.yaw_rate,
             yaw_rate_std=self._turning.yaw_rate_std,
+            headings=self._steering.state.headings,
             rims=rims,
             slips=self._slips.state,
             loads=loads,

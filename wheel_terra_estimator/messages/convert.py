@@ -69,6 +69,7 @@ class InputLayout:
     """What of the configuration is needed to read messages; arrays are (n,), one per wheel."""
 
     names: tuple[str, ...]
+    steering: dict[str, list[int]]  # joint that steers -> wheels that it steers
     directions: FloatArray  # +1, or -1 where the joint counts negative forward
     lateral_positions: FloatArray  # y of the wheels in base_link [m]
     slip_radius: FloatArray  # [m]
@@ -85,8 +86,13 @@ class InputLayout:
 def input_layout(configuration: Configuration) -> InputLayout:
     """Return what of the configuration is needed to read messages."""
     wheels, sensors = configuration.wheels, configuration.sensors
+    steering: dict[str, list[int]] = {}
+    for i, joint in enumerate(wheels.steering_joints):
+        if joint:
+            steering.setdefault(joint, []).append(i)
     return InputLayout(
         names=wheels.names,
+        steering=steering,
         directions=wheels.direction,
         lateral_positions=wheels.y,
         slip_radius=wheels.slip_radius,
@@ -136,7 +142,11 @@ class InputConverter:
         return f'{reason} but {there}; wheels.names: {", ".join(self.layout.names)}'
 
     def joint_states(self, message: Any) -> WheelOdometry | None:
-        """Wheel rates and torques; wheels that the message does not hold are nan."""
+        """Wheel rates, torques and steering angles; what the message does not hold is nan."""
+        steering = self._steering(message) if self.layout.steering else None
+        if steering is not None and not self._columns_of(message.name)[0]:
+            unknown = np.full(len(self.layout.names), math.nan)
+            return WheelOdometry(stamp_of(message), unknown, unknown, steering)
         values = self._wheel_values('joint_states', message.name, message.velocity, 'velocity')
         if values is None:
             return None
@@ -151,7 +161,21 @@ class InputConverter:
         if unknown and unknown > len(values) - len(set(self._columns_of(message.name)[1])):
             self.rejected['joint_states', 'velocity of a wheel is nan (taken as unknown)'] += 1
         directions = self.layout.directions
-        return WheelOdometry(stamp_of(message), values * directions, torque * directions)
+        return WheelOdometry(stamp_of(message), values * directions, torque * directions, steering)
+
+    def _steering(self, message: Any) -> FloatArray | None:
+        """Return the steering angles of the wheels [rad], nan where there is none; None: none."""
+        joints = self.layout.steering
+        there = [k for k, name in enumerate(message.name) if name in joints]
+        if not there:
+            return None
+        if len(message.position) != len(message.name):
+            self.rejected['joint_states', 'position of steering joints missing'] += 1
+            return None
+        angles = np.full(len(self.layout.names), math.nan)
+        for k in there:
+            angles[joints[message.name[k]]] = message.position[k]
+        return angles
 
     def odom(self, message: Any) -> WheelOdometry:
         """Wheel rates of a rover that publishes no joint states, from its wheel odometry."""

@@ -20,9 +20,11 @@ from wheel_terra_estimator.simulation.commands import Command
 from wheel_terra_estimator.simulation.contact import ContactModel, SoilForces
 from wheel_terra_estimator.simulation.contact_memory import ContactMemory, Shear
 from wheel_terra_estimator.simulation.drives import Drives
+from wheel_terra_estimator.simulation.steering import SteeringDrives
 from wheel_terra_estimator.simulation.suspension import Suspension, suspension_of
 from wheel_terra_estimator.simulation.terrain import Terrain
-from wheel_terra_estimator.simulation.truth import Truth, wheel_slip
+from wheel_terra_estimator.simulation.truth import Truth
+from wheel_terra_estimator.terramechanics.kinematics import slip_ratio
 
 FloatArray = NDArray[np.float64]
 
@@ -115,7 +117,9 @@ class RoverPlant:
         n = wheels.count
         one, zero = np.ones(n), np.zeros(n)
         # Hub speed (forward, lateral) by body speed (forward, lateral, turning): (2, 3, n).
-        self._lever = np.array([[one, zero, -wheels.y], [zero, one, wheels.x]])
+        self._body_lever = np.array([[one, zero, -wheels.y], [zero, one, wheels.x]])
+        self._steering = SteeringDrives(configuration)
+        self._lever = self._body_lever
         # A plane through the wheels gives the attitude of ground and chassis.
         self._plane = np.linalg.pinv(np.stack([wheels.x, wheels.y, one], axis=1))[:2]
 
@@ -152,10 +156,12 @@ class RoverPlant:
         wheels, memory, forces = self._wheels, self._memory, self._forces
         forward, lateral, turning = (float(speed) for speed in self._speeds)
         rim = self._rate * wheels.slip_radius
+        along = np.einsum('jn,j->n', self._lever[0], self._speeds)
         return Truth(
             time=self._time,
-            slip=wheel_slip(forward, turning, wheels.y, rim, self._rest_speed),
-            slip_velocity=rim - (forward - turning * wheels.y),
+            slip=np.asarray(slip_ratio(along, rim, self._rest_speed)),
+            slip_velocity=rim - along,
+            steering=self._steering.angle,
             drawbar_pull=forces.pull,
             side_force=forces.side_force,
             normal_load=self._carried,
@@ -241,7 +247,9 @@ class RoverPlant:
     def _advance(self, command: Command, dt: float) -> None:
         wheels = self._wheels
         self._look_at_ground()
-        commanded = (command.forward - command.turn_rate * wheels.y) / wheels.slip_radius
+        self._steer(command, dt)
+        hubs = self._steering.commanded_hubs(command)
+        commanded = self._steering.along_wheels(hubs)[0] / wheels.slip_radius
         self._drives.command(commanded * self.faults.rate_factor, self.faults.torque_factor, dt)
         speeds, rate = self._speeds, self._rate
         for _ in range(MOST_ITERATIONS):
@@ -258,6 +266,11 @@ class RoverPlant:
         self._move(dt)
         self._balance(dt)
         self._time += dt
+
+    def _steer(self, command: Command, dt: float) -> None:
+        if self._steering.any:
+            self._steering.follow(command, dt)
+            self._lever = self._steering.along_wheels(self._body_lever)
 
     def _newton_step(
         self, speeds: FloatArray, rate: FloatArray, dt: float
@@ -342,12 +355,19 @@ class RoverPlant:
     def _contact_force(self) -> FloatArray:
         """Return the sum of all soil forces over the mass, along the ground below the rover."""
         up = self._gravity * np.sqrt(max(1.0 - float(self._sine @ self._sine), 0.01))
-        push = self._forces.pull - self._load * self._tilt
-        return np.array([push.sum() / self._mass, self._forces.side_force.sum() / self._mass, up])
+        on_body = np.einsum('ijn,in->j', self._lever, self._wheel_push())
+        push = on_body[0] - (self._load * self._tilt).sum()
+        return np.array([push / self._mass, on_body[1] / self._mass, up])
+
+    def _wheel_push(self) -> FloatArray:
+        """Return the (2, n) forces along and across each wheel [N]."""
+        return np.stack([self._forces.pull, self._forces.side_force])
 
     def _static_loads(self, force: FloatArray) -> FloatArray:
-        moment = self._forces.torque - self._forces.pull * self._wheels.radius
-        loads = self._suspension.normal_loads(self._mass, force, self._forces.pull, moment)
+        cosine = self._lever[0, 0]  # of the steering angle
+        moment = (self._forces.torque - self._forces.pull * self._wheels.radius) * cosine
+        pull = self._forces.pull * cosine
+        loads = self._suspension.normal_loads(self._mass, force, pull, moment)
         loads = loads * self.faults.load_factor
         return loads * self._mass * force[2] / loads.sum()
 

@@ -92,6 +92,7 @@ class SensorSuite:
             name: period * (1.0 if name == 'odometry' else random.uniform())
             for name, period in self._periods.items()
         }
+        self._steered = np.array(configuration.wheels.steered)
         self._before: Truth | None = None
         self._counted: FloatArray | None = None
         self._held_sinkage = np.zeros(n)
@@ -154,7 +155,11 @@ class SensorSuite:
             torque = np.where(missing, np.nan, torque)
         if (wheels := self._failed('nan_values', time)) is not None:
             rate = np.where(wheels & (self._random.uniform(size=n) < 0.2), np.nan, rate)
-        yield WheelOdometry(self._stamp(time), rate, torque)
+        steering = None
+        if self._steered.any():
+            steering = _between(before.steering, truth.steering, part)
+            steering = np.where(self._steered, steering, np.nan)
+        yield WheelOdometry(self._stamp(time), rate, torque, steering)
 
     def _imu(self, before: Truth, truth: Truth, part: float, time: float) -> Iterator[Measurement]:
         if not self._there.imu or self._failed('no_imu', time) is not None:

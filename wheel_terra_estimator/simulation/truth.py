@@ -10,8 +10,6 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from wheel_terra_estimator.terramechanics.kinematics import slip_ratio
-
 FloatArray = NDArray[np.float64]
 
 
@@ -33,6 +31,7 @@ class Truth:
     torque: FloatArray
     wheel_rate: FloatArray
     wheel_angle: FloatArray
+    steering: FloatArray  # positive left [rad]
     leaving_angle: FloatArray
     pass_number: FloatArray  # 1 on virgin soil
     forward_velocity: float
@@ -114,13 +113,6 @@ class TruthTable:
         """Return when the rover was first entrapped, from the first row on [s]."""
         rows = np.flatnonzero(self.stuck)
         return None if rows.size == 0 else float(self.stamp[rows[0]] - self.stamp[0]) * 1e-9
-
-
-def wheel_slip(
-    forward: float, yaw_rate: float, wheel_y: FloatArray, rim_speed: FloatArray, rest_speed: float
-) -> FloatArray:
-    """Return the slip ratio of each wheel from its own ground speed, nan at rest."""
-    return np.asarray(slip_ratio(forward - yaw_rate * wheel_y, rim_speed, rest_speed))
 
 
 def slip_classes(slip: FloatArray, thresholds: FloatArray) -> NDArray[np.uint8]:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wheel_terra_estimator.estimation.component import Component
+from wheel_terra_estimator.estimation.contacts.steering import Headings
 from wheel_terra_estimator.estimation.contacts.wheel_models import (
     WheelForces,
     WheelModels,
@@ -116,6 +117,7 @@ class Linearisation(Component[SlopeState]):
         *,
         turns: tuple[bool, ...],
         yaw_rate: float,
+        headings: Headings,
         rims: Floats,
         loads: Floats,
         leaving_angles: Floats,
@@ -130,6 +132,8 @@ class Linearisation(Component[SlopeState]):
             Wheels for which the models hold, see `turning`.
         yaw_rate : float
             [rad/s].
+        headings : Headings
+            Of the wheels.
         rims, loads, leaving_angles : tuple of float
             Of each wheel [m/s], [N], [rad]; nan = unknown.
         """
@@ -147,7 +151,7 @@ class Linearisation(Component[SlopeState]):
             rim = abs(rims[i])
             direction = 1.0 if rims[i] > 0.0 else -1.0
             wheel = WheelState(
-                speed_ratio=direction * (speed - yaw_rate * rover.lateral[i]) / rim,
+                speed_ratio=direction * headings.speed(i, speed, yaw_rate) / rim,
                 sinkage=sinkage[i],
                 load=loads[i],
                 strength=strength + error[i],
@@ -165,8 +169,9 @@ class Linearisation(Component[SlopeState]):
             torque_slopes[i], pull_slopes[i] = by_torque, by_pull = self.smoothed(
                 torque_slopes[i], pull_slopes[i], forces, moment
             )
-            self._fill(rows[0, i], i, by_pull, direction, rim)
-            self._fill(rows[1, i], i, by_torque, direction, rim)
+            by_speed = headings.by_speed[i] / rim
+            self._fill(rows[0, i], i, by_pull, direction, by_speed)
+            self._fill(rows[1, i], i, by_torque, direction, by_speed)
         self.state = SlopeState(tuple(torque_slopes), tuple(pull_slopes))
         return ContactForces(x.copy(), pull, torque, rows[0], rows[1], pull_noise, torque_noise)
 
@@ -198,13 +203,16 @@ class Linearisation(Component[SlopeState]):
         return torque, pull
 
     def _fill(
-        self, row: FloatArray, wheel: int, slopes: Floats, direction: float, rim: float
+        self, row: FloatArray, wheel: int, slopes: Floats, direction: float, by_speed: float
     ) -> None:
-        """Write the derivatives of a wheel's force into its row of the Jacobian."""
+        """Write the derivatives of a wheel's force into its row of the Jacobian.
+
+        `by_speed` is the derivative of its v / rim speed by the body's speed [s/m].
+        """
         layout = self._layout
         by_ratio, by_sinkage, by_strength, by_modulus, by_centroid, by_mound = slopes
         # The ratio is that of the direction of rolling: the two signs cancel.
-        row[SPEED] = by_ratio / rim
+        row[SPEED] = by_ratio * by_speed
         row[layout.sinkage.start + wheel] = direction * by_sinkage
         row[SHEAR_STRENGTH] = row[layout.shear_error.start + wheel] = direction * by_strength
         row[SHEAR_MODULUS] = direction * by_modulus

@@ -7,6 +7,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from wheel_terra_estimator.estimation.component import Component
+from wheel_terra_estimator.estimation.contacts.steering import Headings
 from wheel_terra_estimator.estimation.inputs.inertial import InertialWindow
 from wheel_terra_estimator.estimation.rover import Rover
 
@@ -37,7 +38,12 @@ class WheelLoads(Component[LoadState]):
         self._rover = rover
 
     def update(
-        self, window: InertialWindow, pulls: Floats, torques: Floats, unloaded: tuple[bool, ...]
+        self,
+        window: InertialWindow,
+        pulls: Floats,
+        torques: Floats,
+        unloaded: tuple[bool, ...],
+        headings: Headings,
     ) -> LoadState:
         """Work out the loads of a cycle; they are held where no IMU reading came.
 
@@ -49,11 +55,16 @@ class WheelLoads(Component[LoadState]):
             Of each wheel after the last cycle [N], [N m].
         unloaded : tuple of bool
             Wheels that carry nothing: their load goes to the others.
+        headings : Headings
+            Of the wheels: pulls and moments act along them.
         """
         if window.readings:
             force = window.mean_force()
             rover = self._rover
             moment = [t - f * r for t, f, r in zip(torques, pulls, rover.rim_radius, strict=True)]
+            if headings.steered:
+                moment = [m * c for m, c in zip(moment, headings.along, strict=True)]
+                pulls = tuple([f * c for f, c in zip(pulls, headings.along, strict=True)])
             loads = rover.load.loads(force, pulls, moment).tolist()
             if any(unloaded):
                 total = sum(loads)

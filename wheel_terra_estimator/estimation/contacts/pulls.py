@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.contacts.linearisation import ContactForces
 from wheel_terra_estimator.estimation.contacts.loads import LoadState
+from wheel_terra_estimator.estimation.contacts.steering import Headings
 from wheel_terra_estimator.estimation.filter.force_balance import SumOfPulls
 from wheel_terra_estimator.estimation.filter.state import SHEAR_STRENGTH
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
@@ -101,6 +102,7 @@ class Pulls(Component[PullState]):
         total: SumOfPulls | None,
         *,
         loads: LoadState,
+        headings: Headings,
         turning: tuple[bool, ...],
         readings: Floats,
         slips: Floats,
@@ -118,6 +120,8 @@ class Pulls(Component[PullState]):
         total : SumOfPulls or None
             What the specific force says of their sum; None = nothing.
         loads : LoadState
+            Of the wheels.
+        headings : Headings
             Of the wheels.
         turning : tuple of bool
             Wheels for which the models hold.
@@ -171,8 +175,9 @@ class Pulls(Component[PullState]):
         model_pull = tuple(pull)
         if forces is not None and total is not None:
             scrub = (tuning.scrub_std * lateral_motion * np.array(loads.load)) ** 2
-            shares = (joint + np.diag(own)).sum(axis=1) + scrub
-            pull = self.distributed(pull, shares, total, loads.load, tilt)
+            along = np.array(headings.along)
+            shares = (joint + np.diag(own)) @ along + scrub
+            pull = self.distributed(pull, shares, along, total, loads.load, tilt)
         self.state = PullState(
             tuple(pull), tuple(std), model_pull, tuple(torque), tuple(excess), state.stationary
         )
@@ -181,17 +186,20 @@ class Pulls(Component[PullState]):
         self,
         pull: list[float],
         shares: FloatArray,
+        along: FloatArray,
         total: SumOfPulls,
         loads: Floats,
         tilt: float,
     ) -> list[float]:
         """Return the pulls with the residual of their sum distributed among them.
 
-        The shares (n,) are the covariances of each pull with the sum [N^2]. The deviations stay:
+        The shares (n,) are the covariances of each pull with the sum [N^2], in which it counts with
+        `along` (n,), the cosine of its steering angle. The deviations stay:
         what parts the wheels from one another is not known better for it.
         """
-        residual = total.along - total.weight * tilt - sum(pull)
-        gains = shares / (shares.sum() + total.variance)
+        seen = sum(f * c for f, c in zip(pull, along.tolist(), strict=True))
+        residual = total.along - total.weight * tilt - seen
+        gains = shares / (float(along @ shares) + total.variance)
         most = self._tuning.most_drag
         return [
             clipped(f + gain * residual, -most * load, load)

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from wheel_terra_estimator.estimation.contacts.steering import Headings
 from wheel_terra_estimator.estimation.contacts.wheel_models import WheelModels, WheelState
 from wheel_terra_estimator.estimation.filter.state import (
     CENTROID,
@@ -72,6 +73,7 @@ class StationaryWheels:
         load: float,
         *,
         yaw_rate: float,
+        headings: Headings,
         lateral_motion: float,
     ) -> float:
         """Return the pull of a wheel that stands, from its torque [N]; nan without a torque.
@@ -90,11 +92,13 @@ class StationaryWheels:
             [N m], [N].
         yaw_rate, lateral_motion : float
             Turning of the rover [rad/s], [-].
+        headings : Headings
+            Of the wheels.
         """
         if isnan(torque):
             return NAN
         rover, tuning = self._rover, self._tuning
-        speed = float(x[SPEED]) - yaw_rate * rover.lateral[wheel]
+        speed = headings.speed(wheel, float(x[SPEED]), yaw_rate)
         if abs(speed) < rover.rest_speed:
             return clipped(torque / rover.shear_radius[wheel], -load, load)
         direction = 1.0 if speed > 0.0 else -1.0

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from wheel_terra_estimator.estimation.component import Component
+from wheel_terra_estimator.estimation.contacts.steering import Headings
 from wheel_terra_estimator.estimation.inputs.inertial import InertialWindow
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
 from wheel_terra_estimator.estimation.scalars import clipped, gain_of
@@ -44,6 +45,7 @@ class TurningState(NamedTuple):
     """Turning of the rover, curvature of its path."""
 
     yaw_rate: float = 0.0  # smoothed [rad/s]
+    side_speed: float = 0.0  # greatest with which a wheel is pushed sideways [m/s]
     lateral_motion: float = 0.0
     """Lateral motion of the outer wheels over the fastest rim speed, 0 to 1 [-]."""
     lateral_motion_mean: float = 0.0  # over the last second
@@ -71,7 +73,12 @@ class Turning(Component[TurningState]):
         )
 
     def update(
-        self, window: InertialWindow, dt: float, speed: float, fastest_rim: float
+        self,
+        window: InertialWindow,
+        dt: float,
+        speed: float,
+        fastest_rim: float,
+        headings: Headings,
     ) -> TurningState:
         """Take the IMU readings of a cycle of length `dt` [s]; speeds in [m/s]."""
         state = self.state
@@ -84,6 +91,7 @@ class Turning(Component[TurningState]):
         keep = math.exp(-abs(travel) / self._curvature_length)
         state = state._replace(
             yaw_rate=yaw_rate,
+            side_speed=self._side_speed(speed, yaw_rate, headings),
             rotation=keep * state.rotation - window.pitch_rate / window.readings * dt,
             travel=keep * state.travel + travel,
             speed_change=0.0,
@@ -108,8 +116,17 @@ class Turning(Component[TurningState]):
 
         Turning shears the soil sideways too, which the model does not know.
         """
-        side = abs(self.state.yaw_rate) * self._rover.curvature_length / abs(rim_speed)
+        side = self.state.side_speed / abs(rim_speed)
         return self._tuning.scrub * min(side + self.state.transient, 1.0) ** 2
+
+    def _side_speed(self, speed: float, yaw_rate: float, headings: Headings) -> float:
+        """Return how fast the wheel is pushed sideways that is pushed most [m/s].
+
+        Wheels that do not steer are all taken as the outermost.
+        """
+        if not headings.steered:
+            return abs(yaw_rate) * self._rover.curvature_length
+        return max(abs(side) for side in headings.side_speeds(speed, yaw_rate))
 
     def _yaw_rate(self, window: InertialWindow) -> float:
         """Return the yaw rate: smoothed where its change may be noise, followed where not."""
@@ -122,7 +139,7 @@ class Turning(Component[TurningState]):
     def _with_lateral_motion(self, state: TurningState, dt: float, fastest: float) -> TurningState:
         """Return the state with the lateral motion, and where turning begins or ends."""
         tuning, rover = self._tuning, self._rover
-        side = min(abs(state.yaw_rate) * rover.curvature_length / fastest, 1.0)
+        side = min(state.side_speed / fastest, 1.0)
         mean = state.lateral_motion_mean
         mean += gain_of(dt, tuning.side_time) * (side - mean)
         change = abs(side - mean) - tuning.side_dead_band

@@ -8,9 +8,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
+import numpy as np
+
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.contacts.linearisation import ContactForces
 from wheel_terra_estimator.estimation.contacts.stationary_wheels import StationaryPull
+from wheel_terra_estimator.estimation.contacts.steering import Headings
 from wheel_terra_estimator.estimation.filter.ekf import GatedFilter, Row
 from wheel_terra_estimator.estimation.filter.state import StateLayout
 from wheel_terra_estimator.estimation.filter.torque import ForceRows
@@ -25,6 +28,9 @@ class BalanceTuning:
     """Tuned on simulated drives, seeds 1000 to 1019."""
 
     weight_std: float = 0.005  # of the weight: what curvature, ruts and mass leave open
+    side_share: float = 0.5
+    """Of the load: the side force that a steered wheel may give, which acts along the body by the
+    sine of its angle (friction angle of sand)."""
     model_share: float = 0.1  # of the load: pull that a doubt of a shear model leaves open
 
 
@@ -73,6 +79,7 @@ class ForceBalance(ForceRows):
         total: SumOfPulls,
         *,
         stationary: Sequence[StationaryPull | None],
+        headings: Headings,
         loads: Floats,
         model_variance: Floats,
         repeats: float,
@@ -89,6 +96,8 @@ class ForceBalance(ForceRows):
             What the specific force says.
         stationary : sequence of StationaryPull or None
             Of each wheel; None where it turns.
+        headings : Headings
+            Of the wheels.
         loads : tuple of float
             [N].
         model_variance : tuple of float
@@ -96,15 +105,20 @@ class ForceBalance(ForceRows):
         repeats : float
             Cycles that are one piece of information.
         """
-        jacobian = forces.pull_rows.sum(axis=0)
+        if headings.steered:
+            jacobian = np.array(headings.along) @ forces.pull_rows
+        else:
+            jacobian = forces.pull_rows.sum(axis=0)
         pull_sum = open_variance = 0.0
         for i, (load, standing) in enumerate(zip(loads, stationary, strict=True)):
+            along, side = headings.along[i], headings.across[i] * self._tuning.side_share * load
+            open_variance += side * side
             if standing is None:
-                pull_sum += float(forces.pull[i])
+                pull_sum += along * float(forces.pull[i])
                 open_variance += model_variance[i] * (self._tuning.model_share * load) ** 2
                 open_variance += float(forces.pull_noise[i]) ** 2
             else:
-                pull_sum += standing.expected
+                pull_sum += along * standing.expected
                 open_variance += standing.std**2
         tilt = rut_tilt(self._rover, self._layout, ekf)
         for i, gain in enumerate(self._rover.rut_tilt):

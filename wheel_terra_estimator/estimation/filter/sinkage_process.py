@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.contacts.linearisation import smoothed_slopes
+from wheel_terra_estimator.estimation.contacts.steering import Headings
 from wheel_terra_estimator.estimation.contacts.wheel_models import WheelModels, WheelState
 from wheel_terra_estimator.estimation.filter.ekf import GatedFilter
 from wheel_terra_estimator.estimation.filter.prediction import Prediction
@@ -112,6 +113,7 @@ class SinkageProcess(Component[SinkageState]):
         rims: Floats,
         loads: Floats,
         yaw_rate: float,
+        headings: Headings,
         leaving_angles: Floats,
         reference_known: bool,
     ) -> float:
@@ -129,6 +131,8 @@ class SinkageProcess(Component[SinkageState]):
             Of each wheel [m/s], [N], [rad]; nan = unknown.
         yaw_rate : float
             [rad/s].
+        headings : Headings
+            Of the wheels.
         reference_known : bool
             Whether a reference velocity tells the slip.
         """
@@ -142,7 +146,7 @@ class SinkageProcess(Component[SinkageState]):
                 prediction.Q[zi, zi] = tuning.resting_walk * dt
                 continue
             direction = 1.0 if rim > 0.0 else -1.0
-            speed = direction * (float(x[SPEED]) - yaw_rate * self._rover.lateral[i])
+            speed = direction * headings.speed(i, float(x[SPEED]), yaw_rate)
             rim = abs(rim)
             travels.append(abs(speed) + tuning.spin_travel * abs(rim - speed))
             if loads[i] <= tuning.least_load:
@@ -163,7 +167,8 @@ class SinkageProcess(Component[SinkageState]):
             prediction.F[zi, zi] = step.memory
             prediction.F[zi, layout.stiffness.start + i] = step.by_stiffness
             prediction.F[zi, SLIP_SINKAGE] = step.by_slip_sinkage
-            prediction.F[zi, SPEED] = share * step.by_speed * direction
+            by_speed = step.by_speed * direction * headings.by_speed[i]
+            prediction.F[zi, SPEED] = share * by_speed
             prediction.Q[zi, zi] = step.noise
         self.state = self.state._replace(slopes=tuple(slopes))
         return dt * math.fsum(travels) / len(rims) if travels else 0.0

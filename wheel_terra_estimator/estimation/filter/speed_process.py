@@ -23,6 +23,7 @@ from typing import NamedTuple
 
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.component import Component
+from wheel_terra_estimator.estimation.contacts.steering import LEAST_ALONG, Headings
 from wheel_terra_estimator.estimation.filter.ekf import GatedFilter
 from wheel_terra_estimator.estimation.filter.prediction import Prediction
 from wheel_terra_estimator.estimation.filter.state import GRAVITY_BIAS, SLIP_PER_DEMAND, SPEED
@@ -103,16 +104,23 @@ class SpeedStep(NamedTuple):
 
 
 class RimSpeeds(NamedTuple):
-    """Rim speeds without the share that turning has in them [m/s]; nan = unknown."""
+    """Rim speeds without the share that turning and steering have in them [m/s]; nan = unknown."""
 
     each: Floats
     typical: float
     """Median of the known ones, so that no single wheel decides; nan = none is known."""
 
     @classmethod
-    def of(cls, rims: Floats, yaw_rate: float, lateral: Floats) -> RimSpeeds:
-        """Take the turning [rad/s] off the rim speeds of wheels at `lateral` [m]."""
-        each = tuple([rim + yaw_rate * y for rim, y in zip(rims, lateral, strict=True)])
+    def of(cls, rims: Floats, yaw_rate: float, headings: Headings) -> RimSpeeds:
+        """Take turning [rad/s] and steering off: as if all wheels rolled along with the body."""
+        each = tuple(
+            [
+                (rim - yaw_rate * by_yaw_rate) / by_speed if by_speed >= LEAST_ALONG else NAN
+                for rim, by_yaw_rate, by_speed in zip(
+                    rims, headings.by_yaw_rate, headings.by_speed, strict=True
+                )
+            ]
+        )
         heard = known(each)
         return cls(each, median(heard) if heard else NAN)
 

@@ -83,6 +83,8 @@ class WheelOdometryInput(Component[WheelOdometryState]):
     def update(self, time: float, odometry: WheelOdometry) -> None:
         """Take a message at a time [s]."""
         state, tuning = self.state, self._tuning
+        if odometry.steering is not None and all(isnan(rate) for rate in odometry.rate.tolist()):
+            return  # steering angles alone
         dt = time - state.time
         keep = 0.0 if dt >= tuning.longest_smoothed else math.exp(-dt / tuning.smoothing_time)
         rim_speed, rate_time = list(state.rim_speed), list(state.rate_time)

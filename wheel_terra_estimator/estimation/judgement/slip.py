@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.component import Component
+from wheel_terra_estimator.estimation.contacts.steering import Headings
 from wheel_terra_estimator.estimation.judgement.classes import (
     UNKNOWN,
     ClassState,
@@ -29,6 +30,8 @@ class SlipTuning:
 
     turning_std: float = 0.05
     """At full lateral motion: turning scrubs the soil sideways (tuned, seeds 1000 to 1019)."""
+    drift: float = 0.05
+    """Sideways over forward speed that no sensor of a steered rover reads: 3 degrees."""
     forgetting: float = 0.02  # growth of the deviation per stamp where no rate is known
     least_std: float = 1e-3
 
@@ -40,6 +43,7 @@ class BodyMotion(NamedTuple):
     speed_std: float
     yaw_rate: float  # [rad/s]
     yaw_rate_std: float
+    headings: Headings  # of the wheels
     lateral_motion: float  # of the outer wheels over the fastest rim speed [-]
     stopped: bool
     """All wheels stand, and no reference velocity says that the rover slides on them."""
@@ -96,9 +100,13 @@ class SlipJudge(Component[tuple[WheelSlip, ...]]):
             # All wheels stand: what the gyro says beside them is noise.
             v, v_std = 0.0, 0.0
         else:
-            lateral = self._rover.lateral[i]
-            v = body.speed - body.yaw_rate * lateral
-            v_std = math.hypot(body.speed_std, body.yaw_rate_std * lateral)
+            headings = body.headings
+            v = headings.speed(i, body.speed, body.yaw_rate)
+            v_std = math.hypot(
+                headings.by_speed[i] * body.speed_std, body.yaw_rate_std * headings.by_yaw_rate[i]
+            )
+            drift = self._tuning.drift * headings.across[i] * body.speed
+            v_std = math.hypot(v_std, drift)
         if abs(rim) < rest and abs(v) < max(rest, 2.0 * v_std):
             return self._at_rest(before, time)
         slip, std = slip_and_deviation(rim, v, v_std, self._rim_std[i], rest)

@@ -27,6 +27,7 @@ from wheel_terra_estimator.estimation.measurements import (
 )
 
 GREATEST_SPEED = 50.0  # rim or body [m/s]; far above any rover
+GREATEST_STEERING = math.pi  # [rad]
 GREATEST_TORQUE = 1.0e5  # [N m]
 GREATEST_FORCE = 500.0  # specific force [m/s^2], 50 g
 GREATEST_RATE = 50.0  # angular rate [rad/s]
@@ -127,7 +128,17 @@ class InputChecks:
             if bad_torques:
                 self.reject(WHEEL_ODOMETRY, 'torque infinite or absurd')
             m = replace(m, rate=_without(m.rate, bad_rates), torque=_without(m.torque, bad_torques))
-        return m
+        return m if m.steering is None else self._steered(m, m.steering)
+
+    def _steered(self, m: WheelOdometry, steering: FloatArray) -> WheelOdometry:
+        if len(steering) != self._count:
+            self.reject(WHEEL_ODOMETRY, 'wrong number of steering angles')
+            return replace(m, steering=None)
+        bad = [i for i, angle in enumerate(steering.tolist()) if abs(angle) > GREATEST_STEERING]
+        if not bad:
+            return m
+        self.reject(WHEEL_ODOMETRY, 'steering angle beyond half a turn')
+        return replace(m, steering=_without(steering, bad))
 
     def _inertial(self, m: InertialReading) -> InertialReading | None:
         x, y, z = m.specific_force.tolist()

@@ -44,7 +44,8 @@ def merge_wheels(before: Any, after: Any) -> tuple[Any, bool]:
     if isinstance(before, WheelOdometry):
         rate, overlap = _newer(before.rate, after.rate)
         torque, _ = _newer(before.torque, after.torque)
-        return WheelOdometry(stamp, rate, torque), overlap
+        steering = _newest([before.steering, after.steering])
+        return WheelOdometry(stamp, rate, torque, steering), overlap
     if isinstance(before, SinkageReading):
         sinkage, overlap = _newer(before.sinkage, after.sinkage)
         return SinkageReading(stamp, sinkage), overlap
@@ -114,7 +115,23 @@ class StepMerger:
         if len(readings) == 1:
             return readings[0]
         mean = [w / t if t else nan for w, t in zip(weighted, total, strict=True)]
-        return WheelOdometry(stamp, np.array(mean), _mean([reading.torque for reading in readings]))
+        return WheelOdometry(
+            stamp,
+            np.array(mean),
+            _mean([reading.torque for reading in readings]),
+            _newest([reading.steering for reading in readings]),
+        )
+
+
+def _newest(rows: list[FloatArray | None]) -> FloatArray | None:
+    """Return the last value of each column that is not nan; None where no row is there."""
+    there = [row for row in rows if row is not None]
+    if not there:
+        return None
+    newest = there[0]
+    for row in there[1:]:
+        newest = np.where(np.isnan(row), newest, row)
+    return newest
 
 
 def _single(measurements: list[_Some]) -> _Some | None:
