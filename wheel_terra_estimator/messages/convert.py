@@ -145,8 +145,8 @@ class InputConverter:
         """Wheel rates, torques and steering angles; what the message does not hold is nan."""
         steering = self._steering(message) if self.layout.steering else None
         if steering is not None and not self._columns_of(message.name)[0]:
-            unknown = np.full(len(self.layout.names), math.nan)
-            return WheelOdometry(stamp_of(message), unknown, unknown, steering)
+            blank = np.full(len(self.layout.names), math.nan)
+            return WheelOdometry(stamp_of(message), blank, blank, steering)
         values = self._wheel_values('joint_states', message.name, message.velocity, 'velocity')
         if values is None:
             return None
