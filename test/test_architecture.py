@@ -138,7 +138,15 @@ MAY_USE = {
     # The truth of a trial knows nothing of the models that are to find it.
     'trials': ({'configuration', 'discrepancy', 'reporting'}, {'numpy'} | PICTURES),
     'evaluation': (
-        {'configuration', 'terramechanics', 'estimation', 'checks', 'simulation', 'bags'},
+        {
+            'configuration',
+            'terramechanics',
+            'estimation',
+            'checks',
+            'simulation',
+            'bags',
+            'reporting',
+        },
         {'numpy'} | PICTURES,
     ),
     # Discrete elements know nothing of the models that they are to judge.

@@ -78,7 +78,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help='drive the same soft patch with and without the traction limiter (and a picture '
         'beside the output)',
     )
-    parser.add_argument('-o', dest='output', type=Path, metavar='F.md', help='write the tables')
+    parser.add_argument(
+        '-o',
+        dest='output',
+        type=Path,
+        metavar='F.md|F.html',
+        help='write the tables; as a page with a picture where the name ends in .html',
+    )
     parser.add_argument('--overwrite', action='store_true', help='replace an earlier output')
 
 
@@ -88,6 +94,7 @@ def run(arguments: argparse.Namespace) -> int:
         bench,
         closed_loop,
         kinds,
+        page,
         real_drives,
         runner,
         tables,
@@ -95,10 +102,11 @@ def run(arguments: argparse.Namespace) -> int:
     from wheel_terra_estimator.output_folder import check_file, new_file
 
     status = 0
+    title, results, drive = 'The estimator against truth and baselines', None, None
     picture: Path | None = None
     if arguments.output:
         check_file(arguments.output, arguments.overwrite)
-        if arguments.limiter:
+        if arguments.limiter and not page.is_page(arguments.output):
             picture = arguments.output.with_suffix('.png')
             check_file(picture, arguments.overwrite)
     first = (kinds.TUNING_SEEDS if arguments.tuning else kinds.TEST_SEEDS).start
@@ -109,10 +117,11 @@ def run(arguments: argparse.Namespace) -> int:
         text = real_drives.report(arguments.measured)
     elif arguments.limiter:
         drives = closed_loop.compare(seeds)
+        title, drive = 'The traction limiter in a closed loop', drives[0]
         text = closed_loop.report(drives)
         if picture:
             with new_file(picture, arguments.overwrite) as fresh:
-                closed_loop.picture(drives[0], fresh)
+                page.draw_limiter(drive, fresh)
     else:
         chosen = _chosen(arguments.world, arguments.kinds)
         if arguments.rover:
@@ -142,7 +151,10 @@ def run(arguments: argparse.Namespace) -> int:
     print(text)
     if arguments.output:
         with new_file(arguments.output, arguments.overwrite) as fresh:
-            fresh.write_text(text + '\n', encoding='utf-8')
+            if page.is_page(arguments.output):
+                page.write(fresh, title, text, results, drive)
+            else:
+                fresh.write_text(text + '\n', encoding='utf-8')
     return status
 
 

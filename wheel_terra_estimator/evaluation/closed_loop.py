@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -132,29 +131,3 @@ def report(drives: Sequence[Comparison]) -> str:
     return table(
         ('seed', 'good ground', 'with limiter', 'without', 'stopped at [s]', 'because'), rows
     )
-
-
-def picture(drive: Comparison, path: Path) -> None:
-    """Draw both drives: way, slip, sinkage."""
-    import matplotlib
-
-    matplotlib.use('Agg')
-    from matplotlib import pyplot as plt
-
-    figure, axes = plt.subplots(3, 1, figsize=(8, 7), sharex=True, layout='constrained')
-    for run, name in ((drive.free, 'without limiter'), (drive.limited, 'with limiter')):
-        slip = np.nan_to_num(run.slip)
-        axes[0].plot(run.time, run.position, label=name)
-        axes[1].plot(run.time, np.median(slip, axis=1), label=name)
-        axes[2].plot(run.time, 1e3 * run.sinkage.max(axis=1), label=name)
-    axes[2].axhline(
-        250.0 * drive.radius, color='grey', linestyle='--', label='a quarter of the radius'
-    )
-    for axis, label in zip(axes, ('way [m]', 'median slip [-]', 'deepest wheel [mm]'), strict=True):
-        axis.set_ylabel(label)
-        axis.grid(alpha=0.3)
-    axes[0].legend()
-    axes[2].legend()
-    axes[2].set_xlabel('time [s]')
-    figure.savefig(path, dpi=110)
-    plt.close(figure)
