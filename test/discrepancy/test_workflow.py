@@ -110,6 +110,51 @@ def test_names_what_is_hidden_and_shrinks_the_gap(name, factor):
     assert refit > (1.0 if name == 'cohesion' else 1.3) * after
 
 
+DING_WHEEL = {
+    'slip_sinkage_exponent': 0.72,
+    'lug_digging': 1.0,
+    'lug_support': 0.0015,
+    'lug_shear_radius': 0.5,
+    'stress_peak_shift': 0.32,
+}
+
+
+def ding_wheel(seed):
+    """Rows of the wheel of Ding et al. 2010 (157 mm, lugs of 0 to 15 mm) with all that it needs."""
+    rng = np.random.default_rng(seed)
+    soil = TrueSoil(2.4074e6, 0.8, np.radians(31.9), 0.0115, 250.0, 0.2, -0.11, 15.6e3, 1600.0)
+    axes = [0.0, 0.005, 0.010, 0.015], [35.0, 80.0, 125.0], [0.03, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6]
+    lugs, load, slip = (axis.ravel() for axis in np.meshgrid(*axes, indexing='ij'))
+    fixed = {
+        'wheel_radius': 0.157,
+        'wheel_width': 0.165,
+        'lug_count': 24.0,
+        'gravity': 9.81,
+        'angular_velocity': 0.06,
+        'pass_number': 1.0,
+        'slope': 0.0,
+    }
+    rows = {key: np.full(slip.size, value) for key, value in fixed.items()}
+    rows |= {'slip': slip, 'normal_load': load, 'lug_height': lugs}
+    hidden = tuple(LISTED[name].make(size, 0.5, rows, soil) for name, size in DING_WHEEL.items())
+    out = solve(rows, soil, hidden)
+    table = dict(rows)
+    for key in OUTPUTS:
+        std = SHARE[key] * np.ptp(out[key])
+        table[key] = out[key] + std * rng.standard_normal(slip.size)
+        table[f'{key}_std'] = np.full(slip.size, std)
+    return table, settings(soil, rows)
+
+
+def test_the_whole_set_of_ding_s_wheel_is_found_in_one_run():
+    found = run(*ding_wheel(2))
+    named = {effect.name for effect in found.effects}
+    assert len(named & set(DING_WHEEL)) >= 4
+    assert named <= set(DING_WHEEL)
+    for gap in found.gap.values():
+        assert gap.after < 1.3 * gap.noise < gap.refit
+
+
 def test_as_many_effects_as_the_rows_carry():
     """Four at once, two of them of the instruments: all are found, none is false."""
     hidden = (

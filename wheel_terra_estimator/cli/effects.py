@@ -94,12 +94,23 @@ def as_text(effects: Mapping[str, Effect]) -> str:
             lines += _wrapped('not with: ', ', '.join(sorted(effect.incompatible_with)))
         if effect.sparse:
             lines.append('- Proposed by the discrepancy workflow, never named.')
-        elif not effect.candidate:
-            lines += _wrapped('', 'tried by the discrepancy workflow only when asked for by name')
+        for text in _aside(effect):
+            lines += _wrapped('', text)
         lines += _wrapped('valid: ', effect.validity)
         lines += _wrapped('source: ', effect.source)
         blocks.append('\n'.join(lines) + '\n')
     return '\n'.join(blocks)
+
+
+def _aside(effect: Effect) -> list[str]:
+    """Return which forms the discrepancy workflow leaves aside, and why."""
+    found = []
+    for form in effect.forms:
+        if not form.candidate and not form.sparse:
+            of = f'the form {form.form} is ' if len(effect.forms) > 1 else ''
+            why = f': {form.why_aside}' if form.why_aside else ''
+            found.append(f'{of}tried by the discrepancy workflow only when asked for by name{why}')
+    return found
 
 
 def _parameter_text(p: EffectParameter) -> list[str]:
@@ -151,8 +162,7 @@ def as_markdown(effects: Mapping[str, Effect]) -> str:
             lines.append(f'- Nearly the same as `{other}`; what separates them: {separates}.')
         if effect.incompatible_with:
             lines.append(f'- Not together with: {", ".join(sorted(effect.incompatible_with))}.')
-        if not effect.candidate:
-            lines.append('- Tried by the discrepancy workflow only when asked for by name.')
+        lines += [f'- {text[0].upper()}{text[1:]}.' for text in _aside(effect)]
         if lines[-1]:
             lines.append('')
         if not effect.sparse:

@@ -28,7 +28,7 @@ from wheel_terra_estimator.discrepancy.fitting.evidence import log_sum
 from wheel_terra_estimator.discrepancy.fitting.forward import Forward
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
 from wheel_terra_estimator.discrepancy.fitting.reference import join, shared_error
-from wheel_terra_estimator.discrepancy.proposal.find import propose
+from wheel_terra_estimator.discrepancy.proposal.find import promise_on_top, propose
 from wheel_terra_estimator.discrepancy.report import words
 from wheel_terra_estimator.discrepancy.result import (
     OPEN,
@@ -232,10 +232,16 @@ def _effects_to_try(
             not_tried[name] = 'was not asked for'
         elif effect.sparse:
             not_tried[name] = 'is a law found from the rows: it is proposed, never named'
-        elif options.effects is None and not effect.candidate:
-            not_tried[name] = f'is tried only when asked for (--only {name})'
         else:
-            tried.update({form.name: form for form in effect.forms})
+            asked = options.effects is not None
+            tried.update({f.name: f for f in effect.forms if asked or f.candidate})
+            aside = [form for form in effect.forms if form.name not in tried]
+            keys = [f'{name}:{form.form}' for form in aside]
+            if len(aside) == len(effect.forms):
+                keys = [name, *keys[1:]]
+            for key, form in zip(keys, aside, strict=True):
+                why = f': {form.why_aside}' if form.why_aside else ''
+                not_tried[key] = f'is tried only when asked for (--only {name}){why}'
     return tried, not_tried
 
 
@@ -313,7 +319,7 @@ def _report(
         )
     covariance = np.asarray(np.linalg.inv(after.precision()), dtype=float)
     nearest = () if after.names else _nearest(findings)
-    effects = _named(findings, verdict, left, known, after, gap) if after.names else ()
+    effects = _named(table, findings, verdict, left, known, after, gap) if after.names else ()
     candidates = _candidates(findings, verdict, shown, gains, floor_index)
     stretch = changed_stretch(both, setting, after, variance)
     return Diagnosis(
@@ -389,6 +395,7 @@ def _parameters(
 
 
 def _named(
+    table: SteadyTable,
     findings: Findings,
     verdict: Verdict,
     left: Remainder,
@@ -400,6 +407,8 @@ def _named(
     covariance = np.asarray(np.linalg.inv(fitted.precision()), dtype=float)
     parameters = _parameters(fitted, covariance)
     shown = _what_rows_show(findings, fitted, gap)
+    promise = promise_on_top(table, findings.setting, fitted)
+    shown['law'] = float(np.log1p(max(promise, 0.0)))
     found = []
     for place, name in enumerate(fitted.names):
         values = confidences.features(findings.selection, verdict, place, left) | shown

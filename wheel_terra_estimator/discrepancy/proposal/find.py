@@ -99,6 +99,17 @@ def propose(
     return _proposal(table, findings, setting, *best, gap)
 
 
+def promise_on_top(table: SteadyTable, setting: Setting, fitted: Fit) -> float:
+    """Return the nats that the best term of an unlisted law promises on top of a fit.
+
+    Near zero where the fit leaves noise alone; several nats where what is left has the shape of
+    some closure, so that the named effect is not the whole truth, or not the truth.
+    """
+    terms = replace(setting, effects=_terms(table))
+    starts = linear_starts(terms, fitted, tuple(terms.effects))
+    return max((promise for promise, _, _ in starts), default=0.0)
+
+
 def _terms(table: SteadyTable) -> dict[str, Effect]:
     """Return the terms whose features vary in the table, each as an effect of one parameter."""
     varying = set(table.varying())

@@ -90,11 +90,18 @@ def _squash(value: float) -> float:
     return float(4.0 * np.tanh(value / 8.0))
 
 
+def _loosened(squashed: float) -> float:
+    """Undo `_squash`."""
+    return 8.0 * float(np.arctanh(np.clip(squashed / 4.0, -0.999, 0.999)))
+
+
 def confidence(values: dict[str, float]) -> Confidence:
     """Map features to probabilities."""
     weights = _weights()
     vector = np.array([values[name] for name in FEATURES])
     of_name = float(expit(vector @ np.array(weights['name'])))
+    # Never more than the rows themselves say: two names that fit alike share what there is.
+    of_name = min(of_name, float(expit(_loosened(values['margin']))))
     of_set = float(expit(vector @ np.array(weights['set'])))
     return Confidence(of_name, max(of_name, of_set))
 

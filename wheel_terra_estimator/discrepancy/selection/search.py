@@ -32,14 +32,15 @@ from wheel_terra_estimator.discrepancy.selection.signatures import (
     unavailable,
 )
 from wheel_terra_estimator.discrepancy.selection.weights import (
+    MISFIT,
     MOST_EFFECTS,
     Selection,
     explain_fewer,
     explain_members,
     explain_more,
-    explain_other_forms,
     explain_pairs,
     explain_singles,
+    explain_swaps,
     weigh,
 )
 from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES, SteadyTable
@@ -51,6 +52,10 @@ _FLEXIBLE = 0.25  # floor of the first robust pass: wide enough for any effect [
 _ROBUST_FLOOR = 0.02  # floor of the later ones
 _PASSES = 5
 _LATENT_FLOOR = 0.03  # structural error allowed while slips are moved [share of range]
+_SEEDS = 3  # sets to which one effect more is added
+_SWAPS = 3  # sets in which others are put in the place of each effect, at most
+_NEAR = 2.0  # nats behind the best one, up to which that is done
+_GAIN = 0.5  # nats by which a larger set must be better to be gone on from
 _FARTHEST = 2.0  # a slip is moved by at most so many of its deviations
 
 
@@ -211,7 +216,9 @@ def _select(setting: Setting, nothing: Fit) -> Selection:
     explanations += explain_pairs(setting, singles, incompatible)
     selection = weigh(explanations, setting.floors, setting.effects)
     if len(selection.explanations[0].names) < 2:
-        return selection
+        if selection.misfit < MISFIT:
+            return selection
+        return _with_more(setting, selection, incompatible)
     # A pair may have found a layer's depth or a mound's onset that its member alone had missed.
     again = {e.names: e for e in explain_members(setting, selection.explanations[0])}
     better = [
@@ -226,27 +233,52 @@ def _select(setting: Setting, nothing: Fit) -> Selection:
 def _with_more(
     setting: Setting, selection: Selection, incompatible: Mapping[str, frozenset[str]]
 ) -> Selection:
-    """Go on from a pair: one effect more, then each of the set left out, while that helps."""
-    while 2 <= len(selection.explanations[0].names) < MOST_EFFECTS:
-        best = selection.explanations[0]
-        more = explain_more(setting, best, incompatible)
-        if not more:
+    """Go on from the best sets: one effect more, then each of the set left out, while that helps.
+
+    The best sets are those that would be if no misfit asked for a name, though none of them may be
+    good enough yet.
+    """
+    for _ in range(MOST_EFFECTS):
+        leaders = selection.without_misfit(_SEEDS)
+        before = leaders[0][0]
+        seeds = [e for _, e in leaders if 1 <= len(e.names) < MOST_EFFECTS]
+        selection = _joined_by(
+            setting, selection, [e for s in seeds for e in explain_more(setting, s, incompatible)]
+        )
+        after, top = selection.without_misfit(1)[0]
+        if after < before + _GAIN or len(top.names) < 2:
             break
-        known = {frozenset(e.names) for e in selection.explanations}
-        fresh = [e for e in more if frozenset(e.names) not in known]
-        selection = weigh([*selection.explanations, *fresh], setting.floors, setting.effects)
-        top = selection.explanations[0]
-        if len(top.names) <= len(best.names):
+        selection = _joined_by(setting, selection, explain_fewer(setting, top))
+    done: set[frozenset[str]] = set()
+    for _ in range(_SWAPS):
+        leaders = selection.without_misfit(_SEEDS)
+        best = next(
+            (
+                explanation
+                for weight, explanation in leaders
+                if weight > leaders[0][0] - _NEAR
+                and len(explanation.names) > 1
+                and _effects(explanation) not in done
+            ),
+            None,
+        )
+        if best is None:
             break
-        known = {frozenset(e.names) for e in selection.explanations}
-        fewer = [e for e in explain_fewer(setting, top) if frozenset(e.names) not in known]
-        selection = weigh([*selection.explanations, *fewer], setting.floors, setting.effects)
-    best = selection.explanations[0]
-    if len(best.names) < 2:
+        done.add(_effects(best))
+        selection = _joined_by(setting, selection, explain_swaps(setting, best, incompatible))
+    return selection
+
+
+def _effects(explanation: Explanation) -> frozenset[str]:
+    return frozenset(effect_of(key) for key in explanation.names)
+
+
+def _joined_by(setting: Setting, selection: Selection, more: list[Explanation]) -> Selection:
+    """Return the selection with further explanations, each set of effects once."""
+    known = {frozenset(e.names): e for e in (*more[::-1], *selection.explanations)}
+    if len(known) == len(selection.explanations):
         return selection
-    known = {frozenset(e.names) for e in selection.explanations}
-    forms = [e for e in explain_other_forms(setting, best) if frozenset(e.names) not in known]
-    return weigh([*selection.explanations, *forms], setting.floors, setting.effects)
+    return weigh(tuple(known.values()), setting.floors, setting.effects)
 
 
 def _variances(problem: Problem, amplitude: FloatArray | float) -> list[FloatArray]:

@@ -32,6 +32,7 @@ FloatArray = NDArray[np.float64]
 PRIOR_NOTHING, PRIOR_ONE, PRIOR_TWO = 0.50, 0.45, 0.05
 PRIOR_MORE = 0.2  # each further effect, relative to one effect less
 MOST_EFFECTS = 6
+MISFIT = 0.5  # probability of a misfit that asks for a name, from which more effects are tried
 # Prior of the structural error: floors that a good model may have ...
 _FLOORS = ((0.0, 0.60), (0.007, 0.10), (0.015, 0.12), (0.025, 0.10), (0.04, 0.04))
 # ... and smooth misfits that ask for a name, in all quantities or in one of them.
@@ -42,6 +43,7 @@ _SOME = ((1, 0, 0), (0, 1, 0), (0, 0, 1), (0, 1, 1))
 
 _PAIR_SEEDS = 4  # best single effects to which a second one is added
 _FURTHER = 4  # sets with one effect more that are fitted, at most
+_RIVALS = 2  # other effects that are put in the place of each effect of a set
 _PAIRS = 8  # pairs that are fitted, at most
 # A pair must promise so many nats over the best single effect: its prior alone costs it four.
 _PROMISE = 1.5
@@ -104,6 +106,17 @@ class Selection:
     def unexplained(self) -> NDArray[np.bool_]:
         """(F,) True for floors that ask for a name."""
         return np.array([floor.unexplained for floor in self.floors])
+
+    @property
+    def misfit(self) -> float:
+        """Posterior probability that a misfit is left that asks for a name."""
+        return float(self.probability[:, self.unexplained].sum())
+
+    def without_misfit(self, count: int) -> list[tuple[float, Explanation]]:
+        """Return the best explanations, were there no such misfit, with their log weights."""
+        weights = log_sum(self.log_joint[:, ~self.unexplained], axis=1)
+        order = np.argsort(-weights)[:count]
+        return [(float(weights[h]), self.explanations[h]) for h in order]
 
     def of(self, names: Sequence[str]) -> float:
         """Posterior probability of a set of effects, structural error integrated out."""
@@ -249,19 +262,34 @@ def explain_fewer(setting: Setting, best: Explanation) -> list[Explanation]:
     return [setting.explain(f) for f in setting.fit(sets, starts, fitted.angle)]
 
 
-def explain_other_forms(setting: Setting, best: Explanation) -> list[Explanation]:
-    """Put the other forms of each effect of a set in its place, one at a time."""
-    found = []
-    for reduced in explain_fewer(setting, best):
+def explain_swaps(
+    setting: Setting, best: Explanation, incompatible: Mapping[str, frozenset[str]]
+) -> list[Explanation]:
+    """Leave each effect of a set out, and put others in its place: other forms, best rivals."""
+    starts: list[tuple[tuple[str, ...], FloatArray, FloatArray]] = []
+    fewer = explain_fewer(setting, best)
+    for reduced in fewer:
         (left_out,) = set(best.names) - set(reduced.names)
-        same = effect_of(left_out)
-        others = [key for key in setting.effects if effect_of(key) == same and key != left_out]
-        starts = linear_starts(setting, reduced.fitted, others)
-        fits = setting.fit(
-            [n for _, n, _ in starts], [u for _, _, u in starts], reduced.fitted.angle
-        )
-        found += [setting.explain(f) for f in fits]
-    return found
+        others = [
+            key for key in _compatible(setting, reduced.names, incompatible) if key != left_out
+        ]
+        found = linear_starts(setting, reduced.fitted, others)
+        forms = [s for s in found if effect_of(s[1][-1]) == effect_of(left_out)]
+        rivals = [s for s in found if effect_of(s[1][-1]) != effect_of(left_out)]
+        kept = [*forms, *sorted(rivals, key=lambda s: -s[0])[:_RIVALS]]
+        starts += [(names, start, reduced.fitted.angle) for _, names, start in kept]
+    if not starts:
+        return fewer
+    fits = fit(
+        setting.forward,
+        setting.problem,
+        setting.observed,
+        [(names, setting.coordinates(names)) for names, _, _ in starts],
+        [start for _, start, _ in starts],
+        [best.fitted.variance] * len(starts),
+        np.array([angle for _, _, angle in starts]),
+    )
+    return [*fewer, *(setting.explain(f) for f in fits)]
 
 
 def explain_members(setting: Setting, pair: Explanation) -> list[Explanation]:

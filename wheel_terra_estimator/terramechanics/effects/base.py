@@ -78,8 +78,10 @@ class Form:
         Value of the configuration key ``effects.<effect>.form``.
     claim, symbol, parameters, validity, source
         As for the effect.
-    touches, needs : frozenset of str, tuple of str or None
+    touches, needs, candidate : frozenset of str, tuple of str, bool or None
         None: those of the effect.
+    why_aside : str
+        As for the effect, of this form alone.
     on_inputs, on_contact, on_normal_stress, on_outputs : callable or None
         The terms of this form; those of the effect itself play no part in it.
     """
@@ -92,6 +94,8 @@ class Form:
     source: str
     touches: frozenset[str] | None = None
     needs: tuple[str, ...] | None = None
+    candidate: bool | None = None
+    why_aside: str = ''
     on_inputs: Term | None = None
     on_contact: Term | None = None
     on_normal_stress: Term | None = None
@@ -130,6 +134,8 @@ class Effect:
         Where it holds; paper and equation.
     candidate : bool
         False: never tried by the discrepancy workflow unless asked for by name.
+    why_aside : str
+        The reason for that.
     sparse : bool
         True: parameters that are not given are absent instead of at their defaults, and
         configuration files state the others as flat lists (``learned_closure``).
@@ -153,6 +159,7 @@ class Effect:
     confounded_with: Mapping[str, str] = field(default_factory=dict)
     incompatible_with: frozenset[str] = frozenset()
     candidate: bool = True
+    why_aside: str = ''
     sparse: bool = False
     form: str = 'standard'
     other_forms: tuple[Form, ...] = ()
@@ -256,5 +263,7 @@ def _variant(first: Effect, form: Form) -> Effect:
         source=form.source,
         touches=first.touches if form.touches is None else form.touches,
         needs=first.needs if form.needs is None else form.needs,
+        candidate=first.candidate if form.candidate is None else form.candidate,
+        why_aside=form.why_aside,
         **{stage: getattr(form, stage) for stage in STAGES},
     )

@@ -44,6 +44,7 @@ EFFECT = Effect(
     validity='the same as a fitted soil.shear_modulus, hence not tried beside one',
     source='Janosi and Hanamoto 1961',
     candidate=False,
+    why_aside='the refitted soil.shear_modulus stands for it',
     on_inputs=_factor,
     other_forms=(
         Form(
@@ -56,6 +57,7 @@ EFFECT = Effect(
                 ),
             ),
             needs=('normal_load',),
+            candidate=True,
             validity='pressures W/(b r) of 0.5 to 20 kPa; invisible at one load',
             source='Wong, Theory of Ground Vehicles: K of some soils rises with normal pressure; '
             'power law assumed',

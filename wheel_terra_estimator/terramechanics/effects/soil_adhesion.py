@@ -46,7 +46,6 @@ EFFECT = Effect(
     },
     validity='an even layer; the recorded slip keeps the configured radius',
     source='geometry of a coated wheel; sticking soil: Bekker 1969',
-    candidate=False,
     on_inputs=_layer,
     on_outputs=_below_the_rim,
     other_forms=(
@@ -69,6 +68,8 @@ EFFECT = Effect(
             validity='moist or fine soil; needs a leaving angle behind the hub; tension below the '
             'normal stress',
             source='adhesion of soil to metal (Bekker 1969); growth to the leaving edge assumed',
+            candidate=False,
+            why_aside='an uncertain leaving angle looks like it',
             on_normal_stress=_tension,
         ),
     ),

@@ -38,6 +38,5 @@ EFFECT = Effect(
     validity='lugs that hold soil up to the top of the wheel; slip 0 to 0.9',
     source='balance of volume (soil dug per rim travel after Ding et al. 2010 eq. 12, doi '
     '10.1007/s11771-010-0021-7) and of energy: weight lifted by 2 r',
-    candidate=False,
     on_outputs=_carry,
 )

@@ -12,15 +12,23 @@ from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectPara
 from wheel_terra_estimator.terramechanics.stresses import rolling_sinkage
 
 
-def _flatten(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
-    """Widen the contact to the circle of the same chord, r* = r (1 + f/z0)."""
+_LEAST = 1e-9  # keeps a wheel without load free of divisions by zero [m]
+
+
+def _widening(contact: Contact, p: SimpleNamespace, maths: Any) -> Any:
+    """Circle of the same chord over the rim, r*/r = 1 + f/z0; nothing of the contact's shape."""
     modulus = maths.maximum(contact.bearing_modulus, 1.0) / (
         contact.reference_depth**contact.sinkage_exponent
     )
     sinkage = rolling_sinkage(
         contact.normal_load, contact.rim_radius, contact.width, modulus, contact.sinkage_exponent
     )
-    flatter = 1.0 + p.compliance * contact.normal_load / sinkage
+    return 1.0 + p.compliance * contact.normal_load / maths.maximum(sinkage, _LEAST)
+
+
+def _flatten(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
+    """Widen the contact."""
+    flatter = _widening(contact, p, maths)
     contact.radius = contact.radius * flatter
     # The belt runs at the rim's speed along a longer contact: j and its force grow alike.
     contact.shear_radius = contact.shear_radius * flatter
@@ -29,7 +37,7 @@ def _flatten(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
 
 def _arm(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
     """Keep the arm of the shear at the height of the hub."""
-    contact.torque = contact.torque * (contact.rim_radius / contact.radius)
+    contact.torque = contact.torque / _widening(contact, p, maths)
 
 
 EFFECT = Effect(
