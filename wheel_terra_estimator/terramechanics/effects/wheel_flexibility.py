@@ -11,7 +11,6 @@ from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter
 from wheel_terra_estimator.terramechanics.stresses import rolling_sinkage
 
-
 _LEAST = 1e-9  # keeps a wheel without load free of divisions by zero [m]
 
 
