@@ -40,7 +40,9 @@ def choose_topics(bag: Bag, remaps: Mapping[str, str]) -> dict[str, str]:
         for topic in bag.topics.values()
         if topic.message_count and not topic.name.startswith(_OWN_TOPICS)
     ]
-    for name, kind in INPUT_TYPES.items():
+    # A slip-free velocity first: what is left may be wheel odometry.
+    for name in sorted(INPUT_TYPES, key=lambda name: name == 'odom'):
+        kind = INPUT_TYPES[name]
         wanted = remaps.get(name, f'/{name}')
         fitting = [topic.name for topic in there if topic.type == kind]
         if wanted in fitting:

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -46,15 +47,17 @@ class Calibration:
     figures: dict[str, Any]
 
 
-def calibrate(recording: Recording, configuration: Configuration) -> Calibration:
-    """Return what a recording tells of the rover file.
+def calibrate(
+    recording: Recording, configuration: Configuration, remapped: Sequence[str] = ()
+) -> Calibration:
+    """Return what a recording tells of the rover file; see `check_recording`.
 
     Raises
     ------
     UserError
         The recording has no usable wheel rates.
     """
-    report, evidence = examine(recording, configuration)
+    report, evidence = examine(recording, configuration, remapped)
     if evidence is None:
         raise UserError(f'{recording.name}: no wheel rates in it to calibrate with')
     changes = [

@@ -182,6 +182,12 @@ def skids(evidence: Evidence) -> bool:
     return not steered and float(np.ptp(wheels.x)) > 0.3 * track
 
 
+def stated_track(evidence: Evidence) -> float:
+    """Return the distance of the sides as the rover file has it [m]."""
+    lateral, side = evidence.facts.lateral, evidence.facts.side
+    return float(lateral[side > 0].mean() - lateral[side < 0].mean())
+
+
 def track_ratio(evidence: Evidence) -> Estimate | NotChecked:
     """Return effective over configured track from the gyro and the difference of the sides."""
     facts, difference = evidence.facts, evidence.side_difference
@@ -193,7 +199,7 @@ def track_ratio(evidence: Evidence) -> Estimate | NotChecked:
     clear = rows.sum() > 60 and correlation((yaw - bias)[rows], difference[rows]) > CLEAR_TURN
     if not clear or float(np.quantile(np.abs(yaw), 0.95)) < LEAST_YAW_RATE:
         return NotChecked('track', 'no clear turn in it; drive a circle both ways')
-    track = facts.lateral[facts.side > 0].mean() - facts.lateral[facts.side < 0].mean()
+    track = stated_track(evidence)
     slope = block_fit((yaw[rows] - bias)[:, None], difference[rows])[0]
     return Estimate(float(slope.value / track), float(slope.std / abs(track)))
 
@@ -205,6 +211,8 @@ def check_track(evidence: Evidence, figures: dict[str, Any]) -> list[Outcome]:
         return [ratio]
     figures['rover.effective_over_stated_track'] = round(float(ratio.value), 3)
     figures['rover.effective_over_stated_track_std'] = round(float(ratio.std), 3)
+    stated = stated_track(evidence)
+    figures['rover.effective_track_m'] = round(float(ratio.value) * stated, 4)
     skidding = skids(evidence)
     reference = evidence.reference()
     slip_free = reference is not None and 'rover.speed_over_rim_speed' in figures
@@ -212,8 +220,9 @@ def check_track(evidence: Evidence, figures: dict[str, Any]) -> list[Outcome]:
         return [
             NotChecked(
                 'track',
-                f'the wheels skid in turns (effective track {ratio.value:.2f} of the stated one): '
-                'measure it with a tape',
+                f'the wheels skid in turns as if the track were {ratio.value * stated:.3f} +- '
+                f'{ratio.std * stated:.3f} m ({ratio.value:.2f} of the stated one); how much of '
+                'that is skid no recording tells: measure it with a tape',
             )
         ]
     if ratio.sigmas_from(1.0) < 4.0 or abs(ratio.value - 1.0) < LEAST_TRACK_ERROR:
@@ -222,8 +231,7 @@ def check_track(evidence: Evidence, figures: dict[str, Any]) -> list[Outcome]:
         ratio = Estimate(ratio.value, math.hypot(ratio.std, 0.03))
     joints = evidence.recording.joints
     assert joints is not None
-    facts = evidence.facts
-    track = float(facts.lateral[facts.side > 0].mean() - facts.lateral[facts.side < 0].mean())
+    facts, track = evidence.facts, stated
     listed = ', '.join(f'{y * ratio.value:.3f}' for y in facts.lateral)
     return [
         Finding(

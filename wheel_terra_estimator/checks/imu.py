@@ -35,6 +35,8 @@ GRAVITY_TOLERANCE = 0.1
 GRAVITIES = {'the Moon': 1.62, 'Mars': 3.71, 'the Earth': 9.81}  # [m/s^2]
 UPSIDE_TILT = math.radians(35.0)
 """Mean tilt that no rover drives at [rad]: the mounting is wrong, whatever the slope."""
+LEAST_SHOWN = 0.01
+"""Change of an angle [deg] below which a cure leaves it out."""
 LEAST_MOUNTING = math.radians(1.5)
 """Mounting errors below this [rad] are left to calibration."""
 LEAST_TURN = 4.5
@@ -490,7 +492,11 @@ def mounting_finding(
     names = [f'sensors.imu_mounting_{axis}_deg' for axis in ('roll', 'pitch', 'yaw')]
     imu = evidence.recording.imu
     assert imu is not None
-    cure = '  '.join(f'{name}: {angle:.2f}' for name, angle in zip(names, new, strict=True))
+    cure = '  '.join(
+        f'{name}: {angle:.2f}'
+        for name, angle, apart in zip(names, new, change, strict=True)
+        if apart >= LEAST_SHOWN
+    )
     return Finding(
         'mounting', imu.topic, None, names[most], round(new[most], 3), std, sure, words, cure
     )

@@ -17,8 +17,8 @@ FloatArray = NDArray[np.float64]
 
 _LEFT = re.compile(r'(^|[^a-z])(left|l|fl|ml|rl|lf|lm|lr|bl|lb)([^a-z]|$)')
 _RIGHT = re.compile(r'(^|[^a-z])(right|r|fr|mr|rr|rf|rm|br|rb)([^a-z]|$)')
-_FRONT = re.compile(r'front|(^|[^a-z])f[lr]?([^a-z]|$)')
-_MIDDLE = re.compile(r'mid|cent(re|er)')
+_FRONT = re.compile(r'front|(^|[^a-z])(f[lr]?|[lr]f)([^a-z]|$)')
+_MIDDLE = re.compile(r'mid|cent(re|er)|(^|[^a-z])(m[lr]?|[lr]m)([^a-z]|$)')
 _WHEEL = re.compile(r'wheel|drive|traction')
 
 

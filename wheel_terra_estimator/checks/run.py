@@ -27,7 +27,7 @@ from wheel_terra_estimator.checks import (
     wheel_rates,
 )
 from wheel_terra_estimator.checks.evidence import LEAST_MOVING_ROWS, Evidence, gather
-from wheel_terra_estimator.checks.finding import CheckReport, NotChecked
+from wheel_terra_estimator.checks.finding import CheckReport, Finding, NotChecked, Outcome
 from wheel_terra_estimator.checks.rover_facts import RoverFacts
 from wheel_terra_estimator.checks.series import Recording
 from wheel_terra_estimator.configuration.configuration import Configuration
@@ -158,14 +158,30 @@ def _wheels(evidence: Evidence, report: CheckReport) -> Evidence:
     figures = report.figures
     outcomes, evidence = wheel_rates.check_dead_wheels(evidence)
     report.take(outcomes)
-    outcomes, evidence = alignment.check_gyro_unit(evidence)
+    outcomes, evidence = _gyro_unit(evidence)
     report.take(outcomes)
-    outcomes, evidence = wheel_rates.check_unit(evidence, figures)
-    report.take(outcomes)
+    unit, evidence = wheel_rates.check_unit(evidence, figures)
     outcomes, evidence = wheel_rates.check_signs(evidence)
     report.take(outcomes)
+    if any(isinstance(outcome, NotChecked) for outcome in unit):
+        # Wheels that count against each other hide the speed as well.
+        unit, evidence = wheel_rates.check_unit(evidence, figures)
+    report.take(unit)
     report.take(wheel_rates.check_noise(evidence, figures))
     return evidence
+
+
+def _gyro_unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
+    """Judge the unit of the gyro; wheels that count backwards hide the turns from it."""
+    outcomes, judged = alignment.check_gyro_unit(evidence)
+    if not any(isinstance(outcome, NotChecked) for outcome in outcomes):
+        return outcomes, judged
+    _, mended = wheel_rates.check_signs(evidence)
+    again, judged = alignment.check_gyro_unit(mended)
+    if not any(isinstance(outcome, Finding) for outcome in again):
+        return outcomes, evidence
+    recording = replace(evidence.recording, imu=judged.recording.imu)
+    return again, replace(evidence, recording=recording, gyro=judged.gyro)
 
 
 def _rest(evidence: Evidence, report: CheckReport) -> Evidence:

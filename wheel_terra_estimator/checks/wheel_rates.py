@@ -233,6 +233,8 @@ def check_signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     found: list[Outcome] = []
     if chosen is None or chosen.track == 0.0:
         reason = 'no turn in it, or no IMU: left and right not checked; drive a circle both ways'
+        if not facts.known:
+            reason = 'left and right need the places of the wheels: a rover file (wheel-terra init)'
         found += [NotChecked(kind, reason) for kind in ('swapped_sides', 'exchanged_wheels')]
     signs = np.ones(len(facts.names))
     if chosen is not None:

@@ -53,8 +53,9 @@ def run(arguments: argparse.Namespace) -> int:
     check_file(arguments.output, arguments.overwrite, [arguments.bag])
     with open_bag(arguments.bag, bag_limits.from_arguments(arguments)) as bag:
         name = arguments.bag.resolve().name
-        recording = read_series(bag, parse_remaps(arguments.remap), name)
-        calibration = calibrate(recording, configuration)
+        remaps = parse_remaps(arguments.remap)
+        recording = read_series(bag, remaps, name)
+        calibration = calibrate(recording, configuration, tuple(remaps))
     text = as_file(calibration, configuration, name)
     with new_file(arguments.output, arguments.overwrite) as path:
         path.write_text(text, encoding='utf-8')
