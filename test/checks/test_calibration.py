@@ -62,6 +62,42 @@ def test_the_written_gain_is_found_no_more(tmp_path):
     np.testing.assert_allclose(zero, mended.sensors.torque_zero, atol=0.02)
 
 
+def in_the_air(friction=0.7, zero=0.2, begin=0.5, turn=7.5, end=14.0):
+    """The drive whose rover hangs in the air in its first seconds, wheels forward, then back."""
+    joints = rolling.recording().joints
+    seconds = joints.seconds
+    sense = np.select([(seconds > begin) & (seconds < turn), (seconds >= turn) & (seconds < end)],
+                      [1.0, -1.0])[:, None]  # fmt: skip
+    noise = 0.05 * np.random.default_rng(5).standard_normal(joints.rate.shape)
+    free = np.abs(sense) > 0.0
+    return replace(
+        joints,
+        rate=np.where(free, 1.5 * sense + 0.01 * noise, joints.rate),
+        torque=np.where(free, friction * sense + noise, joints.torque) + zero,
+    )
+
+
+def test_drive_friction_of_wheels_in_the_air(tmp_path):
+    recording = replace(rolling.recording(), joints=in_the_air())
+    rover = rolling.rover(**{'wheels.radius': [0.94 * rolling.RADIUS] * 4})
+    calibration = calibrate(recording, rover)
+    told = {change.key: change for change in calibration.changes}
+    friction = told['effects.drivetrain_friction.torque']
+    assert friction.after == pytest.approx(0.7, abs=0.02)
+    assert abs(friction.after - 0.7) < 3.0 * friction.std
+    assert told['wheels.radius'].after[0] == pytest.approx(rolling.RADIUS, rel=0.01)
+    path = tmp_path / 'rover.yaml'
+    path.write_text(as_file(calibration, rover, 'drive'))
+    mended = reader.load([path])
+    assert mended.effects['drivetrain_friction']['torque'] == pytest.approx(0.7, abs=0.02)
+
+
+def test_a_drive_that_never_leaves_the_ground_tells_no_friction():
+    calibration = calibrate(rolling.recording(), rolling.rover())
+    assert not any('friction' in change.key for change in calibration.changes)
+    assert any('in the air' in entry.reason for entry in calibration.not_seen)
+
+
 def test_what_the_recording_cannot_tell_stays():
     straight = rolling.recording(rolling.ten_minute_drive(turns=False))
     calibration = calibrate(straight, rolling.rover(**WRONG))

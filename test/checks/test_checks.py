@@ -9,6 +9,9 @@ import numpy as np
 import pytest
 import rolling_rover as rolling
 
+from wheel_terra_estimator.bags.bag_file import BagFile
+from wheel_terra_estimator.bags.series_reader import choose_topics
+from wheel_terra_estimator.bags.storage import open_bag
 from wheel_terra_estimator.checks.finding import KINDS
 from wheel_terra_estimator.checks.run import check_recording
 
@@ -217,3 +220,42 @@ def test_values_that_are_no_numbers_are_passed_over():
         reference=replace(reference, velocity=velocity),
     )
     assert not report.findings, [str(f) for f in report.findings]
+
+
+def test_degrees_per_second_behind_a_side_that_counts_backwards():
+    """Wheels that count against each other hide the turns; both faults are told, nothing else."""
+    recording = rolling.recording()
+    joints, imu = recording.joints, recording.imu
+    left = np.array([-1.0, 1.0, -1.0, 1.0])
+    faulty = replace(
+        recording,
+        joints=replace(joints, rate=left * joints.rate, torque=left * joints.torque),
+        imu=replace(imu, rate=np.degrees(imu.rate)),
+    )
+    report = check_recording(faulty, rolling.rover())
+    found = {(f.kind, f.topic, f.wheel) for f in report.findings}
+    assert found == {
+        ('unit', '/imu/data', None),
+        ('sign', '/joint_states', 'front_left'),
+        ('sign', '/joint_states', 'rear_left'),
+    }
+    assert not any('wheel rates' in entry.reason for entry in report.not_checked)
+
+
+def test_visual_odometry_is_the_reference_beside_joint_states(tmp_path):
+    topics = {
+        '/drive': 'sensor_msgs/msg/JointState',
+        '/zed/visual_odometry': 'nav_msgs/msg/Odometry',
+        '/wheel_odom': 'nav_msgs/msg/Odometry',
+    }
+    with BagFile(tmp_path / 'bag', topics) as file:
+        header = file.messages.header(1)
+        file.write('/drive', file.messages.joint_state(header, ('a',), [0.0], [1.0], []), 1)
+        for topic in ('/zed/visual_odometry', '/wheel_odom'):
+            twist = file.messages.twist_with_covariance(0.1, 0.0, np.zeros(36))
+            file.write(topic, file.messages.odometry(header, twist), 1)
+    with open_bag(tmp_path / 'bag') as bag:
+        chosen = choose_topics(bag, {})
+    assert chosen['joint_states'] == '/drive'
+    assert chosen['reference_odom'] == '/zed/visual_odometry'
+    assert chosen['odom'] == '/wheel_odom'

@@ -25,6 +25,12 @@ WORTH_CHANGING = 0.2
 NOISE_STD = 0.1
 """Relative deviation of a noise that a drive tells [-]."""
 
+NO_CENTRE_OF_GRAVITY = NotChecked(
+    'mass',
+    'centre of gravity: a drive does not tell it (ruts shift the torques as much as the slope '
+    'does); weigh the axles on the level and on a ramp',
+)
+
 
 @dataclass(frozen=True)
 class Change:
@@ -70,7 +76,9 @@ def calibrate(
     radius, evidence = _radius(evidence, report)
     changes += radius
     changes += _torques(evidence, report)
+    changes += _friction(evidence, report)
     changes += _track(evidence)
+    report.not_checked.append(NO_CENTRE_OF_GRAVITY)
     mended = {change.key for change in changes}
     left = [f for f in report.findings if f.parameter not in mended and f.kind != 'mass']
     return Calibration(tuple(changes), tuple(report.not_checked), tuple(left), report.figures)
@@ -215,6 +223,32 @@ def _torques(evidence: Evidence, report: CheckReport) -> list[Change]:
     return changes
 
 
+def _friction(evidence: Evidence, report: CheckReport) -> list[Change]:
+    configuration = evidence.facts.configuration
+    assert configuration is not None
+    if not np.isfinite(evidence.torque).any(axis=0).all():
+        return []
+    friction = torque.drive_friction(evidence)
+    if isinstance(friction, NotChecked):
+        report.not_checked.append(friction)
+        return []
+    report.figures['torque.friction_N_m'] = round(friction.value, 4)
+    if friction.value < 2.0 * friction.std:
+        return []
+    keys = {'enabled': True, 'torque': round(friction.value, 4)}
+    source = 'torque of the wheels in the air (the reference says that the rover stands)'
+    return [
+        Change(
+            f'effects.drivetrain_friction.{key}',
+            _before(configuration, f'effects.drivetrain_friction.{key}'),
+            after,
+            friction.std if key == 'torque' else None,
+            source,
+        )
+        for key, after in keys.items()
+    ]
+
+
 def _with_deviation(
     configuration: Configuration, key: str, after: Value, std: float, source: str
 ) -> list[Change]:
@@ -247,13 +281,14 @@ def as_file(calibration: Calibration, configuration: Configuration, recording: s
     changes = {change.key: change for change in calibration.changes}
     values = configuration.flat()
     keys = [key for key in values if key in configuration.stated or key in changes]
+    keys += [key for key in changes if key not in values]
     lines = [f'# Calibrated from the recording {recording}.', '#']
     lines += ['# Not seen in it, and left as it was:'] if calibration.not_seen else []
     lines += [f'#   {entry.kind}: {entry.reason}' for entry in calibration.not_seen]
     lines += ['/**:', '  ros__parameters:']
     for key in keys:
         told = changes.get(key)
-        value = values[key] if told is None else told.after
+        value = told.after if told is not None else values[key]
         if told is not None:
             lines.append(f'    # {_in_words(told)}')
         lines.append(f'    {key}: {ros_yaml.format_value(_as_declared(value, values.get(key)))}')

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +27,14 @@ SETTLING = 0.5
 """A speed counts as steady this long after it changed [s]."""
 STRAIGHT_SHARE = 0.25
 """Speed of the sides against the middle, as a share of it, below which a drive is straight [-]."""
+STANDING_SHARE = 0.1
+"""Speed of the reference over rim speed below which the rover stands while its wheels turn [-]."""
+FREE_TRACTION = 0.12
+"""Sum of T/r over the weight that wheels in the air stay below; stuck ones take more [-]."""
+SMOOTH_ROWS = 5
+"""Messages over which speed and torque are averaged for that."""
+SHORTEST_FREE = 3.0
+"""Wheels that turn so long while the rover stands may be in the air [s]."""
 LEAST_MOVING_ROWS = 30
 """Fewer rows of driving than these tell nothing."""
 
@@ -80,8 +89,29 @@ class Evidence:
 
     @property
     def moving(self) -> Mask:
-        """Rows in which the wheels turn."""
+        """Rows in which the wheels turn on the ground."""
+        return self._turning_wheels & ~self.in_air
+
+    @property
+    def _turning_wheels(self) -> Mask:
         return np.asarray(_nanmedian(np.abs(self.rate)) > 0.2 * max(self.working_rate, 1e-9))
+
+    @cached_property
+    def in_air(self) -> Mask:
+        """Rows in which the wheels turn freely while the reference says that the rover stands."""
+        reference, facts = self.reference(), self.facts
+        if reference is None or not facts.known or not np.isfinite(self.torque).any():
+            return np.zeros(self.time.size, dtype=bool)
+        at = (reference.stamp - self.origin) * 1e-9
+        speed = np.abs(np.interp(self.time, at, _smooth(reference.velocity[:, 0], SMOOTH_ROWS)))
+        size = _nanmedian(np.abs(self.rate * facts.radius))
+        taken = np.nansum(np.abs(self.torque) / facts.radius, axis=1)
+        free = _smooth(taken, SMOOTH_ROWS) < FREE_TRACTION * facts.mass * facts.gravity
+        return _after(
+            self._turning_wheels & (speed < STANDING_SHARE * size) & free,
+            self.period,
+            SHORTEST_FREE,
+        )
 
     @property
     def at_rest(self) -> Mask:
@@ -221,6 +251,12 @@ def _after(condition: Mask, period: float, duration: float) -> Mask:
     if condition.size >= width:
         held[width - 1 :] = total[width:] - total[:-width] == width
     return held
+
+
+def _smooth(values: FloatArray, width: int) -> FloatArray:
+    if values.size < width:
+        return np.full(values.shape, np.nanmean(values)) if values.size else values
+    return np.asarray(np.convolve(np.nan_to_num(values), np.ones(width) / width, mode='same'))
 
 
 def _nanmedian(values: FloatArray) -> FloatArray:

@@ -34,6 +34,8 @@ GAIN_MODEL_STD = 0.05
 """What rolling resistance, larger uphill, adds to the scale (firm drives of the simulator)."""
 SMOOTH_ROWS = 20
 """Rows over which slopes are averaged."""
+LEAST_BACK_ROWS = 10
+"""Rows of wheels turning back in the air that tell zero and friction apart."""
 LEAST_GAIN_ERROR = 0.15
 ZERO_FACTOR = 6.0
 
@@ -267,6 +269,31 @@ def torque_zeros(evidence: Evidence) -> list[Estimate] | None:
         block_fit(design, np.nan_to_num(evidence.torque[rows, i]))[0]
         for i in range(len(evidence.facts.names))
     ]
+
+
+def drive_friction(evidence: Evidence) -> Estimate | NotChecked:
+    """Return the torque that a wheel takes in the air, mean of the wheels [N m].
+
+    On the ground rolling resistance looks the same.
+    """
+    rows = evidence.in_air
+    if rows.sum() < LEAST_MOVING_ROWS:
+        reason = 'drive friction: let the wheels turn in the air for ten seconds, both ways'
+        return NotChecked('zero', reason)
+    sense = np.sign(evidence.rate[rows])
+    ways = (sense > 0).any(axis=1).sum(), (sense < 0).any(axis=1).sum()
+    both = min(ways) > LEAST_BACK_ROWS
+    wheels = []
+    for i in range(len(evidence.facts.names)):
+        design = np.column_stack([sense[:, i], np.ones(sense.shape[0])][: 2 if both else 1])
+        wheels.append(block_fit(design, np.nan_to_num(evidence.torque[rows, i]))[0])
+    mean = float(np.mean([wheel.value for wheel in wheels]))
+    scatter = float(np.std([wheel.value for wheel in wheels])) / math.sqrt(len(wheels))
+    zero = 0.0
+    if not both and evidence.facts.configuration is not None:
+        zero = float(evidence.facts.configuration.sensors.torque_zero_std)
+    noise = max(wheel.std for wheel in wheels)
+    return Estimate(mean, math.hypot(scatter, zero / math.sqrt(len(wheels)), noise))
 
 
 def _zeros(evidence: Evidence, figures: dict[str, Any]) -> list[Outcome]:
