@@ -3,6 +3,7 @@
 """``wheel-terra bench`` runs, and its peers do the same work as what they stand beside."""
 
 import json
+import subprocess
 
 import numpy as np
 import pytest
@@ -43,12 +44,17 @@ def test_the_ratio_is_the_median_of_the_pairs():
     assert figure.as_dict()['real_time_factor'] == 10.0
 
 
-def test_it_runs(capsys):
+@pytest.mark.parametrize('processes', [False, pytest.param(True, marks=pytest.mark.slow)])
+def test_it_runs(capsys, monkeypatch, processes):
+    started = []
+    if not processes:
+        monkeypatch.setattr(subprocess, 'run', lambda command, **_: started.append(command))
     assert main(['bench', '--quick', '--json']) == 0
     told = capsys.readouterr().out
     figures = json.loads(told)['figures']
     assert len(figures) == 9
     assert all(entry['seconds'] > 0 and entry['times_as_fast'] > 0 for entry in figures)
+    assert processes or {'diagnose', '--help', 'predict'} <= {c[3] for c in started if len(c) > 3}
 
 
 def test_an_earlier_run_is_compared_by_its_ratios(tmp_path, monkeypatch, capsys):

@@ -8,10 +8,11 @@ from wheel_terra_estimator.simulation.scenario import load
 
 
 def test_without_it_the_rover_digs_in_with_it_it_stops_in_time():
-    scenario = load({**LIMITER, 'duration': 60.0})
-    radius = scenario.configuration.wheels.radius[0]
-    free = closed_loop(scenario, 0, limited=False)
-    limited = closed_loop(scenario, 0, limited=True)
+    free, limited = (
+        closed_loop(load({**LIMITER, 'duration': duration}), 0, limited=limited)
+        for duration, limited in ((52.0, False), (40.0, True))
+    )
+    radius = load(LIMITER).configuration.wheels.radius[0]
     assert free.sinkage.max() > 0.5 * radius
     assert limited.stopped is not None
     assert limited.sinkage.max() < 0.25 * radius
