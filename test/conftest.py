@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -36,7 +37,15 @@ def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
     """Pictures are made, but not drawn (half a second each): for tests of words."""
     from matplotlib.figure import Figure
 
-    monkeypatch.setattr(Figure, 'savefig', lambda self, file, **_: file.write(b'picture'))
+    def savefig(self: Figure, file: Any, **_: Any) -> None:
+        if isinstance(file, io.TextIOBase):
+            file.write('picture')
+        elif isinstance(file, Path):
+            file.write_bytes(b'picture')
+        else:
+            file.write(b'picture')
+
+    monkeypatch.setattr(Figure, 'savefig', savefig)
 
 
 @pytest.fixture(scope='session')

@@ -157,7 +157,7 @@ def told(estimates):
 def test_a_fault_is_told_with_its_cure_and_nothing_is_judged(drives, name):
     fault, kind, topic, cure, begins = FAULTS[name]
     drive = drives[SIX]
-    sets = sets_of(drive, fault)
+    sets = sets_of(drive, fault, min(END, begins + LONGEST + 2.0))
     found = [s for s in sets if told(s)]
     assert found, f'{kind} was not found'
     start = sets[0].stamp

@@ -188,7 +188,8 @@ def test_soil_that_changes_along_the_way_is_said_in_words(softer):
     here, over = solve(rows, soil), solve(rows, there)
     for key in OUTPUTS:
         table[key] = table[key] + np.where(patch, over[key] - here[key], 0.0)
-    found = run({**table, 'time': time}, values)
+    few = Options(effects=('bulldozing', 'cohesion', 'slip_sinkage_exponent'))
+    found = run({**table, 'time': time}, values, options=few)
     notes = [note for note in found.notes if 'soil changes along the way' in note]
     if softer == 1.0:
         assert not notes
@@ -235,7 +236,7 @@ def test_words_of_a_misfit_of_both_signs():
     for key in OUTPUTS:
         turn = np.where(np.arange(len(table[key])) % 2, 1.0, -1.0)
         noisy[key] = table[key] + 12.0 * table[f'{key}_std'] * turn
-    found = run(noisy, values)
+    found = run(noisy, values, options=Options(effects=('soil_mound', 'cohesion')))
     assert 'of both signs' in found.where.sentence
     assert 'too scattered' in found.sentence or found.verdict != 'agrees'
 

@@ -90,7 +90,7 @@ def test_a_restart_passes_over_what_is_done_by_content(
 
 
 def test_an_output_that_has_lost_a_file_is_made_anew(
-    bags: list[str], config: list[str], tmp_path: Path
+    bags: list[str], config: list[str], tmp_path: Path, undrawn: None
 ) -> None:
     out = tmp_path / 'out'
     arguments = ['replay', bags[1], bags[3], *config, '-o', str(out), '--report', 'r.html']

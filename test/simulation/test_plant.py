@@ -38,7 +38,7 @@ def drive(plant: RoverPlant, seconds: float, forward: float = 0.05, turn: float 
     return truth
 
 
-@pytest.mark.parametrize('slope', [-8.0, 0.0, 7.0, 13.0])
+@pytest.mark.parametrize('slope', [-8.0, 7.0, 13.0])
 def test_steady_climb_is_the_steady_state_of_the_reference(plant: MakePlant, slope: float) -> None:
     configuration = rover()
     truth = drive(plant(configuration, slope_deg=slope), 35.0)
@@ -67,7 +67,7 @@ def test_energy_balance_over_a_climb(plant: MakePlant) -> None:
     mass = rover().rover.mass
     pulled = driven = dissipated = 0.0
     height = speed = 0.0
-    for _ in range(600):
+    for _ in range(300):
         truth = rover_plant.step(Command(0.05), 0.05)
         rim = truth.wheel_rate * 0.12
         pulled += float(truth.drawbar_pull.sum() * truth.forward_velocity) * 0.05
@@ -83,7 +83,7 @@ def test_energy_balance_over_a_climb(plant: MakePlant) -> None:
 
 
 def test_a_parked_rover_stays_where_it_is(plant: MakePlant) -> None:
-    truth = drive(plant(slope_deg=12.0, side_deg=5.0), 20.0, forward=0.0)
+    truth = drive(plant(slope_deg=12.0, side_deg=5.0), 10.0, forward=0.0)
     assert np.abs(truth.position[:2]).max() < 1e-4
     assert np.isnan(truth.slip).all()
     expected = rover().rover.mass * G * np.sin(np.radians(12.0))
@@ -113,10 +113,10 @@ def test_specific_force_times_mass_is_the_sum_of_pulls_while_accelerating(
 
 def test_too_steep_a_slope_entraps(plant: MakePlant) -> None:
     rover_plant = plant(slope_deg=24.0)
-    truth = drive(rover_plant, 20.0)
+    truth = drive(rover_plant, 15.0)
     assert truth.forward_velocity < 0.002
     assert np.nanmin(truth.slip) > 0.9
-    deeper = drive(rover_plant, 5.0)
+    deeper = drive(rover_plant, 3.0)
     assert (deeper.sinkage > truth.sinkage).all()
 
 
@@ -129,7 +129,7 @@ def test_weak_drives_stall(plant: MakePlant) -> None:
 
 def test_descent_skids_and_a_locked_wheel_is_dragged(plant: MakePlant) -> None:
     rover_plant = plant(slope_deg=-16.0)
-    truth = drive(rover_plant, 30.0)
+    truth = drive(rover_plant, 20.0)
     assert (truth.slip < -0.03).all()
     assert (truth.drawbar_pull < 0.0).all()
     rover_plant.faults.rate_factor[0] = 0.0
@@ -146,8 +146,8 @@ def test_reverse_mirrors_forward(plant: MakePlant) -> None:
         'rover.centre_of_gravity:=[0.0, 0.0, 0.2]',
         'wheels.passes:=[1, 1, 2, 2, 3, 3]',
     ]
-    ahead = drive(plant(rover(*ends)), 15.0, forward=0.05)
-    back = drive(plant(rover(*ends)), 15.0, forward=-0.05)
+    ahead = drive(plant(rover(*ends)), 8.0, forward=0.05)
+    back = drive(plant(rover(*ends)), 8.0, forward=-0.05)
     mirror = [4, 5, 2, 3, 0, 1]
     np.testing.assert_allclose(back.forward_velocity, -ahead.forward_velocity, rtol=1e-6)
     np.testing.assert_allclose(back.slip[mirror], ahead.slip, atol=1e-6)
@@ -156,8 +156,8 @@ def test_reverse_mirrors_forward(plant: MakePlant) -> None:
 
 
 def test_left_mirrors_right_and_scrub_slows_the_turn(plant: MakePlant) -> None:
-    left = drive(plant(), 12.0, turn=0.05)
-    right = drive(plant(), 12.0, turn=-0.05)
+    left = drive(plant(), 8.0, turn=0.05)
+    right = drive(plant(), 8.0, turn=-0.05)
     mirror = [1, 0, 3, 2, 5, 4]
     np.testing.assert_allclose(left.slip[mirror], right.slip, atol=1e-5)
     np.testing.assert_allclose(left.side_force[mirror], -right.side_force, atol=1e-2)
@@ -167,7 +167,7 @@ def test_left_mirrors_right_and_scrub_slows_the_turn(plant: MakePlant) -> None:
 
 
 def test_the_path_closes_on_a_turn_in_place(plant: MakePlant) -> None:
-    truth = drive(plant(), 15.0, forward=0.0, turn=0.1)
+    truth = drive(plant(), 10.0, forward=0.0, turn=0.1)
     assert truth.yaw_rate > 0.01
     assert np.abs(truth.position[:2]).max() < 0.1
     outward = np.sign(truth.slip_velocity)
@@ -176,8 +176,8 @@ def test_the_path_closes_on_a_turn_in_place(plant: MakePlant) -> None:
 
 
 def test_less_gravity_less_sinkage(plant: MakePlant) -> None:
-    earth = drive(plant(), 20.0)
-    moon = drive(plant(rover('rover.gravity:=1.62')), 20.0)
+    earth = drive(plant(), 12.0)
+    moon = drive(plant(rover('rover.gravity:=1.62')), 12.0)
     assert (moon.sinkage < 0.5 * earth.sinkage).all()
     assert moon.normal_load.sum() == pytest.approx(180.0 * 1.62, rel=1e-6)
 
@@ -190,7 +190,7 @@ def test_a_shorter_step_gives_the_same_drive(monkeypatch: pytest.MonkeyPatch) ->
         hill = ground(
             slope_position=np.array([0.0, 0.2, 0.4]), slope_angle=np.radians([0.0, 0.0, 12.0])
         )
-        ends.append(drive(RoverPlant(configuration, hill, drives(configuration)), 15.0))
+        ends.append(drive(RoverPlant(configuration, hill, drives(configuration)), 9.0))
     np.testing.assert_allclose(ends[0].slip, ends[1].slip, atol=3e-3)
     np.testing.assert_allclose(ends[0].sinkage, ends[1].sinkage, atol=3e-4)
     np.testing.assert_allclose(ends[0].position, ends[1].position, atol=5e-3)
