@@ -122,3 +122,42 @@ def make_bag(tmp_path: Path, drive: list[tuple[str, Any, int]]) -> MakeBag:
         return path
 
     return make
+
+
+@pytest.fixture(scope='session')
+def filter_failures() -> Iterator[list[str]]:
+    """What made a filter start anew anywhere in this process, in words."""
+    from wheel_terra_estimator.estimation.filter.ekf import GatedFilter
+    from wheel_terra_estimator.estimation.output_guard import OutputGuard
+
+    found: list[str] = []
+    repaired, keep_sound = OutputGuard.repaired, GatedFilter._keep_sound
+
+    def watched_repaired(self: OutputGuard, stamp: int, outcome: Any) -> Any:
+        result = repaired(self, stamp, outcome)
+        if result[1]:
+            found.append(repr(outcome) if isinstance(outcome, Exception) else 'not a number')
+        return result
+
+    def watched_keep_sound(self: GatedFilter) -> None:
+        before = self.restarts
+        keep_sound(self)
+        if self.restarts > before:
+            found.append('mean or covariance not a number')
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(OutputGuard, 'repaired', watched_repaired)
+        patch.setattr(GatedFilter, '_keep_sound', watched_keep_sound)
+        yield found
+
+
+@pytest.fixture(autouse=True)
+def no_filter_fails(request: pytest.FixtureRequest, filter_failures: list[str]) -> Iterator[None]:
+    """No test may start a filter anew without saying so: the handler would hide its error."""
+    before = len(filter_failures)
+    yield
+    failures = filter_failures[before:]
+    if request.node.get_closest_marker('filter_fails') is None:
+        assert not failures, f'a filter was started anew: {failures[:3]}'
+    else:
+        assert failures, 'no filter was started anew, so the mark filter_fails is wrong'

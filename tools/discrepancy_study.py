@@ -3,7 +3,7 @@
 """The slow study of the discrepancy workflow: campaigns with something hidden, scored.
 
     python tools/discrepancy_study.py run study.csv                 # about 2,000 campaigns
-    python tools/discrepancy_study.py run study.csv --processes 3   # same, faster
+    python tools/discrepancy_study.py run study.csv --jobs 3   # same, faster
     python tools/discrepancy_study.py show study.csv                # tables on the terminal
     python tools/discrepancy_study.py show study.csv -o docs/discrepancy   # study.md and pictures
 
@@ -23,6 +23,7 @@ import os
 import sys
 import time
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 
 for _name in ('OMP_NUM_THREADS', 'OPENBLAS_NUM_THREADS'):
@@ -33,7 +34,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from campaigns import make_campaign, scoring, summary  # noqa: E402
 from campaigns.groups import GROUPS  # noqa: E402
 
-from wheel_terra_estimator.worker_pool import worker_pool  # noqa: E402
+from wheel_terra_estimator.scheduler import add_jobs_argument, finished  # noqa: E402
 
 SCORING_SEEDS = 11_000_000
 Task = tuple[str, str, int]
@@ -78,19 +79,22 @@ def run(arguments: argparse.Namespace) -> None:
         writer = csv.DictWriter(stream, scoring.FIELDS)
         if not done:
             writer.writeheader()
-        for count, record in enumerate(_results(todo, arguments.processes), 1):
+        for count, record in enumerate(_results(todo, arguments.jobs), 1):
             writer.writerow(record)
             stream.flush()
             if count % 100 == 0:
                 print(f'{count} of {len(todo)}', flush=True)
 
 
-def _results(todo: list[Task], processes: int) -> Iterator[dict[str, object]]:
-    if processes <= 1:
+def _results(todo: list[Task], jobs: int) -> Iterator[dict[str, object]]:
+    if jobs == 1:
         yield from map(one, todo)
         return
-    with worker_pool(processes) as pool:
-        yield from pool.map(one, todo)
+    with closing(finished(one, todo, jobs)) as outcomes:
+        for _, record in outcomes:
+            if isinstance(record, Exception):
+                raise record
+            yield record
 
 
 def show(arguments: argparse.Namespace) -> None:
@@ -114,7 +118,7 @@ def main() -> None:
     commands = parser.add_subparsers(required=True, metavar='COMMAND')
     runner = commands.add_parser('run', help='score campaigns into a CSV file')
     runner.add_argument('file', type=Path)
-    runner.add_argument('--processes', type=int, default=1)
+    add_jobs_argument(runner, '--processes', words='campaigns at a time')
     runner.add_argument('--first-seed', type=int, default=SCORING_SEEDS)
     runner.add_argument('--share', type=float, default=1.0, help='share of the campaigns per group')
     runner.add_argument('--groups', nargs='*', choices=list(GROUPS), metavar='GROUP')

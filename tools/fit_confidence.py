@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Refit the map from posterior weights to confidence (discrepancy/selection/confidence_map.json).
 
-    python tools/fit_confidence.py run names.jsonl --processes 2    # campaigns; resumable
+    python tools/fit_confidence.py run names.jsonl --jobs 2    # campaigns; resumable
     python tools/fit_confidence.py fit names.jsonl                  # writes the map, prints errors
 
 Campaigns of all groups of the slow study, on seeds of their own. The calibration error is that of
@@ -15,6 +15,7 @@ import argparse
 import json
 import os
 import sys
+from contextlib import closing
 from pathlib import Path
 
 for _name in ('OMP_NUM_THREADS', 'OPENBLAS_NUM_THREADS'):
@@ -28,7 +29,7 @@ from campaigns.groups import GROUPS  # noqa: E402
 from scipy.special import expit  # noqa: E402
 
 from wheel_terra_estimator.discrepancy.selection import confidence  # noqa: E402
-from wheel_terra_estimator.worker_pool import worker_pool  # noqa: E402
+from wheel_terra_estimator.scheduler import add_jobs_argument, finished  # noqa: E402
 
 FIRST_SEED = 50_000  # below 100,000: not for scoring
 LEFT_OUT = ', kind left out'
@@ -63,7 +64,7 @@ def names_of(task: tuple[str, str, int]) -> list[dict[str, object]]:
     ] or [{'key': key}]
 
 
-def run(file: Path, per_group: int, processes: int) -> None:
+def run(file: Path, per_group: int, jobs: int) -> None:
     """Diagnose campaigns and append their names to the file."""
     done = set()
     if file.exists():
@@ -75,8 +76,10 @@ def run(file: Path, per_group: int, processes: int) -> None:
         for design in GROUPS[group.partition(LEFT_OUT)[0]].designs
         if f'{group} {design} {FIRST_SEED + i}' not in done
     ]
-    with worker_pool(processes) as pool, file.open('a') as stream:
-        for records in pool.map(names_of, todo):
+    with closing(finished(names_of, todo, jobs)) as outcomes, file.open('a') as stream:
+        for _, records in outcomes:
+            if isinstance(records, Exception):
+                raise records
             stream.writelines(json.dumps(record) + '\n' for record in records)
             stream.flush()
 
@@ -164,13 +167,13 @@ def main() -> None:
     runner = commands.add_parser('run')
     runner.add_argument('file', type=Path)
     runner.add_argument('--per-group', type=int, default=20, help='campaigns per group and design')
-    runner.add_argument('--processes', type=int, default=1)
+    add_jobs_argument(runner, '--processes', words='campaigns at a time')
     fitter = commands.add_parser('fit')
     fitter.add_argument('file', type=Path)
     fitter.add_argument('--around', type=Path, help='map of an earlier state to start from')
     arguments = parser.parse_args()
     if arguments.command == 'run':
-        run(arguments.file, arguments.per_group, arguments.processes)
+        run(arguments.file, arguments.per_group, arguments.jobs)
     else:
         fit(arguments.file, arguments.around)
 

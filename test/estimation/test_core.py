@@ -68,6 +68,7 @@ class Failing(FakeEstimator):
         self.poisoned = snapshot[1]
 
 
+@pytest.mark.filter_fails
 @pytest.mark.parametrize('how', ['raise', 'nan', 'inf'])
 def test_a_failing_filter_is_held_said_and_started_anew(how):
     config = configuration()
@@ -96,6 +97,7 @@ def test_a_failing_filter_is_held_said_and_started_anew(how):
     assert core.health()['filter_restarts'] == 1
 
 
+@pytest.mark.filter_fails
 def test_restarts_of_the_filter_and_of_the_core_add_up():
     class Both(Failing):
         def health(self):
@@ -108,6 +110,7 @@ def test_restarts_of_the_filter_and_of_the_core_add_up():
     assert core.health()['filter_restarts'] == 3
 
 
+@pytest.mark.filter_fails
 def test_a_filter_that_fails_at_once_gives_the_blank_set():
     config = configuration()
     core = EstimatorCore(config, Failing(config, 'raise'))

@@ -3,6 +3,7 @@
 """Kinds of drives load; seeds are apart; baselines do what they are called."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -191,3 +192,17 @@ def test_a_filter_that_failed_on_a_drive_ends_evaluate_with_status_1(monkeypatch
     assert 'The filter was started anew 2 times in 1 runs.' in capsys.readouterr().out
     health['filter_restarts'] = 0
     assert main(['evaluate', '--kinds', 'climb', '--seeds', '1']) == 0
+
+
+def test_evaluate_of_measured_drives_and_of_the_limiter_count_failures_too(monkeypatch, capsys):
+    from wheel_terra_estimator.evaluation import closed_loop, real_drives
+
+    failed = {'filter_restarts': 1}
+    monkeypatch.setattr(real_drives, 'report', lambda _: ('tables', [failed, {}]))
+    assert main(['evaluate', '--measured', 'folder']) == 1
+    assert 'The filter was started anew 1 times in 2 runs.' in capsys.readouterr().out
+    drive = SimpleNamespace(free=SimpleNamespace(health={}), limited=SimpleNamespace(health=failed))
+    monkeypatch.setattr(closed_loop, 'compare', lambda _: [drive])
+    monkeypatch.setattr(closed_loop, 'report', lambda _: 'tables')
+    assert main(['evaluate', '--limiter', '--seeds', '1']) == 1
+    assert 'The filter was started anew 1 times in 2 runs.' in capsys.readouterr().out

@@ -97,10 +97,18 @@ def jobs(count):
     return [Job(Case().replace(bed__seed=seed), {'name': f'bed {seed}'}) for seed in range(count)]
 
 
+def in_this_process(function, tasks, jobs, address):
+    for i, task in enumerate(tasks):
+        try:
+            yield i, function(task)
+        except UserError as error:
+            yield i, error
+
+
 def test_study_goes_on_where_it_was_cut(tmp_path, monkeypatch):
     ran = []
 
-    def fake(case, folder, cache, stop):
+    def fake(case, folder, cache):
         if len(ran) == 2 and case.bed.seed == 2:
             ran.append('cut')
             raise StoppedByUserError('interrupted')
@@ -110,6 +118,7 @@ def test_study_goes_on_where_it_was_cut(tmp_path, monkeypatch):
         return {'slip': 0.1 * case.bed.seed, 'stopped': ''}
 
     monkeypatch.setattr(study, 'run_case', fake)
+    monkeypatch.setattr(study, 'finished', in_this_process)
     table = tmp_path / 'out' / 'study.csv'
     with pytest.raises(StoppedByUserError):
         study.run_study(jobs(5), table, tmp_path, None, 1, tell=lambda _: None)
@@ -121,6 +130,13 @@ def test_study_goes_on_where_it_was_cut(tmp_path, monkeypatch):
     assert by_name['bed 3']['stopped'] == 'the bed itself slides'
     assert by_name['bed 3']['slip'] == ''
     assert float(by_name['bed 4']['slip']) == pytest.approx(0.4)
+
+
+def test_cases_run_in_processes_that_end_with_the_study(tmp_path):
+    """The scheduler of all commands runs them: what one raises there ends the study here."""
+    impossible = Job(Case().replace(operation__duration=-1.0), {})
+    with pytest.raises(UserError, match='duration'):
+        study.run_study([impossible], tmp_path / 'a.csv', tmp_path, None, 1, tell=lambda _: None)
 
 
 def test_a_changed_case_is_run_again():
@@ -261,7 +277,7 @@ def test_dask_absent_gives_one_line(tmp_path, monkeypatch):
 
     monkeypatch.setitem(sys.modules, 'dask.distributed', None)
     with pytest.raises(UserError, match=r"pip install 'wheel_terra_estimator\[cluster\]'"):
-        study.run_study(jobs(1), tmp_path / 'a.csv', tmp_path, None, 1, dask='local')
+        study.run_study(jobs(1), tmp_path / 'a.csv', tmp_path, None, 1, 'here:8786')
 
 
 @pytest.mark.parametrize(

@@ -173,7 +173,7 @@ def csv_case(dice: random.Random, folder: Path) -> None:
 
 
 def core_case(dice: random.Random, folder: Path) -> None:
-    """Send measurements of any value and order to the core; what comes out is finite."""
+    """Send measurements of any value and order to the core: finite sets, no filter that fails."""
     core = EstimatorCore(_rover())
     stamp = START
     sets = []
@@ -195,6 +195,8 @@ def core_case(dice: random.Random, folder: Path) -> None:
         ):
             if not np.all(np.isfinite(getattr(estimates, name))):
                 raise FaultError(f'{name} is not finite')
+    if restarts := core.health()['filter_restarts']:
+        raise FaultError(f'the filter was started anew {restarts} times')
 
 
 def output_case(dice: random.Random, folder: Path) -> None:

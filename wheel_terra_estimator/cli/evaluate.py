@@ -114,11 +114,12 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.rover and (arguments.measured or arguments.limiter):
         raise UserError('--rover goes with simulated kinds, not with --measured or --limiter')
     if arguments.measured:
-        text = real_drives.report(arguments.measured)
+        text, healths = real_drives.report(arguments.measured)
     elif arguments.limiter:
         drives = closed_loop.compare(seeds)
         title, drive = 'The traction limiter in a closed loop', drives[0]
         text = closed_loop.report(drives)
+        healths = [run.health for drive in drives for run in (drive.free, drive.limited)]
         if picture:
             with new_file(picture, arguments.overwrite) as fresh:
                 page.draw_limiter(drive, fresh)
@@ -140,14 +141,16 @@ def run(arguments: argparse.Namespace) -> int:
             )
         write = tables.pooled_report if arguments.pooled else tables.report
         text = write(results, arguments.modes)
-        restarts = sum(drive.health.get('filter_restarts', 0) for drive in results.drives)
-        text += f'\n\nThe filter was started anew {restarts} times in {len(results.drives)} runs.'
+        healths = [drive.health for drive in results.drives]
         if arguments.rover:
             text += f'\n\nRover in place of that of the kinds: {arguments.rover}.'
-        status = FILTER_FAILED if restarts else 0
         if results.interrupted:
             text += f'\n\n{results.interrupted}'
             status = INTERRUPTED
+    restarts = sum(health.get('filter_restarts', 0) for health in healths)
+    text += f'\n\nThe filter was started anew {restarts} times in {len(healths)} runs.'
+    if restarts and not status:
+        status = FILTER_FAILED
     print(text)
     if arguments.output:
         with new_file(arguments.output, arguments.overwrite) as fresh:

@@ -96,8 +96,12 @@ def _common(parser: argparse.ArgumentParser, studies: bool) -> None:
             words='engine processes at a time (default: one per core)',
         )
         parser.add_argument(
-            '--dask', default='', metavar='ADDRESS', help="a Dask scheduler, or 'local'"
+            '--scheduler',
+            default='',
+            metavar='ADDRESS',
+            help='Dask scheduler whose workers take the cases, over files that all of them see',
         )
+        parser.add_argument('--dask', dest='scheduler', help=argparse.SUPPRESS)
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -6,8 +6,9 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import as_completed
+from contextlib import closing
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 from wheel_terra_estimator.estimation.measurements import Measurement
@@ -15,7 +16,7 @@ from wheel_terra_estimator.evaluation import baselines, scores
 from wheel_terra_estimator.evaluation.runner import inputs_of_mode, record, run_estimator
 from wheel_terra_estimator.evaluation.two_state_filters import slip_course
 from wheel_terra_estimator.evaluation.worlds import WORLDS, BenchDrive
-from wheel_terra_estimator.worker_pool import worker_pool
+from wheel_terra_estimator.scheduler import finished
 
 
 @dataclass(frozen=True)
@@ -138,10 +139,13 @@ def _scored(
         for task in tasks:
             yield score_drive(*task, modes, rover), ' '.join(map(str, task))
         return
-    with worker_pool(processes) as pool:
-        waiting = {
-            pool.submit(score_drive, *task, modes, rover): ' '.join(map(str, task))
-            for task in tasks
-        }
-        for future in as_completed(waiting):
-            yield future.result(), waiting[future]
+    score = partial(_score, modes=modes, rover=rover)
+    with closing(finished(score, tasks, processes)) as outcomes:
+        for index, outcome in outcomes:
+            if isinstance(outcome, Exception):
+                raise outcome
+            yield outcome, ' '.join(map(str, tasks[index]))
+
+
+def _score(task: tuple[str, str, int], modes: Sequence[str], rover: str | None) -> list[DriveScore]:
+    return score_drive(*task, modes, rover)

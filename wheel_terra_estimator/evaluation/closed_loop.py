@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,6 +40,7 @@ class ClosedLoopDrive:
     scale: FloatArray  # of the command
     stopped: float | None  # when the limiter stopped the rover [s]
     reason: str
+    health: dict[str, Any]  # of the estimator
 
 
 def closed_loop(
@@ -88,6 +90,7 @@ def closed_loop(
         scale=np.array(columns[4]),
         stopped=stopped,
         reason=decision.reason,
+        health=core.health(),
     )
 
 

@@ -8,6 +8,7 @@ import csv
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -192,15 +193,17 @@ def pathfinder_record(bag: Path, reference_rate: float) -> Record:
     return record(*run_estimator(configuration, given))
 
 
-def report(measured: Path) -> str:
-    """Return the tables of the real drives in a folder of measured data."""
+def report(measured: Path) -> tuple[str, list[dict[str, Any]]]:
+    """Return the tables of the real drives in a folder of measured data, and each run's health."""
     from wheel_terra_estimator.evaluation.tables import table
 
     parts = []
+    healths = []
     for rate, title in ((1.0, 'reference at 1 Hz'), (0.0, 'without any speed')):
         rows, leads, late, runs = [], [], 0, 0
         for event in snow_events(measured / 'frostyboy_snow'):
             score, kept = score_snow_event(event, rate)
+            healths.append(kept.health)
             error = kept.speed - event.speed[: len(kept.speed)]
             late, runs = late + score.late_classes, runs + score.high_slip_runs
             if score.lead is not None:
@@ -227,10 +230,11 @@ def report(measured: Path) -> str:
     bag = measured / 'bags' / 'wvu_pathfinder_test17_mcap'
     for rate, title in ((1.0, 'reference at 1 Hz'), (0.0, 'without reference')):
         kept = pathfinder_record(bag, rate)
+        healths.append(kept.health)
         moving = np.abs(kept.speed) > 0.1
         median = float(np.median(kept.slip[moving])) if moving.any() else 0.0
         parts.append(
             f'Pathfinder, {title}: {"a" if kept.stuck.any() else "no"} stuck warning, median slip '
             f'{median:+.3f}.\n'
         )
-    return '\n'.join(parts)
+    return '\n'.join(parts), healths

@@ -37,14 +37,13 @@ def run_case(
     folder: Path,
     cache: Path | None,
     progress: Progress | None = None,
-    stop: Callable[[], bool] = lambda: False,
     checkpoint_every: float = 120.0,
 ) -> dict[str, object]:
     """Run (or go on with) a case in a working folder; return its summary.
 
     The folder keeps ``series.npy``, ``outcome.json`` and the frames; an interrupted run leaves
     ``checkpoint/`` and goes on from it when called again with the same case. ``progress`` takes
-    (stage, fraction); ``stop`` is asked now and then whether to interrupt.
+    (stage, fraction). The engine ends, and keeps its state, when this process does.
     """
     check(case)
     time_step(case)
@@ -57,7 +56,7 @@ def run_case(
         (folder / 'outcome.json').unlink(missing_ok=True)
     if not (folder / 'outcome.json').exists():
         _write(job_file, json.dumps(job | {'checkpoint_every': checkpoint_every}))
-        _engine(folder, case.name, progress, stop)
+        _engine(folder, case.name, progress)
     outcome = json.loads((folder / 'outcome.json').read_text())
     series = np.load(folder / 'series.npy')
     if len(series) < 4:
@@ -75,7 +74,7 @@ def _write(path: Path, text: str) -> None:
     part.replace(path)
 
 
-def _engine(folder: Path, name: str, progress: Progress | None, stop: Callable[[], bool]) -> None:
+def _engine(folder: Path, name: str, progress: Progress | None) -> None:
     environment = dict(os.environ, OMP_NUM_THREADS='1')
     with (folder / 'engine.err').open('w') as errors:
         process = subprocess.Popen(
@@ -99,9 +98,6 @@ def _engine(folder: Path, name: str, progress: Progress | None, stop: Callable[[
                         words, kind = message['error'], message.get('kind', '')
                     elif progress:
                         progress(message['stage'], message['fraction'])
-                    if stop() and not interrupted:
-                        interrupted = True
-                        process.send_signal(signal.SIGTERM)
                 break
             except KeyboardInterrupt:
                 interrupted = True

@@ -41,6 +41,6 @@ def run(arguments: argparse.Namespace, cache: Path | None) -> int:
     )
     jobs: list[Job] = module.jobs(arguments)
     workers = 0 if arguments.report_only else arguments.jobs or os.cpu_count() or 1
-    rows = run_study(jobs, table, folder / '.work', cache, workers, arguments.dask)
+    rows = run_study(jobs, table, folder / '.work', cache, workers, arguments.scheduler)
     module.report(arguments, rows, folder)
     return 0

@@ -8,13 +8,13 @@ import csv
 import hashlib
 import json
 import shutil
-import threading
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor, as_completed
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
-from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.scheduler import finished
 from wheel_terra_estimator.soilbin.case import Case, to_dict
 from wheel_terra_estimator.soilbin.launch import CaseFailedError, run_case
 
@@ -42,13 +42,11 @@ class Job:
         return hashlib.sha256(json.dumps(data, sort_keys=True).encode()).hexdigest()[:12]
 
 
-def run_job(
-    job: Job, work: str, cache: str, stop: Callable[[], bool] = lambda: False
-) -> dict[str, object]:
+def run_job(job: Job, work: str, cache: str) -> dict[str, object]:
     """Run one job; a case that cannot give a result gives a row that says why."""
     folder = Path(work) / job.key
     try:
-        row = run_case(job.case, folder, Path(cache) if cache else None, stop=stop)
+        row = run_case(job.case, folder, Path(cache) if cache else None)
         _keep_series(folder / 'series.npy', Path(work).parent / 'series' / f'{job.key}.npy')
     except CaseFailedError as error:
         row = {'stopped': str(error)}
@@ -77,13 +75,14 @@ def run_study(
     work: Path,
     cache: Path | None,
     workers: int,
-    dask: str = '',
+    scheduler: str = '',
     tell: Callable[[str], None] = print,
 ) -> list[dict[str, str]]:
     """Run the jobs that the table does not hold yet; return the rows of all jobs.
 
     ``workers``: engine processes at a time; 0 runs nothing and returns the finished rows.
-    ``dask``: address of a scheduler, or 'local' for a cluster of processes on this machine.
+    ``scheduler``: address of a Dask scheduler whose workers take the cases. Interrupted, or after
+    an error, the running cases keep their state, the others do not start.
     """
     done = {row['key'] for row in read_rows(table)}
     unique = {job.key: job for job in jobs}
@@ -91,55 +90,17 @@ def run_study(
     if waiting and workers:
         tell(f'{len(waiting)} of {len(unique)} cases to run, {workers} at a time')
         table.parent.mkdir(parents=True, exist_ok=True)
-        runner = _on_dask if dask else _on_this_machine
-        for number, row in enumerate(
-            runner(waiting, str(work), str(cache or ''), workers, dask), start=1
-        ):
-            _append(table, row)
-            slip = row.get('slip')
-            told = f'slip {float(str(slip)):.3f}' if slip is not None else str(row['stopped'])
-            tell(f'{number}/{len(waiting)} {row.get("name", row["key"])}: {told}')
+        task = partial(run_job, work=str(work.absolute()), cache=str(cache or ''))
+        with closing(finished(task, waiting, workers, scheduler)) as outcomes:
+            for number, (_, row) in enumerate(outcomes, start=1):
+                if isinstance(row, Exception):
+                    raise row
+                _append(table, row)
+                slip = row.get('slip')
+                told = f'slip {float(str(slip)):.3f}' if slip is not None else str(row['stopped'])
+                tell(f'{number}/{len(waiting)} {row.get("name", row["key"])}: {told}')
     wanted = set(unique)
     return [row for row in read_rows(table) if row['key'] in wanted]
-
-
-def _on_this_machine(
-    jobs: Sequence[Job], work: str, cache: str, workers: int, _: str
-) -> Iterable[dict[str, object]]:
-    stop = threading.Event()
-    with ThreadPoolExecutor(workers) as pool:
-        running: list[Future] = [
-            pool.submit(run_job, job, work, cache, stop.is_set) for job in jobs
-        ]
-        try:
-            for future in as_completed(running):
-                yield future.result()
-        finally:
-            # Interrupted or failed: the running cases keep their state, the others do not start.
-            stop.set()
-            for future in running:
-                future.cancel()
-
-
-def _on_dask(
-    jobs: Sequence[Job], work: str, cache: str, workers: int, address: str
-) -> Iterable[dict[str, object]]:
-    try:
-        from dask.distributed import Client, LocalCluster
-        from dask.distributed import as_completed as completed
-    except ImportError as error:
-        raise UserError(
-            f"Dask is not installed: pip install 'wheel_terra_estimator[cluster]' ({error})"
-        ) from error
-    cluster = None
-    if address == 'local':
-        cluster = LocalCluster(n_workers=workers, threads_per_worker=1)
-    with Client(cluster or address) as client:
-        futures = client.map(run_job, jobs, work=work, cache=cache, pure=False)
-        for future in completed(futures):
-            yield future.result()
-    if cluster:
-        cluster.close()
 
 
 def _append(table: Path, row: Mapping[str, object]) -> None:
