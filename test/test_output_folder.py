@@ -224,31 +224,34 @@ def test_commands_refuse_folders_of_others(tmp_path: Path, capsys: pytest.Captur
     assert len(contents(z)) == 5
 
 
+@pytest.mark.parametrize('kind', ['new_folder', 'new_file'])
 def test_what_a_killed_run_left_is_removed_by_the_next_and_a_running_one_is_left_alone(
-    tmp_path: Path,
+    tmp_path: Path, kind: str
 ) -> None:
     out = tmp_path / 'out'
     code = (
         'import sys, time\n'
         'from pathlib import Path\n'
-        'from wheel_terra_estimator.output_folder import new_folder\n'
-        'with new_folder(Path(sys.argv[1])) as folder:\n'
-        "    (folder / 'half.mcap').write_bytes(b'half')\n"
+        f'from wheel_terra_estimator.output_folder import {kind} as new\n'
+        'with new(Path(sys.argv[1])) as place:\n'
+        "    (place / 'half' if place.is_dir() else place).write_bytes(b'half')\n"
         "    print('there', flush=True)\n"
         '    time.sleep(60)\n'
     )
+
+    def write() -> None:
+        with {'new_folder': new_folder, 'new_file': new_file}[kind](out, overwrite=True) as place:
+            (place / 'whole' if place.is_dir() else place).write_text('whole')
+
     with subprocess.Popen(
         [sys.executable, '-c', code, str(out)], stdout=subprocess.PIPE, text=True
     ) as running:
         assert running.stdout is not None
         assert running.stdout.readline() == 'there\n'
         (hidden,) = tmp_path.glob('.out.wheel-terra-*')
-        with new_folder(out) as folder:
-            (folder / 'whole').write_text('whole')
-        assert (hidden / 'out' / 'half.mcap').is_file()
+        write()
+        assert any(path.read_bytes() == b'half' for path in hidden.rglob('*') if path.is_file())
         running.kill()
     assert hidden.is_dir()
-    with new_folder(out, overwrite=True) as folder:
-        (folder / 'again').write_text('again')
-    assert not hidden.exists()
-    assert [p.name for p in tmp_path.iterdir()] == ['out']
+    write()
+    assert [path.name for path in tmp_path.iterdir()] == ['out']

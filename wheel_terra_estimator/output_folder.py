@@ -167,9 +167,12 @@ def new_file(path: Path, overwrite: bool = False, inputs: Iterable[Path] = ()) -
     check_file(path, overwrite, inputs)
     path = _absolute(path)
     beside: Path | None = None
+    held: int | None = None
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
+        _remove_left_behind(path)
         beside = Path(tempfile.mkdtemp(dir=path.parent, prefix=f'.{path.name}.wheel-terra-'))
+        held = _hold(beside)
         yield beside / path.name
         (beside / path.name).replace(path)
         if (path.parent / MARKER).is_file():
@@ -180,6 +183,8 @@ def new_file(path: Path, overwrite: bool = False, inputs: Iterable[Path] = ()) -
     finally:
         if beside is not None:
             shutil.rmtree(beside, ignore_errors=True)
+        if held is not None:
+            os.close(held)
 
 
 def working_folder(
