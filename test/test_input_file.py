@@ -128,6 +128,7 @@ def test_what_is_no_regular_file_is_refused_and_never_waited_for(
             assert main(command) == 2, command
             said = capsys.readouterr().err
             assert said.count('\n') == 1, said
+            assert 'no such file' not in said or place.is_symlink(), said
     assert not (tmp_path / 'out').exists()
 
 

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import argparse
 import os
 import signal
 from pathlib import Path
@@ -12,7 +13,7 @@ from typing import Any
 import pytest
 
 from wheel_terra_estimator.errors import UserError
-from wheel_terra_estimator.scheduler import finished
+from wheel_terra_estimator.scheduler import add_jobs_argument, finished
 
 
 def root(number: float) -> float:
@@ -70,3 +71,14 @@ def test_a_cluster_that_loses_a_worker_ends_all_tasks(tmp_path: Path) -> None:
         found = dict(finished(killed_once, tasks, address=address))
         assert sorted(found) == [0, 1, 2]
         assert all(isinstance(process, int) for process in found.values()), found
+
+
+@pytest.mark.parametrize('text', ['0', '-1', '1.5', 'all', '²', '9' * 5000])
+def test_no_number_of_processes(text: str, capsys: pytest.CaptureFixture[str]) -> None:
+    parser = argparse.ArgumentParser()
+    add_jobs_argument(parser)
+    with pytest.raises(SystemExit):
+        parser.parse_args([f'--jobs={text}'])
+    said = capsys.readouterr().err
+    assert 'is no number of processes; give 1 or more' in said
+    assert len(said) < 300

@@ -17,6 +17,7 @@ from wheel_terra_estimator.worker_pool import worker_pool
 Task = TypeVar('Task')
 Result = TypeVar('Result')
 
+_MOST_DIGITS = 4  # of a number of processes
 CONNECT_TIMEOUT = 10
 """Time [s] in which a Dask scheduler has to answer."""
 
@@ -126,6 +127,6 @@ def _outcome(future: Any) -> Any:
 
 
 def _count(text: str) -> int:
-    if not text.isdecimal() or int(text) < 1:
-        raise argparse.ArgumentTypeError(f"'{text}' is no number of processes; give 1 or more")
+    if not (text.isdecimal() and len(text) <= _MOST_DIGITS and int(text) > 0):
+        raise argparse.ArgumentTypeError(f"'{text[:20]}' is no number of processes; give 1 or more")
     return int(text)

@@ -81,6 +81,32 @@ def test_a_refusal_says_what_is_missing(tmp_path: Path, capsys: Any) -> None:
     assert said.count('\n') == 1
 
 
+def test_every_command_says_what_is_damaged(
+    make_bag: Any, rover: Any, tmp_path: Path, capsys: Any
+) -> None:
+    rover.write(tmp_path / 'rover.yaml')
+    config = ['--config', str(tmp_path / 'rover.yaml')]
+    bag = make_bag()
+    estimates = str(tmp_path / 'estimates')
+    assert main(['replay', str(bag), *config, '-o', estimates]) == 0
+    for folder in (bag, Path(estimates)):
+        (file,) = folder.glob('*.mcap')
+        file.write_bytes(file.read_bytes()[:-200])
+    calibrated = str(tmp_path / 'calibrated.yaml')
+    for command in (
+        ['replay', str(bag), *config],
+        ['check', str(bag), *config],
+        ['check', str(bag), '--json'],
+        ['calibrate', str(bag), *config, '-o', calibrated],
+        ['compare', estimates, estimates],
+        ['diagnose', str(bag), *config, '-o', str(tmp_path / 'd')],
+    ):
+        capsys.readouterr()
+        main(command)
+        said = capsys.readouterr()
+        assert 'whole messages recovered' in said.out + said.err, command
+
+
 @pytest.mark.shared
 def test_measured_drive_with_a_lost_sector(
     shared: Path, tmp_path: Path, capsys: Any, undrawn: None

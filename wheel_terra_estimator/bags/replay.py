@@ -154,7 +154,9 @@ def _notes(
         yield f'not in the bag: {", ".join(reader.absent)}'
     used = set(reader.topics.values())
     unknown = [
-        t for t in bag.topics.values() if t.name not in used and not t.name.startswith(TRUTH_TOPICS)
+        t
+        for t in bag.topics.values()
+        if t.message_count and t.name not in used and not t.name.startswith(TRUTH_TOPICS)
     ]
     if unknown:
         count = sum(topic.message_count for topic in unknown)

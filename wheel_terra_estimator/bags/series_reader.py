@@ -120,6 +120,7 @@ def read_series(
         reference=made('reference_odom'),
         wheel_odometry=made('odom'),
         shortened=shortened,
+        notes=tuple(bag.notes),
     )
 
 

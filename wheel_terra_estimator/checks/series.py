@@ -69,7 +69,8 @@ class VelocitySeries(Channel):
 class Recording:
     """What the checks look at; None where the recording has no such topic.
 
-    ``topics`` lists (name, type, number of messages) of everything that was recorded.
+    ``topics`` lists (name, type, number of messages) of everything that was recorded; ``notes`` say
+    what is damaged.
     """
 
     name: str
@@ -80,3 +81,4 @@ class Recording:
     reference: VelocitySeries | None
     wheel_odometry: VelocitySeries | None
     shortened: bool = False
+    notes: tuple[str, ...] = ()

@@ -61,5 +61,7 @@ def run(arguments: argparse.Namespace) -> int:
         path.write_text(text, encoding='utf-8')
     print(f'{name}: {len(calibration.changes)} parameters told')
     print('\n'.join(summary(calibration)))
+    for note in recording.notes:
+        print(f'note: {note}')
     print(f'rover file: {arguments.output}')
     return 0

@@ -61,7 +61,7 @@ def run(arguments: argparse.Namespace) -> int:
             )
     report = check_recording(recording, configuration, tuple(remaps))
     if arguments.json:
-        print(json.dumps(report.as_dict(), indent=2))
+        print(json.dumps({**report.as_dict(), 'notes': list(recording.notes)}, indent=2))
     else:
         print(as_text(recording, report, configuration is None))
     return 1 if report.findings else 0
@@ -73,6 +73,7 @@ def as_text(recording: Recording, report: CheckReport, without_rover: bool) -> s
 
     lines = [f'{recording.name}: {len(report.findings) or "no"} findings']
     lines += [f'  {finding}' for finding in report.findings]
+    lines += [f'  note: {note}' for note in recording.notes]
     if without_rover:
         lines += ['', '  topics']
         lines += [f'    {name}  {kind}  {count}' for name, kind, count in recording.topics]

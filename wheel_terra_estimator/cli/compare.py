@@ -50,13 +50,16 @@ def run(arguments: argparse.Namespace) -> int:
         check_file(arguments.report, arguments.overwrite, inputs)
     limits = bag_limits.from_arguments(arguments)
     histories = []
+    notes: list[str] = []
     for path in inputs:
         with open_bag(path, limits) as bag:
             histories.append(read_estimates(bag))
+            notes += bag.notes
     truth = None
     if arguments.truth:
         with open_bag(arguments.truth, limits) as bag:
             truth = read_simulated_truth(bag, histories[0].names)
+            notes += bag.notes
         if truth is None:
             raise UserError(
                 f'{arguments.truth}: no truth in it: neither /ground_truth/twist nor '
@@ -65,7 +68,10 @@ def run(arguments: argparse.Namespace) -> int:
     origins = read_origin(inputs[0]), read_origin(inputs[1])
     names = [str(path) for path in inputs]
     comparison = compare(histories[0], histories[1], names, truth, origins)
-    print(json.dumps(as_dict(comparison), indent=2) if arguments.json else as_text(comparison))
+    if arguments.json:
+        print(json.dumps({**as_dict(comparison), 'notes': notes}, indent=2))
+    else:
+        print('\n'.join([as_text(comparison), *(f'note: {note}' for note in notes)]))
     if arguments.report:
         write_comparison(arguments.report, comparison, histories, truth, arguments.overwrite)
         if not arguments.json:

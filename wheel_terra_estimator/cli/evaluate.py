@@ -119,7 +119,7 @@ def run(arguments: argparse.Namespace) -> int:
         drives = closed_loop.compare(seeds)
         title, drive = 'The traction limiter in a closed loop', drives[0]
         text = closed_loop.report(drives)
-        healths = [run.health for drive in drives for run in (drive.free, drive.limited)]
+        healths = [run.health for pair in drives for run in (pair.free, pair.limited)]
         if picture:
             with new_file(picture, arguments.overwrite) as fresh:
                 page.draw_limiter(drive, fresh)
@@ -141,7 +141,7 @@ def run(arguments: argparse.Namespace) -> int:
             )
         write = tables.pooled_report if arguments.pooled else tables.report
         text = write(results, arguments.modes)
-        healths = [drive.health for drive in results.drives]
+        healths = [score.health for score in results.drives]
         if arguments.rover:
             text += f'\n\nRover in place of that of the kinds: {arguments.rover}.'
         if results.interrupted:

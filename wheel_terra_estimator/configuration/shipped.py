@@ -11,6 +11,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.input_file import check_regular
 
 PACKAGE = 'wheel_terra_estimator'
 
@@ -99,6 +100,8 @@ def find(name: str | Path, kind: str = '') -> Path:
         raise UserError(f"'{text}' is ambiguous: {' or '.join(matches)}")
     if path.is_dir():
         raise UserError(f'{text}: is a folder, not a configuration file')
+    if path.exists():
+        check_regular(path)
     near = nearest_names(wanted, shipped)
     first = near[0].rsplit('/', 1)[-1] if near else ''
     alike = difflib.get_close_matches(wanted.rsplit('/', 1)[-1], [first])

@@ -178,12 +178,14 @@ def rows_from_bag(
     UserError
         If the bag cannot be read, lacks a sensor, or holds no steady window.
     """
-    from wheel_terra_estimator.bags import reader
     from wheel_terra_estimator.bags.limits import LIMITS
+    from wheel_terra_estimator.bags.reader import MeasurementReader
+    from wheel_terra_estimator.bags.storage import open_bag
 
-    read = reader.read(path, remaps or {}, configuration, limits or LIMITS)
-    measurements = (item for _, item in read)
-    return rows_from_measurements(measurements, configuration, str(path))
+    with open_bag(path, limits or LIMITS) as bag:
+        read = MeasurementReader(bag, remaps or {}, configuration).measurements()
+        rows = rows_from_measurements((item for _, item in read), configuration, str(path))
+        return replace(rows, notes=(*bag.notes, *rows.notes))
 
 
 def rows_from_measurements(
