@@ -39,6 +39,7 @@ def window(yaw=0.0, pitch=0.0, force=(0.0, 0.0, 9.8), readings=5):
         *(readings * f for f in force),
         yaw_rate=readings * yaw,
         pitch_rate=readings * pitch,
+        rates=readings,
     )
 
 
@@ -164,6 +165,20 @@ def test_angles_of_nought_are_those_of_a_rover_that_does_not_steer(parts):
     found, straight = headings(parts.rover, [0.0] * 6), straight_headings(parts.rover)
     for gains, expected in zip(found[:-1], straight[:-1], strict=True):
         assert gains == pytest.approx(expected)
+
+
+def test_without_a_gyro_the_sides_tell_the_yaw_rate(parts):
+    """Wheels that roll: exact. A rover that has to skid turns less, by an unknown share."""
+    straight = straight_headings(parts.rover)
+    rims = tuple([0.05 - 0.04 * y for y in parts.rover.lateral])
+    assert straight.yaw_rate(rims) == pytest.approx(0.04)
+    turning = Turning(parts.rover, parts.sensors)
+    turning.update(InertialWindow(), 0.1, 0.05, 0.06, straight, rims)
+    assert turning.state.yaw_rate == pytest.approx(0.6 * 0.04)
+    assert turning.state.yaw_rate_std > 0.3 * turning.state.yaw_rate
+    # With a gyro the wheels are not asked.
+    turning.update(window(0.01), 0.1, 0.05, 0.06, straight, None)
+    assert turning.state.yaw_rate < 0.6 * 0.04
 
 
 # -- What the ground asks -----------------------------------------------------------------------

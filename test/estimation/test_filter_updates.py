@@ -162,7 +162,7 @@ def rest(parts, ekf, seconds, rims=(0.0,) * 6, yaw=0.0):
             typical_rim=float(np.median(rims)),
             still=still,
             sliding=False,
-            window=InertialWindow(readings=5, pitch_rate=5 * 0.002),
+            window=InertialWindow(readings=5, rates=5, pitch_rate=5 * 0.002),
             yaw_rate=yaw,
         )
     return update

@@ -96,11 +96,28 @@ def test_leaving_angle(checks):
 def test_imu_that_is_not_a_number(checks, bad, axis):
     force, rate = np.array([0.0, 0.0, 9.8]), np.zeros(3)
     force[axis] = bad
-    assert check(checks, InertialReading(stamp_at(0.0), force, np.zeros(3), None)) is None
+    turning, good = np.array([0.0, 0.1, 0.2]), np.array([0.0, 0.0, 9.8])
+    kept = check(checks, InertialReading(stamp_at(0.0), force, turning, None))
+    assert np.isnan(kept.specific_force).all()
+    assert kept.angular_rate.tolist() == turning.tolist()
     rate[axis] = bad
-    good = np.array([0.0, 0.0, 9.8])
-    assert check(checks, InertialReading(stamp_at(0.0), good, rate, None)) is None
+    kept = check(checks, InertialReading(stamp_at(0.0), good, rate, None))
+    assert np.isnan(kept.angular_rate).all()
+    assert kept.specific_force.tolist() == good.tolist()
     assert len(reasons(checks)) == 2
+    assert check(checks, InertialReading(stamp_at(0.0), force, rate, None)) is None
+    level = np.array([0.0, 0.0, 0.0, 1.0])
+    kept = check(checks, InertialReading(stamp_at(0.0), force, rate, level))
+    assert kept.orientation.tolist() == level.tolist()
+
+
+def test_an_imu_without_an_accelerometer_keeps_its_gyro(checks):
+    """Drivers without one send zeros, or nan where the covariance says that there is none."""
+    turning = np.array([0.0, 0.0, 0.2])
+    for force in (np.zeros(3), np.full(3, NAN)):
+        kept = check(checks, InertialReading(stamp_at(0.0), force, turning, None))
+        assert np.isnan(kept.specific_force).all()
+        assert kept.angular_rate[2] == 0.2
 
 
 def test_imu_that_does_not_run(checks):

@@ -81,6 +81,29 @@ def test_the_noise_of_a_vibrating_accelerometer_is_seen_raw_and_in_means():
     assert seen[20.0] == pytest.approx(0.01, rel=0.5)
 
 
+def test_a_gyro_without_accelerometer_and_the_reverse_are_kept_apart():
+    """A rover tilted nose up by 0.1 rad, each part of the IMU sent by itself."""
+    inertial, unknown = InertialInput(9.8), np.full(3, NAN)
+    rate = np.array([0.0, 0.0, 0.3])
+    half = 0.5 * 0.1
+    up = np.array([0.0, -np.sin(half), 0.0, np.cos(half)])
+    for i in range(5):
+        inertial.update(0.02 * i, InertialReading(0, unknown, rate, None), GyroZero())
+    window = inertial.take()
+    assert (window.readings, window.rates, window.tells_force) == (0, 5, False)
+    assert window.yaw_rate / window.rates == pytest.approx(0.3)
+    force = np.array([1.0, 0.0, 9.7])
+    inertial.update(0.1, InertialReading(0, force, unknown, None), GyroZero())
+    window = inertial.take()
+    assert (window.readings, window.rates) == (1, 0)
+    assert window.mean_force() == pytest.approx((1.0, 0.0, 9.7))
+    # An orientation alone gives the specific force of a rover that stands so.
+    inertial.update(0.12, InertialReading(0, unknown, unknown, up), GyroZero())
+    window = inertial.take()
+    assert window.tells_force
+    assert window.mean_force() == pytest.approx((9.8 * np.sin(0.1), 0.0, 9.8 * np.cos(0.1)))
+
+
 def test_the_zero_of_the_gyro_is_taken_off():
     imu = InertialInput(GRAVITY)
     imu.update(0.0, reading(rate=(0.0, 0.03, 0.05)), GyroZero(yaw=0.01, pitch=0.02))

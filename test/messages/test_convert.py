@@ -145,15 +145,35 @@ def test_absurd_values_pass_without_a_warning_on_the_terminal(
 
 
 @pytest.mark.parametrize('field', ['linear_acceleration', 'angular_velocity'])
-def test_imu_that_says_it_lacks_a_field_is_refused_in_words(
+def test_imu_that_says_it_lacks_a_field_keeps_the_others(
     converter: InputConverter, factory: Any, field: str
 ) -> None:
     message = factory.imu(factory.header(STAMP), (0.0, 0.0, 9.8), (0.0, 0.0, 0.0), None)
     getattr(message, f'{field}_covariance')[0] = -1.0
-    assert converter.convert('imu/data', message) is None
+    measured = converter.convert('imu/data', message)
+    vectors = {
+        'linear_acceleration': measured.specific_force,
+        'angular_velocity': measured.angular_rate,
+    }
+    assert np.isnan(vectors.pop(field)).all()
+    assert all(np.isfinite(other).all() for other in vectors.values())
     ((topic, reason),) = converter.rejected
     assert topic == 'imu/data'
     assert field.replace('_', ' ') in reason
+
+
+def test_imu_with_nothing_but_an_orientation_keeps_that(
+    converter: InputConverter, factory: Any
+) -> None:
+    level = (0.0, 0.0, 0.0, 1.0)
+    for orientation in (level, None):
+        message = factory.imu(factory.header(STAMP), (0.0,) * 3, (0.0,) * 3, orientation)
+        message.linear_acceleration_covariance[0] = -1.0
+        message.angular_velocity_covariance[0] = -1.0
+        measured = converter.convert('imu/data', message)
+        assert (measured is None) == (orientation is None)
+        if measured is not None:
+            assert measured.orientation.tolist() == list(level)
 
 
 def test_mounting_turns_the_imu_into_base_link(rover: Any, factory: Any) -> None:

@@ -312,6 +312,8 @@ class OnlineChecks:
     def _add_inertial(self, reading: InertialReading) -> None:
         sums = self._sums
         x, y, z = reading.specific_force.tolist()
+        if math.isnan(x) or math.isnan(float(reading.angular_rate[2])):
+            return
         sums.force_x += x
         sums.force_y += y
         sums.force_z += z

@@ -43,7 +43,7 @@ class WheelOdometry:
 
 @dataclass(frozen=True)
 class InertialReading:
-    """One IMU message, already turned into ``base_link``.
+    """One IMU message, already turned into ``base_link``; a vector that is unknown is nan.
 
     Attributes
     ----------

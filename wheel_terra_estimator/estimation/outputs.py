@@ -31,7 +31,6 @@ FloatArray = NDArray[np.float64]
 Floats = tuple[float, ...]
 _LEAST_VARIANCE = 1e-12  # of a speed [(m/s)^2]
 _UNKNOWN_STD = 1.0  # of a slip velocity [m/s]
-_UNKNOWN_YAW_VARIANCE = 1.0  # [(rad/s)^2]
 _UNLOADED_STD = 1.0  # of the pull of a wheel in the air [N]
 _BELIEVED_LOAD = 0.1
 """Sum of the loads over the rover's weight below which the specific force is none of a rover on
@@ -76,6 +75,8 @@ class MissingInputs(NamedTuple):
 
     wheel_odometry: bool
     imu: bool
+    acceleration: bool
+    angular_rate: bool
     orientation: bool
     torque: bool
     sinkage: bool
@@ -84,7 +85,9 @@ class MissingInputs(NamedTuple):
 
 _COST = (
     'no wheel odometry: slip held',
-    'no IMU: loads of level ground, no balance of forces',
+    'no IMU: loads of level ground, turning from the wheels, no balance of forces',
+    'no acceleration: no balance of forces, loads of level ground or by the orientation',
+    'no angular rate: turning from the wheels',
     'no orientation: slope from gyro and specific force',
     'no torque: pull from the balance of forces and the soil model',
     'no sinkage: held by its model',
@@ -152,9 +155,7 @@ class Outputs:
             forward_velocity=given.speed,
             forward_velocity_variance=max(given.speed_variance, _LEAST_VARIANCE),
             yaw_rate=given.yaw_rate,
-            yaw_rate_variance=(
-                given.yaw_rate_std**2 if given.loads.force_known else _UNKNOWN_YAW_VARIANCE
-            ),
+            yaw_rate_variance=given.yaw_rate_std**2,
             stuck=given.assessment.stuck,
             reasons=reasons_in_words(given),
             faults=faults_in_words(missing),

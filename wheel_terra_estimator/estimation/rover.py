@@ -17,6 +17,8 @@ from wheel_terra_estimator.estimation.contacts.load_distribution import (
 _LEAST_LOW_RIM = 0.005
 """Rim speed [m/s] below which v / rim speed is not told from the noise of encoders."""
 _LOW_RIM_OVER_REST = 3.0
+_SKID_LENGTH = 0.3
+"""Length between the axles over the track above which turning is skidding."""
 _CONTACT_SHARE = 0.5
 """Contact length over the rim radius: an entrance angle of 30 degrees, as of rovers in sand."""
 
@@ -47,6 +49,8 @@ class Rover:
     """Rim speed below which v / rim speed is not told from noise [m/s]."""
     contact_length: float
     """Travel after which a contact is new all along, and its shear that of the model [m]."""
+    skids: bool
+    """Whether it has to skid to turn: wheels in several rows, none of which steers."""
     curvature_length: float
     """Half the distance between the first and the last axle [m]."""
 
@@ -77,6 +81,7 @@ class Rover:
             period=float(tuning.period),
             low_rim=max(_LOW_RIM_OVER_REST * rest_speed, _LEAST_LOW_RIM),
             contact_length=_CONTACT_SHARE * min(_floats(wheels.radius)),
+            skids=not any(wheels.steered) and np.ptp(x) > _SKID_LENGTH * np.ptp(wheels.y),
             curvature_length=0.5 * (max(_floats(x)) - min(_floats(x))),
         )
 

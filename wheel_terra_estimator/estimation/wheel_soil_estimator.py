@@ -326,7 +326,15 @@ class WheelSoilEstimator:
         window = self._inertial.take()
         fastest = self._wheels.fastest()
         headings = self._steering.state.headings
-        turning = self._turning.update(window, dt, float(ekf.mean[SPEED]), fastest, headings)
+        no_gyro = time - self._inertial.state.rate_time > rover.silence
+        turning = self._turning.update(
+            window,
+            dt,
+            float(ekf.mean[SPEED]),
+            fastest,
+            headings,
+            self._wheels.rim_speeds(time) if no_gyro else None,
+        )
         pulls = self._pulls.state
         loads = self._loads.update(
             window, pulls.model_pull, pulls.torque, self._unloaded.state.unloaded, headings
@@ -336,7 +344,9 @@ class WheelSoilEstimator:
         unturned = RimSpeeds.of(rims, turning.yaw_rate, headings)
         reference_known = self._reference.known(time)
         event = self._contact_age.update(unturned.typical)
-        demand = self._contact_age.state.direction * loads.slope_share if window.readings else NAN
+        demand = (
+            self._contact_age.state.direction * loads.slope_share if window.tells_force else NAN
+        )
         if event.reversed:
             speed.turn_back(ekf, self._demand.until(demand))
         elif event.new_direction:
@@ -550,7 +560,7 @@ class WheelSoilEstimator:
                 speed,
                 math.sqrt(max(variance, 0.0)),
                 motion.yaw_rate,
-                self._turning.yaw_rate_std,
+                motion.yaw_rate_std,
                 self._steering.state.headings,
                 motion.lateral_motion,
                 stopped=self._zero_velocity.standing()
@@ -614,7 +624,7 @@ class WheelSoilEstimator:
             speed=speed,
             speed_variance=variance,
             yaw_rate=self._turning.state.yaw_rate,
-            yaw_rate_std=self._turning.yaw_rate_std,
+            yaw_rate_std=self._turning.state.yaw_rate_std,
             headings=self._steering.state.headings,
             rims=rims,
             slips=self._slips.state,
@@ -629,6 +639,8 @@ class WheelSoilEstimator:
         missing = MissingInputs(
             wheel_odometry=self._wheels.silent(time),
             imu=silent,
+            acceleration=not silent and time - inertial.force_time > self._rover.silence,
+            angular_rate=not silent and time - inertial.rate_time > self._rover.silence,
             orientation=not silent and not inertial.attitude.reported,
             torque=not self._wheels.torque_known(time),
             sinkage=len(self._sinkage.unread(time)) == self._rover.wheel_count,

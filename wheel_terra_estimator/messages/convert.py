@@ -188,16 +188,22 @@ class InputConverter:
         return WheelOdometry(stamp_of(message), rate, np.full_like(rim_speed, math.nan))
 
     def imu(self, message: Any) -> InertialReading | None:
-        """Specific force, angular rate and attitude, turned into ``base_link``."""
-        for field, words in _INERTIAL_FIELDS.items():
-            if getattr(message, field)[0] == -1.0:  # REP 145
+        """Specific force, angular rate and attitude in ``base_link``; nan where not told."""
+        told = [getattr(message, field)[0] != -1.0 for field in _INERTIAL_FIELDS]  # REP 145
+        for words, there in zip(_INERTIAL_FIELDS.values(), told, strict=True):
+            if not there:
                 self.rejected['imu/data', f'says that it has no {words} (covariance -1)'] += 1
-                return None
-        force = _vector(message.linear_acceleration)
-        rate = _vector(message.angular_velocity)
+        force, rate = (
+            _vector(vector) if there else np.full(3, math.nan)
+            for vector, there in zip(
+                (message.linear_acceleration, message.angular_velocity), told, strict=True
+            )
+        )
         orientation = None
         if message.orientation_covariance[0] != -1.0:  # REP 145: -1 is "no orientation"
             orientation = self._orientation(message.orientation)
+        if orientation is None and not any(told):
+            return None
         if self._mounted:
             with np.errstate(all='ignore'):
                 force, rate = self._rotation @ force, self._rotation @ rate

@@ -58,7 +58,7 @@ class WheelLoads(Component[LoadState]):
         headings : Headings
             Of the wheels: pulls and moments act along them.
         """
-        if window.readings:
+        if window.tells_force:
             force = window.mean_force()
             rover = self._rover
             moment = [t - f * r for t, f, r in zip(torques, pulls, rover.rim_radius, strict=True)]

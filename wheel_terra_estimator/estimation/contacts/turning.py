@@ -12,7 +12,9 @@ from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.contacts.steering import Headings
 from wheel_terra_estimator.estimation.inputs.inertial import InertialWindow
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
-from wheel_terra_estimator.estimation.scalars import clipped, gain_of
+from wheel_terra_estimator.estimation.scalars import clipped, gain_of, known
+
+Floats = tuple[float, ...]
 
 
 @dataclass(frozen=True)
@@ -36,6 +38,12 @@ class TurningTuning:
     least_speed: float = 1e-4  # [m/s]
     least_yaw_noise_share: float = 0.4
     """Of the gyro's noise that the smoothing leaves: sqrt(g / (2 - g)) for the least gain."""
+    skid_yaw_share: float = 0.6
+    """Yaw rate over that of rolling wheels, of a rover that has to skid to turn, and its doubt: it
+    turns as one with 1.3 to 3 times its track (docs/development/checks_study.md)."""
+    skid_yaw_doubt: float = 0.4  # of that yaw rate
+    roll_yaw_doubt: float = 0.15  # of a rover that does not skid
+    least_wheel_yaw_std: float = 0.005  # [rad/s]
     scrub: float = 10.0
     """Variance of a shear model, over its square, at full lateral motion: ten cycles of it are one
     piece of information."""
@@ -45,6 +53,7 @@ class TurningState(NamedTuple):
     """Turning of the rover, curvature of its path."""
 
     yaw_rate: float = 0.0  # smoothed [rad/s]
+    yaw_rate_std: float = 1.0  # nothing was heard yet
     side_speed: float = 0.0  # greatest with which a wheel is pushed sideways [m/s]
     lateral_motion: float = 0.0
     """Lateral motion of the outer wheels over the fastest rim speed, 0 to 1 [-]."""
@@ -63,14 +72,17 @@ class Turning(Component[TurningState]):
     def __init__(
         self, rover: Rover, sensors: SensorFigures, tuning: TurningTuning = TurningTuning()
     ) -> None:
-        super().__init__(TurningState())
-        self._rover, self._sensors, self._tuning = rover, sensors, tuning
-        self._curvature_length = max(rover.curvature_length, tuning.least_curvature_length)
         per_cycle = max(sensors.imu_rate * rover.period, 1.0)
         noise = sensors.angular_rate_std / math.sqrt(per_cycle)
-        self.yaw_rate_std = math.hypot(
+        self._gyro_std = math.hypot(
             tuning.least_yaw_noise_share * noise, sensors.angular_rate_bias_std
         )
+        super().__init__(TurningState())
+        self._rover, self._sensors, self._tuning = rover, sensors, tuning
+        skids = rover.skids
+        self._skid_share = tuning.skid_yaw_share if skids else 1.0
+        self._wheel_doubt = tuning.skid_yaw_doubt if skids else tuning.roll_yaw_doubt
+        self._curvature_length = max(rover.curvature_length, tuning.least_curvature_length)
 
     def update(
         self,
@@ -79,20 +91,30 @@ class Turning(Component[TurningState]):
         speed: float,
         fastest_rim: float,
         headings: Headings,
+        rims: Floats | None = None,
     ) -> TurningState:
-        """Take the IMU readings of a cycle of length `dt` [s]; speeds in [m/s]."""
-        state = self.state
-        if not window.readings:
+        """Take the IMU readings of a cycle of length `dt` [s]; speeds in [m/s].
+
+        `rims` are the rim speeds of a rover without a gyro; None while there is one.
+        """
+        state, tuning = self.state, self._tuning
+        if window.rates:
+            yaw_rate, std = self._yaw_rate(window), self._gyro_std
+        elif known(rims or ()):
+            # No gyro: the difference of the sides, which turns a rover that skids less.
+            yaw_rate = self._skid_share * headings.yaw_rate(rims or ())
+            std = math.hypot(self._wheel_doubt * yaw_rate, tuning.least_wheel_yaw_std)
+        else:
             self.state = state = state._replace(speed_change=0.0)
             return state
-        yaw_rate = self._yaw_rate(window)
         # Nose-up rotation over travel, both forgotten over the length of the rover.
         travel = speed * dt
         keep = math.exp(-abs(travel) / self._curvature_length)
         state = state._replace(
             yaw_rate=yaw_rate,
+            yaw_rate_std=std,
             side_speed=self._side_speed(speed, yaw_rate, headings),
-            rotation=keep * state.rotation - window.pitch_rate / window.readings * dt,
+            rotation=keep * state.rotation - window.pitch_rate / max(window.rates, 1) * dt,
             travel=keep * state.travel + travel,
             speed_change=0.0,
         )
@@ -131,8 +153,8 @@ class Turning(Component[TurningState]):
     def _yaw_rate(self, window: InertialWindow) -> float:
         """Return the yaw rate: smoothed where its change may be noise, followed where not."""
         tuning, old = self._tuning, self.state.yaw_rate
-        now = window.yaw_rate / window.readings
-        noise = max(self._sensors.angular_rate_std / math.sqrt(window.readings), tuning.least_noise)
+        now = window.yaw_rate / window.rates
+        noise = max(self._sensors.angular_rate_std / math.sqrt(window.rates), tuning.least_noise)
         gain = clipped(tuning.least_gain * abs(now - old) / noise, tuning.least_gain, 1.0)
         return old + gain * (now - old)
 

@@ -110,8 +110,8 @@ class ZeroVelocityUpdate(Component[ZeroVelocityState]):
             variance += chi_square_gate(speed, P + variance, tuning.coasting_gate)
         ekf.fuse_entry(SPEED, 0.0, variance)
         turning = abs(yaw_rate) >= tuning.most_yaw_rate
-        if settled > tuning.gyro_settling_time and window.readings and not turning:
-            self._learn_zero(yaw_rate, window.pitch_rate / window.readings)
+        if settled > tuning.gyro_settling_time and window.rates and not turning:
+            self._learn_zero(yaw_rate, window.pitch_rate / window.rates)
 
     def _spin_in_place(self, ekf: GatedFilter, rims: tuple[float, ...], typical_rim: float) -> None:
         """Hold the body where it is, to a share of the rim speed."""

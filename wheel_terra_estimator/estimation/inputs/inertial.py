@@ -6,10 +6,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from math import isnan
 from typing import NamedTuple
 
 from wheel_terra_estimator.estimation.component import Component
-from wheel_terra_estimator.estimation.measurements import InertialReading
+from wheel_terra_estimator.estimation.measurements import FloatArray, InertialReading
 from wheel_terra_estimator.estimation.scalars import NAN, clipped, gain_of
 
 
@@ -36,12 +37,13 @@ class GyroZero(NamedTuple):
 class InertialWindow(NamedTuple):
     """Sums over the IMU readings since the last filter cycle."""
 
-    readings: int = 0
+    readings: int = 0  # of the accelerometer
     force_x: float = 0.0  # sum of specific force [m/s^2]
     force_y: float = 0.0
     force_z: float = 0.0
     yaw_rate: float = 0.0  # sum, zero taken off [rad/s]
     pitch_rate: float = 0.0
+    rates: int = 0  # readings of the gyro in these two sums
     speed_change: float = 0.0  # integral of f_x - g_x [m/s]
     duration: float = 0.0  # [s] covered by that integral
     noise_density: float = 0.0
@@ -49,9 +51,20 @@ class InertialWindow(NamedTuple):
     vibration included [(m/s^2)^2 s]."""
 
     def mean_force(self) -> tuple[float, float, float]:
-        """Return the mean specific force [m/s^2]; the window is not empty."""
+        """Return the mean specific force [m/s^2]; `tells_force` holds."""
         n = self.readings
+        if not n and self.gravity is not None:
+            return self.gravity
         return self.force_x / n, self.force_y / n, self.force_z / n
+
+    gravity: tuple[float, float, float] | None = None
+    """What the accelerometer of a rover at rest would read by the reported orientation [m/s^2];
+    None unless there is an orientation and no accelerometer."""
+
+    @property
+    def tells_force(self) -> bool:
+        """Whether anything tells the specific force."""
+        return self.readings > 0 or self.gravity is not None
 
 
 class Attitude(NamedTuple):
@@ -65,7 +78,9 @@ class Attitude(NamedTuple):
 class InertialState(NamedTuple):
     """What is kept of the IMU."""
 
-    time: float = -math.inf  # of the last reading [s]
+    time: float = -math.inf  # of the last message [s]
+    force_time: float = -math.inf  # of the last specific force
+    rate_time: float = -math.inf  # of the last angular rate
     window: InertialWindow = InertialWindow()
     attitude: Attitude = Attitude()
     force_x: float = NAN  # of the last reading [m/s^2]
@@ -87,32 +102,48 @@ class InertialInput(Component[InertialState]):
 
     def update(self, time: float, reading: InertialReading, zero: GyroZero) -> None:
         """Take a reading at a time [s]."""
-        before, window, attitude, last_force = self.state
+        before, force_time, rate_time, window, attitude, last_force = self.state
         dt = time - before if before > -math.inf else 0.0
         attitude = self.attitude_after(attitude, reading, dt)
         force_x, force_y, force_z = reading.specific_force.tolist()
         _, pitch_rate, yaw_rate = reading.angular_rate.tolist()
-        speed_change, duration = window.speed_change, window.duration
-        noise = window.noise_density
-        if 0.0 < dt <= self._tuning.longest_gap:
-            # Readings of a white noise differ by twice its variance; times dt it is a density, the
-            # same for raw readings and for means of several.
-            seen = 0.5 * (force_x - last_force) ** 2 * dt
-            noise += gain_of(dt, self._tuning.noise_time) * (seen - noise)
-            speed_change += (force_x - self._gravity * attitude.sine_up) * dt
-            duration += dt
-        window = InertialWindow(
-            readings=window.readings + 1,
-            force_x=window.force_x + force_x,
-            force_y=window.force_y + force_y,
-            force_z=window.force_z + force_z,
-            yaw_rate=window.yaw_rate + (yaw_rate - zero.yaw),
-            pitch_rate=window.pitch_rate + (pitch_rate - zero.pitch),
-            speed_change=speed_change,
-            duration=duration,
-            noise_density=noise,
-        )
-        self.state = InertialState(time, window, attitude, force_x)
+        if not isnan(yaw_rate):
+            rate_time = time
+            window = window._replace(
+                yaw_rate=window.yaw_rate + (yaw_rate - zero.yaw),
+                pitch_rate=window.pitch_rate + (pitch_rate - zero.pitch),
+                rates=window.rates + 1,
+            )
+        if not isnan(force_x):
+            since = time - force_time if force_time > -math.inf else 0.0
+            force_time, change, last_force = time, force_x - last_force, force_x
+            speed_change, duration = window.speed_change, window.duration
+            noise = window.noise_density
+            if 0.0 < since <= self._tuning.longest_gap:
+                # Readings of a white noise differ by twice its variance; times dt it is a density,
+                # the same for raw readings and for means of several.
+                seen = 0.5 * change**2 * since
+                noise += gain_of(since, self._tuning.noise_time) * (seen - noise)
+                speed_change += (force_x - self._gravity * attitude.sine_up) * since
+                duration += since
+            window = window._replace(
+                readings=window.readings + 1,
+                force_x=window.force_x + force_x,
+                force_y=window.force_y + force_y,
+                force_z=window.force_z + force_z,
+                speed_change=speed_change,
+                duration=duration,
+                noise_density=noise,
+            )
+        elif reading.orientation is not None:
+            window = window._replace(gravity=self._at_rest(reading.orientation))
+        self.state = InertialState(time, force_time, rate_time, window, attitude, last_force)
+
+    def _at_rest(self, orientation: FloatArray) -> tuple[float, float, float]:
+        """Return the specific force of a rover that stands with this orientation [m/s^2]."""
+        x, y, z, w = orientation.tolist()
+        g = self._gravity
+        return 2.0 * (x * z - w * y) * g, 2.0 * (y * z + w * x) * g, (1 - 2 * (x * x + y * y)) * g
 
     def take(self) -> InertialWindow:
         """Return the sums since the last call, and begin new ones."""
@@ -133,8 +164,11 @@ class InertialInput(Component[InertialState]):
             return Attitude(2.0 * (x * z - w * y), known=True, reported=True)
         force = float(reading.specific_force[0]) / self._gravity
         if not attitude.known:
-            return Attitude(clipped(force, -1.0, 1.0), known=True)
+            return attitude if isnan(force) else Attitude(clipped(force, -1.0, 1.0), known=True)
         # Nose up is a negative rotation about y.
-        turned = attitude.sine_up - float(reading.angular_rate[1]) * dt
+        rate = float(reading.angular_rate[1])
+        turned = attitude.sine_up - (0.0 if isnan(rate) else rate * dt)
+        if isnan(force):
+            return Attitude(clipped(turned, -1.0, 1.0), known=True)
         lean = dt / (self._tuning.lean_time + dt)
         return Attitude(clipped(turned + lean * (force - turned), -1.0, 1.0), known=True)

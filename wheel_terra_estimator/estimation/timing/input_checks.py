@@ -54,6 +54,10 @@ CURES = {
 """Reason for leaving something out -> what mends it."""
 
 
+_UNKNOWN = np.full(3, math.nan)
+_UNKNOWN.setflags(write=False)
+
+
 class InputChecks:
     """Judges measurements of one rover.
 
@@ -141,18 +145,28 @@ class InputChecks:
         return replace(m, steering=_without(steering, bad))
 
     def _inertial(self, m: InertialReading) -> InertialReading | None:
+        """Keep the good fields of a message; nan stands for one that is not there."""
         x, y, z = m.specific_force.tolist()
         force = math.sqrt(x * x + y * y + z * z)
-        if not force <= GREATEST_FORCE:
-            self.refuse(INERTIAL, 'specific force not finite or absurd')
-            return None
-        if force == 0.0:
-            self.refuse(INERTIAL, 'specific force exactly zero (sensor not running)')
-            return None
         x, y, z = m.angular_rate.tolist()
-        if not math.sqrt(x * x + y * y + z * z) <= GREATEST_RATE:
-            self.refuse(INERTIAL, 'angular rate not finite or absurd')
-            return None
+        rate = math.sqrt(x * x + y * y + z * z)
+        bad_force = force == 0.0 or not force <= GREATEST_FORCE
+        bad_rate = not rate <= GREATEST_RATE
+        if bad_force or bad_rate:
+            if force == 0.0:
+                self.reject(INERTIAL, 'specific force exactly zero (sensor not running)')
+            elif bad_force and not np.isnan(m.specific_force).all():
+                self.reject(INERTIAL, 'specific force not finite or absurd')
+            if bad_rate and not np.isnan(m.angular_rate).all():
+                self.reject(INERTIAL, 'angular rate not finite or absurd')
+            if (bad_force and bad_rate and m.orientation is None) or (force == rate == 0.0):
+                self.refused[INERTIAL] += 1
+                return None
+            m = replace(
+                m,
+                specific_force=_UNKNOWN if bad_force else m.specific_force,
+                angular_rate=_UNKNOWN if bad_rate else m.angular_rate,
+            )
         if m.orientation is None:
             return m
         x, y, z, w = m.orientation.tolist()
