@@ -161,6 +161,16 @@ def test_reference():
     only(checked(reference=fast), 'unit')
 
 
+def test_a_variance_of_zero_is_right_where_the_rover_file_states_what_is_seen():
+    reference = rolling.recording().reference
+    silent = replace(reference, variance=np.zeros_like(reference.variance))
+    recording = replace(rolling.recording(), reference=silent)
+    told = check_recording(recording, rolling.rover())  # states 0.01 m/s, the true scatter
+    assert not [f for f in told.findings if f.kind == 'covariance']
+    far = check_recording(recording, rolling.rover(**{'sensors.reference_std': 0.5}))
+    assert [f for f in far.findings if f.kind == 'covariance']
+
+
 def test_sinkage():
     sinkage = WHOLE.sinkage
     only(checked(sinkage=replace(sinkage, sinkage=1000.0 * sinkage.sinkage)), 'unit')

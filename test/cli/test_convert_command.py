@@ -48,6 +48,19 @@ def test_the_example_converts_units_and_signs(files):
     assert main(command(files)) == 2  # nothing is overwritten
 
 
+@pytest.mark.parametrize('delimiter', [';', '\t'])
+def test_decimal_commas_between_semicolons_or_tabs(files, delimiter):
+    lines = [HEADER, *ROWS]
+    text = '\n'.join(line.replace(',', delimiter).replace('.', ',') for line in lines)
+    (files / 'log.csv').write_text(text)
+    assert main(command(files)) == 0
+    with open_bag(files / 'bag') as bag:
+        told = read_series(bag, {}, 'bag')
+    assert told.reference.velocity[:, 0].tolist() == [0.5]
+    assert np.allclose(told.joints.torque[0], 1.5)
+    assert np.diff(told.joints.stamp).tolist() == [100_000_000]
+
+
 @pytest.mark.parametrize(
     ('old', 'new', 'words'),
     [

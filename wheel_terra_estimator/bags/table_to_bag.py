@@ -24,6 +24,7 @@ from wheel_terra_estimator.messages.convert import INPUT_TYPES
 
 EXAMPLE = """\
 # Which column of the table is what. Units: see below; sign: -1 turns a value round.
+# Between the columns: comma, semicolon or tab; with the latter two, 0,5 is read as 0.5.
 time: {column: time, unit: s}             # s, ms, us or ns; any zero
 joint_states:                             # one entry per wheel, as in wheels.names
   front_left:
@@ -54,6 +55,7 @@ UNITS: dict[str, dict[str, float]] = {
     'speed': {'m/s': 1.0, 'km/h': 1 / 3.6, 'mm/s': 1e-3},
     'number': {'-': 1.0},
 }
+_DELIMITERS = (',', ';', '\t')  # where two are as frequent, the first
 _AXES = 'xyz'
 _IMU = {
     **{f'linear_acceleration.{axis}': 'acceleration' for axis in _AXES},
@@ -101,12 +103,14 @@ def convert(table: Path, columns: Path, output: Path, overwrite: bool = False) -
     check_regular(table)
     try:
         with table.open(newline='', encoding='utf-8-sig') as file:
-            rows = csv.reader(file)
+            delimiter = _delimiter(file.readline())
+            file.seek(0)
+            rows = csv.reader(file, delimiter=delimiter)
             header = [cell.strip() for cell in next(rows, [])]
             layout = _read_map(columns, header, table)
             topics = {f'/{name}': INPUT_TYPES[name] for name in _used(layout)}
             with BagFile(output, topics, overwrite=overwrite, inputs=[table, columns]) as bag:
-                sender = _Sender(bag, layout, table)
+                sender = _Sender(bag, layout, table, decimal_comma=delimiter != ',')
                 for number, row in enumerate(rows, start=2):
                     if any(cell.strip() for cell in row):
                         sender.send(number, row)
@@ -114,9 +118,16 @@ def convert(table: Path, columns: Path, output: Path, overwrite: bool = False) -
                     raise UserError(f'{table}: no rows below the header')
             return bag
     except UnicodeDecodeError:
-        raise UserError(f'{table}: not a UTF-8 text; save it as CSV (UTF-8)') from None
+        raise UserError(
+            f'{table}: not a UTF-8 text; save it as CSV (UTF-8), or: iconv -f cp1252 -t utf8'
+        ) from None
     except csv.Error as error:
         raise UserError(f'{table}: not a CSV table: {error}') from None
+
+
+def _delimiter(header: str) -> str:
+    """Return what stands between the columns: semicolon, tab or comma."""
+    return max(_DELIMITERS, key=header.count)
 
 
 def _used(layout: ColumnMap) -> list[str]:
@@ -201,8 +212,11 @@ class _MapReader:
 class _Sender:
     """Writes the messages of each row, at its own stamp."""
 
-    def __init__(self, bag: BagFile, layout: ColumnMap, table: Path) -> None:
+    def __init__(
+        self, bag: BagFile, layout: ColumnMap, table: Path, decimal_comma: bool = False
+    ) -> None:
         self.bag, self.layout, self.table = bag, layout, table
+        self.decimal_comma = decimal_comma
         self.make = bag.messages
         self.sent = 0
 
@@ -234,7 +248,8 @@ class _Sender:
         if not cell:
             return math.nan
         try:
-            return column.factor * float(cell)
+            point = cell.replace(',', '.') if self.decimal_comma else cell
+            return column.factor * float(point)
         except ValueError:
             raise UserError(
                 f"{self.table}: row {number}: {column.name}: '{cell}' is no number; leave the cell "

@@ -255,6 +255,10 @@ def _covariance(
     parameter = 'sensors.reference_std'
     if usual == 0.0:
         configuration = evidence.facts.configuration
+        if configuration is not None and evidence.facts.stated(parameter):
+            usual = configuration.sensors.reference_std
+            if usual / COVARIANCE_FACTOR < noise < COVARIANCE_FACTOR * usual:
+                return []  # the rover file decides, and says what is seen
         if configuration is None or noise < COVARIANCE_FACTOR * configuration.sensors.reference_std:
             words = 'states no variance (0): the rover file decides'
         else:
