@@ -5,7 +5,7 @@
     python tools/discrepancy_study.py run study.csv                 # about 2,000 campaigns
     python tools/discrepancy_study.py run study.csv --jobs 3   # same, faster
     python tools/discrepancy_study.py show study.csv                # tables on the terminal
-    python tools/discrepancy_study.py show study.csv -o docs/discrepancy   # study.md and pictures
+    python tools/discrepancy_study.py show study.csv -o docs/development   # tables and pictures
 
 ``run`` adds to the CSV file row by row and skips what is already there: stop it at any time, start
 it again. ``--groups one none``, ``--designs lugs48``, ``--share 0.1`` (a tenth of the campaigns)

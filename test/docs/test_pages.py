@@ -75,6 +75,31 @@ def test_no_source_that_readers_cannot_open(name):
         assert not re.search(words, text), f'{name}: {words}'
 
 
+DIARY = (
+    r'\b(in|on) (\w+ )?tuning (seeds|drives)\b',
+    r'\bTried(:| besides| and left out)',
+    r'\bfilter before\b',
+)
+"""What was tried stands in dated notes of the development pages, not where the code is described."""
+
+
+@pytest.mark.parametrize(
+    'name',
+    [
+        name
+        for part in SITE['nav']
+        for title, pages in part.items()
+        if title in ('Start', 'Tutorials', 'Reference', 'Explained')
+        for name, _ in entries(pages)
+    ],
+)
+def test_what_was_tried_stands_in_the_notes(name):
+    text = text_without_code(DOCS / name)
+    for words in DIARY:
+        found = re.search(words, text)
+        assert not found, f'{name}: {text[max(found.start() - 60, 0) : found.end()]!r}'
+
+
 def test_python_of_the_readme_runs():
     mpl = pytest.importorskip('matplotlib')
     mpl.use('agg')

@@ -212,15 +212,7 @@ def section(shared: Path, figures: Path) -> str:
             f'and {6980 * full / slow:.0f} us.',
             '',
             'Slip runs over 0 to 0.9 in all rows that solve a balance, in the batches drawn at '
-            'random together with loads of half to one and a half times 80 N. What made the '
-            'difference: all that does not depend on the angle prepared once, one sine for each '
-            'of six angles and cosines from them, three evaluations whose parabola is read off at '
-            'the load in place of Newton with a repeated evaluation (arrays 6,700 to 16,000, '
-            'floats 410 to over 1,000), and both sides of the peak written out for floats (a '
-            'quarter of the six wheels). Tried and left out: single precision for the first '
-            'steps (its rounding spoils finite differences), an analytic slope in the Newton step '
-            '(as dear as the evaluation that it saves), smaller chunks of the arrays and steps in '
-            'place (no gain). Arrays lose more than floats where all cores are busy: '
-            '12,000 to 15,000 were seen then, 16,000 to 20,000 on a quieter one.',
+            'random together with loads of half to one and a half times 80 N. Arrays lose more '
+            'than floats where all cores are busy.',
         ]
     )
