@@ -80,7 +80,7 @@ DIARY = (
     r'\bTried(:| besides| and left out)',
     r'\bfilter before\b',
 )
-"""What was tried stands in dated notes of the development pages, not where the code is described."""
+"""What was tried stands in dated notes of the development pages."""
 
 
 @pytest.mark.parametrize(
