@@ -10,6 +10,7 @@ watch over silence.
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterable
 from functools import partial
 from inspect import signature
@@ -254,8 +255,7 @@ class EstimatorNode(LifecycleNode):
             self._arrival.write(f'{topic} {stamp}\n')
         now = self._seconds()
         number = info.get('publication_sequence_number') if topic in self._numbered else None
-        delay = (self.get_clock().now().nanoseconds - stamp) / _SECOND
-        self._watch_inputs.heard(topic, now, delay, number)
+        self._watch_inputs.heard(topic, now, (self._nanoseconds() - stamp) / _SECOND, number)
         self._incompatible.pop(topic, None)
         if pipeline.transport_faults:
             pipeline.transport_faults.pop(topic, None)  # no longer silent; the watch knows the rest
@@ -290,6 +290,8 @@ class EstimatorNode(LifecycleNode):
         self.get_logger().warning(f'{name}: {words}')
 
     def _on_message_lost(self, topic: str, event: Any) -> None:
+        if topic in self._numbered:
+            return  # gaps in the publisher's own count say it at once, and exactly
         self._watch_inputs.lost(topic, event.total_count_change, self._seconds())
 
     # -- Services -------------------------------------------------------------------------------
@@ -552,5 +554,11 @@ class EstimatorNode(LifecycleNode):
                 f'record_arrival: {name} cannot be written ({error.strerror})'
             ) from None
 
+    def _nanoseconds(self) -> int:
+        """Return the time of the node's clock; the system's is asked without a detour by rcl."""
+        clock = self.get_clock()
+        return clock.now().nanoseconds if clock.ros_time_is_active else time.time_ns()
+
     def _seconds(self) -> float:
-        return float(self._steady.now().nanoseconds) * 1e-9
+        """Return the time of the steady clock [s]."""
+        return time.monotonic()

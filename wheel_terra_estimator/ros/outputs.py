@@ -84,8 +84,9 @@ class EstimatePublisher:
         """Publish the messages of a set that somebody listens to."""
         stamp = time_message(estimates.stamp)
         wanted = {t for t, p in self._joint_publishers.items() if p.get_subscription_count()}
+        classes_wanted = self._class_publisher.get_subscription_count() > 0
         fields_of = joint_fields(estimates, self._names) if wanted else {}
-        if 'slip' not in wanted and self._class_publisher.get_subscription_count():
+        if classes_wanted and 'slip' not in wanted:
             self._publish_classes(estimates)
         for topic, fields in fields_of.items():
             if topic not in wanted:
@@ -99,7 +100,7 @@ class EstimatePublisher:
             message.velocity = array('d', fields.velocity)
             message.effort = array('d', fields.effort)
             self._joint_publishers[topic].publish(message)
-            if topic == 'slip':
+            if topic == 'slip' and classes_wanted:
                 self._publish_classes(estimates)
         if self._twist_publisher.get_subscription_count():
             self._publish_twist(estimates, stamp)
