@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 
 from nav_msgs.msg import Odometry
 from rcl_interfaces.msg import SetParametersResult
-from rclpy.clock import Clock
+from rclpy.clock import Clock, ROSClock
 from rclpy.clock_type import ClockType
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
@@ -557,7 +557,8 @@ class EstimatorNode(LifecycleNode):
     def _nanoseconds(self) -> int:
         """Return the time of the node's clock; the system's is asked without a detour by rcl."""
         clock = self.get_clock()
-        return clock.now().nanoseconds if clock.ros_time_is_active else time.time_ns()
+        simulated = isinstance(clock, ROSClock) and clock.ros_time_is_active
+        return int(clock.now().nanoseconds) if simulated else time.time_ns()
 
     def _seconds(self) -> float:
         """Return the time of the steady clock [s]."""
