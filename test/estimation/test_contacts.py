@@ -399,7 +399,6 @@ def published_pull(parts, excess, lateral_motion=0.0):
             headings=straight_headings(parts.rover),
             turning=(True,) * 6,
             readings=tuple((forces.torque + excess).tolist()),
-            slips=(0.3,) * 6,
             lateral_motion=lateral_motion,
             tilt=0.0,
         )

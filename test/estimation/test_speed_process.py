@@ -29,6 +29,7 @@ def process(rims, ratio=0.8, keys=()):
     ekf.set(SPEED, ratio, 1e-4)
     made.end_cycle(0.0, ekf, fast, settled=True)
     made.end_cycle(0.0, ekf, speeds(rims), settled=False)
+    made.state = made.state._replace(settled=True)
     return made
 
 
@@ -162,9 +163,20 @@ def test_a_reversal_carries_the_slip_over_by_what_is_asked_less():
     """Up a slope of 0.1 the slip is 0.2; down it, at a slip per demand of 1.5, it is -0.1."""
     made, ekf = process([0.05] * 6, ratio=0.8), Parts(reader.load(SAND)).filter()
     ekf.set(SLIP_PER_DEMAND, 1.5, 0.5**2)
-    made.turn_back(ekf, demand_change=-0.2)
+    made.turn_back(ekf, before=0.1, now=-0.1)
     assert made.state.ratio == pytest.approx(1.1)
     assert made.state.ratio_std == pytest.approx(np.hypot(0.1, 0.5 * 0.2))
+    # Up again, on a steeper slope: as on the way up before, and slip for what is asked more.
+    made.turn_back(ekf, before=-0.1, now=0.14)
+    assert made.state.ratio == pytest.approx(0.8 - 1.5 * 0.04)
+
+
+def test_a_start_goes_by_the_remembered_ratio_and_not_by_that_of_its_first_moment():
+    """Wheels at 10 mm/s and a speed of 3 mm/s, half of it noise: at 50 mm/s the slip is 0.2."""
+    made = process([0.01] * 6, ratio=0.8)
+    made.end_cycle(0.0, Parts(reader.load(SAND)).filter(), speeds([0.01] * 6), settled=False)
+    found = made.step(0.1, speeds([0.05] * 6), InertialWindow(), inflated=True)
+    assert found.speed_gain * 0.003 + found.constant == pytest.approx(0.003 + 0.8 * 0.04)
 
 
 def test_the_slip_of_a_start_walks_farther():

@@ -314,7 +314,6 @@ class WheelSoilEstimator:
             headings=self._steering.state.headings,
             turning=cycle.turns,
             readings=self._wheels.state.torque,
-            slips=tuple([wheel.slip for wheel in self._slips.state]),
             lateral_motion=lateral_motion,
             tilt=rut_tilt(self._rover, layout, ekf),
         )
@@ -348,7 +347,7 @@ class WheelSoilEstimator:
             self._contact_age.state.direction * loads.slope_share if window.tells_force else NAN
         )
         if event.reversed:
-            speed.turn_back(ekf, self._demand.until(demand))
+            speed.turn_back(ekf, self._demand.state, demand)
         elif event.new_direction:
             speed.forget_ratio()
         demand_change = self._demand.update(demand, dt, settled=self._contact_age.settled)

@@ -25,10 +25,6 @@ class Demand(Component[float]):
     def __init__(self) -> None:
         super().__init__(NAN)
 
-    def until(self, demand: float) -> float:
-        """Return how far another demand is from the present one [-]; 0 where one is unknown."""
-        return 0.0 if isnan(demand) or isnan(self.state) else demand - self.state
-
     def update(self, demand: float, dt: float, *, settled: bool) -> float:
         """Return the change of the demand over a cycle [-]; 0 where the contacts form anew.
 

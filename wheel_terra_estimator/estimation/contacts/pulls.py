@@ -38,9 +38,6 @@ class PullTuning:
     model_std: float = 0.01  # of the load
     level_std: float = 0.2  # of the load, where loads are those of level ground
     gain_share: float = 0.5  # of the torques' gain error that the pull takes over
-    piled_std: float = 0.05
-    """Of the load at slip 1: soil piled up by a wheel that hardly moves is in no model."""
-    piled_slip: float = 0.6  # where it begins
     most_torque: float = 1.2  # of load times radius
     most_drag: float = 2.0  # of the load
     excess_gain: float = 0.2  # smoothing of reading less model, per cycle
@@ -105,7 +102,6 @@ class Pulls(Component[PullState]):
         headings: Headings,
         turning: tuple[bool, ...],
         readings: Floats,
-        slips: Floats,
         lateral_motion: float,
         tilt: float,
     ) -> None:
@@ -127,8 +123,6 @@ class Pulls(Component[PullState]):
             Wheels for which the models hold.
         readings : tuple of float
             Last torque of each wheel [N m], nan = never known.
-        slips : tuple of float
-            Of each wheel [-].
         lateral_motion : float
             Of the outer wheels over the fastest rim speed [-].
         tilt : float
@@ -168,7 +162,7 @@ class Pulls(Component[PullState]):
                 most = tuning.most_torque * load * self._rover.shear_radius[i]
                 torque[i] = clipped(float(torques[i]), -most, most)
                 own[i] = self._own_variance(
-                    i, pull[i], torque[i], load, slips[i], level=not loads.force_known
+                    i, pull[i], torque[i], load, level=not loads.force_known
                 )
                 own[i] += forces.pull_noise[i] ** 2
                 std[i] = math.sqrt(max(float(joint[i, i]), 0.0) + own[i])
@@ -207,19 +201,17 @@ class Pulls(Component[PullState]):
         ]
 
     def _own_variance(
-        self, i: int, pull: float, torque: float, load: float, slip: float, *, level: bool
+        self, i: int, pull: float, torque: float, load: float, *, level: bool
     ) -> float:
         """Return the variance of a turning wheel's pull that no other wheel shares [N^2]."""
         rover, sensors, tuning = self._rover, self._sensors, self._tuning
         radius = rover.shear_radius[i]
-        piled = max(slip - tuning.piled_slip, 0.0) / (1.0 - tuning.piled_slip)
         return (
             (rover.load_std * pull) ** 2
             + (sensors.torque_zero_std / radius) ** 2
             + (tuning.gain_share * sensors.torque_gain_std * torque / radius) ** 2
             + (tuning.model_std * load) ** 2
             + (tuning.level_std * load if level else 0.0) ** 2
-            + (tuning.piled_std * piled * load) ** 2
         )
 
     def _smoothed_excess(self, excess: float, reading: float, model: float) -> float:

@@ -27,6 +27,7 @@ class TurningTuning:
     side_time: float = 1.0
     """Time over which the lateral motion must change to count as new [s]."""
     side_dead_band: float = 0.05  # of the lateral motion [-]
+    side_noise: float = 3.0  # deviations of the yaw rate that are no change of it
     speed_change: float = 1.5
     """Change of the body's speed over the rim speed for each change of the lateral motion."""
     least_curvature_length: float = 0.1  # [m], for rovers with one axle
@@ -120,6 +121,9 @@ class Turning(Component[TurningState]):
         )
         if fastest_rim > self._rover.low_rim:
             state = self._with_lateral_motion(state, dt, fastest_rim)
+        else:
+            # The next start is no end of the last turn.
+            state = state._replace(lateral_motion=0.0, lateral_motion_mean=0.0)
         self.state = state
         return state
 
@@ -164,7 +168,8 @@ class Turning(Component[TurningState]):
         side = min(state.side_speed / fastest, 1.0)
         mean = state.lateral_motion_mean
         mean += gain_of(dt, tuning.side_time) * (side - mean)
-        change = abs(side - mean) - tuning.side_dead_band
+        noise = tuning.side_noise * state.yaw_rate_std * rover.curvature_length / fastest
+        change = abs(side - mean) - tuning.side_dead_band - noise
         transient, speed_change = state.transient, 0.0
         if change > 0.0:
             speed_change = tuning.speed_change * change * fastest

@@ -125,6 +125,14 @@ class RimSpeeds(NamedTuple):
         return cls(each, median(heard) if heard else NAN)
 
 
+class PastDrive(NamedTuple):
+    """What is remembered of the last drive in a direction."""
+
+    ratio: float  # v / rim speed
+    ratio_std: float
+    demand: float  # what the ground asked, as a share of the load [-]; nan = unknown
+
+
 class SpeedState(NamedTuple):
     """What the prediction of the speed remembers."""
 
@@ -136,6 +144,8 @@ class SpeedState(NamedTuple):
     traction_slope: float = 0.0  # of the traction curve at the last cycle; 0 = unknown [-]
     inflation: float = 0.0
     """Process-noise inflation: change of speed that changing contacts may bring [m/s]."""
+    settled: bool = True  # the contacts were, at the last cycle
+    other_direction: PastDrive | None = None
     change_time: float = -math.inf  # when contacts or commands last changed [s]
 
 
@@ -180,22 +190,36 @@ class SpeedProcess(Component[SpeedState]):
         """Forget how well v / rim speed is known: the first drive in a direction begins."""
         self.state = self.state._replace(ratio_std=self._tuning.first_ratio_std)
 
-    def turn_back(self, ekf: GatedFilter, demand_change: float) -> None:
+    def turn_back(self, ekf: GatedFilter, before: float, now: float) -> None:
         """Carry v / rim speed over to the other direction: up becomes down.
 
-        The slip changes by the learned slip per demand times what is asked less (or more), as it
-        does where the slope changes.
+        It is that of the last drive in this direction, else of the drive that ended. The slip
+        changes by the learned slip per demand times what is asked less (or more) than there.
+
+        Parameters
+        ----------
+        ekf : GatedFilter
+            Gives the slip per demand.
+        before, now : float
+            What the ground asked of the drive that ended, and asks of this one, as shares of the
+            load [-]; nan = unknown.
         """
         state, tuning = self.state, self._tuning
-        ratio = state.ratio - float(ekf.mean[SLIP_PER_DEMAND]) * demand_change
+        ended = PastDrive(state.ratio, state.ratio_std, before)
+        known_one = state.other_direction or ended
+        change = now - known_one.demand
+        if isnan(change):
+            change = 0.0
+        ratio = known_one.ratio - float(ekf.mean[SLIP_PER_DEMAND]) * change
         gain_std = math.sqrt(float(ekf.covariance[SLIP_PER_DEMAND, SLIP_PER_DEMAND]))
         self.state = state._replace(
             ratio=clipped(ratio, tuning.least_reversed_ratio, tuning.most_reversed_ratio),
             ratio_std=clipped(
-                math.hypot(state.ratio_std, gain_std * demand_change),
+                math.hypot(known_one.ratio_std, gain_std * change),
                 tuning.least_ratio_std,
                 tuning.first_ratio_std,
             ),
+            other_direction=ended,
         )
 
     def note_change(self, time: float, rims: RimSpeeds) -> None:
@@ -307,8 +331,9 @@ class SpeedProcess(Component[SpeedState]):
         variance += (tuning.rim_change * change) ** 2 + tuning.floor_walk * dt
         apart = self.disagreement(rims)
         variance += tuning.inflation_rate * inflation * inflation * dt + apart * apart
-        if abs(before) > self._rover.low_rim:
+        if state.settled and abs(before) > self._rover.low_rim:
             return SpeedStep(now / before, 0.0, 0.0, variance)
+        # From a start on: a ratio taken from slow wheels would carry their noise up the ramp.
         variance += state.ratio_std**2 * max(now * now - before * before, 0.0)
         return SpeedStep(1.0, 0.0, state.ratio * change, variance)
 
@@ -437,5 +462,10 @@ class SpeedProcess(Component[SpeedState]):
             std = math.sqrt(variance) / abs(rim)
             ratio_std = clipped(std, tuning.least_ratio_std, tuning.most_ratio_std)
         self.state = state._replace(
-            cycle_time=time, rims=rims, ratio=ratio, ratio_std=ratio_std, inflation=inflation
+            cycle_time=time,
+            rims=rims,
+            ratio=ratio,
+            ratio_std=ratio_std,
+            inflation=inflation,
+            settled=settled,
         )
