@@ -60,8 +60,10 @@ def run(arguments: argparse.Namespace) -> int:
                 'name the wheel rates with --remap joint_states:=/TOPIC, or record them'
             )
     report = check_recording(recording, configuration, tuple(remaps))
+    if recording.notes:
+        report.figures['recording.notes'] = list(recording.notes)
     if arguments.json:
-        print(json.dumps({**report.as_dict(), 'notes': list(recording.notes)}, indent=2))
+        print(json.dumps(report.as_dict(), indent=2))
     else:
         print(as_text(recording, report, configuration is None))
     return 1 if report.findings else 0
@@ -73,7 +75,6 @@ def as_text(recording: Recording, report: CheckReport, without_rover: bool) -> s
 
     lines = [f'{recording.name}: {len(report.findings) or "no"} findings']
     lines += [f'  {finding}' for finding in report.findings]
-    lines += [f'  note: {note}' for note in recording.notes]
     if without_rover:
         lines += ['', '  topics']
         lines += [f'    {name}  {kind}  {count}' for name, kind, count in recording.topics]
