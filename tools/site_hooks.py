@@ -53,3 +53,10 @@ def on_post_page(output: str, page: Any, **_: Any) -> str:
     """Load the library behind the search from the site itself, so that it works offline."""
     depth = len(PurePosixPath(page.url).parts) - 1
     return output.replace(SHIM, '../' * depth + 'assets/iframe-worker.js')
+
+
+def on_post_template(output: str, template_name: str, **_: Any) -> str:
+    """Do the same for the page of what is not found, which stands at the root."""
+    return (
+        output.replace(SHIM, '/assets/iframe-worker.js') if template_name == '404.html' else output
+    )

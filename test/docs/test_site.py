@@ -1,0 +1,100 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""The built site: two clicks to every page, nothing from elsewhere, a warning is an error."""
+
+from __future__ import annotations
+
+import importlib.util
+import re
+import shutil
+import subprocess
+import sys
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+NEEDED = ('mkdocs', 'material', 'mkdocstrings', 'latex2mathml')
+SOURCES = ('docs', 'tools', 'wheel_terra_estimator', 'mkdocs.yml', 'CONTRIBUTING.md')
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(
+        any(importlib.util.find_spec(name) is None for name in NEEDED),
+        reason='no MkDocs here (requirements/docs.txt)',
+    ),
+]
+
+
+def build(root: Path, site: Path) -> subprocess.CompletedProcess[str]:
+    """Build as ``make docs`` does."""
+    command = [sys.executable, '-m', 'mkdocs', 'build', '--strict', '-d', str(site)]
+    return subprocess.run(command, cwd=root, capture_output=True, text=True, check=False)
+
+
+class Page(HTMLParser):
+    """What a page links to, and what it loads."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.links: list[str] = []
+        self.loads: list[str] = []
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attributes: list[tuple[str, str | None]]) -> None:
+        named = {key: value or '' for key, value in attributes}
+        if tag == 'a' and 'href' in named:
+            self.links.append(named['href'])
+        if tag in ('script', 'img', 'iframe') and 'src' in named:
+            self.loads.append(named['src'])
+        if tag == 'link' and named.get('rel') in ('stylesheet', 'preload', 'icon'):
+            self.loads.append(named['href'])
+
+
+@pytest.fixture(scope='module')
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp('site')
+    made = build(ROOT, folder)
+    assert made.returncode == 0, made.stdout + made.stderr
+    return folder
+
+
+def test_two_clicks_lead_to_every_page(site: Path) -> None:
+    pages = {path.resolve() for path in site.rglob('*.html')} - {(site / '404.html').resolve()}
+    reached = {(site / 'index.html').resolve()}
+    for _ in range(2):
+        for page in tuple(reached):
+            for link in Page(page.read_text(encoding='utf-8')).links:
+                target = (page.parent / link.partition('#')[0]).resolve()
+                if target in pages:
+                    reached.add(target)
+    assert pages == reached
+
+
+def test_pages_need_nothing_from_elsewhere(site: Path) -> None:
+    for path in site.rglob('*.html'):
+        for address in Page(path.read_text(encoding='utf-8')).loads:
+            assert not re.match(r'(https?:)?//', address), f'{path.name}: {address}'
+
+
+def test_formulas_are_mathematics(site: Path) -> None:
+    text = (site / 'models' / 'models.html').read_text(encoding='utf-8')
+    assert text.count('<math') > 40
+    for path in site.rglob('*.html'):
+        page = path.read_text(encoding='utf-8')
+        assert 'class="arithmatex"' not in page, f'{path.name}: a formula is left as TeX'
+
+
+def test_a_warning_fails_the_build(tmp_path: Path) -> None:
+    for name in SOURCES:
+        source = ROOT / name
+        if source.is_dir():
+            shutil.copytree(source, tmp_path / name, ignore=shutil.ignore_patterns('__pycache__'))
+        else:
+            shutil.copy(source, tmp_path / name)
+    page = tmp_path / 'docs' / 'index.md'
+    page.write_text(page.read_text(encoding='utf-8') + '\n[nowhere](nowhere.md)\n')
+    made = build(tmp_path, tmp_path / 'site')
+    assert made.returncode != 0
+    assert 'nowhere.md' in made.stdout + made.stderr
