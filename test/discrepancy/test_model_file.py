@@ -75,8 +75,8 @@ def with_errors(table, factors, zeros):
 @pytest.mark.parametrize(
     ('factors', 'zeros', 'keys'),
     [
-        ({'sinkage': 0.7}, {}, {'sinkage_gain': 0.7}),
-        ({}, {'sinkage': 0.004}, {'sinkage_zero': 0.004}),
+        pytest.param({'sinkage': 0.7}, {}, {'sinkage_gain': 0.7}, marks=pytest.mark.slow),
+        pytest.param({}, {'sinkage': 0.004}, {'sinkage_zero': 0.004}, marks=pytest.mark.slow),
         ({}, {'torque': 0.6}, {'torque_zero': 0.6}),
         ({'torque': 1.3}, {'sinkage': -0.003}, {'torque_gain': 1.3, 'sinkage_zero': -0.003}),
     ],

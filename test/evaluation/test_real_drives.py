@@ -55,7 +55,7 @@ def test_snow_events_are_warned_without_any_speed(names, least, most_late):
     assert np.mean([s.lead for s in found]) >= -1.1
 
 
-@pytest.mark.parametrize('rate', [1.0, 0.0])
+@pytest.mark.parametrize('rate', [pytest.param(1.0, marks=pytest.mark.slow), 0.0])
 def test_firm_ground_raises_no_warning(rate):
     bag = MEASURED / 'bags' / 'wvu_pathfinder_test17_mcap'
     assert not real_drives.pathfinder_record(bag, rate).stuck.any()
@@ -76,9 +76,9 @@ def test_a_shaking_husky_on_firm_ground_is_not_stuck():
     configuration = reader.from_parameters(HUSKY)
     bag = MEASURED / 'bags' / 'boreal_husky_flooring_00_mcap'
     measurements = [m for _, m in read(bag, {}, configuration)]
-    end = measurements[0].stamp + 100 * 10**9
+    end = measurements[0].stamp + 60 * 10**9
     sets, _ = run_estimator(configuration, [m for m in measurements if m.stamp < end])
-    assert len(sets) > 600
+    assert len(sets) > 400
     assert not any(s.stuck for s in sets)
     high = np.isin(np.array([s.slip_class for s in sets]), (2, 3))
     assert high.mean() < 0.01

@@ -203,6 +203,7 @@ def test_output_folder_is_complete(coarse_run):
     assert values['normal_load'] == pytest.approx(19.6 * math.cos(math.radians(10)), rel=1e-4)
 
 
+@pytest.mark.slow
 def test_interrupted_run_goes_on_and_leaves_no_half_result(coarse_run, tmp_path, capsys):
     _, cache = coarse_run
     output = tmp_path / 'out'
@@ -268,6 +269,7 @@ def test_bed_that_does_not_settle_is_said(tmp_path, capsys):
     assert 'raise soilbin.bed.settling_time' in said
 
 
+@pytest.mark.slow
 def test_damaged_kept_bed_is_made_again(coarse_run, tmp_path):
     _, cache = coarse_run
     broken = tmp_path / 'cache'
