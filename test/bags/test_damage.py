@@ -195,6 +195,21 @@ def test_a_chunk_that_seems_to_end_with_the_file_hides_nothing(tmp_path: Path) -
     assert all(RawMessage(*s) in found for _, _, part in made.parts[:-1] for s in part)
 
 
+def test_a_chunk_that_seems_to_end_with_another_does_not_hide_it(tmp_path: Path) -> None:
+    """As many bytes are missing as bring the end of a later chunk to where this one should end."""
+    dice = random.Random(1)
+    whole = [sample._replace(data=dice.randbytes(200)) for sample in samples()]
+    made = make(whole, TYPES, Layout(900, 'zstd', checksums=False, definitions=False))
+    (begin, end, _), (first, last, _) = made.parts[2], made.parts[-1]
+    inside = begin + 80
+    path = tmp_path / 'a.mcap'
+    path.write_bytes(made.content[:inside] + made.content[inside + last - end :])
+    assert inside + last - end <= first  # the last chunk is whole
+    found = Counter(read(path)[0])
+    intact = [part for _, _, part in (*made.parts[:2], made.parts[-1])]
+    assert all(RawMessage(*sample) in found for part in intact for sample in part)
+
+
 def test_two_copies_of_a_channel_that_differ_are_said(tmp_path: Path) -> None:
     """No checksum tells which of them is right."""
     made = make(samples(), TYPES, Layout(checksums=False))

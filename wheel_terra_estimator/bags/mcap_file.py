@@ -115,6 +115,7 @@ class McapFile:
         self._pieces: list[Piece] = []
         self._definitions = _Definitions()
         self._counts: Counter[int] = Counter()
+        self._statistics: dict[int, int] | None = None  # messages by channel, as the file states
         self._touched = 0
         self._size = path.stat().st_size
         self._map = self._open(stack)
@@ -211,7 +212,7 @@ class McapFile:
     # --- The way of every other file: from front to end. ---
 
     def _survey(self) -> None:
-        content, limits = self._map, self._limits
+        content = self._map
         assert content is not None
         closed = content[-len(mcap.MAGIC) :] == mcap.MAGIC
         begin = len(mcap.MAGIC) if content[: len(mcap.MAGIC)] == mcap.MAGIC else 0
@@ -219,8 +220,29 @@ class McapFile:
         if not closed:
             self.losses.state = 'was not closed'
         gaps: list[mcap.Gap] = []
-        statistics: dict[int, int] | None = None
-        possible = mcap.Possible(longest=limits.chunk)
+        self._take_records(begin, end, gaps)
+        damaged = []
+        for piece in self._pieces:  # grows
+            if not self._count(piece, again=False):
+                damaged.append(piece)
+                self._look_inside(piece, gaps)
+        self._pieces.sort(key=lambda piece: piece.begin)
+        for piece in damaged:  # now every channel is known
+            self._count(piece, again=True)
+        self._pieces = [piece for piece in self._pieces if piece.start <= piece.last]
+        if any(piece.head for piece in self._pieces):
+            # Recorders put messages into chunks or do not: these have lost the head of theirs.
+            loose = (piece for piece in self._pieces if not piece.head)
+            gaps += [mcap.Gap(piece.begin, piece.begin) for piece in loose]
+        self._add_gaps(gaps)
+        if self._statistics is not None:
+            self._declare(self._statistics)
+
+    def _take_records(self, begin: int, end: int, gaps: list[mcap.Gap]) -> None:
+        """Note what stands between two places, and the gaps."""
+        content = self._map
+        assert content is not None
+        possible = mcap.Possible(longest=self._limits.chunk)
         for item in mcap.records(content, begin, end, possible):
             self._forget(item.end - item.begin)
             if isinstance(item, mcap.Gap):
@@ -231,24 +253,23 @@ class McapFile:
                 self._add_loose(item)
             elif item.opcode == mcap.STATISTICS:
                 try:
-                    statistics = mcap.channel_counts(content, item)
+                    self._statistics = mcap.channel_counts(content, item)
                 except ValueError:
                     gaps.append(mcap.Gap(item.begin, item.end))
             elif item.opcode == mcap.MESSAGE_INDEX:
                 self._add_message_index(item, gaps)
             else:
                 self._define(item, gaps)
-        damaged = [piece for piece in self._pieces if not self._count(piece, again=False)]
-        for piece in damaged:  # now every channel is known
-            self._count(piece, again=True)
-        self._pieces = [piece for piece in self._pieces if piece.start <= piece.last]
-        if any(piece.head for piece in self._pieces):
-            # Recorders put messages into chunks or do not: these have lost the head of theirs.
-            loose = (piece for piece in self._pieces if not piece.head)
-            gaps += [mcap.Gap(piece.begin, piece.begin) for piece in loose]
-        self._add_gaps(gaps)
-        if statistics is not None:
-            self._declare(statistics)
+
+    def _look_inside(self, piece: Piece, gaps: list[mcap.Gap]) -> None:
+        """Find what a packed chunk seems to hold that reaches too far, as it lost bytes."""
+        assert self._map is not None
+        if piece.head is None or not piece.head.codec or not self._content(piece).damage:
+            return
+        at = mcap.next_outside(self._map, piece.head.begin, piece.end, self._size)
+        if at < piece.end:
+            end, piece.end, piece.listed = piece.end, at, 0
+            self._take_records(at, end, gaps)
 
     def _add_chunk(self, record: mcap.Record) -> None:
         assert self._map is not None

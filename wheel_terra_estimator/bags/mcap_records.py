@@ -170,10 +170,15 @@ def _record(content: Buffer, at: int, end: int, possible: Possible) -> Record | 
     return record if inside == record.end else None
 
 
+def next_outside(content: Buffer, begin: int, stop: int, end: int) -> int:
+    """Return where a record that stands outside of chunks can begin before ``stop``, else it."""
+    return _next(content, begin, stop, end, Possible((CHUNK, SCHEMA, CHANNEL)))
+
+
 def _inside(content: Buffer, record: Record, stop: int, end: int, possible: Possible) -> int:
     """Return where a record begins that cannot be part of the one given, else ``stop``."""
-    if record.opcode == CHUNK:
-        possible = Possible((CHUNK, SCHEMA, CHANNEL))  # none of them stands in packed bytes
+    if record.opcode == CHUNK:  # none of those stands in packed bytes
+        return next_outside(content, record.begin, stop, end)
     return _next(content, record.begin, stop, end, possible)
 
 
