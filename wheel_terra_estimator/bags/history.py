@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wheel_terra_estimator.bags.message_types import jazzy_types
+from wheel_terra_estimator.bags.cdr_messages import DamagedMessageError, TopicMessages
 from wheel_terra_estimator.bags.storage import Bag
 from wheel_terra_estimator.bags.thinning import ThinnedRows
 from wheel_terra_estimator.errors import UserError
@@ -230,7 +230,6 @@ def read_estimates(bag: Bag, namespace: str = f'/{NODE}') -> EstimateHistory:
     UserError
         The bag holds no estimates.
     """
-    store = jazzy_types()
     types = {f'{namespace}/{topic}': kind for topic, kind in OUTPUT_TYPES.items()}
     types['/diagnostics'] = 'diagnostic_msgs/msg/DiagnosticArray'
     if f'{namespace}/slip' not in bag.topics:
@@ -243,8 +242,12 @@ def read_estimates(bag: Bag, namespace: str = f'/{NODE}') -> EstimateHistory:
     latest: dict[str, Any] = {}
     warnings: list[StuckWarning] = []
     reasons: dict[str, str] = {}
+    unpack = {topic: TopicMessages(kind).unpack for topic, kind in types.items()}
     for log_time, topic, data in bag.messages(tuple(types)):
-        message: Any = store.deserialize_cdr(data, types[topic])
+        try:
+            message = unpack[topic](data)
+        except DamagedMessageError:
+            continue
         short = topic.removeprefix(f'{namespace}/')
         if short in _TOPIC_FIELDS and types[topic] == JOINT_STATE:
             row = sets.setdefault(stamp_of(message), {})

@@ -367,7 +367,9 @@ class McapFile:
         while waiting or heap:
             while waiting and (not heap or waiting[-1].start <= heap[0][0][0]):
                 rows = self._rows(waiting.pop(), wanted, held)
-                if rows:
+                if rows and not heap and (not waiting or waiting[-1].start > rows[-1][0]):
+                    yield from rows  # no other piece lies between
+                elif rows:
                     size = _size(rows)
                     held += size
                     rest = iter(rows)
@@ -423,6 +425,9 @@ class McapFile:
         else:  # at second try, the times in the head may be what is damaged
             possible = [mcap.Possible(_IN_CHUNK, known, head.start, head.end)]
             possible.append(mcap.Possible(_IN_CHUNK, known))
+        whole = self._whole_pass(piece.begin, content.data, possible[0], wanted, allowed)
+        if whole is not None:
+            return whole
         best = None
         for each in possible:
             reading = self._pass(piece.begin, content.data, each, wanted, allowed)
@@ -432,6 +437,63 @@ class McapFile:
                 break
         assert best is not None
         return best
+
+    def _whole_pass(
+        self,
+        place: int,
+        data: bytes,
+        possible: mcap.Possible,
+        wanted: Collection[int],
+        allowed: int,
+    ) -> Reading | None:
+        """Read records that stand one behind the other to the end; None where they do not.
+
+        It gives what `_pass` gives, and only saves its doubts.
+        """
+        found = Reading()
+        rows = found.rows
+        counts: dict[int, int] = defaultdict(int)
+        first, last = mcap.LATEST, 0
+        at, end, head = 0, len(data), mcap.HEAD + mcap.MESSAGE_HEAD
+        unpack = mcap.MESSAGE_RECORD.unpack_from
+        known, start, latest = possible.channels, possible.start, possible.end
+        any_channel = not known
+        while at < end:
+            if data[at] == mcap.MESSAGE and at + head <= end:
+                _, length, channel, _, time, _ = unpack(data, at)
+                after = at + mcap.HEAD + length
+                if (
+                    after > end
+                    or not mcap.MESSAGE_HEAD <= length <= possible.longest
+                    or not start <= time <= latest
+                    or not (any_channel or channel in known)
+                ):
+                    return None
+                counts[channel] += 1
+                first = time if time < first else first
+                last = time if time > last else last
+                if channel in wanted:
+                    rows.append((time, place + at + head, channel, data[at + head : after]))
+                    allowed -= length - mcap.MESSAGE_HEAD + _ROW_SIZE
+                    if allowed < 0:
+                        raise self._too_much()
+            else:
+                record = mcap.fitting_record(data, at, end, possible)
+                if record is None:
+                    return None
+                found.definitions.append(record)
+                after = record.end
+            at = after
+        found.start, found.last = first, last
+        found.counts.update(counts)
+        return found
+
+    def _too_much(self) -> UserError:
+        return UserError(
+            f'{self.path}: more than {in_words(self._limits.held)} of messages would be held to '
+            'bring them into order; sort it first (ros2 bag convert), or allow more with '
+            '--most-held'
+        )
 
     def _pass(
         self,
@@ -460,11 +522,7 @@ class McapFile:
                     rows.append((time, place + begin, channel, data[begin:end]))
                     allowed -= end - begin + _ROW_SIZE
                     if allowed < 0:
-                        raise UserError(
-                            f'{self.path}: more than {in_words(self._limits.held)} of messages '
-                            'would be held to bring them into order; sort it first (ros2 bag '
-                            'convert), or allow more with --most-held'
-                        )
+                        raise self._too_much()
             else:
                 found.definitions.append(item)
         if gap_after:

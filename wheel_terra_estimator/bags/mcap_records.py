@@ -49,7 +49,7 @@ _LENGTHS = {
 }
 
 _RECORD = struct.Struct('<BQ')
-_MESSAGE = struct.Struct('<BQHIQQ')
+MESSAGE_RECORD = _MESSAGE = struct.Struct('<BQHIQQ')
 _CHUNK = struct.Struct('<BQQQQII')
 _WINDOWS = (2**12, 2**20)
 """Bytes that a search through damage looks at together: at first, and at most."""
@@ -146,6 +146,14 @@ def records(content: Buffer, begin: int, end: int, possible: Possible) -> Iterat
             at = record.end
     if before is not None:
         yield before
+
+
+def fitting_record(content: Buffer, at: int, end: int, possible: Possible) -> Record | None:
+    """Return the record that fits at a place, whatever stands behind it."""
+    if not _fits(content, at, end, possible):
+        return None
+    opcode, length = _RECORD.unpack_from(content, at)
+    return Record(opcode, at + HEAD, at + HEAD + length)
 
 
 def _record(content: Buffer, at: int, end: int, possible: Possible) -> Record | None:

@@ -9,8 +9,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from wheel_terra_estimator.bags.cdr_messages import DamagedMessageError, TopicMessages
 from wheel_terra_estimator.bags.limits import LIMITS, Limits, in_words
-from wheel_terra_estimator.bags.message_types import jazzy_types
 from wheel_terra_estimator.bags.storage import Bag, open_bag
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.configuration.parameters import nearest
@@ -68,8 +68,7 @@ class MeasurementReader:
     def __init__(self, bag: Bag, remaps: Mapping[str, str], configuration: Configuration) -> None:
         self.bag = bag
         self.converter = InputConverter(input_layout(configuration))
-        # Standard types only, so that a bag without message definitions is read as well.
-        self._store = jazzy_types()
+        self._unpack = {name: TopicMessages(kind).unpack for name, kind in INPUT_TYPES.items()}
         self.topics: dict[str, str] = {}
         self.absent: list[str] = []
         for name in self.converter.layout.topics:
@@ -111,8 +110,8 @@ class MeasurementReader:
             self.rejected[name, f'above {in_words(largest)}'] += 1
             return None
         try:
-            return self._store.deserialize_cdr(data, INPUT_TYPES[name])
-        except Exception:  # the library lets many kinds through on damaged bytes
+            return self._unpack[name](data)
+        except DamagedMessageError:
             self.rejected[name, 'damaged message'] += 1
             return None
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from wheel_terra_estimator.bags.message_types import jazzy_types
+from wheel_terra_estimator.bags.cdr_messages import DamagedMessageError, TopicMessages
 from wheel_terra_estimator.bags.storage import Bag
 from wheel_terra_estimator.checks.series import (
     ImuSeries,
@@ -89,21 +89,24 @@ def read_series(
     most : int
         Messages of a topic that are kept; the rest of a longer recording is not looked at.
     """
-    store = jazzy_types()
     chosen = choose_topics(bag, remaps)
     by_topic = {topic: own for own, topic in chosen.items()}
     collectors: dict[str, _Collector] = {
         own: _COLLECTORS[own](topic) for own, topic in chosen.items() if own in _COLLECTORS
     }
+    unpack = {own: TopicMessages(INPUT_TYPES[own]).unpack for own in collectors}
     shortened = False
     for log_time, topic, data in bag.messages([chosen[own] for own in collectors]):
-        collector = collectors[by_topic[topic]]
+        own = by_topic[topic]
+        collector = collectors[own]
         if len(collector.stamps) >= most:
             shortened = True
             continue
+        if len(data) > bag.limits.message:
+            continue
         try:
-            message = store.deserialize_cdr(data, INPUT_TYPES[by_topic[topic]])
-        except Exception:  # the library lets many kinds through on damaged bytes
+            message = unpack[own](data)
+        except DamagedMessageError:
             continue
         collector.add(log_time, message)
 

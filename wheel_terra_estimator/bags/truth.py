@@ -4,14 +4,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from wheel_terra_estimator.bags.message_types import jazzy_types
+from wheel_terra_estimator.bags.cdr_messages import TWIST, DamagedMessageError, TopicMessages
 from wheel_terra_estimator.bags.reader import MeasurementReader
 from wheel_terra_estimator.bags.storage import Bag
 from wheel_terra_estimator.bags.thinning import ThinnedRows
@@ -22,7 +22,6 @@ from wheel_terra_estimator.terramechanics.kinematics import slip_ratio
 
 FloatArray = NDArray[np.float64]
 
-TWIST = 'geometry_msgs/msg/TwistWithCovarianceStamped'
 BODY_VELOCITY = '/truth/odometry'
 _TYPES = {
     '/ground_truth/slip': JOINT_STATE,
@@ -56,6 +55,13 @@ class Truth:
     drawbar_pull: WheelTruth | None
 
 
+class _Values(NamedTuple):
+    """What is taken of the messages of a topic: a function, and how many numbers it gives."""
+
+    of: Callable[[Any], list[float]]
+    width: int
+
+
 def read_truth(bag: Bag, remaps: Mapping[str, str], configuration: Configuration) -> Truth | None:
     """Return the truth in a bag: a simulator's ``/ground_truth/*``, or a true body velocity.
 
@@ -66,7 +72,7 @@ def read_truth(bag: Bag, remaps: Mapping[str, str], configuration: Configuration
     if simulated is not None and simulated.source != BODY_VELOCITY:
         return simulated
     if BODY_VELOCITY in bag.topics:
-        velocity = _thinned(bag, BODY_VELOCITY, _forward, 1).known()
+        velocity = _body_velocity(bag)
         if velocity.stamp.size:
             slip_truth = _slip_from_velocity(
                 velocity, MeasurementReader(bag, remaps, configuration), configuration
@@ -79,25 +85,34 @@ def read_simulated_truth(bag: Bag, names: tuple[str, ...]) -> Truth | None:
     """Return the truth that needs no rover file: a simulator's, or a true body velocity alone."""
     if '/ground_truth/twist' in bag.topics:
         wheels = len(names)
-        slips = _thinned(
-            bag,
-            '/ground_truth/slip',
-            lambda m: [*_ordered(m, m.position, names), *_ordered(m, m.effort, names)],
-            2 * wheels,
+        both = _Values(
+            lambda m: [*_ordered(m, m.position, names), *_ordered(m, m.effort, names)], 2 * wheels
         )
+        depth = _Values(lambda m: _ordered(m, m.position, names), wheels)
+        found = _thinned(
+            bag,
+            {
+                '/ground_truth/slip': both,
+                '/ground_truth/sinkage': depth,
+                '/ground_truth/twist': _Values(_forward, 1),
+            },
+        )
+        slips = found['/ground_truth/slip']
         return Truth(
             source='/ground_truth',
-            velocity=_thinned(bag, '/ground_truth/twist', _forward, 1).known(),
+            velocity=found['/ground_truth/twist'].known(),
             slip=WheelTruth(slips.stamp, slips.value[:, :wheels]).known(),
-            sinkage=_thinned(
-                bag, '/ground_truth/sinkage', lambda m: _ordered(m, m.position, names), wheels
-            ).known(),
+            sinkage=found['/ground_truth/sinkage'].known(),
             drawbar_pull=WheelTruth(slips.stamp, slips.value[:, wheels:]).known(),
         )
     if BODY_VELOCITY in bag.topics:
-        velocity = _thinned(bag, BODY_VELOCITY, _forward, 1).known()
+        velocity = _body_velocity(bag)
         return Truth(BODY_VELOCITY, velocity, None, None, None) if velocity.stamp.size else None
     return None
+
+
+def _body_velocity(bag: Bag) -> WheelTruth:
+    return _thinned(bag, {BODY_VELOCITY: _Values(_forward, 1)})[BODY_VELOCITY].known()
 
 
 def _slip_from_velocity(
@@ -122,25 +137,24 @@ def _slip_from_velocity(
     return WheelTruth(rate.stamp, slip)
 
 
-def _messages(bag: Bag, topic: str) -> Iterator[Any]:
-    store = jazzy_types()
-    if topic in bag.topics and bag.topics[topic].type == _TYPES[topic]:
-        for _, _, data in bag.messages((topic,)):
-            yield store.deserialize_cdr(data, _TYPES[topic])
-
-
 def _ordered(message: Any, values: Any, names: tuple[str, ...]) -> list[float]:
     """Return values in the order of the wheels, nan where the message has none."""
     found = dict(zip(message.name, values, strict=False))
     return [float(found.get(name, np.nan)) for name in names]
 
 
-def _thinned(bag: Bag, topic: str, values: Callable[[Any], list[float]], width: int) -> WheelTruth:
-    """Return what the messages of a topic say, sorted by stamp."""
-    rows = ThinnedRows()
-    for message in _messages(bag, topic):
-        rows.add(stamp_of(message), values(message))
-    return _sorted(rows, width)
+def _thinned(bag: Bag, wanted: Mapping[str, _Values]) -> dict[str, WheelTruth]:
+    """Return what the messages of some topics say, sorted by stamp; one pass over the bag."""
+    rows = {topic: ThinnedRows() for topic in wanted}
+    unpack = {topic: TopicMessages(_TYPES[topic]).unpack for topic in wanted}
+    there = [t for t in wanted if t in bag.topics and bag.topics[t].type == _TYPES[t]]
+    for _, topic, data in bag.messages(there):
+        try:
+            message = unpack[topic](data)
+        except DamagedMessageError:
+            continue
+        rows[topic].add(stamp_of(message), wanted[topic].of(message))
+    return {topic: _sorted(rows[topic], values.width) for topic, values in wanted.items()}
 
 
 def _sorted(rows: ThinnedRows, width: int) -> WheelTruth:

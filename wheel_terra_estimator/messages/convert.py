@@ -119,6 +119,7 @@ class InputConverter:
         self._columns: dict[tuple[str, ...], tuple[list[int], list[int]]] = {}
         self._index = {name: i for i, name in enumerate(layout.names)}
         self._all = list(range(len(layout.names)))
+        self._reversed = bool(np.any(layout.directions != 1.0))
         self._mounted = not np.allclose(layout.imu_mounting, (0.0, 0.0, 0.0, 1.0), atol=0.0)
         self._rotation = rotation_matrix(layout.imu_mounting)
         self._methods = {
@@ -160,8 +161,10 @@ class InputConverter:
         unknown = np.count_nonzero(np.isnan(values))
         if unknown and unknown > len(values) - len(set(self._columns_of(message.name)[1])):
             self.rejected['joint_states', 'velocity of a wheel is nan (taken as unknown)'] += 1
-        directions = self.layout.directions
-        return WheelOdometry(stamp_of(message), values * directions, torque * directions, steering)
+        if self._reversed:
+            with np.errstate(invalid='ignore'):  # a damaged nan may be a signalling one
+                values, torque = values * self.layout.directions, torque * self.layout.directions
+        return WheelOdometry(stamp_of(message), values, torque, steering)
 
     def _steering(self, message: Any) -> FloatArray | None:
         """Return the steering angles of the wheels [rad], nan where there is none; None: none."""

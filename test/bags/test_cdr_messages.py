@@ -1,0 +1,136 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Messages that are unpacked quickly give the measurements that rosbags' own messages give."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+
+from wheel_terra_estimator.bags import cdr_messages
+from wheel_terra_estimator.bags.cdr_messages import TWIST, DamagedMessageError, TopicMessages
+from wheel_terra_estimator.bags.message_factory import MessageFactory
+from wheel_terra_estimator.messages.convert import INPUT_TYPES, InputConverter, input_layout
+
+START = 1_700_000_000_000_000_000
+
+
+def messages(factory: MessageFactory, name: str, count: int, dice: random.Random) -> Iterator[Any]:
+    """Messages of an input topic: numbers of all kinds, other frames and names now and then."""
+    frames, groups = ('', 'base_link', 'ü'), (('left', 'right'), ('right', 'x', 'left'), ('arm',))
+
+    def some(number: int) -> list[float]:
+        odd = (float('nan'), float('inf'), -0.0, 5e-324)
+        return [dice.choice((dice.gauss(0, 2), *odd)) for _ in range(number)]
+
+    frame, names = 'base_link', ('left', 'right')
+    for step in range(count):
+        if dice.random() < 0.3:
+            frame, names = dice.choice(frames), dice.choice(groups)
+        header = factory.header(START + step * 10**7, frame)
+        if name == 'imu/data':
+            attitude = tuple(some(4)) if dice.random() < 0.3 else (0.0, 0.0, 0.0, 1.0)
+            yield factory.imu(header, some(3), some(3), attitude)
+        elif name in ('odom', 'reference_odom'):
+            twist = factory.twist_with_covariance(*some(2), some(36))
+            yield factory.odometry(header, twist)
+        else:
+            lengths = [dice.choice((0, len(names), len(names), 5)) for _ in range(3)]
+            values = dict(zip(('position', 'velocity', 'effort'), map(some, lengths), strict=True))
+            yield factory.joint_state(header, names, **values)
+
+
+def measured(converter: InputConverter, name: str, message: Any) -> Any:
+    if message is None:
+        return None
+    found = converter.convert(name, message)
+    return found and [
+        value.tobytes() if isinstance(value, np.ndarray) else repr(value)
+        for value in vars(found).values()
+    ]
+
+
+def with_rosbags(store: Any, kind: str, data: bytes) -> Any:
+    try:
+        return store.deserialize_cdr(data, kind)
+    except Exception:
+        return None
+
+
+def quickly(reader: TopicMessages, data: bytes) -> Any:
+    try:
+        return reader.unpack(data)
+    except DamagedMessageError:
+        return None
+
+
+@pytest.mark.filterwarnings('error')
+@pytest.mark.parametrize('name', INPUT_TYPES)
+@pytest.mark.parametrize('little', [True, False])
+def test_measurements_are_those_of_rosbags(
+    name: str, little: bool, factory: MessageFactory, rover: Any
+) -> None:
+    dice = random.Random(name)
+    kind, store = INPUT_TYPES[name], factory.store
+    reader = TopicMessages(kind)
+    ours, theirs = (InputConverter(input_layout(rover)) for _ in range(2))
+    quick = 0
+    for message in messages(factory, name, 150, dice):
+        data = bytearray(store.serialize_cdr(message, kind, little_endian=little))
+        for damage in (0, 0, 1, 3, 20):
+            for _ in range(damage):
+                if dice.random() < 0.7:
+                    data[dice.randrange(len(data))] = dice.randrange(256)
+                else:
+                    at = dice.randrange(len(data))
+                    data[at : at + dice.randrange(3)] = dice.randbytes(dice.randrange(5))
+            found = quickly(reader, bytes(data))
+            quick += type(found).__module__ == cdr_messages.__name__
+            assert measured(ours, name, found) == measured(
+                theirs, name, with_rosbags(store, kind, bytes(data))
+            )
+    assert ours.rejected == theirs.rejected
+    assert (quick > 150) == little
+
+
+def test_every_field_that_anybody_reads(factory: MessageFactory) -> None:
+    dice = random.Random(1)
+    for name in ('joint_states', 'imu/data', 'odom'):
+        reader = TopicMessages(INPUT_TYPES[name])
+        *_, message = messages(factory, name, 9, dice)
+        data = bytes(factory.store.serialize_cdr(message, INPUT_TYPES[name]))
+        for _ in range(2):
+            found = reader.unpack(data)
+        assert type(found).__module__ == cdr_messages.__name__
+        assert_same(found, message)
+
+
+def test_a_stamped_twist(factory: MessageFactory) -> None:
+    twist = factory.twist_with_covariance(0.3, -0.1, [float(i) for i in range(36)])
+    message = factory.make(TWIST, header=factory.header(START), twist=twist)
+    data = bytes(factory.store.serialize_cdr(message, TWIST))
+    reader = TopicMessages(TWIST)
+    for _ in range(2):
+        found = reader.unpack(data)
+    assert type(found).__module__ == cdr_messages.__name__
+    assert_same(found, message)
+
+
+def assert_same(found: Any, message: Any) -> None:
+    """Compare the fields of a quick message, down to the numbers, with those of the whole one."""
+    for field in found._fields:
+        ours, theirs = getattr(found, field), getattr(message, field)
+        if hasattr(ours, '_fields'):
+            assert_same(ours, theirs)
+        elif isinstance(ours, tuple | np.ndarray):
+            assert list(map(repr, map(plain, ours))) == list(map(repr, map(plain, theirs)))
+        else:
+            assert repr(ours) == repr(plain(theirs))
+
+
+def plain(value: Any) -> Any:
+    return value.item() if isinstance(value, np.generic) else value

@@ -1,0 +1,263 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Messages out of their CDR bytes, quickly where one is like the last one of its topic.
+
+rosbags unpacks every field of a message. Of the messages that come a hundred times a second only
+some fields are used, and their names do not change from one to the next: where the beginning (frame
+and names) is byte by byte that of an earlier message that rosbags has unpacked, only the numbers
+are taken out. Everything else goes through rosbags: other types, big-endian or damaged messages.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wheel_terra_estimator.bags.message_types import jazzy_types
+from wheel_terra_estimator.messages.convert import JOINT_STATE, ODOMETRY
+
+FloatArray = NDArray[np.float64]
+
+IMU = 'sensor_msgs/msg/Imu'
+TWIST = 'geometry_msgs/msg/TwistWithCovarianceStamped'
+
+_LITTLE_ENDIAN = b'\x00\x01'
+_BODY = 4  # where the fields begin, and from where they are aligned [byte]
+_AFTER_STAMP = 12  # the frame of the header [byte]
+_LONGEST_PADDING = 3  # [byte] behind the last field
+_MOST_BEGINNINGS = 8  # beginnings of messages that are remembered of one topic
+
+_STAMP = struct.Struct('<iI')
+_COUNT = struct.Struct('<I')
+_IMU = struct.Struct('<37d')  # attitude (4 + 9), angular rate (3 + 9), specific force (3 + 9)
+_POSE = 43 * 8  # [byte] of an Odometry: position, attitude, covariance
+_TWIST = struct.Struct('<42d')  # linear, angular, covariance
+_NO_VALUES: FloatArray = np.zeros(0)
+
+
+class DamagedMessageError(ValueError):
+    """Bytes that are no message of the type."""
+
+
+class Stamp(NamedTuple):
+    """A time of a message."""
+
+    sec: int
+    nanosec: int
+
+
+class Header(NamedTuple):
+    """A header; its frame is not used."""
+
+    stamp: Stamp
+
+
+class Vector(NamedTuple):
+    """A vector, or the vector part of a quaternion."""
+
+    x: float
+    y: float
+    z: float
+
+
+class Quaternion(NamedTuple):
+    """An attitude."""
+
+    x: float
+    y: float
+    z: float
+    w: float
+
+
+class JointState(NamedTuple):
+    """A ``sensor_msgs/msg/JointState``."""
+
+    header: Header
+    name: tuple[str, ...]
+    position: FloatArray
+    velocity: FloatArray
+    effort: FloatArray
+
+
+class Imu(NamedTuple):
+    """A ``sensor_msgs/msg/Imu``."""
+
+    header: Header
+    orientation: Quaternion
+    orientation_covariance: tuple[float, ...]
+    angular_velocity: Vector
+    angular_velocity_covariance: tuple[float, ...]
+    linear_acceleration: Vector
+    linear_acceleration_covariance: tuple[float, ...]
+
+
+class Twist(NamedTuple):
+    """A ``geometry_msgs/msg/Twist``."""
+
+    linear: Vector
+    angular: Vector
+
+
+class TwistWithCovariance(NamedTuple):
+    """A ``geometry_msgs/msg/TwistWithCovariance``."""
+
+    twist: Twist
+    covariance: tuple[float, ...]
+
+
+class TwistStamped(NamedTuple):
+    """A ``geometry_msgs/msg/TwistWithCovarianceStamped``."""
+
+    header: Header
+    twist: TwistWithCovariance
+
+
+class Odometry(NamedTuple):
+    """The velocity of a ``nav_msgs/msg/Odometry``; its pose is not used."""
+
+    header: Header
+    twist: TwistWithCovariance
+
+
+class _Beginning(NamedTuple):
+    """What stands between the stamp and the numbers of a message."""
+
+    content: bytes
+    names: tuple[str, ...]
+    end: int
+
+
+class TopicMessages:
+    """Unpacks the messages of one topic.
+
+    Parameters
+    ----------
+    kind : str
+        Message type, as in ``sensor_msgs/msg/Imu``.
+    """
+
+    def __init__(self, kind: str) -> None:
+        self._kind = kind
+        quick: tuple[_Quick | None, bool, int] = _QUICK.get(kind, (None, False, 0))
+        self._quick, self._names, self._strings = quick
+        self._known: list[_Beginning] = []
+
+    def unpack(self, data: bytes) -> Any:
+        """Return a message.
+
+        Raises
+        ------
+        DamagedMessageError
+            The bytes are no message of the type.
+        """
+        quick = self._quick
+        if quick is not None and data[:2] == _LITTLE_ENDIAN:
+            for known in self._known:
+                if data.startswith(known.content, _AFTER_STAMP):
+                    message = quick(data, known)
+                    if message is not None:
+                        return message
+                    break
+        try:
+            message = jazzy_types().deserialize_cdr(data, self._kind)
+        except Exception as error:  # the library lets many kinds through on damaged bytes
+            raise DamagedMessageError(str(error)) from None
+        if quick is not None and data[:2] == _LITTLE_ENDIAN:
+            self._remember(data, message)
+        return message
+
+    def _remember(self, data: bytes, message: Any) -> None:
+        """Remember the beginning of a message that is sound."""
+        end = _AFTER_STAMP
+        for _ in range(self._strings):
+            end = _behind_string(data, end)
+        names: tuple[str, ...] = ()
+        if self._names:
+            names = tuple(message.name)
+            end = _aligned(end, 4) + _COUNT.size
+            for _ in names:
+                end = _behind_string(data, end)
+        self._known.insert(0, _Beginning(bytes(data[_AFTER_STAMP:end]), names, end))
+        del self._known[_MOST_BEGINNINGS:]
+
+
+def _joint_state(data: bytes, known: _Beginning) -> JointState | None:
+    end = len(data)
+    at = _aligned(known.end, 4)
+    fields = []
+    for _ in range(3):
+        if at + 4 > end:
+            return None
+        (count,) = _COUNT.unpack_from(data, at)
+        at += 4
+        if count:
+            at += -(at - _BODY) % 8
+            if at + 8 * count > end:
+                return None
+            fields.append(np.frombuffer(data, np.float64, count, at))
+            at += 8 * count
+        else:
+            fields.append(_NO_VALUES)
+    if end - at > _LONGEST_PADDING:
+        return None
+    return JointState(_header(data), known.names, *fields)
+
+
+def _imu(data: bytes, known: _Beginning) -> Imu | None:
+    at = _aligned(known.end, 8)
+    if not 0 <= len(data) - at - _IMU.size <= _LONGEST_PADDING:
+        return None
+    v = _IMU.unpack_from(data, at)
+    return Imu(
+        _header(data),
+        Quaternion(*v[:4]),
+        v[4:13],
+        Vector(*v[13:16]),
+        v[16:25],
+        Vector(*v[25:28]),
+        v[28:],
+    )
+
+
+def _odometry(data: bytes, known: _Beginning) -> Odometry | None:
+    twist = _twist(data, _aligned(known.end, 8) + _POSE)
+    return None if twist is None else Odometry(_header(data), twist)
+
+
+def _twist_stamped(data: bytes, known: _Beginning) -> TwistStamped | None:
+    twist = _twist(data, _aligned(known.end, 8))
+    return None if twist is None else TwistStamped(_header(data), twist)
+
+
+def _twist(data: bytes, at: int) -> TwistWithCovariance | None:
+    if not 0 <= len(data) - at - _TWIST.size <= _LONGEST_PADDING:
+        return None
+    v = _TWIST.unpack_from(data, at)
+    return TwistWithCovariance(Twist(Vector(*v[:3]), Vector(*v[3:6])), v[6:])
+
+
+_Quick = Callable[[bytes, _Beginning], Any]
+_QUICK: dict[str, tuple[_Quick, bool, int]] = {
+    JOINT_STATE: (_joint_state, True, 1),
+    IMU: (_imu, False, 1),
+    ODOMETRY: (_odometry, False, 2),
+    TWIST: (_twist_stamped, False, 1),
+}
+"""Type -> how it is unpacked, whether names follow, and how many strings stand before."""
+
+
+def _header(data: bytes) -> Header:
+    return Header(Stamp(*_STAMP.unpack_from(data, _BODY)))
+
+
+def _aligned(at: int, size: int) -> int:
+    return at + -(at - _BODY) % size
+
+
+def _behind_string(data: bytes, at: int) -> int:
+    at = _aligned(at, 4)
+    return at + _COUNT.size + int(_COUNT.unpack_from(data, at)[0])
