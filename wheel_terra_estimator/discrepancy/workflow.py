@@ -312,7 +312,7 @@ def _report(
     gap = words.gaps(table, findings, curves, floor, options.allowed_error)
     if verdict.word == 'agrees' and not off and words.channels_off(gap):
         return _report(table, both, configuration, findings, known, options, off=True)
-    if after.names and words.channels_worsened(gap) and len(excluded) < _MOST_EXCLUDED:
+    if after.names and words.channels_worsened(gap, left) and len(excluded) < _MOST_EXCLUDED:
         further = (*excluded, verdict.index)
         return _report(
             table, both, configuration, findings, known, options, off=off, excluded=further

@@ -51,6 +51,19 @@ _WORSE = 1.1  # times the soil refit: an error of one quantity that no law may r
 _FINE = 1.35  # ... unless it is no more than so many times the noise
 _ALIKE = 0.8  # cosine of two signatures from which one resembles the other
 _RESEMBLING = 3
+# Terms that are the law of a named effect.
+_SAME = {
+    'exponent_by_slip': 'slip_sinkage_exponent',
+    'exponent_by_load': 'slip_sinkage_exponent',
+    'peak_angle_by_slip': 'stress_peak_shift',
+    'torque_by_one': 'drivetrain_friction',
+    'drawbar_pull_by_one': 'pull_zero',
+    'drawbar_pull_by_load': 'pull_zero',
+    'sinkage_by_one': 'sinkage_offset',
+    'shear_modulus_by_load': 'shear_deformation',
+    'bearing_pressure_by_pass': 'multipass',
+    'bearing_pressure_by_rim_speed': 'rate_dependence',
+}
 _LEVEL_INPUTS = (
     'normal_load',
     'lug_height',
@@ -287,4 +300,6 @@ def _resembling(findings: Findings, fits: Sequence[Fit]) -> tuple[str, ...]:
         cosine = float(signature.change @ weighted) / far if far > 0.0 else 0.0
         alike[effect_of(key)] = max(abs(cosine), alike.get(effect_of(key), 0.0))
     order = sorted(alike, key=lambda name: -alike[name])
-    return tuple(name for name in order if alike[name] > _ALIKE)[:_RESEMBLING]
+    same = [_SAME[c.name] for c in fits[1].coordinates if c.name in _SAME]
+    found = [*same, *(name for name in order if alike[name] > _ALIKE)]
+    return tuple(dict.fromkeys(found))[:_RESEMBLING]

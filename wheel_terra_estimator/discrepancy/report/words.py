@@ -35,6 +35,7 @@ _SOIL_KEYS = {
     'tan_friction': 'the tangent of soil.friction_angle_deg',
 }
 WORSE = 1.25  # times soil refit and noise: a quantity that a name has made worse
+WORTH = 5.0  # squared noise deviations that a name must take off the rest for each one it adds
 TOO_FAR = 2.0  # times noise and allowed model error: a channel that is off
 _COARSE = 0.05  # model-error floor above which agreement says little
 
@@ -161,8 +162,21 @@ def _plain(name: str) -> str:
     return name.replace('_', ' ')
 
 
-def channels_worsened(gap: Mapping[str, QuantityGap]) -> tuple[str, ...]:
-    """Return the quantities that an effect predicts worse on unseen rows than the soil alone."""
+def channels_worsened(gap: Mapping[str, QuantityGap], left: Remainder) -> tuple[str, ...]:
+    """Return the quantities that an effect predicts worse on unseen rows than the soil alone.
+
+    None where it leaves noise alone and takes far more from the others: `WORTH` times as many
+    squared noise deviations.
+    """
+    change = {
+        name: (item.after**2 - item.refit**2) / item.noise**2
+        for name, item in gap.items()
+        if item.noise
+    }
+    lost = sum(value for value in change.values() if value > 0.0)
+    gained = -sum(value for value in change.values() if value < 0.0)
+    if not left.significant and gained > WORTH * lost:
+        return ()
     return tuple(
         name
         for name, item in gap.items()

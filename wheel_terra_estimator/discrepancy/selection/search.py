@@ -52,6 +52,7 @@ _FLEXIBLE = 0.25  # floor of the first robust pass: wide enough for any effect [
 _ROBUST_FLOOR = 0.02  # floor of the later ones
 _PASSES = 5
 _LATENT_FLOOR = 0.03  # structural error allowed while slips are moved [share of range]
+_CELLS = 8  # measured cells for each effect of a set, at least
 _SEEDS = 3  # sets to which one effect more is added
 _SWAPS = 3  # sets in which others are put in the place of each effect, at most
 _NEAR = 2.0  # nats behind the best one, up to which that is done
@@ -238,10 +239,11 @@ def _with_more(
     The best sets are those that would be if no misfit asked for a name, though none of them may be
     good enough yet.
     """
-    for _ in range(MOST_EFFECTS):
+    most = min(MOST_EFFECTS, setting.problem.size // _CELLS)
+    for _ in range(most):
         leaders = selection.without_misfit(_SEEDS)
         before = leaders[0][0]
-        seeds = [e for _, e in leaders if 1 <= len(e.names) < MOST_EFFECTS]
+        seeds = [e for _, e in leaders if 1 <= len(e.names) < most]
         selection = _joined_by(
             setting, selection, [e for s in seeds for e in explain_more(setting, s, incompatible)]
         )
