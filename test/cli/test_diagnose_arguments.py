@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -111,3 +112,15 @@ def test_a_soil_that_nobody_stated_is_said(tmp_path: Path, capsys: Any) -> None:
     command = ['diagnose', _table(tmp_path / 'rig.csv'), '-o', str(tmp_path / 'out')]
     assert main([*command, '--no-pictures', '--config', 'hit_wh1']) == 0
     assert 'no soil was stated' in capsys.readouterr().out
+
+
+def test_json_is_the_report_and_nothing_else(tmp_path: Path, capsys: Any) -> None:
+    config = ['--config', 'hit_wh3', '--config', 'dlr_mss']
+    rows = str(tmp_path / 'rows.csv')
+    assert main(['predict', *config, '--slip', '0.1:0.5:5', '--load', '60,90', '-o', rows]) == 0
+    capsys.readouterr()
+    out = tmp_path / 'out'
+    arguments = ['diagnose', rows, *config, '-o', str(out), '--no-pictures', '--json']
+    assert main([*arguments, '--only', 'lug_digging']) == 0
+    said = capsys.readouterr().out
+    assert json.loads(said) == json.loads((out / 'report.json').read_text())

@@ -123,6 +123,12 @@ def test_examples_of_the_help_parse(line):
         main.build_parser().parse_args(arguments)
 
 
+def test_every_command_has_examples_and_a_debug_option():
+    for name, parser in main.sub_parsers().items():
+        assert 'examples:' in (parser.epilog or ''), name
+        assert '--debug' in parser.format_help(), name
+
+
 def test_completion():
     pytest.importorskip('shtab')
     with pytest.raises(SystemExit) as end:

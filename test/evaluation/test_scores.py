@@ -211,3 +211,22 @@ def test_a_page_holds_the_numbers_of_the_tables(tmp_path):
     axis = page.slip_errors(results, page.PHONE).axes[0]
     drawn = [line.get_xdata()[0] for line in axis.lines if line.get_marker() == 'o']
     assert any(x == pytest.approx(scores.rms(drive.samples.slip_error)) for x in drawn)
+
+
+def test_figures_for_programs_are_those_of_the_tables():
+    import json
+
+    true = truth(np.concatenate([np.full(200, 0.1), np.full(200, 0.7)]))
+    record = said(true)
+    drive = DriveScore(
+        'climb', 1, 'reference', take(true, record), scores.warnings(true, record, RADIUS), {}
+    )
+    results = Results([drive, replace(drive, kind='cruise', world='rival')])
+    found = tables.as_dict(results, ['reference', 'no_torque'])
+    assert set(found) == {'own', 'rival'}
+    assert set(found['own']) == {'reference'}
+    assert set(found['own']['reference']) == {'climb', 'pooled'}
+    figures = found['own']['reference']['climb']
+    assert figures['rms']['slip'] == pytest.approx(scores.rms(drive.samples.slip_error))
+    assert figures == found['own']['reference']['pooled']
+    json.dumps(found, allow_nan=False)

@@ -81,6 +81,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--no-pictures', action='store_true', help='write report.json and model.yaml only'
     )
+    parser.add_argument('--json', action='store_true', help='print report.json and nothing else')
     bag_limits.add_arguments(parser)
     parser.add_argument('--overwrite', action='store_true', help='replace DIR if it exists')
     reader.add_arguments(parser)
@@ -90,7 +91,6 @@ def run(arguments: argparse.Namespace) -> int:
     """Run the command."""
     from wheel_terra_estimator.configuration import reader
     from wheel_terra_estimator.discrepancy.report.files import write_files
-    from wheel_terra_estimator.discrepancy.tables.steady_table import UNITS
     from wheel_terra_estimator.discrepancy.tables.together import together
     from wheel_terra_estimator.discrepancy.workflow import Options, diagnose
 
@@ -123,6 +123,17 @@ def run(arguments: argparse.Namespace) -> int:
         diagnosis = replace(diagnosis, notes=(*diagnosis.notes, note))
     with new_folder(output, arguments.overwrite, inputs) as folder:
         write_files(diagnosis, folder, pictures=not arguments.no_pictures)
+    if arguments.json:
+        print((output / 'report.json').read_text(encoding='utf-8').rstrip())
+    else:
+        _tell(diagnosis, output)
+    return 0
+
+
+def _tell(diagnosis: Diagnosis, output: Path) -> None:
+    """Print the verdict, the gaps, what to do next and what was written."""
+    from wheel_terra_estimator.discrepancy.tables.steady_table import UNITS
+
     print(diagnosis.sentence)
     for quantity, gap in diagnosis.gap.items():
         scale, unit = (1e3, 'mm') if quantity == 'sinkage' else (1.0, UNITS[quantity])
@@ -138,7 +149,6 @@ def run(arguments: argparse.Namespace) -> int:
     for note in diagnosis.notes:
         print(f'  note: {note}')
     print(f'  written: {output}')
-    return 0
 
 
 def _load_effects(files: list[str]) -> dict[str, Path]:

@@ -40,6 +40,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help='text (default), json for programs, markdown for the documentation',
     )
     parser.add_argument(
+        '--json',
+        dest='format',
+        action='store_const',
+        const='json',
+        help='the same as --format json',
+    )
+    parser.add_argument(
         '--load',
         type=Path,
         action='append',

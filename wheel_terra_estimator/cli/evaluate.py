@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import argparse
+import json
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -85,6 +86,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='F.md|F.html',
         help='write the tables; as a page with a picture where the name ends in .html',
     )
+    parser.add_argument(
+        '--json', action='store_true', help='print the figures of simulated kinds as JSON'
+    )
     parser.add_argument('--overwrite', action='store_true', help='replace an earlier output')
 
 
@@ -111,6 +115,8 @@ def run(arguments: argparse.Namespace) -> int:
             check_file(picture, arguments.overwrite)
     first = (kinds.TUNING_SEEDS if arguments.tuning else kinds.TEST_SEEDS).start
     seeds = range(first, first + arguments.seeds)
+    if arguments.json and (arguments.measured or arguments.limiter):
+        raise UserError('--json goes with simulated kinds, not with --measured or --limiter')
     if arguments.rover and (arguments.measured or arguments.limiter):
         raise UserError('--rover goes with simulated kinds, not with --measured or --limiter')
     if arguments.measured:
@@ -151,7 +157,10 @@ def run(arguments: argparse.Namespace) -> int:
     text += f'\n\nThe filter was started anew {restarts} times in {len(healths)} runs.'
     if restarts and not status:
         status = FILTER_FAILED
-    print(text)
+    if arguments.json and results is not None:
+        print(json.dumps(tables.as_dict(results, arguments.modes), indent=2))
+    else:
+        print(text)
     if arguments.output:
         with new_file(arguments.output, arguments.overwrite) as fresh:
             if page.is_page(arguments.output):
