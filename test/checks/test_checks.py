@@ -269,3 +269,11 @@ def test_visual_odometry_is_the_reference_beside_joint_states(tmp_path):
     assert chosen['joint_states'] == '/drive'
     assert chosen['reference_odom'] == '/zed/visual_odometry'
     assert chosen['odom'] == '/wheel_odom'
+
+
+def test_gravity_taken_off_on_a_slope_is_not_a_unit():
+    """A slope of 6 degrees leaves 1 m/s^2: the size of gravity in g, across the wrong axis."""
+    imu = rolling.recording().imu
+    tilted = imu.force + np.array([1.0, 0.0, -9.80665])
+    assert only(checked(imu=replace(imu, force=tilted)), 'gravity').cure.count('REP 145') == 1
+    assert only(checked(imu=replace(imu, force=imu.force / 9.80665)), 'unit').value == 9.80665

@@ -33,6 +33,8 @@ STANDARD_GRAVITY = 9.80665  # [m/s^2]
 GRAVITY_TOLERANCE = 0.1
 """Share by which the mean specific force may differ from gravity (slopes, bias, vibration)."""
 GRAVITIES = {'the Moon': 1.62, 'Mars': 3.71, 'the Earth': 9.81}  # [m/s^2]
+UPRIGHT_SHARE = 0.5
+"""Share of the mean specific force along z that gravity has on a rover [-]."""
 UPSIDE_TILT = math.radians(35.0)
 """Mean tilt that no rover drives at [rad]: the mounting is wrong, whatever the slope."""
 LEAST_SHOWN = 0.01
@@ -161,7 +163,9 @@ def _gravity(
 ) -> tuple[list[Outcome], ImuState]:
     imu = state.recording.imu
     assert imu is not None
-    size = float(np.linalg.norm(np.median(imu.force, axis=0)))
+    middle = np.median(imu.force, axis=0)
+    size = float(np.linalg.norm(middle))
+    upright = abs(float((state.rotation @ middle)[2])) > UPRIGHT_SHARE * size
     typical = float(np.median(np.linalg.norm(imu.force, axis=1)))
     figures['imu.mean_specific_force_m_s2'] = round(size, 4)
     gravity = facts.gravity
@@ -181,7 +185,8 @@ def _gravity(
             cure,
         )
 
-    if size < 0.3 * min(gravity, STANDARD_GRAVITY) and abs(size - 1.0) > 0.12:
+    in_g = abs(size - 1.0) <= 0.12 and upright  # what a slope leaves may have the same size
+    if size < 0.3 * min(gravity, STANDARD_GRAVITY) and not in_g:
         outcome = found(
             'gravity',
             None,

@@ -393,7 +393,7 @@ class OnlineChecks:
     def _of_gravity(self, force: tuple[float, float, float]) -> Iterator[Evidence]:
         size = math.sqrt(sum(f * f for f in force))
         share = size / self._gravity
-        yield 'gravity', -1, abs(share - 1.0) > GRAVITY_SHARE, size
+        yield 'gravity', -1, abs(share - 1.0) > GRAVITY_SHARE, abs(force[2])
         if share > GRAVITY_OFF:
             yield 'mounting', -1, force[2] < UPRIGHT * size, force[2] / size
 
@@ -517,7 +517,7 @@ class OnlineChecks:
             yield _WORDS[name](self, self._verdicts.figures[name, wheel], wheel, sure)
 
     def _gravity_words(self, figure: float, wheel: int, sure: float) -> Finding:
-        seen = f'mean specific force {figure:.3g} m/s^2 where gravity is {self._gravity:.4g}: '
+        seen = f'specific force {figure:.3g} m/s^2 along z where gravity is {self._gravity:.4g}: '
         for unit, factor in (('g', STANDARD_GRAVITY), ('mg', STANDARD_GRAVITY / 1000.0)):
             if abs(figure * factor / self._gravity - 1.0) < GRAVITY_SHARE:
                 cure = f'multiply linear_acceleration by {factor:.5g} in the driver (m/s^2)'
