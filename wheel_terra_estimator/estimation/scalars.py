@@ -24,7 +24,9 @@ def known(values: Iterable[float]) -> list[float]:
 
 def clipped(value: float, low: float, high: float) -> float:
     """Return the value, or the bound beyond which it lies."""
-    return min(max(value, low), high)
+    if value < low:
+        return low
+    return high if value > high else value
 
 
 def gain_of(dt: float, time_constant: float) -> float:

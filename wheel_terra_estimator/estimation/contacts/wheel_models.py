@@ -17,6 +17,7 @@ from math import isnan
 from typing import NamedTuple, cast
 
 from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.estimation.scalars import clipped
 from wheel_terra_estimator.terramechanics.closed_form import coefficients, peak_stresses
 from wheel_terra_estimator.terramechanics.conditioned import SMALLEST_ANGLE, ConditionedForces
 from wheel_terra_estimator.terramechanics.contact import Contact
@@ -155,13 +156,13 @@ class WheelModels:
         shear_modulus = self._shear_modulus * math.exp(modulus)
         span = self._mound_span
         high = max(span - ratio, 0.0) / span
-        depth = min(max(sinkage, _LEAST_SINKAGE), self._radius[wheel])
+        depth = clipped(sinkage, _LEAST_SINKAGE, self._radius[wheel])
         angle = math.acos(1.0 - depth / self._radius[wheel])
         shift = centroid - mound * high * high
         by_depth = shift / (self._radius[wheel] * math.sin(angle)) if depth == sinkage else 0.0
         torque, pull, d_torque, d_pull, _ = self._forces.forces(
             wheel,
-            min(max(ratio, 0.0), _MOST_RATIO),
+            clipped(ratio, 0.0, _MOST_RATIO),
             sinkage,
             load,
             cohesion,
@@ -222,10 +223,8 @@ class WheelModels:
         sinkage, load, leaving = state.sinkage, state.load, state.leaving_angle
         c, m = self._contacts[wheel], ScalarMaths
         slip = slip_of_speed_ratio(ratio, m)
-        c.slip, c.velocity_ratio = (
-            slip,
-            min(max(ratio, 0.0), _MOST_RATIO) * self._slip_radius[wheel],
-        )
+        c.slip = slip
+        c.velocity_ratio = clipped(ratio, 0.0, _MOST_RATIO) * self._slip_radius[wheel]
         c.normal_load = c.stated_load = load
         c.rim_speed = math.nan
         c.radius = c.shear_radius = c.rim_radius
@@ -238,7 +237,7 @@ class WheelModels:
         c.sinkage = c.drawbar_pull = c.torque = c.entrance_angle = 0.0
         for term, values in stages['on_outputs']:
             term(c, values, m)
-        depth = min(max(sinkage - c.sinkage, 0.0), _MOST_SINKAGE * c.radius)
+        depth = clipped(sinkage - c.sinkage, 0.0, _MOST_SINKAGE * c.radius)
         entrance = max(math.acos(1.0 - depth / c.radius), 10.0 * SMALLEST_ANGLE)
         set_angles(c, entrance, None if isnan(leaving) else leaving, self._terms, m)
         a, b, _ = coefficients(c.entrance_angle, c.peak_angle, c.leaving_angle, m)

@@ -155,8 +155,10 @@ class ClockWatch:
         if channel == WHEEL_ODOMETRY:
             self._odometry_astray = 0
         own = self._newest_of[channel]
-        self._newest_of[channel] = stamp if own is None else max(own, stamp)
-        self.newest = stamp if self.newest is None else max(self.newest, stamp)
+        if own is None or stamp > own:
+            self._newest_of[channel] = stamp
+        if self.newest is None or stamp > self.newest:
+            self.newest = stamp
 
     def _drop_held(self) -> tuple[tuple[Suspicion, Arrival], ...]:
         strays = tuple((self._suspicion, arrival) for arrival in self._held)
