@@ -132,7 +132,7 @@ def test_the_slip_walks_as_the_demand_over_the_slope_of_the_traction_curve():
     made = process([0.05] * 6)
     walks = []
     for slope in (0.001, 0.4, 10.0):
-        made.follow_traction_curve(slope, travel=10.0)
+        made.follow_traction_curve(slope, travel=10.0, dragging=False)
         walks.append(made.state.ratio_walk)
     assert walks == pytest.approx([0.13, 0.025 / 0.4, 0.03])
 
@@ -179,11 +179,30 @@ def test_a_start_goes_by_the_remembered_ratio_and_not_by_that_of_its_first_momen
     assert found.speed_gain * 0.003 + found.constant == pytest.approx(0.003 + 0.8 * 0.04)
 
 
+def test_a_rover_that_ends_a_turn_opens_its_speed():
+    """Left wheels slow down and right ones speed up over two seconds, each cycle within noise."""
+    turning = process([0.07, 0.03] * 3)
+    straight = process([0.05, 0.05] * 3)
+    for i in range(20):
+        sides = [0.07 - 0.001 * i, 0.03 + 0.001 * i] * 3
+        turning.follow_sides(speeds(sides), 0.1)
+        straight.follow_sides(speeds([0.05 + 0.001 * i] * 6), 0.1)
+    # A mean over a second lags a ramp of 10 mm/s^2 by 10 mm/s (1 - exp(-2)) after two of them;
+    # what noise may make of it is taken off.
+    parts = Parts(reader.load(SAND))
+    noise = 3.0 * parts.sensors.wheel_rate_std * max(parts.rover.slip_radius)
+    lag = 0.01 * (1.0 - np.exp(-2.0))
+    assert turning.state.inflation == pytest.approx(lag - noise, rel=0.1)
+    assert straight.state.inflation == 0.0
+
+
 def test_the_slip_of_a_start_walks_farther():
     made = process([0.05] * 6)
     walks = []
     for travel in (0.0, 0.1, 10.0):
-        made.follow_traction_curve(0.5, travel)
+        made.follow_traction_curve(0.5, travel, dragging=False)
         walks.append(made.state.ratio_walk)
+    made.follow_traction_curve(0.5, 10.0, dragging=True)
+    assert made.state.ratio_walk == 0.6  # a locked wheel digs in
     assert walks[0] > 2.0 * walks[2]
     assert walks[0] > walks[1] > walks[2]

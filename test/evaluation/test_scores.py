@@ -230,3 +230,19 @@ def test_figures_for_programs_are_those_of_the_tables():
     assert figures['rms']['slip'] == pytest.approx(scores.rms(drive.samples.slip_error))
     assert figures == found['own']['reference']['pooled']
     json.dumps(found, allow_nan=False)
+
+
+def test_the_first_seconds_after_a_start_are_scored_apart():
+    """Standing from 40 to 45 s of 100 s at 10 Hz; the estimate is off after the start alone."""
+    slip = np.full(1000, 0.4)
+    slip[400:450] = np.nan
+    true = truth(slip)
+    true.wheel_rate[400:450] = 0.0
+    record = said(true)
+    record.slip[450:750] += 0.2
+    data = take(true, record)
+    part = scores.after_start(data)
+    # 10 to 30 s after the first start, 0 to 30 s after the second.
+    assert len(part) == pytest.approx(4 * (200 + 300), abs=20)
+    assert scores.coverage(part.slip_error, part.slip_std) == pytest.approx(0.4, abs=0.01)
+    assert scores.rms(data.slip_error) < scores.rms(part.slip_error)

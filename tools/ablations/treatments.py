@@ -83,6 +83,8 @@ TREATMENTS: tuple[Treatment, ...] = (
     ),
     Treatment('opening on a change of turning', _OPENING, _turning(speed_change=0.0)),
     Treatment('opening where wheels disagree', _OPENING, _speed(rate_noise=NEVER)),
+    Treatment('opening where sides change for a second', _OPENING, _speed(side_change=0.0)),
+    Treatment('wider walk while a wheel is dragged', _OPENING, _speed(drag_walk=0.0)),
     Treatment('noise with a change of rim speed', _OPENING, _speed(rim_change=0.0)),
     Treatment('all openings of the speed', _OPENING, _speed(inflation_rate=0.0)),
     Treatment('models doubted while references lean', _OPENING, _reference(most_doubt=1.0)),

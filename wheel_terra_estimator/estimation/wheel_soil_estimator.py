@@ -352,6 +352,7 @@ class WheelSoilEstimator:
             speed.forget_ratio()
         demand_change = self._demand.update(demand, dt, settled=self._contact_age.settled)
         speed.begin(ekf, unturned)
+        speed.follow_sides(unturned, dt)
         speed.note_change(time, unturned)
         heard = known(rims)
         return _Cycle(
@@ -502,7 +503,12 @@ class WheelSoilEstimator:
             repeats=repeats,
         )
         self._speed.follow_traction_curve(
-            traction_slope(forces, cycle.rims, loads), self._contact_age.state.travel
+            traction_slope(forces, cycle.rims, loads),
+            self._contact_age.state.travel,
+            dragging=any(
+                not turns and abs(rim) < self._rover.rest_speed
+                for turns, rim in zip(cycle.turns, cycle.rims, strict=True)
+            ),
         )
         if not cycle.window.readings:
             return forces, None, rows

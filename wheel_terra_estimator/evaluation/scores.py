@@ -27,6 +27,9 @@ SCORING_PERIOD = 0.1
 SLOW_TIME = 20.0
 """The slow part of an error is its mean over blocks of this length [s]."""
 
+START_TIME = 30.0
+"""A drive counts as started for so long after its wheels last stood [s]."""
+
 LEAST_LOAD = 0.1
 """Pull is scored on wheels that carry at least this share of the mean load."""
 
@@ -45,6 +48,7 @@ class Samples:
     true_class: NDArray[np.uint8]
     said_class: NDArray[np.uint8]
     slow_slip_error: FloatArray  # mean of slip_error over its block of 20 s
+    since_start: FloatArray  # time since the wheels last stood [s]
     held_error: FloatArray  # slip, baselines
     dead_reckoned_error: FloatArray
     torque_filter_error: FloatArray
@@ -125,6 +129,7 @@ def samples(
         true_class=truth.slip_class[scored],
         said_class=record.slip_class[position][scored],
         slow_slip_error=take(_block_means(truth.stamp, slip_error, scored)),
+        since_start=take(np.broadcast_to(_since_start(truth.stamp, rim)[:, None], rim.shape)),
         held_error=take(baselines.held - truth.slip),
         dead_reckoned_error=take(baselines.dead_reckoned - truth.slip),
         torque_filter_error=take(torque.slip - truth.slip),
@@ -133,6 +138,18 @@ def samples(
         pitch_filter_std=take(pitch.std),
         shared_pull_error=over_load(shared - truth.drawbar_pull),
     )
+
+
+def _since_start(stamp: NDArray[np.int64], rim: FloatArray) -> FloatArray:
+    """Return (k,) the time since the wheels last stood, or since the first row [s]."""
+    time = (stamp - stamp[0]) * 1e-9
+    standing = np.where((rim < LEAST_SPEED).all(axis=1), time, 0.0)
+    return np.asarray(time - np.maximum.accumulate(standing))
+
+
+def after_start(data: Samples) -> Samples:
+    """Return the samples of the first 30 s after a start."""
+    return data.where(data.since_start < START_TIME)
 
 
 def _one_per_period(stamp: NDArray[np.int64], matched: NDArray[np.bool_]) -> NDArray[np.bool_]:

@@ -105,13 +105,20 @@ def _two_states(by_kind: dict[str, list[DriveScore]]) -> str:
                 _RULE[ratio.keeps_the_rule],
                 f'{scores.rms(data.slow_slip_error):.4f}',
                 f'{scores.coverage(data.slip_error, data.slip_std):.1%}',
+                _coverage_after_start(data),
                 f'{scores.coverage(data.torque_filter_error, data.torque_filter_std):.1%}',
                 f'{mean:.2f}, {median:.2f}',
             )
         )
     head = (
         *('drives', 'slip RMSE', 'two states, torque', 'two states, pitch', 'better'),
-        *('ratio (95 % interval)', 'rule kept', 'slow part (20 s means)', 'coverage'),
+        *(
+            'ratio (95 % interval)',
+            'rule kept',
+            'slow part (20 s means)',
+            'coverage',
+            '30 s after a start',
+        ),
         *('coverage of two states, torque', 'squared error over variance: mean, median'),
     )
     judged = any(len(drives) >= scores.FEWEST_DRIVES for drives in by_kind.values())
@@ -125,6 +132,11 @@ def _two_states(by_kind: dict[str, list[DriveScore]]) -> str:
 
 
 _RULE = {True: 'yes', False: '**no**', None: 'too few drives'}
+
+
+def _coverage_after_start(data: scores.Samples) -> str:
+    part = scores.after_start(data)
+    return f'{scores.coverage(part.slip_error, part.slip_std):.1%}' if len(part) else '-'
 
 
 def _interval(ratio: scores.Ratio) -> str:
@@ -168,6 +180,7 @@ def _figures(drives: Sequence[DriveScore]) -> dict[str, str]:
         'dead reckoning': f'{scores.rms(data.dead_reckoned_error):.4f}',
         'slow part of the slip error': f'{scores.rms(data.slow_slip_error):.4f}',
         'coverage of slip': f'{scores.coverage(data.slip_error, data.slip_std):.1%}',
+        'coverage of slip, first 30 s after a start': _coverage_after_start(data),
         'squared slip error over variance: mean, median': f'{mean:.2f}, {median:.2f}',
         'sinkage RMSE [mm]': f'{1e3 * scores.rms(data.sinkage_error):.2f}',
         'coverage of sinkage': f'{scores.coverage(data.sinkage_error, data.sinkage_std):.1%}',

@@ -17,6 +17,7 @@ So the accelerometer's role follows from its noise and the speed; no switch is n
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import isnan
 from typing import NamedTuple
@@ -29,9 +30,11 @@ from wheel_terra_estimator.estimation.filter.prediction import Prediction
 from wheel_terra_estimator.estimation.filter.state import GRAVITY_BIAS, SLIP_PER_DEMAND, SPEED
 from wheel_terra_estimator.estimation.inputs.inertial import InertialWindow
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
-from wheel_terra_estimator.estimation.scalars import NAN, clipped, known, median
+from wheel_terra_estimator.estimation.scalars import NAN, clipped, gain_of, known, median
 
 Floats = tuple[float, ...]
+_LEAST_WHEELS = 3
+"""Wheels that can disagree."""
 
 
 @dataclass(frozen=True)
@@ -56,6 +59,7 @@ class SpeedTuning:
     floor_walk: float = 1e-8  # [(m/s)^2/s]
     start_walk: float = 0.6
     """Random walk of v / rim speed at a start [1/sqrt(m)]: ruts form and the slip settles."""
+    drag_walk: float = 0.6  # the same while a wheel is dragged
     start_walk_travel: float = 0.2  # [m] with which it decays
     demand_error: float = 0.3  # of what the demand changes, over that change [-]
     slip_per_demand_walk: float = 0.2  # [1/sqrt(m)]
@@ -65,7 +69,8 @@ class SpeedTuning:
     inflation_time: float = 0.3  # with which the inflation decays [s]
     rate_noise: float = 3.0
     """Deviations of the wheel rates within which the wheels do not disagree [-]."""
-    least_wheels: int = 3  # that can disagree
+    side_time: float = 1.0  # over which a change of one side against the other is seen [s]
+    side_change: float = 1.0  # speed that it may bring, over that change [-]
     least_covered: float = 0.5  # of a step by the IMU, to use it
     attitude_time: float = 0.5
     """Time within which errors of the attitude change over rough ground [s]."""
@@ -144,6 +149,7 @@ class SpeedState(NamedTuple):
     traction_slope: float = 0.0  # of the traction curve at the last cycle; 0 = unknown [-]
     inflation: float = 0.0
     """Process-noise inflation: change of speed that changing contacts may bring [m/s]."""
+    slow_rims: Floats = ()  # mean of `rims.each` over the last second [m/s]
     settled: bool = True  # the contacts were, at the last cycle
     other_direction: PastDrive | None = None
     change_time: float = -math.inf  # when contacts or commands last changed [s]
@@ -165,7 +171,14 @@ class SpeedProcess(Component[SpeedState]):
         self._demand_walk = float(figures.demand_walk)
         unknown = RimSpeeds((NAN,) * rover.wheel_count, NAN)
         super().__init__(
-            SpeedState(NAN, unknown, tuning.first_ratio, tuning.first_ratio_std, self._most_walk)
+            SpeedState(
+                NAN,
+                unknown,
+                tuning.first_ratio,
+                tuning.first_ratio_std,
+                self._most_walk,
+                slow_rims=unknown.each,
+            )
         )
         self._rover, self._tuning = rover, tuning
         rate = max(sensors.imu_rate, 1.0)
@@ -185,6 +198,25 @@ class SpeedProcess(Component[SpeedState]):
         """Widen the prediction for contacts under change that may bring `speed_change` [m/s]."""
         if speed_change > self.state.inflation:
             self.state = self.state._replace(inflation=speed_change)
+
+    def follow_sides(self, rims: RimSpeeds, dt: float) -> None:
+        """Widen the prediction where wheels change against one another for longer than a cycle.
+
+        A rover that begins or ends a turn moves with the mean of its sides no more: by how much
+        one side slips more than the other is not known.
+        """
+        tuning, slow = self._tuning, self.state.slow_rims
+        gain = gain_of(dt, tuning.side_time)
+        self.state = self.state._replace(
+            slow_rims=tuple(
+                [
+                    now if isnan(old) else old if isnan(now) else old + gain * (now - old)
+                    for old, now in zip(slow, rims.each, strict=True)
+                ]
+            )
+        )
+        apart = spread([now - old for old, now in zip(slow, rims.each, strict=True)])
+        self.inflate(tuning.side_change * max(apart - self._rim_noise, 0.0))
 
     def forget_ratio(self) -> None:
         """Forget how well v / rim speed is known: the first drive in a direction begins."""
@@ -232,17 +264,19 @@ class SpeedProcess(Component[SpeedState]):
         if changed or state.inflation > tuning.restless_share * abs(rim):
             self.state = state._replace(change_time=time)
 
-    def follow_traction_curve(self, slope: float, travel: float) -> None:
+    def follow_traction_curve(self, slope: float, travel: float, *, dragging: bool) -> None:
         """Let the slip walk as what the ground asks does, over the slope of the traction curve.
 
         Where the curve is steep, a change of demand changes the slip little; on the plateau the
-        same change makes the rover dig in. After a start it walks farther, over some `travel` [m].
+        same change makes the rover dig in. After a start it walks farther, over some `travel` [m],
+        and so it does while a wheel is dragged, which digs in and asks more of the others.
         """
         tuning = self._tuning
         slope = max(slope, tuning.least_slope)
         walk = self._demand_walk / slope
         start = tuning.start_walk * math.exp(-travel / tuning.start_walk_travel)
-        walk = max(clipped(walk, self._least_walk, self._most_walk), start)
+        least = max(start, tuning.drag_walk if dragging else 0.0)
+        walk = max(clipped(walk, self._least_walk, self._most_walk), least)
         self.state = self.state._replace(traction_slope=slope, ratio_walk=walk)
 
     # -- Prediction ------------------------------------------------------------------------------
@@ -362,13 +396,8 @@ class SpeedProcess(Component[SpeedState]):
         Median deviation from the median: one wheel apart makes none, two that spin up beside two
         that stand do. What the noise of the rates makes is taken off.
         """
-        changes = known(
-            [now - before for now, before in zip(rims.each, self.state.rims.each, strict=True)]
-        )
-        if len(changes) < self._tuning.least_wheels:
-            return 0.0
-        middle = median(changes)
-        return max(median([abs(change - middle) for change in changes]) - self._rim_noise, 0.0)
+        changes = [now - old for now, old in zip(rims.each, self.state.rims.each, strict=True)]
+        return max(spread(changes) - self._rim_noise, 0.0)
 
     def towards_usual_slip(
         self, step: SpeedStep, dt: float, rim: float, *, direction: float, slope_share: float
@@ -469,3 +498,12 @@ class SpeedProcess(Component[SpeedState]):
             inflation=inflation,
             settled=settled,
         )
+
+
+def spread(changes: Sequence[float]) -> float:
+    """Return the median deviation of changes from their median; 0 where fewer than 3 are known."""
+    there = known(changes)
+    if len(there) < _LEAST_WHEELS:
+        return 0.0
+    middle = median(there)
+    return median([abs(change - middle) for change in there])
