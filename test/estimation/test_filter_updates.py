@@ -215,7 +215,7 @@ def test_a_spike_of_the_sinkage_is_dropped_and_eight_in_a_row_are_believed(parts
 
 
 def relaxed(parts, ekf, seconds, loads=None, reference_known=True, speed=0.05, start=None):
-    process = SinkageProcess(parts.rover, parts.layout, parts.models)
+    process = SinkageProcess(parts.rover, parts.layout, parts.models, 0.0)
     loads = loads or WheelLoads(parts.rover).state.load
     x, travel = ekf.mean.copy(), 0.0
     x[SPEED] = speed
@@ -245,6 +245,33 @@ def test_the_sinkage_relaxes_over_travel_to_where_the_bearing_law_carries_the_lo
     assert found == pytest.approx(at_rest, rel=0.05)
     halfway, _, _ = relaxed(parts, ekf, 1.0, start=0.05)
     assert ((at_rest < halfway) & (halfway < 0.05)).all()
+
+
+def test_the_error_of_a_measured_leaving_angle_loosens_the_sinkage(parts, ekf):
+    """A deviation of the angle adds the square of what such a step of it changes the sinkage."""
+    part, std = parts.layout.sinkage, 0.01
+
+    def predicted(angle, angle_std):
+        prediction = Prediction.unchanged(ekf.mean)
+        SinkageProcess(parts.rover, parts.layout, parts.models, angle_std).predict(
+            prediction,
+            ekf.mean,
+            0.1,
+            rims=FORWARD,
+            loads=WheelLoads(parts.rover).state.load,
+            yaw_rate=0.0,
+            headings=straight_headings(parts.rover),
+            leaving_angles=(angle,) * 6,
+            reference_known=True,
+        )
+        return prediction.mean[part], np.diagonal(prediction.Q)[part]
+
+    here, sure = predicted(-0.2, 0.0)
+    there, _ = predicted(-0.2 - std, 0.0)
+    _, unsure = predicted(-0.2, std)
+    assert (np.abs(there - here) > 1e-7).all()
+    assert unsure - sure == pytest.approx((there - here) ** 2, rel=0.05)
+    assert (predicted(NAN, std)[1] == predicted(NAN, 0.0)[1]).all()
 
 
 def test_sinkage_tells_half_as_much_of_the_slip_without_a_reference(parts, ekf):

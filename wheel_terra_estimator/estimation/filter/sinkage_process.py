@@ -87,18 +87,28 @@ class _Step(NamedTuple):
 
 
 class SinkageProcess(Component[SinkageState]):
-    """Predicts the sinkage of all wheels; keeps its rate."""
+    """Predicts the sinkage of all wheels; keeps its rate.
+
+    Parameters
+    ----------
+    rover, layout, models
+        Constants of the rover, layout of the state, wheel models.
+    leaving_angle_std : float
+        Of a measured leaving angle as it is used, smoothed [rad].
+    """
 
     def __init__(
         self,
         rover: Rover,
         layout: StateLayout,
         models: WheelModels,
+        leaving_angle_std: float,
         tuning: SinkageTuning = SinkageTuning(),
     ) -> None:
         n = rover.wheel_count
         super().__init__(SinkageState((None,) * n, (0.0,) * n, (tuning.first_rate_std,) * n))
         self._rover, self._layout, self._models, self._tuning = rover, layout, models, tuning
+        self._leaving_angle_std = leaving_angle_std
 
     def forget_slopes(self) -> None:
         """Take the derivatives anew: the wheels stand."""
@@ -224,6 +234,10 @@ class SinkageProcess(Component[SinkageState]):
         # What the law does not know: a share of the sinkage per contact length, and digging.
         digging = tuning.digging * max(slip, 0.0) ** 2 * rim * dt
         noise = (tuning.law_error * z_floor) ** 2 * 2.0 * alpha + digging**2 + tuning.walk * dt
+        if not isnan(wheel.leaving_angle):
+            angle = wheel.leaving_angle - self._leaving_angle_std
+            there = self._models.bearing(i, wheel._replace(leaving_angle=angle))
+            noise += (sensitivity * math.log(bearing.load / there.load)) ** 2
         step = _Step(
             mean,
             noise,
