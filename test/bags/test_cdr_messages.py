@@ -12,7 +12,13 @@ import numpy as np
 import pytest
 
 from wheel_terra_estimator.bags import cdr_messages
-from wheel_terra_estimator.bags.cdr_messages import TWIST, DamagedMessageError, TopicMessages
+from wheel_terra_estimator.bags.cdr_messages import (
+    TWIST,
+    DamagedMessageError,
+    JointStatePacker,
+    TopicMessages,
+    TwistPacker,
+)
 from wheel_terra_estimator.bags.message_factory import MessageFactory
 from wheel_terra_estimator.messages.convert import INPUT_TYPES, InputConverter, input_layout
 
@@ -118,6 +124,28 @@ def test_a_stamped_twist(factory: MessageFactory) -> None:
         found = reader.unpack(data)
     assert type(found).__module__ == cdr_messages.__name__
     assert_same(found, message)
+
+
+@pytest.mark.parametrize('frame', ['', 'base_link', 'ab', 'ü'])
+@pytest.mark.parametrize('names', [(), ('left', 'right'), ('a', 'ab', 'abc', 'abcd', 'ü')])
+def test_packed_messages_are_the_bytes_of_rosbags(
+    frame: str, names: tuple[str, ...], factory: MessageFactory
+) -> None:
+    dice = random.Random(7)
+    joint_states, twists = JointStatePacker(frame), TwistPacker(frame)
+    for lengths in ((0, 0, 0), (3, 0, 1), (1, 2, 3), (0, 4, 0), (1, 2, 3)):
+        stamp = dice.randrange(2**60)
+        values = [[dice.gauss(0, 1) for _ in range(length)] for length in lengths]
+        header = factory.header(stamp, frame)
+        theirs = factory.store.serialize_cdr(
+            factory.joint_state(header, names, *values), INPUT_TYPES['joint_states']
+        )
+        assert joint_states.packed(stamp, names, *values) == bytes(theirs)
+        covariance = [dice.random() for _ in range(36)]
+        theirs = factory.store.serialize_cdr(
+            factory.twist_stamped(header, 0.3, -0.2, covariance), TWIST
+        )
+        assert twists.packed(stamp, 0.3, -0.2, covariance) == bytes(theirs)
 
 
 def assert_same(found: Any, message: Any) -> None:

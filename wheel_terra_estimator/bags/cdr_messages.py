@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Messages out of their CDR bytes, quickly where one is like the last one of its topic.
+"""Messages out of and into their CDR bytes, quickly where one is like the last of its topic.
 
 rosbags unpacks every field of a message. Of the messages that come a hundred times a second only
 some fields are used, and their names do not change from one to the next: where the beginning (frame
@@ -11,7 +11,7 @@ are taken out. Everything else goes through rosbags: other types, big-endian or 
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -26,6 +26,7 @@ IMU = 'sensor_msgs/msg/Imu'
 TWIST = 'geometry_msgs/msg/TwistWithCovarianceStamped'
 
 _LITTLE_ENDIAN = b'\x00\x01'
+_HEAD = _LITTLE_ENDIAN + bytes(2)
 _BODY = 4  # where the fields begin, and from where they are aligned [byte]
 _AFTER_STAMP = 12  # the frame of the header [byte]
 _LONGEST_PADDING = 3  # [byte] behind the last field
@@ -261,3 +262,88 @@ def _aligned(at: int, size: int) -> int:
 def _behind_string(data: bytes, at: int) -> int:
     at = _aligned(at, 4)
     return at + _COUNT.size + int(_COUNT.unpack_from(data, at)[0])
+
+
+class JointStatePacker:
+    """Packs the JointStates of one frame: what does not change from one to the next only once.
+
+    Parameters
+    ----------
+    frame : str
+        Frame of the headers.
+    """
+
+    def __init__(self, frame: str) -> None:
+        self._frame = _string(frame)
+        self._layouts: dict[tuple[Any, ...], tuple[struct.Struct, bytes]] = {}
+
+    def packed(
+        self,
+        stamp: int,
+        names: tuple[str, ...],
+        position: Sequence[float],
+        velocity: Sequence[float],
+        effort: Sequence[float],
+    ) -> bytes:
+        """Return the CDR bytes of a message; the stamp in ns."""
+        counts = len(position), len(velocity), len(effort)
+        layout = self._layouts.get((names, counts))
+        if layout is None:
+            layout = self._layouts[names, counts] = self._layout(names, counts)
+        form, beginning = layout
+        seconds, nanoseconds = divmod(stamp, 1_000_000_000)
+        return form.pack(
+            _HEAD,
+            seconds,
+            nanoseconds,
+            beginning,
+            counts[0],
+            *position,
+            counts[1],
+            *velocity,
+            counts[2],
+            *effort,
+        )
+
+    def _layout(self, names: tuple[str, ...], counts: Sequence[int]) -> tuple[struct.Struct, bytes]:
+        """Return how a message is packed, and what stands between its stamp and its numbers."""
+        beginning = _padded(self._frame, 4) + _COUNT.pack(len(names))
+        for name in names:
+            beginning = _padded(beginning, 4) + _string(name)
+        beginning = _padded(beginning, 4)
+        at = _AFTER_STAMP + len(beginning)
+        form = f'<4siI{len(beginning)}s'
+        for count in counts:
+            form += 'I'
+            at += _COUNT.size
+            if count:
+                padding = -(at - _BODY) % 8
+                form += f'{padding}x{count}d'
+                at += padding + 8 * count
+        return struct.Struct(form), beginning
+
+
+class TwistPacker:
+    """Packs the stamped twists of one frame, see `JointStatePacker`."""
+
+    def __init__(self, frame: str) -> None:
+        self._beginning = _padded(_string(frame), 8)
+        self._form = struct.Struct(f'<4siI{len(self._beginning)}s42d')
+
+    def packed(
+        self, stamp: int, forward: float, yaw_rate: float, covariance: Sequence[float]
+    ) -> bytes:
+        """Return the CDR bytes of a message; the stamp in ns, 36 covariances."""
+        seconds, nanoseconds = divmod(stamp, 1_000_000_000)
+        velocity = (forward, 0.0, 0.0, 0.0, 0.0, yaw_rate)
+        return self._form.pack(_HEAD, seconds, nanoseconds, self._beginning, *velocity, *covariance)
+
+
+def _string(text: str) -> bytes:
+    content = text.encode() + b'\0'
+    return _COUNT.pack(len(content)) + content
+
+
+def _padded(behind_stamp: bytes, size: int) -> bytes:
+    """Return bytes that begin behind the stamp, filled up to a multiple of ``size``."""
+    return behind_stamp + bytes(-(_AFTER_STAMP + len(behind_stamp) - _BODY) % size)

@@ -13,10 +13,12 @@ from typing import Any
 from wheel_terra_estimator import __version__
 from wheel_terra_estimator.bags import bag_metadata
 from wheel_terra_estimator.bags.bag_file import BagFile
+from wheel_terra_estimator.bags.cdr_messages import JointStatePacker, TwistPacker
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.estimates import EstimateSet
 from wheel_terra_estimator.messages import diagnostics
 from wheel_terra_estimator.messages.convert import (
+    BASE_FRAME,
     OUTPUT_TYPES,
     joint_fields,
     twist_covariance,
@@ -107,6 +109,8 @@ class EstimateBagWriter(BagFile):
         self.names = names
         self._diagnostics = statuses or diagnostics.Diagnostics(names)
         self._stuck: bool | None = None
+        self._joint_states = JointStatePacker(BASE_FRAME)
+        self._twists = TwistPacker(BASE_FRAME)
 
     def state_origin(self, configuration: Configuration, recording: str) -> None:
         """State version, settings and recording in the metadata of the bag."""
@@ -120,23 +124,22 @@ class EstimateBagWriter(BagFile):
 
     def add(self, estimates: EstimateSet, log_time: int) -> None:
         """Write all messages of a set at the log time [ns] of the input that completed it."""
-        make = self.messages
-        header = make.header(estimates.stamp)
+        stamp = estimates.stamp
         for topic, fields in joint_fields(estimates, self.names).items():
-            self.write(f'{NAMESPACE}/{topic}', make.joint_state(header, *fields), log_time)
+            data = self._joint_states.packed(stamp, *fields)
+            self.write_raw(f'{NAMESPACE}/{topic}', data, log_time)
             if topic == 'slip':
-                classes = make.slip_class(estimates.slip_class)
+                classes = self.messages.slip_class(estimates.slip_class)
                 self.write(f'{NAMESPACE}/slip_class', classes, log_time)
-        twist = make.twist_stamped(
-            header,
-            estimates.forward_velocity,
-            estimates.yaw_rate,
-            twist_covariance(estimates),
+        twist = self._twists.packed(
+            stamp, estimates.forward_velocity, estimates.yaw_rate, twist_covariance(estimates)
         )
-        self.write(f'{NAMESPACE}/twist', twist, log_time)
+        self.write_raw(f'{NAMESPACE}/twist', twist, log_time)
         self._write_stuck(estimates.stuck, log_time)
         if found := self._diagnostics.due(estimates):
-            self.write(DIAGNOSTICS, make.diagnostic_array(header, found), log_time)
+            header = self.messages.header(stamp)
+            array = self.messages.diagnostic_array(header, found)
+            self.write(DIAGNOSTICS, array, log_time)
 
     def _write_stuck(self, stuck: bool, log_time: int) -> None:
         if stuck != self._stuck:
