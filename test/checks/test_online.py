@@ -271,6 +271,22 @@ def test_a_warning_waits_for_the_verdict_on_a_suspicion_and_never_comes_if_it_is
     assert not raised(Wheels(), StuckAfter(at(7.0)), flip_from=3.0)
 
 
+@pytest.mark.parametrize(('nis', 'told'), [(7.0, False), (13.0, True)])
+def test_torques_that_do_not_fit_are_told_and_slip_is_still_judged(nis, told):
+    class Misfit(StuckAfter):
+        def health(self):
+            return {'nis_torque': nis}
+
+    watched = WatchedEstimator(Wheels().configuration, Misfit(0))
+    watched.step(1, StepInputs())
+    estimates = watched.estimates()
+    assert ('fit of torque' in estimates.faults) is told
+    if told:
+        assert 'NIS 13' in estimates.faults['fit of torque']
+        assert 'wheel-terra check' in estimates.faults['fit of torque']
+    np.testing.assert_array_equal(estimates.slip_class, some_estimates(6).slip_class)
+
+
 def test_kinds_are_those_of_the_checks_of_a_recording(drives):
     from wheel_terra_estimator.checks.finding import KINDS
 

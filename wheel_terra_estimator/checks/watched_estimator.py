@@ -24,6 +24,14 @@ SUBJECT = 'check of '
 """Begins the subject of a finding among the faults of a set."""
 LONGEST_WAIT = 4_000_000_000
 """A stuck warning waits no longer [ns of stamps] for the verdict on its inputs."""
+FAR_NIS = 10.0
+"""Mean normalised innovation squared of torque or balance that says that they do not fit. Usual
+0.03 to 1; up to 7 for seconds in turns without a reference and on snow; with the wrong sign 13."""
+_MISFITS = {
+    'nis_torque': ('fit of torque', 'torque does not fit the soil model'),
+    'nis_balance': ('fit of balance', 'torques, weight and slope do not fit each other'),
+}
+"""Figure of the filter -> subject and words of the fault."""
 
 
 class _Warning(NamedTuple):
@@ -67,7 +75,7 @@ class WatchedEstimator:
 
     def estimates(self) -> EstimateSet:
         """Return the estimates; slip is not judged while a finding stands."""
-        estimates = self._estimator.estimates()
+        estimates = self._with_misfits(self._estimator.estimates())
         findings = self._checks.findings
         if findings:
             return without_judgement(estimates, findings)
@@ -75,6 +83,17 @@ class WatchedEstimator:
             reason = f'stuck warning waits: {self._checks.undecided}'
             return replace(estimates, stuck=False, reasons=(reason,) * len(estimates.reasons))
         return estimates
+
+    def _with_misfits(self, estimates: EstimateSet) -> EstimateSet:
+        """Say where torque or balance are far from what the filter expects of them."""
+        health = self.health()
+        told = {
+            subject: f'{words} (NIS {health[key]:.0f}, usual below 1): sign or scale of the '
+            'torques, rover.mass or soil -> wheel-terra check'
+            for key, (subject, words) in _MISFITS.items()
+            if health.get(key, 0.0) > FAR_NIS
+        }
+        return replace(estimates, faults={**estimates.faults, **told}) if told else estimates
 
     def snapshot(self) -> Any:
         """Return all states."""
