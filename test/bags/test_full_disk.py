@@ -6,8 +6,8 @@ from __future__ import annotations
 
 import errno
 import resource
-import subprocess
-import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -29,20 +29,28 @@ def fill(path: Path, count: int) -> None:
             bag.write_raw(TOPIC, number.to_bytes(8, 'little') * 1000, 1000 + number)
 
 
+@contextmanager
+def largest_file(size: int) -> Iterator[None]:
+    """A limit on the size of files stands for a full disk: both fail in the middle of a write."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+
+
 @pytest.mark.parametrize('fails_at', [2.5, 3.02, 4.0])
 def test_bag_on_a_disk_that_fills_up_is_closed_and_readable(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fails_at: float
 ) -> None:
-    """A limit on the size of files stands for a full disk: both fail in the middle of a write."""
     from rosbags.rosbag2 import Reader
 
-    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (int(fails_at * MEGABYTE), hard))
-    try:
-        with pytest.raises(UserError, match='what was written before is kept there') as caught:
-            fill(tmp_path / 'out', 1000)
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    with (
+        largest_file(int(fails_at * MEGABYTE)),
+        pytest.raises(UserError, match='what was written before is kept there') as caught,
+    ):
+        fill(tmp_path / 'out', 1000)
     assert '\n' not in str(caught.value)
     with Reader(tmp_path / 'out') as reader:
         times = [time for _, time, _ in reader.messages()]
@@ -93,22 +101,19 @@ def test_places_that_cannot_be_written_are_one_line_before_anything_is_computed(
         assert said.count('\n') == 1
 
 
-def test_full_disk_of_the_real_command(make_bag: Any, make_drive: Any, rover: Any, tmp_path: Path):
-    """From the shell: a drive of three minutes onto a disk with room for little more than one."""
+def test_full_disk_of_the_real_command(
+    make_bag: Any, make_drive: Any, rover: Any, tmp_path: Path, capsys: Any
+) -> None:
+    """A drive of two minutes onto a disk with room for little more than a megabyte."""
     rover.write(tmp_path / 'rover.yaml')
-    bag = make_bag(messages=make_drive(2000), name='long')
+    bag = make_bag(messages=make_drive(1400), name='long')
     out = tmp_path / 'out'
-    code = (
-        'import resource, sys; from wheel_terra_estimator.cli.main import main; '
-        'resource.setrlimit(resource.RLIMIT_FSIZE, (1400000, 1400000)); sys.exit(main())'
-    )
-    command = ['replay', str(bag), '--config', str(tmp_path / 'rover.yaml'), '-o', str(out)]
-    done = subprocess.run(
-        [sys.executable, '-c', code, *command], capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 2, done.stderr
-    assert 'cannot be written (File too large)' in done.stderr
-    assert done.stderr.count('\n') == 1
+    with largest_file(1_200_000):
+        command = ['replay', str(bag), '--config', str(tmp_path / 'rover.yaml'), '-o', str(out)]
+        assert main(command) == 2
+    said = capsys.readouterr().err
+    assert 'cannot be written (File too large)' in said
+    assert said.count('\n') == 1
     with open_bag(out) as opened:
         assert opened.message_count > 1000
         assert not opened.notes

@@ -396,7 +396,7 @@ def test_the_zero_of_the_pitch_gyro_does_not_reach_the_pulls():
 
 def test_a_steered_rover_is_judged_along_its_wheels():
     """On an arc the inner wheels of a steered rover are slow because they are on inner circles."""
-    drive = simulate(load('steered_turns'), 4, duration=50.0)
+    drive = simulate(load('steered_turns'), 4, duration=38.0)
     truth, configuration = drive.truth, drive.configuration
     turning = np.abs(truth.yaw_rate) > 0.03
     assert turning.sum() > 100
