@@ -151,7 +151,12 @@ def simulated_drives() -> Iterator[tuple[str, Scenario, int, tuple[str, ...]]]:
         yield kind, scenario, SEEDS[1], ('reference', 'no_torque')
     for kind in ('cruise', 'mixed_soil', 'stop_and_go'):
         scenario = load({**kinds.KINDS[kind], 'duration': SHORT})
-        yield f'{kind}_short', scenario, SEEDS[1], ('no_sinkage', 'no_orientation', 'fixes_2s_late')
+        yield (
+            f'{kind}_short',
+            scenario,
+            SEEDS[1],
+            ('no_sinkage', 'no_orientation', 'reference_2s_late'),
+        )
     for file in sorted((PACKAGE / 'config' / 'scenarios').glob('*.yaml')):
         scenario = load(str(file))
         scenario = replace(scenario, duration=min(scenario.duration, SCENARIO_LENGTH))

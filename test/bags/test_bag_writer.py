@@ -55,7 +55,7 @@ def messages(path: Path) -> list[tuple[int, str, Any]]:
         ]
 
 
-def test_topics_have_full_names_and_the_types_of_the_contract(bag: Path) -> None:
+def test_topics_have_full_names_and_their_types(bag: Path) -> None:
     joint_state = 'sensor_msgs/msg/JointState'
     with open_bag(bag) as opened:
         found = {name: (topic.type, topic.message_count) for name, topic in opened.topics.items()}

@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""``wheel-terra check``: exit status and JSON of the contract, on the Pathfinder recording."""
+"""``wheel-terra check``: exit status and JSON, on the Pathfinder recording."""
 
 import json
 from pathlib import Path

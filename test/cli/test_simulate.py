@@ -30,7 +30,7 @@ def bag_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def test_the_bag_has_inputs_and_truth_of_the_contract(bag_path: Path) -> None:
+def test_the_bag_has_inputs_and_truth(bag_path: Path) -> None:
     with open_bag(bag_path) as bag:
         found = {name: topic.type for name, topic in bag.topics.items()}
     wanted = {f'/{name}': kind for name, kind in INPUT_TYPES.items() if name != 'leaving_angle'}

@@ -31,7 +31,7 @@ DEFAULT = {'output_rate': 20.0, 'max_lag': -1.0}
 
 
 def by_the_letter(stamps, rate):
-    """Stamps of the sets by the words of the contract, one multiple after the other."""
+    """Stamps of the sets by the words of the topics page, one multiple after the other."""
     first, found = min(stamps), []
     for k in range(math.ceil((max(stamps) - first) * rate / 1e9) + 1):
         due = [s for s in stamps if s >= first + k * 1e9 / rate]

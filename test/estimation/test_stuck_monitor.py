@@ -193,7 +193,7 @@ def test_spin_in_place_raises_nothing():
 
 
 def test_a_level_found_to_be_wrong_is_no_growth():
-    """After wild fixes the speed is opened to them: the jump of the slip is not a trend."""
+    """After wild references the speed is opened to them: the jump of the slip is not a trend."""
 
     def warned(forget):
         monitor = StuckMonitor()
@@ -208,11 +208,11 @@ def test_a_level_found_to_be_wrong_is_no_growth():
 
 
 def test_fixes_that_disagree_by_chance_are_no_bogging_down():
-    """Slip 0.66 +- 0.07 near the torque limit: each second another fix moves the speed."""
+    """Slip 0.66 +- 0.07 near the torque limit: each second another reference moves the speed."""
     monitor = StuckMonitor()
     found = []
     for i in range(300):
-        # 4 mm/s between fixes is what 3 mm/s of noise make of a speed of 17 mm/s.
+        # 4 mm/s between references is what 3 mm/s of noise make of a speed of 17 mm/s.
         slip = 0.66 + (0.04 if i // 10 % 2 else -0.04)
         wheels = [wheel(slip, torque=0.6)._replace(slip_std=0.07)] * 6
         found.append(judge(monitor, 0.1 * i, 0.05 * (1.0 - slip), True, wheels))

@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""The contract's rules of time, on an estimator that notices every lapse."""
+"""Rules of stamps, order and lateness, on an estimator that notices every lapse."""
 
 import math
 from itertools import pairwise

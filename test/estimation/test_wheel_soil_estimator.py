@@ -246,10 +246,10 @@ def test_sliding_back_is_class_stuck():
     assert s.stuck
 
 
-def test_one_wild_fix_in_ten_costs_little(climb):
+def test_one_wild_reference_in_ten_costs_little(climb):
     wild = [a.measurement for a in climb.arrivals]
-    fixes = [i for i, m in enumerate(wild) if isinstance(m, ReferenceVelocity)]
-    i = fixes[len(fixes) // 2]
+    references = [i for i, m in enumerate(wild) if isinstance(m, ReferenceVelocity)]
+    i = references[len(references) // 2]
     wild[i] = ReferenceVelocity(wild[i].stamp, 0.5, wild[i].variance)
     estimator = WheelSoilEstimator(climb.configuration)
     speeds = []
@@ -310,21 +310,21 @@ def test_a_wheel_sunk_to_its_hub_is_followed():
     assert found.sinkage[1] < 0.5 * sunk
 
 
-def test_two_wild_fixes_that_agree_need_a_witness(climb):
-    """Torque, slope and rim speed say that nothing changed: a third fix would have to agree."""
+def test_two_wild_references_that_agree_need_a_witness(climb):
+    """Torque, slope and rim speed say that nothing changed: a third one would have to agree."""
     wild = [a.measurement for a in climb.arrivals]
-    fixes = [i for i, m in enumerate(wild) if isinstance(m, ReferenceVelocity)]
-    for i in fixes[8:10]:
+    references = [i for i, m in enumerate(wild) if isinstance(m, ReferenceVelocity)]
+    for i in references[8:10]:
         wild[i] = replace(wild[i], forward=wild[i].forward + 0.03)
     worst = 0.0
     row = {int(stamp): i for i, stamp in enumerate(climb.truth.stamp)}
     estimator = WheelSoilEstimator(climb.configuration)
     for stamp, inputs in merged(wild):
         estimator.step(stamp, inputs)
-        if stamp > wild[fixes[8]].stamp and stamp in row:
+        if stamp > wild[references[8]].stamp and stamp in row:
             error = estimator.estimates().slip - climb.truth.slip[row[stamp]]
             worst = max(worst, np.abs(np.median(error)))
-    assert worst < 0.25  # of the 0.6 that the fixes say
+    assert worst < 0.25  # of the 0.6 that the references say
 
 
 def errors_of(kind, duration, mode, of, truth):
@@ -369,7 +369,7 @@ def with_inertial(run, change):
     return replace(run, arrivals=changed)
 
 
-def test_a_jolt_at_the_start_does_not_stop_the_speed_without_fixes():
+def test_a_jolt_at_the_start_does_not_stop_the_speed_without_a_reference():
     run = drive()
 
     def jolted(reading, time):

@@ -91,20 +91,20 @@ def test_command_names_what_it_does_not_know(capsys, tmp_path):
 
 def test_modes_change_what_the_estimator_gets():
     wheels = WheelOdometry(10**9, np.array([1.0]), np.array([2.0]))
-    fix = ReferenceVelocity(10**9, 0.05, 1e-6)
+    reference = ReferenceVelocity(10**9, 0.05, 1e-6)
     inertial = InertialReading(10**9, np.zeros(3), np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0]))
     arrivals = [
         Arrival(10**9, wheels),
         Arrival(int(1.1e9), inertial),
-        Arrival(int(1.4e9), fix),
+        Arrival(int(1.4e9), reference),
         Arrival(int(2.9e9), replace(wheels, stamp=int(2.9e9))),
     ]
     assert list(inputs_of_mode(arrivals, 'reference')) == [a.measurement for a in arrivals]
-    assert fix not in list(inputs_of_mode(arrivals, 'no_reference'))
-    assert [type(m) for m in inputs_of_mode(arrivals, 'fixes_at_once')] == [
+    assert reference not in list(inputs_of_mode(arrivals, 'no_reference'))
+    assert [type(m) for m in inputs_of_mode(arrivals, 'reference_at_once')] == [
         *(WheelOdometry, ReferenceVelocity, InertialReading, WheelOdometry)
     ]
-    assert list(inputs_of_mode(arrivals, 'fixes_2s_late'))[-1] is fix
+    assert list(inputs_of_mode(arrivals, 'reference_2s_late'))[-1] is reference
     assert np.isnan(next(inputs_of_mode(arrivals, 'no_torque')).torque).all()
     assert list(inputs_of_mode(arrivals, 'no_orientation'))[1].orientation is None
 

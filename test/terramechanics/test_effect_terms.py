@@ -25,7 +25,7 @@ from wheel_terra_estimator.terramechanics.effects import (
 from wheel_terra_estimator.terramechanics.model import WheelSoilModel
 from wheel_terra_estimator.terramechanics.wheel import Wheel
 
-CONTRACT = (
+LISTED = (
     'slip_sinkage_exponent', 'lug_digging', 'lug_support', 'lug_shear_radius', 'soil_mound',
     'stress_peak_shift', 'slope_gravity', 'bulldozing', 'cohesion', 'multipass',
     'rate_dependence', 'hard_layer', 'drivetrain_friction', 'wheel_radius_bias',
@@ -52,9 +52,9 @@ def outputs(settings: dict, method: str = 'quadrature') -> np.ndarray:
     return state(**ROW, effects=settings, method=method).outputs()
 
 
-def test_all_names_of_the_contract_are_there_and_complete() -> None:
+def test_all_listed_names_are_there_and_complete() -> None:
     known = catalogue()
-    assert set(CONTRACT) <= set(known)
+    assert set(LISTED) <= set(known)
     for effect in known.values():
         assert effect.parameters and effect.claim and effect.symbol and effect.source
         assert effect.validity
@@ -95,7 +95,7 @@ def test_closed_form_and_quadrature_tell_the_same_change(name: str) -> None:
         assert ours == pytest.approx(truth, rel=0.25, abs=0.02 * scale)
 
 
-def test_signs_of_the_contract() -> None:
+def test_signs_of_the_listed_effects() -> None:
     base = state(0.3, slope=0.2)
     tilted = state(0.3, slope=0.2, effects={'pitch_bias': {'bias': 0.05}})
     assert tilted.drawbar_pull - base.drawbar_pull == pytest.approx(80.0 * math.sin(0.05))

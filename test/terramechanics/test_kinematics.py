@@ -36,7 +36,7 @@ from wheel_terra_estimator.terramechanics.wheel import Wheel
         (-0.001, 0.10, 1.0),
     ],
 )
-def test_slip_ratio_of_the_contract(speed: float, rim: float, slip: float) -> None:
+def test_slip_ratio_of_driving_and_braking(speed: float, rim: float, slip: float) -> None:
     assert slip_ratio(speed, rim) == pytest.approx(slip)
 
 
@@ -71,7 +71,7 @@ def test_shear_displacement_starts_at_zero_and_has_its_slope() -> None:
 
 
 def test_lug_period() -> None:
-    # Seed 1 equation 2: 2 pi r (1 - s)/(n v); falls with slip at constant carriage speed.
+    # 2 pi r (1 - s)/(n v), Ding et al. (2010) eq. 2; falls with slip at constant carriage speed.
     wheel = Wheel(0.1574, 0.165, 0.01, 30)
     for slip in (0.0, 0.4):
         rate = 0.010 / (0.1574 * (1.0 - slip))

@@ -53,9 +53,7 @@ def test_mound_predicts_the_rows_it_did_not_see_on_grc3(shared: Path) -> None:
     assert errors[0] < 0.8 * errors[1]
 
 
-def test_statements_of_ding_2010_hold_together_where_they_can(
-    shared: Path, tmp_path: Path
-) -> None:
+def test_statements_of_ding_2010_hold_together_where_they_can(shared: Path, tmp_path: Path) -> None:
     text = ding_statements.section(shared.parent, tmp_path)
     rows = {
         cells[1].strip(): cells[3].strip()

@@ -44,16 +44,16 @@ def check_gyro_unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     if not GYRO_DEGREES[0] < abs(ratio) < GYRO_DEGREES[1]:
         return [], evidence
     outcome = Finding(
-        'unit',
-        imu.topic,
-        None,
-        None,
-        math.pi / 180.0,
-        None,
-        0.95,
-        f'angular_velocity.z is {1.0 / abs(ratio):.0f} times what the wheels allow: degrees per '
-        'second',
-        'multiply angular_velocity by 0.0174533 in the driver (rad/s, REP 103)',
+        kind='unit',
+        topic=imu.topic,
+        value=math.pi / 180.0,
+        confidence=0.95,
+        words=(
+            f'angular_velocity.z is {1.0 / abs(ratio):.0f} times what the wheels allow: '
+            'degrees per '
+            'second'
+        ),
+        cure='multiply angular_velocity by 0.0174533 in the driver (rad/s, REP 103)',
     )
     mended = replace(imu, rate=np.radians(imu.rate))
     recording = replace(evidence.recording, imu=mended)
@@ -112,15 +112,15 @@ def check_clock(evidence: Evidence, figures: dict[str, Any]) -> list[Outcome]:
         return []
     return [
         Finding(
-            'delay',
-            imu.topic,
-            None,
-            None,
-            round(found.value, 3),
-            round(found.std, 3),
-            0.95,
-            f'sees turns {found.value:+.2f} s after the wheels, by the stamps',
-            f'take {found.value:.2f} s off the stamps of the IMU (or put them on those of the '
-            'wheels): synchronise the clocks',
+            kind='delay',
+            topic=imu.topic,
+            value=round(found.value, 3),
+            std=round(found.std, 3),
+            confidence=0.95,
+            words=f'sees turns {found.value:+.2f} s after the wheels, by the stamps',
+            cure=(
+                f'take {found.value:.2f} s off the stamps of the IMU (or put them on those of the '
+                'wheels): synchronise the clocks'
+            ),
         )
     ]

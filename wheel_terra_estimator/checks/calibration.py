@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -151,13 +151,11 @@ _NOISES = {
 
 
 def _noises(report: CheckReport, configuration: Configuration) -> list[Change]:
-    changes = []
-    for key, figure in _NOISES.items():
-        seen, stated = report.figures.get(figure), _before(configuration, key)
-        assert isinstance(stated, (int, float))
-        if seen and (not stated or abs(math.log(seen / stated)) > WORTH_CHANGING):
-            source = 'changes from message to message on the move'
-            changes.append(Change(key, stated, float(f'{seen:.3g}'), NOISE_STD * seen, source))
+    source = 'changes from message to message on the move'
+    changes = [
+        Change(key, stated, float(f'{seen:.3g}'), NOISE_STD * seen, source)
+        for key, stated, seen in _worth_changing(_NOISES, report, configuration)
+    ]
     if report.figures.get('reference.stated_std_m_s') == 0.0:
         key, seen = 'sensors.reference_std', report.figures['reference.noise_m_s']
         source = 'changes from message to message; the messages state none'
@@ -174,13 +172,21 @@ _RATES = {
 
 
 def _rates(report: CheckReport, configuration: Configuration) -> list[Change]:
-    changes = []
-    for key, figure in _RATES.items():
+    return [
+        Change(key, stated, round(seen, 2), None, 'median period of the stamps')
+        for key, stated, seen in _worth_changing(_RATES, report, configuration)
+    ]
+
+
+def _worth_changing(
+    figures: Mapping[str, str], report: CheckReport, configuration: Configuration
+) -> Iterator[tuple[str, float, float]]:
+    """Yield key, stated and seen value of the parameters that are seen to be others."""
+    for key, figure in figures.items():
         seen, stated = report.figures.get(figure), _before(configuration, key)
         assert isinstance(stated, (int, float))
-        if seen and abs(math.log(seen / stated)) > WORTH_CHANGING:
-            changes.append(Change(key, stated, round(seen, 2), None, 'median period of the stamps'))
-    return changes
+        if seen and (not stated or abs(math.log(seen / stated)) > WORTH_CHANGING):
+            yield key, stated, seen
 
 
 def _radius(evidence: Evidence, report: CheckReport) -> tuple[list[Change], Evidence]:

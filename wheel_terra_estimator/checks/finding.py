@@ -33,7 +33,7 @@ KINDS = (
 """All kinds of findings."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Finding:
     """Something wrong, and what mends it.
 
@@ -59,10 +59,10 @@ class Finding:
 
     kind: str
     topic: str
-    wheel: str | None
-    parameter: str | None
-    value: float | None
-    std: float | None
+    wheel: str | None = None
+    parameter: str | None = None
+    value: float | None = None
+    std: float | None = None
     confidence: float
     words: str
     cure: str

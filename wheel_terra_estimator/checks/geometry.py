@@ -157,16 +157,17 @@ def check_radius(evidence: Evidence, figures: dict[str, Any]) -> list[Outcome]:
     listed = ', '.join(f'{radius:.4f}' for radius in rims)
     return [
         Finding(
-            'radius',
-            joints.topic,
-            None,
-            'wheels.radius',
-            round(float(np.mean(rims)), 5),
-            round(float(np.mean(facts.radius)) * ratio.std, 5),
-            confidence(sigmas),
-            f'the rover runs {ratio.value:.3f} +- {ratio.std:.3f} of what its rims say on the '
-            'straight',
-            f'wheels.radius: [{listed}]',
+            kind='radius',
+            topic=joints.topic,
+            parameter='wheels.radius',
+            value=round(float(np.mean(rims)), 5),
+            std=round(float(np.mean(facts.radius)) * ratio.std, 5),
+            confidence=confidence(sigmas),
+            words=(
+                f'the rover runs {ratio.value:.3f} +- {ratio.std:.3f} of what its rims say on the '
+                'straight'
+            ),
+            cure=f'wheels.radius: [{listed}]',
         )
     ]
 
@@ -235,15 +236,16 @@ def check_track(evidence: Evidence, figures: dict[str, Any]) -> list[Outcome]:
     listed = ', '.join(f'{y * ratio.value:.3f}' for y in facts.lateral)
     return [
         Finding(
-            'track',
-            joints.topic,
-            None,
-            'wheels.y',
-            round(track * ratio.value, 4),
-            round(track * ratio.std, 4),
-            confidence(ratio.sigmas_from(1.0)),
-            f'turns need a track of {ratio.value:.3f} +- {ratio.std:.3f} of the stated '
-            f'{track:.3f} m',
-            f'wheels.y: [{listed}]',
+            kind='track',
+            topic=joints.topic,
+            parameter='wheels.y',
+            value=round(track * ratio.value, 4),
+            std=round(track * ratio.std, 4),
+            confidence=confidence(ratio.sigmas_from(1.0)),
+            words=(
+                f'turns need a track of {ratio.value:.3f} +- {ratio.std:.3f} of the stated '
+                f'{track:.3f} m'
+            ),
+            cure=f'wheels.y: [{listed}]',
         )
     ]

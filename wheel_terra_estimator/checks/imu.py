@@ -99,15 +99,11 @@ def _placeholders(imu: ImuSeries, state: ImuState) -> tuple[list[Outcome], ImuSt
         if not np.any(np.nan_to_num(values)):
             found.append(
                 Finding(
-                    'placeholder',
-                    imu.topic,
-                    None,
-                    None,
-                    None,
-                    None,
-                    0.999,
-                    f'{field} is 0 in every message',
-                    f'fill {field}, or say that there is none: {field}_covariance[0] = -1',
+                    kind='placeholder',
+                    topic=imu.topic,
+                    confidence=0.999,
+                    words=f'{field} is 0 in every message',
+                    cure=f'fill {field}, or say that there is none: {field}_covariance[0] = -1',
                 )
             )
             blind = 'usable_force' if name == 'force' else 'usable_gyro'
@@ -120,15 +116,11 @@ def _placeholders(imu: ImuSeries, state: ImuState) -> tuple[list[Outcome], ImuSt
             shown = ', '.join(f'{value:g}' for value in orientation[0])
             found.append(
                 Finding(
-                    'placeholder',
-                    imu.topic,
-                    None,
-                    None,
-                    None,
-                    None,
-                    0.999,
-                    f'orientation is ({shown}) in every message',
-                    'say that there is none: orientation_covariance[0] = -1 (REP 145)',
+                    kind='placeholder',
+                    topic=imu.topic,
+                    confidence=0.999,
+                    words=f'orientation is ({shown}) in every message',
+                    cure='say that there is none: orientation_covariance[0] = -1 (REP 145)',
                 )
             )
             blank = np.full_like(imu.orientation, np.nan)
@@ -145,15 +137,11 @@ def _frozen(imu: ImuSeries, state: ImuState) -> list[Outcome]:
         return []
     return [
         Finding(
-            'frozen',
-            imu.topic,
-            None,
-            None,
-            None,
-            None,
-            0.99,
-            f'{100 * np.mean(same):.0f} % of the messages repeat the one before',
-            'publish a message when the IMU has measured, not on a timer',
+            kind='frozen',
+            topic=imu.topic,
+            confidence=0.99,
+            words=f'{100 * np.mean(same):.0f} % of the messages repeat the one before',
+            cure='publish a message when the IMU has measured, not on a timer',
         )
     ]
 
@@ -174,15 +162,13 @@ def _gravity(
 
     def found(kind: str, parameter: str | None, value: float, words: str, cure: str) -> Outcome:
         return Finding(
-            kind,
-            imu.topic,
-            None,
-            parameter,
-            value,
-            None,
-            0.98,
-            f'mean specific force {size:.3g} m/s^2 where gravity is {gravity:.4g}: {words}',
-            cure,
+            kind=kind,
+            topic=imu.topic,
+            parameter=parameter,
+            value=value,
+            confidence=0.98,
+            words=f'mean specific force {size:.3g} m/s^2 where gravity is {gravity:.4g}: {words}',
+            cure=cure,
         )
 
     in_g = abs(size - 1.0) <= 0.12 and upright  # what a slope leaves may have the same size
@@ -253,15 +239,15 @@ def _against_orientation(
             rate[:, axis] *= -1.0
             found.append(
                 Finding(
-                    'sign',
-                    imu.topic,
-                    None,
-                    None,
-                    -1.0,
-                    None,
-                    confidence(6.0 * abs(fit)),
-                    f'angular_velocity.{name} turns against the orientation',
-                    f'negate angular_velocity.{name} in the driver (no mounting angle does that)',
+                    kind='sign',
+                    topic=imu.topic,
+                    value=-1.0,
+                    confidence=confidence(6.0 * abs(fit)),
+                    words=f'angular_velocity.{name} turns against the orientation',
+                    cure=(
+                        f'negate angular_velocity.{name} in the driver (no mounting angle '
+                        'does that)'
+                    ),
                 )
             )
         if 30.0 < abs(gain) < 110.0:
@@ -282,15 +268,12 @@ def _all_degrees(found: list[Outcome]) -> bool:
 
 def _degrees(topic: str, words: str) -> Finding:
     return Finding(
-        'unit',
-        topic,
-        None,
-        None,
-        math.pi / 180.0,
-        None,
-        0.99,
-        f'angular_velocity is in degrees per second ({words})',
-        'multiply angular_velocity by 0.0174533 in the driver (rad/s, REP 103)',
+        kind='unit',
+        topic=topic,
+        value=math.pi / 180.0,
+        confidence=0.99,
+        words=f'angular_velocity is in degrees per second ({words})',
+        cure='multiply angular_velocity by 0.0174533 in the driver (rad/s, REP 103)',
     )
 
 
@@ -503,7 +486,14 @@ def mounting_finding(
         if apart >= LEAST_SHOWN
     )
     return Finding(
-        'mounting', imu.topic, None, names[most], round(new[most], 3), std, sure, words, cure
+        kind='mounting',
+        topic=imu.topic,
+        parameter=names[most],
+        value=round(new[most], 3),
+        std=std,
+        confidence=sure,
+        words=words,
+        cure=cure,
     )
 
 
@@ -525,15 +515,13 @@ def check_noise_and_zero(evidence: Evidence, figures: dict[str, Any]) -> list[Ou
         if noise > NOISE_FACTOR * stated:
             found.append(
                 Finding(
-                    'noise',
-                    imu.topic,
-                    None,
-                    f'sensors.{key}',
-                    float(f'{noise:.2g}'),
-                    None,
-                    confidence(noise / stated),
-                    f'noise {noise:.2g} {unit} where the rover file has {stated:g} {unit}',
-                    f'sensors.{key}: {noise:.2g}',
+                    kind='noise',
+                    topic=imu.topic,
+                    parameter=f'sensors.{key}',
+                    value=float(f'{noise:.2g}'),
+                    confidence=confidence(noise / stated),
+                    words=f'noise {noise:.2g} {unit} where the rover file has {stated:g} {unit}',
+                    cure=f'sensors.{key}: {noise:.2g}',
                 )
             )
     bias, std, where = gyro_bias(evidence)
@@ -548,15 +536,14 @@ def check_noise_and_zero(evidence: Evidence, figures: dict[str, Any]) -> list[Ou
         listed = ', '.join(f'{value:.5f}' for value in whole)
         found.append(
             Finding(
-                'zero',
-                imu.topic,
-                None,
-                'sensors.angular_rate_bias',
-                float(f'{whole[worst]:.4g}'),
-                float(std[worst]),
-                0.99,
-                f'angular_velocity.{"xyz"[worst]} reads {bias[worst]:.3g} rad/s {where}',
-                f'sensors.angular_rate_bias: [{listed}]',
+                kind='zero',
+                topic=imu.topic,
+                parameter='sensors.angular_rate_bias',
+                value=float(f'{whole[worst]:.4g}'),
+                std=float(std[worst]),
+                confidence=0.99,
+                words=f'angular_velocity.{"xyz"[worst]} reads {bias[worst]:.3g} rad/s {where}',
+                cure=f'sensors.angular_rate_bias: [{listed}]',
             )
         )
     return found

@@ -33,15 +33,11 @@ def check_topics(recording: Recording, remapped: Sequence[str]) -> list[Outcome]
         if 'truth' not in series.topic:  # kept apart on purpose, to compare with
             found.append(
                 Finding(
-                    'unknown_name',
-                    series.topic,
-                    None,
-                    None,
-                    None,
-                    None,
-                    0.9,
-                    f'the estimator listens to {default}, the recording has {series.topic}',
-                    f'--remap {own}:={series.topic}',
+                    kind='unknown_name',
+                    topic=series.topic,
+                    confidence=0.9,
+                    words=f'the estimator listens to {default}, the recording has {series.topic}',
+                    cure=f'--remap {own}:={series.topic}',
                 )
             )
     return found
@@ -69,15 +65,13 @@ def check_wheel_names(recording: Recording, facts: RoverFacts) -> list[Outcome]:
         for own, other in renamed.items():
             found.append(
                 Finding(
-                    'unknown_name',
-                    joints.topic,
-                    own,
-                    'wheels.names',
-                    None,
-                    None,
-                    0.95,
-                    f'no joint {own} in the recording, but {other}',
-                    f'wheels.names: [{listed}]',
+                    kind='unknown_name',
+                    topic=joints.topic,
+                    wheel=own,
+                    parameter='wheels.names',
+                    confidence=0.95,
+                    words=f'no joint {own} in the recording, but {other}',
+                    cure=f'wheels.names: [{listed}]',
                 )
             )
     for name in absent:
@@ -90,15 +84,13 @@ def check_wheel_names(recording: Recording, facts: RoverFacts) -> list[Outcome]:
         if name not in renamed.values() and 'wheel' in name.lower() and name not in silent:
             found.append(
                 Finding(
-                    'unknown_name',
-                    joints.topic,
-                    name,
-                    'wheels.names',
-                    None,
-                    None,
-                    0.7,
-                    'turns like a wheel and is not in wheels.names',
-                    f'add {name} to wheels.names, with its radius, width, x and y',
+                    kind='unknown_name',
+                    topic=joints.topic,
+                    wheel=name,
+                    parameter='wheels.names',
+                    confidence=0.7,
+                    words='turns like a wheel and is not in wheels.names',
+                    cure=f'add {name} to wheels.names, with its radius, width, x and y',
                 )
             )
     return found
@@ -113,15 +105,15 @@ def proposal(recording: Recording) -> dict[str, Any]:
 
 def _missing(topic: str, name: str, words: str) -> Finding:
     return Finding(
-        'missing_wheel',
-        topic,
-        name,
-        'wheels.names',
-        None,
-        None,
-        0.99,
-        words,
-        f'publish the joint {name}, or take it out of wheels.names and of every per-wheel list',
+        kind='missing_wheel',
+        topic=topic,
+        wheel=name,
+        parameter='wheels.names',
+        confidence=0.99,
+        words=words,
+        cure=(
+            f'publish the joint {name}, or take it out of wheels.names and of every per-wheel list'
+        ),
     )
 
 

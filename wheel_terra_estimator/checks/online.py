@@ -722,7 +722,16 @@ class OnlineChecks:
         cure: str,
     ) -> Finding:
         name = None if wheel is None else self._names[wheel]
-        return Finding(kind, topic, name, parameter, value, None, sure, words, cure)
+        return Finding(
+            kind=kind,
+            topic=topic,
+            wheel=name,
+            parameter=parameter,
+            value=value,
+            confidence=sure,
+            words=words,
+            cure=cure,
+        )
 
 
 _WORDS: dict[str, Callable[[OnlineChecks, float, int, float], Finding]] = {

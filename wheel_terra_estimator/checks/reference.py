@@ -67,17 +67,19 @@ def _frame(evidence: Evidence, reference: VelocitySeries) -> tuple[list[Outcome]
     if rotated is not None:
         return [
             Finding(
-                'mounting',
-                reference.topic,
-                None,
-                None,
-                None,
-                None,
-                0.95,
-                'the direction of its velocity turns with the heading: it is given in the world '
-                'frame',
-                'publish twist in child_frame_id base_link (nav_msgs/Odometry), or turn it by the '
-                'heading first',
+                kind='mounting',
+                topic=reference.topic,
+                confidence=0.95,
+                words=(
+                    'the direction of its velocity turns with the heading: it is given in '
+                    'the world '
+                    'frame'
+                ),
+                cure=(
+                    'publish twist in child_frame_id base_link (nav_msgs/Odometry), or turn '
+                    'it by the '
+                    'heading first'
+                ),
             )
         ], replace(
             evidence,
@@ -94,15 +96,15 @@ def _frame(evidence: Evidence, reference: VelocitySeries) -> tuple[list[Outcome]
         mended = replace(evidence.recording, reference=replace(reference, velocity=turned))
         return [
             Finding(
-                'mounting',
-                reference.topic,
-                None,
-                None,
-                round(angle, 1),
-                5.0,
-                0.95,
-                'the rover moves along y of its frame, not along x',
-                f'turn twist.linear by {-angle:.0f} degrees about z into base_link (x forward)',
+                kind='mounting',
+                topic=reference.topic,
+                value=round(angle, 1),
+                std=5.0,
+                confidence=0.95,
+                words='the rover moves along y of its frame, not along x',
+                cure=(
+                    f'turn twist.linear by {-angle:.0f} degrees about z into base_link (x forward)'
+                ),
             )
         ], replace(evidence, recording=mended)
     return [], evidence
@@ -142,15 +144,12 @@ def _unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         if 0.55 * factor < ratio < 1.25 * factor:
             mended = replace(reference, velocity=reference.velocity / factor)
             outcome = Finding(
-                'unit',
-                reference.topic,
-                None,
-                None,
-                1.0 / factor,
-                None,
-                0.9,
-                f'linear.x is {ratio:.3g} times the rim speed: it is in {unit}',
-                f'multiply twist.linear by {1.0 / factor:.5g} in its driver (m/s, REP 103)',
+                kind='unit',
+                topic=reference.topic,
+                value=1.0 / factor,
+                confidence=0.9,
+                words=f'linear.x is {ratio:.3g} times the rim speed: it is in {unit}',
+                cure=f'multiply twist.linear by {1.0 / factor:.5g} in its driver (m/s, REP 103)',
             )
             return [outcome], replace(
                 evidence, recording=replace(evidence.recording, reference=mended)
@@ -184,17 +183,18 @@ def _jumps(
         return [], velocity
     return [
         Finding(
-            'jumps',
-            reference.topic,
-            None,
-            None,
-            None,
-            None,
-            0.97,
-            f'{wild.sum()} velocities ({100 * share:.1f} %) leave their neighbours by up to '
-            f'{np.abs(off).max():.2g} m/s',
-            'use the filtered velocity of the receiver in place of differences of raw positions, '
-            'and leave out what has no fix',
+            kind='jumps',
+            topic=reference.topic,
+            confidence=0.97,
+            words=(
+                f'{wild.sum()} velocities ({100 * share:.1f} %) leave their neighbours by up to '
+                f'{np.abs(off).max():.2g} m/s'
+            ),
+            cure=(
+                'use the filtered velocity of the receiver in place of differences of raw '
+                'positions, '
+                'and leave out what has no solution'
+            ),
         )
     ], velocity
 
@@ -228,16 +228,19 @@ def _delay(evidence: Evidence, reference: VelocitySeries, figures: dict[str, Any
         return []
     return [
         Finding(
-            'delay',
-            reference.topic,
-            None,
-            None,
-            round(found.value, 3),
-            round(found.std, 3),
-            0.97,
-            f'its velocity comes {found.value:+.2f} s after that of the wheels, by the stamps',
-            f'take {found.value:.2f} s off the stamps of the reference: stamp the moment of the '
-            'picture or fix, not of the result (or the wheels late, if it is negative)',
+            kind='delay',
+            topic=reference.topic,
+            value=round(found.value, 3),
+            std=round(found.std, 3),
+            confidence=0.97,
+            words=(
+                f'its velocity comes {found.value:+.2f} s after that of the wheels, by the stamps'
+            ),
+            cure=(
+                f'take {found.value:.2f} s off the stamps of the reference: stamp the moment '
+                'of the '
+                'picture or measurement, not of the result (or the wheels late, if it is negative)'
+            ),
         )
     ]
 
@@ -268,32 +271,32 @@ def _covariance(
     elif noise > 4.0 * usual:
         return [
             Finding(
-                'noise',
-                reference.topic,
-                None,
-                parameter,
-                float(f'{noise:.2g}'),
-                None,
-                0.9,
-                f'velocity scatters by {noise:.2g} m/s and states {usual:.2g} m/s',
-                f'state the variance {noise**2:.2g} in twist.covariance[0] '
-                f'({parameter}: {noise:.2g} where it states none)',
+                kind='noise',
+                topic=reference.topic,
+                parameter=parameter,
+                value=float(f'{noise:.2g}'),
+                confidence=0.9,
+                words=f'velocity scatters by {noise:.2g} m/s and states {usual:.2g} m/s',
+                cure=(
+                    f'state the variance {noise**2:.2g} in twist.covariance[0] '
+                    f'({parameter}: {noise:.2g} where it states none)'
+                ),
             )
         ]
     else:
         return []
     return [
         Finding(
-            'covariance',
-            reference.topic,
-            None,
-            parameter,
-            float(f'{max(noise, 1e-4):.2g}'),
-            None,
-            0.9,
-            f'covariance is a placeholder: it {words}',
-            f'{parameter}: {max(noise, 1e-4):.2g} and twist.covariance[0] = 0, or the true '
-            f'variance ({max(noise, 1e-4) ** 2:.2g}) there',
+            kind='covariance',
+            topic=reference.topic,
+            parameter=parameter,
+            value=float(f'{max(noise, 1e-4):.2g}'),
+            confidence=0.9,
+            words=f'covariance is a placeholder: it {words}',
+            cure=(
+                f'{parameter}: {max(noise, 1e-4):.2g} and twist.covariance[0] = 0, or the true '
+                f'variance ({max(noise, 1e-4) ** 2:.2g}) there'
+            ),
         )
     ]
 

@@ -38,15 +38,12 @@ def check_sinkage(evidence: Evidence, figures: dict[str, Any]) -> list[Outcome]:
         if name not in sinkage.names:
             found.append(
                 Finding(
-                    'missing_wheel',
-                    sinkage.topic,
-                    name,
-                    None,
-                    None,
-                    None,
-                    0.9,
-                    'has no sinkage',
-                    f'publish the sinkage of {name}, nan while there is none',
+                    kind='missing_wheel',
+                    topic=sinkage.topic,
+                    wheel=name,
+                    confidence=0.9,
+                    words='has no sinkage',
+                    cure=f'publish the sinkage of {name}, nan while there is none',
                 )
             )
     wheels = facts.configuration.wheels.names if facts.configuration else sinkage.names
@@ -100,16 +97,15 @@ def _unit(evidence: Evidence, table: FloatArray) -> tuple[list[Outcome], FloatAr
         fits = 0.1 < noise * factor / max(stated, 1e-4) < 10.0 and level * factor < 0.8 * radius
         if (level > DEEPEST * radius or noise > 0.2 * radius) and fits:
             outcome = Finding(
-                'unit',
-                sinkage.topic,
-                None,
-                None,
-                factor,
-                None,
-                0.97,
-                f'median sinkage {level:.3g} with noise {noise:.2g} at a wheel radius of '
-                f'{radius:.3g} m: it is in {unit}',
-                f'multiply position by {factor:g} in the driver (m, REP 103)',
+                kind='unit',
+                topic=sinkage.topic,
+                value=factor,
+                confidence=0.97,
+                words=(
+                    f'median sinkage {level:.3g} with noise {noise:.2g} at a wheel radius of '
+                    f'{radius:.3g} m: it is in {unit}'
+                ),
+                cure=f'multiply position by {factor:g} in the driver (m, REP 103)',
             )
             return [outcome], table * factor
     return [], table
@@ -158,26 +154,23 @@ def _one_wheel(evidence: Evidence, name: str, kind: str, reading: float, typical
     zero = _whole_zero(evidence, name, off)
     if kind == 'sign':
         return Finding(
-            'sign',
-            topic,
-            name,
-            None,
-            -1.0,
-            None,
-            0.9,
-            f'median sinkage {1000 * reading:.0f} mm, the others {1000 * typical:.0f} mm',
-            f'negate position of {name} in the driver (positive down)',
+            kind='sign',
+            topic=topic,
+            wheel=name,
+            value=-1.0,
+            confidence=0.9,
+            words=f'median sinkage {1000 * reading:.0f} mm, the others {1000 * typical:.0f} mm',
+            cure=f'negate position of {name} in the driver (positive down)',
         )
     return Finding(
-        'zero',
-        topic,
-        name,
-        'sensors.sinkage_zero',
-        round(zero, 4),
-        None,
-        0.9,
-        f'reads {1000 * off:+.0f} mm off the other wheels all the time',
-        f'sensors.sinkage_zero: {zero:.4f} in the place of {name}',
+        kind='zero',
+        topic=topic,
+        wheel=name,
+        parameter='sensors.sinkage_zero',
+        value=round(zero, 4),
+        confidence=0.9,
+        words=f'reads {1000 * off:+.0f} mm off the other wheels all the time',
+        cure=f'sensors.sinkage_zero: {zero:.4f} in the place of {name}',
     )
 
 
@@ -192,30 +185,25 @@ def _reversed_or_zero(
     if top < 0.004 and skew < 0.3:
         return [
             Finding(
-                'sign',
-                sinkage.topic,
-                None,
-                None,
-                -1.0,
-                None,
-                0.9,
-                f'median sinkage {1000 * middle:.0f} mm: the wheels would float',
-                'negate position in the driver (sinkage is positive down)',
+                kind='sign',
+                topic=sinkage.topic,
+                value=-1.0,
+                confidence=0.9,
+                words=f'median sinkage {1000 * middle:.0f} mm: the wheels would float',
+                cure='negate position in the driver (sinkage is positive down)',
             )
         ]
     zeros = [_whole_zero(evidence, name, middle) for name in names]
     listed = ', '.join(f'{zero:.4f}' for zero in zeros)
     return [
         Finding(
-            'zero',
-            sinkage.topic,
-            None,
-            'sensors.sinkage_zero',
-            round(float(np.mean(zeros)), 4),
-            None,
-            0.8,
-            f'median sinkage {1000 * middle:.0f} mm: the wheels would float',
-            f'sensors.sinkage_zero: [{listed}]',
+            kind='zero',
+            topic=sinkage.topic,
+            parameter='sensors.sinkage_zero',
+            value=round(float(np.mean(zeros)), 4),
+            confidence=0.8,
+            words=f'median sinkage {1000 * middle:.0f} mm: the wheels would float',
+            cure=f'sensors.sinkage_zero: [{listed}]',
         )
     ]
 
@@ -240,15 +228,15 @@ def _noise(evidence: Evidence, table: FloatArray, figures: dict[str, Any]) -> li
         return []
     return [
         Finding(
-            'noise',
-            sinkage.topic,
-            None,
-            'sensors.sinkage_std',
-            float(f'{noise:.2g}'),
-            None,
-            0.95,
-            f'readings scatter by {1000 * noise:.2g} mm where the rover file has '
-            f'{1000 * stated:.2g} mm',
-            f'sensors.sinkage_std: {noise:.2g}',
+            kind='noise',
+            topic=sinkage.topic,
+            parameter='sensors.sinkage_std',
+            value=float(f'{noise:.2g}'),
+            confidence=0.95,
+            words=(
+                f'readings scatter by {1000 * noise:.2g} mm where the rover file has '
+                f'{1000 * stated:.2g} mm'
+            ),
+            cure=f'sensors.sinkage_std: {noise:.2g}',
         )
     ]

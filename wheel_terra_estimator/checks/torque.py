@@ -78,16 +78,19 @@ def _signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         if fit < WRONG_SIGN:
             found.append(
                 Finding(
-                    'sign',
-                    joints.topic,
-                    name,
-                    None,
-                    -1.0,
-                    None,
-                    confidence(4.0 * abs(fit)),
-                    f'torque brakes where the wheel drives (correlation with its rate {fit:.2f})',
-                    f'negate effort of {name} in the driver (wheels.direction flips rate and '
-                    'torque together)',
+                    kind='sign',
+                    topic=joints.topic,
+                    wheel=name,
+                    value=-1.0,
+                    confidence=confidence(4.0 * abs(fit)),
+                    words=(
+                        'torque brakes where the wheel drives (correlation with its rate '
+                        f'{fit:.2f})'
+                    ),
+                    cure=(
+                        f'negate effort of {name} in the driver (wheels.direction flips rate and '
+                        'torque together)'
+                    ),
                 )
             )
             torque[:, index] *= -1.0
@@ -113,15 +116,12 @@ def _scale(evidence: Evidence, figures: dict[str, Any]) -> tuple[list[Outcome], 
     figures['torque.level_traction'] = round(traction, 4)
     if traction > UNIT_TRACTION:
         outcome = Finding(
-            'unit',
-            joints.topic,
-            None,
-            None,
-            1e-3,
-            None,
-            0.97,
-            f'sum of T/r is {traction:.0f} times the weight on the level: effort is in N mm',
-            'multiply effort by 0.001 in the driver (N m, REP 103)',
+            kind='unit',
+            topic=joints.topic,
+            value=1e-3,
+            confidence=0.97,
+            words=f'sum of T/r is {traction:.0f} times the weight on the level: effort is in N mm',
+            cure='multiply effort by 0.001 in the driver (N m, REP 103)',
         )
         return [outcome], evidence.with_rate(evidence.rate, evidence.torque * 1e-3)
     if traction > MOST_TRACTION or traction < LEAST_TRACTION:
@@ -142,17 +142,20 @@ def _off_scale(evidence: Evidence, traction: float) -> Finding:
         gain = ', '.join(f'{one:.3g}' for one in whole)
         value, std = float(np.mean(whole)), float(np.mean(whole)) * fit.std / fit.value
     return Finding(
-        'gain',
-        joints.topic,
-        None,
-        'sensors.torque_gain',
-        value,
-        std,
-        0.8,
-        f'sum of T/r is {traction:.3g} of the weight on the level, what no soil asks for: '
-        'a motor current, or a torque before the gear?',
-        f'sensors.torque_gain: [{gain}], or turn current into torque at the wheel '
-        '(motor constant times gear ratio times efficiency)',
+        kind='gain',
+        topic=joints.topic,
+        parameter='sensors.torque_gain',
+        value=value,
+        std=std,
+        confidence=0.8,
+        words=(
+            f'sum of T/r is {traction:.3g} of the weight on the level, what no soil asks for: '
+            'a motor current, or a torque before the gear?'
+        ),
+        cure=(
+            f'sensors.torque_gain: [{gain}], or turn current into torque at the wheel '
+            '(motor constant times gear ratio times efficiency)'
+        ),
     )
 
 
@@ -231,26 +234,24 @@ def _gain(evidence: Evidence, figures: dict[str, Any]) -> list[Outcome]:
     words = f'slopes cost {gain.value:.2f} +- {gain.std:.2f} of what weight and torque say'
     return [
         Finding(
-            'gain',
-            joints.topic,
-            None,
-            'sensors.torque_gain',
-            round(middle, 4),
-            round(middle * gain.std / gain.value, 4),
-            0.5 * confidence(sigmas),
-            f'{words}: the torque has another scale, or the mass is another',
-            f'sensors.torque_gain: [{listed}]',
+            kind='gain',
+            topic=joints.topic,
+            parameter='sensors.torque_gain',
+            value=round(middle, 4),
+            std=round(middle * gain.std / gain.value, 4),
+            confidence=0.5 * confidence(sigmas),
+            words=f'{words}: the torque has another scale, or the mass is another',
+            cure=f'sensors.torque_gain: [{listed}]',
         ),
         Finding(
-            'mass',
-            joints.topic,
-            None,
-            'rover.mass',
-            round(mass, 2),
-            round(facts.mass * gain.std, 2),
-            0.5 * confidence(sigmas),
-            f'{words}: the mass is another, or the torque has another scale',
-            f'rover.mass: {mass:.1f}',
+            kind='mass',
+            topic=joints.topic,
+            parameter='rover.mass',
+            value=round(mass, 2),
+            std=round(facts.mass * gain.std, 2),
+            confidence=0.5 * confidence(sigmas),
+            words=f'{words}: the mass is another, or the torque has another scale',
+            cure=f'rover.mass: {mass:.1f}',
         ),
     ]
 
@@ -326,15 +327,15 @@ def _zeros(evidence: Evidence, figures: dict[str, Any]) -> list[Outcome]:
     for name, zero in wrong:
         found.append(
             Finding(
-                'zero',
-                joints.topic,
-                name,
-                'sensors.torque_zero',
-                round(whole[name].value, 3),
-                round(whole[name].std, 3),
-                confidence(zero.sigmas_from(0.0)),
-                f'torque reads {zero.value:.2f} N m off zero, {where}',
-                f'sensors.torque_zero: [{listed}]',
+                kind='zero',
+                topic=joints.topic,
+                wheel=name,
+                parameter='sensors.torque_zero',
+                value=round(whole[name].value, 3),
+                std=round(whole[name].std, 3),
+                confidence=confidence(zero.sigmas_from(0.0)),
+                words=f'torque reads {zero.value:.2f} N m off zero, {where}',
+                cure=f'sensors.torque_zero: [{listed}]',
             )
         )
     return found

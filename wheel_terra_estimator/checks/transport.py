@@ -45,17 +45,20 @@ def check_transport(recording: Recording, figures: dict[str, Any]) -> list[Outco
         if abs(difference) > CLOCK_DIFFERENCE:
             found.append(
                 Finding(
-                    'delay',
-                    recording.imu.topic,
-                    None,
-                    None,
-                    round(difference, 3),
-                    0.0,
-                    0.999,
-                    f'its stamps lie {difference:+.3g} s off those of the wheels by log time: '
-                    'two clocks',
-                    'synchronise the clocks (chrony, PTP) or let the driver stamp with the clock '
-                    'of the computer that records',
+                    kind='delay',
+                    topic=recording.imu.topic,
+                    value=round(difference, 3),
+                    std=0.0,
+                    confidence=0.999,
+                    words=(
+                        f'its stamps lie {difference:+.3g} s off those of the wheels by log time: '
+                        'two clocks'
+                    ),
+                    cure=(
+                        'synchronise the clocks (chrony, PTP) or let the driver stamp with '
+                        'the clock '
+                        'of the computer that records'
+                    ),
                 )
             )
     return found
@@ -83,15 +86,13 @@ def _order(channel: Channel) -> list[Outcome]:
         return []
     return [
         Finding(
-            'order',
-            channel.topic,
-            None,
-            None,
-            None,
-            None,
-            0.99,
-            '; '.join(words),
-            'stamp each message in the driver, once, when it is measured, and publish in order',
+            kind='order',
+            topic=channel.topic,
+            confidence=0.99,
+            words='; '.join(words),
+            cure=(
+                'stamp each message in the driver, once, when it is measured, and publish in order'
+            ),
         )
     ]
 
@@ -113,16 +114,16 @@ def _drop_outs(name: str, channel: Channel, figures: dict[str, Any]) -> list[Out
         return []
     return [
         Finding(
-            'drop_outs',
-            channel.topic,
-            None,
-            None,
-            None,
-            None,
-            0.99,
-            f'{gaps.size} gaps, the longest {step.max():.2g} s at a period of {period:.3g} s; '
-            f'{100 * missing:.1f} % of the messages are missing',
-            'look at the load of bus and network, and record with a larger cache '
-            '(ros2 bag record --max-cache-size)',
+            kind='drop_outs',
+            topic=channel.topic,
+            confidence=0.99,
+            words=(
+                f'{gaps.size} gaps, the longest {step.max():.2g} s at a period of {period:.3g} s; '
+                f'{100 * missing:.1f} % of the messages are missing'
+            ),
+            cure=(
+                'look at the load of bus and network, and record with a larger cache '
+                '(ros2 bag record --max-cache-size)'
+            ),
         )
     ]

@@ -98,16 +98,16 @@ def check_dead_wheels(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
             )
             found.append(
                 Finding(
-                    'frozen',
-                    joints.topic,
-                    name,
-                    'wheels.names',
-                    None,
-                    None,
-                    0.97,
-                    words,
-                    f'look at encoder and cable of {name}; publish nan, or leave it out of the '
-                    'message, while it is dead',
+                    kind='frozen',
+                    topic=joints.topic,
+                    wheel=name,
+                    parameter='wheels.names',
+                    confidence=0.97,
+                    words=words,
+                    cure=(
+                        f'look at encoder and cable of {name}; publish nan, or leave it out of the '
+                        'message, while it is dead'
+                    ),
                 )
             )
             mended[:, index] = np.nan
@@ -151,15 +151,12 @@ def check_unit(evidence: Evidence, figures: dict[str, Any]) -> tuple[list[Outcom
             ratio is None and by_turn and not ordinary
         ):
             outcome = Finding(
-                'unit',
-                joints.topic,
-                None,
-                None,
-                factor,
-                None,
-                0.97,
-                f'velocity is in {unit} ({how if ratio else "turns seen by the gyro"})',
-                f'multiply velocity by {factor:.6g} in the driver (rad/s, REP 103)',
+                kind='unit',
+                topic=joints.topic,
+                value=factor,
+                confidence=0.97,
+                words=f'velocity is in {unit} ({how if ratio else "turns seen by the gyro"})',
+                cure=f'multiply velocity by {factor:.6g} in the driver (rad/s, REP 103)',
             )
             return [outcome], evidence.with_rate(evidence.rate * factor)
     return [], evidence
@@ -275,15 +272,12 @@ def check_signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         assert reference is not None
         found.append(
             Finding(
-                'sign',
-                reference.topic,
-                None,
-                None,
-                -1.0,
-                None,
-                confidence(3.0) if turn_known or told.force is not None else 0.5,
-                'linear.x runs against the wheels',
-                'negate twist.linear.x in its driver, or turn its frame into base_link',
+                kind='sign',
+                topic=reference.topic,
+                value=-1.0,
+                confidence=confidence(3.0) if turn_known or told.force is not None else 0.5,
+                words='linear.x runs against the wheels',
+                cure='negate twist.linear.x in its driver, or turn its frame into base_link',
             )
         )
         turned = replace(reference, velocity=-reference.velocity)
@@ -400,15 +394,14 @@ def _backwards(evidence: Evidence, index: int, signs: FloatArray) -> Finding:
     if np.isfinite(torque).any() and correlation(torque[moving], rate[moving]) < -0.3:
         cure += ' and negate effort in the driver (it has the right sign as it is)'
     return Finding(
-        'sign',
-        joints.topic,
-        facts.names[index],
-        'wheels.direction',
-        float(-facts.direction[index]),
-        None,
-        0.99,
-        'counts backwards when the rover drives forward',
-        cure,
+        kind='sign',
+        topic=joints.topic,
+        wheel=facts.names[index],
+        parameter='wheels.direction',
+        value=float(-facts.direction[index]),
+        confidence=0.99,
+        words='counts backwards when the rover drives forward',
+        cure=cure,
     )
 
 
@@ -416,15 +409,13 @@ def _all_backwards(evidence: Evidence, sure: float) -> Finding:
     joints = evidence.recording.joints
     assert joints is not None
     return Finding(
-        'sign',
-        joints.topic,
-        None,
-        'wheels.direction',
-        -1.0,
-        None,
-        sure,
-        'all wheels may count backwards: they run against the reference',
-        _direction_cure(evidence, -np.ones(len(evidence.facts.names))),
+        kind='sign',
+        topic=joints.topic,
+        parameter='wheels.direction',
+        value=-1.0,
+        confidence=sure,
+        words='all wheels may count backwards: they run against the reference',
+        cure=_direction_cure(evidence, -np.ones(len(evidence.facts.names))),
     )
 
 
@@ -437,30 +428,28 @@ def _swapped(evidence: Evidence) -> list[Outcome]:
     names = ', '.join(facts.names)
     mirrored = ', '.join(f'{-y:g}' for y in facts.lateral)
     sides = Finding(
-        'swapped_sides',
-        joints.topic,
-        None,
-        'wheels.names',
-        None,
-        None,
-        0.97 if orientation_told else 0.5,
-        'left and right wheels turn against the gyro: the sides are swapped'
-        + ('' if orientation_told else ', or the gyro counts yaw to the right'),
-        f'exchange left and right in wheels.names: [{names}]'
-        + (f', or wheels.y: [{mirrored}]' if facts.known else ''),
+        kind='swapped_sides',
+        topic=joints.topic,
+        parameter='wheels.names',
+        confidence=0.97 if orientation_told else 0.5,
+        words=(
+            'left and right wheels turn against the gyro: the sides are swapped'
+            + ('' if orientation_told else ', or the gyro counts yaw to the right')
+        ),
+        cure=(
+            f'exchange left and right in wheels.names: [{names}]'
+            + (f', or wheels.y: [{mirrored}]' if facts.known else '')
+        ),
     )
     if orientation_told:
         return [sides]
     gyro = Finding(
-        'sign',
-        imu.topic,
-        None,
-        None,
-        -1.0,
-        None,
-        0.5,
-        'angular_velocity.z turns against the wheels, or left and right wheels are swapped',
-        'negate angular_velocity.z in the driver (REP 103: positive to the left)',
+        kind='sign',
+        topic=imu.topic,
+        value=-1.0,
+        confidence=0.5,
+        words='angular_velocity.z turns against the wheels, or left and right wheels are swapped',
+        cure='negate angular_velocity.z in the driver (REP 103: positive to the left)',
     )
     return [sides, gyro]
 
@@ -498,15 +487,13 @@ def _exchanged(evidence: Evidence, turns: NDArray[np.bool_]) -> tuple[list[Outco
         for one, other in ((a, b), (b, a)):
             found.append(
                 Finding(
-                    'exchanged_wheels',
-                    joints.topic,
-                    facts.names[one],
-                    'wheels.names',
-                    None,
-                    None,
-                    0.95,
-                    f'turns like a wheel of the other side, as {facts.names[other]} does',
-                    f'wheels.names: [{listed}]',
+                    kind='exchanged_wheels',
+                    topic=joints.topic,
+                    wheel=facts.names[one],
+                    parameter='wheels.names',
+                    confidence=0.95,
+                    words=f'turns like a wheel of the other side, as {facts.names[other]} does',
+                    cure=f'wheels.names: [{listed}]',
                 )
             )
     return found, evidence.with_rate(rate, torque)
@@ -536,16 +523,17 @@ def check_noise(evidence: Evidence, figures: dict[str, Any]) -> list[Outcome]:
         if noise > limit and (alone or name == next(iter(noises))):
             found.append(
                 Finding(
-                    'noise',
-                    joints.topic,
-                    name if alone else None,
-                    'sensors.wheel_rate_std',
-                    float(f'{noise:.2g}'),
-                    None,
-                    0.95,
-                    f'rate scatters by {noise:.2g} rad/s where the rover file has {stated:g} '
-                    '(noise, or steps of a coarse encoder)',
-                    f'sensors.wheel_rate_std: {noise:.2g}',
+                    kind='noise',
+                    topic=joints.topic,
+                    wheel=name if alone else None,
+                    parameter='sensors.wheel_rate_std',
+                    value=float(f'{noise:.2g}'),
+                    confidence=0.95,
+                    words=(
+                        f'rate scatters by {noise:.2g} rad/s where the rover file has {stated:g} '
+                        '(noise, or steps of a coarse encoder)'
+                    ),
+                    cure=f'sensors.wheel_rate_std: {noise:.2g}',
                 )
             )
     return found

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from wheel_terra_estimator.configuration import reader as configuration_reader
 from wheel_terra_estimator.configuration.readings import Readings
+from wheel_terra_estimator.discrepancy.tables.steady_table import INPUT_UNITS
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.input_file import LARGEST_TABLE, read_text
 from wheel_terra_estimator.output_folder import check_file, new_file
@@ -41,19 +42,7 @@ DEFAULT_SLIP = '0:0.9:19'
 MOST_POINTS = 100_000
 
 # Columns of the result, in the layout of the tables of steady measurements.
-INPUTS = (
-    'slip',
-    'normal_load',
-    'slope',
-    'wheel_radius',
-    'wheel_width',
-    'lug_height',
-    'lug_count',
-    'gravity',
-    'angular_velocity',
-    'pass_number',
-    'leaving_angle',
-)
+INPUTS = (*INPUT_UNITS, 'leaving_angle')
 OUTPUTS = ('sinkage', 'drawbar_pull', 'torque')
 ANGLES = ('entrance_angle', 'peak_stress_angle', 'leaving_angle')
 PICTURES = ('.png', '.svg', '.pdf')

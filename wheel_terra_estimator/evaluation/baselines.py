@@ -86,7 +86,7 @@ def _run(
 
 
 def slip_of(speed: FloatArray, yaw_rate: FloatArray, rim: FloatArray, y: FloatArray) -> FloatArray:
-    """Return the contract's slip (k, n) of a speed (k,), yaw rate (k,) and rim speeds (k, n)."""
+    """Return the slip ratio (k, n) of a speed (k,), yaw rate (k,) and rim speeds (k, n)."""
     from wheel_terra_estimator.terramechanics.kinematics import slip_ratio
 
     slip = slip_ratio(speed[:, None] - yaw_rate[:, None] * y, rim)

@@ -185,7 +185,7 @@ KINDS: Mapping[str, Mapping[str, Any]] = {
     ),
     'sensor_faults': _kind(
         _HIT,
-        'wild fixes and readings, drop-outs, jitter',
+        'wild references and readings, drop-outs, jitter',
         slope__position=[0.0, 1.0, 3.0],
         slope__angle_deg=[0.0, 6.0, 10.0],
         sensors__reference_outliers=0.1,

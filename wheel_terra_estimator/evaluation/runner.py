@@ -25,7 +25,7 @@ from wheel_terra_estimator.evaluation.worlds import TimedMeasurement
 
 FloatArray = NDArray[np.float64]
 
-FIX_DELAYS = {'fixes_at_once': 0.0, 'fixes_2s_late': 2.0}
+REFERENCE_DELAYS = {'reference_at_once': 0.0, 'reference_2s_late': 2.0}
 """Modes in which the reference arrives at another time than the sensor file says: delay [s]."""
 
 MODES = (
@@ -34,9 +34,9 @@ MODES = (
     'no_torque',
     'no_sinkage',
     'no_orientation',
-    *FIX_DELAYS,
+    *REFERENCE_DELAYS,
 )
-"""What the estimator gets: everything, everything but one input, or fixes sooner or later."""
+"""What the estimator gets: everything, all but one input, or the reference sooner or later."""
 
 
 @dataclass(frozen=True)
@@ -62,8 +62,8 @@ class Record:
 def inputs_of_mode(arrivals: Iterable[TimedMeasurement], mode: str) -> Iterator[Measurement]:
     """Yield what a mode gets of a drive, in the order of arrival."""
     timed = [(a.arrival, a.measurement) for a in arrivals]
-    if mode in FIX_DELAYS:
-        delay = round(FIX_DELAYS[mode] * 1e9)
+    if mode in REFERENCE_DELAYS:
+        delay = round(REFERENCE_DELAYS[mode] * 1e9)
         timed = [
             (m.stamp + delay if isinstance(m, ReferenceVelocity) else arrival, m)
             for arrival, m in timed

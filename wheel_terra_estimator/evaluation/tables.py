@@ -21,8 +21,8 @@ _MODES = {
     'no_torque': 'Without torque',
     'no_sinkage': 'Without sinkage',
     'no_orientation': 'Without orientation',
-    'fixes_at_once': 'Fixes at once',
-    'fixes_2s_late': 'Fixes 2 s late',
+    'reference_at_once': 'Reference at once',
+    'reference_2s_late': 'Reference 2 s late',
 }
 
 
@@ -176,7 +176,7 @@ def _figures(drives: Sequence[DriveScore]) -> dict[str, str]:
         'worst kind': f'{worst[hardest]:.4f} ({hardest})',
         'better two-state filter': f'{scores.rms(error):.4f} ({better})',
         'ratio (95 % interval)': _interval(ratio),
-        'last fix held': f'{scores.rms(data.held_error):.4f}',
+        'last reference held': f'{scores.rms(data.held_error):.4f}',
         'dead reckoning': f'{scores.rms(data.dead_reckoned_error):.4f}',
         'slow part of the slip error': f'{scores.rms(data.slow_slip_error):.4f}',
         'coverage of slip': f'{scores.coverage(data.slip_error, data.slip_std):.1%}',
@@ -207,7 +207,7 @@ def _errors(rows: dict[str, Samples]) -> str:
         'slip RMSE',
         'bias',
         'coverage',
-        'held fix',
+        'held reference',
         'dead reckoning',
         'sinkage RMSE [mm]',
         'coverage',

@@ -45,7 +45,7 @@ class TwoStateTuning:
     smoothing: float = 0.5  # [s], of the demand
     yaw_smoothing: float = 0.2  # [s]
     largest_slip: float = 1.1  # sliding back no faster than a tenth of the rims
-    turning_share: float = 0.3  # mean over fastest rim below which a fix says nothing of the slip
+    turning_share: float = 0.3  # mean over fastest rim below which a reference tells no slip
 
 
 TUNING: dict[Demand, TwoStateTuning] = {

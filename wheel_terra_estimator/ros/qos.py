@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Quality of service of the estimator's topics (see the contract in docs/topics.md)."""
+"""Quality of service of the estimator's topics (docs/topics.md)."""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@ FloatArray = NDArray[np.float64]
 class Truth:
     """State of rover and soil; arrays are (n,), in the order of ``wheels.names``, in SI units.
 
-    ``slip`` is nan for a wheel at rest (``rest_speed`` of the contract).
+    ``slip`` is nan for a wheel at rest (below ``rest_speed``).
     """
 
     time: float  # since the start of the drive [s]
@@ -56,7 +56,7 @@ class TruthTable:
     slip, slip_velocity, drawbar_pull, normal_load, sinkage, sinkage_rate, torque, wheel_rate
         (k, n), as in ``Truth``; ``slip`` is nan at rest.
     slip_class : numpy.ndarray
-        (k, n) class of the contract without hysteresis, 255 at rest.
+        (k, n) slip class without hysteresis, 255 at rest.
     stuck : numpy.ndarray
         (k,) bool: median abs(slip) of the turning wheels above 0.9 for 1 s; clears after 3 s below
         0.6.

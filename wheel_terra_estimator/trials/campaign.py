@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from wheel_terra_estimator.discrepancy.effect_keys import effect_of
+from wheel_terra_estimator.discrepancy.tables.steady_table import INPUT_UNITS
 from wheel_terra_estimator.trials.designs import random_rows, random_soil
 from wheel_terra_estimator.trials.detectability import Ruler, listed_kinds, size_for
 from wheel_terra_estimator.trials.forms import FORMS
@@ -27,18 +28,7 @@ from wheel_terra_estimator.trials.truth import (
     solve,
 )
 
-INPUTS = (
-    'slip',
-    'normal_load',
-    'slope',
-    'wheel_radius',
-    'wheel_width',
-    'lug_height',
-    'lug_count',
-    'gravity',
-    'angular_velocity',
-    'pass_number',
-)
+INPUTS = tuple(INPUT_UNITS)
 SLIP_STD = 0.02  # of a window of a drive
 
 

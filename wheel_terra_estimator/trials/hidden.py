@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Effects of the hidden world: those of the catalogue, other formulas of them, and strangers.
 
-``LISTED[name]`` follows the public contract and the compendium's equations; ``OTHER[name]``
+``LISTED[name]`` follows the equations of the catalogue's sources; ``OTHER[name]``
 stands for the same physical claim written with another formula (what a real soil would do to us);
 ``OUTSIDE[name]`` are effects that no catalogue entry describes. Each is a function
 ``(size, spice, rows, soil) -> Hidden``: ``size`` is the main parameter in its own unit, ``spice``

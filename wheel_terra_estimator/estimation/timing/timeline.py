@@ -41,7 +41,7 @@ class Fate(Enum):
 
 @dataclass(frozen=True)
 class TimeSettings:
-    """Times of the contract, in nanoseconds, and rates."""
+    """Durations of the timeline [ns] and rates: the parameters of the same names."""
 
     output_rate: float  # [Hz], 0 = a set at every stamp of the wheel odometry
     history: int
@@ -59,7 +59,7 @@ class Timeline:
     estimator : Estimator
         Must be deterministic: the same steps from the same state give the same numbers.
     settings : TimeSettings
-        Times of the contract.
+        Durations and rates.
     finish : callable
         Takes the stamp of a due set, the estimates (or the error instead of them) and whether
         wheel odometry is silent; returns the set to be published, and whether the estimator has

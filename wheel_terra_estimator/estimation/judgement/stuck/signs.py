@@ -76,7 +76,7 @@ _SPEED, _NO_SPEED, _SLIP_TOLD, _STRAIGHT, _PULLED_AWAY = (
 )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Sign:
     """One sign of entrapment.
 
@@ -98,8 +98,8 @@ class Sign:
 
     name: str
     hold: float
-    needs: Need
-    while_stopping: bool
+    needs: Need = Need.NOTHING
+    while_stopping: bool = False
     present: Callable[[Situation, SignTuning], bool]
     words: Callable[[Situation, SignTuning], str]
 
@@ -232,83 +232,77 @@ def _labouring(s: Situation, t: SignTuning) -> bool:
 
 SIGNS: tuple[Sign, ...] = (
     Sign(
-        'digging',
-        1.5,
-        Need.SLIP_TOLD,
-        False,
-        _digging,
-        lambda s, t: f'median slip {s.typical_slip:.2f}: digging in',
+        name='digging',
+        hold=1.5,
+        needs=Need.SLIP_TOLD,
+        present=_digging,
+        words=lambda s, t: f'median slip {s.typical_slip:.2f}: digging in',
     ),
     Sign(
-        'exhausted',
-        6.0,
-        Need.NO_SPEED | Need.SLIP_TOLD,
-        False,
-        _exhausted,
-        lambda s, t: f'soil gives {s.motion.margin:.3f} of the load more than is asked',
+        name='exhausted',
+        hold=6.0,
+        needs=Need.NO_SPEED | Need.SLIP_TOLD,
+        present=_exhausted,
+        words=lambda s, t: f'soil gives {s.motion.margin:.3f} of the load more than is asked',
     ),
     Sign(
-        'within_horizon',
-        1.0,
-        Need.SLIP_TOLD,
-        False,
-        _within_horizon,
-        lambda s, t: f'median slip {s.typical_slip:.2f} grows by {s.trend:.3f} per second',
+        name='within_horizon',
+        hold=1.0,
+        needs=Need.SLIP_TOLD,
+        present=_within_horizon,
+        words=lambda s, t: f'median slip {s.typical_slip:.2f} grows by {s.trend:.3f} per second',
     ),
     Sign(
-        'within_travel',
-        1.0,
-        Need.SLIP_TOLD,
-        False,
-        _within_travel,
-        lambda s, t: (
+        name='within_travel',
+        hold=1.0,
+        needs=Need.SLIP_TOLD,
+        present=_within_travel,
+        words=lambda s, t: (
             f'median slip {s.typical_slip:.2f} passes {ENTRAPPED_SLIP:g} within '
             f'{s.settings.travel:g} m of rim travel'
         ),
     ),
     Sign(
-        'deepening',
-        4.0,  # wheels that enter a patch sink as fast, over a contact length
-        Need.SLIP_TOLD,
-        False,
-        _deepening,
-        lambda s, t: (
+        name='deepening',
+        hold=4.0,  # wheels that enter a patch sink as fast, over a contact length
+        needs=Need.SLIP_TOLD,
+        present=_deepening,
+        words=lambda s, t: (
             f'wheels dig in: too deep to climb out within {s.settings.travel:g} m of rim travel'
         ),
     ),
     Sign(
-        'held',
-        0.4,
-        Need.SPEED | Need.PULLED_AWAY,
-        True,
-        _held,
-        lambda s, t: f'{_lost_share(s):.0%} of the fastest rim speed lost, others held',
+        name='held',
+        hold=0.4,
+        needs=Need.SPEED | Need.PULLED_AWAY,
+        while_stopping=True,
+        present=_held,
+        words=lambda s, t: f'{_lost_share(s):.0%} of the fastest rim speed lost, others held',
     ),
     Sign(
-        'bogging',
-        0.2,
-        Need.STRAIGHT | Need.PULLED_AWAY,
-        True,
-        _bogging,
-        lambda s, t: (
+        name='bogging',
+        hold=0.2,
+        needs=Need.STRAIGHT | Need.PULLED_AWAY,
+        while_stopping=True,
+        present=_bogging,
+        words=lambda s, t: (
             f'bogging down: stands in {_time_to_stand(s, t):.1f} s, wheels near their torque limit'
         ),
     ),
     Sign(
-        'stall',
-        0.4,
-        Need.NOTHING,
-        True,
-        _stalling,
-        lambda s, t: f'{sum(s.stalled)} wheels stalled near their torque limit',
+        name='stall',
+        hold=0.4,
+        while_stopping=True,
+        present=_stalling,
+        words=lambda s, t: f'{sum(s.stalled)} wheels stalled near their torque limit',
     ),
     Sign(
-        'labour',
-        0.4,
-        Need.STRAIGHT,
-        True,
-        _labouring,
-        lambda s, t: f'wheels slowed to {s.typical_rim:.2f} m/s near their torque limit',
+        name='labour',
+        hold=0.4,
+        needs=Need.STRAIGHT,
+        while_stopping=True,
+        present=_labouring,
+        words=lambda s, t: f'wheels slowed to {s.typical_rim:.2f} m/s near their torque limit',
     ),
 )
 """The signs; where several are there at once, the first gives the words."""
