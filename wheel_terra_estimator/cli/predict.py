@@ -84,6 +84,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default='csv',
         help='layout on standard output (default csv, as diagnose reads it)',
     )
+    parser.add_argument(
+        '--noise',
+        metavar='Z,F,T',
+        help='make virtual measurements: standard deviations of sinkage [m], drawbar pull [N] and '
+        'torque [N m], added as normal noise and stated in columns of their own',
+    )
+    parser.add_argument(
+        '--seed', type=int, default=1, metavar='N', help='draws the noise (default 1)'
+    )
     parser.add_argument('--angles', action='store_true', help='add the contact angles [rad]')
     parser.add_argument(
         '-o',
@@ -154,6 +163,8 @@ def run(arguments: argparse.Namespace) -> int:
     answers = dict(zip(OUTPUTS, read.T, strict=True))
     answers |= {name: getattr(state, name) for name in ANGLES if arguments.angles}
     result |= {name: np.where(overloaded, np.nan, values) for name, values in answers.items()}
+    if arguments.noise is not None:
+        result = _measured(result, arguments.noise, arguments.seed)
     if output is None:
         (_write_csv if arguments.table == 'csv' else _write_text)(result, sys.stdout)
         return 0
@@ -164,6 +175,26 @@ def run(arguments: argparse.Namespace) -> int:
         else:
             _draw(result, fresh, _title(arguments, configuration))
     return 0
+
+
+def _measured(columns: dict[str, FloatArray], text: str, seed: int) -> dict[str, FloatArray]:
+    """Return the columns with noise, and the standard deviation of each reading."""
+    deviations = _numbers('--noise', text)
+    if deviations.size != len(OUTPUTS) or (deviations < 0.0).any():
+        raise UserError(
+            f'--noise {text}: give three standard deviations, none below 0: sinkage [m], drawbar '
+            'pull [N], torque [N m]'
+        )
+    if seed < 0:
+        raise UserError(f'--seed {seed}: must be 0 or more')
+    random = np.random.default_rng(seed)
+    result = dict(columns)
+    for name, deviation in zip(OUTPUTS, deviations.tolist(), strict=True):
+        values = columns[name]
+        result[name] = values + random.normal(0.0, deviation, values.shape)
+        if deviation > 0.0:
+            result[f'{name}_std'] = np.where(np.isnan(values), np.nan, deviation)
+    return result
 
 
 def _tables(arguments: argparse.Namespace) -> list[Path]:

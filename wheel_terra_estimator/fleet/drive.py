@@ -23,6 +23,7 @@ from wheel_terra_estimator.reporting.replay_report import write_replay_report
 
 QUICK_MESSAGES = 60_000
 """Messages of a topic that the checks before a replay look at."""
+NO_SOIL = 'no soil was stated (--config): the default sand was the first guess, learned from there'
 
 
 @dataclass(frozen=True)
@@ -108,7 +109,8 @@ def replay_drive(
         thresholds = configuration.filter.class_thresholds
         errors = truth_scores.truth_errors(result.history, judged, thresholds)
     title = path.resolve().name
-    summary = summarise(
-        title, result.history, result.topics, result.heard, result.rejected, result.notes
-    )
+    notes = list(result.notes)
+    if not any(key.startswith('soil.') for key in configuration.stated):
+        notes.append(NO_SOIL)
+    summary = summarise(title, result.history, result.topics, result.heard, result.rejected, notes)
     return Drive(configuration, checked, result, truth, errors, summary)
