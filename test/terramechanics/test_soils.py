@@ -29,7 +29,7 @@ def test_soil_file(path: Path) -> None:
         if '#' not in line and not line.rstrip().endswith(':')
         and 'name:' not in line and 'enabled:' not in line
     ]  # fmt: skip
-    assert not bare, 'values without a source'
+    assert not bare, 'values without a source: put "# <source>" or "# assumed" behind each'
     configuration = reader.load([path], complete=False)
     model = WheelSoilModel(configuration.soil, configuration.effects)
     answer = model.steady_state(points([0.0, 0.3, 0.6], 40.0, WHEEL, slip_radius='shear'))
