@@ -391,6 +391,32 @@ def test_a_damaged_row_number_of_sqlite_hides_no_row_behind(tmp_path: Path) -> N
     assert 'is damaged' in notes[0]
 
 
+def test_pages_that_sqlite_does_not_miss_are_said(tmp_path: Path) -> None:
+    """The page that lists the pages of the table states too few of them, which is no error."""
+    path, whole = big_sqlite(tmp_path)
+    content = bytearray(path.read_bytes())
+    interior = next(at for at in range(4096, len(content), 4096) if content[at] == 5)
+    count = int.from_bytes(content[interior + 3 : interior + 5], 'big')
+    assert count > 20
+    content[interior + 3 : interior + 5] = (count - 9).to_bytes(2, 'big')
+    path.write_bytes(content)
+    found, notes = read(path)
+    assert len(found) < len(whole)
+    gone = sorted(m.log_time for m in Counter(whole) - Counter(found))
+    first, last = ((gone[i] + step - START) * 1e-9 for i, step in ((0, -(10**7)), (-1, 10**7)))
+    assert f'lost from {first:.1f} s to {last:.1f} s' in notes[0]
+
+
+def test_rows_taken_out_here_and_there_are_no_damage(tmp_path: Path) -> None:
+    path, _ = big_sqlite(tmp_path, 900)
+    with sqlite3.connect(path) as connection:
+        connection.execute('DELETE FROM messages WHERE topic_id = 2')
+    connection.close()
+    found, notes = read(path)
+    assert len(found) == 450
+    assert not notes
+
+
 def test_an_index_of_sqlite_that_lies_hides_no_row(tmp_path: Path) -> None:
     path, whole = big_sqlite(tmp_path)
     with sqlite3.connect(path) as connection:

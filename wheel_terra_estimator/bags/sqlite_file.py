@@ -30,6 +30,7 @@ from wheel_terra_estimator.errors import UserError
 _LAST_ROW = 2**63 - 1
 # Damaged text may stand in the library's own message, which is decoded as UTF-8.
 _UNREADABLE = (sqlite3.Error, UnicodeDecodeError, MemoryError, OverflowError)
+_MOST_GAPS = 100  # in the numbers of the rows that damage explains
 _ONE_BY_ONE = 1000  # numbers tried behind damage before the search takes longer steps
 
 
@@ -153,9 +154,25 @@ class SqliteFile:
             losses = self.losses
             losses.start = time if losses.start is None else min(losses.start, time)
             losses.last = time if losses.last is None else max(losses.last, time)
+        self._note_missing_numbers()
         if self._ordered:
             self._number = self._time = array('q')
         return counts
+
+    def _note_missing_numbers(self) -> None:
+        """Find rows that SQLite does not miss: their page is left out where the pages are listed.
+
+        Recorders number rows without a gap. Many gaps are no damage: rows were taken out.
+        """
+        number, time = np.asarray(self._number), np.asarray(self._time)
+        order = np.argsort(number, kind='stable')
+        number, time = number[order], time[order]
+        gaps = np.flatnonzero(np.diff(number) > 1)
+        if len(gaps) > _MOST_GAPS:
+            return
+        for gap in gaps.tolist():
+            start, end = sorted(time[gap : gap + 2].tolist())
+            self.losses.spans.setdefault(int(number[gap]), (start, end))
 
     def _note_gap(self, number: int) -> None:
         """Remember that rows behind a number cannot be read; the log times around say when."""
