@@ -140,3 +140,12 @@ def test_the_page_of_commands_is_that_of_the_parsers():
     assert documentation.path().read_text(encoding='utf-8') == documentation.page(), (
         'run python -m wheel_terra_estimator.cli.documentation'
     )
+
+
+def test_ctrl_c_while_the_commands_are_loaded_is_an_interrupt(monkeypatch, capsys):
+    def interrupted():
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(main, '_parsers', interrupted)
+    assert main.main(['effects']) == 130
+    assert capsys.readouterr().err == 'wheel-terra: interrupted\n'

@@ -140,8 +140,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     # to be said before numpy is imported; what the user has set stays.
     for library in ('OMP', 'OPENBLAS'):
         os.environ.setdefault(f'{library}_NUM_THREADS', '1')
-    parser, subs = _parsers()
-    arguments, unknown = parser.parse_known_args(argv)
+    try:
+        parser, subs = _parsers()
+        arguments, unknown = parser.parse_known_args(argv)
+    except KeyboardInterrupt:
+        _complain('wheel-terra: interrupted')
+        return INTERRUPTED
     if unknown:
         _refuse(unknown[0], subs[arguments.command])
     try:
