@@ -5,15 +5,21 @@
 ::
 
     python tools/node_load.py --odometry 100 --imu 100 --executor events --pairs 5 --seconds 20
+    python tools/node_load.py --late imu/data --delay 0.5 --jitter 0.2
+
+The second kind compares the node with late messages with itself with punctual ones.
 """
 
 from __future__ import annotations
 
 import argparse
+import heapq
+import random
 import signal
 import sys
 import tempfile
 import time
+from collections.abc import Callable
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -25,6 +31,39 @@ from rclpy.executors import SingleThreadedExecutor
 from wheel_terra_estimator.configuration import reader
 
 OUTPUTS = ('slip', 'sinkage', 'slip_stddev', 'sinkage_stddev', 'mobility', 'soil')
+
+
+class LateLink:
+    """Sends the messages of one topic late.
+
+    Parameters
+    ----------
+    topic : str
+        Which; empty text: none.
+    delay, jitter : float
+        How late [s], and by what share of it more or less at random.
+    """
+
+    def __init__(self, topic: str, delay: float, jitter: float) -> None:
+        self._topic, self._delay, self._jitter = topic, delay, jitter
+        self._held: list[tuple[float, int, Callable[[Any], None], Any]] = []
+        self._count = 0
+
+    def send(self, topic: str, message: Any, publish: Callable[[Any], None]) -> None:
+        """Send a message at once or hold it back."""
+        if topic != self._topic:
+            publish(message)
+            return
+        delay = self._delay * (1.0 + self._jitter * random.uniform(-1.0, 1.0))
+        self._count += 1
+        heapq.heappush(self._held, (time.monotonic() + delay, self._count, publish, message))
+
+    def release(self) -> float:
+        """Send what is due; return when the next message is."""
+        while self._held and self._held[0][0] <= time.monotonic():
+            _, _, publish, message = heapq.heappop(self._held)
+            publish(message)
+        return self._held[0][0] if self._held else float('inf')
 
 
 def floor_node(executor: str) -> None:
@@ -62,12 +101,13 @@ def floor_node(executor: str) -> None:
 
 
 def run(
-    arguments: argparse.Namespace, command: list[str], names: tuple[str, ...]
+    arguments: argparse.Namespace, command: list[str], names: tuple[str, ...], late: str = ''
 ) -> dict[str, float]:
-    """Run one node for a while; return what it cost."""
+    """Run one node for a while, one topic late; return what it cost."""
     rclpy.init(args=[])
     rates = {'joint_states': arguments.odometry, 'imu/data': arguments.imu}
-    rover = Rover(names, rates | {'sinkage': 20.0, 'reference_odom': 1.0})
+    link = LateLink(late, arguments.delay, arguments.jitter)
+    rover = Rover(names, rates | {'sinkage': 20.0, 'reference_odom': 1.0}, link.send)
     executor = SingleThreadedExecutor()
     executor.add_node(rover)
     begin = time.monotonic()
@@ -76,18 +116,21 @@ def run(
     def serve(seconds: float) -> None:
         end = time.monotonic() + seconds
         while time.monotonic() < end:
-            due = rover.publish_due()
+            due = min(rover.publish_due(), link.release())
             executor.spin_once(timeout_sec=max(min(due, end) - time.monotonic(), 0.0))
 
     while not rover.sets and time.monotonic() - begin < 30.0:
         serve(0.05)
-    first = time.monotonic() - begin
+    first, cpu_first = time.monotonic() - begin, process.seconds()
     serve(6.0)
     rover.latencies.clear()
     before, wall, sent = process.seconds(), time.monotonic(), rover.count['joint_states']
+    sets = rover.sets
     serve(arguments.seconds)
     result = {
         'cpu': 100.0 * (process.seconds() - before) / (time.monotonic() - wall),
+        'cpu_first': cpu_first,
+        'sets': (rover.sets - sets) / (time.monotonic() - wall),
         'p50': 1e3 * quantile(rover.latencies, 0.5),
         'p99': 1e3 * quantile(rover.latencies, 0.99),
         'rss': process.resident(),
@@ -116,6 +159,9 @@ def main() -> int:
     parser.add_argument('--executor', default='events', choices=('events', 'single_threaded'))
     parser.add_argument('--pairs', type=int, default=5)
     parser.add_argument('--seconds', type=float, default=20.0)
+    parser.add_argument('--late', default='', help='topic whose messages come late')
+    parser.add_argument('--delay', type=float, default=0.5, help='how late [s]')
+    parser.add_argument('--jitter', type=float, default=0.0, help='share of it, more or less')
     parser.add_argument('--floor', action='store_true', help=argparse.SUPPRESS)
     arguments = parser.parse_args()
     if arguments.floor:
@@ -130,11 +176,16 @@ def main() -> int:
         floor = [__file__, '--floor', '--executor', arguments.executor]
         names = configuration.wheels.names
         pairs = [
-            (run(arguments, floor, names), run(arguments, node, names))
+            (
+                run(arguments, node if arguments.late else floor, names),
+                run(arguments, node, names, arguments.late),
+            )
             for _ in range(arguments.pairs)
         ]
-    print('            floor     node      ratio   (cpu: % of a core; p50, p99: ms; rss: MB)')
-    for key in ('cpu', 'p50', 'p99', 'rss', 'first', 'rate', 'lost', 'lost_share'):
+    first, second = ('punctual', 'late') if arguments.late else ('floor', 'node')
+    print(f'            {first:9} {second:9} ratio   (cpu: % of a core; p50, p99: ms; rss: MB)')
+    keys = ('cpu', 'p50', 'p99', 'rss', 'first', 'cpu_first', 'sets', 'rate', 'lost', 'lost_share')
+    for key in keys:
         floor_values, node_values = ([pair[i].get(key) for pair in pairs] for i in (0, 1))
         words = [_median(floor_values), _median(node_values)]
         if None not in floor_values:
