@@ -69,6 +69,36 @@ def test_findings_come_before_anything_else(upside_down, tmp_path, capsys):
     assert said.startswith('finding: mounting') and 'imu_mounting_roll_deg: 180' in said
 
 
+def test_smoothed(tmp_path, capsys):
+    """Same sets at the same times, warnings and diagnostics as given live, both in the report."""
+    from wheel_terra_estimator.bags.writer import NAMESPACE
+
+    drive = tmp_path / 'short'
+    write_simulated_drive(simulate(scenario.load('turns'), seed=5, duration=14.0), drive)
+    page, table = tmp_path / 'page.html', tmp_path / 'table.csv'
+    for name, extra in (
+        ('live', ['--json']),
+        ('smooth', ['--smooth', '--report', str(page), '--table', str(table)]),
+    ):
+        assert main(['replay', str(drive), *CONFIG, *extra, '-o', str(tmp_path / name)]) == 0
+        said = capsys.readouterr().out
+    assert 'rms of the filter' in said and 'note: smoothed: each estimate knows' in said
+    with open_bag(tmp_path / 'live') as live, open_bag(tmp_path / 'smooth') as smooth:
+        assert live.topics.keys() == smooth.topics.keys()
+        for topic in live.topics:
+            one, other = list(live.messages([topic])), list(smooth.messages([topic]))
+            assert [m[0] for m in one] == [m[0] for m in other], topic
+            same = [m[2] for m in one] == [m[2] for m in other]
+            if topic in (
+                '/diagnostics',
+                *(f'{NAMESPACE}/{name}' for name in ('stuck', 'mobility')),
+            ):
+                assert same, topic
+            elif topic in (f'{NAMESPACE}/{name}' for name in ('slip', 'slip_stddev', 'twist')):
+                assert not same, topic
+    assert 'Slip: smoother and filter' in page.read_text() and table.is_file()
+
+
 def test_compare(drive, tmp_path, capsys, undrawn):
     for name, extra in (('a', []), ('b', ['-p', 'soil.cohesion:=900.0'])):
         assert main(['replay', str(drive), *CONFIG, *extra, '-o', str(tmp_path / name)]) == 0

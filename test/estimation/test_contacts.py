@@ -13,7 +13,7 @@ from wheel_terra_estimator.estimation.contacts.contact_age import ContactAge
 from wheel_terra_estimator.estimation.contacts.demand import Demand
 from wheel_terra_estimator.estimation.contacts.linearisation import Linearisation, traction_slope
 from wheel_terra_estimator.estimation.contacts.loads import LoadState, WheelLoads
-from wheel_terra_estimator.estimation.contacts.pulls import Pulls
+from wheel_terra_estimator.estimation.contacts.pulls import PullEvidence, Pulls
 from wheel_terra_estimator.estimation.contacts.stationary_wheels import StationaryWheels
 from wheel_terra_estimator.estimation.contacts.steering import headings, straight_headings
 from wheel_terra_estimator.estimation.contacts.torque_change import TorqueChange
@@ -393,13 +393,16 @@ def published_pull(parts, excess, lateral_motion=0.0):
         pulls.update(
             ekf.mean,
             1e-9 * np.eye(len(ekf.mean)),
-            forces,
-            None,
-            loads=LoadState(loads, (0.0, 0.0, 9.8), force_known=True),
-            headings=straight_headings(parts.rover),
-            turning=(True,) * 6,
-            readings=tuple((forces.torque + excess).tolist()),
-            lateral_motion=lateral_motion,
+            PullEvidence(
+                forces,
+                total=None,
+                loads=LoadState(loads, (0.0, 0.0, 9.8), force_known=True),
+                headings=straight_headings(parts.rover),
+                turning=(True,) * 6,
+                readings=tuple((forces.torque + excess).tolist()),
+                stationary=(np.nan,) * 6,
+                lateral_motion=lateral_motion,
+            ),
             tilt=0.0,
         )
     return np.array(pulls.state.pull), forces

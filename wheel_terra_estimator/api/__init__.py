@@ -17,7 +17,7 @@ True
 """
 
 from wheel_terra_estimator import __version__
-from wheel_terra_estimator.api.drives import estimate, simulate
+from wheel_terra_estimator.api.drives import estimate, simulate, smooth
 from wheel_terra_estimator.api.models import Curve, Model, Soil, Wheel
 from wheel_terra_estimator.api.pictures import plot_curve, plot_diagnosis, plot_estimates
 from wheel_terra_estimator.api.tables import corrected_model, diagnose
@@ -37,4 +37,5 @@ __all__ = [
     'plot_diagnosis',
     'plot_estimates',
     'simulate',
+    'smooth',
 ]

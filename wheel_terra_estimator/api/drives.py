@@ -97,18 +97,31 @@ def estimate(
     >>> bool(abs(columns[f'slip.{wheel}'][-1]) < 0.3)
     True
     """
-    if isinstance(drive, SimulatedDrive):
-        configuration = drive.configuration if rover is None else _rover(rover, parameters)
-        measurements: Iterable[Measurement] = (a.measurement for a in drive.arrivals)
-    else:
-        if rover is None:
-            raise UserError("rover is missing; name its configuration files, such as ['my_rover']")
-        configuration = _rover(rover, parameters)
-        if isinstance(drive, str | Path):
-            return _result(_replayed(Path(drive), configuration, remaps or {}), as_frame)
-        rows = columns_of(drive, 'drive')
-        measurements = _measurements(rows, configuration.wheels.names)
-    return _result(_estimated(measurements, configuration), as_frame)
+    return _run(drive, rover, parameters, remaps, as_frame, smoothed=False)
+
+
+def smooth(
+    drive: Any,
+    rover: str | Path | Sequence[str | Path] | Configuration | None = None,
+    *,
+    parameters: Sequence[str] = (),
+    remaps: Mapping[str, str] | None = None,
+    as_frame: bool = True,
+) -> DataFrame | Columns:
+    """Run the fixed-interval smoother over a whole drive.
+
+    Parameters and columns are those of `estimate`; the numbers are those of ``wheel-terra replay
+    --smooth`` on the same input. What foretells (``stuck``, ``rim_travel_left``, ``pull_margin``)
+    is as it was live.
+
+    Examples
+    --------
+    >>> drive = simulate('firm_drive', seed=1, duration=3.0)
+    >>> columns = smooth(drive, as_frame=False)
+    >>> columns.keys() == estimate(drive, as_frame=False).keys()
+    True
+    """
+    return _run(drive, rover, parameters, remaps, as_frame, smoothed=True)
 
 
 def simulate(
@@ -157,6 +170,28 @@ def simulate(
     return result
 
 
+def _run(
+    drive: Any,
+    rover: str | Path | Sequence[str | Path] | Configuration | None,
+    parameters: Sequence[str],
+    remaps: Mapping[str, str] | None,
+    as_frame: bool,
+    smoothed: bool,
+) -> DataFrame | Columns:
+    if isinstance(drive, SimulatedDrive):
+        configuration = drive.configuration if rover is None else _rover(rover, parameters)
+        measurements: Iterable[Measurement] = (a.measurement for a in drive.arrivals)
+    else:
+        if rover is None:
+            raise UserError("rover is missing; name its configuration files, such as ['my_rover']")
+        configuration = _rover(rover, parameters)
+        if isinstance(drive, str | Path):
+            return _result(_replayed(Path(drive), configuration, remaps or {}, smoothed), as_frame)
+        rows = columns_of(drive, 'drive')
+        measurements = _measurements(rows, configuration.wheels.names)
+    return _result(_estimated(measurements, configuration, smoothed), as_frame)
+
+
 def _rover(
     rover: str | Path | Sequence[str | Path] | Configuration, parameters: Sequence[str]
 ) -> Configuration:
@@ -168,26 +203,37 @@ def _rover(
     return reader.load(files, parameters)
 
 
-def _replayed(path: Path, configuration: Configuration, remaps: Mapping[str, str]) -> Any:
+def _replayed(
+    path: Path, configuration: Configuration, remaps: Mapping[str, str], smoothed: bool
+) -> Any:
     from wheel_terra_estimator.bags.replay import replay
     from wheel_terra_estimator.bags.storage import open_bag
 
     with open_bag(path) as bag:
-        return replay(bag, configuration, remaps).history
+        return replay(bag, configuration, remaps, smooth=smoothed).history
 
 
-def _estimated(measurements: Iterable[Measurement], configuration: Configuration) -> Any:
+def _estimated(
+    measurements: Iterable[Measurement], configuration: Configuration, smoothed: bool
+) -> Any:
     from wheel_terra_estimator.bags.history import HistoryRecorder
     from wheel_terra_estimator.checks.watched_estimator import WatchedEstimator
     from wheel_terra_estimator.estimation.core import EstimatorCore
+    from wheel_terra_estimator.estimation.smoothing.smoother import DriveSmoother
 
-    core = EstimatorCore(configuration, watched_by=WatchedEstimator)
+    smoother = DriveSmoother(configuration) if smoothed else None
+    estimator = smoother.estimator if smoother else None
+    core = EstimatorCore(configuration, estimator, watched_by=WatchedEstimator)
     recorder = HistoryRecorder(configuration.wheels.names)
+    take = smoother.keep if smoother else recorder.add
     for measurement in measurements:
         for estimates in core.add(measurement):
-            recorder.add(estimates)
+            take(estimates)
     for estimates in core.flush():
-        recorder.add(estimates)
+        take(estimates)
+    if smoother:
+        for kept in smoother.sets():
+            recorder.add(kept.estimates)
     return recorder.history()
 
 

@@ -18,11 +18,13 @@ from typing import Any
 
 from wheel_terra_estimator.bags.history import EstimateHistory, HistoryRecorder
 from wheel_terra_estimator.bags.reader import MeasurementReader
+from wheel_terra_estimator.bags.smoothing import Event, smoothed
 from wheel_terra_estimator.bags.storage import Bag
 from wheel_terra_estimator.bags.thinning import MOST_ROWS
 from wheel_terra_estimator.bags.writer import EstimateBagWriter
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.estimation.smoothing.smoother import DriveSmoother
 from wheel_terra_estimator.input_file import read_text
 from wheel_terra_estimator.messages.convert import stamp_of
 from wheel_terra_estimator.messages.pipeline import Pipeline
@@ -37,6 +39,7 @@ _STAMP = re.compile(r'-?[0-9]{1,19}')
 TRUTH_TOPICS = ('/ground_truth/', '/truth/')
 """Topics that are compared with the estimates, never heard."""
 
+SMOOTHED = 'smoothed: each estimate knows the whole drive; warnings stay as they were given live'
 RESET = 'reset'
 """Line of an arrival log for a call of ``~/reset``."""
 
@@ -53,6 +56,7 @@ class Replay:
     notes: tuple[str, ...]
     interrupted: bool
     learned: dict[str, Any]  # configuration key -> value, see `EstimatorCore.learned`
+    filtered: EstimateHistory | None = None  # what the filter said, where ``history`` is smoothed
 
 
 def replay(
@@ -65,6 +69,7 @@ def replay(
     arrival: Path | None = None,
     every_set: bool = False,
     progress: bool = True,
+    smooth: bool = False,
 ) -> Replay:
     """Run the estimator over an open bag.
 
@@ -86,6 +91,8 @@ def replay(
         Whether the history holds every set of a long drive, whatever memory that takes.
     progress : bool
         Whether a long drive shows its progress on a terminal.
+    smooth : bool
+        Whether the estimates are those of the fixed-interval smoother.
 
     Raises
     ------
@@ -93,8 +100,9 @@ def replay(
         Input that cannot be used, an output path that is taken.
     """
     reader = MeasurementReader(bag, remaps, configuration)
-    pipeline = Pipeline(configuration)
-    recorder = HistoryRecorder(pipeline.names, None if every_set else MOST_ROWS)
+    smoother = DriveSmoother(configuration) if smooth else None
+    pipeline = Pipeline(configuration, estimator=smoother.estimator if smoother else None)
+    most = None if every_set else MOST_ROWS
     messages = _in_order_of(arrival, reader) if arrival else reader.messages()
     if progress:
         messages = _progress(messages, reader)
@@ -107,36 +115,56 @@ def replay(
             )
             writer.state_origin(configuration, bag.path.resolve().name)
         interrupted = stack.enter_context(_until_interrupted())
-        log_time = 0
-        for count, (log_time, name, message) in enumerate(messages):
-            if writer is not None and count == 0:
-                writer.clear_stuck(log_time)
-            if name == RESET:
-                pipeline.reset()
-                if writer is not None:
-                    writer.clear_stuck(log_time)
+        events = _events(messages, pipeline, interrupted)
+        filtered = None
+        if smoother is not None:
+            live = HistoryRecorder(pipeline.names, most)
+            events = smoothed(events, smoother, live, pipeline.diagnostics)
+            filtered = live.history
+        recorder = HistoryRecorder(pipeline.names, most)
+        for event in events:
+            if event.estimates is not None:
+                recorder.add(event.estimates)
+            if writer is None:
                 continue
-            for estimates in pipeline.hear(name, message):
-                recorder.add(estimates)
-                if writer is not None:
-                    writer.add(estimates, log_time)
-            if interrupted.is_set():
-                break
-        else:
-            for estimates in pipeline.flush():
-                recorder.add(estimates)
-                if writer is not None:
-                    writer.add(estimates, log_time)
+            if event.estimates is None:
+                writer.clear_stuck(event.log_time)
+            else:
+                writer.add(event.estimates, event.log_time, event.statuses)
     return Replay(
         history=recorder.history(),
         topics=reader.topics,
         heard=pipeline.received,
         rejected=reader.rejected + pipeline.rejected,
         counters=pipeline.counters(),
-        notes=tuple(_notes(bag, reader, pipeline, interrupted.is_set())),
+        notes=(
+            *([SMOOTHED] if smooth else []),
+            *_notes(bag, reader, pipeline, interrupted.is_set()),
+        ),
         interrupted=interrupted.is_set(),
         learned=pipeline.core.learned(),
+        filtered=filtered() if filtered is not None else None,
     )
+
+
+def _events(
+    messages: Iterator[tuple[int, str, Any]], pipeline: Pipeline, interrupted: threading.Event
+) -> Iterator[Event]:
+    """Yield the sets of a drive, and where the node says that there is no warning."""
+    log_time = 0
+    for count, (log_time, name, message) in enumerate(messages):
+        if count == 0:
+            yield Event(log_time)
+        if name == RESET:
+            pipeline.reset()
+            yield Event(log_time)
+            continue
+        for estimates in pipeline.hear(name, message):
+            yield Event(log_time, estimates)
+        if interrupted.is_set():
+            return
+    for estimates in pipeline.flush():
+        yield Event(log_time, estimates)
 
 
 def _notes(

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -122,8 +122,16 @@ class EstimateBagWriter(BagFile):
         """Write what the node sends at its start and after a reset: no stuck warning."""
         self._write_stuck(False, log_time)
 
-    def add(self, estimates: EstimateSet, log_time: int) -> None:
-        """Write all messages of a set at the log time [ns] of the input that completed it."""
+    def add(
+        self,
+        estimates: EstimateSet,
+        log_time: int,
+        statuses: Sequence[diagnostics.Status] | None = None,
+    ) -> None:
+        """Write all messages of a set at the log time [ns] of the input that completed it.
+
+        `statuses` are what diagnostics said live, empty for nothing; None: it is asked now.
+        """
         stamp = estimates.stamp
         for topic, fields in joint_fields(estimates, self.names).items():
             data = self._joint_states.packed(stamp, *fields)
@@ -136,9 +144,10 @@ class EstimateBagWriter(BagFile):
         )
         self.write_raw(f'{NAMESPACE}/twist', twist, log_time)
         self._write_stuck(estimates.stuck, log_time)
-        if found := self._diagnostics.due(estimates):
+        found = self._diagnostics.due(estimates) if statuses is None else statuses
+        if found:
             header = self.messages.header(stamp)
-            array = self.messages.diagnostic_array(header, found)
+            array = self.messages.diagnostic_array(header, list(found))
             self.write(DIAGNOSTICS, array, log_time)
 
     def _write_stuck(self, stuck: bool, log_time: int) -> None:

@@ -21,6 +21,7 @@ INTERRUPTED = 130
 EXAMPLES = (
     'wheel-terra replay my_bag --config my_rover.yaml -o estimates --report report.html',
     'wheel-terra replay drive.mcap --config pathfinder --remap reference_odom:=/truth/odometry',
+    'wheel-terra replay my_bag --config my_rover.yaml --smooth --table smoothed.csv',
     'wheel-terra replay bags/* --config my_rover.yaml -o estimates --jobs 4 --report report.html',
 )
 
@@ -56,6 +57,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='F.yaml',
         help='parameter file with the soil and the sensor biases that were learned, a further '
         '--config for the next drive of this rover; of one recording',
+    )
+    parser.add_argument(
+        '--smooth',
+        action='store_true',
+        help='estimates of the fixed-interval smoother, which knows the whole drive at each of its '
+        'instants; warnings stay as they were given live',
     )
     parser.add_argument('--json', action='store_true', help='print the summary as JSON')
     parser.add_argument(
@@ -135,6 +142,7 @@ def _run_one(arguments: argparse.Namespace) -> int:
         arrival=arguments.arrival,
         every_set=bool(arguments.table),
         limits=bag_limits.from_arguments(arguments),
+        smooth=arguments.smooth,
         on_checked=print_findings,
     )
     errors = drive.errors
@@ -142,9 +150,14 @@ def _run_one(arguments: argparse.Namespace) -> int:
         told = as_dict(drive.summary)
         told['findings'] = drive.checked.as_dict()['findings']
         told['truth'] = truth_scores.as_dict(errors) if errors else None
+        if arguments.smooth:
+            live = drive.filter_errors
+            told['filter'] = {'truth': truth_scores.as_dict(live) if live else None}
         print(json.dumps(told, indent=2))
     else:
-        lines = truth_scores.as_lines(errors) if errors else ()
+        lines = truth_scores.as_lines(errors) if errors else []
+        if errors and drive.filter_errors:
+            lines += truth_scores.beside(errors, drive.filter_errors)
         print('\n'.join([as_text(drive.summary), *lines]))
     if arguments.table:
         drive.write_table(arguments.table, arguments.overwrite)
@@ -191,6 +204,7 @@ def _run_several(arguments: argparse.Namespace) -> int:
         _plain_name('--report', arguments.report),
         _plain_name('--table', arguments.table),
         bag_limits.from_arguments(arguments),
+        smooth=arguments.smooth,
     )
     rows = replay_bags(
         arguments.bags,

@@ -13,6 +13,8 @@ import math
 from math import isnan
 from typing import Any, NamedTuple, Protocol
 
+import numpy as np
+
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.contacts.contact_age import ContactAge
 from wheel_terra_estimator.estimation.contacts.demand import Demand
@@ -22,7 +24,7 @@ from wheel_terra_estimator.estimation.contacts.linearisation import (
     traction_slope,
 )
 from wheel_terra_estimator.estimation.contacts.loads import LoadState, WheelLoads
-from wheel_terra_estimator.estimation.contacts.pulls import Pulls
+from wheel_terra_estimator.estimation.contacts.pulls import PullEvidence, Pulls
 from wheel_terra_estimator.estimation.contacts.stationary_wheels import (
     StationaryPull,
     StationaryWheels,
@@ -33,7 +35,7 @@ from wheel_terra_estimator.estimation.contacts.turning import Turning
 from wheel_terra_estimator.estimation.contacts.unloaded_wheels import UnloadedWheels
 from wheel_terra_estimator.estimation.contacts.wheel_models import WheelModels
 from wheel_terra_estimator.estimation.estimates import EstimateSet
-from wheel_terra_estimator.estimation.filter.ekf import Row
+from wheel_terra_estimator.estimation.filter.ekf import FloatArray, Row
 from wheel_terra_estimator.estimation.filter.force_balance import (
     ForceBalance,
     SumOfPulls,
@@ -73,6 +75,7 @@ from wheel_terra_estimator.estimation.measurements import ReferenceVelocity, Ste
 from wheel_terra_estimator.estimation.outputs import MissingInputs, Outputs, Sources
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
 from wheel_terra_estimator.estimation.scalars import NAN, known
+from wheel_terra_estimator.estimation.smoothing.tape import Gaussian, Tape
 
 Floats = tuple[float, ...]
 _SECOND = 1e-9  # of a nanosecond
@@ -93,6 +96,17 @@ class Part(Protocol):
 
     def restore(self, snapshot: Any) -> None:
         """Go back to a snapshot."""
+
+
+class Instant(NamedTuple):
+    """What `WheelSoilEstimator` judged at a stamp and a smoother judges anew."""
+
+    time: float  # [s] since the start of the run
+    motion: BodyMotion
+    sources: Sources
+    """Mean and covariance of the filter left out: they are the smoother's business."""
+    cycle_speed: float  # [m/s] of the filter at its last cycle
+    cycle_variance: float
 
 
 class _Clock(NamedTuple):
@@ -130,9 +144,11 @@ class WheelSoilEstimator:
     ----------
     configuration : Configuration
         Rover, soil, sensors, tuning.
+    tape : Tape, optional
+        Keeps what a smoother needs.
     """
 
-    def __init__(self, configuration: Configuration) -> None:
+    def __init__(self, configuration: Configuration, tape: Tape | None = None) -> None:
         self._configuration = configuration
         self._rover = rover = Rover.from_configuration(configuration)
         sensors = SensorFigures.from_configuration(configuration)
@@ -201,6 +217,15 @@ class WheelSoilEstimator:
             self._margin,
             self._stuck,
         )
+        self._tape = tape
+        if tape is not None:
+            self._ekf.tape = tape
+            self._parts += (tape,)
+
+    @property
+    def bounds(self) -> tuple[FloatArray, FloatArray]:
+        """Lower and upper bounds of the state, (size,) each."""
+        return self._ekf.bounds
 
     # -- Runs and snapshots ----------------------------------------------------------------------
 
@@ -305,18 +330,21 @@ class WheelSoilEstimator:
         self._sinkage_process.end_cycle(ekf, sinkage_before, cycle.dt)
         lateral_motion = self._turning.state.lateral_motion
         self._speed.keep_least_variance(ekf, cycle.rims, lateral_motion)
-        self._pulls.update(
-            ekf.mean,
-            ekf.covariance,
-            forces,
-            total,
+        evidence = PullEvidence(
+            forces=forces,
+            total=total,
             loads=cycle.loads,
             headings=self._steering.state.headings,
             turning=cycle.turns,
             readings=self._wheels.state.torque,
+            stationary=self._pulls.state.stationary,
             lateral_motion=lateral_motion,
-            tilt=rut_tilt(self._rover, layout, ekf),
         )
+        tilt = rut_tilt(self._rover, layout, ekf.mean)
+        self._pulls.update(ekf.mean, ekf.covariance, evidence, tilt=tilt)
+        if self._tape is not None:
+            present = Gaussian(ekf.mean, ekf.covariance)
+            self._tape.mark((evidence, ekf.mean.copy()), present)
 
     def _begin_cycle(self, time: float) -> _Cycle:
         """Work out turning, loads and rim speeds; note what changes under the wheels."""
@@ -558,21 +586,18 @@ class WheelSoilEstimator:
         rims = wheels.rim_speeds(time)
         speed, variance = self._present_speed(rims)
         motion = self._turning.state
-        slips = self._slips.update(
-            time,
-            rims,
-            BodyMotion(
-                speed,
-                math.sqrt(max(variance, 0.0)),
-                motion.yaw_rate,
-                motion.yaw_rate_std,
-                self._steering.state.headings,
-                motion.lateral_motion,
-                stopped=self._zero_velocity.standing()
-                and time >= self._reference.state.sliding_until,
-            ),
+        body = BodyMotion(
+            speed,
+            math.sqrt(max(variance, 0.0)),
+            motion.yaw_rate,
+            motion.yaw_rate_std,
+            self._steering.state.headings,
+            motion.lateral_motion,
+            stopped=self._zero_velocity.standing() and time >= self._reference.state.sliding_until,
         )
-        sinkage = self._ekf.mean[self._layout.sinkage].tolist()
+        slips = self._slips.update(time, rims, body)
+        ekf = self._ekf
+        sinkage = ekf.mean[self._layout.sinkage].tolist()
         seen = []
         for i, (wheel, rim) in enumerate(zip(slips, rims, strict=True)):
             limit, torque = rover.torque_limit[i], wheels.state.torque[i]
@@ -602,7 +627,17 @@ class WheelSoilEstimator:
             ),
         )
         self._clock = self._clock._replace(assessment=assessment, speed=(speed, variance))
-        self._margin.update(time, self._ekf.mean, loads, self._contact_age.state.direction)
+        self._margin.update(time, ekf.mean, loads, self._contact_age.state.direction)
+        if self._tape is not None:
+            self._tape.mark(self._instant(time, body), Gaussian(ekf.mean, ekf.covariance))
+
+    def _instant(self, time: float, body: BodyMotion) -> Instant:
+        """Return what a smoother judges anew."""
+        ekf, nothing = self._ekf, np.empty(0)
+        sources = self._sources()._replace(mean=nothing, covariance=nothing)
+        return Instant(
+            time, body, sources, float(ekf.mean[SPEED]), float(ekf.covariance[SPEED, SPEED])
+        )
 
     def _present_speed(self, rims: Floats) -> tuple[float, float]:
         """Return speed [m/s] and variance at the present stamp."""
@@ -619,10 +654,27 @@ class WheelSoilEstimator:
 
     def estimates(self) -> EstimateSet:
         """Return all outputs at the present stamp; nothing changes."""
+        time = self._clock.time
+        inertial = self._inertial.state
+        silent = time - inertial.time > self._rover.silence
+        missing = MissingInputs(
+            wheel_odometry=self._wheels.silent(time),
+            imu=silent,
+            orientation=not silent and not inertial.attitude.reported,
+            torque=not self._wheels.torque_known(time),
+            sinkage=len(self._sinkage.unread(time)) == self._rover.wheel_count,
+            acceleration=not silent and time - inertial.force_time > self._rover.silence,
+            angular_rate=not silent and time - inertial.rate_time > self._rover.silence,
+            reference=not self._reference.known(time),
+        )
+        return self._outputs.estimate_set(self._sources(), missing)
+
+    def _sources(self) -> Sources:
+        """Return what the outputs of the present stamp follow from."""
         time, loads = self._clock.time, self._loads.state
         rims = self._wheels.rim_speeds(time)
         speed, variance = self._clock.speed or self._present_speed(rims)
-        given = Sources(
+        return Sources(
             stamp=self._clock.stamp,
             mean=self._ekf.mean,
             covariance=self._ekf.covariance,
@@ -639,19 +691,6 @@ class WheelSoilEstimator:
             margin=self._margin.state.margin,
             assessment=self._clock.assessment,
         )
-        inertial = self._inertial.state
-        silent = time - inertial.time > self._rover.silence
-        missing = MissingInputs(
-            wheel_odometry=self._wheels.silent(time),
-            imu=silent,
-            acceleration=not silent and time - inertial.force_time > self._rover.silence,
-            angular_rate=not silent and time - inertial.rate_time > self._rover.silence,
-            orientation=not silent and not inertial.attitude.reported,
-            torque=not self._wheels.torque_known(time),
-            sinkage=len(self._sinkage.unread(time)) == self._rover.wheel_count,
-            reference=not self._reference.known(time),
-        )
-        return self._outputs.estimate_set(given, missing)
 
     @property
     def stuck(self) -> bool:

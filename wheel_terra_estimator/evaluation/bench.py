@@ -13,7 +13,13 @@ from typing import Any
 
 from wheel_terra_estimator.estimation.measurements import Measurement
 from wheel_terra_estimator.evaluation import baselines, scores
-from wheel_terra_estimator.evaluation.runner import inputs_of_mode, record, run_estimator
+from wheel_terra_estimator.evaluation.runner import (
+    SMOOTHED,
+    inputs_of_mode,
+    record,
+    run_estimator,
+    run_smoother,
+)
 from wheel_terra_estimator.evaluation.two_state_filters import slip_course
 from wheel_terra_estimator.evaluation.worlds import WORLDS, BenchDrive
 from wheel_terra_estimator.scheduler import finished
@@ -65,7 +71,8 @@ def score_mode(world: str, kind: str, seed: int, mode: str, drive: BenchDrive) -
     """Score the estimator in one mode on a drive."""
     configuration, truth = drive.configuration, drive.truth
     measurements = list(inputs_of_mode(drive.arrivals, mode))
-    sets, health = run_estimator(configuration, measurements)
+    run = run_smoother if mode.startswith(SMOOTHED) else run_estimator
+    sets, health = run(configuration, measurements)
     kept = record(sets, health)
     radius = configuration.wheels.slip_radius
     return DriveScore(

@@ -35,8 +35,12 @@ MODES = (
     'no_sinkage',
     'no_orientation',
     *REFERENCE_DELAYS,
+    'smoothed',
+    'smoothed_no_reference',
 )
-"""What the estimator gets: everything, all but one input, or the reference sooner or later."""
+"""What the estimator gets: everything, all but one input, or the reference sooner or later; and what
+the smoother makes of it."""
+SMOOTHED = 'smoothed'
 
 
 @dataclass(frozen=True)
@@ -61,6 +65,7 @@ class Record:
 
 def inputs_of_mode(arrivals: Iterable[TimedMeasurement], mode: str) -> Iterator[Measurement]:
     """Yield what a mode gets of a drive, in the order of arrival."""
+    mode = mode.removeprefix(SMOOTHED).removeprefix('_')
     timed = [(a.arrival, a.measurement) for a in arrivals]
     if mode in REFERENCE_DELAYS:
         delay = round(REFERENCE_DELAYS[mode] * 1e9)
@@ -122,3 +127,20 @@ def record(sets: Sequence[EstimateSet], health: dict[str, Any]) -> Record:
             )
         },
     )
+
+
+def run_smoother(
+    configuration: Configuration, measurements: Iterable[Measurement]
+) -> tuple[list[EstimateSet], dict[str, Any]]:
+    """Run the smoother over measurements in the order of arrival; as `run_estimator`."""
+    from wheel_terra_estimator.estimation.core import EstimatorCore
+    from wheel_terra_estimator.estimation.smoothing.smoother import DriveSmoother
+
+    smoother = DriveSmoother(configuration)
+    core = EstimatorCore(configuration, smoother.estimator, watched_by=WatchedEstimator)
+    for measurement in measurements:
+        for estimates in core.add(measurement):
+            smoother.keep(estimates)
+    for estimates in core.flush():
+        smoother.keep(estimates)
+    return [kept.estimates for kept in smoother.sets()], core.health()

@@ -36,6 +36,7 @@ class Drive:
     truth: Truth | None
     errors: truth_scores.TruthErrors | None
     summary: DriveSummary
+    filter_errors: truth_scores.TruthErrors | None = None  # where the estimates are smoothed
 
     def write_table(self, path: Path, overwrite: bool) -> None:
         """Write the estimates as a table."""
@@ -53,6 +54,8 @@ class Drive:
             overwrite=overwrite,
             findings=self.checked.findings,
             errors=self.errors,
+            filtered=self.result.filtered,
+            filter_errors=self.filter_errors,
         )
 
 
@@ -67,6 +70,7 @@ def replay_drive(
     every_set: bool = False,
     progress: bool = True,
     limits: Limits = LIMITS,
+    smooth: bool = False,
     on_checked: Callable[[CheckReport], None] = lambda checked: None,
 ) -> Drive:
     """Check a recording, run the estimator over it and sum it up.
@@ -75,7 +79,7 @@ def replay_drive(
     ----------
     path : Path
         rosbag2 folder or file.
-    configuration, remaps, output, overwrite, arrival, every_set, progress
+    configuration, remaps, output, overwrite, arrival, every_set, progress, smooth
         See `bags.replay.replay`.
     limits : Limits
         What of the recording is unpacked and held.
@@ -100,17 +104,20 @@ def replay_drive(
             arrival=arrival,
             every_set=every_set,
             progress=progress,
+            smooth=smooth,
         )
         truth = read_truth(bag, remaps, configuration)
     # A truth that the estimator was given as its reference is none to judge it by.
     judged = truth if truth and truth.source not in result.topics.values() else None
-    errors = None
+    errors = filter_errors = None
     if judged:
         thresholds = configuration.filter.class_thresholds
         errors = truth_scores.truth_errors(result.history, judged, thresholds)
+        if result.filtered:
+            filter_errors = truth_scores.truth_errors(result.filtered, judged, thresholds)
     title = path.resolve().name
     notes = list(result.notes)
     if not any(key.startswith('soil.') for key in configuration.stated):
         notes.append(NO_SOIL)
     summary = summarise(title, result.history, result.topics, result.heard, result.rejected, notes)
-    return Drive(configuration, checked, result, truth, errors, summary)
+    return Drive(configuration, checked, result, truth, errors, summary, filter_errors)

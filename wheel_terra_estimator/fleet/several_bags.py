@@ -56,7 +56,8 @@ READ_AT_ONCE = 2**20
 class Settings:
     """What is the same for all recordings.
 
-    ``report`` and ``table`` are names of files in the folder of each recording, empty for none.
+    ``report`` and ``table`` are names of files in the folder of each recording, empty for none;
+    ``smooth``: estimates of the fixed-interval smoother.
     """
 
     configuration: Configuration
@@ -65,6 +66,7 @@ class Settings:
     report: str = ''
     table: str = ''
     limits: Limits = LIMITS
+    smooth: bool = False
 
 
 @dataclass(frozen=True)
@@ -198,6 +200,7 @@ def _digest(settings: Settings, path: Path) -> str:
         'remaps': dict(settings.remaps),
         'files': [settings.report, settings.table],
         'limits': asdict(settings.limits),
+        'smooth': settings.smooth,
     }
     digest = hashlib.blake2b(digest_size=DIGEST_SIZE)
     digest.update(json.dumps(stated, sort_keys=True, default=str).encode())
@@ -238,6 +241,7 @@ def _replay(settings: Settings, task: _Task) -> DriveRow:
         every_set=bool(settings.table),
         limits=settings.limits,
         progress=False,
+        smooth=settings.smooth,
     )
     if settings.table:
         drive.write_table(output / settings.table, overwrite=True)

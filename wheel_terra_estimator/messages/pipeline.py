@@ -15,6 +15,7 @@ from wheel_terra_estimator.checks.watched_estimator import WatchedEstimator
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.core import EstimatorCore
 from wheel_terra_estimator.estimation.estimates import EstimateSet
+from wheel_terra_estimator.estimation.timing.input_log import Estimator
 from wheel_terra_estimator.messages.convert import InputConverter, input_layout
 from wheel_terra_estimator.messages.diagnostics import NODE, Diagnostics
 
@@ -34,6 +35,8 @@ class Pipeline:
         Rover, soil, sensors, filter.
     node_name : str
         Name of the node with its namespace, for diagnostics.
+    estimator : Estimator, optional
+        See `EstimatorCore`.
 
     Attributes
     ----------
@@ -46,11 +49,16 @@ class Pipeline:
         Says what ``/diagnostics`` is to say, and when.
     """
 
-    def __init__(self, configuration: Configuration, node_name: str = NODE) -> None:
+    def __init__(
+        self,
+        configuration: Configuration,
+        node_name: str = NODE,
+        estimator: Estimator | None = None,
+    ) -> None:
         self.configuration = configuration
         self.names = configuration.wheels.names
         self.converter = InputConverter(input_layout(configuration))
-        self.core = EstimatorCore(configuration, watched_by=WatchedEstimator)
+        self.core = EstimatorCore(configuration, estimator, watched_by=WatchedEstimator)
         self.received: Counter[str] = Counter()
         self.diagnostics = Diagnostics(self.names, self.counters, self._faults, node_name)
         self.transport_faults: dict[str, str] = {}

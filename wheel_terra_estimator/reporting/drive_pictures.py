@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
 FloatArray = NDArray[np.float64]
 
+FILTER_COLOUR = '#9aa5b0'
 LINE_POINTS, BAND_POINTS, SPANS = 400, 150, 250
 """Points of a line on a printed page; more would only make the file large."""
 
@@ -83,12 +84,22 @@ def pull_by_wheel(history: EstimateHistory, truth: Truth | None) -> Figure:
     return _by_wheel(history, 'drawbar_pull', 'drawbar pull [N]', known)
 
 
+def smoother_and_filter(
+    history: EstimateHistory, filtered: EstimateHistory, quantity: str, truth: Truth | None
+) -> Figure:
+    """Draw ``slip`` or ``drawbar_pull`` of each wheel by the smoother, and the filter's in grey."""
+    label = {'slip': 'slip ratio [-]', 'drawbar_pull': 'drawbar pull [N]'}[quantity]
+    known = getattr(truth, quantity) if truth else None
+    return _by_wheel(history, quantity, label, known, filtered=filtered)
+
+
 def _by_wheel(
     history: EstimateHistory,
     quantity: str,
     label: str,
     truth: WheelTruth | None,
     scale: float = 1.0,
+    filtered: EstimateHistory | None = None,
 ) -> Figure:
     from matplotlib.figure import Figure
 
@@ -102,6 +113,10 @@ def _by_wheel(
         axes = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
         for i, name in enumerate(short_names(history.names)):
             axis = axes.flat[i]
+            if filtered is not None:
+                live = scale * _drawn(filtered, quantity)[:, i]
+                x, y = thin(filtered.seconds, live, LINE_POINTS)
+                axis.plot(x, y, color=FILTER_COLOUR, linewidth=0.9, label='filter')
             _band(axis, history.seconds, values[:, i], deviation[:, i], _colour(i))
             if truth is not None:
                 _truth_line(axis, history, truth, i, scale)

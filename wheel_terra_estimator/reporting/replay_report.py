@@ -31,6 +31,8 @@ def write_replay_report(
     overwrite: bool = False,
     findings: Sequence[Any] = (),
     errors: TruthErrors | None = None,
+    filtered: EstimateHistory | None = None,
+    filter_errors: TruthErrors | None = None,
 ) -> None:
     """Write the report of a drive.
 
@@ -50,6 +52,8 @@ def write_replay_report(
         What a check of the recording found (``words``, ``wheel``, ``cure``), shown at the top.
     errors : TruthErrors, optional
         How far the estimates are from a truth that may judge them.
+    filtered, filter_errors : EstimateHistory, TruthErrors, optional
+        What the filter said, where the estimates are those of the smoother: both are shown.
     """
     from wheel_terra_estimator.terramechanics.effects import catalogue
 
@@ -70,6 +74,10 @@ def write_replay_report(
         library=plotly_script() if summary.sets else '',
         findings=findings,
         errors=[_error_row(error) for error in errors.quantities] if errors else [],
+        filter_errors=(
+            [_error_row(error) for error in filter_errors.quantities] if filter_errors else []
+        ),
+        smoothed=_smoothed_pictures(history, filtered, truth) if summary.sets else [],
         truth_source=truth.source if truth else '',
         provenance=configuration.provenance,
         parameters=[(key, values[key]) for key in values if key in configuration.stated],
@@ -114,6 +122,24 @@ def _cards(summary: DriveSummary) -> list[dict[str, str]]:
             'value': f'{100 * unknown / len(summary.wheels):.0f} %',
             'label': 'of the time at rest or unknown',
         },
+    ]
+
+
+def _smoothed_pictures(
+    history: EstimateHistory, filtered: EstimateHistory | None, truth: Truth | None
+) -> list[dict[str, str]]:
+    """Return pictures of smoother and filter; none where there is no smoother."""
+    if filtered is None:
+        return []
+    dashed = ' The truth is dashed.' if truth else ''
+    return [
+        {
+            'title': f'{title}: smoother and filter',
+            'source': picture(drive_pictures.smoother_and_filter(history, filtered, name, truth)),
+            'caption': f'Colour: smoother, with ± {BAND:g} standard deviations; grey: the filter '
+            f'as it was live.{dashed}',
+        }
+        for title, name in (('Slip', 'slip'), ('Drawbar pull', 'drawbar_pull'))
     ]
 
 

@@ -49,6 +49,20 @@ class PullTuning:
     scrub_std: float = 0.05  # of the load at full lateral motion: pushed sideways
 
 
+class PullEvidence(NamedTuple):
+    """What the pulls of a cycle follow from besides the state of the filter."""
+
+    forces: ContactForces | None
+    """Of the turning wheels; None where the contacts are fresh after a start."""
+    total: SumOfPulls | None  # what the specific force says of their sum; None = nothing
+    loads: LoadState
+    headings: Headings
+    turning: tuple[bool, ...]  # wheels for which the models hold
+    readings: Floats  # last torque of each wheel [N m], nan = never known
+    stationary: Floats  # pull of wheels that stand, from their torque [N]; nan = not known
+    lateral_motion: float  # of the outer wheels over the fastest rim speed [-]
+
+
 class PullState(NamedTuple):
     """One entry per wheel."""
 
@@ -95,14 +109,8 @@ class Pulls(Component[PullState]):
         self,
         mean: FloatArray,
         covariance: FloatArray,
-        forces: ContactForces | None,
-        total: SumOfPulls | None,
+        evidence: PullEvidence,
         *,
-        loads: LoadState,
-        headings: Headings,
-        turning: tuple[bool, ...],
-        readings: Floats,
-        lateral_motion: float,
         tilt: float,
     ) -> None:
         """Work out the pulls of a cycle.
@@ -111,23 +119,12 @@ class Pulls(Component[PullState]):
         ----------
         mean, covariance : numpy.ndarray
             (size,), (size, size) after the update.
-        forces : ContactForces or None
-            Of the turning wheels before it; None where the contacts are fresh after a start.
-        total : SumOfPulls or None
-            What the specific force says of their sum; None = nothing.
-        loads : LoadState
-            Of the wheels.
-        headings : Headings
-            Of the wheels.
-        turning : tuple of bool
-            Wheels for which the models hold.
-        readings : tuple of float
-            Last torque of each wheel [N m], nan = never known.
-        lateral_motion : float
-            Of the outer wheels over the fastest rim speed [-].
+        evidence : PullEvidence
+            Forces, their sum, loads and torques of the cycle.
         tilt : float
             Of the body against the ground by its ruts [rad].
         """
+        forces, total, loads, headings, turning, readings, stationary, lateral_motion = evidence
         state, share, tuning = self.state, loads.slope_share, self._tuning
         n = self._rover.wheel_count
         pull, std = [0.0] * n, [0.0] * n
@@ -140,7 +137,7 @@ class Pulls(Component[PullState]):
         for i, load in enumerate(loads.load):
             if not turning[i]:
                 # Static friction carries the slope, or it is dragged along.
-                standing = state.stationary[i]
+                standing = stationary[i]
                 pull[i] = load * share if isnan(standing) else standing
                 torque[i] = pull[i] * self._rover.rim_radius[i]
                 known = tuning.guess_std if loads.force_known else 1.0
@@ -173,7 +170,7 @@ class Pulls(Component[PullState]):
             shares = (joint + np.diag(own)) @ along + scrub
             pull = self.distributed(pull, shares, along, total, loads.load, tilt)
         self.state = PullState(
-            tuple(pull), tuple(std), model_pull, tuple(torque), tuple(excess), state.stationary
+            tuple(pull), tuple(std), model_pull, tuple(torque), tuple(excess), stationary
         )
 
     def distributed(

@@ -19,6 +19,8 @@ from filterpy.kalman import ExtendedKalmanFilter
 from numpy.typing import NDArray
 from scipy.linalg.lapack import dposv
 
+from wheel_terra_estimator.estimation.smoothing.tape import Gaussian, Tape
+
 FloatArray = NDArray[np.float64]
 _LEAST_VARIANCE = 1e-30  # of an innovation, in its own unit squared
 _LEAST_SHARE = 1e-9  # of the reading's own variance in that of its innovation
@@ -82,6 +84,11 @@ class GatedFilter:
         (n,) and (n, n) start.
     lower, upper : numpy.ndarray
         (n,) physical bounds of the state, enforced after each update.
+
+    Attributes
+    ----------
+    tape : Tape or None
+        Keeps the transitions of the state for a smoother.
     """
 
     def __init__(
@@ -94,9 +101,17 @@ class GatedFilter:
         self._start = FilterMemory(mean.copy(), covariance.copy(), 0)
         self._lower, self._upper = lower, upper
         self.restarts = 0
+        self.tape: Tape | None = None
+
+    @property
+    def bounds(self) -> tuple[FloatArray, FloatArray]:
+        """Lower and upper bounds of the state, (n,) each."""
+        return self._lower, self._upper
 
     def reset(self) -> None:
         """Go back to the start; restarts count from 0."""
+        if self.tape is not None:
+            self.tape.cut()
         self.restore(self._start)
 
     @property
@@ -111,11 +126,13 @@ class GatedFilter:
 
     def predict(self, mean: FloatArray, transition: FloatArray, noise: FloatArray) -> None:
         """Go to a predicted mean with transition matrix F and process noise Q."""
+        before = self._present()
         self._ekf.predicted = mean
         self._ekf.F = transition
         self._ekf.Q = noise
         self._ekf.predict()
         self._keep_sound()
+        self._keep_transition(before, transition)
 
     def update(
         self,
@@ -156,15 +173,21 @@ class GatedFilter:
 
     def set(self, index: int, value: float, variance: float) -> None:
         """Give one entry a value known from elsewhere and cut its correlations."""
+        before = self._present()
         ekf = self._ekf
         ekf.x[index] = value
         ekf.P[index, :] = 0.0
         ekf.P[:, index] = 0.0
         ekf.P[index, index] = variance
+        transition = np.eye(len(ekf.x))
+        transition[index, index] = 0.0
+        self._keep_transition(before, transition)
 
     def widen(self, index: int, variance: float) -> None:
         """Add variance to one entry."""
+        before = self._present()
         self._ekf.P[index, index] += variance
+        self._keep_transition(before, np.eye(len(self._ekf.x)))
 
     def snapshot(self) -> FilterMemory:
         """Return copies of mean and covariance and the count of restarts."""
@@ -174,6 +197,16 @@ class GatedFilter:
         """Go back to a snapshot."""
         mean, covariance, self.restarts = snapshot
         self._ekf.x, self._ekf.P = mean.copy(), covariance.copy()
+
+    def _present(self) -> Gaussian | None:
+        """Return a copy of the state where there is a tape to keep it."""
+        if self.tape is None:
+            return None
+        return Gaussian(self._ekf.x.copy(), self._ekf.P.copy())
+
+    def _keep_transition(self, before: Gaussian | None, transition: FloatArray) -> None:
+        if self.tape is not None and before is not None:
+            self.tape.add(before, transition, Gaussian(self._ekf.x, self._ekf.P))
 
     def _keep_sound(self) -> None:
         """Keep mean and covariance finite, within their bounds and positive."""
@@ -185,6 +218,8 @@ class GatedFilter:
             ekf.P = self._start.covariance.copy()
             entries = ekf.P.ravel('K')
             self.restarts += 1
+            if self.tape is not None:
+                self.tape.cut()
         np.minimum(np.maximum(x, self._lower, out=x), self._upper, out=x)
         diagonal = entries[:: len(x) + 1]
         if np.minimum.reduce(diagonal) <= 0.0:

@@ -14,7 +14,7 @@ from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.contacts.linearisation import ContactForces
 from wheel_terra_estimator.estimation.contacts.stationary_wheels import StationaryPull
 from wheel_terra_estimator.estimation.contacts.steering import Headings
-from wheel_terra_estimator.estimation.filter.ekf import GatedFilter, Row
+from wheel_terra_estimator.estimation.filter.ekf import FloatArray, GatedFilter, Row
 from wheel_terra_estimator.estimation.filter.state import StateLayout
 from wheel_terra_estimator.estimation.filter.torque import ForceRows
 from wheel_terra_estimator.estimation.inputs.inertial import InertialWindow
@@ -120,7 +120,7 @@ class ForceBalance(ForceRows):
             else:
                 pull_sum += along * standing.expected
                 open_variance += standing.std**2
-        tilt = rut_tilt(self._rover, self._layout, ekf)
+        tilt = rut_tilt(self._rover, self._layout, ekf.mean)
         for i, gain in enumerate(self._rover.rut_tilt):
             # Specific force along the ground: f_x - f_z * tilt (body pitched up by the ruts).
             jacobian[self._layout.sinkage.start + i] += total.weight * gain
@@ -129,7 +129,7 @@ class ForceBalance(ForceRows):
         return self.row(Row(residual, jacobian, repeats * total.variance + open_variance), prior)
 
 
-def rut_tilt(rover: Rover, layout: StateLayout, ekf: GatedFilter) -> float:
+def rut_tilt(rover: Rover, layout: StateLayout, mean: FloatArray) -> float:
     """Return by how much ruts of unequal depth pitch the body up against the ground [rad]."""
-    sinkage = ekf.mean[layout.sinkage].tolist()
+    sinkage = mean[layout.sinkage].tolist()
     return sum(gain * z for gain, z in zip(rover.rut_tilt, sinkage, strict=True))

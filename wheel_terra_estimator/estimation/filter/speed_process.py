@@ -475,7 +475,7 @@ class SpeedProcess(Component[SpeedState]):
         """Keep a least slip deviation."""
         tuning = self._tuning
         typical = sum(abs(rim) for rim in known(rims)) / len(rims)
-        std = tuning.least_slip_std + tuning.turning_slip_std * min(lateral_motion, 1.0)
+        std = least_slip_std(lateral_motion, tuning)
         lacking = (typical * std) ** 2 - float(ekf.covariance[SPEED, SPEED])
         if lacking > 0.0:
             ekf.widen(SPEED, lacking)
@@ -507,3 +507,11 @@ def spread(changes: Sequence[float]) -> float:
         return 0.0
     middle = median(there)
     return median([abs(change - middle) for change in there])
+
+
+def least_slip_std(lateral_motion: float, tuning: SpeedTuning = SpeedTuning()) -> float:
+    """Return the least deviation of a speed over the rim speed [-].
+
+    `lateral_motion` is that of the outer wheels over the fastest rim speed [-].
+    """
+    return tuning.least_slip_std + tuning.turning_slip_std * min(lateral_motion, 1.0)

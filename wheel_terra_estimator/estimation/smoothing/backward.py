@@ -1,0 +1,77 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Backward pass over a tape (Rauch, Tung and Striebel 1965; Särkkä 2013, algorithm 9.1).
+
+With x, P after the last update, x', P' after the transition and x_s', P_s' smoothed there::
+
+    G   = P F^T P'^-1
+    x_s = x + G (x_s' - x')
+    P_s = P + G (P_s' - P') G^T
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wheel_terra_estimator.estimation.smoothing.tape import Gaussian, Tape, Transition
+
+FloatArray = NDArray[np.float64]
+_LEAST_PIVOT = 1e-7
+"""Square root of the least share of a variance that the other entries leave open: below it the
+inverse of a covariance is rounding."""
+
+
+def smoothed_before(
+    transition: Transition, later: Gaussian | None, lower: FloatArray, upper: FloatArray
+) -> Gaussian:
+    """Return the smoothed state before a transition.
+
+    Parameters
+    ----------
+    transition : Transition
+        Of the forward pass.
+    later : Gaussian or None
+        Smoothed state after it; None = nothing is known of what came later.
+    lower, upper : numpy.ndarray
+        (size,) bounds of the state.
+
+    Returns
+    -------
+    Gaussian
+        The filter's own where the covariance cannot be inverted.
+    """
+    before, F, after = transition
+    if later is None:
+        return before
+    scale = 1.0 / np.sqrt(np.diagonal(after.covariance))
+    correlation = after.covariance * np.outer(scale, scale)
+    try:
+        pivots = np.diagonal(np.linalg.cholesky(correlation))
+    except np.linalg.LinAlgError:
+        return before
+    if not pivots.min() > _LEAST_PIVOT:
+        return before
+    crossed = (F @ before.covariance) * scale[:, None]
+    gain = np.linalg.solve(correlation, crossed).T * scale
+    mean = before.mean + gain @ (later.mean - after.mean)
+    covariance = before.covariance + gain @ (later.covariance - after.covariance) @ gain.T
+    covariance = 0.5 * (covariance + covariance.T)
+    if not (np.isfinite(mean).all() and np.diagonal(covariance).min() > 0.0):
+        return before
+    return Gaussian(np.clip(mean, lower, upper), covariance)
+
+
+def smoothed_states(tape: Tape, lower: FloatArray, upper: FloatArray) -> Iterator[Gaussian | None]:
+    """Yield the smoothed state at each position of a tape, the last one (its length) first.
+
+    None where the filter was started anew and nothing is known of what came after.
+    """
+    state = tape.end
+    yield state
+    for position in range(len(tape) - 1, -1, -1):
+        transition = tape.transition(position)
+        state = None if transition is None else smoothed_before(transition, state, lower, upper)
+        yield state

@@ -1,0 +1,240 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""The estimates of a whole drive once it is over.
+
+The forward pass is the estimator itself. What follows from the state is worked out anew from the
+smoothed one by the very parts that the estimator has. What warns of things to come (stuck warning,
+its probability and times, rim travel left, pull margin, the words beside them) stays the filter's:
+a warning of the past is of no use, and what was warned of when is what the recording is asked
+about. So do the normal loads, which follow from attitude and specific force alone, and the rates of
+sinkage. Where the filter does not judge a wheel (class unknown), the smoother does not either.
+
+Pulls: the errors of the shear model have a short memory, and what the future says of them is worth
+less than what the filter has learned of them from the torques. They stay the filter's; and two
+estimates that err differently are best taken together, so the mean of both pulls is published.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.estimation.contacts.loads import WheelLoads
+from wheel_terra_estimator.estimation.contacts.pulls import PullEvidence, Pulls
+from wheel_terra_estimator.estimation.estimates import EstimateSet, SlipClass
+from wheel_terra_estimator.estimation.filter.force_balance import rut_tilt
+from wheel_terra_estimator.estimation.filter.speed_process import least_slip_std
+from wheel_terra_estimator.estimation.filter.state import SPEED, StateLayout
+from wheel_terra_estimator.estimation.judgement.slip import SlipJudge
+from wheel_terra_estimator.estimation.output_guard import OutputGuard
+from wheel_terra_estimator.estimation.outputs import MissingInputs, Outputs
+from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
+from wheel_terra_estimator.estimation.scalars import known
+from wheel_terra_estimator.estimation.smoothing.backward import smoothed_states
+from wheel_terra_estimator.estimation.smoothing.spool import Spool
+from wheel_terra_estimator.estimation.smoothing.tape import Gaussian, Tape, packed, unpacked
+from wheel_terra_estimator.estimation.smoothing.window import Moment, centred
+from wheel_terra_estimator.estimation.wheel_soil_estimator import Instant, WheelSoilEstimator
+
+FloatArray = NDArray[np.float64]
+
+_OF_THE_FILTER = (
+    'stuck',
+    'stuck_probability',
+    'time_to_stuck',
+    'rim_travel_left',
+    'pull_margin',
+    'reasons',
+    'faults',
+)
+"""Fields of a set that stay the filter's."""
+_NOTHING_MISSING = MissingInputs(*(False,) * len(MissingInputs._fields))
+
+
+@dataclass(frozen=True)
+class SmootherTuning:
+    """Tuned on simulated drives of both worlds, seeds 1021 to 1024."""
+
+    least_share: float = 0.7
+    """Of the filter's deviation of a speed: model errors do not average out as noise does."""
+    pull_share: float = 0.9  # of the filter's deviation of a pull
+
+
+class Kept(NamedTuple):
+    """A set of the filter, and what else came with it."""
+
+    estimates: EstimateSet
+    companion: Any
+
+
+class _Key(NamedTuple):
+    """Place of a set in a recording whose clock may step back."""
+
+    run: int = 0
+    stamp: int = 0  # [ns]
+
+    def next(self, stamp: int) -> _Key:
+        """Return the key of what follows; a stamp that goes back begins a new run."""
+        return _Key(self.run + (stamp < self.stamp), stamp)
+
+
+class DriveSmoother:
+    """Fixed-interval smoother of one drive.
+
+    Run the drive through a core with `estimator`, keep the sets that it gives, then ask for those
+    of the smoother.
+
+    Parameters
+    ----------
+    configuration : Configuration
+        Rover, soil, sensors, tuning.
+
+    Attributes
+    ----------
+    estimator : WheelSoilEstimator
+        Makes the forward pass.
+    """
+
+    def __init__(
+        self, configuration: Configuration, tuning: SmootherTuning = SmootherTuning()
+    ) -> None:
+        self._tape = Tape()
+        self.estimator = WheelSoilEstimator(configuration, self._tape)
+        self._configuration, self._tuning = configuration, tuning
+        self._kept: Spool[Kept] = Spool()
+
+    def keep(self, estimates: EstimateSet, companion: Any = None) -> None:
+        """Keep a set of the filter, with anything that is to come back beside the smoothed one."""
+        self._kept.append(Kept(estimates, companion))
+
+    def sets(self) -> Iterator[Kept]:
+        """Yield the smoothed sets in the order of those that were kept, with their companions.
+
+        A set of the filter is given as it is where there is nothing to smooth.
+        """
+        parts = _Judges(self._configuration, self._tuning)
+        guard = OutputGuard(self._configuration)
+        for kept, moment in centred(self._moments(parts)):
+            if moment is None:
+                yield kept
+                continue
+            judged = parts.judge(moment, kept.estimates)
+            yield Kept(guard.repaired(judged.stamp, judged)[0], kept.companion)
+
+    def _moments(self, parts: _Judges) -> Iterator[tuple[Kept, Moment | None]]:
+        """Yield each set that was kept with what is smoothed of its instant."""
+        moments = self._smoothed(parts)
+        place, key = _Key(), _Key()
+        moment: Moment | None = None
+        for index in range(len(self._kept)):
+            kept = self._kept[index]
+            key = key.next(kept.estimates.stamp)
+            while place < key:
+                moment = next(moments, None)
+                if moment is None:
+                    break
+                place = place.next(moment.instant.sources.stamp)
+            if moment is not None and place == key:
+                half = tuple((0.5 * (moment.pull + kept.estimates.drawbar_pull)).tolist())
+                yield kept, moment._replace(pull=np.array(half))
+            else:
+                yield kept, None
+
+    def _smoothed(self, parts: _Judges) -> Iterator[Moment]:
+        """Yield what follows from the smoothed state at each instant of the tape."""
+        tape = self._tape
+        backwards: Spool[tuple[FloatArray, FloatArray] | None] = Spool()
+        for state in smoothed_states(tape, *self.estimator.bounds):
+            backwards.append(packed(state) if state else None)
+        position, now = -1, None
+        for index in range(len(tape.marks)):
+            mark = tape.marks[index]
+            if mark.position != position:
+                position = mark.position
+                kept = backwards[len(tape) - position]
+                now = unpacked(kept) if kept else None
+            if now is None:
+                continue
+            if isinstance(mark.content, Instant):
+                yield parts.moment(mark.content, now)
+            else:
+                evidence, filtered = mark.content
+                parts.follow_pulls(evidence, filtered, now)
+
+
+class _Judges:
+    """What the estimator makes of its state, run once more over the smoothed one."""
+
+    def __init__(self, configuration: Configuration, tuning: SmootherTuning) -> None:
+        self._rover = rover = Rover.from_configuration(configuration)
+        sensors = SensorFigures.from_configuration(configuration)
+        self._layout = layout = StateLayout(rover.wheel_count)
+        self._tuning = tuning
+        self._slips = SlipJudge(configuration, rover, sensors)
+        self._pulls = Pulls(rover, sensors, WheelLoads(rover).state.load)
+        self._outputs = Outputs(configuration, rover, sensors, layout)
+
+    def follow_pulls(self, evidence: PullEvidence, filtered: FloatArray, now: Gaussian) -> None:
+        """Work out the pulls of a cycle; errors of the shear model stay those of the filter."""
+        mean, own = now.mean.copy(), self._layout.shear_error
+        mean[own] = filtered[own]
+        tilt = rut_tilt(self._rover, self._layout, mean)
+        self._pulls.update(mean, now.covariance, evidence, tilt=tilt)
+
+    def moment(self, instant: Instant, now: Gaussian) -> Moment:
+        """Return what is smoothed of an instant."""
+        # Between two cycles the speed is carried on from the state; so is its correction.
+        given = instant.sources
+        speed = given.speed + float(now.mean[SPEED]) - instant.cycle_speed
+        carried = max(given.speed_variance - instant.cycle_variance, 0.0)
+        variance = float(now.covariance[SPEED, SPEED]) + carried
+        heard = known(given.rims)
+        typical = sum(map(abs, heard)) / len(given.rims)
+        least = max(
+            typical * least_slip_std(instant.motion.lateral_motion),
+            self._tuning.least_share * instant.motion.speed_std,
+        )
+        return Moment(
+            instant,
+            now,
+            np.array(given.rims),
+            speed,
+            given.yaw_rate,
+            max(math.sqrt(variance), least),
+            np.array(self._pulls.state.pull),
+        )
+
+    def judge(self, moment: Moment, live: EstimateSet) -> EstimateSet:
+        """Return the estimates of a moment; `live` is what the filter said of it."""
+        given = moment.instant.sources
+        rims = tuple(moment.rims.tolist())
+        body = moment.instant.motion._replace(
+            speed=moment.speed, speed_std=moment.speed_std, yaw_rate=moment.yaw_rate
+        )
+        slips = self._slips.update(moment.instant.time, rims, body)
+        smoothed = self._outputs.estimate_set(
+            given._replace(
+                mean=moment.state.mean,
+                covariance=moment.state.covariance,
+                rims=rims,
+                speed=moment.speed,
+                speed_variance=moment.speed_std**2,
+                yaw_rate=moment.yaw_rate,
+                slips=slips,
+            ),
+            _NOTHING_MISSING,
+        )
+        unknown = live.slip_class == SlipClass.UNKNOWN
+        return replace(
+            smoothed,
+            drawbar_pull=moment.pull,
+            drawbar_pull_std=self._tuning.pull_share * live.drawbar_pull_std,
+            slip_class=np.where(unknown, live.slip_class, smoothed.slip_class),
+            **{name: getattr(live, name) for name in _OF_THE_FILTER},
+        )

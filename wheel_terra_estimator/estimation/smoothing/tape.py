@@ -1,0 +1,132 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""What the forward pass of the estimator keeps for the backward pass.
+
+The filter changes its state in four ways, and each is one thing to a smoother:
+
+* a prediction, a widening (process noise by another name) and an entry that is set (its row of the
+  transition matrix is zero) are transitions: mean and covariance before and after, and F;
+* a measurement changes what is known of the state and not the state: nothing is kept;
+* a start anew is a cut, over which nothing of the future is carried back.
+
+So the prediction on the tape is exactly what the next update started from. Of a covariance one
+triangle is kept, of F what differs from no change.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wheel_terra_estimator.estimation.smoothing.spool import Spool
+
+FloatArray = NDArray[np.float64]
+
+
+class Gaussian(NamedTuple):
+    """Mean (size,) and covariance (size, size) of the state."""
+
+    mean: FloatArray
+    covariance: FloatArray
+
+
+class Transition(NamedTuple):
+    """A step of the state: x' = F x + ... + noise, to first order."""
+
+    before: Gaussian
+    F: FloatArray  # (size, size)
+    after: Gaussian
+
+
+class Mark(NamedTuple):
+    """Something of the forward pass that is to be worked out anew from the smoothed state."""
+
+    position: int  # transitions before it
+    content: Any
+
+
+class TapeLength(NamedTuple):
+    """What `Tape.restore` needs."""
+
+    transitions: int
+    marks: int
+
+
+class Tape:
+    """Transitions and marks of a drive in the order of their stamps.
+
+    It is a part of the estimator like any other: where the estimator goes back to an earlier state
+    for a late input, the tape is wound back with it.
+    """
+
+    def __init__(self) -> None:
+        self._transitions: Spool[tuple[FloatArray, ...] | None] = Spool()  # None: a cut
+        self.marks: Spool[Mark] = Spool()
+        self._end: tuple[int, Gaussian] | None = None
+
+    def __len__(self) -> int:
+        return len(self._transitions)
+
+    def add(self, before: Gaussian, F: FloatArray, after: Gaussian) -> None:
+        """Keep a transition."""
+        change = F - np.eye(len(F))
+        places = np.flatnonzero(change)
+        self._transitions.append(
+            (*packed(before), places.astype(np.uint16), change.ravel()[places], *packed(after))
+        )
+
+    def cut(self) -> None:
+        """Keep that the filter was started anew."""
+        self._transitions.append(None)
+
+    def transition(self, index: int) -> Transition | None:
+        """Return a transition; None: a cut."""
+        kept = self._transitions[index]
+        if kept is None:
+            return None
+        mean, triangle, places, change, mean_after, triangle_after = kept
+        F = np.eye(len(mean))
+        F.ravel()[places] += change
+        return Transition(unpacked((mean, triangle)), F, unpacked((mean_after, triangle_after)))
+
+    def mark(self, content: Any, present: Gaussian) -> None:
+        """Keep something that belongs to the present state."""
+        position = len(self)
+        self.marks.append(Mark(position, content))
+        self._end = position, Gaussian(present.mean.copy(), present.covariance.copy())
+
+    @property
+    def end(self) -> Gaussian | None:
+        """The filter's state after the last transition; None where it is not known."""
+        if self._end is None or self._end[0] != len(self):
+            return None
+        return self._end[1]
+
+    # -- Part of the estimator -------------------------------------------------------------------
+
+    def reset(self) -> None:
+        """Leave everything: a new run of the same recording goes on behind the cut."""
+
+    def snapshot(self) -> TapeLength:
+        """Return how far the tape is."""
+        return TapeLength(len(self), len(self.marks))
+
+    def restore(self, snapshot: TapeLength) -> None:
+        """Wind the tape back."""
+        self._transitions.truncate(snapshot.transitions)
+        self.marks.truncate(snapshot.marks)
+
+
+def packed(state: Gaussian) -> tuple[FloatArray, FloatArray]:
+    """Return the mean and the lower triangle of the covariance, row by row."""
+    return state.mean.copy(), state.covariance[np.tril_indices(len(state.mean))]
+
+
+def unpacked(kept: tuple[FloatArray, FloatArray]) -> Gaussian:
+    """Return the state of which `packed` gave the parts."""
+    mean, triangle = kept
+    covariance = np.zeros((len(mean),) * 2)
+    covariance[np.tril_indices(len(mean))] = triangle
+    return Gaussian(mean, covariance + np.tril(covariance, -1).T)

@@ -1,0 +1,121 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Means over a window around each set: the noise of encoders, gyro and torques is not in the state.
+
+The smoothed state says how fast the rover was; slip and pull also take the rim speeds, the yaw rate
+and the torques of the moment, with their noise. A window that lies evenly around a moment takes the
+noise and delays nothing. It ends where a wheel starts, stops or turns round, where sets are
+missing, and it is never longer on one side than on the other.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterable, Iterator
+from typing import Generic, NamedTuple, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wheel_terra_estimator.estimation.smoothing.tape import Gaussian
+from wheel_terra_estimator.estimation.wheel_soil_estimator import Instant
+
+FloatArray = NDArray[np.float64]
+Companion = TypeVar('Companion')
+
+HALF_WIDTH = 0.5
+"""Of the window [s]; tuned on simulated drives of both worlds, seeds 1021 to 1024."""
+LONGEST_GAP = 0.25  # between two sets of a window [s]
+TURNING = 5e-3
+"""Rim speed above which a wheel turns [m/s]."""
+_ROUNDING = 1e-6  # [s]
+
+
+class Moment(NamedTuple):
+    """What is smoothed of an instant."""
+
+    instant: Instant
+    state: Gaussian
+    rims: FloatArray  # (n,) [m/s], nan = unknown
+    speed: float  # [m/s]
+    yaw_rate: float  # [rad/s]
+    speed_std: float
+    pull: FloatArray  # (n,) [N]
+
+
+class _Place(NamedTuple, Generic[Companion]):
+    companion: Companion
+    moment: Moment
+    begin: float  # of the stretch that may be averaged [s]
+
+
+def centred(
+    pairs: Iterable[tuple[Companion, Moment | None]],
+) -> Iterator[tuple[Companion, Moment | None]]:
+    """Yield the same pairs with rim speeds, speed, yaw rate and pull over load averaged."""
+    places: deque[_Place[Companion]] = deque()
+    given = 0  # of the places: how many were yielded and wait for others' windows
+    for companion, moment in pairs:
+        before = places[-1] if places else None
+        goes_on = before is not None and moment is not None and _alike(before.moment, moment)
+        if before is not None and not goes_on:
+            yield from _averaged(places, given, before.moment.instant.time)
+            places.clear()
+            given = 0
+        if moment is None:
+            yield companion, None
+            continue
+        time = moment.instant.time
+        places.append(_Place(companion, moment, places[-1].begin if places else time))
+        while places[given].moment.instant.time + HALF_WIDTH <= time + _ROUNDING:
+            place = places[given]
+            yield place.companion, _mean_around(place, places, time)
+            given += 1
+        oldest = places[given].moment.instant.time - HALF_WIDTH - _ROUNDING
+        while places[0].moment.instant.time < oldest:
+            places.popleft()
+            given -= 1
+    if places:
+        yield from _averaged(places, given, places[-1].moment.instant.time)
+
+
+def _averaged(
+    places: deque[_Place[Companion]], given: int, end: float
+) -> Iterator[tuple[Companion, Moment]]:
+    """Yield what waits at the end of a stretch [s]."""
+    for index in range(given, len(places)):
+        yield places[index].companion, _mean_around(places[index], places, end)
+
+
+def _mean_around(place: _Place[Companion], places: deque[_Place[Companion]], end: float) -> Moment:
+    """Return the mean around a place within its stretch, which ends at `end` [s] or later."""
+    moment = place.moment
+    time = moment.instant.time
+    half = min(HALF_WIDTH, time - place.begin, end - time) + _ROUNDING
+    near = [p.moment for p in places if abs(p.moment.instant.time - time) <= half]
+    load = np.array(moment.instant.sources.loads.load)
+    share = np.mean([m.pull / _load(m) for m in near], axis=0)
+    return moment._replace(
+        rims=np.mean([m.rims for m in near], axis=0),
+        speed=float(np.mean([m.speed for m in near])),
+        yaw_rate=float(np.mean([m.yaw_rate for m in near])),
+        pull=np.where(load > 0.0, share * load, moment.pull),
+    )
+
+
+def _load(moment: Moment) -> FloatArray:
+    """Return the loads (n,) to divide by [N]."""
+    load = np.array(moment.instant.sources.loads.load)
+    return np.where(load > 0.0, load, np.inf)
+
+
+def _alike(before: Moment, after: Moment) -> bool:
+    """Whether a window may reach over both moments."""
+    if not 0.0 < after.instant.time - before.instant.time <= LONGEST_GAP:
+        return False
+    return bool(np.array_equal(_turning(before), _turning(after), equal_nan=True))
+
+
+def _turning(moment: Moment) -> FloatArray:
+    """Return per wheel (n,): 1 forward, -1 backward, 0 stands, nan unknown."""
+    return np.where(np.abs(moment.rims) < TURNING, 0.0, 1.0) * np.sign(moment.rims)
