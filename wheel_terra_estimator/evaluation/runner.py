@@ -38,8 +38,8 @@ MODES = (
     'smoothed',
     'smoothed_no_reference',
 )
-"""What the estimator gets: everything, all but one input, or the reference sooner or later; and what
-the smoother makes of it."""
+"""What the estimator gets: everything, all but one input, or the reference sooner or later; and
+what the smoother makes of it."""
 SMOOTHED = 'smoothed'
 
 
