@@ -128,7 +128,8 @@ def fit(file: Path, around: Path | None) -> None:
     """
     known = json.loads(around.read_text()) if around else {'features': []}
     records = [json.loads(line) for line in file.read_text().splitlines()]
-    records = [record for record in records if 'features' in record]
+    # Where an effect that looks like the name was left out, its share is taken off by rule.
+    records = [r for r in records if 'features' in r and not r['features'].get('alike', 0.0)]
     x = np.array([[record['features'][name] for name in confidence.FEATURES] for record in records])
     design = np.array([record['design'] for record in records])
     result: dict[str, object] = {'features': list(confidence.FEATURES), 'names': len(records)}

@@ -153,3 +153,54 @@ def test_noise_makes_virtual_measurements(capsys: pytest.CaptureFixture[str]) ->
 def test_noise_that_makes_no_sense(noise: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main([*BASE, '--slip', '0.1', '--load', '80', f'--noise={noise}']) == 2
     assert '--noise' in capsys.readouterr().err
+
+
+def test_a_wheel_climbs_at_the_slip_that_gives_the_pull(capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = [*BASE, '--climb', 'wheel', '--load', '80', '--slope', '0:0.9:10']
+    assert main(arguments) == 0
+    out = capsys.readouterr()
+    climbed = table(out.out)
+    steep = np.isnan(climbed['slip'])
+    assert 'too steep' in out.err and steep[-1] and not steep[:3].any()
+    assert (np.diff(climbed['slip'][~steep]) > 0.0).all()
+    assert climbed['drawbar_pull'][~steep] == pytest.approx(
+        80.0 * np.sin(climbed['slope'][~steep]), abs=0.02
+    )
+    assert climbed['normal_load'] == pytest.approx(80.0 * np.cos(climbed['slope']))
+    # The same numbers from the curves of a driven wheel under that load.
+    row = 2
+    slip, load = climbed['slip'][row], climbed['normal_load'][row]
+    assert main([*BASE, '--slip', f'{slip:.9f}', '--load', f'{load:.9f}']) == 0
+    driven = table(capsys.readouterr().out)
+    for name in ('sinkage', 'drawbar_pull', 'torque'):
+        assert driven[name][0] == pytest.approx(climbed[name][row], rel=1e-4)
+
+
+def test_a_rover_climbs_on_all_its_wheels(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rover = (
+        'predict',
+        '--config',
+        'generic_six_wheel',
+        '--config',
+        'test_sand',
+        '--climb',
+        'rover',
+    )
+    assert main([*rover, '--slope', '0,0.2']) == 0
+    rows = table(capsys.readouterr().out)
+    configuration = reader.load(['generic_six_wheel', 'test_sand'])
+    weight = float(configuration.rover.mass) * float(configuration.rover.gravity)
+    uphill = rows['slope'] == 0.2
+    assert uphill.sum() == configuration.wheels.count
+    assert len(set(rows['slip'][uphill])) == 1
+    assert rows['drawbar_pull'][uphill].sum() == pytest.approx(weight * np.sin(0.2), abs=0.1)
+    assert rows['normal_load'][uphill].sum() == pytest.approx(weight * np.cos(0.2), rel=1e-6)
+    # The rear wheels carry more uphill than on the level.
+    rear = configuration.wheels.x == configuration.wheels.x.min()
+    assert (rows['normal_load'][uphill][rear] > rows['normal_load'][~uphill][rear]).all()
+    assert main([*rover, '-o', str(tmp_path / 'climb.png')]) == 0
+    assert (tmp_path / 'climb.png').stat().st_size > 5000
+    assert main([*rover, '--load', '80']) == 2
+    assert main([*rover, '--slip', '0.2']) == 2

@@ -101,7 +101,9 @@ def test_strangers_of_another_hand_shrink_on_loads_and_lugs_left_out():
         assert np.sqrt(law / refit) < 0.5, name
 
 
-@pytest.mark.parametrize(('seed', 'design', 'name'), [(507, 'full56', 'side_drag')])
+@pytest.mark.parametrize(
+    ('seed', 'design', 'name'), [(507, 'full56', 'side_drag'), (509, 'slope48', 'crosstalk')]
+)
 def test_strangers_that_listed_effects_imitate_are_not_named_with_confidence(seed, design, name):
     """A drag as a bulldozing with another radius, a crosstalk as a gain: said, but as a guess."""
     plan = Plan(hide='outside', names=(name,), noise='mixed')

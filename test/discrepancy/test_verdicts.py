@@ -163,3 +163,13 @@ def test_two_tables_with_other_lugs_share_one_soil_and_tell_more():
     assert found.gap['sinkage'].after == pytest.approx(whole.gap['sinkage'].after, rel=0.05)
     assert any('2 tables share one soil' in note for note in found.notes)
     assert together(parts[:1]) is parts[0]
+
+
+def test_a_name_leaves_room_for_an_effect_that_looks_like_it_and_was_not_tried():
+    table, values, *_ = make('slope48', ('pitch_bias',), 3.0)
+    free = run(table, values)
+    narrow = run(table, values, options=Options(effects=('pitch_bias',)))
+    assert free.effects[0].name == narrow.effects[0].name == 'pitch_bias'
+    assert narrow.effects[0].confidence <= 0.5
+    assert any('bulldozing' in note and 'not tried' in note for note in narrow.notes)
+    assert not any('not tried' in note for note in free.notes)

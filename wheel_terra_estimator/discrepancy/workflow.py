@@ -344,7 +344,10 @@ def _report(
         remainder_p_value=left.p_value,
         remainder_amplitude=left.amplitude,
         floor=floor,
-        notes=words.notes(both, findings, after, stretch),
+        notes=(
+            *words.notes(both, findings, after, stretch),
+            *words.untried({e.name: known_alike(e.name, findings, known) for e in effects}),
+        ),
         base_effects=tuple(configuration.effects),
         refitted=_parameters(after, covariance, base=True),
         nearest=nearest,
@@ -413,7 +416,9 @@ def _named(
     for place, name in enumerate(fitted.names):
         values = confidences.features(findings.selection, verdict, place, left) | shown
         values['strength'] = _strength(fitted, name)
-        sure = confidences.confidence(values)
+        alike = known_alike(name, findings, known)
+        values['alike'] = float(len(alike))
+        sure = confidences.confidence(values, len(alike))
         rivals = verdict.open_sets[place]
         forms = {
             explanation.names[0]: float(log_sum(findings.selection.joint_of(explanation.names)))
@@ -476,6 +481,23 @@ def _proposal(
         soil=_soil_shifts(findings, found.fit, variance),
         refitted={key: value for key, value in base.items() if not key.startswith(f'{NAME}.')},
     )
+
+
+def known_alike(name: str, findings: Findings, known: Mapping[str, Effect]) -> tuple[str, ...]:
+    """Return effects that are known to look like a name, might be named, and were not tried."""
+    on = set(findings.setting.forward.base_effects)
+    own = known[effect_of(name)].confounded_with
+    others = (
+        other.base_name for other in known.values() if effect_of(name) in other.confounded_with
+    )
+
+    def might_be(other: str) -> bool:
+        return other not in known or (
+            known[other].candidate and not known[other].incompatible_with & on
+        )
+
+    names = dict.fromkeys((*own, *others))
+    return tuple(other for other in names if other not in findings.tried and might_be(other))
 
 
 def _nearest(findings: Findings) -> tuple[str, ...]:

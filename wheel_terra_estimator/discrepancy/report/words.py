@@ -265,6 +265,16 @@ def notes(
     return tuple(found)
 
 
+def untried(alike: Mapping[str, tuple[str, ...]]) -> tuple[str, ...]:
+    """Return remarks on effects that look like a named one and were not tried."""
+    return tuple(
+        f'{", ".join(others)} {"looks" if len(others) == 1 else "look"} like {name} and '
+        f'{"was" if len(others) == 1 else "were"} not tried: the confidence leaves room for that'
+        for name, others in alike.items()
+        if others
+    )
+
+
 def sentence(
     verdict: Verdict,
     effects: tuple[NamedEffect, ...],

@@ -77,6 +77,8 @@ class Findings:
         Effect -> reason.
     noise : Noise
     outliers : tuple of (row, quantity, deviation)
+    tried : frozenset of str
+        Effects that might have been named, seen or not, and those that were on already.
     """
 
     setting: Setting
@@ -86,6 +88,7 @@ class Findings:
     not_visible: Mapping[str, str]
     noise: Noise
     outliers: tuple[tuple[int, int, float], ...]
+    tried: frozenset[str] = frozenset()
 
 
 def search(
@@ -152,6 +155,7 @@ def search(
             _not_visible(reasons, found, selection),
             noise,
             tuple(outliers),
+            frozenset(map(effect_of, (*effects, *forward.base_effects))),
         )
         if turn == _PASSES - 1:
             break

@@ -1,0 +1,100 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Slip against slope: a wheel or a whole rover that climbs by itself (``predict --climb``)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wheel_terra_estimator.configuration.readings import Readings
+from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.terramechanics.model import WheelSoilModel
+from wheel_terra_estimator.terramechanics.slope_locomotion import rover_climb
+from wheel_terra_estimator.terramechanics.wheel import Wheel
+
+if TYPE_CHECKING:
+    from wheel_terra_estimator.configuration.configuration import Configuration
+
+FloatArray = NDArray[np.float64]
+WHO = ('wheel', 'rover')
+OUTPUTS = ('sinkage', 'drawbar_pull', 'torque')
+STEEPEST = np.radians(60.0)  # [rad]
+
+
+def climb(
+    configuration: Configuration,
+    who: str,
+    wheel: int,
+    weight: float,
+    slopes: FloatArray,
+    method: str,
+) -> dict[str, FloatArray]:
+    """Return the steady state of free travel on each slope; nan where the slope is too steep.
+
+    Parameters
+    ----------
+    who : str
+        ``wheel``: one wheel under ``weight``; ``rover``: all wheels, their loads moved by the slope
+        as the suspension does it; one row per slope and wheel, in the order of ``wheels.names``.
+    weight : float
+        Weight on the wheel, W [N]: the soil carries W cos(slope), the pull is W sin(slope).
+    slopes : numpy.ndarray
+        (N,) positive uphill [rad].
+
+    Raises
+    ------
+    UserError
+        For a slope beyond 60 degrees, or an effect that makes the balance already.
+    """
+    if np.abs(slopes).max() > STEEPEST:
+        raise UserError('--slope: slopes of --climb are at most 1.05 rad (60 degrees)')
+    if 'slope_gravity' in configuration.effects:
+        raise UserError(
+            'effects.slope_gravity.enabled: --climb makes the balance on the slope itself; leave '
+            'the effect off'
+        )
+    model = WheelSoilModel(configuration.soil, configuration.effects, method, strict=False)
+    wheels = configuration.wheels
+    chosen = list(range(wheels.count)) if who == 'rover' else [wheel]
+    if who == 'rover':
+        from wheel_terra_estimator.estimation.rover import Rover
+
+        rover = Rover.from_configuration(configuration)
+        loads = np.array(
+            [
+                rover.load.loads((rover.gravity * np.sin(a), 0.0, rover.gravity * np.cos(a)))
+                for a in slopes
+            ]
+        )
+    else:
+        loads = weight * np.cos(slopes)[:, None]
+    state = rover_climb(
+        model,
+        Wheel(
+            *(
+                np.asarray(getattr(wheels, name), dtype=float)[chosen]
+                for name in ('radius', 'width', 'lug_height', 'lug_count', 'lug_thickness')
+            )
+        ),
+        loads,
+        slopes,
+        np.asarray(wheels.passes, dtype=float)[chosen],
+        configuration.slip_radius,
+        float(configuration.rover.gravity),
+    )
+    count = len(chosen)
+    result = {
+        'slope': np.repeat(state.slope, count),
+        'slip': np.repeat(state.slip, count),
+        'normal_load': loads.ravel(),
+    }
+    if who == 'rover':
+        result['pass_number'] = np.tile(np.asarray(wheels.passes, dtype=float), len(slopes))
+    read = [Readings.of(configuration, index) for index in chosen]
+    true = np.stack([getattr(state, name) for name in OUTPUTS], axis=-1)  # (slopes, wheels, 3)
+    readings = np.stack([one.read(true[:, k]) for k, one in enumerate(read)], axis=1)
+    result |= dict(zip(OUTPUTS, readings.reshape(-1, len(OUTPUTS)).T, strict=True))
+    return result
