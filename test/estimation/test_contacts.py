@@ -9,7 +9,7 @@ import pytest
 from parts import SAND, Parts
 
 from wheel_terra_estimator.configuration import reader
-from wheel_terra_estimator.estimation.contacts.contact_age import ContactAge
+from wheel_terra_estimator.estimation.contacts.contact_age import ContactAge, ContactAgeTuning
 from wheel_terra_estimator.estimation.contacts.demand import Demand
 from wheel_terra_estimator.estimation.contacts.linearisation import Linearisation, traction_slope
 from wheel_terra_estimator.estimation.contacts.loads import LoadState, WheelLoads
@@ -415,3 +415,15 @@ def test_the_pull_follows_a_torque_that_the_model_does_not_explain(parts):
     # What the sensor's zero may be is not believed, nor what a turn may do.
     assert published_pull(parts, 0.05)[0] == pytest.approx(forces.pull, abs=1e-3)
     assert published_pull(parts, 6.0, lateral_motion=0.5)[0] == pytest.approx(forces.pull)
+
+
+def test_the_doubt_of_the_shear_model_is_the_stated_one_at_a_contact_length(parts):
+    """And falls by the same factor over each further one."""
+    age, variances = ContactAge(parts.rover), []
+    for _ in range(3):
+        age.advance(parts.rover.contact_length)
+        variances.append(age.shear_variance)
+    tuning = ContactAgeTuning()
+    assert variances[0] == pytest.approx(tuning.start_variance)
+    assert variances[1] / variances[0] == pytest.approx(np.exp(-tuning.decay))
+    assert variances[2] / variances[1] == pytest.approx(np.exp(-tuning.decay))

@@ -16,7 +16,7 @@ from wheel_terra_estimator.estimation.filter.observability import considered_ent
 from wheel_terra_estimator.estimation.filter.prediction import Prediction
 from wheel_terra_estimator.estimation.filter.reference import ReferenceUpdate
 from wheel_terra_estimator.estimation.filter.repetition import repetitions
-from wheel_terra_estimator.estimation.filter.sinkage import SinkageUpdate
+from wheel_terra_estimator.estimation.filter.sinkage import SinkageUpdate, SinkageUpdateTuning
 from wheel_terra_estimator.estimation.filter.sinkage_process import SinkageProcess
 from wheel_terra_estimator.estimation.filter.soil_process import SoilProcess
 from wheel_terra_estimator.estimation.filter.state import (
@@ -464,3 +464,54 @@ def test_a_vibrating_accelerometer_weakens_the_balance(parts):
     shaken = balance.sum_of_pulls(window(0.0, 9.8, noise=0.01), loads, 0.0)
     added = parts.rover.mass**2 * (0.1 - parts.sensors.specific_force_std**2 / 5)
     assert shaken.variance - calm.variance == pytest.approx(added)
+
+
+def test_two_readings_of_the_sinkage_are_the_textbook_update(parts, ekf):
+    """Information adds up: that of the state, and that of their mean with its floor."""
+    update = SinkageUpdate(parts.configuration, parts.sensors, parts.layout)
+    zi, floor = parts.layout.sinkage.start, SinkageUpdateTuning().floor_variance
+    ekf.set(zi, 0.03, 0.002**2)
+    ekf.fuse(update.update(ekf, 0.0, SinkageSums((0.062,) + (0.0,) * 5, (2,) + (0,) * 5)))
+    noise = parts.sensors.sinkage_std**2 / 2.0 + floor
+    information = 1.0 / 0.002**2 + 1.0 / noise
+    assert float(ekf.covariance[zi, zi]) == pytest.approx(1.0 / information)
+    mean = (0.03 / 0.002**2 + 0.031 / noise) / information
+    assert float(ekf.mean[zi]) == pytest.approx(mean)
+
+
+@pytest.mark.parametrize('entry', ['sinkage', 'stiffness', 'slip_sinkage', 'speed'])
+def test_the_jacobian_of_a_settled_sinkage_is_its_derivative(parts, ekf, entry):
+    part = parts.layout.sinkage
+    settled, _, _ = relaxed(parts, ekf, 60.0, speed=0.04)
+    column = {
+        'sinkage': part.start,
+        'stiffness': parts.layout.stiffness.start,
+        'slip_sinkage': SLIP_SINKAGE,
+        'speed': SPEED,
+    }[entry]
+
+    def predicted(step):
+        x = ekf.mean.copy()
+        x[SPEED], x[part] = 0.04, settled
+        x[column] += step
+        prediction = Prediction.unchanged(x)
+        SinkageProcess(parts.rover, parts.layout, parts.models, 0.0).predict(
+            prediction,
+            x,
+            0.1,
+            rims=FORWARD,
+            loads=WheelLoads(parts.rover).state.load,
+            yaw_rate=0.0,
+            headings=straight_headings(parts.rover),
+            leaving_angles=(NAN,) * 6,
+            reference_known=True,
+        )
+        return prediction
+
+    step = {'sinkage': 1e-4, 'speed': 1e-4}.get(entry, 1e-3)
+    difference = (predicted(step).mean - predicted(-step).mean)[part.start] / (2.0 * step)
+    stated = predicted(0.0).F[part.start, column]
+    if entry == 'sinkage':  # what is forgotten; the law's slope is a number of the tuning
+        assert 1.0 - stated == pytest.approx(1.0 - difference, rel=0.25)
+    else:
+        assert stated == pytest.approx(difference, rel=0.1)

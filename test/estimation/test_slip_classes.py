@@ -4,6 +4,7 @@
 
 import pytest
 
+from wheel_terra_estimator.estimation.estimates import SlipClass
 from wheel_terra_estimator.estimation.judgement.classes import (
     ClassState,
     SlipClassifier,
@@ -68,3 +69,13 @@ def test_the_hysteresis_is_what_keeps_a_flicker_out():
 def test_probability_of_a_gaussian():
     assert exceedance_probability(0.8, 0.1, 0.8) == pytest.approx(0.5)
     assert exceedance_probability(0.8, 0.1, 0.8 + 0.1) == pytest.approx(0.158655, abs=1e-5)
+
+
+@pytest.mark.parametrize('start', [0.0, 0.1, 0.4, 0.7])
+def test_a_first_class_of_stuck_comes_at_the_dwell_whatever_the_stamps_round_to(start):
+    """0.7 - 0.4 is a little less than 0.3 in floating point, 0.4 - 0.1 a little more."""
+    classifier, state, found = SlipClassifier(BORDERS, 0.02, 0.3), ClassState(), []
+    for i in range(5):
+        state = classifier.update(state, start + 0.1 * i, 0.95, 0.01, False)
+        found.append(state.current)
+    assert found == [SlipClass.UNKNOWN] * 3 + [3] * 2

@@ -12,6 +12,7 @@ from wheel_terra_estimator.estimation.filter.speed_process import (
     RimSpeeds,
     SpeedProcess,
     SpeedStep,
+    SpeedTuning,
 )
 from wheel_terra_estimator.estimation.filter.state import SLIP_PER_DEMAND, SPEED
 from wheel_terra_estimator.estimation.inputs.inertial import InertialWindow
@@ -206,3 +207,21 @@ def test_the_slip_of_a_start_walks_farther():
     assert made.state.ratio_walk == 0.6  # a locked wheel digs in
     assert walks[0] > 2.0 * walks[2]
     assert walks[0] > walks[1] > walks[2]
+
+
+def test_without_a_reference_the_ratio_returns_to_the_usual_one_over_travel():
+    """As a first-order process in travel: a share of exp(-1) is left after its length."""
+    made, rim = process([0.05] * 6), 0.05
+    free = SpeedStep(1.0, 0.0, 0.0, 0.0)
+    length = SpeedTuning().usual_length
+
+    def after(travel):
+        return made.towards_usual_slip(free, travel / rim, rim, direction=1.0, slope_share=0.0)
+
+    assert after(length).speed_gain == pytest.approx(np.exp(-1.0))
+    usual = after(1e3 * length).constant
+    assert 0.5 * rim < usual < rim
+    twice = after(0.5 * length)
+    gain, constant = twice.speed_gain, twice.constant
+    assert gain * constant + constant == pytest.approx(after(length).constant), 'two halves'
+    assert (gain**2 + 1.0) * twice.variance == pytest.approx(after(length).variance)

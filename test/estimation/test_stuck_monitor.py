@@ -346,3 +346,39 @@ def test_an_accelerometer_alone_raises_nothing():
             for i in range(200)
         ]
         assert (first(found) is not None) == told
+
+
+def test_a_wheel_whose_slip_is_not_known_or_brakes_has_no_entrapment_in_sight():
+    rows = [[wheel(0.95), wheel(0.95, known=False), wheel(-0.3), wheel(0.1)]] * 30
+    chances = [wheel.probability for wheel in course(rows)[-1].wheels]
+    assert chances[0] > 0.5
+    assert chances[1] == chances[2] == 0.0
+
+
+def test_held_wheels_count_while_the_drive_is_being_stopped_too():
+    """A driver who takes the speed back because the rover is held is still held."""
+    rolling = [wheel(0.2, rim=0.5, torque=0.2)] * 4
+    monitor = StuckMonitor()
+    for i in range(30):
+        judge(monitor, 0.1 * i, 0.4, True, rolling)
+    found = []
+    for i in range(12):
+        rim = 0.5 - 0.02 * i
+        stands = wheel(0.0, rim=0.0, known=False, torque=0.95)
+        held = [stands, *[wheel(0.75, rim=rim, torque=0.1)] * 2, wheel(0.1, rim=0.3 * rim)]
+        found.append(judge(monitor, 3.0 + 0.1 * i, 0.2 * rim, True, held))
+    assert found[-1].stuck
+    assert 'others held' in found[-1].reason
+
+
+def test_a_growth_right_after_a_start_says_nothing_though_the_rover_drove_before():
+    """Slip settles over the first travel after each start, not after the first one only."""
+
+    def warned(pause):
+        slips = [0.2] * 100 + [min(0.2 + 0.1 * 0.1 * i, 0.68) for i in range(60)]
+        rows = [[wheel(s)] * 6 for s in slips]
+        standing = [[wheel(0.0, rim=0.0, known=False)] * 6] * pause
+        return any(a.stuck for a in course([*rows[:100], *standing, *rows[100:]]))
+
+    assert warned(pause=0)
+    assert not warned(pause=30)

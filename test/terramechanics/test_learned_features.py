@@ -1,0 +1,55 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Features of the learned closure, by hand."""
+
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from wheel_terra_estimator.terramechanics.effects.learned_closure import FEATURES
+from wheel_terra_estimator.terramechanics.maths import ScalarMaths
+
+CONTACT = {
+    'slip': -0.5,
+    # Ten times rho g b r^2.
+    'stated_load': 10.0 * 1600.0 * 9.8 * 0.1 * 0.2**2,
+    'density': 1600.0,
+    'gravity': 9.8,
+    'width': 0.1,
+    'radius': 0.2,
+    'lug_height': 0.01,
+    'rim_speed': 0.5,
+    'pass_number': 3.0,
+    'slope': 0.1,
+    'entrance_angle': math.acos(0.75),
+}
+BY_HAND = {
+    'one': 1.0,
+    'slip': 0.5,
+    'slip_squared': 0.25,
+    'slip_over_02': 0.3,
+    'slip_over_04': 0.1,
+    'slip_over_06': 0.0,
+    'load': 1.0,  # a decade
+    'lug': 0.05,
+    'width': 0.5,
+    'rim_speed': 1.0,  # a decade above 0.05 m/s
+    'pass': 2.0,  # earlier ones
+    'slope': 0.1,
+    'depth': 0.25,  # z/r = 1 - cos(t1)
+}
+
+
+@pytest.mark.parametrize('name', FEATURES)
+def test_a_feature_is_what_it_says(name):
+    contact = SimpleNamespace(**CONTACT)
+    arrays = SimpleNamespace(**{key: np.array([value]) for key, value in CONTACT.items()})
+    assert FEATURES[name].value(contact, ScalarMaths) == pytest.approx(BY_HAND[name], abs=1e-12)
+    assert FEATURES[name].value(arrays, np) == pytest.approx([BY_HAND[name]], abs=1e-12)
+
+
+def test_a_rim_speed_that_was_not_recorded_is_the_usual_one():
+    contact = SimpleNamespace(**{**CONTACT, 'rim_speed': math.nan})
+    assert FEATURES['rim_speed'].value(contact, ScalarMaths) == 0.0
