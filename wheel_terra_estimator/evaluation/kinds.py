@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from typing import Any
 
 TUNING_SEEDS = range(1000, 1020)
-TEST_SEEDS = range(2163, 2223)  # 2000 to 2162 were looked at while the filter was built
+TEST_SEEDS = range(2166, 2226)  # 2000 to 2165 were looked at while the filter was built
 
 # Nominal soils: a file of config/soils and what differs from it.
 _HIT = ('hit_lss1', 'soil.leaving_angle_ratio:=-0.1')
