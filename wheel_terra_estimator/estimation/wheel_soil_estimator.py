@@ -50,7 +50,7 @@ from wheel_terra_estimator.estimation.filter.sinkage import SinkageUpdate
 from wheel_terra_estimator.estimation.filter.sinkage_process import SinkageProcess
 from wheel_terra_estimator.estimation.filter.soil_process import SoilProcess
 from wheel_terra_estimator.estimation.filter.speed_process import RimSpeeds, SpeedProcess
-from wheel_terra_estimator.estimation.filter.state import SPEED, StateLayout
+from wheel_terra_estimator.estimation.filter.state import GRAVITY_BIAS, SPEED, StateLayout
 from wheel_terra_estimator.estimation.filter.torque import TorqueUpdate
 from wheel_terra_estimator.estimation.filter.zero_velocity import ZeroVelocityUpdate
 from wheel_terra_estimator.estimation.inputs.contact_sensors import (
@@ -58,6 +58,7 @@ from wheel_terra_estimator.estimation.inputs.contact_sensors import (
     SinkageInput,
 )
 from wheel_terra_estimator.estimation.inputs.inertial import InertialInput, InertialWindow
+from wheel_terra_estimator.estimation.inputs.seen_noise import SeenNoise
 from wheel_terra_estimator.estimation.inputs.wheel_odometry import WheelOdometryInput
 from wheel_terra_estimator.estimation.judgement.pull_margin import PullMargin
 from wheel_terra_estimator.estimation.judgement.slip import BodyMotion, SlipJudge
@@ -159,6 +160,17 @@ class WheelSoilEstimator:
         self._wheels = WheelOdometryInput(rover, sensors)
         self._sinkages = SinkageInput(rover.wheel_count)
         self._leaving_angles = LeavingAngleInput(rover.wheel_count)
+        figures = configuration.sensors
+        self._noise = SeenNoise(
+            sensors,
+            {
+                'accelerometer': figures.imu_rate,
+                'gyro': figures.imu_rate,
+                'wheel_rate': figures.wheel_odometry_rate,
+                'torque': figures.wheel_odometry_rate,
+                'sinkage': figures.sinkage_rate,
+            },
+        )
         # Wheels on the ground.
         self._steering = Steering(rover)
         self._turning = Turning(rover, sensors)
@@ -196,6 +208,7 @@ class WheelSoilEstimator:
             self._wheels,
             self._sinkages,
             self._leaving_angles,
+            self._noise,
             self._steering,
             self._turning,
             self._loads,
@@ -270,13 +283,19 @@ class WheelSoilEstimator:
 
     def _take(self, time: float, inputs: StepInputs) -> None:
         """Take in the measurements of a stamp, `time` [s] after the start of the run."""
+        noise = self._noise
         if inputs.inertial is not None:
+            noise.read('accelerometer', time, (float(inputs.inertial.specific_force[0]),))
+            noise.read('gyro', time, (float(inputs.inertial.angular_rate[2]),))
             self._inertial.update(time, inputs.inertial, self._zero_velocity.state.zero)
         if inputs.sinkage is not None:
+            noise.read('sinkage', time, tuple(inputs.sinkage.sinkage.tolist()))
             self._sinkages.update(inputs.sinkage)
         if inputs.leaving_angle is not None:
             self._leaving_angles.update(time, inputs.leaving_angle)
         if inputs.wheel_odometry is not None:
+            noise.read('wheel_rate', time, tuple(inputs.wheel_odometry.rate.tolist()))
+            noise.read('torque', time, tuple(inputs.wheel_odometry.torque.tolist()))
             self._wheels.update(time, inputs.wheel_odometry)
             if inputs.wheel_odometry.steering is not None:
                 self._steering.update(inputs.wheel_odometry.steering)
@@ -456,7 +475,13 @@ class WheelSoilEstimator:
 
     def _fuse_reference(self, cycle: _Cycle, reference: ReferenceVelocity) -> None:
         """Fuse a reference velocity; a speed that was wrong is no growth of the slip."""
-        time = cycle.time
+        time, ekf = cycle.time, self._ekf
+        self._noise.compare_reference(
+            time,
+            reference.forward - float(ekf.mean[SPEED]),
+            self._reference.variance(reference),
+            float(ekf.covariance[SPEED, SPEED]),
+        )
         opened = self._reference.update(
             self._ekf,
             time,
@@ -718,4 +743,10 @@ class WheelSoilEstimator:
         ):
             if nis is not None:
                 report[f'nis_{channel}'] = round(nis, 3)
+        zero = self._zero_velocity.state.zero
+        report['gyro_zero_yaw_rad_s'] = float(f'{zero.yaw:.3g}')
+        report['accelerometer_bias_m_s2'] = float(f'{float(self._ekf.mean[GRAVITY_BIAS]):.3g}')
+        report |= self._noise.report()
+        if words := self._noise.in_words():
+            report['noise_beyond_stated'] = words
         return report

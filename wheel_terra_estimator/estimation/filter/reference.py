@@ -149,7 +149,7 @@ class ReferenceUpdate(Component[ReferenceState]):
         """
         tuning = self._tuning
         witnessed = not (torque_known and time - last_change > tuning.witness_time)
-        variance = self._variance(reference) + (tuning.timing_std * rim_acceleration) ** 2
+        variance = self.variance(reference) + (tuning.timing_std * rim_acceleration) ** 2
         self._note_time(time)
         if still:
             self._note_slide(ekf, time, reference.forward, variance)
@@ -187,7 +187,7 @@ class ReferenceUpdate(Component[ReferenceState]):
         self.state = state
         return opened
 
-    def _variance(self, reference: ReferenceVelocity) -> float:
+    def variance(self, reference: ReferenceVelocity) -> float:
         """Return the variance of a reading, the sensor's where it states none [(m/s)^2]."""
         sensors = self._sensors
         stated = reference.variance

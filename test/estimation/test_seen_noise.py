@@ -1,0 +1,80 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Noise as it is seen: of readings on a ramp, of means, of references beside a moving filter."""
+
+import numpy as np
+import pytest
+from parts import SAND, Parts
+
+from wheel_terra_estimator.configuration import reader
+from wheel_terra_estimator.estimation.inputs.seen_noise import SeenNoise
+
+NAN = float('nan')
+RATES = {'accelerometer': 100.0, 'gyro': 100.0, 'wheel_rate': 10.0, 'torque': 10.0, 'sinkage': 10.0}
+
+
+@pytest.fixture
+def noise():
+    return SeenNoise(Parts(reader.load(SAND)).sensors, RATES)
+
+
+def read(noise, sensor, std, times, slope=0.0, messages=1):
+    """Readings of six wheels on a ramp, each the mean of some messages."""
+    rng = np.random.default_rng(5)
+    for time in times:
+        values = slope * time + std / np.sqrt(messages) * rng.normal(size=6)
+        noise.read(sensor, float(time), tuple(values.tolist()))
+    return noise.seen(sensor)
+
+
+def test_white_noise_on_a_ramp_is_seen_as_it_is(noise):
+    times = 0.1 * np.arange(400)
+    assert read(noise, 'torque', 0.8, times, slope=5.0) == pytest.approx(0.8, rel=0.08)
+
+
+def test_means_of_several_messages_tell_the_noise_of_one(noise):
+    times = 0.1 * np.arange(800)
+    assert read(noise, 'gyro', 0.01, times, messages=10) == pytest.approx(0.01, rel=0.08)
+
+
+def test_steps_and_gaps_are_no_noise(noise):
+    times = 0.1 * np.arange(400)
+    std = noise.stated['sinkage']
+    rng = np.random.default_rng(6)
+    for i, time in enumerate(times):
+        value = 0.02 * (i // 100) + std * rng.normal()  # a wheel enters another rut
+        noise.read('sinkage', float(time), (value, NAN))
+    assert noise.seen('sinkage') == pytest.approx(std, rel=0.3)
+    before = noise.state.sinkage.count
+    noise.read('sinkage', 100.0, (0.5, 0.5))
+    assert noise.state.sinkage.count == before
+
+
+def test_what_was_hardly_heard_is_not_told(noise):
+    assert read(noise, 'torque', 0.8, 0.1 * np.arange(50)) is None
+    assert noise.report() == {}
+    assert noise.in_words() == ''
+
+
+@pytest.mark.parametrize('factor', [0.5, 1.0, 4.0])
+def test_the_noise_of_references_is_seen_beside_a_filter_that_follows_them(noise, factor):
+    """A Kalman filter of a constant, told a wrong R; what it lags behind does not count."""
+    rng = np.random.default_rng(7)
+    R = noise.stated['reference'] ** 2
+    true, mean, P = 0.05, 0.04, 1e-5
+    for i in range(600):
+        P += 0.02 * R
+        innovation = true + factor * np.sqrt(R) * rng.normal() - mean
+        noise.compare_reference(float(i), innovation, R, P)
+        mean += P / (P + R) * innovation
+        P *= R / (P + R)
+    assert noise.seen('reference') == pytest.approx(factor * np.sqrt(R), rel=0.3)
+
+
+def test_a_vibrating_rover_is_told_in_words(noise):
+    std = 20.0 * noise.stated['accelerometer']
+    read(noise, 'accelerometer', std, 0.01 * np.arange(6000))
+    assert noise.report()['accelerometer_noise_seen_m_s2'] == pytest.approx(std, rel=0.15)
+    words = noise.in_words()
+    assert 'accelerometer noise' in words
+    assert 'sensors.specific_force_std' in words

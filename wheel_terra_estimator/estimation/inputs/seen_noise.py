@@ -1,0 +1,182 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""How noisy the sensors are seen to be, beside what their file states.
+
+Three readings in step differ from a straight line by their noise and by how the quantity bends:
+x1 - 2 x2 + x3 has six times the variance of white noise, and hardly any of slow motion. A reference
+velocity is compared with the filter in place of a line: innovations of a slow state differ from one
+another by the noise of two references.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from math import isnan
+from typing import NamedTuple
+
+from wheel_terra_estimator.estimation.component import Component
+from wheel_terra_estimator.estimation.rover import SensorFigures
+from wheel_terra_estimator.estimation.scalars import clipped
+
+Floats = tuple[float, ...]
+
+_LINE = 6.0  # variance of x1 - 2 x2 + x3 over that of each
+
+
+@dataclass(frozen=True)
+class SeenNoiseTuning:
+    """How slowly it is learned, and within which bounds."""
+
+    readings: float = 200.0  # over which the mean goes
+    references: float = 30.0
+    most_jump: float = 4.0
+    """Deviations of what is seen beyond which one reading does not count: steps are no noise."""
+    in_step: float = 0.2  # share by which two spacings of readings may differ
+    longest_gap: float = 0.5  # between readings that are compared [s]
+    least_share: float = 0.01  # of the stated deviation
+    most_share: float = 100.0
+    told_after: int = 100  # readings before it is told
+    told_references: int = 10
+    much: float = 5.0  # times what is stated, to be said
+
+
+class ChannelState(NamedTuple):
+    """One sensor: its last two readings, and the mean of what they scatter."""
+
+    time: float = -math.inf  # of the last reading [s]
+    gap: float = 0.0  # between the last two [s]
+    last: Floats = ()
+    before: Floats = ()
+    variance: float = 0.0
+    count: int = 0
+
+
+class SeenNoiseState(NamedTuple):
+    """One entry per sensor."""
+
+    accelerometer: ChannelState = ChannelState()
+    gyro: ChannelState = ChannelState()
+    wheel_rate: ChannelState = ChannelState()
+    torque: ChannelState = ChannelState()
+    sinkage: ChannelState = ChannelState()
+    reference: ChannelState = ChannelState()
+
+
+UNITS = {
+    'accelerometer': 'm_s2',
+    'gyro': 'rad_s',
+    'wheel_rate': 'rad_s',
+    'torque': 'N_m',
+    'sinkage': 'm',
+    'reference': 'm_s',
+}
+"""Sensor -> unit in the keys of diagnostics."""
+KEYS = {
+    'accelerometer': 'sensors.specific_force_std',
+    'gyro': 'sensors.angular_rate_std',
+    'wheel_rate': 'sensors.wheel_rate_std',
+    'torque': 'sensors.torque_std',
+    'sinkage': 'sensors.sinkage_std',
+    'reference': 'the covariance of reference_odom, or sensors.reference_std,',
+}
+"""Sensor -> where its noise is stated."""
+
+
+class SeenNoise(Component[SeenNoiseState]):
+    """Learns the noise of a message of each sensor; readings are means of those of a step."""
+
+    def __init__(
+        self, sensors: SensorFigures, rates: dict[str, float], tuning: SeenNoiseTuning | None = None
+    ) -> None:
+        super().__init__(SeenNoiseState())
+        self._tuning = tuning or SeenNoiseTuning()
+        self._rates = rates  # messages a second, by sensor
+        self.stated = {
+            'accelerometer': sensors.specific_force_std,
+            'gyro': sensors.angular_rate_std,
+            'wheel_rate': sensors.wheel_rate_std,
+            'torque': sensors.torque_std,
+            'sinkage': sensors.sinkage_std,
+            'reference': sensors.reference_std,
+        }
+
+    def read(self, sensor: str, time: float, values: Floats) -> None:
+        """Take a reading (one value per wheel or axis, nan = none) at a time [s]."""
+        state: ChannelState = getattr(self.state, sensor)
+        tuning, gap = self._tuning, time - state.time
+        variance, count = state.variance, state.count
+        in_step = (
+            abs(gap - state.gap) <= tuning.in_step * gap <= tuning.in_step * tuning.longest_gap
+        )
+        if in_step and len(state.before) == len(values):
+            bends = [
+                (a - 2.0 * b + c) ** 2
+                for a, b, c in zip(state.before, state.last, values, strict=True)
+                if not isnan(a + b + c)
+            ]
+            if bends:
+                # The mean of n messages has an n-th of their variance.
+                messages = max(gap * self._rates[sensor], 1.0)
+                seen = messages * sum(bends) / (_LINE * len(bends))
+                variance, count = self._mean(sensor, variance, count, seen, tuning.readings)
+        self._keep(sensor, ChannelState(time, gap, values, state.last, variance, count))
+
+    def compare_reference(self, time: float, innovation: float, variance: float, P: float) -> None:
+        """Take the innovation of a reference [m/s], its variance and that of the speed [(m/s)^2].
+
+        The speed took over the share K = P / (P + R) of the innovation before, so that the
+        difference of two has the variance (1 + (1 + K)^2) R.
+        """
+        state = self.state.reference
+        seen_variance, count = state.variance, state.count
+        if state.last:
+            last, gain = state.last
+            seen = (innovation - last) ** 2 / (1.0 + (1.0 + gain) ** 2)
+            seen_variance, count = self._mean(
+                'reference', seen_variance, count, seen, self._tuning.references
+            )
+        kept = (innovation, P / (P + variance))
+        self._keep('reference', ChannelState(time, 0.0, kept, (), seen_variance, count))
+
+    def _mean(
+        self, sensor: str, variance: float, count: int, seen: float, length: float
+    ) -> tuple[float, int]:
+        tuning, stated = self._tuning, self.stated[sensor] ** 2
+        if count and seen > tuning.most_jump**2 * max(variance, stated):
+            # Louder for good is learned, a little at a time; a step is not.
+            seen = tuning.most_jump**2 * max(variance, stated)
+        count += 1
+        variance += (seen - variance) / min(count, length)
+        low, high = tuning.least_share**2 * stated, tuning.most_share**2 * stated
+        return clipped(variance, low, high), count
+
+    def _keep(self, sensor: str, channel: ChannelState) -> None:
+        self.state = self.state._replace(**{sensor: channel})
+
+    def seen(self, sensor: str) -> float | None:
+        """Return the deviation of one message as seen; None while too few came."""
+        state: ChannelState = getattr(self.state, sensor)
+        tuning = self._tuning
+        least = tuning.told_references if sensor == 'reference' else tuning.told_after
+        return math.sqrt(state.variance) if state.count >= least else None
+
+    def report(self) -> dict[str, float]:
+        """Return stated and seen noise by key, with the unit at its end."""
+        found = {}
+        for sensor, unit in UNITS.items():
+            seen = self.seen(sensor)
+            if seen is not None:
+                found[f'{sensor}_noise_stated_{unit}'] = self.stated[sensor]
+                found[f'{sensor}_noise_seen_{unit}'] = float(f'{seen:.3g}')
+        return found
+
+    def in_words(self) -> str:
+        """Return what is much noisier than stated; empty where nothing is."""
+        words = []
+        for sensor in UNITS:
+            seen, stated = self.seen(sensor), self.stated[sensor]
+            if seen is not None and stated > 0.0 and seen > self._tuning.much * stated:
+                name = sensor.replace('_', ' ')
+                words.append(f'{name} noise {seen / stated:.0f} times what {KEYS[sensor]} states')
+        return '; '.join(words)
