@@ -45,9 +45,9 @@ def test_steps_and_gaps_are_no_noise(noise):
         value = 0.02 * (i // 100) + std * rng.normal()  # a wheel enters another rut
         noise.read('sinkage', float(time), (value, NAN))
     assert noise.seen('sinkage') == pytest.approx(std, rel=0.3)
-    before = noise.state.sinkage.count
+    before = noise.state.sinkage.readings
     noise.read('sinkage', 100.0, (0.5, 0.5))
-    assert noise.state.sinkage.count == before
+    assert noise.state.sinkage.readings == before
 
 
 def test_what_was_hardly_heard_is_not_told(noise):

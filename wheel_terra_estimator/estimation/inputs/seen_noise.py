@@ -49,7 +49,7 @@ class ChannelState(NamedTuple):
     last: Floats = ()
     before: Floats = ()
     variance: float = 0.0
-    count: int = 0
+    readings: int = 0
 
 
 class SeenNoiseState(NamedTuple):
@@ -105,7 +105,7 @@ class SeenNoise(Component[SeenNoiseState]):
         """Take a reading (one value per wheel or axis, nan = none) at a time [s]."""
         state: ChannelState = getattr(self.state, sensor)
         tuning, gap = self._tuning, time - state.time
-        variance, count = state.variance, state.count
+        variance, count = state.variance, state.readings
         in_step = (
             abs(gap - state.gap) <= tuning.in_step * gap <= tuning.in_step * tuning.longest_gap
         )
@@ -129,7 +129,7 @@ class SeenNoise(Component[SeenNoiseState]):
         difference of two has the variance (1 + (1 + K)^2) R.
         """
         state = self.state.reference
-        seen_variance, count = state.variance, state.count
+        seen_variance, count = state.variance, state.readings
         if state.last:
             last, gain = state.last
             seen = (innovation - last) ** 2 / (1.0 + (1.0 + gain) ** 2)
@@ -159,7 +159,7 @@ class SeenNoise(Component[SeenNoiseState]):
         state: ChannelState = getattr(self.state, sensor)
         tuning = self._tuning
         least = tuning.told_references if sensor == 'reference' else tuning.told_after
-        return math.sqrt(state.variance) if state.count >= least else None
+        return math.sqrt(state.variance) if state.readings >= least else None
 
     def report(self) -> dict[str, float]:
         """Return stated and seen noise by key, with the unit at its end."""
