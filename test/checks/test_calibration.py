@@ -10,7 +10,7 @@ import pytest
 import rolling_rover as rolling
 
 from wheel_terra_estimator.checks.calibration import as_file, calibrate
-from wheel_terra_estimator.checks.run import check_recording
+from wheel_terra_estimator.checks.run import check_recording, examine
 from wheel_terra_estimator.configuration import reader
 
 WRONG = {
@@ -96,6 +96,14 @@ def test_a_drive_that_never_leaves_the_ground_tells_no_friction():
     calibration = calibrate(rolling.recording(), rolling.rover())
     assert not any('friction' in change.key for change in calibration.changes)
     assert any('in the air' in entry.reason for entry in calibration.not_seen)
+
+
+def test_a_dead_reference_lifts_no_rover():
+    whole = rolling.recording()
+    dead = replace(whole.reference, velocity=0.0 * whole.reference.velocity)
+    joints = replace(whole.joints, torque=0.0 * whole.joints.torque)
+    _, evidence = examine(replace(whole, reference=dead, joints=joints), rolling.rover())
+    assert not evidence.in_air.any() and evidence.moving.any()
 
 
 def test_what_the_recording_cannot_tell_stays():

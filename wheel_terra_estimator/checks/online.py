@@ -36,6 +36,8 @@ STANDARD_GRAVITY = 9.80665  # [m/s^2]
 
 LEAST_RIM_SPEED = 0.005
 """Rim speed [m/s] below which a window says nothing of the wheels."""
+MEAN_SHARE = 0.5
+"""Mean over greatest rim speed of a window, above which it is no noise."""
 UNSTEADY = 0.4
 """Change of the rim speed within a window, as a share of it, that is a start or a stop."""
 STRAIGHT = 0.15
@@ -178,7 +180,7 @@ class _Window:
     force: tuple[float, float, float] | None
     yaw_rate: float  # [rad/s], nan: unknown
     reference: float  # [m/s], nan: none or lost in its noise
-    moving: bool
+    fastest: float  # greatest typical rim speed of one message [m/s]
     changes: tuple[int, ...]
     depth: float  # [m], nan: none
 
@@ -187,6 +189,11 @@ class _Window:
         """Median rim speed, signed; nan where no wheel is known."""
         known = [rim for rim in self.rims if rim == rim]
         return median(known) if known else math.nan
+
+    @property
+    def moving(self) -> bool:
+        """Whether the wheels turn; noise about a standstill has no mean."""
+        return self.size > max(LEAST_RIM_SPEED, MEAN_SHARE * self.fastest)
 
     @property
     def size(self) -> float:
@@ -354,7 +361,7 @@ class OnlineChecks:
             else None,
             yaw_rate=sums.yaw_rate / inertial if inertial else math.nan,
             reference=reference,
-            moving=sums.fastest > LEAST_RIM_SPEED,
+            fastest=sums.fastest,
             changes=tuple(sums.changes),
             depth=sums.depth / sums.depths if sums.depths else math.nan,
         )
