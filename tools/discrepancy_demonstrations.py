@@ -32,8 +32,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.configuration.configuration import Configuration
-from wheel_terra_estimator.discrepancy.report.model_file import write_model
-from wheel_terra_estimator.discrepancy.report.page import write_report
+from wheel_terra_estimator.discrepancy.report.files import write_files
 from wheel_terra_estimator.discrepancy.result import Diagnosis
 from wheel_terra_estimator.discrepancy.tables.checks import check_table
 from wheel_terra_estimator.discrepancy.tables.parsing import read_table
@@ -367,10 +366,7 @@ def from_table(name: str, arguments: argparse.Namespace) -> Case:
 def write(folder: Path, diagnosis: Diagnosis, *, pictures: bool) -> None:
     """Write what the command ``wheel-terra diagnose`` writes."""
     folder.mkdir(parents=True, exist_ok=True)
-    diagnosis.write_json(folder / 'report.json')
-    write_model(diagnosis, folder / 'model.yaml')
-    if pictures:
-        write_report(diagnosis, folder)
+    write_files(diagnosis, folder, pictures=pictures)
 
 
 def summary(name: str, case: Case, diagnosis: Diagnosis) -> str:

@@ -92,6 +92,35 @@ def test_what_was_learned_is_a_further_config_of_every_command(
     assert read_values(kept)['sensors.torque_zero'] == [0.0, 0.0]
 
 
+def test_a_proposed_law_and_errors_of_readings_are_further_configs(
+    make_bag: Any, config: list[str], tmp_path: Path
+) -> None:
+    """The law of a ``proposal.yaml`` acts on the estimates; a stated gain is taken off once."""
+    law = {
+        'enabled': True,
+        'targets': ['torque', 'exponent'],
+        'features': ['slip', 'slip'],
+        'coefficients': [0.05, 0.4],
+        'coefficients_std': [0.01, 0.1],
+    }
+    values = {f'effects.learned_closure.{key}': value for key, value in law.items()}
+    reader.from_parameters(values, complete=False).write(tmp_path / 'proposal.yaml')
+    model = {'sensors.torque_gain': [1.25]}
+    reader.from_parameters(model, complete=False).write(tmp_path / 'model.yaml')
+    assert set(reader.load([config[1], tmp_path / 'proposal.yaml']).effects) == {'learned_closure'}
+    assert list(reader.load([config[1], tmp_path / 'model.yaml']).sensors.torque_gain) == [1.25] * 2
+    bag = str(make_bag())
+    found = {}
+    for name, files in {'plain': [], 'proposal': ['proposal'], 'model': ['model']}.items():
+        further = [part for file in files for part in ('--config', str(tmp_path / f'{file}.yaml'))]
+        assert main(['replay', bag, *config, *further, '-o', str(tmp_path / name)]) == 0
+        with open_bag(tmp_path / name) as opened:
+            found[name] = read_estimates(opened).values['drawbar_pull']
+    assert np.isfinite(found['proposal']).all()
+    assert not np.allclose(found['proposal'], found['plain'])
+    assert not np.allclose(found['model'], found['plain'])
+
+
 def test_existing_output_is_refused_unless_overwrite(
     make_bag: Any, config: list[str], tmp_path: Path, capsys: Any
 ) -> None:

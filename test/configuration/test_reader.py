@@ -369,8 +369,18 @@ def test_every_shipped_file_and_a_written_one_are_loaded_by_ros(tmp_path):
     rclpy = pytest.importorskip('rclpy')
     written = tmp_path / 'model.yaml'
     reader.load(['frostyboy']).write(written, comment='x')
+    proposal = tmp_path / 'proposal.yaml'  # flat lists of one type
+    law = {
+        'enabled': True,
+        'targets': ['torque', 'exponent'],
+        'features': ['rim_speed', 'slip'],
+        'coefficients': [0.04, 0.3],
+        'coefficients_std': [0.01, 0.1],
+    }
+    values = {f'effects.learned_closure.{key}': value for key, value in law.items()}
+    reader.from_parameters(values, complete=False).write(proposal)
     names = [n for n in shipped.files() if n.startswith(('rovers/', 'soils/'))]
-    for file in [written, *(shipped.find(name) for name in names)]:
+    for file in [written, proposal, *(shipped.find(name) for name in names)]:
         context = rclpy.Context()
         rclpy.init(args=['--ros-args', '--params-file', str(file)], context=context)
         try:
