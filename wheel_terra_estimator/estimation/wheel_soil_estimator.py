@@ -283,19 +283,14 @@ class WheelSoilEstimator:
 
     def _take(self, time: float, inputs: StepInputs) -> None:
         """Take in the measurements of a stamp, `time` [s] after the start of the run."""
-        noise = self._noise
+        self._noise.take(time, inputs)
         if inputs.inertial is not None:
-            noise.read('accelerometer', time, (float(inputs.inertial.specific_force[0]),))
-            noise.read('gyro', time, (float(inputs.inertial.angular_rate[2]),))
             self._inertial.update(time, inputs.inertial, self._zero_velocity.state.zero)
         if inputs.sinkage is not None:
-            noise.read('sinkage', time, tuple(inputs.sinkage.sinkage.tolist()))
             self._sinkages.update(inputs.sinkage)
         if inputs.leaving_angle is not None:
             self._leaving_angles.update(time, inputs.leaving_angle)
         if inputs.wheel_odometry is not None:
-            noise.read('wheel_rate', time, tuple(inputs.wheel_odometry.rate.tolist()))
-            noise.read('torque', time, tuple(inputs.wheel_odometry.torque.tolist()))
             self._wheels.update(time, inputs.wheel_odometry)
             if inputs.wheel_odometry.steering is not None:
                 self._steering.update(inputs.wheel_odometry.steering)

@@ -16,6 +16,7 @@ from math import isnan
 from typing import NamedTuple
 
 from wheel_terra_estimator.estimation.component import Component
+from wheel_terra_estimator.estimation.measurements import StepInputs
 from wheel_terra_estimator.estimation.rover import SensorFigures
 from wheel_terra_estimator.estimation.scalars import clipped
 
@@ -28,6 +29,7 @@ _LINE = 6.0  # variance of x1 - 2 x2 + x3 over that of each
 class SeenNoiseTuning:
     """How slowly it is learned, and within which bounds."""
 
+    one_second_in: int = 4  # is learned from; the noise of sensors changes slowly
     readings: float = 200.0  # over which the mean goes
     references: float = 30.0
     most_jump: float = 4.0
@@ -100,6 +102,19 @@ class SeenNoise(Component[SeenNoiseState]):
             'sinkage': sensors.sinkage_std,
             'reference': sensors.reference_std,
         }
+
+    def take(self, time: float, inputs: StepInputs) -> None:
+        """Take the readings of a step at a time [s]: one second in four is enough to learn from."""
+        if int(time) % self._tuning.one_second_in:
+            return
+        if inputs.inertial is not None:
+            self.read('accelerometer', time, (float(inputs.inertial.specific_force[0]),))
+            self.read('gyro', time, (float(inputs.inertial.angular_rate[2]),))
+        if inputs.wheel_odometry is not None:
+            self.read('wheel_rate', time, tuple(inputs.wheel_odometry.rate.tolist()))
+            self.read('torque', time, tuple(inputs.wheel_odometry.torque.tolist()))
+        if inputs.sinkage is not None:
+            self.read('sinkage', time, tuple(inputs.sinkage.sinkage.tolist()))
 
     def read(self, sensor: str, time: float, values: Floats) -> None:
         """Take a reading (one value per wheel or axis, nan = none) at a time [s]."""
