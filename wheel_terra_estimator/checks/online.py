@@ -10,12 +10,19 @@ start, so windows that speak against one count for long. Thresholds come from si
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from statistics import median
 from typing import NamedTuple
 
 from wheel_terra_estimator.checks.finding import Finding
+from wheel_terra_estimator.checks.online_words import (
+    GRAVITY_OFF,
+    GRAVITY_SHARE,
+    Seen,
+    Wording,
+    rate_unit,
+)
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.measurements import (
     InertialReading,
@@ -32,7 +39,6 @@ WINDOW = 1_000_000_000
 GREATEST_SURE = 0.99
 CAP = 12
 """Agreeing windows beyond this many count no more."""
-STANDARD_GRAVITY = 9.80665  # [m/s^2]
 
 LEAST_RIM_SPEED = 0.005
 """Rim speed [m/s] below which a window says nothing of the wheels."""
@@ -42,24 +48,12 @@ UNSTEADY = 0.4
 """Change of the rim speed within a window, as a share of it, that is a start or a stop."""
 STRAIGHT = 0.15
 """Rim speed from yawing over rim speed below which a window is straight."""
-GRAVITY_SHARE = 0.2
-"""Share by which the mean specific force may differ from gravity."""
-GRAVITY_OFF = 0.3
-"""Specific force over gravity below which gravity was taken off."""
 UPRIGHT = math.cos(math.radians(50.0))
 """Upward share of the specific force that no rover drives below."""
 GREATEST_RIM_SPEED = 15.0
 """Rim speed [m/s] that no rover of this kind drives."""
-RATE_UNITS = {
-    'revolutions per minute': 30.0 / math.pi,
-    'degrees per second': 180.0 / math.pi,
-    'thousandths of rad/s': 1000.0,
-}
-"""Wheel rates in another unit: how many times too fast they read."""
-UNIT_BAND = (0.85, 1.5)
-"""Rim speed over reference speed of a rolling wheel, slip included."""
 ORDINARY_RATIO = (0.3, 5.0)
-"""The same, of wheels in the right unit that still make way."""
+"""Rim speed over reference speed of wheels in the right unit that still make way."""
 LEAST_YAW_RATE = 0.02
 """Yaw rate [rad/s] below which a window says nothing of a turn."""
 CLEAR_TURN = 0.1
@@ -217,10 +211,8 @@ class OnlineChecks:
 
     def __init__(self, configuration: Configuration) -> None:
         wheels, rover = configuration.wheels, configuration.rover
-        self._names = wheels.names
-        self._odometry_topic = configuration.wheel_odometry
+        self._wording = Wording(configuration)
         self._radius: list[float] = wheels.slip_radius.tolist()
-        self._direction: list[float] = wheels.direction.tolist()
         lateral = wheels.y.tolist()
         self._left = [i for i, y in enumerate(lateral) if y > 0.0]
         self._right = [i for i, y in enumerate(lateral) if y < 0.0]
@@ -229,7 +221,6 @@ class OnlineChecks:
             self._track = sum(lateral[i] for i in self._left) / len(self._left) - sum(
                 lateral[i] for i in self._right
             ) / len(self._right)
-        self._lateral = lateral
         self._gravity = float(rover.gravity)
         self._weight = float(rover.mass) * self._gravity
         self._reference_std = float(configuration.sensors.reference_std)
@@ -476,7 +467,7 @@ class OnlineChecks:
         yield 'reference_sign', -1, -2.0 < ratio < 0.0, reference
         if ORDINARY_RATIO[0] < abs(ratio) < ORDINARY_RATIO[1]:
             yield 'rate_unit', -1, False, abs(ratio)
-        elif _unit(abs(ratio)) is not None:
+        elif rate_unit(abs(ratio)) is not None:
             yield 'rate_unit', -1, True, abs(ratio)
 
     def _of_torque(self, window: _Window) -> Iterator[Evidence]:
@@ -507,257 +498,22 @@ class OnlineChecks:
             if beside > least and abs(thrust) > 0.3 * beside:
                 yield 'torque_of_wheel', i, thrust < 0.0, thrust / beside
 
-    # -- Words ----------------------------------------------------------------------------------
+    # -- Findings -------------------------------------------------------------------------------
 
     def _findings(self) -> Iterator[Finding]:
         """Word what stands; what follows from another finding is left out."""
-        standing = self._standing()
-        names = {name for name, _ in standing}
+        tallies = self._verdicts.tallies
+        standing = {key: tally.score for key, tally in tallies.items() if tally.stands}
+        backwards = tuple(wheel for name, wheel in standing if name == 'backwards')
         left_out: set[str] = set()
-        for name, consequences in _CONSEQUENCES.items():
-            if name in names:
-                left_out |= consequences
+        for name, _ in standing:
+            left_out |= _CONSEQUENCES.get(name, set())
         for (name, wheel), score in standing.items():
-            if name in left_out:
-                continue
-            sure = min(1.0 - 0.5 ** (score + 1), GREATEST_SURE)
-            yield _WORDS[name](self, self._verdicts.figures[name, wheel], wheel, sure)
+            if name not in left_out:
+                seen = Seen(self._verdicts.figures[name, wheel], wheel, backwards)
+                sure = min(1.0 - 0.5 ** (score + 1), GREATEST_SURE)
+                yield self._wording.finding(name, seen, sure)
 
-    def _gravity_words(self, figure: float, wheel: int, sure: float) -> Finding:
-        seen = f'specific force {figure:.3g} m/s^2 along z where gravity is {self._gravity:.4g}: '
-        for unit, factor in (('g', STANDARD_GRAVITY), ('mg', STANDARD_GRAVITY / 1000.0)):
-            if abs(figure * factor / self._gravity - 1.0) < GRAVITY_SHARE:
-                cure = f'multiply linear_acceleration by {factor:.5g} in the driver (m/s^2)'
-                words = f'{seen}linear_acceleration is in {unit}'
-                return self._finding('unit', 'imu/data', None, None, factor, sure, words, cure)
-        if figure < GRAVITY_OFF * self._gravity:
-            cure = 'publish the specific force with gravity (+g on z at rest, REP 145)'
-            words = f'{seen}gravity was taken off'
-            return self._finding('gravity', 'imu/data', None, None, None, sure, words, cure)
-        words = f'{seen}another planet, or another scale'
-        cure = f'rover.gravity: {figure:.3g}, or the right scale in the driver'
-        return self._finding(
-            'gravity', 'imu/data', None, 'rover.gravity', figure, sure, words, cure
-        )
-
-    def _mounting_words(self, figure: float, wheel: int, sure: float) -> Finding:
-        tilt = math.degrees(math.acos(max(-1.0, min(1.0, figure))))
-        return self._finding(
-            'mounting',
-            'imu/data',
-            None,
-            'sensors.imu_mounting_roll_deg',
-            None,
-            sure,
-            f'gravity points {tilt:.0f} degrees off straight down',
-            'sensors.imu_mounting_roll_deg: 180.0'
-            if tilt > 150.0
-            else 'state sensors.imu_mounting_*_deg (wheel-terra check has the angles)',
-        )
-
-    def _gyro_unit_words(self, figure: float, wheel: int, sure: float) -> Finding:
-        return self._finding(
-            'unit',
-            'imu/data',
-            None,
-            None,
-            math.pi / 180.0,
-            sure,
-            'angular_velocity.z is many times what the wheels allow: degrees per second',
-            'multiply angular_velocity by 0.0174533 in the driver (rad/s, REP 103)',
-        )
-
-    def _sides_words(self, figure: float, wheel: int, sure: float) -> Finding:
-        mirrored = ', '.join(f'{-y:g}' for y in self._lateral)
-        return self._finding(
-            'swapped_sides',
-            self._odometry_topic,
-            None,
-            'wheels.names',
-            None,
-            sure,
-            'left and right wheels turn against the gyro: the sides are swapped, all wheels count '
-            'backwards, or the gyro counts yaw to the right',
-            f'exchange left and right in wheels.names, or wheels.y: [{mirrored}]; or negate '
-            'angular_velocity.z in the driver',
-        )
-
-    def _directions(self, flipped: list[int]) -> str:
-        listed = (int(-d if i in flipped else d) for i, d in enumerate(self._direction))
-        return f'wheels.direction: [{", ".join(str(d) for d in listed)}]'
-
-    def _backwards_words(self, figure: float, wheel: int, sure: float) -> Finding:
-        flipped = [w for name, w in self._standing() if name == 'backwards']
-        return self._finding(
-            'sign',
-            self._odometry_topic,
-            wheel,
-            'wheels.direction',
-            -self._direction[wheel],
-            sure,
-            'counts backwards when the rover drives forward',
-            self._directions(flipped),
-        )
-
-    def _one_side_words(self, figure: float, wheel: int, sure: float) -> Finding:
-        cures = (self._directions(self._left), self._directions(self._right))
-        return self._finding(
-            'sign',
-            self._odometry_topic,
-            None,
-            'wheels.direction',
-            -1.0,
-            sure,
-            'left and right wheels turn against each other while the gyro sees no turn: one side '
-            'counts backwards',
-            f'{cures[0]} if the left side is the one, {cures[1].partition(": ")[2]} if the right',
-        )
-
-    def _reference_words(self, figure: float, wheel: int, sure: float) -> Finding:
-        everyone = list(range(len(self._names)))
-        return self._finding(
-            'sign',
-            'reference_odom',
-            None,
-            None,
-            -1.0,
-            sure,
-            'linear.x runs against the wheels',
-            'negate twist.linear.x in its driver, or turn its frame into base_link; if all wheels '
-            f'count backwards, {self._directions(everyone)}',
-        )
-
-    def _rate_unit_words(self, figure: float, wheel: int, sure: float) -> Finding:
-        unit = _unit(figure)
-        assert unit is not None
-        return self._rate_unit_finding(unit, sure, f'rim speed {figure:.3g} times the reference')
-
-    def _turn_unit_words(self, figure: float, wheel: int, sure: float) -> Finding:
-        unit = next((u for u, f in RATE_UNITS.items() if figure < 3.0 * f), 'thousandths of rad/s')
-        return self._rate_unit_finding(unit, sure, f'turns {figure:.3g} times those of the gyro')
-
-    def _absurd_words(self, figure: float, wheel: int, sure: float) -> Finding:
-        return self._finding(
-            'unit',
-            self._odometry_topic,
-            None,
-            None,
-            None,
-            sure,
-            f'rim speed {figure:.3g} m/s: velocity is not in rad/s',
-            'publish rad/s (REP 103): revolutions per minute times 0.10472, degrees per second '
-            'times 0.0174533',
-        )
-
-    def _rate_unit_finding(self, unit: str, sure: float, how: str) -> Finding:
-        factor = 1.0 / RATE_UNITS[unit]
-        return self._finding(
-            'unit',
-            self._odometry_topic,
-            None,
-            None,
-            factor,
-            sure,
-            f'velocity is in {unit} ({how})',
-            f'multiply velocity by {factor:.6g} in the driver (rad/s, REP 103)',
-        )
-
-    def _torque_words(self, figure: float, wheel: int, sure: float) -> Finding:
-        name = self._names[wheel] if wheel >= 0 else 'all wheels'
-        return self._finding(
-            'sign',
-            self._odometry_topic,
-            wheel if wheel >= 0 else None,
-            None,
-            -1.0,
-            sure,
-            'torque brakes where the wheels drive on the level or uphill',
-            f'negate effort of {name} in the driver (wheels.direction flips rate and torque '
-            'together)',
-        )
-
-    def _torque_unit_words(self, figure: float, wheel: int, sure: float) -> Finding:
-        return self._finding(
-            'unit',
-            self._odometry_topic,
-            None,
-            'sensors.torque_gain',
-            None,
-            sure,
-            f'sum of T/r is {figure:.3g} times the weight: N mm, a current or a motor torque',
-            'publish the torque at the wheel in N m (N mm times 0.001), or state its scale in '
-            'sensors.torque_gain (wheel-terra calibrate)',
-        )
-
-    def _sinkage_words(self, figure: float, wheel: int, sure: float) -> Finding:
-        return self._finding(
-            'sign',
-            'sinkage',
-            None,
-            'sensors.sinkage_zero',
-            -1.0,
-            sure,
-            f'the wheels seem to run {-1000.0 * figure:.0f} mm above the surface: counted upwards, '
-            'or the zero is off',
-            'negate position in the driver (positive down), or state sensors.sinkage_zero [m]',
-        )
-
-    def _frozen_words(self, figure: float, wheel: int, sure: float) -> Finding:
-        return self._finding(
-            'frozen',
-            self._odometry_topic,
-            wheel,
-            None,
-            None,
-            sure,
-            f'rim speed stays at exactly {figure:.4g} m/s while the other wheels change',
-            f'mend the encoder or driver of {self._names[wheel]}; until then leave it out of name',
-        )
-
-    def _standing(self) -> dict[Suspicion, int]:
-        return {key: tally.score for key, tally in self._verdicts.tallies.items() if tally.stands}
-
-    def _finding(
-        self,
-        kind: str,
-        topic: str,
-        wheel: int | None,
-        parameter: str | None,
-        value: float | None,
-        sure: float,
-        words: str,
-        cure: str,
-    ) -> Finding:
-        name = None if wheel is None else self._names[wheel]
-        return Finding(
-            kind=kind,
-            topic=topic,
-            wheel=name,
-            parameter=parameter,
-            value=value,
-            confidence=sure,
-            words=words,
-            cure=cure,
-        )
-
-
-_WORDS: dict[str, Callable[[OnlineChecks, float, int, float], Finding]] = {
-    'gravity': OnlineChecks._gravity_words,
-    'mounting': OnlineChecks._mounting_words,
-    'gyro_unit': OnlineChecks._gyro_unit_words,
-    'sides': OnlineChecks._sides_words,
-    'backwards': OnlineChecks._backwards_words,
-    'one_side_backwards': OnlineChecks._one_side_words,
-    'reference_sign': OnlineChecks._reference_words,
-    'rate_unit': OnlineChecks._rate_unit_words,
-    'rate_unit_in_turns': OnlineChecks._turn_unit_words,
-    'absurd_rate': OnlineChecks._absurd_words,
-    'torque': OnlineChecks._torque_words,
-    'torque_of_wheel': OnlineChecks._torque_words,
-    'torque_unit': OnlineChecks._torque_unit_words,
-    'sinkage': OnlineChecks._sinkage_words,
-    'frozen': OnlineChecks._frozen_words,
-}
 
 _CONSEQUENCES = {
     'mounting': {'gyro_unit', 'sides', 'one_side_backwards', 'torque', 'torque_of_wheel'},
@@ -775,11 +531,3 @@ _CONSEQUENCES = {
 def _mean(values: Floats, indices: list[int]) -> float:
     known = [values[i] for i in indices if values[i] == values[i]]
     return sum(known) / len(known) if known else math.nan
-
-
-def _unit(ratio: float) -> str | None:
-    """Return the unit in which wheels read so many times too fast; None: none."""
-    for unit, factor in RATE_UNITS.items():
-        if UNIT_BAND[0] < ratio / factor < UNIT_BAND[1]:
-            return unit
-    return None
