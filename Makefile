@@ -1,7 +1,7 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
 #
-# make demo    the shipped drives through the real node: estimates, report, key numbers
+# make demo    the shipped drives through the real node, and a blind trial: reports, key numbers
 # make test    all tests
 # make lint    ruff and mypy
 # make docs    the site (site/index.html), warnings are errors

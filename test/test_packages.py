@@ -79,5 +79,6 @@ def test_demo_after_pip_install_alone(built_wheel: Path, tmp_path: Path) -> None
     said = run(command, 'demo', '--no-node', cwd=tmp_path)
     assert 'entrapped at' in said
     assert 'warned' in said
-    for name in ('entrapment', 'pathfinder'):
+    assert 'seal opened: hard_layer was hidden' in said and ': right' in said
+    for name in ('entrapment', 'pathfinder', 'trial/diagnosis/report'):
         assert (tmp_path / 'demo_output' / f'{name}.html').stat().st_size > 100_000

@@ -1,64 +1,54 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Makes the picture of a diagnosis in the README: ``python tools/readme_pictures.py``.
+"""Makes the picture of a blind trial in the README: ``python tools/readme_pictures.py``.
 
-A wheel that digs in with slip, measured with noise (model-made, known seed); the model that knows
-nothing of it, and the model after ``diagnose`` has named the effect.
+The trial that ``wheel-terra demo`` runs: measured sinkage under each load, the model as configured
+and after the diagnosis, and the gap on rows that the fit did not see.
 """
 
 from __future__ import annotations
 
+import tempfile
 from pathlib import Path
 
 import numpy as np
 
-from wheel_terra_estimator.api import Model, corrected_model, diagnose, plot_diagnosis
+from wheel_terra_estimator.api import plot_diagnosis
+from wheel_terra_estimator.cli.demo import TRIAL_SEED
 from wheel_terra_estimator.reporting.style import LINE_COLOURS, picture_style
+from wheel_terra_estimator.trials import trial
 
 IMAGE = Path(__file__).resolve().parents[1] / 'docs' / 'images' / 'diagnosis.png'
-FILES = ('hit_wh3', 'dlr_mss')
-HIDDEN = (
-    'effects.slip_sinkage_exponent.enabled:=true',
-    'effects.slip_sinkage_exponent.n1:=0.4',
-)
-NOISE = {'sinkage': 4e-4, 'drawbar_pull': 0.6, 'torque': 0.06}  # [m], [N], [N m]
-LOADS = (60.0, 90.0, 120.0)  # [N]
-SEED = 7
 
 
 def main() -> None:
-    """Measure, diagnose, draw."""
+    """Hide, diagnose blind, open the seal, draw."""
     from matplotlib import pyplot
 
-    random = np.random.default_rng(SEED)
-    slip, load = (a.ravel() for a in np.meshgrid(np.linspace(0.03, 0.6, 12), LOADS))
-    before = Model.load(*FILES)
-    true = Model.load(*FILES, parameters=HIDDEN).curve(slip, load).columns()
-    rows = {'slip': slip, 'normal_load': load}
-    for name, std in NOISE.items():
-        rows[name] = true[name] + std * random.standard_normal(slip.size)
-        rows[f'{name}_std'] = np.full(slip.size, std)
-    diagnosis = diagnose(rows, before)
-    after = corrected_model(diagnosis)
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        trial.hide(trial.draw(TRIAL_SEED, None), folder)
+        diagnosis = trial.solve_blind(folder)
+        outcome = trial.compare(folder, diagnosis)
+    columns, curves = diagnosis.table.columns, diagnosis.curves
     with picture_style():
         figure, (left, right) = pyplot.subplots(1, 2, figsize=(10.5, 3.6))
-        fine = np.linspace(0.0, 0.62, 60)
-        for i, weight in enumerate(LOADS):
-            colour = LINE_COLOURS[i]
-            mine = load == weight
-            left.plot(slip[mine], 1e3 * rows['sinkage'][mine], 'o', color=colour, markersize=4)
-            left.plot(fine, 1e3 * before.curve(fine, weight).sinkage, ':', color=colour)
-            left.plot(
-                fine, 1e3 * after.curve(fine, weight).sinkage, color=colour, label=f'{weight:g} N'
-            )
+        for i, load in enumerate(np.unique(columns['normal_load'])):
+            mine = np.flatnonzero(columns['normal_load'] == load)
+            mine = mine[np.argsort(columns['slip'][mine])]
+            slip, colour = columns['slip'][mine], LINE_COLOURS[i % len(LINE_COLOURS)]
+            measured = 1e3 * diagnosis.table.measured[mine, 0]
+            left.plot(slip, measured, 'o', color=colour, markersize=4)
+            left.plot(slip, 1e3 * curves.before[mine, 0], ':', color=colour)
+            left.plot(slip, 1e3 * curves.after[mine, 0], color=colour, label=f'{load:.0f} N')
         left.set_xlabel('slip ratio [-]')
         left.set_ylabel('sinkage [mm]')
         left.set_title('dots: measured; dotted: model before; lines: after')
         left.legend()
         plot_diagnosis(diagnosis, right)
-        right.set_title(f'missing: {", ".join(e.name for e in diagnosis.effects)}')
+        right.set_title(f'said: {" + ".join(outcome.said)}; hidden: {outcome.hidden}')
         figure.savefig(IMAGE, dpi=110)
-    print(diagnosis.sentence)
+    print(outcome.words)
 
 
 if __name__ == '__main__':

@@ -1,10 +1,11 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""``wheel-terra demo``: two shipped drives through the real node, with reports and key numbers.
+"""``wheel-terra demo``: two shipped drives through the real node, and a blind trial.
 
 The entrapment of a simulated six-wheel rover, whose ground truth is known, and a piece of a real
 drive of the Pathfinder rover. The node hears them over DDS; where there is no rclpy the same drives
-go through ``wheel-terra replay``, which gives the same numbers.
+go through ``wheel-terra replay``, which gives the same numbers. The trial hides an effect in a
+table, diagnoses it blind and opens the seal (``wheel-terra trial``).
 """
 
 from __future__ import annotations
@@ -24,7 +25,8 @@ from wheel_terra_estimator.errors import UserError
 if TYPE_CHECKING:
     from wheel_terra_estimator.bags.truth import Truth
 
-SUMMARY = 'run the estimator over two shipped drives and report'
+SUMMARY = 'run the estimator over two shipped drives, and a blind trial of the diagnosis'
+TRIAL_SEED = 55  # what it hides is told when the seal is opened
 EXAMPLES = ('wheel-terra demo', 'wheel-terra demo --no-node -o /tmp/demo --overwrite')
 
 
@@ -90,6 +92,13 @@ def run(arguments: argparse.Namespace) -> int:
             return status
         _key_numbers(drive, output)
         reports.append(output / f'{drive.name}.html')
+    print(f'\n=== trial {TRIAL_SEED}: what is missing in the model of a wheel?\n', flush=True)
+    trial = [sys.executable, '-m', 'wheel_terra_estimator.cli.main', 'trial', '--overwrite']
+    trial += ['--seed', str(TRIAL_SEED), '-o', str(output / 'trial')]
+    status = subprocess.run(trial, env=_environment(), check=False).returncode
+    if status:
+        return status
+    reports.append(output / 'trial' / 'diagnosis' / 'report.html')
     print('\nReports with pictures, to be opened in a browser:')
     for report in reports:
         print(f'  {report.resolve()}')
