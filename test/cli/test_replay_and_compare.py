@@ -76,9 +76,10 @@ def test_smoothed(tmp_path, capsys):
     drive = tmp_path / 'short'
     write_simulated_drive(simulate(scenario.load('turns'), seed=5, duration=14.0), drive)
     page, table = tmp_path / 'page.html', tmp_path / 'table.csv'
+    ways = ['--track', str(tmp_path / 'way.geojson')]
     for name, extra in (
         ('live', ['--json']),
-        ('smooth', ['--smooth', '--report', str(page), '--table', str(table)]),
+        ('smooth', ['--smooth', '--report', str(page), '--table', str(table), *ways]),
     ):
         assert main(['replay', str(drive), *CONFIG, *extra, '-o', str(tmp_path / name)]) == 0
         said = capsys.readouterr().out
@@ -97,6 +98,9 @@ def test_smoothed(tmp_path, capsys):
             elif topic in (f'{NAMESPACE}/{name}' for name in ('slip', 'slip_stddev', 'twist')):
                 assert not same, topic
     assert 'Slip: smoother and filter' in page.read_text() and table.is_file()
+    assert 'Where the ground is bad' in page.read_text()
+    way = json.loads((tmp_path / 'way.geojson').read_text())
+    assert {f['geometry']['type'] for f in way['features']} >= {'LineString'}
 
 
 def test_compare(drive, tmp_path, capsys, undrawn):

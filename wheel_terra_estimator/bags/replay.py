@@ -21,6 +21,7 @@ from wheel_terra_estimator.bags.reader import MeasurementReader
 from wheel_terra_estimator.bags.smoothing import Event, smoothed
 from wheel_terra_estimator.bags.storage import Bag
 from wheel_terra_estimator.bags.thinning import MOST_ROWS
+from wheel_terra_estimator.bags.track import Track, TrackRecorder, read_odometry
 from wheel_terra_estimator.bags.writer import EstimateBagWriter
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.errors import UserError
@@ -56,6 +57,7 @@ class Replay:
     notes: tuple[str, ...]
     interrupted: bool
     learned: dict[str, Any]  # configuration key -> value, see `EstimatorCore.learned`
+    track: Track
     filtered: EstimateHistory | None = None  # what the filter said, where ``history`` is smoothed
 
 
@@ -70,6 +72,7 @@ def replay(
     every_set: bool = False,
     progress: bool = True,
     smooth: bool = False,
+    odometry: str = '',
 ) -> Replay:
     """Run the estimator over an open bag.
 
@@ -93,15 +96,20 @@ def replay(
         Whether a long drive shows its progress on a terminal.
     smooth : bool
         Whether the estimates are those of the fixed-interval smoother.
+    odometry : str
+        Topic of the bag whose positions the track has; empty: it is reckoned.
 
     Raises
     ------
     UserError
         Input that cannot be used, an output path that is taken.
     """
+    places = read_odometry(bag, odometry) if odometry else None
     reader = MeasurementReader(bag, remaps, configuration)
+    tracker = TrackRecorder(configuration)
     smoother = DriveSmoother(configuration) if smooth else None
     pipeline = Pipeline(configuration, estimator=smoother.estimator if smoother else None)
+    pipeline.on_measurement = tracker.hear
     most = None if every_set else MOST_ROWS
     messages = _in_order_of(arrival, reader) if arrival else reader.messages()
     if progress:
@@ -125,6 +133,7 @@ def replay(
         for event in events:
             if event.estimates is not None:
                 recorder.add(event.estimates)
+                tracker.add(event.estimates)
             if writer is None:
                 continue
             if event.estimates is None:
@@ -144,6 +153,7 @@ def replay(
         interrupted=interrupted.is_set(),
         learned=pipeline.core.learned(),
         filtered=filtered() if filtered is not None else None,
+        track=tracker.track(places),
     )
 
 

@@ -52,6 +52,27 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         'recordings a name, for one in the folder of each',
     )
     parser.add_argument(
+        '--track',
+        type=Path,
+        metavar='F.csv|F.geojson',
+        help='map of the drive: position, slip, class, sinkage, pull margin and learned soil along '
+        'the way, units in the header; with several recordings a name, for one in the folder of '
+        'each',
+    )
+    parser.add_argument(
+        '--track-odometry',
+        default='',
+        metavar='TOPIC',
+        help='odometry in the recording whose positions the map has (default: reckoned from the '
+        'estimated velocity and the attitude)',
+    )
+    parser.add_argument(
+        '--track-origin',
+        default='0,0',
+        metavar='LAT,LON',
+        help='where the origin of a GeoJSON map lies [deg] (default 0,0)',
+    )
+    parser.add_argument(
         '--save-soil',
         type=Path,
         metavar='F.yaml',
@@ -110,7 +131,7 @@ def _run_one(arguments: argparse.Namespace) -> int:
     from wheel_terra_estimator.checks.finding import CheckReport
     from wheel_terra_estimator.fleet.drive import replay_drive
     from wheel_terra_estimator.output_folder import check_file, check_folder, new_file
-    from wheel_terra_estimator.reporting import estimates_table, truth_scores
+    from wheel_terra_estimator.reporting import estimates_table, track_table, truth_scores
     from wheel_terra_estimator.reporting.drive_summary import as_dict, as_text
     from wheel_terra_estimator.reporting.html import check_page
 
@@ -129,6 +150,10 @@ def _run_one(arguments: argparse.Namespace) -> int:
     if arguments.table:
         estimates_table.check_table(arguments.table)
         check_file(arguments.table, arguments.overwrite, inputs)
+    origin = track_table.parse_origin(arguments.track_origin)
+    if arguments.track:
+        track_table.check_track(arguments.track)
+        check_file(arguments.track, arguments.overwrite, inputs)
     if arguments.save_soil:
         check_file(arguments.save_soil, arguments.overwrite, inputs)
     if arguments.output:
@@ -143,6 +168,7 @@ def _run_one(arguments: argparse.Namespace) -> int:
         every_set=bool(arguments.table),
         limits=bag_limits.from_arguments(arguments),
         smooth=arguments.smooth,
+        odometry=arguments.track_odometry,
         on_checked=print_findings,
     )
     errors = drive.errors
@@ -161,6 +187,8 @@ def _run_one(arguments: argparse.Namespace) -> int:
         print('\n'.join([as_text(drive.summary), *lines]))
     if arguments.table:
         drive.write_table(arguments.table, arguments.overwrite)
+    if arguments.track:
+        drive.write_track(arguments.track, arguments.overwrite, origin)
     if arguments.save_soil:
         if not drive.result.learned:
             raise UserError(f'{bag}: no estimates, so nothing for {arguments.save_soil}')
@@ -170,6 +198,7 @@ def _run_one(arguments: argparse.Namespace) -> int:
         drive.write_report(arguments.report, arguments.overwrite)
     written = {
         'table': arguments.table,
+        'track': arguments.track,
         'soil': arguments.save_soil,
         'estimates': arguments.output,
         'report': arguments.report,
@@ -184,7 +213,7 @@ def _run_one(arguments: argparse.Namespace) -> int:
 def _run_several(arguments: argparse.Namespace) -> int:
     from wheel_terra_estimator.bags.reader import parse_remaps
     from wheel_terra_estimator.fleet.several_bags import SUMMARY_PAGE, Settings, replay_bags
-    from wheel_terra_estimator.reporting import estimates_table
+    from wheel_terra_estimator.reporting import estimates_table, track_table
     from wheel_terra_estimator.reporting.html import check_page
 
     if not arguments.output:
@@ -197,6 +226,8 @@ def _run_several(arguments: argparse.Namespace) -> int:
         check_page(arguments.report)
     if arguments.table:
         estimates_table.check_table(arguments.table)
+    if arguments.track:
+        track_table.check_track(arguments.track)
     settings = Settings(
         configuration_reader.from_arguments(arguments),
         parse_remaps(arguments.remap),
@@ -205,6 +236,9 @@ def _run_several(arguments: argparse.Namespace) -> int:
         _plain_name('--table', arguments.table),
         bag_limits.from_arguments(arguments),
         smooth=arguments.smooth,
+        track=_plain_name('--track', arguments.track),
+        odometry=arguments.track_odometry,
+        origin=track_table.parse_origin(arguments.track_origin),
     )
     rows = replay_bags(
         arguments.bags,

@@ -17,7 +17,7 @@ from wheel_terra_estimator.checks.finding import CheckReport
 from wheel_terra_estimator.checks.run import check_recording
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.output_folder import new_file
-from wheel_terra_estimator.reporting import estimates_table, truth_scores
+from wheel_terra_estimator.reporting import estimates_table, track_table, truth_scores
 from wheel_terra_estimator.reporting.drive_summary import DriveSummary, summarise
 from wheel_terra_estimator.reporting.replay_report import write_replay_report
 
@@ -43,6 +43,11 @@ class Drive:
         with new_file(path, overwrite) as fresh:
             estimates_table.write_table(self.result.history, fresh)
 
+    def write_track(self, path: Path, overwrite: bool, origin: tuple[float, float]) -> None:
+        """Write the track as CSV, or as GeoJSON from an origin (latitude, longitude) [deg]."""
+        with new_file(path, overwrite) as fresh:
+            track_table.write_track(self.result.track, fresh, origin)
+
     def write_report(self, path: Path, overwrite: bool) -> None:
         """Write the page with pictures."""
         write_replay_report(
@@ -56,6 +61,7 @@ class Drive:
             errors=self.errors,
             filtered=self.result.filtered,
             filter_errors=self.filter_errors,
+            track=self.result.track,
         )
 
 
@@ -71,6 +77,7 @@ def replay_drive(
     progress: bool = True,
     limits: Limits = LIMITS,
     smooth: bool = False,
+    odometry: str = '',
     on_checked: Callable[[CheckReport], None] = lambda checked: None,
 ) -> Drive:
     """Check a recording, run the estimator over it and sum it up.
@@ -79,7 +86,7 @@ def replay_drive(
     ----------
     path : Path
         rosbag2 folder or file.
-    configuration, remaps, output, overwrite, arrival, every_set, progress, smooth
+    configuration, remaps, output, overwrite, arrival, every_set, progress, smooth, odometry
         See `bags.replay.replay`.
     limits : Limits
         What of the recording is unpacked and held.
@@ -105,6 +112,7 @@ def replay_drive(
             every_set=every_set,
             progress=progress,
             smooth=smooth,
+            odometry=odometry,
         )
         truth = read_truth(bag, remaps, configuration)
     # A truth that the estimator was given as its reference is none to judge it by.

@@ -56,8 +56,9 @@ READ_AT_ONCE = 2**20
 class Settings:
     """What is the same for all recordings.
 
-    ``report`` and ``table`` are names of files in the folder of each recording, empty for none;
-    ``smooth``: estimates of the fixed-interval smoother.
+    ``report``, ``table`` and ``track`` are names of files in the folder of each recording, empty
+    for none; ``smooth``: estimates of the fixed-interval smoother; ``odometry``, ``origin``: of
+    the track.
     """
 
     configuration: Configuration
@@ -67,6 +68,9 @@ class Settings:
     table: str = ''
     limits: Limits = LIMITS
     smooth: bool = False
+    track: str = ''
+    odometry: str = ''
+    origin: tuple[float, float] = (0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -201,6 +205,7 @@ def _digest(settings: Settings, path: Path) -> str:
         'files': [settings.report, settings.table],
         'limits': asdict(settings.limits),
         'smooth': settings.smooth,
+        'track': [settings.track, settings.odometry, *settings.origin],
     }
     digest = hashlib.blake2b(digest_size=DIGEST_SIZE)
     digest.update(json.dumps(stated, sort_keys=True, default=str).encode())
@@ -242,9 +247,12 @@ def _replay(settings: Settings, task: _Task) -> DriveRow:
         limits=settings.limits,
         progress=False,
         smooth=settings.smooth,
+        odometry=settings.odometry,
     )
     if settings.table:
         drive.write_table(output / settings.table, overwrite=True)
+    if settings.track:
+        drive.write_track(output / settings.track, overwrite=True, origin=settings.origin)
     if settings.report:
         drive.write_report(output / settings.report, overwrite=True)
     row = DriveRow.from_drive(str(task.path), drive.summary, drive.checked)

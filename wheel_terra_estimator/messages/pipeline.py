@@ -15,6 +15,7 @@ from wheel_terra_estimator.checks.watched_estimator import WatchedEstimator
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.core import EstimatorCore
 from wheel_terra_estimator.estimation.estimates import EstimateSet
+from wheel_terra_estimator.estimation.measurements import Measurement
 from wheel_terra_estimator.estimation.timing.input_log import Estimator
 from wheel_terra_estimator.messages.convert import InputConverter, input_layout
 from wheel_terra_estimator.messages.diagnostics import NODE, Diagnostics
@@ -45,6 +46,8 @@ class Pipeline:
     transport_faults, transport_values : dict, callable
         What whoever brings the messages has to say for itself in diagnostics: faults in words, and
         a function that returns key-values.
+    on_measurement : callable or None
+        Gets each measurement before the core does.
     diagnostics : Diagnostics
         Says what ``/diagnostics`` is to say, and when.
     """
@@ -63,6 +66,7 @@ class Pipeline:
         self.diagnostics = Diagnostics(self.names, self.counters, self._faults, node_name)
         self.transport_faults: dict[str, str] = {}
         self.transport_values: Callable[[], dict[str, Any]] = dict
+        self.on_measurement: Callable[[Measurement], object] | None = None
         self._published = 0
         self._refused: dict[tuple[str, str], tuple[int, int]] = {}  # -> count, stamp
 
@@ -72,6 +76,8 @@ class Pipeline:
         measurement = self.converter.convert(topic, message)
         if measurement is None:
             return []
+        if self.on_measurement is not None:
+            self.on_measurement(measurement)
         return self._out(self.core.add(measurement))
 
     def flush(self) -> list[EstimateSet]:

@@ -9,11 +9,12 @@ from pathlib import Path
 from typing import Any
 
 from wheel_terra_estimator.bags.history import EstimateHistory
+from wheel_terra_estimator.bags.track import Track
 from wheel_terra_estimator.bags.truth import Truth
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.estimates import SlipClass
 from wheel_terra_estimator.output_folder import new_file
-from wheel_terra_estimator.reporting import drive_pictures
+from wheel_terra_estimator.reporting import drive_pictures, track_picture
 from wheel_terra_estimator.reporting.drive_figure import drive_figure
 from wheel_terra_estimator.reporting.drive_style import BAND, CLASS_COLOURS
 from wheel_terra_estimator.reporting.drive_summary import DriveSummary
@@ -33,6 +34,7 @@ def write_replay_report(
     errors: TruthErrors | None = None,
     filtered: EstimateHistory | None = None,
     filter_errors: TruthErrors | None = None,
+    track: Track | None = None,
 ) -> None:
     """Write the report of a drive.
 
@@ -54,6 +56,8 @@ def write_replay_report(
         How far the estimates are from a truth that may judge them.
     filtered, filter_errors : EstimateHistory, TruthErrors, optional
         What the filter said, where the estimates are those of the smoother: both are shown.
+    track : Track, optional
+        Where the rover was.
     """
     from wheel_terra_estimator.terramechanics.effects import catalogue
 
@@ -77,6 +81,7 @@ def write_replay_report(
         filter_errors=(
             [_error_row(error) for error in filter_errors.quantities] if filter_errors else []
         ),
+        map=_map(track) if track and track_picture.has_map(track) else None,
         smoothed=_smoothed_pictures(history, filtered, truth) if summary.sets else [],
         truth_source=truth.source if truth else '',
         provenance=configuration.provenance,
@@ -123,6 +128,14 @@ def _cards(summary: DriveSummary) -> list[dict[str, str]]:
             'label': 'of the time at rest or unknown',
         },
     ]
+
+
+def _map(track: Track) -> dict[str, str]:
+    return {
+        'source': picture(track_picture.map_of(track)),
+        'caption': f'Position {track.source}; circle: start, cross: stuck warning. Strength: what '
+        'was learned of cohesion and friction, over what the soil file states.',
+    }
 
 
 def _smoothed_pictures(

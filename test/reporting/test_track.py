@@ -1,0 +1,141 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Maps of drives against ways that are known in closed form."""
+
+import csv
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from estimate_sets import some_estimates
+
+from wheel_terra_estimator.bags.bag_file import BagFile
+from wheel_terra_estimator.bags.storage import open_bag
+from wheel_terra_estimator.bags.track import COLUMNS, TrackRecorder, read_odometry
+from wheel_terra_estimator.cli.main import main
+from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.estimation.measurements import InertialReading
+from wheel_terra_estimator.messages.convert import ODOMETRY
+from wheel_terra_estimator.reporting.track_picture import has_map, map_of
+from wheel_terra_estimator.reporting.track_table import as_geojson, parse_origin, write_track
+
+SPEED, YAW_RATE, STEP = 0.1, 0.05, 50_000_000
+START = 1_000_000_000
+
+
+def drive(rover, count, yaw_rate=YAW_RATE, **fields):
+    """Sets at a constant speed and yaw rate."""
+    soil = rover.soil
+    stated = (math.degrees(soil.friction_angle), float(soil.frictional_modulus))
+    base = replace(
+        some_estimates(),
+        stamp=START,
+        forward_velocity=SPEED,
+        yaw_rate=yaw_rate,
+        soil_names=('soil.friction_angle_deg', 'soil.frictional_modulus', 'soil.cohesive_modulus'),
+        soil=np.array([*stated, float(soil.cohesive_modulus)]),
+        soil_std=np.ones(3),
+        **fields,
+    )
+    return [replace(base, stamp=START + i * STEP) for i in range(count)]
+
+
+def recorded(rover, sets, attitudes=()):
+    recorder = TrackRecorder(rover)
+    for reading in attitudes:
+        recorder.hear(reading)
+    for estimates in sets:
+        recorder.add(estimates)
+    return recorder
+
+
+def test_a_circle_closes(rover):
+    whole = round(2.0 * math.pi / YAW_RATE / (STEP * 1e-9))
+    values = recorded(rover, drive(rover, whole + 1)).track().values
+    radius = SPEED / YAW_RATE
+    assert np.hypot(values['x'][-1], values['y'][-1]) < 0.03
+    assert values['distance'][-1] == pytest.approx(2.0 * math.pi * radius, rel=2e-3)
+    assert values['y'].max() == pytest.approx(2.0 * radius, rel=5e-3), 'a left turn'
+    np.testing.assert_allclose(values['soil_strength'], 1.0)
+    np.testing.assert_allclose(values['soil_stiffness'], 1.0)
+
+
+def test_orientation_gives_heading_and_height(rover):
+    """Nose up by 0.2 rad (a negative pitch, REP 103), heading north."""
+    heading, pitch = math.pi / 2.0, -0.2
+    cy, sy, cp, sp = (f(a / 2.0) for a in (heading, pitch) for f in (math.cos, math.sin))
+    q = np.array([-sy * sp, cy * sp, sy * cp, cy * cp])
+    attitudes = [InertialReading(START + i * STEP, np.zeros(3), np.zeros(3), q) for i in range(201)]
+    values = recorded(rover, drive(rover, 201, yaw_rate=0.7), attitudes).track().values
+    way = SPEED * 200 * STEP * 1e-9
+    end = [values[name][-1] for name in 'xyz']
+    np.testing.assert_allclose(end, [0.0, way * math.cos(0.2), way * math.sin(0.2)], atol=0.01)
+
+
+def test_nothing_is_reckoned_over_a_pause_or_a_step_of_the_clock(rover):
+    sets = drive(rover, 100, yaw_rate=0.0)
+    later = [replace(s, stamp=s.stamp + 60_000_000_000) for s in sets]
+    values = recorded(rover, [*sets, *later, *sets]).track().values
+    assert values['x'][-1] == pytest.approx(3 * 99 * SPEED * STEP * 1e-9, abs=0.03)
+
+
+def test_table_and_map(rover, tmp_path):
+    sets = drive(rover, 400, yaw_rate=0.0)
+    sets[200:300] = [replace(s, slip_class=np.array([0, 2], dtype=np.uint8)) for s in sets[200:300]]
+    sets[280:] = [replace(s, stuck=True) for s in sets[280:]]
+    track = recorded(rover, sets).track()
+    write_track(track, tmp_path / 'way.csv')
+    with (tmp_path / 'way.csv').open() as file:
+        rows = list(csv.DictReader(file))
+    assert list(rows[0]) == [
+        'stamp [ns]',
+        *(f'{name} [{unit}]' if unit else name for name, unit in COLUMNS.items()),
+    ]
+    assert float(rows[-1]['x [m]']) == pytest.approx(track.values['x'][-1], rel=1e-5)
+    assert {row['slip_class'] for row in rows} == {'0', '2'}
+    found = as_geojson(track, (48.0, 11.0))['features']
+    assert [f['properties'].get('slip_class') for f in found] == ['low', 'high', 'low', None]
+    assert found[-1]['properties']['name'] == 'stuck warning'
+    (east, north, _), end = found[0]['geometry']['coordinates'][0], found[2]['geometry']
+    assert (east, north) == (pytest.approx(11.0, abs=1e-6), 48.0)
+    # Great circle on the same sphere.
+    turned = math.radians(end['coordinates'][-1][0] - east)
+    half = math.cos(math.radians(48.0)) * math.sin(turned / 2.0)
+    assert 2.0 * 6_378_137.0 * math.asin(half) == pytest.approx(track.values['x'][-1], rel=1e-3)
+    assert has_map(track)
+    drawn = map_of(track)
+    drawn.savefig(tmp_path / 'map.svg')
+    assert len(drawn.axes) == 3
+
+
+def test_an_odometry_in_the_recording(rover, factory, tmp_path):
+    path = tmp_path / 'bag'
+    with BagFile(path, {'/slam': ODOMETRY}) as file:
+        for i in range(0, 100, 10):
+            twist = factory.twist_with_covariance(0.0, 0.0, [0.0] * 36)
+            message = factory.odometry(factory.header(START + i * STEP), twist)
+            message.pose.pose.position.x = 5.0 + 0.01 * i
+            message.pose.pose.orientation.w = 1.0
+            file.write('/slam', message, START + i * STEP)
+    with open_bag(path) as bag:
+        odometry = read_odometry(bag, '/slam')
+        with pytest.raises(UserError, match='no odometry on /other; there is /slam'):
+            read_odometry(bag, '/other')
+    track = recorded(rover, drive(rover, 200)).track(odometry)
+    assert track.source == 'odometry on /slam'
+    seconds = (track.stamp - START) / STEP
+    np.testing.assert_allclose(track.values['x'], 5.0 + 0.01 * seconds, atol=1e-9)
+    assert track.stamp[-1] <= odometry.stamp[-1], 'no place where the odometry is silent'
+
+
+@pytest.mark.parametrize('text', ['48.1', '91,0', 'a,b', '0,200'])
+def test_origins_that_are_none(text):
+    with pytest.raises(UserError, match='--track-origin'):
+        parse_origin(text)
+
+
+def test_what_a_track_cannot_be_is_said_first(tmp_path, capsys):
+    command = ['replay', str(tmp_path), '--config', 'pathfinder', '--track', 'way.png']
+    assert main(command) == 2
+    assert 'ends in .csv or .geojson' in capsys.readouterr().err

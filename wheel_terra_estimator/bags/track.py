@@ -1,0 +1,225 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""A map of a drive: where the rover was, and what the ground was like there.
+
+The position is reckoned in the plane from the estimated body velocity along the heading: that of
+the reported orientation where there is one, else the estimated yaw rate; the height from the pitch
+of the reported orientation. Or it is taken from an odometry in the recording.
+"""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_right
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wheel_terra_estimator.bags.message_types import jazzy_types
+from wheel_terra_estimator.bags.storage import Bag
+from wheel_terra_estimator.bags.thinning import ThinnedRows
+from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.estimation.estimates import EstimateSet, SlipClass
+from wheel_terra_estimator.estimation.measurements import InertialReading, Measurement
+from wheel_terra_estimator.messages.convert import ODOMETRY, stamp_of
+
+FloatArray = NDArray[np.float64]
+
+SPACING = 0.02
+"""Way between two points of a track [m]."""
+PAUSE = 1.0
+"""Time after which a point is added without way [s]; also the longest step that is reckoned on."""
+ATTITUDE_PERIOD = 0.05
+"""Time between two attitudes that are kept [s]."""
+MOST_POINTS = 200_000
+"""Points that are kept: 4 km without a gap; of a longer drive every second, fourth ... one."""
+_SECOND = 1e-9  # of a nanosecond
+
+COLUMNS = {
+    'time': 's',
+    'x': 'm',
+    'y': 'm',
+    'z': 'm',
+    'heading': 'rad',
+    'distance': 'm',
+    'forward_velocity': 'm/s',
+    'slip': '-',
+    'slip_std': '-',
+    'slip_class': '',
+    'sinkage': 'm',
+    'pull_margin': 'N',
+    'soil_strength': '-',
+    'soil_stiffness': '-',
+    'stuck_probability': '-',
+    'stuck': '',
+}
+"""Columns of a track and their units, see `Track`."""
+
+
+@dataclass(frozen=True)
+class Track:
+    """Points along a drive, (k,) each.
+
+    ``values`` by the names of `COLUMNS`: position [m] and heading [rad] from the first point, or of
+    the odometry; ``distance`` travelled; medians of slip and its deviation over the wheels; the
+    worst known class of a wheel (255: none is known); greatest sinkage; sum of the pull margins;
+    learned shear strength and bearing modulus over those stated (1: as stated); the probability of
+    an entrapment and whether the warning ran.
+    """
+
+    stamp: NDArray[np.int64]  # [ns]
+    values: dict[str, FloatArray]
+    source: str  # of the position, in words
+
+
+class TrackRecorder:
+    """Collects a track from sets and attitudes.
+
+    Parameters
+    ----------
+    configuration : Configuration
+        The soil that the learned one is compared with.
+    """
+
+    def __init__(self, configuration: Configuration) -> None:
+        soil = configuration.soil
+        self._tangent = math.tan(float(soil.friction_angle))
+        moduli = {
+            'soil.frictional_modulus': float(soil.frictional_modulus),
+            'soil.cohesive_modulus': float(soil.cohesive_modulus),
+        }
+        # Both are learned by one factor; either may be 0.
+        self._modulus = max(moduli.items(), key=lambda item: abs(item[1]))
+        self._attitude_stamps: list[int] = []
+        self._attitudes: list[tuple[float, float]] = []  # heading and sine of the climb
+        self._rows = ThinnedRows(MOST_POINTS)
+        self._origin = self._stamp = self._noted = 0
+        self._place = [0.0, 0.0, 0.0]
+        self._heading = self._distance = self._next = 0.0
+
+    def hear(self, measurement: Measurement) -> None:
+        """Take the attitude out of a measurement that has one."""
+        if not isinstance(measurement, InertialReading) or measurement.orientation is None:
+            return
+        stamps = self._attitude_stamps
+        if not stamps or measurement.stamp - stamps[-1] >= ATTITUDE_PERIOD / _SECOND:
+            stamps.append(measurement.stamp)
+            self._attitudes.append(heading_and_climb(measurement.orientation))
+
+    def add(self, estimates: EstimateSet) -> None:
+        """Go on to a set."""
+        first = not self._origin
+        step = 0.0 if first else (estimates.stamp - self._stamp) * _SECOND
+        if first:
+            self._origin = estimates.stamp
+        self._stamp = estimates.stamp
+        if not 0.0 <= step <= PAUSE:
+            step = 0.0  # a pause, or a clock that steps back: nothing is known of the way
+        way = estimates.forward_velocity * step
+        told = self._attitude(estimates.stamp)
+        climb = 0.0
+        if told is None:
+            self._heading += estimates.yaw_rate * step
+        else:
+            self._heading, climb = told
+        level = way * math.sqrt(max(1.0 - climb * climb, 0.0))
+        self._place[0] += level * math.cos(self._heading)
+        self._place[1] += level * math.sin(self._heading)
+        self._place[2] += way * climb
+        self._distance += abs(way)
+        since = abs(estimates.stamp - self._noted) * _SECOND
+        if first or self._distance >= self._next or since >= PAUSE:
+            self._noted = estimates.stamp
+            self._next = self._distance + SPACING
+            self._rows.add(estimates.stamp, self._row(estimates))
+
+    def track(self, odometry: Track | None = None) -> Track:
+        """Return the track, on the positions of an `odometry` where one is given."""
+        columns = self._rows.values(len(COLUMNS)).T
+        values = dict(zip(COLUMNS, columns, strict=True))
+        stamp = self._rows.stamps()
+        if odometry is None:
+            yaw = 'orientation' if self._attitudes else 'yaw rate'
+            return Track(stamp, values, f'reckoned from estimated velocity and {yaw}')
+        inside = (stamp >= odometry.stamp[0]) & (stamp <= odometry.stamp[-1])
+        there = {
+            name: np.interp(stamp[inside], odometry.stamp, odometry.values[name])
+            for name in ('x', 'y', 'z', 'heading')
+        }
+        kept = {name: column[inside] for name, column in values.items()}
+        return Track(stamp[inside], kept | there, odometry.source)
+
+    def _attitude(self, stamp: int) -> tuple[float, float] | None:
+        """Return heading [rad] and sine of the climb last known of late; None: not known."""
+        index = bisect_right(self._attitude_stamps, stamp) - 1
+        if index < 0 or (stamp - self._attitude_stamps[index]) * _SECOND > PAUSE:
+            return None
+        return self._attitudes[index]
+
+    def _row(self, estimates: EstimateSet) -> FloatArray:
+        soil = dict(zip(estimates.soil_names, estimates.soil.tolist(), strict=True))
+        known = estimates.slip_class[estimates.slip_class != SlipClass.UNKNOWN]
+        return np.array(
+            [
+                (estimates.stamp - self._origin) * _SECOND,
+                *self._place,
+                self._heading,
+                self._distance,
+                estimates.forward_velocity,
+                np.median(estimates.slip),
+                np.median(estimates.slip_std),
+                known.max() if known.size else SlipClass.UNKNOWN,
+                estimates.sinkage.max(),
+                estimates.pull_margin.sum(),
+                math.tan(math.radians(soil['soil.friction_angle_deg'])) / self._tangent,
+                soil[self._modulus[0]] / self._modulus[1],
+                estimates.stuck_probability.max(),
+                float(estimates.stuck),
+            ]
+        )
+
+
+def heading_and_climb(orientation: FloatArray) -> tuple[float, float]:
+    """Return heading [rad] and sine of the climb (nose up) of a quaternion x, y, z, w."""
+    x, y, z, w = orientation.tolist()
+    heading = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+    return heading, -2.0 * (w * y - x * z)
+
+
+def read_odometry(bag: Bag, topic: str) -> Track:
+    """Read the positions of an odometry (nav_msgs/Odometry) in a recording.
+
+    Raises
+    ------
+    UserError
+        There is none.
+    """
+    if topic not in bag.topics or bag.topics[topic].type != ODOMETRY:
+        known = [name for name, there in bag.topics.items() if there.type == ODOMETRY]
+        raise UserError(
+            f'{bag.path}: no odometry on {topic}; '
+            + (f'there is {", ".join(known)}' if known else 'there is none in the recording')
+        )
+    rows: dict[int, list[float]] = {}
+    for _, _, data in bag.messages([topic]):
+        try:
+            message: Any = jazzy_types().deserialize_cdr(data, ODOMETRY)
+        except Exception:  # the library lets many kinds through on damaged bytes
+            continue
+        pose = message.pose.pose
+        turned = np.array([getattr(pose.orientation, axis) for axis in 'xyzw'])
+        place = [pose.position.x, pose.position.y, pose.position.z]
+        row = [*place, heading_and_climb(turned)[0]]
+        if np.isfinite(row).all():
+            rows[stamp_of(message)] = row
+    if not rows:
+        raise UserError(f'{bag.path}: the odometry on {topic} holds no positions')
+    stamps = sorted(rows)
+    table = np.array([rows[stamp] for stamp in stamps])
+    table[:, 3] = np.unwrap(table[:, 3])
+    values: Mapping[str, FloatArray] = dict(zip(('x', 'y', 'z', 'heading'), table.T, strict=True))
+    return Track(np.array(stamps, dtype=np.int64), dict(values), f'odometry on {topic}')
