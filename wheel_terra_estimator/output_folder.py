@@ -42,6 +42,9 @@ from wheel_terra_estimator.errors import UserError
 MARKER = '.wheel-terra.json'
 """File in an output folder that lists what the program wrote there; folders end in ``/``."""
 
+LEAST_ROOM = 2**16
+"""Room on the disk [byte] without which nothing is begun."""
+
 LARGEST_MARKER = 16 * 2**20
 """A marker is a short list: a longer file [byte] is none of ours."""
 
@@ -358,12 +361,12 @@ def _absolute(path: Path) -> Path:
 
 
 def _try_to_write(path: Path) -> None:
-    """Find out whether the nearest folder that exists takes new entries."""
+    """Find out whether the nearest folder that exists takes new entries of some size."""
     place = _absolute(path).parent
     while not place.exists() and place != place.parent:
         place = place.parent
-    with tempfile.TemporaryDirectory(dir=place, prefix='.wheel-terra-'):
-        pass
+    with tempfile.TemporaryDirectory(dir=place, prefix='.wheel-terra-') as probe:
+        (Path(probe) / 'probe').write_bytes(bytes(LEAST_ROOM))
 
 
 def _listed(folder: Path) -> set[str]:
@@ -460,5 +463,9 @@ def _write_marker(
     content: dict[str, Any] = {'program': f'wheel-terra {__version__}', 'files': sorted(names)}
     if known := {**_noted(marker), **facts}:
         content['facts'] = known
-    part.write_text(json.dumps(content, indent=1) + '\n', encoding='utf-8')
-    part.replace(marker)
+    try:
+        part.write_text(json.dumps(content, indent=1) + '\n', encoding='utf-8')
+        part.replace(marker)
+    except OSError:
+        part.unlink(missing_ok=True)
+        raise

@@ -66,6 +66,22 @@ def test_bag_on_a_disk_that_fills_up_is_closed_and_readable(
     assert fill_again == ['out']
 
 
+def test_a_disk_without_room_for_one_chunk_keeps_nothing(tmp_path: Path) -> None:
+    with largest_file(400_000), pytest.raises(UserError) as caught:
+        fill(tmp_path / 'out', 1000)
+    assert 'kept' not in str(caught.value)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_full_disk_is_found_before_anything_is_computed(tmp_path: Path, capsys: Any) -> None:
+    with largest_file(1000):
+        assert main(['evaluate', '--kinds', 'climb', '-o', str(tmp_path / 'out.md')]) == 2
+    said = capsys.readouterr()
+    assert 'cannot be written' in said.err
+    assert 'drive' not in said.out + said.err
+    assert not list(tmp_path.iterdir())
+
+
 def test_a_disk_that_is_full_at_the_end_only(tmp_path: Path, monkeypatch: Any) -> None:
     """The last chunk does not fit when the bag is closed."""
     from rosbags.rosbag2.storage_mcap import McapWriter

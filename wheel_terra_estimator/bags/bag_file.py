@@ -111,13 +111,20 @@ class BagFile:
             self._stack.__exit__(kind, error, trace)
 
     def _close_cut(self) -> None:
-        """Close the bag on a disk that takes no more: it keeps all chunks that are whole."""
+        """Close the bag on a disk that takes no more: it keeps all chunks that are whole.
+
+        Without one it keeps nothing: a file that only a recovery could read is no bag.
+        """
         storage: Any = self._writer.storage
         if self._storage != 'mcap' or storage is None:
             return
-        with suppress(OSError):  # then nothing can be kept; the first error is the one to be said
+        with suppress(OSError):  # the first error is the one to be said
             storage.bio.raw.close()  # what is buffered has no place any more
-            kept = close_cut_file(storage.path)
+            try:
+                kept = close_cut_file(storage.path)
+            except OSError:
+                storage.path.unlink()
+                return
             self._writer.counts = {c.id: kept.counts[c.id] for c in self._connections.values()}
             self._writer.min_timestamp, self._writer.max_timestamp = kept.start, kept.end
             writer: Any = self._writer
