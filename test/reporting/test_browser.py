@@ -175,11 +175,66 @@ def test_two_runs_over_an_hour_on_one_time_axis(comparison_report: Path) -> None
     assert known.min() == pytest.approx(expected.min(), abs=1e-4)
 
 
+@pytest.fixture(scope='module')
+def soilbin_report(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    from wheel_terra_estimator.soilbin import report
+    from wheel_terra_estimator.soilbin.bookkeeping import SERIES
+    from wheel_terra_estimator.soilbin.case import Case
+
+    series = np.random.default_rng(1).random((200, len(SERIES)))
+    series[:, 0] = np.linspace(0.0, 40.0, 200)
+    folder = tmp_path_factory.mktemp('soilbin')
+    report.write_report(folder, series, Case(), {'slip (second half)': '21.3 % (24.1 %)'})
+    return folder / 'report.html'
+
+
+@pytest.fixture(scope='module')
+def limiter_report(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    from wheel_terra_estimator.evaluation import page
+    from wheel_terra_estimator.evaluation.closed_loop import ClosedLoopDrive, Comparison, report
+
+    time = np.linspace(0.0, 90.0, 900)
+    wheels = np.outer(time / 90.0, np.ones(6))
+    free = ClosedLoopDrive(
+        time, time, 0.1 * wheels, wheels, np.ones(900), None, 'command passes', {}
+    )
+    limited = dataclasses.replace(free, stopped=40.0, reason='stop: 0.05 m of rim travel left')
+    drive = Comparison(3, 0.1, free, limited)
+    path = tmp_path_factory.mktemp('limiter') / 'report.html'
+    page.write(path, 'The traction limiter', report([drive]), None, drive)
+    return path
+
+
+@pytest.fixture(scope='module')
+def fleet_report(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    from wheel_terra_estimator.reporting.fleet_summary import CLASSES, DriveRow, write_summary_page
+
+    shares = dict(zip(CLASSES, (60.0, 10.0, 5.0, 0.0, 1.0), strict=True))
+    finding = 'radius (100 %), /joint_states: the rover runs 1.068 of what its rims say'
+    drive = DriveRow('bags/a', 'a', verdict='No stuck warning.', duration=76.0, sets=760,
+                     seconds=shares, findings=(finding,))  # fmt: skip
+    rows = [drive, DriveRow('bags/b', error='no wheel of wheels.names is on /joint_states')]
+    path = tmp_path_factory.mktemp('fleet') / 'summary.html'
+    write_summary_page(rows, path, 'report.html')
+    return path
+
+
+KINDS = {
+    'report': 20,
+    'diagnosis_report': 0,
+    'comparison_report': 10,
+    'soilbin_report': 6,
+    'limiter_report': 8,
+    'fleet_report': 0,
+}
+"""Page -> lines that its figure has at least."""
+
+
 @pytest.mark.slow
 @pytest.mark.skipif(BROWSER is None, reason='no Chromium')
 @pytest.mark.parametrize('scheme', ['light', 'dark'])
 @pytest.mark.parametrize('width', [1280, 390])
-@pytest.mark.parametrize('kind', ['report', 'diagnosis_report', 'comparison_report'])
+@pytest.mark.parametrize('kind', list(KINDS))
 def test_in_a_browser(
     request: pytest.FixtureRequest, tmp_path: Path, kind: str, width: int, scheme: str
 ) -> None:
@@ -216,6 +271,6 @@ def test_in_a_browser(
     assert found['dark'] == (scheme == 'dark')
     assert found['overflow'] <= 0
     assert found['small'] == []
-    assert found['paths'] >= {'report': 20, 'comparison_report': 10}.get(kind, 0)
+    assert found['paths'] >= KINDS[kind]
     light = [int(v) for v in re.findall(r'\d+', found['ground'])[:3]]
     assert (sum(light) < 150) == (scheme == 'dark')
