@@ -53,6 +53,7 @@ def said(true, error=0.0, std=0.05, stuck=None):
         slip_class=true.slip_class,
         stuck=np.zeros(len(true.stamp), bool) if stuck is None else stuck,
         rim_travel_left=np.full_like(true.slip, 10.0),
+        stuck_probability=np.zeros_like(true.slip),
         speed=true.forward_velocity,
         speed_std=np.full(len(true.stamp), 0.01),
         health={'nis_reference': 1.0},
@@ -175,6 +176,11 @@ def test_tables_hold_every_kind():
     assert 'not judged' in text
     text = tables.report(Results([replace(drive, seed=i) for i in range(3)]), ['reference'])
     assert 'kept in every kind' in text
+    better = replace(drive, mode='smoothed', samples=take(true, said(true, error=0.02)))
+    worse = replace(drive, samples=take(true, said(true, error=0.04)))
+    text = tables.report(Results([worse, better]), ['reference', 'smoothed'])
+    assert '| With reference at 1 Hz, simulator of the package | 0.500 | 100.0% |' in text
+    assert '## Smoother with reference at 1 Hz' in text
     both = Results([drive, replace(drive, world='rival', kind='spin')])
     text = tables.report(both, ['reference'])
     assert 'side by side' in text

@@ -11,8 +11,10 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
+from wheel_terra_estimator.estimation.judgement.stuck.settings import StuckSettings
 from wheel_terra_estimator.estimation.measurements import Measurement
 from wheel_terra_estimator.evaluation import baselines, scores
+from wheel_terra_estimator.evaluation.foresight import Foresight, foresight
 from wheel_terra_estimator.evaluation.runner import (
     SMOOTHED,
     inputs_of_mode,
@@ -36,6 +38,7 @@ class DriveScore:
     warnings: scores.Warnings
     health: dict[str, Any]
     world: str = 'own'
+    foresight: Foresight | None = None
 
 
 @dataclass
@@ -83,6 +86,7 @@ def score_mode(world: str, kind: str, seed: int, mode: str, drive: BenchDrive) -
         warnings=scores.warnings(truth, kept, radius),
         health=health,
         world=world,
+        foresight=foresight(truth, kept, radius, StuckSettings.from_configuration(configuration)),
     )
 
 

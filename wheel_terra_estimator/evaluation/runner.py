@@ -58,6 +58,7 @@ class Record:
     slip_class: NDArray[np.uint8]
     stuck: NDArray[np.bool_]
     rim_travel_left: FloatArray
+    stuck_probability: FloatArray
     speed: FloatArray  # (k,)
     speed_std: FloatArray
     health: dict[str, Any]
@@ -124,6 +125,7 @@ def record(sets: Sequence[EstimateSet], health: dict[str, Any]) -> Record:
                 'normal_load',
                 'slip_class',
                 'rim_travel_left',
+                'stuck_probability',
             )
         },
     )

@@ -11,6 +11,13 @@ import numpy as np
 
 from wheel_terra_estimator.evaluation import scores
 from wheel_terra_estimator.evaluation.bench import DriveScore, Results
+from wheel_terra_estimator.evaluation.foresight import (
+    Foresight,
+    brier_interval,
+    reliability,
+    reliability_error,
+)
+from wheel_terra_estimator.evaluation.runner import SMOOTHED
 from wheel_terra_estimator.evaluation.scores import Samples
 from wheel_terra_estimator.evaluation.worlds import WORLDS
 
@@ -23,6 +30,8 @@ _MODES = {
     'no_orientation': 'Without orientation',
     'reference_at_once': 'Reference at once',
     'reference_2s_late': 'Reference 2 s late',
+    'smoothed': 'Smoother with reference at 1 Hz',
+    'smoothed_no_reference': 'Smoother without reference',
 }
 
 
@@ -41,6 +50,7 @@ def report(results: Results, modes: Sequence[str]) -> str:
     parts = []
     if len(results.worlds) > 1:
         parts += [_side_by_side(results, mode) for mode in modes]
+    parts += _smoother_over_filter(results, modes)
     for mode, world in ((mode, world) for mode in modes for world in results.worlds):
         by_kind = results.of_mode(mode, world)
         if not by_kind:
@@ -63,6 +73,7 @@ def report(results: Results, modes: Sequence[str]) -> str:
         parts.append(_confusion(pooled))
         parts.append('\nStuck warnings:\n')
         parts.append(_warnings(by_kind))
+        parts += _foresight([d for drives in by_kind.values() for d in drives])
         parts.append('\nFilter, mean over the drives (NIS of a consistent filter: 1):\n')
         parts.append(_health(by_kind))
         parts.append('')
@@ -292,6 +303,57 @@ def _warnings(by_kind: dict[str, list[DriveScore]]) -> str:
     )
 
 
+def _foresight(drives: Sequence[DriveScore]) -> list[str]:
+    """Return the reliability diagram of the stuck probability, and its Brier score."""
+    parts = [d.foresight for d in drives if d.foresight is not None]
+    data = Foresight.joined(parts) if parts else None
+    if data is None or not data.came.size:
+        return []
+    found = brier_interval(parts)
+    share = data.came.mean()
+    rows = [
+        (name, f'{value:.4f}', f'{low:.4f} to {high:.4f}')
+        for name, (value, low, high) in found.items()
+    ]
+    rows.append(('the share of events, always', f'{share * (1.0 - share):.4f}', '-'))
+    bins = [(f'{said:.2f}', f'{came:.2f}', str(count)) for count, said, came in reliability(data)]
+    return [
+        '\nProbability of an entrapment (median slip above 0.9 for a second, within horizon or '
+        f'travel): {share:.1%} of {data.came.size} rows; reliability error '
+        f'{reliability_error(data):.3f}.\n',
+        table(('Brier score of', 'value', '95 % interval'), rows),
+        '',
+        table(('said', 'came', 'rows'), bins),
+    ]
+
+
+def _smoother_over_filter(results: Results, modes: Sequence[str]) -> list[str]:
+    """Return the table of smoother over filter, for modes of which both were run."""
+    rows = []
+    for mode in (m for m in modes if m.startswith(SMOOTHED)):
+        live = mode.removeprefix(SMOOTHED).removeprefix('_') or 'reference'
+        for world in results.worlds:
+            sides = [
+                [d.samples for drives in results.of_mode(m, world).values() for d in drives]
+                for m in (live, mode)
+            ]
+            if all(sides):
+                before, after = (Samples.joined(side) for side in sides)
+                rows.append((f'{_MODES[live]}, {_WORLDS[world]}', *_ratios(before, after)))
+    if not rows:
+        return []
+    head = ('drives', 'slip', 'coverage', 'sinkage', 'coverage', 'pull', 'coverage')
+    return ['## Smoother over filter (RMSE)\n', table(head, rows), '']
+
+
+def _ratios(live: Samples, smoothed: Samples) -> Iterable[str]:
+    for name in ('slip', 'sinkage', 'pull'):
+        error, std = getattr(smoothed, f'{name}_error'), getattr(smoothed, f'{name}_std')
+        before = scores.rms(getattr(live, f'{name}_error'))
+        yield f'{scores.rms(error) / before:.3f}'
+        yield f'{scores.coverage(error, std):.1%}'
+
+
 def _health(by_kind: dict[str, list[DriveScore]]) -> str:
     keys = ('nis_reference', 'nis_sinkage', 'nis_torque', 'nis_balance', 'filter_restarts')
     rows = []
@@ -341,6 +403,21 @@ def _numbers(drives: Sequence[DriveScore]) -> dict[str, Any]:
         'warned_before': sum(w.lead_time is not None for w in trapped),
         'false_alarms': sum(w.false_alarms for w in warnings),
         'hours': sum(w.duration for w in warnings) / 3600.0,
+        **_foresight_numbers([d.foresight for d in drives if d.foresight is not None]),
+    }
+
+
+def _foresight_numbers(parts: Sequence[Foresight]) -> dict[str, Any]:
+    data = Foresight.joined(parts) if parts else None
+    if data is None or not data.came.size:
+        return {}
+    return {
+        'stuck_probability': {
+            'rows': int(data.came.size),
+            'events': float(data.came.mean()),
+            'reliability_error': reliability_error(data),
+            'brier': {name: list(found) for name, found in brier_interval(parts).items()},
+        }
     }
 
 
