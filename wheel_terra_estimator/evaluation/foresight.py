@@ -4,8 +4,8 @@
 
 The event: the median driving slip stays above 0.9 for a second, from within
 ``filter.stuck_horizon`` or ``filter.stuck_travel`` of rim travel on. It is judged while it is not
-yet under way, once in `SPACING`. The probability of the rover is the median of those of its wheels; the warning is a
-probability of 0 or 1.
+yet under way, once in `SPACING`. The probability of the rover is the median of those of its wheels;
+the warning is a probability of 0 or 1.
 """
 
 from __future__ import annotations
