@@ -175,3 +175,12 @@ def test_lists_that_make_no_law(lists, part):
     law = {f'effects.learned_closure.{key}': value for key, value in zip(keys, lists, strict=True)}
     with pytest.raises(UserError, match=part):
         reader.from_parameters({'effects.learned_closure.enabled': True, **law}, complete=False)
+
+
+def test_an_open_verdict_says_what_the_law_leaves_and_what_would_settle_it(speedy):
+    from wheel_terra_estimator.discrepancy.report.words import in_words
+
+    _, _, found = speedy
+    said = in_words(found)
+    assert any('with the proposed law' in line for line in said['shrank'])
+    assert any('angular velocity would confirm' in line for line in said['next'])

@@ -24,6 +24,8 @@ from wheel_terra_estimator.discrepancy.selection.remainder import Remainder
 from wheel_terra_estimator.discrepancy.selection.search import Findings
 from wheel_terra_estimator.discrepancy.selection.verdict import Verdict
 from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES, UNITS, SteadyTable
+from wheel_terra_estimator.terramechanics.effects import catalogue
+from wheel_terra_estimator.terramechanics.effects.learned_closure import FEATURES
 
 FloatArray = NDArray[np.float64]
 
@@ -34,6 +36,8 @@ _SOIL_KEYS = {
     'stiffness': 'the factor on soil.frictional_modulus and soil.cohesive_modulus',
     'tan_friction': 'the tangent of soil.friction_angle_deg',
 }
+# Inputs that tell effects apart, in the order of how easily a rig varies them.
+_WORTH_VARYING = ('normal_load', 'lug_height')
 WORSE = 1.25  # times soil refit and noise: a quantity that a name has made worse
 WORTH = 5.0  # squared noise deviations that a name must take off the rest for each one it adds
 TOO_FAR = 2.0  # times noise and allowed model error: a channel that is off
@@ -120,6 +124,9 @@ def in_words(diagnosis: Diagnosis) -> dict[str, list[str]]:
         stages = [f'{scale * item.before:.3g} as configured', f'{scale * item.refit:.3g} refitted']
         if diagnosis.effects:
             stages.append(f'{scale * item.after:.3g} with the effect')
+        if diagnosis.proposal and name in diagnosis.proposal.gap:
+            law = diagnosis.proposal.gap[name].after
+            stages.append(f'{scale * law:.3g} with the proposed law')
         noise = f'; its noise is {scale * item.noise:.3g}' if item.noise else ''
         shrank.append(f'{_plain(name)} [{unit}]: off by {", ".join(stages)}{noise}.')
     left = [
@@ -139,6 +146,8 @@ def in_words(diagnosis: Diagnosis) -> dict[str, list[str]]:
     following = [f'Measure next: {item.what}.' for item in diagnosis.next_measurement[:1]]
     if diagnosis.verdict in OPEN and diagnosis.where.box:
         following.append(f'Look first where the gap is largest: {diagnosis.where.sentence}.')
+    if diagnosis.verdict in OPEN:
+        following += _to_settle(diagnosis)
     if diagnosis.proposal:
         following.append(
             'Until then proposal.yaml may stand in, inside the range of these rows only.'
@@ -146,6 +155,27 @@ def in_words(diagnosis: Diagnosis) -> dict[str, list[str]]:
     if not following:
         following.append('Nothing; model.yaml is the model to go on with.')
     return {'shrank': shrank, 'open': left, 'next': following}
+
+
+def _to_settle(diagnosis: Diagnosis) -> list[str]:
+    """Return what would settle an open verdict: the nearest effects, then what did not vary."""
+    known = catalogue()
+    names = diagnosis.proposal.resembles if diagnosis.proposal else diagnosis.nearest
+    found = []
+    for name in names:
+        separates = next(iter(known[name].confounded_with.values()), '')
+        if separates:
+            found.append(f'To settle whether it is {_plain(name)}, measure: {separates}.')
+    if diagnosis.proposal:
+        columns = [c for f in diagnosis.proposal.features for c in FEATURES[f].columns]
+        levels = ' and '.join(_plain(name) for name in dict.fromkeys(columns))
+        if levels:
+            found.append(f'More levels of {levels} would confirm the proposed law or refute it.')
+    varied = set(diagnosis.table.varying())
+    constant = [_plain(name) for name in _WORTH_VARYING if name not in varied]
+    if constant:
+        found.append(f'Rows at another {" or ".join(constant)} would say more than further slips.')
+    return found
 
 
 def far_soil(diagnosis: Diagnosis) -> list[str]:
