@@ -382,3 +382,20 @@ def test_a_growth_right_after_a_start_says_nothing_though_the_rover_drove_before
 
     assert warned(pause=0)
     assert not warned(pause=30)
+
+
+def test_the_words_say_what_is_seen_and_what_to_do():
+    monitor, found = StuckMonitor(), []
+    for i in range(400):
+        slip = min(0.2 + 0.004 * i, 0.85)
+        wheels = [wheel(slip)._replace(sinkage=0.01 + 0.04 * 0.05 * 0.1 * i)] * 6
+        speed = 0.05 * (1.0 - slip)
+        found.append(judge(monitor, 0.1 * i, speed, True, wheels, margin=0.031))
+    reason = next(a.reason for a in found if a.stuck)
+    assert reason.endswith(
+        ', 6 wheels sink 4 cm per metre of rim travel, pull left 3% of the load; stop, back out'
+    )
+    # Nothing is said of what is not known, and no number of nothing.
+    plain = next(a.reason for a in course([[wheel(0.95)] * 6] * 100) if a.stuck)
+    assert plain.endswith('; stop, back out')
+    assert 'sink' not in plain and 'pull left' not in plain and '0.000' not in plain

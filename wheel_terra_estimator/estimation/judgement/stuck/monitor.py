@@ -15,6 +15,7 @@ from wheel_terra_estimator.estimation.judgement.stuck.signs import (
     SIGNS,
     Sign,
     SignTuning,
+    in_words,
     needs_met,
 )
 from wheel_terra_estimator.estimation.judgement.stuck.situation import (
@@ -83,7 +84,7 @@ class StuckMonitor(Component[StuckState]):
         since, raised = self._signs_at(time, situation)
         stuck, reason, clear_since = self.state.stuck, self.state.reason, NAN
         if raised:
-            reason = reason if stuck else raised[0].words(situation, self._tuning)
+            reason = reason if stuck else in_words(raised[0], situation, self._tuning)
             stuck = True
         elif stuck:
             clear_since = self._clear_since(time, situation, since)

@@ -21,6 +21,10 @@ from wheel_terra_estimator.estimation.scalars import median
 
 ENTRAPPED_SLIP = 0.9
 """Slip above which a rover makes no way that matters: class *stuck*."""
+ADVICE = 'stop, back out'
+"""What to do where wheels dig themselves in: they climb their own ruts better than fresh soil."""
+_TOLD_TIME = 0.05
+"""Time below which a tenth of a second says nothing [s]."""
 
 
 @dataclass(frozen=True)
@@ -230,6 +234,32 @@ def _labouring(s: Situation, t: SignTuning) -> bool:
     )
 
 
+def _growth_in_words(s: Situation, t: SignTuning) -> str:
+    if s.typical_slip >= ENTRAPPED_SLIP:
+        return f'median slip {s.typical_slip:.2f}: hardly any way is made'
+    return f'median slip {s.typical_slip:.2f} grows by {s.trend:.2g} per second'
+
+
+def _bogging_in_words(s: Situation, t: SignTuning) -> str:
+    time = _time_to_stand(s, t)
+    soon = f'stands in {time:.1f} s' if time >= _TOLD_TIME else 'hardly moves'
+    return f'bogging down: {soon}, wheels near their torque limit'
+
+
+def in_words(sign: Sign, s: Situation, t: SignTuning) -> str:
+    """Return why the warning is raised, what the wheels and the soil say, and what to do."""
+    told = [sign.words(s, t)]
+    growths = [d.growth for d in s.observed.deepening]
+    sinking = sum(growth > s.tuning.least_deepening for growth in growths)
+    if sinking:
+        wheels = 'a wheel sinks' if sinking == 1 else f'{sinking} wheels sink'
+        told.append(f'{wheels} {100.0 * max(growths):.0f} cm per metre of rim travel')
+    if not isnan(s.motion.margin):
+        left = max(s.motion.margin, 0.0)
+        told.append(f'pull left {left:.0%} of the load')
+    return f'{", ".join(told)}; {ADVICE}'
+
+
 SIGNS: tuple[Sign, ...] = (
     Sign(
         name='digging',
@@ -243,14 +273,14 @@ SIGNS: tuple[Sign, ...] = (
         hold=6.0,
         needs=Need.NO_SPEED | Need.SLIP_TOLD,
         present=_exhausted,
-        words=lambda s, t: f'soil gives {s.motion.margin:.3f} of the load more than is asked',
+        words=lambda s, t: f'median slip {s.typical_slip:.2f}, the soil is exhausted',
     ),
     Sign(
         name='within_horizon',
         hold=1.0,
         needs=Need.SLIP_TOLD,
         present=_within_horizon,
-        words=lambda s, t: f'median slip {s.typical_slip:.2f} grows by {s.trend:.3f} per second',
+        words=_growth_in_words,
     ),
     Sign(
         name='within_travel',
@@ -285,9 +315,7 @@ SIGNS: tuple[Sign, ...] = (
         needs=Need.STRAIGHT | Need.PULLED_AWAY,
         while_stopping=True,
         present=_bogging,
-        words=lambda s, t: (
-            f'bogging down: stands in {_time_to_stand(s, t):.1f} s, wheels near their torque limit'
-        ),
+        words=_bogging_in_words,
     ),
     Sign(
         name='stall',
