@@ -188,7 +188,7 @@ def main() -> int:
     for key in keys:
         floor_values, node_values = ([pair[i].get(key) for pair in pairs] for i in (0, 1))
         words = [_median(floor_values), _median(node_values)]
-        if None not in floor_values:
+        if None not in floor_values and all(floor_values):
             words.append(_median([b / a for a, b in zip(floor_values, node_values, strict=True)]))
         print(f'{key:11}', *words)
     return 0
