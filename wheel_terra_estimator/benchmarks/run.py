@@ -7,7 +7,7 @@ from __future__ import annotations
 import subprocess
 import sys
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -25,6 +25,8 @@ from wheel_terra_estimator.terramechanics.wheel import Wheel
 
 SCENARIO = 'firm_drive'
 FILES = ('generic_six_wheel', 'test_sand')
+RATES = {'sensors.wheel_odometry_rate': 100.0, 'sensors.imu_rate': 100.0}
+"""Joint states and IMU of the drive that is replayed [Hz]: what rovers send."""
 WHEELS = 6
 CYCLES = 300
 """Filter cycles in one timing."""
@@ -65,7 +67,9 @@ def _replay(folder: Path, size: Size) -> Iterator[Figure]:
     from wheel_terra_estimator.simulation.drive import simulate
 
     path = folder / 'drive'
-    write_simulated_drive(simulate(scenario.load(SCENARIO), seed=1, duration=size.drive), path)
+    drive = scenario.load(SCENARIO)
+    drive = replace(drive, configuration=drive.configuration.replace(RATES))
+    write_simulated_drive(simulate(drive, seed=1, duration=size.drive), path)
 
     def read() -> int:
         with open_bag(path) as bag:
