@@ -380,6 +380,7 @@ class OnlineChecks:
             yield from self._of_frozen_rates(window)
             if abs(window.depth) > self._above_ground:
                 yield 'sinkage', -1, window.depth < 0.0, window.depth
+        yield from self._of_torque_unit(window)
         if not window.steady:
             return
         yield 'absurd_rate', -1, window.size > GREATEST_RIM_SPEED, window.size
@@ -470,20 +471,21 @@ class OnlineChecks:
         elif rate_unit(abs(ratio)) is not None:
             yield 'rate_unit', -1, True, abs(ratio)
 
+    def _of_torque_unit(self, window: _Window) -> Iterator[Evidence]:
+        """No ground carries several times the weight; at rest a small torque says nothing."""
+        pairs = zip(window.torques, self._radius, strict=True)
+        size = sum(abs(torque) / radius for torque, radius in pairs) / self._weight
+        if size > ABSURD_TRACTION:
+            yield 'torque_unit', -1, True, size
+        elif size < ORDINARY_TRACTION and window.moving:
+            yield 'torque_unit', -1, False, size
+
     def _of_torque(self, window: _Window) -> Iterator[Evidence]:
         """On the level or uphill driven wheels take torque; a flipped one mirrors the others."""
         force, torques, typical = window.force, window.torques, window.typical
-        if any(t != t for t in torques) or abs(typical) < LEAST_RIM_SPEED:
+        if force is None or any(t != t for t in torques) or abs(typical) < LEAST_RIM_SPEED:
             return
         sense = math.copysign(1.0, typical)
-        size = sum(abs(t) / r for t, r in zip(torques, self._radius, strict=True)) / self._weight
-        if size > ABSURD_TRACTION:
-            yield 'torque_unit', -1, True, size
-            return
-        if size < ORDINARY_TRACTION:
-            yield 'torque_unit', -1, False, size
-        if force is None:
-            return
         if force[0] * sense < LEVEL * self._gravity or not self._straight(window):
             return
         thrusts = [sense * t / r for t, r in zip(torques, self._radius, strict=True)]
