@@ -131,7 +131,7 @@ def test_study_resumes(tmp_path, monkeypatch):
 
     path = tmp_path / 'study.csv'
     arguments = argparse.Namespace(
-        file=path, processes=1, first_seed=7, share=0.02, groups=['none'], designs=['basic16']
+        file=path, jobs=1, first_seed=7, share=0.02, groups=['none'], designs=['basic16']
     )
     discrepancy_study.run(arguments)
     once = path.read_text()

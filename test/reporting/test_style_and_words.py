@@ -120,3 +120,18 @@ def test_pictures_follow_the_dark_mode_of_the_reader() -> None:
     texts = re.findall(r'<text style="([^"]*)"', drawn)
     assert texts
     assert all('fill: ' in style for style in texts)  # black by default would vanish
+
+
+def test_every_figure_is_drawn_in_the_one_style() -> None:
+    """Who makes a matplotlib figure takes the style of the reports; no other style is set."""
+    from pathlib import Path
+
+    root = Path(__file__).resolve().parents[2]
+    makers = []
+    for folder in ('wheel_terra_estimator', 'tools'):
+        for path in sorted((root / folder).rglob('*.py')):
+            text = path.read_text(encoding='utf-8')
+            if 'figsize=' in text:
+                makers.append(path.name)
+                assert 'picture_style' in text, f'{path}: draw within reporting.style.picture_style'
+    assert {'pictures.py', 'predict.py', 'drive_pictures.py'} <= set(makers)

@@ -382,10 +382,9 @@ def _confidence(records: Sequence[Record]) -> str:
 
 def pictures(records: Sequence[Record], folder: Path) -> list[Path]:
     """Draw the curves over d' (by group, by design) and the reliability of the confidence."""
-    import matplotlib
+    from matplotlib.figure import Figure
 
-    matplotlib.use('Agg')
-    from matplotlib import pyplot as plt
+    from wheel_terra_estimator.reporting.style import INK, LINE_COLOURS, picture_style
 
     good = [r for r in records if not r['error']]
 
@@ -400,35 +399,44 @@ def pictures(records: Sequence[Record], folder: Path) -> list[Path]:
         keep = [i for i, s in enumerate(shares) if s.cases >= 3]
         axes.plot(centres[keep], [shares[i].value for i in keep], 'o-', ms=3, label=label)
 
-    figure, (left, middle, right) = plt.subplots(1, 3, figsize=(13, 4), layout='constrained')
-    for name in ('one', 'other formula', 'outliers', 'noise not given', 'one, soil 2.5x', 'drive'):
-        curve(left, [r for r in good if r['group'] == name], name)
-    for name in dict.fromkeys(r['design'] for r in good if r['design'] != 'drive'):
-        curve(middle, [r for r in good if r['group'] == 'one' and r['design'] == name], name)
-    for axes, title in ((left, 'by kind of campaign'), (middle, 'same physics, by design')):
-        axes.set(xscale='log', ylim=(0, 1.03), xlabel="d' of the hidden effect", title=title)
-        axes.set_ylabel('named first')
-        axes.set_xticks([2, 5, 10, 20, 50, 100], ['2', '5', '10', '20', '50', '100'])
-        axes.minorticks_off()
-        axes.grid(alpha=0.3)
-        axes.legend(fontsize=8)
-    named = [r for r in good if r['verdict'] == 'named']
-    order = sorted(named, key=lambda r: r['confidence'])
-    for part in np.array_split(np.arange(len(order)), 10) if len(order) >= 50 else []:
-        own = [order[i] for i in part]
-        s = share(own, first)
-        low, high = s.interval
-        x = np.mean([r['confidence'] for r in own])
-        error = [[max(s.value - low, 0.0)], [max(high - s.value, 0.0)]]  # rounding at 0 and 1
-        right.errorbar(x, s.value, error, fmt='o', color='C0', ms=4)
-    right.plot([0, 1], [0, 1], color='grey', lw=0.8)
-    right.set(
-        xlabel='stated confidence', ylabel='right', title='confidence of the name', xlim=(0.3, 1.01)
-    )
-    right.set_ylim(0.3, 1.03)
-    right.grid(alpha=0.3)
+    with picture_style():
+        figure = Figure(figsize=(13, 4))
+        left, middle, right = figure.subplots(1, 3)
+        for name in (
+            'one',
+            'other formula',
+            'outliers',
+            'noise not given',
+            'one, soil 2.5x',
+            'drive',
+        ):
+            curve(left, [r for r in good if r['group'] == name], name)
+        for name in dict.fromkeys(r['design'] for r in good if r['design'] != 'drive'):
+            curve(middle, [r for r in good if r['group'] == 'one' and r['design'] == name], name)
+        for axes, title in ((left, 'by kind of campaign'), (middle, 'same physics, by design')):
+            axes.set(xscale='log', ylim=(0, 1.03), xlabel="d' of the hidden effect", title=title)
+            axes.set_ylabel('named first')
+            axes.set_xticks([2, 5, 10, 20, 50, 100], ['2', '5', '10', '20', '50', '100'])
+            axes.minorticks_off()
+            axes.legend(fontsize=8)
+        named = [r for r in good if r['verdict'] == 'named']
+        order = sorted(named, key=lambda r: r['confidence'])
+        for part in np.array_split(np.arange(len(order)), 10) if len(order) >= 50 else []:
+            own = [order[i] for i in part]
+            s = share(own, first)
+            low, high = s.interval
+            x = np.mean([r['confidence'] for r in own])
+            error = [[max(s.value - low, 0.0)], [max(high - s.value, 0.0)]]  # rounding at 0 and 1
+            right.errorbar(x, s.value, error, fmt='o', color=LINE_COLOURS[0], ms=4)
+        right.plot([0, 1], [0, 1], color=INK, lw=0.8)
+        right.set(
+            xlabel='stated confidence',
+            ylabel='right',
+            title='confidence of the name',
+            xlim=(0.3, 1.01),
+        )
+        right.set_ylim(0.3, 1.03)
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / 'study_curves.png'
     figure.savefig(path, dpi=110)
-    plt.close(figure)
     return [path]

@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
+from wheel_terra_estimator.reporting.style import LINE_COLOURS, picture_style
 from wheel_terra_estimator.soilbin import metrics
 from wheel_terra_estimator.soilbin.metrics import Row
 
@@ -191,13 +192,14 @@ def draw(rows: Sequence[Row], path: Path) -> None:
     from matplotlib.figure import Figure as Canvas
 
     names = {POWER: 'power number [-]', SLIP: 'slip [-]', 'torque_coefficient': 'T/(W r) [-]'}
-    canvas = Canvas(figsize=(9.6, 8.4), layout='constrained')
-    for axis, figure in zip(np.ravel(canvas.subplots(3, 3)), FIGURES, strict=True):
-        for curve in figure.curves:
-            axis.plot(*curve.points(rows, figure.quantity), '-o', ms=3, label=curve.label)
-        axis.set_title(f'figure {figure.name}', fontsize='small')
-        axis.set_ylabel(names[figure.quantity])
-        axis.set_xlabel('slope [deg]')
-        axis.legend(fontsize='x-small')
-        axis.grid(alpha=0.3)
-    canvas.savefig(path, metadata={'Date': None})
+    with picture_style():
+        canvas = Canvas(figsize=(9.6, 8.4))
+        for axis, figure in zip(np.ravel(canvas.subplots(3, 3)), FIGURES, strict=True):
+            for curve, colour in zip(figure.curves, LINE_COLOURS, strict=False):
+                slopes, values = curve.points(rows, figure.quantity)
+                axis.plot(slopes, values, '-o', ms=3, color=colour, label=curve.label)
+            axis.set_title(f'figure {figure.name}')
+            axis.set_ylabel(names[figure.quantity])
+            axis.set_xlabel('slope [deg]')
+            axis.legend()
+        canvas.savefig(path, metadata={'Date': None})
