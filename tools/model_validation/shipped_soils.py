@@ -1,10 +1,11 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Print the fitted numbers of config/soils/cmu_sand_fit.yaml and grc3_fit.yaml, with deviations.
+"""Print the fitted numbers of config/soils/{hit,kls1,cmu_sand,grc3}_fit.yaml, with deviations.
 
     python -m model_validation.shipped_soils ../shared      (in the folder tools)
 
-Fitted to all rows (a wheel that is locked aside), where the validation page fits every second one.
+Fitted to all rows (a wheel that is locked aside), where the validation page fits every second one
+of CMU and GRC-3.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from model_validation import cmu_wheel, grc3_wheel
+from model_validation import cmu_wheel, grc3_wheel, hit_wheels, small_wheels
 from model_validation.fitting import FloatArray, Free, Model, deviations, fit
 from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
 
@@ -41,8 +42,15 @@ def report(
 
 
 def main() -> None:
-    """Fit both soils."""
+    """Fit all four soils."""
     shared = Path(sys.argv[1])
+    table = shared / 'reference' / 'measured_single_wheel.csv'
+    smooth = hit_wheels.read(table, 'HIT_Wh34_smooth')
+    report('hit_fit', hit_wheels.BASE, [smooth], hit_wheels.SIGMA, hit_wheels.SMOOTH_PARAMETERS)
+    kls = small_wheels.KLS.with_values({small_wheels.TORQUE.name: small_wheels.TORQUE.expected})
+    free_kls = (*small_wheels.BEARING, *small_wheels.KLS_EXTRA, small_wheels.TORQUE)
+    rows = [hit_wheels.read(table, 'KLS1_smooth')]
+    report('kls1_fit', kls, rows, small_wheels.SIGMA, free_kls)
     soil, points, measured = cmu_wheel.rows(shared)
     turning = points.slip > -0.99
     data = [(cmu_wheel.chosen(points, turning), measured[turning])]
