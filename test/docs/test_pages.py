@@ -100,6 +100,15 @@ def test_what_was_tried_stands_in_the_notes(name):
         assert not found, f'{name}: {text[max(found.start() - 60, 0) : found.end()]!r}'
 
 
+def test_the_page_of_the_interface_has_every_name():
+    from wheel_terra_estimator import api
+
+    text = (DOCS / 'api.md').read_text(encoding='utf-8')
+    shown = set(re.findall(r'^::: wheel_terra_estimator\.api\.(\w+)', text, re.M))
+    missing = {name for name in api.__all__ if not name.startswith('_')} - shown
+    assert not missing, f'add to docs/api.md: {sorted(missing)}'
+
+
 def test_python_of_the_readme_runs():
     mpl = pytest.importorskip('matplotlib')
     mpl.use('agg')
