@@ -9,6 +9,7 @@
 Faults come one after the other with a pause of health between them. The table says for each kind
 how often it came, how often the node said so, and how long it took until sets flowed again. The
 exit status is 1 where the node ended, sent a number that is not finite, or did not come back to OK.
+``--one-process`` leaves out the restarts of the node: only so is its memory that of hours.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ import sys
 import tempfile
 import time
 from collections import defaultdict
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -106,9 +107,11 @@ class Soak:
         For the files of the node.
     seconds : float
         How long.
+    faults : sequence of str
+        Which come.
     """
 
-    def __init__(self, folder: Path, seconds: float) -> None:
+    def __init__(self, folder: Path, seconds: float, faults: Sequence[str] = FAULTS) -> None:
         configuration = reader.load(['generic_six_wheel'])
         parameters = folder / 'rover.yaml'
         configuration.write(parameters)
@@ -120,7 +123,10 @@ class Soak:
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(self.rover)
         self._node = Process(self._command)
-        self._seconds = seconds
+        self._seconds, self._faults = seconds, tuple(faults)
+        self._started = time.monotonic()  # the present process
+        self.grown = 0.0  # most memory since the first ten minutes of a process [MB]
+        self._settled: float | None = None
         self._began = time.monotonic()
         self.memory: list[tuple[float, float]] = []
         self.recoveries: dict[str, list[float]] = defaultdict(list)
@@ -132,21 +138,21 @@ class Soak:
         self._wait(lambda: self.rover.sets > 0, 60.0)
         self._wait(self._is_well, 30.0)
         order: list[str] = []
-        while time.monotonic() - self._began < self._seconds and not self.problems:
+        while time.monotonic() - self._began < self._seconds and self._node.runs():
             if not order:
-                order = random.sample(FAULTS, len(FAULTS))
+                order = random.sample(self._faults, len(self._faults))
             self._one_fault(order.pop())
             self._serve(random.uniform(0.2, 1.0) * HEALTH)
-            self.memory.append((time.monotonic() - self._began, self._node.resident()))
+            if self._node.runs():
+                self._note_memory()
         if self._node.runs():
             status = self._node.end(signal.SIGINT)
             if status:
                 self.problems.append(f'the node ended with status {status}')
         if self.rover.not_finite:
             self.problems.append(f'{self.rover.not_finite} numbers are not finite')
-        late = [mb for at, mb in self.memory if at > SETTLED]
-        if late and max(late) - late[0] > GROWTH:
-            self.problems.append(f'memory grew by {max(late) - late[0]:.1f} MB after ten minutes')
+        if self.grown > GROWTH:
+            self.problems.append(f'memory grew by {self.grown:.1f} MB after ten minutes')
 
     def _one_fault(self, fault: str) -> None:
         levels = len(self.rover.levels)
@@ -156,7 +162,8 @@ class Soak:
             if status:
                 self.problems.append(f'the node ended with status {status}')
             self._node = Process(self._command)
-            begin = time.monotonic()
+            self._started = begin = time.monotonic()
+            self._settled = None
         elif fault in ('clock back', 'clock ahead'):
             self.rover.shift += round((-30.0 if fault == 'clock back' else 1.5) * 1e9)
             begin = time.monotonic()
@@ -170,10 +177,19 @@ class Soak:
         if flows:
             self.recoveries[fault].append(time.monotonic() - begin)
         if not flows or not self._wait(self._is_well, RECOVERY + 30.0):
-            self.problems.append(f'no recovery from: {fault}')
+            words = self.rover.levels[-1][2] if self.rover.levels else 'nothing'
+            self.problems.append(f'no recovery from: {fault}; the node says: {words}')
         self.told[fault] += any(level for _, level, _ in self.rover.levels[levels:])
         if not self._node.runs():
             self.problems.append(f'the node ended by itself at: {fault}')
+
+    def _note_memory(self) -> None:
+        now, memory = time.monotonic(), self._node.resident()
+        self.memory.append((now - self._began, memory))
+        if now - self._started > SETTLED:
+            if self._settled is None:
+                self._settled = memory
+            self.grown = max(self.grown, memory - self._settled)
 
     def _is_well(self) -> bool:
         return bool(self.rover.levels) and self.rover.levels[-1][1] == 0
@@ -208,6 +224,8 @@ class Soak:
         if self.memory:
             memory = [mb for _, mb in self.memory]
             lines.append(f'resident memory {min(memory):.1f} to {max(memory):.1f} MB')
+            if self._settled is not None:
+                lines.append(f'of the last process: + {self.grown:.2f} MB after ten minutes')
         lines += [f'PROBLEM: {problem}' for problem in self.problems]
         return '\n'.join(lines)
 
@@ -217,11 +235,13 @@ def main() -> int:
     parser = argparse.ArgumentParser(description='The node under random faults.')
     parser.add_argument('--minutes', type=float, default=2.0)
     parser.add_argument('--seed', type=int, default=0)
+    parser.add_argument('--one-process', action='store_true', help='without restarts of the node')
     arguments = parser.parse_args()
     random.seed(arguments.seed)
     rclpy.init(args=[])
     with tempfile.TemporaryDirectory() as folder:
-        soak = Soak(Path(folder), 60.0 * arguments.minutes)
+        faults = [f for f in FAULTS if not (arguments.one_process and f == 'node restarted')]
+        soak = Soak(Path(folder), 60.0 * arguments.minutes, faults)
         try:
             soak.run()
         finally:
