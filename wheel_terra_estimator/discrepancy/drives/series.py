@@ -104,8 +104,11 @@ def collect(measurements: Iterable[Measurement], wheels: int, name: str) -> Driv
                     values if before is None else np.where(np.isnan(values), before, values)
                 )
         elif isinstance(item, InertialReading):
-            force[item.stamp] = item.specific_force
-            yaw[item.stamp] = item.angular_rate[2:]
+            # A message may hold some of the fields only.
+            if not np.isnan(item.specific_force).any():
+                force[item.stamp] = item.specific_force
+            if not np.isnan(item.angular_rate[2]):
+                yaw[item.stamp] = item.angular_rate[2:]
         elif isinstance(item, SinkageReading):
             sinkage[item.stamp] = item.sinkage
         elif isinstance(item, ReferenceVelocity):
@@ -113,6 +116,7 @@ def collect(measurements: Iterable[Measurement], wheels: int, name: str) -> Driv
     for series, topic, why in (
         (rate, 'wheel odometry', 'wheel rates'),
         (force, 'imu/data', 'loads and pull come from the specific force'),
+        (yaw, 'imu/data', 'turns are left out by the angular rate'),
         (reference, 'reference_odom', 'the slip of a drive comes from it'),
     ):
         if len(series) < 2:
