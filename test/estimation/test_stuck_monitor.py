@@ -236,6 +236,14 @@ def test_a_slip_that_nobody_knows_is_not_digging():
     assert first(course([[wheel(1.0)] * 6] * 300)) is not None
 
 
+def test_a_slip_of_which_nothing_is_known_forecasts_nothing():
+    """The first set of a run may say slip 0.95 +- 1: that is no entrapment in sight."""
+    untold = wheel(0.95)._replace(slip_std=1.0)
+    outlook = course([[untold] * 6])[0].wheels[0]
+    assert (outlook.probability, outlook.travel) == (0.0, 10.0)
+    assert course([[wheel(0.95)] * 6])[0].wheels[0].travel == 0.0
+
+
 # -- Horizon, travel and clearing -------------------------------------------------------------
 
 

@@ -25,6 +25,8 @@ class ForecastTuning:
     least_slip: float = 0.3  # from which a growing slip leads to an entrapment
     least_travel: float = 0.05  # [m]; 0 is said of wheels that are entrapped
     digging_slip: float = 0.8
+    untold_std: float = 1.0
+    """Deviation of a slip of which nothing is known: no forecast is made from it."""
     certain: float = 0.9
     """Least probability said of wheels that dig while the warning stands."""
 
@@ -69,7 +71,7 @@ def _of_wheel(
 ) -> WheelForecast:
     if stalled:
         probability, time = 1.0, 0.0
-    elif not wheel.known or wheel.slip <= 0.0:
+    elif not wheel.known or wheel.slip <= 0.0 or wheel.slip_std >= tuning.untold_std:
         probability, time = 0.0, LONGEST_TIME
     else:
         ahead = wheel.slip + max(s.trend, 0.0) * s.settings.horizon
