@@ -67,6 +67,36 @@ def test_true_slip_from_a_true_velocity(make_bag: Any, rover: Any, drive: Any) -
     np.testing.assert_allclose(truth.slip.value, np.full((40, 2), 1 / 7), atol=1e-12)
 
 
+def test_true_slip_of_steered_wheels_is_along_their_headings(
+    make_bag: Any, rover: Any, drive: Any, factory: Any
+) -> None:
+    """Both wheels head 0.3 rad to the left: the rover moves along them with 0.36 / cos 0.3."""
+    moved = []
+    for topic, message, time in drive:
+        if topic == '/joint_states':
+            message = factory.joint_state(
+                message.header,
+                (*message.name, 'steer'),
+                position=[*[np.nan] * len(message.name), 0.3],
+                velocity=[*message.velocity, 0.0],
+            )
+        moved.append((topic.replace('/reference_odom', '/truth/odometry'), message, time))
+    bag = make_bag(
+        messages=moved,
+        topics={
+            '/joint_states': 'sensor_msgs/msg/JointState',
+            '/imu/data': 'sensor_msgs/msg/Imu',
+            '/truth/odometry': 'nav_msgs/msg/Odometry',
+        },
+    )
+    steered = rover.replace({'wheels.steering_joints': ['steer', 'steer']})
+    with open_bag(bag) as opened:
+        truth = read_truth(opened, {}, steered)
+    assert truth is not None and truth.slip is not None
+    expected = 1.0 - 0.36 / np.cos(0.3) / 0.42
+    np.testing.assert_allclose(truth.slip.value, np.full((40, 2), expected), atol=1e-12)
+
+
 def test_no_truth_in_a_bag_without(make_bag: Any, rover: Any) -> None:
     with open_bag(make_bag()) as bag:
         assert read_truth(bag, {}, rover) is None

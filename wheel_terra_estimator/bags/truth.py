@@ -16,7 +16,9 @@ from wheel_terra_estimator.bags.reader import MeasurementReader
 from wheel_terra_estimator.bags.storage import Bag
 from wheel_terra_estimator.bags.thinning import ThinnedRows
 from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.estimation.contacts.steering import headings
 from wheel_terra_estimator.estimation.measurements import InertialReading, WheelOdometry
+from wheel_terra_estimator.estimation.rover import Rover
 from wheel_terra_estimator.messages.convert import JOINT_STATE, ODOMETRY, stamp_of
 from wheel_terra_estimator.terramechanics.kinematics import slip_ratio
 
@@ -119,10 +121,12 @@ def _slip_from_velocity(
     velocity: WheelTruth, reader: MeasurementReader, configuration: Configuration
 ) -> WheelTruth:
     wheels = configuration.wheels
-    rates, yaw_rates = ThinnedRows(), ThinnedRows()
+    rates, yaw_rates, angles = ThinnedRows(), ThinnedRows(), ThinnedRows()
     for _, measurement in reader.measurements():
         if isinstance(measurement, WheelOdometry):
             rates.add(measurement.stamp, measurement.rate)
+            if measurement.steering is not None:
+                angles.add(measurement.stamp, np.nan_to_num(measurement.steering))
         elif isinstance(measurement, InertialReading):
             yaw_rates.add(measurement.stamp, measurement.angular_rate[2:])
     rate, yaw = _sorted(rates, wheels.count).known(), _sorted(yaw_rates, 1).known()
@@ -132,9 +136,30 @@ def _slip_from_velocity(
         if yaw.stamp.size
         else np.zeros(rate.stamp.size)
     )
-    speed = body[:, None] - turning[:, None] * wheels.y
+    steering = _sorted(angles, wheels.count).known()
+    if steering.stamp.size:
+        speed = _along_wheels(body, turning, rate.stamp, steering, configuration)
+    else:
+        speed = body[:, None] - turning[:, None] * wheels.y
     slip = slip_ratio(speed, rate.value * wheels.slip_radius, configuration.rest_speed)
     return WheelTruth(rate.stamp, slip)
+
+
+def _along_wheels(
+    body: FloatArray,
+    turning: FloatArray,
+    stamp: NDArray[np.int64],
+    steering: WheelTruth,
+    configuration: Configuration,
+) -> FloatArray:
+    """Return the (k, n) ground speeds of the wheels of a steered rover along their headings."""
+    rover = Rover.from_configuration(configuration)
+    columns = [np.interp(stamp, steering.stamp, column) for column in steering.value.T]
+    rows = []
+    for speed, yaw_rate, angles in zip(body, turning, np.transpose(columns), strict=True):
+        found = headings(rover, angles.tolist())
+        rows.append([found.speed(i, speed, yaw_rate) for i in range(rover.wheel_count)])
+    return np.array(rows).reshape(len(stamp), rover.wheel_count)
 
 
 def _ordered(message: Any, values: Any, names: tuple[str, ...]) -> list[float]:
