@@ -66,7 +66,7 @@ WATCH_PERIOD = 0.25  # [s]
 DIAGNOSTICS_PERIOD = 1.0  # [s] of the steady clock, while nothing is heard
 SILENCE = 1.5  # [s] of the steady clock without a set
 SAVE_PERIOD = 10.0  # [s]
-NAMES_PERIOD = 5.0  # [s] between two looks for a node of the same name
+NAMES_PERIOD = 1.0  # [s] between two looks for a node of the same name
 
 LEVELS = ('OK', 'WARN', 'ERROR', 'STALE')
 
