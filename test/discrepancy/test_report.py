@@ -31,6 +31,7 @@ class Page(HTMLParser):
         super().__init__()
         self.open: list[str] = []
         self.sources: list[str] = []
+        self.names: set[str] = set()
         self.rows: list[list[str]] = []
         self.text = ''
         self.feed(text)
@@ -40,6 +41,7 @@ class Page(HTMLParser):
         if tag not in self.VOID:
             self.open.append(tag)
         self.sources += [value for key, value in attributes if key in ('src', 'href', 'srcset')]
+        self.names |= {value for key, value in attributes if key == 'id'}
         if tag == 'tr':
             self.rows.append([])
         elif tag in ('td', 'th') and self.rows:
@@ -105,13 +107,17 @@ def page(written):
 def test_page_needs_nothing_from_elsewhere(page):
     parsed, _ = page
     assert len(parsed.sources) >= 6
-    assert all(source.startswith('data:') for source in parsed.sources)
+    assert all(source.startswith(('data:', '#')) for source in parsed.sources)
+    within = {source[1:] for source in parsed.sources if source.startswith('#')}
+    assert within
+    assert within <= parsed.names, 'contents lead to sections that are not there'
 
 
 def test_every_picture_is_in_the_page_and_beside_it(page):
     parsed, folder = page
     files = {path.name: path.read_bytes() for path in folder.glob('*.png')}
-    assert len(parsed.sources) == 2 * len(files), 'each wide and for a phone'
+    drawn = [source for source in parsed.sources if source.startswith('data:')]
+    assert len(drawn) == 2 * len(files), 'each wide and for a phone'
     assert {'residuals_by_normal_load.png', 'residuals_by_slope.png', 'where.png'} <= set(files)
     assert {'measured_against_model.png', 'gap.png', 'signature.png'} <= set(files)
     assert 'curves_over_slip.png' in files, 'two loads on three slopes are six curves'
@@ -128,7 +134,8 @@ SMALLEST_TEXT = 11.0  # [px]
 def test_pictures_for_a_phone_are_as_narrow_with_text_that_can_be_read(page):
     parsed, _ = page
     narrow = 0
-    for source in parsed.sources:
+    pictures = [source for source in parsed.sources if source.startswith('data:')]
+    for source in pictures:
         drawn = base64.b64decode(source.partition('base64,')[2]).decode()
         width = POINT * float(re.search(r'<svg [^>]*width="([\d.]+)pt"', drawn)[1])
         sizes = [float(size) for size in re.findall(r'font(?:-size)?: ([\d.]+)px', drawn)]
@@ -137,7 +144,7 @@ def test_pictures_for_a_phone_are_as_narrow_with_text_that_can_be_read(page):
             narrow += 1
             assert width <= PHONE
             assert POINT * min(sizes) >= SMALLEST_TEXT
-    assert narrow == len(parsed.sources) / 2
+    assert narrow == len(pictures) / 2
 
 
 def test_numbers_are_those_of_the_diagnosis(page, named):
