@@ -47,6 +47,17 @@ def test_considered_entries_keep_mean_and_variance_but_their_doubt_counts():
 
 
 @pytest.mark.filter_fails
+@pytest.mark.parametrize('kind', [tuple, list])
+def test_several_entries_are_considered_together(kind):
+    held, P = make(5)
+    before = held.mean.copy()
+    held.update(np.array([1.0]), np.ones((1, 5)), np.array([0.1]), considered=kind([1, 3]))
+    assert (held.mean[[1, 3]] == before[[1, 3]]).all()
+    assert (held.mean[[0, 2, 4]] != before[[0, 2, 4]]).all()
+    block = np.ix_([1, 3], [1, 3])
+    assert held.covariance[block] == pytest.approx(P[block])
+
+
 def test_nan_never_stays():
     kalman, _ = make(4)
     kalman.update(np.array([np.nan]), np.ones((1, 4)), np.array([1.0]))

@@ -68,7 +68,7 @@ class _SchmidtFilter(ExtendedKalmanFilter):
         _, gain, fails = dposv(S, HP)
         K = gain.T if not fails else np.linalg.solve(S, HP).T
         if considered:
-            K[considered] = 0.0
+            K[list(considered)] = 0.0
         rest = self._I - K @ H
         self.x = self.x + K @ residual
         self.P = rest @ self.P @ rest.T + (K * noise) @ K.T
