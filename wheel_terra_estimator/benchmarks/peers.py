@@ -5,6 +5,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
+from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -83,3 +86,23 @@ class PlainFilter:
         rest = np.eye(len(self.x)) - K @ H
         self.x = self.x + K @ residual
         self.P = rest @ self.P @ rest.T + K @ R @ K.T
+
+
+def read_with_rosbags(path: Path, topics: Collection[str]) -> int:
+    """Read and unpack the messages of some topics of a whole bag; return how many there are."""
+    from rosbags.rosbag2 import Reader
+
+    store, count = _types(), 0
+    with Reader(path) as bag:
+        chosen = [connection for connection in bag.connections if connection.topic in topics]
+        for connection, _, data in bag.messages(chosen):
+            store.deserialize_cdr(data, connection.msgtype)
+            count += 1
+    return count
+
+
+@cache
+def _types() -> Any:
+    from rosbags.typesys import Stores, get_typestore
+
+    return get_typestore(Stores.ROS2_JAZZY)

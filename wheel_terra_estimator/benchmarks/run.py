@@ -14,7 +14,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from wheel_terra_estimator.benchmarks.pairs import Figure, timed_pairs
-from wheel_terra_estimator.benchmarks.peers import PlainFilter, smooth_wheel
+from wheel_terra_estimator.benchmarks.peers import PlainFilter, read_with_rosbags, smooth_wheel
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.estimation.filter.ekf import GatedFilter
 from wheel_terra_estimator.estimation.filter.state import StateLayout
@@ -70,12 +70,19 @@ def _replay(folder: Path, size: Size) -> Iterator[Figure]:
     drive = scenario.load(SCENARIO)
     drive = replace(drive, configuration=drive.configuration.replace(RATES))
     write_simulated_drive(simulate(drive, seed=1, duration=size.drive), path)
+    usual = reader.load(FILES)
 
     def read() -> int:
         with open_bag(path) as bag:
-            return sum(1 for _ in MeasurementReader(bag, {}, reader.load(FILES)).messages())
+            return sum(1 for _ in MeasurementReader(bag, {}, usual).messages())
 
-    for words, overrides in (('default output rate', ()), ('every stamp', ('output_rate:=0.0',))):
+    with open_bag(path) as bag:
+        topics = tuple(MeasurementReader(bag, {}, usual).topics.values())
+    floor, words = (lambda: read_with_rosbags(path, topics), 1), 'reading with rosbags alone'
+    yield timed_pairs(
+        f'reading and unpacking of {size.drive:.0f} s', (read, 1), words, floor, size.pairs
+    )
+    for rate, overrides in (('default output rate', ()), ('every stamp', ('output_rate:=0.0',))):
         configuration = reader.load(FILES, overrides)
 
         def run(configuration: object = configuration) -> None:
@@ -83,8 +90,8 @@ def _replay(folder: Path, size: Size) -> Iterator[Figure]:
                 replay(bag, configuration, {}, progress=False)  # type: ignore[arg-type]
 
         yield timed_pairs(
-            f'replay of {size.drive:.0f} s, {words}', (run, 1),
-            'reading and deserialising alone', (read, 1), size.pairs, size.drive,
+            f'replay of {size.drive:.0f} s, {rate}', (run, 1),
+            words, floor, size.pairs, size.drive,
         )  # fmt: skip
 
 
