@@ -14,7 +14,14 @@ from numpy.typing import NDArray
 from wheel_terra_estimator.checks.evidence import Evidence
 from wheel_terra_estimator.checks.finding import Finding, NotChecked, Outcome
 from wheel_terra_estimator.checks.imu import mounting_finding, yaw_mounting
-from wheel_terra_estimator.checks.statistics import Estimate, averaged, block_fit, correlation, lag
+from wheel_terra_estimator.checks.statistics import (
+    Estimate,
+    averaged,
+    block_fit,
+    correlation,
+    even_times,
+    lag,
+)
 from wheel_terra_estimator.checks.torque import heading_of_torque
 
 FloatArray = NDArray[np.float64]
@@ -98,7 +105,7 @@ def check_clock(evidence: Evidence, figures: dict[str, Any]) -> list[Outcome]:
     if imu is None or evidence.gyro is None or not np.isfinite(difference).any():
         return [NotChecked('delay', 'IMU against wheels: no IMU, or sides not known')]
     step = 0.05
-    time = np.asarray(np.arange(evidence.time[0], evidence.time[-1], step), dtype=np.float64)
+    time = even_times(evidence.time, step)
     at = np.asarray((imu.stamp - evidence.origin) * 1e-9, dtype=np.float64)
     yaw = averaged(at, (imu.rate @ evidence.rotation.T)[:, 2:3], time, 2 * step)[:, 0]
     wheels = averaged(evidence.time, np.nan_to_num(difference)[:, None], time, 2 * step)[:, 0]

@@ -14,7 +14,13 @@ from numpy.typing import NDArray
 from wheel_terra_estimator.checks.evidence import Evidence
 from wheel_terra_estimator.checks.finding import Finding, NotChecked, Outcome
 from wheel_terra_estimator.checks.series import VelocitySeries
-from wheel_terra_estimator.checks.statistics import averaged, correlation, lag, robust_std
+from wheel_terra_estimator.checks.statistics import (
+    averaged,
+    correlation,
+    even_times,
+    lag,
+    robust_std,
+)
 
 FloatArray = NDArray[np.float64]
 
@@ -205,14 +211,15 @@ def _period(reference: VelocitySeries) -> float:
 
 def _delay(evidence: Evidence, reference: VelocitySeries, figures: dict[str, Any]) -> list[Outcome]:
     step = 0.05
-    time: FloatArray = np.arange(evidence.time[0], evidence.time[-1], step)
+    time = even_times(evidence.time, step)
     at = (reference.stamp - evidence.origin) * 1e-9
     order = np.argsort(at, kind='stable')
     period = float(np.median(np.diff(at[order])))
     rim = averaged(evidence.time, np.nan_to_num(evidence.rim)[:, None], time, 2 * step)[:, 0]
     speed = np.interp(time, at[order], reference.velocity[order, 0])
     # Between its stamps the reference is a straight line: the rims are smoothed as much.
-    kernel = np.ones(max(round(period / step), 1)) / max(round(period / step), 1)
+    width = min(max(round(period / step), 1), time.size)
+    kernel = np.ones(width) / width
     for _ in range(2):
         rim = np.convolve(rim, kernel, mode='same')
     if period > 1.5 or float(np.std(rim)) < 0.1 * float(np.abs(rim).mean() + 1e-9):

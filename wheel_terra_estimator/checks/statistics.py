@@ -23,6 +23,12 @@ BLOCKS = 12
 correlated over seconds, rows are not independent."""
 
 
+MOST_TIMES = 2_000_000
+"""Even steps over a drive: 28 hours at 20 Hz."""
+LONGEST_PAUSE = 3600.0
+"""Between stamps of one drive [s]."""
+
+
 class Estimate(NamedTuple):
     """A number with one standard deviation."""
 
@@ -32,6 +38,19 @@ class Estimate(NamedTuple):
     def sigmas_from(self, other: float) -> float:
         """Return the distance to a number in standard deviations."""
         return abs(self.value - other) / max(self.std, 1e-12)
+
+
+def even_times(time: FloatArray, step: float) -> FloatArray:
+    """Return times [s] at even steps over a drive, given its increasing stamps [s].
+
+    Where the stamps jump by years (a clock that was set late, a damaged stamp) it is the stretch
+    with the most of them.
+    """
+    if (time[-1] - time[0]) / step > MOST_TIMES:
+        stretches = np.split(time, np.flatnonzero(np.diff(time) > LONGEST_PAUSE) + 1)
+        time = max(stretches, key=len)
+    end = min(float(time[-1]), float(time[0]) + MOST_TIMES * step)
+    return np.asarray(np.arange(time[0], end, step), dtype=np.float64)
 
 
 def robust_std(values: FloatArray) -> float:
