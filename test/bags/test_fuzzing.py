@@ -21,12 +21,6 @@ def test_damaged_inputs_of_all_kinds() -> None:
     assert set(done) == set(cases.CASES)
 
 
-def test_a_first_stamp_of_another_decade() -> None:
-    """The checks before a replay made a grid over all the time between (17 s and 5 GB)."""
-    _, faults = fuzz(71017141, 1)
-    assert not faults
-
-
 def test_the_judgement_can_fail(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A reader that drops one message is found out."""
     from wheel_terra_estimator.bags.mcap_file import McapFile
