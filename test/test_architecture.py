@@ -128,7 +128,7 @@ MAY_USE = {
     # The plain ways that the package is timed against need scipy's quadrature.
     'benchmarks': (
         {'configuration', 'terramechanics', 'estimation', 'simulation', 'bags'},
-        {'numpy', 'scipy'},
+        {'numpy', 'rosbags', 'scipy'},
     ),
     # It has a report of its own, and the wheel loads of its drives are those of the estimator.
     'discrepancy': (
