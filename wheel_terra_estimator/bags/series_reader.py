@@ -59,10 +59,9 @@ def _likeliest(name: str, topics: Sequence[str]) -> str | None:
         'joint_states': _JOINT_WORDS,
         'imu/data': _IMU_WORDS,
         'reference_odom': _REFERENCE_WORDS,
-        'sinkage': ('sinkage',),
         'leaving_angle': ('leaving',),
         'odom': ('wheel', 'odom'),
-    }[name]
+    }.get(name, (name,))
     for word in words:
         for topic in topics:
             slip_free = any(w in topic.lower().replace('/', '_').split('_') for w in words)

@@ -153,12 +153,7 @@ class InputChecks:
         bad_force = force == 0.0 or not force <= GREATEST_FORCE
         bad_rate = not rate <= GREATEST_RATE
         if bad_force or bad_rate:
-            if force == 0.0:
-                self.reject(INERTIAL, 'specific force exactly zero (sensor not running)')
-            elif bad_force and not np.isnan(m.specific_force).all():
-                self.reject(INERTIAL, 'specific force not finite or absurd')
-            if bad_rate and not np.isnan(m.angular_rate).all():
-                self.reject(INERTIAL, 'angular rate not finite or absurd')
+            self._tell_inertial(m, bad_force, bad_rate, silent=force == 0.0)
             if (bad_force and bad_rate and m.orientation is None) or (force == rate == 0.0):
                 self.refused[INERTIAL] += 1
                 return None
@@ -167,16 +162,29 @@ class InputChecks:
                 specific_force=_UNKNOWN if bad_force else m.specific_force,
                 angular_rate=_UNKNOWN if bad_rate else m.angular_rate,
             )
-        if m.orientation is None:
-            return m
-        x, y, z, w = m.orientation.tolist()
+        return m if m.orientation is None else self._oriented(m, m.orientation)
+
+    def _tell_inertial(
+        self, m: InertialReading, bad_force: bool, bad_rate: bool, *, silent: bool
+    ) -> None:
+        """Say what of an IMU message is left out; what it does not hold is no fault of it."""
+        if silent:
+            self.reject(INERTIAL, 'specific force exactly zero (sensor not running)')
+        elif bad_force and not np.isnan(m.specific_force).all():
+            self.reject(INERTIAL, 'specific force not finite or absurd')
+        if bad_rate and not np.isnan(m.angular_rate).all():
+            self.reject(INERTIAL, 'angular rate not finite or absurd')
+
+    def _oriented(self, m: InertialReading, orientation: FloatArray) -> InertialReading:
+        """Return the message with a unit quaternion, or without orientation."""
+        x, y, z, w = orientation.tolist()
         norm = math.sqrt(x * x + y * y + z * z + w * w)
         if abs(norm - 1.0) < 1e-6:
             return m
         if not 0.9 < norm < 1.1:
             self.reject(INERTIAL, 'orientation is no unit quaternion (left out)')
             return replace(m, orientation=None)
-        return replace(m, orientation=m.orientation / norm)
+        return replace(m, orientation=orientation / norm)
 
     def _sinkage(self, m: SinkageReading) -> SinkageReading | None:
         values = self._wheel_values(SINKAGE, m.sinkage)
