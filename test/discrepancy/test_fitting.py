@@ -42,7 +42,7 @@ def test_inverse_covariance_is_the_inverse(rng):
 
 def test_a_cell_set_apart_is_the_evidence_of_its_wider_noise(rng):
     """Against the densities of both hypotheses, up to the factor that they share."""
-    size, std = 30, 2.0
+    size, std = 30, 3.0
     covariance = np.diag(np.full(size, std**2)) + 0.3 * np.ones((size, size))
     target = std * rng.standard_normal(size)
     target[4] += 9.0 * std

@@ -67,7 +67,7 @@ class FakeEstimator:
         if inputs.wheel_odometry is not None:
             self.value += float(np.nansum(inputs.wheel_odometry.rate)) * 1.1
         if inputs.inertial is not None:
-            self.value += float(inputs.inertial.specific_force[0]) * 1.3
+            self.value += float(np.nan_to_num(inputs.inertial.specific_force[0])) * 1.3
         if inputs.sinkage is not None:
             self.value += float(np.nansum(inputs.sinkage.sinkage)) * 1.7
         if inputs.reference is not None:

@@ -370,8 +370,8 @@ def test_held_wheels_count_while_the_drive_is_being_stopped_too():
     for i in range(30):
         judge(monitor, 0.1 * i, 0.4, True, rolling)
     found = []
-    for i in range(12):
-        rim = 0.5 - 0.02 * i
+    for i in range(8):
+        rim = 0.5 * 0.88 ** (i + 1)
         stands = wheel(0.0, rim=0.0, known=False, torque=0.95)
         held = [stands, *[wheel(0.75, rim=rim, torque=0.1)] * 2, wheel(0.1, rim=0.3 * rim)]
         found.append(judge(monitor, 3.0 + 0.1 * i, 0.2 * rim, True, held))
