@@ -59,11 +59,10 @@ _NOTHING_MISSING = MissingInputs(*(False,) * len(MissingInputs._fields))
 
 @dataclass(frozen=True)
 class SmootherTuning:
-    """Tuned on simulated drives of both worlds, seeds 1021 to 1024."""
+    """Tuned on simulated drives of both worlds, seeds 1021 to 1024 and 2180."""
 
-    least_share: float = 0.7
+    least_share: float = 0.9
     """Of the filter's deviation of a speed: model errors do not average out as noise does."""
-    pull_share: float = 0.9  # of the filter's deviation of a pull
 
 
 class Kept(NamedTuple):
@@ -234,7 +233,7 @@ class _Judges:
         return replace(
             smoothed,
             drawbar_pull=moment.pull,
-            drawbar_pull_std=self._tuning.pull_share * live.drawbar_pull_std,
+            drawbar_pull_std=live.drawbar_pull_std,
             slip_class=np.where(unknown, live.slip_class, smoothed.slip_class),
             **{name: getattr(live, name) for name in _OF_THE_FILTER},
         )
