@@ -163,6 +163,17 @@ def test_records_behind_a_damage_within_a_chunk_are_found(tmp_path: Path) -> Non
     assert 'lost: 1 of 45 on /joint_states; from 0.4 s to 0.4 s' in notes[0]
 
 
+def test_a_loose_message_between_two_damaged_ones_is_found(tmp_path: Path) -> None:
+    made = make(samples(), TYPES, Layout(chunk_size=0, checksums=False, closed=False))
+    content = bytearray(made.content)
+    content[made.parts[20][0] + 8] ^= 4  # its length
+    content[made.parts[22][0]] ^= 64  # its opcode
+    path = tmp_path / 'a.mcap'
+    path.write_bytes(content)
+    found, _ = read(path)
+    assert RawMessage(*samples()[21]) in found
+
+
 def test_damaged_names_are_no_traceback(tmp_path: Path) -> None:
     made = make(samples(), TYPES, Layout(900, summary=False))
     content = made.content.replace(b'/imu/data', b'/imu\xff\xfe\xfa\xf0a')

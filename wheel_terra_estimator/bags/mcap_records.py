@@ -35,6 +35,9 @@ CHUNK_HEAD = 40
 LATEST = 2**63 - 1
 """Latest log time [ns] that is one."""
 
+_EARLIEST = 10**18  # log time [ns] of a recording: the year 2001
+_LONGEST_WAY = 60 * 10**9  # from the publisher to the recorder [ns]
+
 # What the lengths of the other records have to be: bytes before so many strings that fill the
 # rest; bytes before a list, its own length included, that fills it; least and most.
 _STRINGS = {HEADER: (0, 2), SCHEMA: (2, 3), CHANNEL: (4, 3), METADATA: (0, 2)}
@@ -195,10 +198,18 @@ def _next(content: Buffer, begin: int, stop: int, end: int, possible: Possible) 
     for at in _candidates(content, begin, min(stop + HEAD - 1, end)):
         if _fits(content, at, end, possible):
             after = at + HEAD + _RECORD.unpack_from(content, at)[1]
-            surely = content[at] == CHUNK or (content[at] == MESSAGE and possible.start > 0)
+            surely = content[at] == CHUNK or (
+                content[at] == MESSAGE and (possible.start > 0 or _times_agree(content, at))
+            )
             if surely or after == end or _head_fits(content, after, end, possible):
                 return at
     return stop
+
+
+def _times_agree(content: Buffer, at: int) -> bool:
+    """Whether log time and publish time of a message are of this age and near one another."""
+    _, _, _, _, log_time, publish_time = _MESSAGE.unpack_from(content, at)
+    return log_time > _EARLIEST and abs(log_time - publish_time) < _LONGEST_WAY
 
 
 def _candidates(content: Buffer, begin: int, end: int) -> Iterator[int]:
