@@ -80,6 +80,6 @@ def test_an_interrupted_bench_keeps_and_says_what_it_has(
     monkeypatch.setattr(tables, 'report', lambda results, modes: f'{len(results.drives)} rows')
     out = tmp_path / 'r.md'
     assert main(['evaluate', '--kinds', 'cruise', '--seeds', '5', '-o', str(out)]) == 130
-    assert out.read_text().startswith('2 rows\n\nThe filter was started anew 0 times in 2 runs.')
-    assert out.read_text().endswith('interrupted: 2 of 5 drives\n')
+    assert out.read_text().startswith('2 rows\n\ninterrupted: 2 of 5 drives\n')
+    assert out.read_text().endswith('The filter was started anew 0 times in 2 runs.\n')
     assert 'interrupted: 2 of 5 drives' in capsys.readouterr().out

@@ -54,7 +54,7 @@ def test_drive_gives_a_bag_a_report_and_a_summary(
     assert_slip_follows_the_reference(history)
     assert (history.slip_class[-10:] == SlipClass.LOW).all()
     page = report.read_text()
-    assert page.count('data:image/svg+xml;base64,') == 4
+    assert page.count('data:image/svg+xml;base64,') == 5
     # Nothing is loaded from elsewhere; what scripts could load is watched in test_browser.
     elements = re.sub(r'<script\b.*?</script>', '', page, flags=re.DOTALL)
     assert not re.search(r'(?:src|href)="(?!data:|#)', elements)
