@@ -21,6 +21,13 @@ def test_damaged_inputs_of_all_kinds() -> None:
     assert set(done) == set(cases.CASES)
 
 
+def test_a_message_that_lost_bytes_hides_no_chunk_behind_it() -> None:
+    """5,000 bytes left out: by its length a message takes the next chunk's head with it."""
+    done, faults = fuzz(75084681, 1)
+    assert set(done) == {'mcap'}
+    assert not faults
+
+
 def test_the_judgement_can_fail(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A reader that drops one message is found out."""
     from wheel_terra_estimator.bags.mcap_file import McapFile

@@ -116,6 +116,7 @@ def records(content: Buffer, begin: int, end: int, possible: Possible) -> Iterat
     channels, start, last = possible.channels, possible.start, possible.end
     any_channel = not channels
     before: Record | None = None  # found, but damage behind it may show that it is none
+    behind_damage = False  # messages of a chunk that lost its head: bytes may be missing in one
     while at < end:
         record: Record | None = None
         # The usual case first: a message that fits, followed by a record that fits.
@@ -131,6 +132,10 @@ def records(content: Buffer, begin: int, end: int, possible: Possible) -> Iterat
             ):
                 record = Record(MESSAGE, at + HEAD, after)
         record = record or _record(content, at, end, possible)
+        if record is not None and behind_damage and CHUNK in possible.opcodes:
+            behind_damage = record.opcode != CHUNK
+            if record.opcode == MESSAGE and _chunk_inside(content, record, end) < record.end:
+                record = None
         if record is None and before is not None:
             inside = _inside(content, before, at, end, possible)
             if inside < at:  # bytes are missing in the record before, so it reached too far
@@ -144,7 +149,7 @@ def records(content: Buffer, begin: int, end: int, possible: Possible) -> Iterat
         if record is None:
             found = _next(content, at + 1, end, end, possible)
             yield Gap(at, found)
-            at = found
+            at, behind_damage = found, True
         else:
             at = record.end
     if before is not None:
@@ -184,6 +189,11 @@ def _record(content: Buffer, at: int, end: int, possible: Possible) -> Record | 
 def next_outside(content: Buffer, begin: int, stop: int, end: int) -> int:
     """Return where a record that stands outside of chunks can begin before ``stop``, else it."""
     return _next(content, begin, stop, end, Possible((CHUNK, SCHEMA, CHANNEL)))
+
+
+def _chunk_inside(content: Buffer, record: Record, end: int) -> int:
+    """Return where a chunk begins in the bytes of a message that lost some, else its end."""
+    return _next(content, record.begin, record.end, end, Possible((CHUNK,)))
 
 
 def _inside(content: Buffer, record: Record, stop: int, end: int, possible: Possible) -> int:
