@@ -166,11 +166,11 @@ def fitting_record(content: Buffer, at: int, end: int, possible: Possible) -> Re
 
 def _record(content: Buffer, at: int, end: int, possible: Possible) -> Record | None:
     """Return the record at a place if one can be there."""
-    if not _fits(content, at, end, possible):
+    record = fitting_record(content, at, end, possible)
+    if record is None:
         return None
-    opcode, length = _RECORD.unpack_from(content, at)
-    after = at + HEAD + length
-    record = Record(opcode, at + HEAD, min(after, end))
+    opcode, after = record.opcode, record.end
+    record = record._replace(end=min(after, end))
     if after < end and _fits(content, after, end, possible):
         return record
     if after == end and opcode != CHUNK:  # no closed file ends with a chunk

@@ -97,32 +97,28 @@ class TimeFigure:
         dash: str = 'solid',
     ) -> None:
         """Add a line; nan is a gap."""
-        x, y = thin(seconds, values, LINE_POINTS)
-        self._add(
-            panel,
-            switches,
-            x=_seconds(x),
-            y=_numbers(y),
-            name=name,
-            line={'color': colour, 'width': width, 'dash': dash},
-            hovertemplate='%{y}',
-        )
+        style = {'color': colour, 'width': width, 'dash': dash}
+        self._curve(panel, switches, name, thin(seconds, values, LINE_POINTS), line=style)
 
     def truth(
         self, panel: int, seconds: FloatArray, values: FloatArray, name: str, *switches: str
     ) -> None:
         """Add a dashed line in the page's ink."""
-        x, y = thin(seconds, values, TRUTH_POINTS)
-        self._add(
-            panel,
-            switches,
-            x=_seconds(x),
-            y=_numbers(y),
-            name=name,
-            line={'dash': 'dash', 'width': 1.0},
-            hovertemplate='%{y}',
-            ink=True,
-        )
+        style = {'dash': 'dash', 'width': 1.0}
+        points = thin(seconds, values, TRUTH_POINTS)
+        self._curve(panel, switches, name, points, line=style, ink=True)
+
+    def _curve(
+        self,
+        panel: int,
+        switches: tuple[str, ...],
+        name: str,
+        points: tuple[FloatArray, FloatArray],
+        **style: Any,
+    ) -> None:
+        """Add a curve whose values are told where the pointer is."""
+        x, y = _seconds(points[0]), _numbers(points[1])
+        self._add(panel, switches, x=x, y=y, name=name, hovertemplate='%{y}', **style)
 
     def band(
         self,
