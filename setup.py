@@ -101,6 +101,7 @@ setup(
             'pytest>=7.4',
             'pytest-xdist>=3.3',
             'pytest-timeout>=2.1',
+            'pytest-rerunfailures>=14.0',
             'hypothesis>=6.80',
             'ruff>=0.6',
             'mypy>=1.8',
