@@ -5,73 +5,27 @@
 The rover drives new ground all day (slopes, turns, stops, reverse, random sensor faults, late and
 jittered messages); nothing of the drive is stored, so that memory is that of the estimator and a
 plant of constant size. ``-s`` prints a line per simulated hour; ``SIMULATED_HOURS`` shortens.
+``wheel-terra evaluate --hours 24 -o DIR`` drives the same day and can be interrupted.
 """
 
-import gc
-import heapq
-import itertools
 import math
 import os
-import resource
-import sys
-import time
-from collections import OrderedDict
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
 
-from wheel_terra_estimator.estimation.core import EstimatorCore
+from wheel_terra_estimator.cli.main import main
+from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.estimation.filter.ekf import GatedFilter
-from wheel_terra_estimator.evaluation import kinds
-from wheel_terra_estimator.simulation.commands import Command
-from wheel_terra_estimator.simulation.drive import Drive
-from wheel_terra_estimator.simulation.scenario import load
-from wheel_terra_estimator.simulation.sensors import START
-
-HOUR = 3600.0
-LAP = (  # time [s], forward [m/s], turn rate [rad/s]; linear between
-    (0, 0.05, 0.0),
-    (150, 0.05, 0.0),
-    (151, 0.0, 0.0),  # stop
-    (170, 0.0, 0.0),
-    (171, 0.07, 0.0),
-    (250, 0.07, 0.0),
-    (252, 0.05, 0.03),  # arcs
-    (280, 0.05, 0.03),
-    (282, 0.05, -0.03),
-    (310, 0.05, -0.03),
-    (312, 0.0, 0.06),  # spins in place
-    (340, 0.0, 0.06),
-    (342, 0.0, -0.06),
-    (370, 0.0, -0.06),
-    (372, 0.0, 0.0),
-    (400, 0.0, 0.0),
-    (402, -0.05, 0.0),  # reverse
-    (470, -0.05, 0.0),
-    (472, 0.05, 0.0),
-    (599, 0.05, 0.0),
+from wheel_terra_estimator.evaluation.long_drive import (
+    HOUR,
+    OF_THE_PROCESS,
+    LongDrive,
+    drive_for_hours,
 )
-LAP_TIME = 600.0
-HILLS = (0.0, 8.0, 2.0, -7.0, 5.0, -4.0)  # [deg], 5 m apart
 
-
-def day(hours):
-    """Return the scenario of so many hours."""
-    laps = math.ceil(hours * HOUR / LAP_TIME)
-    knots = np.arange(0.0, hours * HOUR * 0.1 + 50.0, 5.0)
-    return load(
-        {
-            **kinds.KINDS['cruise'],
-            'duration': hours * HOUR,
-            'drive.time': [LAP_TIME * i + knot[0] for i in range(laps) for knot in LAP],
-            'drive.forward': [knot[1] for knot in LAP] * laps,
-            'drive.turn_rate': [knot[2] for knot in LAP] * laps,
-            'slope.position': [float(x) for x in knots],
-            'slope.angle_deg': [HILLS[i % len(HILLS)] for i in range(len(knots))],
-            'faults.random_rate': 20.0,
-        }
-    )
+SEED = 77
 
 
 @dataclass
@@ -106,105 +60,82 @@ def watch(monkeypatch):
     return watch
 
 
-class Log:
-    """What is kept of the sets: sums."""
-
-    def __init__(self):
-        self.sets = self.not_finite = self.started_anew = self.stuck = 0
-        self.sums = np.zeros(4)  # count, squared error, within 95 %, squared deviation
-        self.known = OrderedDict()  # time [ms] -> truth of the last seconds
-
-    def hear(self, truth):
-        self.known[round(truth.time * 1e3)] = truth  # summed up steps drift by nanoseconds
-        if len(self.known) > 100:
-            self.known.popitem(last=False)
-
-    def take(self, estimates):
-        self.sets += 1
-        for entry in fields(estimates):
-            value = getattr(estimates, entry.name)
-            if isinstance(value, (np.ndarray, float)):
-                self.not_finite += not np.isfinite(value).all()
-        self.started_anew += 'filter' in estimates.faults
-        self.stuck += estimates.stuck
-        truth = self.known.get(round((estimates.stamp - START) * 1e-6))
-        if truth is None:
-            return
-        moving = ~np.isnan(truth.slip)
-        error = np.abs(estimates.slip - truth.slip)[moving]
-        std = estimates.slip_std[moving]
-        self.sums += error.size, error @ error, (error <= 1.96 * std).sum(), std @ std
-
-    def figures(self):
-        """Return RMSE, coverage and mean deviation of slip since the last call, and forget."""
-        count, squared, within, variance = self.sums
-        self.sums = np.zeros(4)
-        return math.sqrt(squared / count), within / count, math.sqrt(variance / count)
+def live(hours, span=HOUR):
+    """Drive so many hours; return the figures of each span."""
+    drive, rows = LongDrive(hours, SEED), []
+    while not drive.over:
+        rows.append(drive.go_on(span))
+        print(rows[-1].line(), flush=True)
+    return rows
 
 
-def live(hours, seed=77, span=HOUR):
-    """Drive so many hours; return core, log and a row per span."""
-    scenario = day(hours)
-    drive = Drive(scenario, seed)
-    core = EstimatorCore(scenario.configuration)
-    log, rows = Log(), []
-    under_way, order = [], itertools.count()
-    due, way, before = span, 0.0, drive.last_truth.position
-    while drive.plant.time < hours * HOUR - 1e-6:
-        told = scenario.profile.at(drive.plant.time)
-        factor = drive.speed_factor
-        for arrival in drive.step(Command(factor * told.forward, factor * told.turn_rate)):
-            heapq.heappush(under_way, (arrival.arrival, next(order), arrival.measurement))
-        truth = drive.last_truth
-        log.hear(truth)
-        way += math.dist(truth.position[:2], before[:2])
-        before = truth.position
-        now = START + round(drive.plant.time * 1e9)
-        while under_way and under_way[0][0] <= now:
-            for estimates in core.add(heapq.heappop(under_way)[2]):
-                log.take(estimates)
-        if drive.plant.time >= due - 1e-6:
-            due += span
-            gc.collect()
-            rmse, coverage, std = log.figures()
-            blocks = sys.getallocatedblocks()
-            peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
-            rows.append((way, rmse, coverage, std, blocks, peak))
-            print(
-                f'{drive.plant.time / HOUR:6.2f} h: {log.sets} sets, {way:.0f} m, slip RMSE '
-                f'{rmse:.3f}, deviation {std:.3f}, coverage {coverage:.3f}, stuck {log.stuck}, '
-                f'{blocks} blocks, {peak:.0f} MiB at most, {time.process_time():.0f} s of CPU',
-                flush=True,
-            )
-    return core, log, np.array(rows)
-
-
-def check_soundness(core, log, watch, hours):
+def check_soundness(rows, watch, hours):
     print(f'least eigenvalue of the correlation matrix {watch.least_eigenvalue:.2e}')
     # A random fault may silence the wheel odometry for some seconds.
-    assert log.sets > 0.95 * hours * HOUR * 10.0
-    assert log.not_finite == 0
-    assert log.started_anew == 0
-    assert core.health()['filter_restarts'] == 0
-    assert core.health()['reruns'] > 0.5 * hours * HOUR  # the reference is late, once a second
+    assert sum(row.sets for row in rows) > 0.95 * hours * HOUR * 10.0
+    assert sum(row.not_finite for row in rows) == 0
+    assert rows[-1].filter_restarts == 0
+    assert rows[-1].reruns > 0.5 * hours * HOUR  # the reference is late, once a second
     assert watch.updates > 5.0 * hours * HOUR
     assert watch.asymmetric == 0
     assert watch.least_eigenvalue > 0.0
 
 
 def test_half_a_minute_of_the_day(watch):
-    core, log, rows = live(30.0 / HOUR, span=15.0)
-    check_soundness(core, log, watch, 30.0 / HOUR)
-    assert rows[-1, 0] > 0.75
+    rows = live(30.0 / HOUR, span=15.0)
+    assert [row.hour * HOUR for row in rows] == pytest.approx([15.0, 30.0], abs=0.1)
+    check_soundness(rows, watch, 30.0 / HOUR)
+    assert rows[-1].metres > 0.75
+    assert 0.005 < rows[-1].slip_rmse < 0.2
+
+
+def without_process(rows):
+    return [{k: v for k, v in row.items() if k not in OF_THE_PROCESS} for row in rows]
+
+
+def test_an_interrupted_run_goes_on_with_equal_figures(tmp_path):
+    hours, span = 6.0 / HOUR, 2.0
+    whole = drive_for_hours(tmp_path / 'whole', hours, SEED, span=span, progress=str)
+
+    def interrupt(line):
+        raise KeyboardInterrupt
+
+    broken = tmp_path / 'broken'
+    with pytest.raises(KeyboardInterrupt):
+        drive_for_hours(broken, hours, SEED, span=span, progress=interrupt)
+    with pytest.raises(UserError, match='seed 77'):
+        drive_for_hours(broken, hours, SEED + 1, span=span, resume=True)
+    told = []
+    rows = drive_for_hours(broken, hours, SEED, span=span, resume=True, progress=told.append)
+    assert len(told) == 2 and len(rows) == 3
+    assert without_process(rows) == without_process(whole)
+    assert rows[0]['processor_time'] != whole[0]['processor_time']
+    # What is finished stays finished.
+    assert drive_for_hours(broken, hours, SEED, span=span, resume=True) == rows
+
+
+def test_the_command_drives_and_refuses_a_folder_that_is_there(tmp_path, capsys):
+    folder = tmp_path / 'day'
+    command = ['evaluate', '--hours', '0.0006', '-o', str(folder)]
+    assert main(command) == 0
+    assert '0 restarts of the filter' in capsys.readouterr().out
+    assert (folder / 'hours.jsonl').read_text().count('\n') == 1
+    assert main(command) == 2
+    assert '--resume' in capsys.readouterr().err
+    assert main([*command, '--resume']) == 0
+    assert main(['evaluate', '--hours', '1']) == 2
+    assert '-o' in capsys.readouterr().err
 
 
 @pytest.mark.slow
 @pytest.mark.timeout(0)
 def test_day(watch):
     hours = float(os.environ.get('SIMULATED_HOURS', '24'))
-    core, log, rows = live(hours, span=min(HOUR, hours * HOUR / 8.0))
-    check_soundness(core, log, watch, hours)
-    way, rmse, coverage, _, blocks, peak = rows.T
+    rows = live(hours, span=min(HOUR, hours * HOUR / 8.0))
+    check_soundness(rows, watch, hours)
+    way, rmse, coverage, blocks, peak = np.array(
+        [(r.metres, r.slip_rmse, r.slip_coverage, r.living_objects, r.memory_peak) for r in rows]
+    ).T
     quarter = max(len(rows) // 4, 1)
     morning, evening = slice(0, quarter), slice(-quarter, None)
     # It went on driving, and the estimates are as good and as honest at the end as at the start.

@@ -15,11 +15,15 @@ from wheel_terra_estimator.scheduler import add_jobs_argument
 FILTER_FAILED = 1
 """Exit status where the filter failed on a drive; none of them should make it."""
 INTERRUPTED = 130
+MOST_HOURS = 1000.0
+"""Longest drive: its ground is drawn before the start."""
 SUMMARY = 'score the estimator against ground truth and baselines'
 EXAMPLES = (
     'wheel-terra evaluate --kinds climb turns --seeds 4',
     'wheel-terra evaluate --rover my_rover.yaml --kinds climb scenarios/slow_entrapment --seeds 2',
     'wheel-terra evaluate --limiter --seeds 10 -o limiter.md',
+    'wheel-terra evaluate --hours 24 -o day',
+    'wheel-terra evaluate --hours 24 -o day --resume',
 )
 
 
@@ -83,9 +87,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '-o',
         dest='output',
         type=Path,
-        metavar='F.md|F.html',
-        help='write the tables; as a page with a picture where the name ends in .html',
+        metavar='F.md|F.html|DIR',
+        help='write the tables; as a page with a picture where the name ends in .html; with '
+        '--hours a folder',
     )
+    parser.add_argument(
+        '--hours',
+        type=float,
+        metavar='N',
+        help='one drive of so many hours with slopes, turns, stops and sensor faults; -o DIR keeps '
+        'a line of JSON per hour (an hour takes about three minutes)',
+    )
+    parser.add_argument('--resume', action='store_true', help='go on with an interrupted --hours')
     parser.add_argument(
         '--json', action='store_true', help='print the figures of simulated kinds as JSON'
     )
@@ -105,6 +118,10 @@ def run(arguments: argparse.Namespace) -> int:
     )
     from wheel_terra_estimator.output_folder import check_file, new_file
 
+    if arguments.hours is not None:
+        return _drive_for_hours(arguments)
+    if arguments.resume:
+        raise UserError('--resume goes with --hours')
     status = 0
     title, results, drive = 'The estimator against truth and baselines', None, None
     picture: Path | None = None
@@ -168,6 +185,35 @@ def run(arguments: argparse.Namespace) -> int:
             else:
                 fresh.write_text(text + '\n', encoding='utf-8')
     return status
+
+
+def _drive_for_hours(arguments: argparse.Namespace) -> int:
+    """Run one long drive, or go on with it."""
+    from wheel_terra_estimator.evaluation import kinds, long_drive
+
+    other = (arguments.measured, arguments.limiter, arguments.rover, arguments.kinds)
+    if any(other) or arguments.world != 'own':
+        raise UserError('--hours is a drive of its own: only -o, --tuning, --resume go with it')
+    if arguments.output is None:
+        raise UserError('--hours needs -o DIR, where its figures are kept')
+    if not 0.0 < arguments.hours <= MOST_HOURS:
+        raise UserError(f'--hours {arguments.hours:g}: must be above 0, at most {MOST_HOURS:g}')
+    seeds = kinds.TUNING_SEEDS if arguments.tuning else kinds.TEST_SEEDS
+    try:
+        rows = long_drive.drive_for_hours(
+            arguments.output,
+            arguments.hours,
+            seeds.start,
+            resume=arguments.resume,
+            overwrite=arguments.overwrite,
+        )
+    except KeyboardInterrupt:
+        print(
+            f'interrupted; go on with: --hours {arguments.hours:g} -o {arguments.output} --resume'
+        )
+        return INTERRUPTED
+    print(long_drive.report(rows))
+    return FILTER_FAILED if rows[-1]['filter_restarts'] else 0
 
 
 def _chosen(world: str, kinds: list[str] | None) -> list[tuple[str, str]]:

@@ -246,6 +246,37 @@ def _bogging_in_words(s: Situation, t: SignTuning) -> str:
     return f'bogging down: {soon}, wheels near their torque limit'
 
 
+def _digging_in_words(s: Situation, t: SignTuning) -> str:
+    return f'median slip {s.typical_slip:.2f}: digging in'
+
+
+def _exhausted_in_words(s: Situation, t: SignTuning) -> str:
+    return f'median slip {s.typical_slip:.2f}, the soil is exhausted'
+
+
+def _travel_in_words(s: Situation, t: SignTuning) -> str:
+    return (
+        f'median slip {s.typical_slip:.2f} passes {ENTRAPPED_SLIP:g} within '
+        f'{s.settings.travel:g} m of rim travel'
+    )
+
+
+def _deepening_in_words(s: Situation, t: SignTuning) -> str:
+    return f'wheels dig in: too deep to climb out within {s.settings.travel:g} m of rim travel'
+
+
+def _held_in_words(s: Situation, t: SignTuning) -> str:
+    return f'{_lost_share(s):.0%} of the fastest rim speed lost, others held'
+
+
+def _stalling_in_words(s: Situation, t: SignTuning) -> str:
+    return f'{sum(s.stalled)} wheels stalled near their torque limit'
+
+
+def _labouring_in_words(s: Situation, t: SignTuning) -> str:
+    return f'wheels slowed to {s.typical_rim:.2f} m/s near their torque limit'
+
+
 def in_words(sign: Sign, s: Situation, t: SignTuning) -> str:
     """Return why the warning is raised, what the wheels and the soil say, and what to do."""
     told = [sign.words(s, t)]
@@ -266,14 +297,14 @@ SIGNS: tuple[Sign, ...] = (
         hold=1.5,
         needs=Need.SLIP_TOLD,
         present=_digging,
-        words=lambda s, t: f'median slip {s.typical_slip:.2f}: digging in',
+        words=_digging_in_words,
     ),
     Sign(
         name='exhausted',
         hold=6.0,
         needs=Need.NO_SPEED | Need.SLIP_TOLD,
         present=_exhausted,
-        words=lambda s, t: f'median slip {s.typical_slip:.2f}, the soil is exhausted',
+        words=_exhausted_in_words,
     ),
     Sign(
         name='within_horizon',
@@ -287,19 +318,14 @@ SIGNS: tuple[Sign, ...] = (
         hold=1.0,
         needs=Need.SLIP_TOLD,
         present=_within_travel,
-        words=lambda s, t: (
-            f'median slip {s.typical_slip:.2f} passes {ENTRAPPED_SLIP:g} within '
-            f'{s.settings.travel:g} m of rim travel'
-        ),
+        words=_travel_in_words,
     ),
     Sign(
         name='deepening',
         hold=4.0,  # wheels that enter a patch sink as fast, over a contact length
         needs=Need.SLIP_TOLD,
         present=_deepening,
-        words=lambda s, t: (
-            f'wheels dig in: too deep to climb out within {s.settings.travel:g} m of rim travel'
-        ),
+        words=_deepening_in_words,
     ),
     Sign(
         name='held',
@@ -307,7 +333,7 @@ SIGNS: tuple[Sign, ...] = (
         needs=Need.SPEED | Need.PULLED_AWAY,
         while_stopping=True,
         present=_held,
-        words=lambda s, t: f'{_lost_share(s):.0%} of the fastest rim speed lost, others held',
+        words=_held_in_words,
     ),
     Sign(
         name='bogging',
@@ -322,7 +348,7 @@ SIGNS: tuple[Sign, ...] = (
         hold=0.4,
         while_stopping=True,
         present=_stalling,
-        words=lambda s, t: f'{sum(s.stalled)} wheels stalled near their torque limit',
+        words=_stalling_in_words,
     ),
     Sign(
         name='labour',
@@ -330,7 +356,7 @@ SIGNS: tuple[Sign, ...] = (
         needs=Need.STRAIGHT,
         while_stopping=True,
         present=_labouring,
-        words=lambda s, t: f'wheels slowed to {s.typical_rim:.2f} m/s near their torque limit',
+        words=_labouring_in_words,
     ),
 )
 """The signs; where several are there at once, the first gives the words."""
