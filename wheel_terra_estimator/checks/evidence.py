@@ -7,6 +7,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,79 +41,49 @@ LEAST_MOVING_ROWS = 30
 
 
 @dataclass(frozen=True)
-class Evidence:
-    """The recording, the rover and what follows from both.
+class WheelRates:
+    """Rates of the wheels and what follows from them alone, worked out once.
 
     Attributes
     ----------
-    recording, facts : Recording, RoverFacts
-        As read.
     time : numpy.ndarray
         (k,) stamps of the wheel odometry since the first one [s], increasing.
-    rate, torque : numpy.ndarray
-        (k, n) per wheel of ``facts.names``, positive forward; nan where not there. Torques, forces
-        and angular rates are without the errors that the rover file states.
-    force, gyro : numpy.ndarray or None
-        (k, 3) specific force and angular rate in ``base_link`` as the rover file has it, averaged
-        over the period of the wheel odometry.
-    rotation : numpy.ndarray
-        (3, 3) from the IMU's frame into ``base_link``.
+    rate : numpy.ndarray
+        (k, n) per wheel [rad/s], positive forward; nan where not there.
     """
 
-    recording: Recording
-    facts: RoverFacts
     time: FloatArray
     rate: FloatArray
-    torque: FloatArray
-    force: FloatArray | None
-    gyro: FloatArray | None
-    rotation: FloatArray
 
-    @property
+    @cached_property
     def period(self) -> float:
         """Median time between two rows [s]."""
         return float(np.median(np.diff(self.time))) if self.time.size > 1 else math.nan
 
-    @property
-    def common_rate(self) -> FloatArray:
+    @cached_property
+    def common(self) -> FloatArray:
         """Median rate of the wheels (k,) [rad/s]."""
-        return _nanmedian(self.rate)
+        return _shared(row_medians(self.rate))
 
-    @property
-    def working_rate(self) -> float:
-        """Typical size of the wheel rates when moving [rad/s]; 0 if the rover never moves."""
-        size = _nanmedian(np.abs(self.rate))
-        size = size[np.isfinite(size)]
+    @cached_property
+    def size(self) -> FloatArray:
+        """Median size of the rates (k,) [rad/s]."""
+        return _shared(row_medians(np.abs(self.rate)))
+
+    @cached_property
+    def working(self) -> float:
+        """Typical size of the rates when moving [rad/s]; 0 if the rover never moves."""
+        size = self.size[np.isfinite(self.size)]
         top = float(np.quantile(size, 0.95)) if size.size else 0.0
         moving = size[size > 0.2 * top]
         return float(np.median(moving)) if moving.size else 0.0
 
-    @property
-    def moving(self) -> Mask:
-        """Rows in which the wheels turn on the ground."""
-        return self._turning_wheels & ~self.in_air
-
-    @property
-    def _turning_wheels(self) -> Mask:
-        return np.asarray(_nanmedian(np.abs(self.rate)) > 0.2 * max(self.working_rate, 1e-9))
+    @cached_property
+    def turning(self) -> Mask:
+        """Rows in which the wheels turn, on the ground or in the air."""
+        return _shared(self.size > 0.2 * max(self.working, 1e-9))
 
     @cached_property
-    def in_air(self) -> Mask:
-        """Rows in which the wheels turn freely while the reference says that the rover stands."""
-        reference, facts = self.reference(), self.facts
-        if reference is None or not facts.known or not np.isfinite(self.torque).any():
-            return np.zeros(self.time.size, dtype=bool)
-        at = (reference.stamp - self.origin) * 1e-9
-        speed = np.abs(np.interp(self.time, at, _smooth(reference.velocity[:, 0], SMOOTH_ROWS)))
-        size = _nanmedian(np.abs(self.rate * facts.radius))
-        taken = np.nansum(np.abs(self.torque) / facts.radius, axis=1)
-        free = _smooth(taken, SMOOTH_ROWS) < FREE_TRACTION * facts.mass * facts.gravity
-        turning = self._turning_wheels
-        rows = _after(turning & (speed < STANDING_SHARE * size) & free, self.period, SHORTEST_FREE)
-        # A reference that always says 0 lifts no rover.
-        return rows if 2 * rows.sum() < turning.sum() else np.zeros_like(rows)
-
-    @property
     def at_rest(self) -> Mask:
         """Rows in which every wheel has stood still for a while."""
         rate = np.nan_to_num(self.rate)
@@ -124,13 +95,93 @@ class Evidence:
         mean[width - 1 :] = (total[width:] - total[:-width]) / width
         bend = np.diff(rate, 2, axis=0) / math.sqrt(6.0)
         noise = robust_std(bend.ravel()) if bend.size else 0.0
-        limit = max(REST_RATE * self.working_rate, 4.0 * noise / math.sqrt(width), 1e-9)
+        limit = max(REST_RATE * self.working, 4.0 * noise / math.sqrt(width), 1e-9)
         still = (np.abs(mean) <= limit).all(axis=1)
         still &= np.abs(rate).max(axis=1) <= max(limit, 5.0 * noise)
         still[: width - 1] = False
-        return _after(still, self.period, SHORTEST_REST)
+        return _shared(_after(still, self.period, SHORTEST_REST))
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """The recording, the rover and what follows from both.
+
+    Attributes
+    ----------
+    recording, facts : Recording, RoverFacts
+        As read.
+    wheels : WheelRates
+        What the wheels did, on the stamps of the wheel odometry.
+    torque : numpy.ndarray
+        (k, n) per wheel of ``facts.names`` [N m], positive forward; nan where not there. Torques,
+        forces and angular rates are without the errors that the rover file states.
+    force, gyro : numpy.ndarray or None
+        (k, 3) specific force and angular rate in ``base_link`` as the rover file has it, averaged
+        over the period of the wheel odometry.
+    rotation : numpy.ndarray
+        (3, 3) from the IMU's frame into ``base_link``.
+    """
+
+    recording: Recording
+    facts: RoverFacts
+    wheels: WheelRates
+    torque: FloatArray
+    force: FloatArray | None
+    gyro: FloatArray | None
+    rotation: FloatArray
 
     @property
+    def time(self) -> FloatArray:
+        """(k,) stamps of the wheel odometry since the first one [s], increasing."""
+        return self.wheels.time
+
+    @property
+    def rate(self) -> FloatArray:
+        """(k, n) per wheel of ``facts.names`` [rad/s], positive forward; nan where not there."""
+        return self.wheels.rate
+
+    @property
+    def period(self) -> float:
+        """Median time between two rows [s]."""
+        return self.wheels.period
+
+    @property
+    def common_rate(self) -> FloatArray:
+        """Median rate of the wheels (k,) [rad/s]."""
+        return self.wheels.common
+
+    @property
+    def working_rate(self) -> float:
+        """Typical size of the wheel rates when moving [rad/s]; 0 if the rover never moves."""
+        return self.wheels.working
+
+    @property
+    def at_rest(self) -> Mask:
+        """Rows in which every wheel has stood still for a while."""
+        return self.wheels.at_rest
+
+    @cached_property
+    def moving(self) -> Mask:
+        """Rows in which the wheels turn on the ground."""
+        return _shared(self.wheels.turning & ~self.in_air)
+
+    @cached_property
+    def in_air(self) -> Mask:
+        """Rows in which the wheels turn freely while the reference says that the rover stands."""
+        reference, facts = self.reference(), self.facts
+        if reference is None or not facts.known or not np.isfinite(self.torque).any():
+            return np.zeros(self.time.size, dtype=bool)
+        at = (reference.stamp - self.origin) * 1e-9
+        speed = np.abs(np.interp(self.time, at, _smooth(reference.velocity[:, 0], SMOOTH_ROWS)))
+        size = row_medians(np.abs(self.rate * facts.radius))
+        taken = np.nansum(np.abs(self.torque) / facts.radius, axis=1)
+        free = _smooth(taken, SMOOTH_ROWS) < FREE_TRACTION * facts.mass * facts.gravity
+        turning = self.wheels.turning
+        rows = _after(turning & (speed < STANDING_SHARE * size) & free, self.period, SHORTEST_FREE)
+        # A reference that always says 0 lifts no rover.
+        return rows if 2 * rows.sum() < turning.sum() else np.zeros_like(rows)
+
+    @cached_property
     def steady(self) -> Mask:
         """Rows in which the rover moves and its speed has not changed for a while."""
         rate = self.common_rate
@@ -139,27 +190,28 @@ class Evidence:
         if rate.size > width:
             change[width:] = np.abs(rate[width:] - rate[:-width])
         calm = change < 0.15 * max(self.working_rate, 1e-9)
-        return self.moving & _after(calm, self.period, SETTLING)
+        return _shared(self.moving & _after(calm, self.period, SETTLING))
 
-    @property
+    @cached_property
     def rim(self) -> FloatArray:
         """Mean rim speed of the wheels (k,) [m/s]; with radius 1 where it is not known."""
         radius = np.where(np.isfinite(self.facts.radius), self.facts.radius, 1.0)
         speed = self.rate * radius
         known = np.isfinite(speed)
-        return np.where(known, speed, 0.0).sum(axis=1) / np.maximum(known.sum(axis=1), 1)
+        total = np.where(known, speed, 0.0).sum(axis=1)
+        return _shared(total / np.maximum(known.sum(axis=1), 1))
 
-    @property
+    @cached_property
     def side_difference(self) -> FloatArray:
         """Mean rim speed right minus left (k,) [m/s]; nan where the sides are not known."""
         radius = np.where(np.isfinite(self.facts.radius), self.facts.radius, 1.0)
         speed = self.rate * radius
         right, left = self.facts.side < 0, self.facts.side > 0
         if not right.any() or not left.any():
-            return np.full(self.time.size, np.nan)
-        return _nanmean(speed[:, right]) - _nanmean(speed[:, left])
+            return _shared(np.full(self.time.size, np.nan))
+        return _shared(_nanmean(speed[:, right]) - _nanmean(speed[:, left]))
 
-    @property
+    @cached_property
     def straight(self) -> Mask:
         """Steady rows without a turn, neither by the gyro nor by the wheels."""
         rim = np.abs(self.rim)
@@ -172,15 +224,15 @@ class Evidence:
         if self.gyro is not None and self.facts.known:
             yaw = np.abs(self.gyro[:, 2] - np.median(self.gyro[:, 2]))
             rows &= yaw * float(np.abs(self.facts.lateral).max()) < STRAIGHT_SHARE * rim
-        return rows
+        return _shared(rows)
 
-    @property
+    @cached_property
     def turning(self) -> Mask:
         """Rows in which the gyro or the wheels see a turn."""
         if self.gyro is None:
-            return np.zeros(self.time.size, dtype=bool)
+            return _shared(np.zeros(self.time.size, dtype=bool))
         rate = np.abs(self.gyro[:, 2])
-        return np.asarray(self.moving & (rate > 0.3 * np.quantile(rate, 0.98)))
+        return _shared(self.moving & (rate > 0.3 * np.quantile(rate, 0.98)))
 
     def reference(self) -> VelocitySeries | None:
         """Return the slip-free velocity."""
@@ -205,7 +257,8 @@ class Evidence:
 
     def with_rate(self, rate: FloatArray, torque: FloatArray | None = None) -> Evidence:
         """Return the evidence with other wheel rates (after something was mended)."""
-        return replace(self, rate=rate, torque=self.torque if torque is None else torque)
+        wheels = self.wheels if rate is self.rate else WheelRates(self.time, rate)
+        return replace(self, wheels=wheels, torque=self.torque if torque is None else torque)
 
 
 def gather(recording: Recording, facts: RoverFacts, rotation: FloatArray) -> Evidence | None:
@@ -239,7 +292,14 @@ def gather(recording: Recording, facts: RoverFacts, rotation: FloatArray) -> Evi
         if errors is not None:
             force = force - errors.specific_force_bias
             gyro = gyro - errors.angular_rate_bias
-    return Evidence(recording, facts, time, rate, torque, force, gyro, rotation)
+    wheels = WheelRates(time, rate)
+    return Evidence(recording, facts, wheels, torque, force, gyro, rotation)
+
+
+def _shared(values: NDArray[Any]) -> NDArray[Any]:
+    """Return values that every check sees, so that none may change them."""
+    values.flags.writeable = False
+    return values
 
 
 def _after(condition: Mask, period: float, duration: float) -> Mask:
@@ -258,11 +318,16 @@ def _smooth(values: FloatArray, width: int) -> FloatArray:
     return np.asarray(np.convolve(np.nan_to_num(values), np.ones(width) / width, mode='same'))
 
 
-def _nanmedian(values: FloatArray) -> FloatArray:
-    known = np.isfinite(values).any(axis=1)
+def row_medians(values: FloatArray) -> FloatArray:
+    """Return the median of each row of (k, n) without nan, 0 where nothing else is there."""
+    known = np.isfinite(values)
+    whole, some = known.all(axis=1), known.any(axis=1)
+    some &= ~whole
     result = np.zeros(values.shape[0])
-    if known.any():
-        result[known] = np.nanmedian(values[known], axis=1)
+    if whole.any():
+        result[whole] = np.median(values[whole], axis=1)  # 20 times as fast as nanmedian
+    if some.any():
+        result[some] = np.nanmedian(values[some], axis=1)
     return result
 
 

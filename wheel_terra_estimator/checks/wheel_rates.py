@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wheel_terra_estimator.checks.evidence import LEAST_MOVING_ROWS, Evidence
+from wheel_terra_estimator.checks.evidence import LEAST_MOVING_ROWS, Evidence, row_medians
 from wheel_terra_estimator.checks.finding import Finding, NotChecked, Outcome
 from wheel_terra_estimator.checks.statistics import (
     block_fit,
@@ -296,7 +296,7 @@ class _Told(NamedTuple):
 
 
 def _told_direction(evidence: Evidence, signs: FloatArray) -> _Told:
-    speed = np.nan_to_num(np.nanmedian(np.nan_to_num(evidence.rate) * signs, axis=1))
+    speed = row_medians(np.nan_to_num(evidence.rate) * signs)
     reference = evidence.reference()
     by_reference = by_force = None
     if reference is not None:
