@@ -59,7 +59,6 @@ def broken(monkeypatch):
 
     def make(error):
         module = types.ModuleType('wheel_terra_estimator.cli.broken')
-        module.SUMMARY = 'fails'
         module.add_arguments = lambda parser: None
 
         def run(arguments):
@@ -67,7 +66,7 @@ def broken(monkeypatch):
 
         module.run = run
         monkeypatch.setitem(main.sys.modules, module.__name__, module)
-        monkeypatch.setattr(main, 'COMMANDS', ('broken',))
+        monkeypatch.setattr(main, 'COMMANDS', {'broken': 'fails'})
 
     return make
 

@@ -11,7 +11,6 @@ from typing import Any
 
 from wheel_terra_estimator.errors import UserError
 
-SUMMARY = 'speed beside floors and peers, in processor time'
 LARGEST_FILE = 2**20
 """Bytes of an earlier output."""
 EXAMPLES = ('wheel-terra bench --json > before.json', 'wheel-terra bench --against before.json')

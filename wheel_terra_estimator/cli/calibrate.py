@@ -10,7 +10,6 @@ from pathlib import Path
 from wheel_terra_estimator.bags import limits as bag_limits
 from wheel_terra_estimator.configuration import reader as configuration_reader
 
-SUMMARY = 'write a rover file with what a recording tells: radius, mounting, zeros, noise'
 EXAMPLES = (
     'wheel-terra calibrate ten_minute_drive --config my_rover.yaml -o my_rover_calibrated.yaml',
     'wheel-terra calibrate drive --config pathfinder --remap reference_odom:=/truth/odometry '

@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from wheel_terra_estimator.checks.finding import CheckReport
     from wheel_terra_estimator.checks.series import Recording
 
-SUMMARY = 'say what is wrong with a recording or a rover file, and what mends it'
 EXAMPLES = (
     'wheel-terra check my_drive',
     'wheel-terra check my_drive --config my_rover.yaml --json',

@@ -10,7 +10,6 @@ from pathlib import Path
 
 from wheel_terra_estimator.bags import limits as bag_limits
 
-SUMMARY = 'put two bags of estimates side by side, against the truth where there is one'
 EXAMPLES = (
     'wheel-terra compare estimates_a estimates_b',
     'wheel-terra compare estimates_a estimates_b --truth my_drive --report compare.html',

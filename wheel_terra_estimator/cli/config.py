@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import argparse
 
-SUMMARY = 'list, show or find the shipped rover, soil and scenario files'
 EXAMPLES = (
     'wheel-terra config list rovers',
     'wheel-terra config show frostyboy',

@@ -9,7 +9,6 @@ from pathlib import Path
 
 from wheel_terra_estimator.errors import UserError
 
-SUMMARY = 'write a table of logged values (CSV) as a rosbag2'
 EXAMPLES = (
     'wheel-terra convert --example',
     'wheel-terra convert log.csv --columns columns.yaml -o drive',

@@ -25,7 +25,6 @@ from wheel_terra_estimator.errors import UserError
 if TYPE_CHECKING:
     from wheel_terra_estimator.bags.truth import Truth
 
-SUMMARY = 'run the estimator over two shipped drives, and a blind trial of the diagnosis'
 TRIAL_SEED = 55  # what it hides is told when the seal is opened
 EXAMPLES = ('wheel-terra demo', 'wheel-terra demo --no-node -o /tmp/demo --overwrite')
 

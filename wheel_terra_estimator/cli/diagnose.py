@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from wheel_terra_estimator.discrepancy.result import Diagnosis
     from wheel_terra_estimator.discrepancy.tables.steady_table import SteadyTable
 
-SUMMARY = 'find where model and measurement disagree and name the missing effect'
 EXAMPLES = (
     'wheel-terra diagnose rows.csv --config hit_wh3 --config hit_fit -o diagnosis',
     'wheel-terra diagnose my_bag --config my_rover.yaml --remap reference_odom:=/vo -o diagnosis',

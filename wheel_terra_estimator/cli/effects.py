@@ -23,7 +23,6 @@ from wheel_terra_estimator.terramechanics.effects import (
 )
 from wheel_terra_estimator.terramechanics.effects import learned_closure as law
 
-SUMMARY = 'list the physical and instrument effects that can be named'
 EXAMPLES = (
     'wheel-terra effects',
     'wheel-terra effects lug_digging multipass',

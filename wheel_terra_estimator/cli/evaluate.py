@@ -17,7 +17,6 @@ FILTER_FAILED = 1
 INTERRUPTED = 130
 MOST_HOURS = 1000.0
 """Longest drive: its ground is drawn before the start."""
-SUMMARY = 'score the estimator against ground truth and baselines'
 EXAMPLES = (
     'wheel-terra evaluate --kinds climb turns --seeds 4',
     'wheel-terra evaluate --rover my_rover.yaml --kinds climb scenarios/slow_entrapment --seeds 2',

@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from wheel_terra_estimator.bags.limits import Limits
     from wheel_terra_estimator.configuration.rover_template import RoverSketch
 
-SUMMARY = 'write a new rover file from a URDF, from a recording, or from a few questions'
 EXAMPLES = (
     'wheel-terra init --urdf rover.urdf -o my_rover.yaml',
     'wheel-terra init --bag my_drive --radius 0.165 --track 0.57 --wheelbase 0.51 --mass 50 '

@@ -13,34 +13,37 @@ import difflib
 import importlib
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from typing import Any, NoReturn
 
 from wheel_terra_estimator import __version__
 from wheel_terra_estimator.cli.terminal import harmless_output, one_line, termination_as_interrupt
 from wheel_terra_estimator.errors import UserError
 
-# Each module has SUMMARY, add_arguments(parser) and run(arguments) -> exit status, and may have
-# EXAMPLES (command lines for its help); it imports heavy libraries inside run, so that help and
-# the light commands start at once.
-COMMANDS = (
-    'simulate',
-    'check',
-    'calibrate',
-    'init',
-    'config',
-    'compare',
-    'convert',
-    'replay',
-    'predict',
-    'diagnose',
-    'trial',
-    'effects',
-    'soilbin',
-    'evaluate',
-    'bench',
-    'demo',
-)
+COMMANDS = {
+    'simulate': 'drive a simulated rover and write a rosbag2 with ground truth',
+    'check': 'say what is wrong with a recording or a rover file, and what mends it',
+    'calibrate': 'write a rover file with what a recording tells: radius, mounting, zeros, noise',
+    'init': 'write a new rover file from a URDF, from a recording, or from a few questions',
+    'config': 'list, show or find the shipped rover, soil and scenario files',
+    'compare': 'put two bags of estimates side by side, against the truth where there is one',
+    'convert': 'write a table of logged values (CSV) as a rosbag2',
+    'replay': 'run the estimator over a rosbag2, without ROS',
+    'predict': 'print or draw the curves of the wheel-soil model',
+    'diagnose': 'find where model and measurement disagree and name the missing effect',
+    'trial': 'hide an effect in a drawn table, diagnose it blind, open the seal',
+    'effects': 'list the physical and instrument effects that can be named',
+    'soilbin': 'run the virtual soil bin (discrete elements)',
+    'evaluate': 'score the estimator against ground truth and baselines',
+    'bench': 'speed beside floors and peers, in processor time',
+    'demo': 'run the estimator over two shipped drives, and a blind trial of the diagnosis',
+}
+"""Sub-commands in the order of the help, and what each is for.
+
+The module of that name has add_arguments(parser) and run(arguments) -> exit status, and may have
+EXAMPLES (command lines for its help). Only that of the command that is asked for is imported, and
+it imports heavy libraries inside run.
+"""
 
 UNUSABLE_INPUT = 2
 PROGRAM_ERROR = 3
@@ -71,15 +74,16 @@ class Parser(argparse.ArgumentParser):
 
 def build_parser() -> argparse.ArgumentParser:
     """Return the parser of all sub-commands."""
-    return _parsers()[0]
+    return _parsers(COMMANDS)[0]
 
 
 def sub_parsers() -> dict[str, argparse.ArgumentParser]:
     """Return sub-command -> its parser."""
-    return _parsers()[1]
+    return _parsers(COMMANDS)[1]
 
 
-def _parsers() -> tuple[Parser, dict[str, argparse.ArgumentParser]]:
+def _parsers(needed: Container[str]) -> tuple[Parser, dict[str, argparse.ArgumentParser]]:
+    """Return the parser and those of the sub-commands; arguments of the `needed` ones alone."""
     parser = Parser(
         prog='wheel-terra',
         description='Slip, sinkage and drawbar pull of rover wheels in loose soil.',
@@ -96,22 +100,34 @@ def _parsers() -> tuple[Parser, dict[str, argparse.ArgumentParser]]:
     commands = parser.add_subparsers(
         dest='command', required=True, metavar='COMMAND', parser_class=Parser
     )
-    for name in COMMANDS:
-        module = importlib.import_module(f'wheel_terra_estimator.cli.{name}')
-        examples = getattr(module, 'EXAMPLES', ())
+    for name, summary in COMMANDS.items():
         sub = commands.add_parser(
             name,
-            help=module.SUMMARY,
-            description=module.SUMMARY,
-            epilog='\n'.join(('examples:', *(f'  {line}' for line in examples)))
-            if examples
-            else '',
+            help=summary,
+            description=summary,
             formatter_class=argparse.RawDescriptionHelpFormatter,
         )
-        module.add_arguments(sub)
-        sub.add_argument('--debug', action='store_true', default=argparse.SUPPRESS, help=DEBUG_HELP)
-        sub.set_defaults(run=module.run)
+        if name in needed:
+            _add_arguments(sub, importlib.import_module(f'wheel_terra_estimator.cli.{name}'))
     return parser, dict(commands.choices)
+
+
+def _add_arguments(parser: argparse.ArgumentParser, module: Any) -> None:
+    """Give the parser of a sub-command what its module declares."""
+    examples = getattr(module, 'EXAMPLES', ())
+    if examples:
+        parser.epilog = '\n'.join(('examples:', *(f'  {line}' for line in examples)))
+    module.add_arguments(parser)
+    parser.add_argument('--debug', action='store_true', default=argparse.SUPPRESS, help=DEBUG_HELP)
+    parser.set_defaults(run=module.run)
+
+
+def _needed(words: Sequence[str]) -> Container[str]:
+    """Return the sub-commands whose arguments a command line needs."""
+    named = [word for word in words if word in COMMANDS][:1]
+    if not named and any(word.startswith('--p') for word in words):
+        return COMMANDS
+    return named
 
 
 class _PrintCompletion(argparse.Action):
@@ -141,8 +157,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     for library in ('OMP', 'OPENBLAS'):
         os.environ.setdefault(f'{library}_NUM_THREADS', '1')
     try:
-        parser, subs = _parsers()
-        arguments, unknown = parser.parse_known_args(argv)
+        words = sys.argv[1:] if argv is None else argv
+        parser, subs = _parsers(_needed(words))
+        arguments, unknown = parser.parse_known_args(words)
     except KeyboardInterrupt:
         _complain('wheel-terra: interrupted')
         return INTERRUPTED

@@ -34,7 +34,6 @@ if TYPE_CHECKING:
 
 FloatArray = NDArray[np.float64]
 
-SUMMARY = 'print or draw the curves of the wheel-soil model'
 EXAMPLES = (
     'wheel-terra predict --config hit_wh3 --config hit_fit --slip 0:0.6:13 --load 80',
     'wheel-terra predict --config hit_wh3 --config dlr_mss -o curves.png',

@@ -15,7 +15,6 @@ from wheel_terra_estimator.configuration import soil_file
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.scheduler import add_jobs_argument
 
-SUMMARY = 'run the estimator over a rosbag2, without ROS'
 SOME_FAILED = 1
 INTERRUPTED = 130
 EXAMPLES = (

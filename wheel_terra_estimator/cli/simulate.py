@@ -11,7 +11,6 @@ from pathlib import Path
 from wheel_terra_estimator.configuration import reader as configuration_reader
 from wheel_terra_estimator.errors import UserError
 
-SUMMARY = 'drive a simulated rover and write a rosbag2 with ground truth'
 EXAMPLES = (
     'wheel-terra simulate -o drive',
     'wheel-terra simulate --scenario steep_climb --seed 3 -o climb',

@@ -14,7 +14,6 @@ from wheel_terra_estimator.scheduler import add_jobs_argument
 if TYPE_CHECKING:
     from wheel_terra_estimator.soilbin.case import Case
 
-SUMMARY = 'run the virtual soil bin (discrete elements)'
 EXAMPLES = (
     'wheel-terra soilbin run quick -o run',
     'wheel-terra soilbin rows --help',

@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from wheel_terra_estimator.discrepancy.result import Diagnosis
     from wheel_terra_estimator.trials.trial import Outcome
 
-SUMMARY = 'hide an effect in a drawn table, diagnose it blind, open the seal'
 EXAMPLES = (
     'wheel-terra trial --seed 3 -o trial',
     'wheel-terra trial --many 20 --seed 100 --effect lug_digging -o trials',
