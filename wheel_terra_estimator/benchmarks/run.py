@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -155,8 +156,15 @@ def _commands(folder: Path, size: Size) -> Iterator[Figure]:
     table = folder / 'rows.csv'
     _write_rows(table, size.rows)
 
+    environment = dict(os.environ)
+    if sys.dont_write_bytecode:
+        # An installed package has its bytecode; the first call, which does not count, makes it.
+        environment.pop('PYTHONDONTWRITEBYTECODE', None)
+        environment['PYTHONPYCACHEPREFIX'] = str(folder / 'bytecode')
+
     def process(*arguments: str) -> None:
-        subprocess.run([sys.executable, *arguments], check=True, capture_output=True)
+        command = [sys.executable, *arguments]
+        subprocess.run(command, check=True, capture_output=True, env=environment)
 
     def command(*arguments: str) -> None:
         process('-m', 'wheel_terra_estimator.cli.main', *arguments)
