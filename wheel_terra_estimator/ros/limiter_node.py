@@ -11,7 +11,6 @@ geometry_msgs/Twist or geometry_msgs/TwistStamped (parameter ``stamped``). It he
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -138,12 +137,6 @@ class TractionLimiter(Node):
 
     def _on_stuck(self, message: Bool) -> None:
         self._states.hear_stuck(message.data)
-
-    def _numbers(self, meanings: Mapping[str, str], defaults: Any) -> dict[str, float]:
-        return {
-            name: self._number(name, getattr(defaults, name), meaning)
-            for name, meaning in meanings.items()
-        }
 
     def _number(self, name: str, default: float, meaning: str) -> float:
         """Declare a number that is read at start; an integer will do."""
