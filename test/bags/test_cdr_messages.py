@@ -11,15 +11,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from wheel_terra_estimator.bags import cdr_messages
-from wheel_terra_estimator.bags.cdr_messages import (
+from wheel_terra_estimator.bags.message_factory import MessageFactory
+from wheel_terra_estimator.bags.message_types import topic_messages
+from wheel_terra_estimator.messages import cdr
+from wheel_terra_estimator.messages.cdr import (
     TWIST,
     DamagedMessageError,
     JointStatePacker,
     TopicMessages,
     TwistPacker,
 )
-from wheel_terra_estimator.bags.message_factory import MessageFactory
 from wheel_terra_estimator.messages.convert import INPUT_TYPES, InputConverter, input_layout
 
 START = 1_700_000_000_000_000_000
@@ -82,7 +83,7 @@ def test_measurements_are_those_of_rosbags(
 ) -> None:
     dice = random.Random(name)
     kind, store = INPUT_TYPES[name], factory.store
-    reader = TopicMessages(kind)
+    reader = topic_messages(kind)
     ours, theirs = (InputConverter(input_layout(rover)) for _ in range(2))
     quick = 0
     for message in messages(factory, name, 150, dice):
@@ -95,7 +96,7 @@ def test_measurements_are_those_of_rosbags(
                     at = dice.randrange(len(data))
                     data[at : at + dice.randrange(3)] = dice.randbytes(dice.randrange(5))
             found = quickly(reader, bytes(data))
-            quick += type(found).__module__ == cdr_messages.__name__
+            quick += type(found).__module__ == cdr.__name__
             assert measured(ours, name, found) == measured(
                 theirs, name, with_rosbags(store, kind, bytes(data))
             )
@@ -106,12 +107,12 @@ def test_measurements_are_those_of_rosbags(
 def test_every_field_that_anybody_reads(factory: MessageFactory) -> None:
     dice = random.Random(1)
     for name in ('joint_states', 'imu/data', 'odom'):
-        reader = TopicMessages(INPUT_TYPES[name])
+        reader = topic_messages(INPUT_TYPES[name])
         *_, message = messages(factory, name, 9, dice)
         data = bytes(factory.store.serialize_cdr(message, INPUT_TYPES[name]))
         for _ in range(2):
             found = reader.unpack(data)
-        assert type(found).__module__ == cdr_messages.__name__
+        assert type(found).__module__ == cdr.__name__
         assert_same(found, message)
 
 
@@ -119,10 +120,10 @@ def test_a_stamped_twist(factory: MessageFactory) -> None:
     twist = factory.twist_with_covariance(0.3, -0.1, [float(i) for i in range(36)])
     message = factory.make(TWIST, header=factory.header(START), twist=twist)
     data = bytes(factory.store.serialize_cdr(message, TWIST))
-    reader = TopicMessages(TWIST)
+    reader = topic_messages(TWIST)
     for _ in range(2):
         found = reader.unpack(data)
-    assert type(found).__module__ == cdr_messages.__name__
+    assert type(found).__module__ == cdr.__name__
     assert_same(found, message)
 
 

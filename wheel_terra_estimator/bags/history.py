@@ -16,11 +16,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wheel_terra_estimator.bags.cdr_messages import DamagedMessageError, TopicMessages
+from wheel_terra_estimator.bags.message_types import topic_messages
 from wheel_terra_estimator.bags.storage import Bag
 from wheel_terra_estimator.bags.thinning import ThinnedRows
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.estimation.estimates import EstimateSet, SlipClass
+from wheel_terra_estimator.messages.cdr import DamagedMessageError
 from wheel_terra_estimator.messages.convert import JOINT_STATE, OUTPUT_TYPES, stamp_of
 from wheel_terra_estimator.messages.diagnostics import NODE
 
@@ -242,7 +243,7 @@ def read_estimates(bag: Bag, namespace: str = f'/{NODE}') -> EstimateHistory:
     latest: dict[str, Any] = {}
     warnings: list[StuckWarning] = []
     reasons: dict[str, str] = {}
-    unpack = {topic: TopicMessages(kind).unpack for topic, kind in types.items()}
+    unpack = {topic: topic_messages(kind).unpack for topic, kind in types.items()}
     for log_time, topic, data in bag.messages(tuple(types)):
         try:
             message = unpack[topic](data)

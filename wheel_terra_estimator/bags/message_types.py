@@ -7,6 +7,8 @@ from __future__ import annotations
 from functools import cache
 from typing import Any
 
+from wheel_terra_estimator.messages.cdr import TopicMessages
+
 
 @cache
 def jazzy_types() -> Any:
@@ -14,3 +16,8 @@ def jazzy_types() -> Any:
     from rosbags.typesys import Stores, get_typestore
 
     return get_typestore(Stores.ROS2_JAZZY)
+
+
+def topic_messages(kind: str) -> TopicMessages:
+    """Return what unpacks the messages of a topic; rosbags where it is not done quickly."""
+    return TopicMessages(kind, lambda data: jazzy_types().deserialize_cdr(data, kind))

@@ -9,13 +9,14 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from wheel_terra_estimator.bags.cdr_messages import DamagedMessageError, TopicMessages
 from wheel_terra_estimator.bags.limits import LIMITS, Limits, in_words
+from wheel_terra_estimator.bags.message_types import topic_messages
 from wheel_terra_estimator.bags.storage import Bag, open_bag
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.configuration.parameters import nearest
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.estimation.measurements import Measurement
+from wheel_terra_estimator.messages.cdr import DamagedMessageError
 from wheel_terra_estimator.messages.convert import INPUT_TYPES, InputConverter, input_layout
 
 
@@ -68,7 +69,7 @@ class MeasurementReader:
     def __init__(self, bag: Bag, remaps: Mapping[str, str], configuration: Configuration) -> None:
         self.bag = bag
         self.converter = InputConverter(input_layout(configuration))
-        self._unpack = {name: TopicMessages(kind).unpack for name, kind in INPUT_TYPES.items()}
+        self._unpack = {name: topic_messages(kind).unpack for name, kind in INPUT_TYPES.items()}
         self.topics: dict[str, str] = {}
         self.absent: list[str] = []
         for name in self.converter.layout.topics:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from wheel_terra_estimator.bags.cdr_messages import DamagedMessageError, TopicMessages
+from wheel_terra_estimator.bags.message_types import topic_messages
 from wheel_terra_estimator.bags.storage import Bag
 from wheel_terra_estimator.checks.series import (
     ImuSeries,
@@ -19,6 +19,7 @@ from wheel_terra_estimator.checks.series import (
     SinkageSeries,
     VelocitySeries,
 )
+from wheel_terra_estimator.messages.cdr import DamagedMessageError
 from wheel_terra_estimator.messages.convert import INPUT_TYPES, stamp_of
 
 MOST_MESSAGES = 400_000
@@ -93,7 +94,7 @@ def read_series(
     collectors: dict[str, _Collector] = {
         own: _COLLECTORS[own](topic) for own, topic in chosen.items() if own in _COLLECTORS
     }
-    unpack = {own: TopicMessages(INPUT_TYPES[own]).unpack for own in collectors}
+    unpack = {own: topic_messages(INPUT_TYPES[own]).unpack for own in collectors}
     shortened = False
     for log_time, topic, data in bag.messages([chosen[own] for own in collectors]):
         own = by_topic[topic]

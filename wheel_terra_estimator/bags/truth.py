@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wheel_terra_estimator.bags.cdr_messages import TWIST, DamagedMessageError, TopicMessages
+from wheel_terra_estimator.bags.message_types import topic_messages
 from wheel_terra_estimator.bags.reader import MeasurementReader
 from wheel_terra_estimator.bags.storage import Bag
 from wheel_terra_estimator.bags.thinning import ThinnedRows
@@ -19,6 +19,7 @@ from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.contacts.steering import headings
 from wheel_terra_estimator.estimation.measurements import InertialReading, WheelOdometry
 from wheel_terra_estimator.estimation.rover import Rover
+from wheel_terra_estimator.messages.cdr import TWIST, DamagedMessageError
 from wheel_terra_estimator.messages.convert import JOINT_STATE, ODOMETRY, stamp_of
 from wheel_terra_estimator.terramechanics.kinematics import slip_ratio
 
@@ -171,7 +172,7 @@ def _ordered(message: Any, values: Any, names: tuple[str, ...]) -> list[float]:
 def _thinned(bag: Bag, wanted: Mapping[str, _Values]) -> dict[str, WheelTruth]:
     """Return what the messages of some topics say, sorted by stamp; one pass over the bag."""
     rows = {topic: ThinnedRows() for topic in wanted}
-    unpack = {topic: TopicMessages(_TYPES[topic]).unpack for topic in wanted}
+    unpack = {topic: topic_messages(_TYPES[topic]).unpack for topic in wanted}
     there = [t for t in wanted if t in bag.topics and bag.topics[t].type == _TYPES[t]]
     for _, topic, data in bag.messages(there):
         try:

@@ -13,10 +13,10 @@ from typing import Any
 from wheel_terra_estimator import __version__
 from wheel_terra_estimator.bags import bag_metadata
 from wheel_terra_estimator.bags.bag_file import BagFile
-from wheel_terra_estimator.bags.cdr_messages import JointStatePacker, TwistPacker
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.estimates import EstimateSet
 from wheel_terra_estimator.messages import diagnostics
+from wheel_terra_estimator.messages.cdr import JointStatePacker, TwistPacker
 from wheel_terra_estimator.messages.convert import (
     BASE_FRAME,
     OUTPUT_TYPES,

@@ -2,10 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Messages out of and into their CDR bytes, quickly where one is like the last of its topic.
 
-rosbags unpacks every field of a message. Of the messages that come a hundred times a second only
-some fields are used, and their names do not change from one to the next: where the beginning (frame
-and names) is byte by byte that of an earlier message that rosbags has unpacked, only the numbers
-are taken out. Everything else goes through rosbags: other types, big-endian or damaged messages.
+rclpy and rosbags unpack every field of a message. Of the messages that come a hundred times a
+second only some fields are used, and their names do not change from one to the next: where the
+beginning (frame and names) is byte by byte that of an earlier message that the library has
+unpacked, only the numbers are taken out. Everything else goes through the library: other types,
+big-endian or damaged messages.
 """
 
 from __future__ import annotations
@@ -17,7 +18,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wheel_terra_estimator.bags.message_types import jazzy_types
 from wheel_terra_estimator.messages.convert import JOINT_STATE, ODOMETRY
 
 FloatArray = NDArray[np.float64]
@@ -139,10 +139,12 @@ class TopicMessages:
     ----------
     kind : str
         Message type, as in ``sensor_msgs/msg/Imu``.
+    whole : callable
+        Unpacks all fields of a message from its bytes, as the library does.
     """
 
-    def __init__(self, kind: str) -> None:
-        self._kind = kind
+    def __init__(self, kind: str, whole: Callable[[bytes], Any]) -> None:
+        self._whole = whole
         quick: tuple[_Quick | None, bool, int] = _QUICK.get(kind, (None, False, 0))
         self._quick, self._names, self._strings = quick
         self._known: list[_Beginning] = []
@@ -164,8 +166,8 @@ class TopicMessages:
                         return message
                     break
         try:
-            message = jazzy_types().deserialize_cdr(data, self._kind)
-        except Exception as error:  # the library lets many kinds through on damaged bytes
+            message = self._whole(data)
+        except Exception as error:  # the libraries let many kinds through on damaged bytes
             raise DamagedMessageError(str(error)) from None
         if quick is not None and data[:2] == _LITTLE_ENDIAN:
             self._remember(data, message)
