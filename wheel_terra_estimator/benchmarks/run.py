@@ -22,6 +22,7 @@ from wheel_terra_estimator.estimation.filter.state import StateLayout
 from wheel_terra_estimator.terramechanics.model import WheelSoilModel
 from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
 from wheel_terra_estimator.terramechanics.soil import Soil
+from wheel_terra_estimator.terramechanics.steady_sinkage import SteadySinkage
 from wheel_terra_estimator.terramechanics.wheel import Wheel
 
 SCENARIO = 'firm_drive'
@@ -31,6 +32,8 @@ RATES = {'sensors.wheel_odometry_rate': 100.0, 'sensors.imu_rate': 100.0}
 WHEELS = 6
 CYCLES = 300
 """Filter cycles in one timing."""
+REPEATS = 20
+"""Of the one wheel in plain floats, which is too quick for the clock."""
 RADIUS, WIDTH = 0.135, 0.165
 """Wheel of the wheel tests on HIT-LSS1 [m] (Ding et al. 2011)."""
 ROW_SEED = 1
@@ -135,8 +138,21 @@ def _models(size: Size) -> Iterator[Figure]:
         for i in chosen:
             forces(soil, 'closed_form', slips[i : i + 1], loads[i : i + 1])
 
+    wheels = SteadySinkage(Wheel(RADIUS, WIDTH), soil)
+
+    def plain_floats() -> None:
+        for _ in range(REPEATS):
+            for i in chosen:
+                wheels.state(0, 1.0 - float(slips[i]), float(loads[i]))
+
     other = (peers, size.peers)
-    yield timed_pairs('closed form, one wheel', (scalars, size.peers), peer, other, size.pairs)
+    yield timed_pairs(
+        'closed form, one wheel in plain floats', (plain_floats, REPEATS * size.peers),
+        peer, other, size.pairs,
+    )  # fmt: skip
+    yield timed_pairs(
+        'closed form, one wheel in arrays', (scalars, size.peers), peer, other, size.pairs
+    )
     for method in ('closed_form', 'quadrature'):
         yield timed_pairs(
             f'{method.replace("_", " ")}, {size.batch} wheels at once, a wheel',
