@@ -95,6 +95,7 @@ class Rover(Node):
         self.heard_at = 0.0
         self.levels: list[tuple[float, int, str]] = []
         self.values: dict[str, str] = {}
+        self.said = ''
         self.shift = 0  # of all stamps [ns]
         count = 2 * len(self.names)
         self._noise = [[random.gauss(0.0, 1.0) for _ in range(count)] for _ in range(NOISES)]
@@ -163,6 +164,7 @@ class Rover(Node):
             if status.name.endswith(': estimator'):
                 level = status.level[0]
                 self.values = {value.key: value.value for value in status.values}
+                self.said = status.message
                 if not self.levels or self.levels[-1][1] != level:
                     self.levels.append((time.monotonic(), level, status.message))
 
