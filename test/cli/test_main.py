@@ -142,7 +142,7 @@ def test_the_page_of_commands_is_that_of_the_parsers():
 
 
 def test_ctrl_c_while_the_commands_are_loaded_is_an_interrupt(monkeypatch, capsys):
-    def interrupted():
+    def interrupted(needed):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(main, '_parsers', interrupted)
