@@ -17,7 +17,12 @@ from wheel_terra_estimator.configuration.parameters import nearest
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.estimation.measurements import Measurement
 from wheel_terra_estimator.messages.cdr import DamagedMessageError
-from wheel_terra_estimator.messages.convert import INPUT_TYPES, InputConverter, input_layout
+from wheel_terra_estimator.messages.convert import (
+    DAMAGED,
+    INPUT_TYPES,
+    InputConverter,
+    input_layout,
+)
 
 
 def read(
@@ -113,7 +118,7 @@ class MeasurementReader:
         try:
             return self._unpack[name](data)
         except DamagedMessageError:
-            self.rejected[name, 'damaged message'] += 1
+            self.rejected[name, DAMAGED] += 1
             return None
 
     def _find(self, name: str, remaps: Mapping[str, str]) -> None:

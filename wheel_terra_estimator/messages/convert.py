@@ -56,7 +56,8 @@ BASE_FRAME = 'base_link'
 UNKNOWN_VARIANCE = 1e6
 """Variance of the twist components that are not estimated (finite, so that no filter chokes)."""
 
-
+DAMAGED = 'damaged message'
+"""Why bytes are refused that are no message of their type."""
 _NO_WHEEL = 'none of the configured wheels in it'
 _INERTIAL_FIELDS = {
     'linear_acceleration_covariance': 'linear acceleration',

@@ -80,6 +80,11 @@ class Pipeline:
             self.on_measurement(measurement)
         return self._out(self.core.add(measurement))
 
+    def refuse(self, topic: str, reason: str) -> None:
+        """Count a message of an input topic that could not even be unpacked."""
+        self.received[topic] += 1
+        self.converter.rejected[topic, reason] += 1
+
     def flush(self) -> list[EstimateSet]:
         """Return the sets that were held back for late inputs; the recording is over."""
         return self._out(self.core.flush())

@@ -16,6 +16,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, MultiArrayDimension, UInt8MultiArray
 
 from wheel_terra_estimator.estimation.estimates import EstimateSet
+from wheel_terra_estimator.messages.cdr import JointStatePacker, TwistPacker
 from wheel_terra_estimator.messages.convert import (
     BASE_FRAME,
     JOINT_OUTPUTS,
@@ -60,11 +61,9 @@ class EstimatePublisher:
         self._twist_publisher = publisher(TwistWithCovarianceStamped, '~/twist')
         self._stuck_publisher = publisher(Bool, '~/stuck', latched=True)
         self._diagnostics_publisher = publisher(DiagnosticArray, '/diagnostics')
-        # Messages are made once and filled anew: publishing copies them.
-        self._joint_messages = {topic: JointState() for topic in JOINT_OUTPUTS}
-        self._twist = TwistWithCovarianceStamped()
-        for message in (*self._joint_messages.values(), self._twist):
-            message.header.frame_id = BASE_FRAME
+        # Bytes, as a recording has them: rclpy would check and convert every field.
+        self._joint_states = JointStatePacker(BASE_FRAME)
+        self._twists = TwistPacker(BASE_FRAME)
         self._classes = UInt8MultiArray()
         size = len(names)
         self._classes.layout.dim = [MultiArrayDimension(label='wheel', size=size, stride=size)]
@@ -82,7 +81,7 @@ class EstimatePublisher:
 
     def publish(self, estimates: EstimateSet) -> None:
         """Publish the messages of a set that somebody listens to."""
-        stamp = time_message(estimates.stamp)
+        stamp = estimates.stamp
         wanted = {t for t, p in self._joint_publishers.items() if p.get_subscription_count()}
         classes_wanted = self._class_publisher.get_subscription_count() > 0
         fields_of = joint_fields(estimates, self._names) if wanted else {}
@@ -91,31 +90,20 @@ class EstimatePublisher:
         for topic, fields in fields_of.items():
             if topic not in wanted:
                 continue
-            message = self._joint_messages[topic]
-            message.header.stamp = stamp
-            if len(message.name) != len(fields.name):
-                message.name = list(fields.name)
-            # The setters take an array as it is and look at every item of a list.
-            message.position = array('d', fields.position)
-            message.velocity = array('d', fields.velocity)
-            message.effort = array('d', fields.effort)
-            self._joint_publishers[topic].publish(message)
+            data = self._joint_states.packed(stamp, *fields)
+            self._joint_publishers[topic].publish(data)
             if topic == 'slip' and classes_wanted:
                 self._publish_classes(estimates)
         if self._twist_publisher.get_subscription_count():
-            self._publish_twist(estimates, stamp)
+            data = self._twists.packed(
+                stamp, estimates.forward_velocity, estimates.yaw_rate, twist_covariance(estimates)
+            )
+            self._twist_publisher.publish(data)
         self.publish_stuck(estimates.stuck)
 
     def _publish_classes(self, estimates: EstimateSet) -> None:
         self._classes.data = array('B', estimates.slip_class.tolist())
         self._class_publisher.publish(self._classes)
-
-    def _publish_twist(self, estimates: EstimateSet, stamp: Time) -> None:
-        self._twist.header.stamp = stamp
-        self._twist.twist.twist.linear.x = estimates.forward_velocity
-        self._twist.twist.twist.angular.z = estimates.yaw_rate
-        self._twist.twist.covariance = twist_covariance(estimates)
-        self._twist_publisher.publish(self._twist)
 
     def publish_stuck(self, stuck: bool) -> None:
         """Publish the stuck warning if it is new."""
