@@ -135,9 +135,10 @@ class Soak:
         self.problems: list[str] = []
 
     def run(self) -> None:
-        """Run until the time is over."""
+        """Run, from the first set on, until the time is over."""
         self._wait(lambda: self.rover.sets > 0, 60.0)
         self._wait(self._is_well, 30.0)
+        self._began = time.monotonic()
         order: list[str] = []
         while time.monotonic() - self._began < self._seconds and self._node.runs():
             if not order:

@@ -13,6 +13,7 @@ import time
 from pathlib import Path
 
 import pytest
+from node_server import NodeServer
 
 ATTEMPTS = 3
 """A test over DDS fails when it fails this often: where processes share few cores, the machine
@@ -51,17 +52,21 @@ def own_domain():
 class NodeProcess:
     """An executable of the package in a process of its own."""
 
-    def __init__(self, module, arguments):
-        self._process = subprocess.Popen(
-            [sys.executable, '-m', f'wheel_terra_estimator.ros.{module}', *arguments],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-        )
+    def __init__(self, process):
+        self._process = process
 
-    def stop(self, signal):
+    @property
+    def pid(self):
+        return self._process.pid
+
+    def signal(self, *numbers):
+        """Send signals, one after the other."""
+        for number in numbers:
+            self._process.send_signal(number)
+
+    def stop(self, number):
         """Send a signal; return exit status and what the process said."""
-        self._process.send_signal(signal)
+        self.signal(number)
         return self.end()
 
     def end(self, timeout=60.0):
@@ -72,31 +77,59 @@ class NodeProcess:
     def kill(self):
         if self._process.poll() is None:
             self._process.kill()
-            self._process.communicate()
+            self._process.communicate(timeout=60.0)
 
 
-@pytest.fixture
-def start():
-    """Start nodes that do not outlive the test."""
+def interpreter(module, arguments):
+    """Start an executable as `ros2 run` does, by an interpreter that has imported nothing yet."""
+    return subprocess.Popen(
+        [sys.executable, '-m', f'wheel_terra_estimator.ros.{module}', *arguments],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    )
+
+
+@pytest.fixture(scope='session')
+def node_server(own_domain):
+    server = NodeServer()
+    yield server
+    server.close()
+
+
+def _starter(make):
     running = []
 
-    def _start(module, *arguments):
-        running.append(NodeProcess(module, arguments))
+    def start(module, *arguments):
+        running.append(NodeProcess(make(module, arguments)))
         return running[-1]
 
-    yield _start
+    yield start
     for process in running:
         process.kill()
 
 
+@pytest.fixture
+def start(node_server):
+    """Start nodes that do not outlive the test, imports done (a second less for each)."""
+    yield from _starter(node_server.start)
+
+
+@pytest.fixture
+def start_interpreter():
+    """Start nodes that do not outlive the test, from nothing: for what happens at the start."""
+    yield from _starter(interpreter)
+
+
 @pytest.fixture(scope='class')
-def running_estimator(tmp_path_factory):
+def running_estimator(node_server, tmp_path_factory):
     """One estimator node for the tests of a class, in their order."""
     from wheel_terra_estimator.configuration import reader
 
     path = tmp_path_factory.mktemp('estimator') / 'rover.yaml'
     reader.load(['pathfinder']).write(path)
-    process = NodeProcess('estimator_node', ['--ros-args', '--params-file', str(path)])
+    arguments = ['--ros-args', '--params-file', str(path)]
+    process = NodeProcess(node_server.start('estimator_node', arguments))
     yield process
     process.kill()
 

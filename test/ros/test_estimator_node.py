@@ -135,7 +135,7 @@ class TestOneNode:
         until(lambda: said_after(wheel_message(['front_left_wheel_joint'], 0.0), 'stamp is zero'))
 
 
-def test_set_of_a_message_reset_and_a_clean_end(start, parameters, listener):
+def test_set_of_a_message_reset_and_a_clean_end(start_interpreter, parameters, listener):
     from sensor_msgs.msg import JointState
     from std_msgs.msg import UInt8MultiArray
     from std_srvs.srv import Trigger
@@ -144,7 +144,7 @@ def test_set_of_a_message_reset_and_a_clean_end(start, parameters, listener):
 
     names = reader.load(['pathfinder']).wheels.names
     node, until = listener
-    process = start('estimator_node', *ROVER, parameters)
+    process = start_interpreter('estimator_node', *ROVER, parameters)
     slip = hear(node, JointState, f'{NODE}/slip')
     classes = hear(node, UInt8MultiArray, f'{NODE}/slip_class')
     wheels = node.create_publisher(JointState, 'joint_states', 10)

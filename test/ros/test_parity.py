@@ -86,6 +86,18 @@ def assert_same_bits(live, again, least):
         assert ours[topic] == messages, topic
 
 
+@pytest.fixture
+def forked_node(node_server, monkeypatch):
+    """The player of a recording gets its node from the server."""
+    from wheel_terra_estimator.ros import live_drive
+
+    def start_node(arguments):
+        return node_server.start('estimator_node', arguments)
+
+    monkeypatch.setattr(live_drive, 'start_node', start_node)
+
+
+@pytest.mark.usefixtures('forked_node')
 @pytest.mark.parametrize('bag', ['entrapment', pytest.param('pathfinder', marks=pytest.mark.slow)])
 def test_live_and_replayed_numbers_are_the_same_bits(bag, tmp_path):
     """Above its pace a recording gets out of order; the log of arrivals knows how.

@@ -2,20 +2,52 @@
 # SPDX-License-Identifier: Apache-2.0
 """The node under random faults: a few in the suite, two minutes of them by ``-m slow``."""
 
+import random
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
-SOAK = Path(__file__).resolve().parents[2] / 'tools' / 'soak.py'
+TOOLS = Path(__file__).resolve().parents[2] / 'tools'
+ONE_FAULT = 0.1  # [s]: no second one begins
 
 
-@pytest.mark.parametrize(
-    'minutes', [pytest.param(0.1, id='short'), pytest.param(2.0, id='long', marks=pytest.mark.slow)]
-)
-def test_no_fault_ends_the_node_and_all_are_recovered_from(minutes):
-    command = [sys.executable, str(SOAK), '--minutes', str(minutes), '--seed', '3']
+@pytest.fixture
+def soak(node_server, monkeypatch):
+    """The program's module, with nodes from the server."""
+    import rclpy
+
+    monkeypatch.syspath_prepend(str(TOOLS))
+    import soak
+    from live_rover import Process
+
+    class Forked(Process):
+        def __init__(self, arguments):
+            _, module, *rest = arguments
+            self._popen = node_server.start(module.rpartition('.')[2], rest)
+
+    monkeypatch.setattr(soak, 'Process', Forked)
+    rclpy.init(args=[])
+    yield soak
+    rclpy.try_shutdown()
+
+
+@pytest.mark.parametrize('fault', ['nan', 'node restarted'])
+def test_a_fault_is_told_and_recovered_from(soak, fault, tmp_path):
+    random.seed(3)
+    run = soak.Soak(tmp_path, ONE_FAULT, [fault])
+    run.run()
+    run.rover.destroy_node()
+    assert not run.problems, run.report()
+    assert len(run.recoveries[fault]) == 1
+    if fault == 'nan':
+        assert run.told[fault] == 1
+
+
+@pytest.mark.slow
+def test_no_fault_ends_the_node_and_all_are_recovered_from():
+    command = [sys.executable, str(TOOLS / 'soak.py'), '--minutes', '2', '--seed', '3']
     done = subprocess.run(command, capture_output=True, text=True, timeout=280, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
     assert 'Traceback' not in done.stderr

@@ -132,7 +132,7 @@ def test_states_over_dds_with_an_estimator_that_is_killed_and_restarted(
             expected = command.twist.linear.x * share
             return heard and heard[-1].twist.linear.x == pytest.approx(expected, abs=1e-6)
 
-        until(arrived, 40.0)
+        until(arrived)
         assert heard[-1].header.stamp.sec == 7
 
     def state():

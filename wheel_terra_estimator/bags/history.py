@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from wheel_terra_estimator.bags.message_types import topic_messages
 from wheel_terra_estimator.bags.storage import Bag
 from wheel_terra_estimator.bags.thinning import ThinnedRows
+from wheel_terra_estimator.bags.writer import DIAGNOSTICS
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.estimation.estimates import EstimateSet, SlipClass
 from wheel_terra_estimator.messages.cdr import DamagedMessageError
@@ -232,66 +233,83 @@ def read_estimates(bag: Bag, namespace: str = f'/{NODE}') -> EstimateHistory:
         The bag holds no estimates.
     """
     types = {f'{namespace}/{topic}': kind for topic, kind in OUTPUT_TYPES.items()}
-    types['/diagnostics'] = 'diagnostic_msgs/msg/DiagnosticArray'
+    types[DIAGNOSTICS] = 'diagnostic_msgs/msg/DiagnosticArray'
     if f'{namespace}/slip' not in bag.topics:
         raise UserError(
             f'{bag.path}: no {namespace}/slip in it, so no estimates; there are: '
             + ', '.join(bag.topics)
         )
-    sets: dict[int, dict[str, Any]] = {}
-    names: tuple[str, ...] = ()
-    latest: dict[str, Any] = {}
-    warnings: list[StuckWarning] = []
-    reasons: dict[str, str] = {}
+    found = _EstimateMessages()
     unpack = {topic: topic_messages(kind).unpack for topic, kind in types.items()}
     for log_time, topic, data in bag.messages(tuple(types)):
         try:
             message = unpack[topic](data)
         except DamagedMessageError:
             continue
-        short = topic.removeprefix(f'{namespace}/')
-        if short in _TOPIC_FIELDS and types[topic] == JOINT_STATE:
-            row = sets.setdefault(stamp_of(message), {})
-            columns = (message.position, message.velocity, message.effort)
-            row.update(
-                (name, values)
-                for name, values in zip(_TOPIC_FIELDS[short], columns, strict=True)
-                if name
-            )
-            if short == 'slip':
-                names, latest = tuple(message.name), row
-                row['log_time'] = log_time
-        elif short == 'slip_class' and latest:
-            latest['slip_class'] = message.data
-        elif short == 'twist':
-            row = sets.setdefault(stamp_of(message), {})
+        found.add(topic.removeprefix(f'{namespace}/'), message, log_time)
+    return found.history()
+
+
+class _EstimateMessages:
+    """Puts the messages of one set together again, by their stamp."""
+
+    def __init__(self) -> None:
+        self._sets: dict[int, dict[str, Any]] = {}
+        self._names: tuple[str, ...] = ()
+        self._latest: dict[str, Any] = {}
+        self._warnings: list[StuckWarning] = []
+        self._reasons: dict[str, str] = {}
+
+    def add(self, topic: str, message: Any, log_time: int) -> None:
+        """Take in a message; of private topics the last part of the name."""
+        if topic in _TOPIC_FIELDS and OUTPUT_TYPES[topic] == JOINT_STATE:
+            self._add_joints(topic, message, log_time)
+        elif topic == 'slip_class' and self._latest:
+            self._latest['slip_class'] = message.data
+        elif topic == 'twist':
+            row = self._sets.setdefault(stamp_of(message), {})
             row['forward_velocity'] = message.twist.twist.linear.x
             row['forward_velocity_std'] = np.sqrt(message.twist.covariance[0])
-        elif short == 'stuck':
-            _follow(warnings, bool(message.data), log_time)
-        elif topic == '/diagnostics':
-            for status in message.status:
-                texts = [pair.value for pair in status.values if pair.key == 'reason']
-                reasons.update((status.name, text) for text in texts)
-            if warnings and not warnings[-1].reason:
-                words = stuck_reason(tuple(reasons.values()))
-                warnings[-1] = StuckWarning(warnings[-1].start, warnings[-1].end, words)
-    wanted = {*WHEEL_FIELDS, 'slip_class', 'forward_velocity'}
-    whole = {stamp: row for stamp, row in sets.items() if wanted <= row.keys()}
-    return EstimateHistory(
-        names=names,
-        stamp=np.array(list(whole), dtype=np.int64),
-        forward_velocity=np.array([row['forward_velocity'] for row in whole.values()]),
-        forward_velocity_std=np.array([row['forward_velocity_std'] for row in whole.values()]),
-        slip_class=np.array([row['slip_class'] for row in whole.values()], dtype=np.uint8).reshape(
-            len(whole), len(names)
-        ),
-        values={
-            name: np.array([row[name] for row in whole.values()]).reshape(len(whole), len(names))
-            for name in WHEEL_FIELDS
-        },
-        warnings=tuple(_in_stamps(warnings, whole)),
-    )
+        elif topic == 'stuck':
+            _follow(self._warnings, bool(message.data), log_time)
+        elif topic == DIAGNOSTICS:
+            self._add_reasons(message)
+
+    def _add_joints(self, topic: str, message: Any, log_time: int) -> None:
+        row = self._sets.setdefault(stamp_of(message), {})
+        columns = (message.position, message.velocity, message.effort)
+        fields = zip(_TOPIC_FIELDS[topic], columns, strict=True)
+        row.update((name, values) for name, values in fields if name)
+        if topic == 'slip':
+            self._names, self._latest = tuple(message.name), row
+            row['log_time'] = log_time
+
+    def _add_reasons(self, message: Any) -> None:
+        for status in message.status:
+            texts = [pair.value for pair in status.values if pair.key == 'reason']
+            self._reasons.update((status.name, text) for text in texts)
+        if self._warnings and not self._warnings[-1].reason:
+            words = stuck_reason(tuple(self._reasons.values()))
+            self._warnings[-1] = replace(self._warnings[-1], reason=words)
+
+    def history(self) -> EstimateHistory:
+        """Return the sets that are whole."""
+        wanted = {*WHEEL_FIELDS, 'slip_class', 'forward_velocity'}
+        whole = {stamp: row for stamp, row in self._sets.items() if wanted <= row.keys()}
+        shape = len(whole), len(self._names)
+
+        def column(name: str) -> NDArray[Any]:
+            return np.array([row[name] for row in whole.values()])
+
+        return EstimateHistory(
+            names=self._names,
+            stamp=np.array(list(whole), dtype=np.int64),
+            forward_velocity=column('forward_velocity'),
+            forward_velocity_std=column('forward_velocity_std'),
+            slip_class=column('slip_class').astype(np.uint8).reshape(shape),
+            values={name: column(name).reshape(shape) for name in WHEEL_FIELDS},
+            warnings=tuple(_in_stamps(self._warnings, whole)),
+        )
 
 
 def _follow(warnings: list[StuckWarning], stuck: bool, log_time: int) -> None:

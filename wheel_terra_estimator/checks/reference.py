@@ -36,6 +36,10 @@ LEAST_DELAY = 0.25
 """Delays below this [s] are left to jitter and filters of encoders."""
 COVARIANCE_FACTOR = 6.0
 """Ratio of stated to seen standard deviation that makes a covariance a placeholder."""
+TOO_SMALL_STD = 4.0
+"""Seen standard deviation over the stated one from which a variance that changes is too small."""
+LEAST_STD = 1e-4
+"""Standard deviation [m/s] that is proposed at least."""
 KNOWN_UNITS = {'kilometres per hour': 3.6, 'millimetres per second': 1000.0, 'knots': 1.9438}
 
 
@@ -263,6 +267,20 @@ def _covariance(
     figures['reference.stated_std_m_s'] = float(f'{usual:.3g}')
     constant = bool(np.ptp(stated) == 0.0) if stated.size else True
     parameter = 'sensors.reference_std'
+
+    def finding(kind: str, std: float, words: str, cure: str) -> list[Outcome]:
+        return [
+            Finding(
+                kind=kind,
+                topic=reference.topic,
+                parameter=parameter,
+                value=float(f'{std:.2g}'),
+                confidence=0.9,
+                words=words,
+                cure=cure,
+            )
+        ]
+
     if usual == 0.0:
         configuration = evidence.facts.configuration
         if configuration is not None and evidence.facts.stated(parameter):
@@ -275,37 +293,24 @@ def _covariance(
             words = f'states no variance (0) and scatters by {noise:.2g} m/s'
     elif constant and (usual > COVARIANCE_FACTOR * noise or usual * COVARIANCE_FACTOR < noise):
         words = f'states {usual:.2g} m/s, always the same, and scatters by {noise:.2g} m/s'
-    elif noise > 4.0 * usual:
-        return [
-            Finding(
-                kind='noise',
-                topic=reference.topic,
-                parameter=parameter,
-                value=float(f'{noise:.2g}'),
-                confidence=0.9,
-                words=f'velocity scatters by {noise:.2g} m/s and states {usual:.2g} m/s',
-                cure=(
-                    f'state the variance {noise**2:.2g} in twist.covariance[0] '
-                    f'({parameter}: {noise:.2g} where it states none)'
-                ),
-            )
-        ]
+    elif noise > TOO_SMALL_STD * usual:
+        return finding(
+            'noise',
+            noise,
+            f'velocity scatters by {noise:.2g} m/s and states {usual:.2g} m/s',
+            f'state the variance {noise**2:.2g} in twist.covariance[0] '
+            f'({parameter}: {noise:.2g} where it states none)',
+        )
     else:
         return []
-    return [
-        Finding(
-            kind='covariance',
-            topic=reference.topic,
-            parameter=parameter,
-            value=float(f'{max(noise, 1e-4):.2g}'),
-            confidence=0.9,
-            words=f'covariance is a placeholder: it {words}',
-            cure=(
-                f'{parameter}: {max(noise, 1e-4):.2g} and twist.covariance[0] = 0, or the true '
-                f'variance ({max(noise, 1e-4) ** 2:.2g}) there'
-            ),
-        )
-    ]
+    std = max(noise, LEAST_STD)
+    return finding(
+        'covariance',
+        std,
+        f'covariance is a placeholder: it {words}',
+        f'{parameter}: {std:.2g} and twist.covariance[0] = 0, or the true '
+        f'variance ({std**2:.2g}) there',
+    )
 
 
 def _scatter(forward: FloatArray) -> float:

@@ -233,59 +233,46 @@ def check_signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         if not facts.known:
             reason = 'left and right need the places of the wheels: a rover file (wheel-terra init)'
         found += [NotChecked(kind, reason) for kind in ('swapped_sides', 'exchanged_wheels')]
-    signs = np.ones(len(facts.names))
+    signs, turn = np.ones(len(facts.names)), 0.0
     if chosen is not None:
-        signs[there] = chosen.signs
+        signs[there], turn = chosen.signs, chosen.track
     told = _told_direction(evidence, signs)
-    turn_agrees = chosen.track >= 0.0 if chosen is not None else True
-    turn_known = chosen is not None and chosen.track != 0.0
-    reversed_reference = False
-    flip = False
-    if told.reference is not None and told.reference < 0.0:
-        # One of the two is backwards: with the turns on their side it is not the wheels.
-        if 2 * int(np.sum(signs[there] < 0.0)) >= there.size:
-            flip = True  # the other half counts backwards
-        elif turn_known:
-            flip = not turn_agrees
-            reversed_reference = turn_agrees
-        elif told.force is not None:
-            flip = told.force < 0.0
-            reversed_reference = not flip
-        else:
-            reversed_reference = True
-            found.append(_all_backwards(evidence, 0.4))
-    elif told.reference is None and turn_known and not turn_agrees and told.force is not None:
-        flip = told.force < 0.0
-    if flip:
-        signs = -signs
-        turn_agrees = not turn_agrees
+    blame = _blame(told, 2 * int(np.sum(signs[there] < 0.0)) >= there.size, turn)
+    if blame.unsure:
+        found.append(_all_backwards(evidence, 0.4))
+    if blame.wheels:
+        signs, turn = -signs, -turn
     backwards = [i for i in there if signs[i] < 0.0]
     mended = evidence
     if backwards:
         found += [_backwards(evidence, int(i), signs) for i in backwards]
         mended = evidence.with_rate(evidence.rate * signs)
-    if turn_known and not turn_agrees:
+    if turn < 0.0:
         found += _swapped(evidence)
         mended = replace(mended, facts=replace(facts, side=-facts.side, lateral=-facts.lateral))
-    if reversed_reference:
-        reference = evidence.reference()
-        assert reference is not None
-        found.append(
-            Finding(
-                kind='sign',
-                topic=reference.topic,
-                value=-1.0,
-                confidence=confidence(3.0) if turn_known or told.force is not None else 0.5,
-                words='linear.x runs against the wheels',
-                cure='negate twist.linear.x in its driver, or turn its frame into base_link',
-            )
-        )
-        turned = replace(reference, velocity=-reference.velocity)
-        mended = replace(mended, recording=replace(mended.recording, reference=turned))
-    if not (turn_known and not turn_agrees):
+    if blame.reference:
+        sure = confidence(3.0) if turn or told.force is not None else 0.5
+        finding, mended = _reversed_reference(mended, sure)
+        found.append(finding)
+    if turn >= 0.0:
         exchanged, mended = _exchanged(mended, turns)
         found += exchanged
     return found, mended
+
+
+def _reversed_reference(evidence: Evidence, sure: float) -> tuple[Finding, Evidence]:
+    reference = evidence.reference()
+    assert reference is not None
+    finding = Finding(
+        kind='sign',
+        topic=reference.topic,
+        value=-1.0,
+        confidence=sure,
+        words='linear.x runs against the wheels',
+        cure='negate twist.linear.x in its driver, or turn its frame into base_link',
+    )
+    turned = replace(reference, velocity=-reference.velocity)
+    return finding, replace(evidence, recording=replace(evidence.recording, reference=turned))
 
 
 class _Told(NamedTuple):
@@ -293,6 +280,40 @@ class _Told(NamedTuple):
 
     reference: float | None
     force: float | None
+
+
+class _Blame(NamedTuple):
+    """What runs backwards, where wheels, turns, reference and specific force do not agree."""
+
+    wheels: bool = False  # all of them, beyond the signs that were found
+    reference: bool = False
+    unsure: bool = False
+
+
+def _blame(told: _Told, half_reversed: bool, turn: float) -> _Blame:
+    """Return what runs backwards.
+
+    Parameters
+    ----------
+    told : _Told
+        Agreement of the common speed with the others.
+    half_reversed : bool
+        Whether half of the wheels or more have a negative sign.
+    turn : float
+        Track that the turns tell, negative where they run against the gyro, 0 without turns.
+    """
+    if told.reference is None:
+        return _Blame(wheels=turn < 0.0 and told.force is not None and told.force < 0.0)
+    if told.reference >= 0.0:
+        return _Blame()
+    # Wheels or reference are backwards: with the turns on their side it is not the wheels.
+    if half_reversed:
+        return _Blame(wheels=True)  # the other half counts backwards
+    if turn:
+        return _Blame(wheels=turn < 0.0, reference=turn > 0.0)
+    if told.force is not None:
+        return _Blame(wheels=told.force < 0.0, reference=told.force >= 0.0)
+    return _Blame(reference=True, unsure=True)
 
 
 def _told_direction(evidence: Evidence, signs: FloatArray) -> _Told:

@@ -8,6 +8,7 @@ import argparse
 from pathlib import Path
 
 from wheel_terra_estimator.bags import limits as bag_limits
+from wheel_terra_estimator.cli import bag_arguments
 from wheel_terra_estimator.configuration import reader as configuration_reader
 
 EXAMPLES = (
@@ -29,14 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '-o', dest='output', type=Path, metavar='F', required=True, help='rover file to be written'
     )
-    parser.add_argument(
-        '--remap',
-        action='append',
-        default=[],
-        metavar='FROM:=TO',
-        help="the estimator's topic, then the bag's; may be given several times",
-    )
-    bag_limits.add_arguments(parser)
+    bag_arguments.add_arguments(parser)
     parser.add_argument('--overwrite', action='store_true', help='replace an earlier file')
 
 

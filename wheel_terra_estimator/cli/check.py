@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from wheel_terra_estimator.bags import limits as bag_limits
+from wheel_terra_estimator.cli import bag_arguments
 from wheel_terra_estimator.configuration import reader as configuration_reader
 
 if TYPE_CHECKING:
@@ -28,14 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         'bag', type=Path, metavar='BAG', help='rosbag2 folder, or a single .mcap or .db3 file'
     )
     configuration_reader.add_arguments(parser)
-    parser.add_argument(
-        '--remap',
-        action='append',
-        default=[],
-        metavar='FROM:=TO',
-        help="the estimator's topic, then the bag's; may be given several times",
-    )
-    bag_limits.add_arguments(parser)
+    bag_arguments.add_arguments(parser)
     parser.add_argument('--json', action='store_true', help='print findings and figures as JSON')
 
 

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from wheel_terra_estimator.bags import limits as bag_limits
+from wheel_terra_estimator.cli import bag_arguments
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.output_folder import check_folder, new_folder
 from wheel_terra_estimator.scheduler import add_jobs_argument, finished
@@ -81,18 +82,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="model error that is no reason for doubt, share of each quantity's range (default "
         '0.02): a channel off by more than twice its sum with the noise does not agree',
     )
-    parser.add_argument(
-        '--remap',
-        action='append',
-        default=[],
-        metavar='FROM:=TO',
-        help="for a bag: FROM is the estimator's topic, TO the bag's; may be given several times",
-    )
+    bag_arguments.add_arguments(parser, 'for a bag: ')
     parser.add_argument(
         '--no-pictures', action='store_true', help='write report.json and model.yaml only'
     )
     parser.add_argument('--json', action='store_true', help='print report.json and nothing else')
-    bag_limits.add_arguments(parser)
     parser.add_argument('--overwrite', action='store_true', help='replace DIR if it exists')
     reader.add_arguments(parser)
 

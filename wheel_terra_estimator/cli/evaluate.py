@@ -6,11 +6,16 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.scheduler import add_jobs_argument
+
+if TYPE_CHECKING:
+    from wheel_terra_estimator.evaluation.bench import Results
+    from wheel_terra_estimator.evaluation.closed_loop import Comparison
 
 FILTER_FAILED = 1
 """Exit status where the filter failed on a drive; none of them should make it."""
@@ -106,84 +111,117 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the command."""
-    from wheel_terra_estimator.evaluation import (
-        bench,
-        closed_loop,
-        kinds,
-        page,
-        real_drives,
-        runner,
-        tables,
-    )
+    from wheel_terra_estimator.evaluation import page, tables
     from wheel_terra_estimator.output_folder import check_file, new_file
 
     if arguments.hours is not None:
         return _drive_for_hours(arguments)
     if arguments.resume:
         raise UserError('--resume goes with --hours')
-    status = 0
-    title, results, drive = 'The estimator against truth and baselines', None, None
-    picture: Path | None = None
+    for option in ('json', 'rover'):
+        if getattr(arguments, option) and (arguments.measured or arguments.limiter):
+            raise UserError(
+                f'--{option} goes with simulated kinds, not with --measured or --limiter'
+            )
     if arguments.output:
         check_file(arguments.output, arguments.overwrite)
-        if arguments.limiter and not page.is_page(arguments.output):
-            picture = arguments.output.with_suffix('.png')
-            check_file(picture, arguments.overwrite)
-    first = (kinds.TUNING_SEEDS if arguments.tuning else kinds.TEST_SEEDS).start
-    seeds = range(first, first + arguments.seeds)
-    if arguments.json and (arguments.measured or arguments.limiter):
-        raise UserError('--json goes with simulated kinds, not with --measured or --limiter')
-    if arguments.rover and (arguments.measured or arguments.limiter):
-        raise UserError('--rover goes with simulated kinds, not with --measured or --limiter')
     if arguments.measured:
-        text, healths = real_drives.report(arguments.measured)
+        told = _measured(arguments)
     elif arguments.limiter:
-        drives = closed_loop.compare(seeds)
-        title, drive = 'The traction limiter in a closed loop', drives[0]
-        text = closed_loop.report(drives)
-        healths = [run.health for pair in drives for run in (pair.free, pair.limited)]
-        if picture:
-            with new_file(picture, arguments.overwrite) as fresh:
-                page.draw_limiter(drive, fresh)
+        told = _limiter(arguments)
     else:
-        chosen = _chosen(arguments.world, arguments.kinds)
-        if arguments.rover:
-            _check_rover(arguments.rover, arguments.world)
-        _check_names(arguments.modes, runner.MODES, 'mode')
-        from tqdm import tqdm
-
-        with tqdm(total=len(chosen) * arguments.seeds, unit='drive') as bar:
-            results = bench.run(
-                chosen,
-                seeds,
-                arguments.modes,
-                arguments.jobs,
-                lambda _: bar.update(),
-                arguments.rover,
-            )
-        write = tables.pooled_report if arguments.pooled else tables.report
-        text = write(results, arguments.modes)
-        healths = [score.health for score in results.drives]
-        if arguments.rover:
-            text += f'\n\nRover in place of that of the kinds: {arguments.rover}.'
-        if results.interrupted:
-            text += f'\n\n{results.interrupted}'
-            status = INTERRUPTED
-    restarts = sum(health.get('filter_restarts', 0) for health in healths)
-    text += f'\n\nThe filter was started anew {restarts} times in {len(healths)} runs.'
-    if restarts and not status:
-        status = FILTER_FAILED
-    if arguments.json and results is not None:
-        print(json.dumps(tables.as_dict(results, arguments.modes), indent=2))
+        told = _simulated(arguments)
+    restarts = sum(health.get('filter_restarts', 0) for health in told.healths)
+    text = (
+        f'{told.text}\n\nThe filter was started anew {restarts} times in {len(told.healths)} runs.'
+    )
+    if arguments.json and told.results is not None:
+        print(json.dumps(tables.as_dict(told.results, arguments.modes), indent=2))
     else:
         print(text)
     if arguments.output:
         with new_file(arguments.output, arguments.overwrite) as fresh:
             if page.is_page(arguments.output):
-                page.write(fresh, title, text, results, drive)
+                page.write(fresh, told.title, text, told.results, told.limited)
             else:
                 fresh.write_text(text + '\n', encoding='utf-8')
-    return status
+    return told.status or (FILTER_FAILED if restarts else 0)
+
+
+class _Told(NamedTuple):
+    """What one kind of evaluation found."""
+
+    text: str
+    healths: Sequence[Mapping[str, Any]]
+    title: str = 'The estimator against truth and baselines'
+    results: Results | None = None
+    limited: Comparison | None = None
+    status: int = 0
+
+
+def _measured(arguments: argparse.Namespace) -> _Told:
+    from wheel_terra_estimator.evaluation import real_drives
+
+    return _Told(*real_drives.report(arguments.measured))
+
+
+def _seeds(arguments: argparse.Namespace) -> range:
+    from wheel_terra_estimator.evaluation import kinds
+
+    first = (kinds.TUNING_SEEDS if arguments.tuning else kinds.TEST_SEEDS).start
+    return range(first, first + arguments.seeds)
+
+
+def _limiter(arguments: argparse.Namespace) -> _Told:
+    from wheel_terra_estimator.evaluation import closed_loop, page
+    from wheel_terra_estimator.output_folder import check_file, new_file
+
+    picture: Path | None = None
+    if arguments.output and not page.is_page(arguments.output):
+        picture = arguments.output.with_suffix('.png')
+        check_file(picture, arguments.overwrite)
+    drives = closed_loop.compare(_seeds(arguments))
+    if picture:
+        with new_file(picture, arguments.overwrite) as fresh:
+            page.draw_limiter(drives[0], fresh)
+    return _Told(
+        closed_loop.report(drives),
+        [run.health for pair in drives for run in (pair.free, pair.limited)],
+        'The traction limiter in a closed loop',
+        limited=drives[0],
+    )
+
+
+def _simulated(arguments: argparse.Namespace) -> _Told:
+    from wheel_terra_estimator.evaluation import bench, runner, tables
+
+    chosen = _chosen(arguments.world, arguments.kinds)
+    if arguments.rover:
+        _check_rover(arguments.rover, arguments.world)
+    _check_names(arguments.modes, runner.MODES, 'mode')
+    from tqdm import tqdm
+
+    with tqdm(total=len(chosen) * arguments.seeds, unit='drive') as bar:
+        results = bench.run(
+            chosen,
+            _seeds(arguments),
+            arguments.modes,
+            arguments.jobs,
+            lambda _: bar.update(),
+            arguments.rover,
+        )
+    write = tables.pooled_report if arguments.pooled else tables.report
+    parts = [write(results, arguments.modes)]
+    if arguments.rover:
+        parts.append(f'Rover in place of that of the kinds: {arguments.rover}.')
+    if results.interrupted:
+        parts.append(results.interrupted)
+    return _Told(
+        '\n\n'.join(parts),
+        [score.health for score in results.drives],
+        results=results,
+        status=INTERRUPTED if results.interrupted else 0,
+    )
 
 
 def _drive_for_hours(arguments: argparse.Namespace) -> int:

@@ -8,12 +8,17 @@ import argparse
 import json
 from dataclasses import asdict
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from wheel_terra_estimator.bags import limits as bag_limits
+from wheel_terra_estimator.cli import bag_arguments
 from wheel_terra_estimator.configuration import reader as configuration_reader
 from wheel_terra_estimator.configuration import soil_file
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.scheduler import add_jobs_argument
+
+if TYPE_CHECKING:
+    from wheel_terra_estimator.fleet.drive import Drive
 
 SOME_FAILED = 1
 INTERRUPTED = 130
@@ -99,15 +104,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help='Dask scheduler whose workers take the recordings, over files that all of them see',
     )
     configuration_reader.add_arguments(parser)
-    parser.add_argument(
-        '--remap',
-        action='append',
-        default=[],
-        metavar='FROM:=TO',
-        help="the estimator's topic, then the bag's (reference_odom:=/truth/odometry); may be "
-        'given several times',
-    )
-    bag_limits.add_arguments(parser)
+    bag_arguments.add_arguments(parser)
     parser.add_argument(
         '--arrival',
         type=Path,
@@ -129,10 +126,7 @@ def _run_one(arguments: argparse.Namespace) -> int:
     from wheel_terra_estimator.bags.reader import parse_remaps
     from wheel_terra_estimator.checks.finding import CheckReport
     from wheel_terra_estimator.fleet.drive import replay_drive
-    from wheel_terra_estimator.output_folder import check_file, check_folder, new_file
-    from wheel_terra_estimator.reporting import estimates_table, track_table, truth_scores
-    from wheel_terra_estimator.reporting.drive_summary import as_dict, as_text
-    from wheel_terra_estimator.reporting.html import check_page
+    from wheel_terra_estimator.reporting import track_table
 
     def print_findings(checked: CheckReport) -> None:
         if not arguments.json:
@@ -142,21 +136,8 @@ def _run_one(arguments: argparse.Namespace) -> int:
     (bag,) = arguments.bags
     configuration = configuration_reader.from_arguments(arguments)
     remaps = parse_remaps(arguments.remap)
-    inputs = [bag, *([arguments.arrival] if arguments.arrival else [])]
-    if arguments.report:
-        check_page(arguments.report)
-        check_file(arguments.report, arguments.overwrite, inputs)
-    if arguments.table:
-        estimates_table.check_table(arguments.table)
-        check_file(arguments.table, arguments.overwrite, inputs)
     origin = track_table.parse_origin(arguments.track_origin)
-    if arguments.track:
-        track_table.check_track(arguments.track)
-        check_file(arguments.track, arguments.overwrite, inputs)
-    if arguments.save_soil:
-        check_file(arguments.save_soil, arguments.overwrite, inputs)
-    if arguments.output:
-        check_folder(arguments.output, arguments.overwrite, inputs)
+    _check_outputs(arguments)
     drive = replay_drive(
         bag,
         configuration,
@@ -170,43 +151,96 @@ def _run_one(arguments: argparse.Namespace) -> int:
         odometry=arguments.track_odometry,
         on_checked=print_findings,
     )
-    errors = drive.errors
     if arguments.json:
-        told = as_dict(drive.summary)
-        told['findings'] = drive.checked.as_dict()['findings']
-        told['truth'] = truth_scores.as_dict(errors) if errors else None
-        if arguments.smooth:
-            live = drive.filter_errors
-            told['filter'] = {'truth': truth_scores.as_dict(live) if live else None}
-        print(json.dumps(told, indent=2))
+        print(json.dumps(_as_dict(drive, arguments.smooth), indent=2))
     else:
-        lines = truth_scores.as_lines(errors) if errors else []
-        if errors and drive.filter_errors:
-            lines += truth_scores.beside(errors, drive.filter_errors)
-        print('\n'.join([as_text(drive.summary), *lines]))
+        print(_as_text(drive))
+    written = _write_outputs(drive, arguments, origin)
+    if not arguments.json:
+        for what, path in written.items():
+            print(f'{what}: {path}')
+    return INTERRUPTED if drive.result.interrupted else 0
+
+
+def _inputs(arguments: argparse.Namespace) -> list[Path]:
+    """Return what no output may be written over."""
+    return [*arguments.bags, *([arguments.arrival] if arguments.arrival else [])]
+
+
+def _check_outputs(arguments: argparse.Namespace) -> None:
+    """Refuse outputs that cannot be written, before hours of work."""
+    from wheel_terra_estimator.output_folder import check_file, check_folder
+    from wheel_terra_estimator.reporting import estimates_table, track_table
+    from wheel_terra_estimator.reporting.html import check_page
+
+    inputs = _inputs(arguments)
+    for path, check_kind in (
+        (arguments.report, check_page),
+        (arguments.table, estimates_table.check_table),
+        (arguments.track, track_table.check_track),
+        (arguments.save_soil, None),
+    ):
+        if path and check_kind:
+            check_kind(path)
+        if path:
+            check_file(path, arguments.overwrite, inputs)
+    if arguments.output:
+        check_folder(arguments.output, arguments.overwrite, inputs)
+
+
+def _as_dict(drive: Drive, smoothed: bool) -> dict[str, Any]:
+    from wheel_terra_estimator.reporting import truth_scores
+    from wheel_terra_estimator.reporting.drive_summary import as_dict
+
+    told = as_dict(drive.summary)
+    told['findings'] = drive.checked.as_dict()['findings']
+    told['truth'] = truth_scores.as_dict(drive.errors) if drive.errors else None
+    if smoothed:
+        live = drive.filter_errors
+        told['filter'] = {'truth': truth_scores.as_dict(live) if live else None}
+    return told
+
+
+def _as_text(drive: Drive) -> str:
+    from wheel_terra_estimator.reporting import truth_scores
+    from wheel_terra_estimator.reporting.drive_summary import as_text
+
+    lines = [as_text(drive.summary)]
+    if drive.errors:
+        lines += truth_scores.as_lines(drive.errors)
+        if drive.filter_errors:
+            lines += truth_scores.beside(drive.errors, drive.filter_errors)
+    return '\n'.join(lines)
+
+
+def _write_outputs(
+    drive: Drive, arguments: argparse.Namespace, origin: tuple[float, float]
+) -> dict[str, Path]:
+    """Write what was asked for beside the bag of estimates; return what there is now."""
+    from wheel_terra_estimator.output_folder import new_file
+
     if arguments.table:
         drive.write_table(arguments.table, arguments.overwrite)
     if arguments.track:
         drive.write_track(arguments.track, arguments.overwrite, origin)
     if arguments.save_soil:
         if not drive.result.learned:
-            raise UserError(f'{bag}: no estimates, so nothing for {arguments.save_soil}')
+            raise UserError(
+                f'{arguments.bags[0]}: no estimates, so nothing for {arguments.save_soil}'
+            )
+        inputs = _inputs(arguments)
         with new_file(arguments.save_soil, arguments.overwrite, inputs) as path:
             soil_file.write_values(path, drive.result.learned)
     if arguments.report:
         drive.write_report(arguments.report, arguments.overwrite)
-    written = {
+    outputs = {
         'table': arguments.table,
         'track': arguments.track,
         'soil': arguments.save_soil,
         'estimates': arguments.output,
         'report': arguments.report,
     }
-    if not arguments.json:
-        for what, written_path in written.items():
-            if written_path:
-                print(f'{what}: {written_path}')
-    return INTERRUPTED if drive.result.interrupted else 0
+    return {what: path for what, path in outputs.items() if path}
 
 
 def _run_several(arguments: argparse.Namespace) -> int:

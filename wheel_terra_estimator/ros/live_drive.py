@@ -56,7 +56,6 @@ from wheel_terra_estimator.ros.lifecycle_node import MESSAGE_TYPES
 QUEUE = 5000
 PATIENCE = 5.0  # [s] until the next message is sent though the node has not heard the last one
 DISCOVERY_TIMEOUT = 60.0  # [s]
-SETTLING = 1.5  # [s] after discovery
 QUIET = 3.0  # [s] without an output after the last input: the node is done
 
 OUTPUT_MESSAGES = {
@@ -64,7 +63,7 @@ OUTPUT_MESSAGES = {
     f'{NAMESPACE}/slip_class': UInt8MultiArray,
     f'{NAMESPACE}/twist': TwistWithCovarianceStamped,
     STUCK: Bool,
-    DIAGNOSTICS: DiagnosticArray,
+    DIAGNOSTICS: DiagnosticArray,  # the last: `_Player.wait_for_partners` relies on it
 }
 
 
@@ -152,12 +151,17 @@ def _context() -> Iterator[None]:
         try_shutdown()
 
 
+def start_node(arguments: Sequence[str]) -> subprocess.Popen[bytes]:
+    """Start the node in a process of its own."""
+    return subprocess.Popen(
+        [sys.executable, '-m', 'wheel_terra_estimator.ros.estimator_node', *arguments]
+    )
+
+
 @contextmanager
 def _running_node(arguments: Sequence[str]) -> Iterator[subprocess.Popen[bytes]]:
     """Run the node; it is stopped as by Ctrl-C."""
-    process = subprocess.Popen(
-        [sys.executable, '-m', 'wheel_terra_estimator.ros.estimator_node', *arguments]
-    )
+    process = start_node(arguments)
     try:
         yield process
     finally:
@@ -189,18 +193,21 @@ class _Player(Node):
             self.create_subscription(kind, topic, self._keeper(topic), profile, raw=True)
 
     def wait_for_partners(self, process: subprocess.Popen[bytes]) -> None:
-        """Wait until every topic has its partner, by counting endpoints."""
+        """Wait until every topic has its partner on both sides.
+
+        The node finds its listeners on its own, a little later, and in the order in which they
+        were made; what it sends before is lost. The diagnostics, which it sends while it hears
+        nothing, have the last listener: once they come, it knows all.
+        """
 
         def ready() -> bool:
             _must_run(process)
-            return all(p.get_subscription_count() for p in self._inputs.values()) and all(
-                self.count_publishers(topic) for topic in OUTPUT_MESSAGES
+            return all(p.get_subscription_count() for p in self._inputs.values()) and any(
+                heard.topic == DIAGNOSTICS for heard in self.heard
             )
 
         if not self._spin_until(ready, DISCOVERY_TIMEOUT):
             raise UserError(f'the node was not found within {DISCOVERY_TIMEOUT:.0f} s')
-        # The node finds its listeners on its own, a little later; what it sends before is lost.
-        self._spin_until(lambda: False, SETTLING)
 
     def play(
         self,

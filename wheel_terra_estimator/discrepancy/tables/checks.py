@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,9 @@ from wheel_terra_estimator.discrepancy.tables.steady_table import (
 from wheel_terra_estimator.errors import UserError
 
 FloatArray = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+_Test: TypeAlias = Callable[[FloatArray], Mask]
+_Refuse: TypeAlias = Callable[[Mask, str, str], None]
 
 MINIMUM_ROWS = 6
 
@@ -115,10 +119,68 @@ def _columns(arrays: Mapping[str, FloatArray], names: Sequence[str], count: int)
     return np.column_stack([arrays.get(name, np.full(count, np.nan)) for name in names])
 
 
+def _above(limit: float) -> _Test:
+    return lambda values: values > limit
+
+
+def _beyond(limit: float) -> _Test:
+    """Above a limit in either direction."""
+    return lambda values: np.abs(values) > limit
+
+
+def _outside(least: float, most: float) -> _Test:
+    return lambda values: (values < least) | (values > most)
+
+
+def _negative(values: FloatArray) -> Mask:
+    return values < 0.0
+
+
+def _not_positive(values: FloatArray) -> Mask:
+    return values <= 0.0
+
+
+def _all_below(limit: float) -> _Test:
+    return lambda values: np.full(values.shape, values.max() < limit)
+
+
+_PERCENT = 'looks like percent; divide the column by 100'
+_KILONEWTON = 'looks like kN; multiply the column by 1000'
+_DEGREES = 'looks like degrees; multiply the column by pi/180'
+_MILLIMETRES = 'looks like millimetres; divide the column by 1000'
+_NO_LENGTH = 'is not a positive length in m'
+_NO_DEVIATION = 'is not positive; leave it empty where the deviation is unknown'
+
+_RANGES: tuple[tuple[str, _Test, str], ...] = (
+    ('slip', _beyond(1.5), _PERCENT),
+    ('slip', _beyond(1.0), 'is outside -1..1; check how the slip ratio was computed'),
+    ('normal_load', _not_positive, 'is not positive; state the load in N'),
+    ('normal_load', _all_below(0.5), _KILONEWTON),
+    ('slope', _beyond(0.9), _DEGREES),
+    ('leaving_angle', _beyond(1.7), _DEGREES),
+    ('wheel_radius', _above(5.0), _MILLIMETRES),
+    ('wheel_radius', _not_positive, _NO_LENGTH),
+    ('wheel_width', _above(5.0), _MILLIMETRES),
+    ('wheel_width', _not_positive, _NO_LENGTH),
+    ('lug_height', _above(0.5), _MILLIMETRES),
+    ('lug_height', _negative, _NO_LENGTH),
+    ('lug_count', _outside(0.0, 1000.0), 'is outside 0..1000'),
+    ('gravity', _outside(1e-3, 100.0), 'is outside 0.001..100'),
+    ('pass_number', _outside(1.0, 1000.0), 'is outside 1..1000'),
+    ('angular_velocity', _beyond(60.0), 'looks like degrees per second; give rad/s'),
+    ('sinkage', _beyond(1.0), 'looks like millimetres (or centimetres); give it in m'),
+    *((f'{quantity}_std', _not_positive, _NO_DEVIATION) for quantity in QUANTITIES),
+    ('slip_std', _negative, _NO_DEVIATION),
+    ('slip_std', _above(0.5), 'is over 0.5; it looks like percent'),
+    ('leaving_angle_std', _not_positive, _NO_DEVIATION),
+)
+"""What no value of a column can be, in SI, and what one that is looks like."""
+
+
 def _check_ranges(name: str, arrays: Mapping[str, FloatArray], lines: NDArray[np.intp]) -> None:
     """Raise where a value is impossible, with the unit that it looks like."""
 
-    def refuse(bad: NDArray[np.bool_], column: str, why: str) -> None:
+    def refuse(bad: Mask, column: str, why: str) -> None:
         if bad.any():
             row = int(np.flatnonzero(bad)[0])
             raise UserError(
@@ -131,71 +193,33 @@ def _check_ranges(name: str, arrays: Mapping[str, FloatArray], lines: NDArray[np
         refuse(np.isnan(arrays[column]), column, 'is missing; every row needs it')
     for column, values in arrays.items():
         refuse(np.isinf(values), column, 'is not finite; leave the cell empty')
-    slip, load = arrays['slip'], arrays['normal_load']
-    if np.nanmax(abs(slip)) > 1.5:
-        refuse(abs(slip) > 1.5, 'slip', 'looks like percent; divide the column by 100')
-    refuse(abs(slip) > 1.0, 'slip', 'is outside -1..1; check how the slip ratio was computed')
-    refuse(load <= 0.0, 'normal_load', 'is not positive; state the load in N')
-    if np.nanmax(load) < 0.5:
-        refuse(load > 0.0, 'normal_load', 'looks like kN; multiply the column by 1000')
-    for column, limit in (('slope', 0.9), ('leaving_angle', 1.7)):
+    for column, impossible, why in _RANGES:
         if column in arrays:
-            refuse(
-                abs(arrays[column]) > limit,
-                column,
-                'looks like degrees; multiply the column by pi/180',
-            )
-    for column, limit in (('wheel_radius', 5.0), ('wheel_width', 5.0), ('lug_height', 0.5)):
-        if column in arrays:
-            refuse(
-                arrays[column] > limit, column, 'looks like millimetres; divide the column by 1000'
-            )
-            low = arrays[column] < 0.0 if column == 'lug_height' else arrays[column] <= 0.0
-            refuse(low, column, 'is not a positive length in m')
+            refuse(impossible(arrays[column]), column, why)
     if 'wheel_radius' in arrays and 'lug_height' in arrays:
         high = arrays['lug_height'] > arrays['wheel_radius']
         refuse(high, 'lug_height', 'is more than the wheel radius; check both, in m')
-    for column, least, most in (
-        ('lug_count', 0.0, 1000.0),
-        ('gravity', 1e-3, 100.0),
-        ('pass_number', 1.0, 1000.0),
-    ):
-        if column in arrays:
-            bad = (arrays[column] < least) | (arrays[column] > most)
-            refuse(bad, column, f'is outside {least:g}..{most:g}')
-    if 'angular_velocity' in arrays:
-        fast = abs(arrays['angular_velocity']) > 60.0
-        refuse(fast, 'angular_velocity', 'looks like degrees per second; give rad/s')
-    if 'sinkage' in arrays:
-        deep = abs(arrays['sinkage']) > 1.0
-        refuse(deep, 'sinkage', 'looks like millimetres (or centimetres); give it in m')
     if 'drawbar_pull' in arrays:
-        strong = abs(arrays['drawbar_pull']) > 3.0 * load
-        refuse(
-            strong,
-            'drawbar_pull',
-            'is over three times the normal load; check both units (N, not kg or kN)',
-        )
-        pull = arrays['drawbar_pull'][np.isfinite(arrays['drawbar_pull'])]
-        if pull.size > 2 and 0.0 < abs(pull).max() < 2e-3 * load.max():
-            refuse(
-                np.isfinite(arrays['drawbar_pull']),
-                'drawbar_pull',
-                'looks like kN; multiply the column by 1000',
-            )
+        _check_size_of_pull(refuse, arrays['drawbar_pull'], arrays['normal_load'])
     for column in STD_COLUMNS:
         if column in arrays:
-            low = arrays[column] < 0.0 if column == 'slip_std' else arrays[column] <= 0.0
-            refuse(low, column, 'is not positive; leave it empty where the deviation is unknown')
             _check_size_of_deviation(refuse, arrays, column)
-    if 'slip_std' in arrays:
-        refuse(arrays['slip_std'] > 0.5, 'slip_std', 'is over 0.5; it looks like percent')
+
+
+def _check_size_of_pull(refuse: _Refuse, pull: FloatArray, load: FloatArray) -> None:
+    """Refuse pulls that are far more than the load, or nothing beside it."""
+    refuse(
+        abs(pull) > 3.0 * load,
+        'drawbar_pull',
+        'is over three times the normal load; check both units (N, not kg or kN)',
+    )
+    measured = np.isfinite(pull)
+    if measured.sum() > 2 and 0.0 < abs(pull[measured]).max() < 2e-3 * load.max():
+        refuse(measured, 'drawbar_pull', _KILONEWTON)
 
 
 def _check_size_of_deviation(
-    refuse: Callable[[NDArray[np.bool_], str, str], None],
-    arrays: Mapping[str, FloatArray],
-    column: str,
+    refuse: _Refuse, arrays: Mapping[str, FloatArray], column: str
 ) -> None:
     """Refuse a deviation beside which its whole column is nothing: its unit is another one."""
     quantity = column.removesuffix('_std')

@@ -7,9 +7,10 @@ from __future__ import annotations
 import csv
 import difflib
 import io
+import math
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -39,6 +40,7 @@ _OTHER_NAMES = {
 }
 
 
+_NOT_MEASURED = ('nan', 'na', 'n/a', '-')
 _KNOWN = 'slip, normal_load, sinkage, drawbar_pull, torque, ...'
 # Units that a header may state in brackets: factor to SI.
 _TO_SI: dict[str, dict[str, float]] = {
@@ -118,58 +120,89 @@ def _with_point(cell: str) -> str:
     return cell.replace(',', '.') if _DECIMAL_COMMA.fullmatch(cell) else cell
 
 
-def _read_header(path: str, header: Sequence[str], notes: list[str]) -> list[_Column]:
-    """Return the columns to be read; raise with all faults of the header in one line."""
-    columns: list[_Column] = []
-    faults: list[str] = []
-    ignored: list[str] = []
-    mended: list[str] = []
-    if not any(_column(name) for name in header) and any(_is_number(name) for name in header):
-        raise UserError(f'{path}, line 1: no header; the first line must name the columns')
-    for place, title in enumerate(header):
-        name, unit = _column(title) or ('', '')
-        factor = _factor(name, unit) if name else None
-        if name and factor is None:
+@dataclass
+class _Header:
+    """What the first line of a file says, and what is wrong with it."""
+
+    columns: list[_Column] = field(default_factory=list)
+    faults: list[str] = field(default_factory=list)
+    unknown: list[str] = field(default_factory=list)
+    mended: list[str] = field(default_factory=list)
+
+    @property
+    def names(self) -> list[str]:
+        """Columns that are read."""
+        return [column.name for column in self.columns]
+
+    def take(self, place: int, title: str) -> None:
+        """Take in a title."""
+        named = _column(title)
+        if named is None:
+            self.unknown += [title] if title else []
+            return
+        name, factor = named[0], _factor(*named)
+        if factor is None:
             known = ', '.join(_TO_SI[_unit_of(name)])
-            faults.append(f'the unit of {title!r} is not known; give one of {known}')
-        elif name and any(column.name == name for column in columns):
-            faults.append(f'column {name!r} stands there twice; delete one')
-        elif name and factor is not None:
-            columns.append(_Column(place, name, factor))
+            self.faults.append(f'the unit of {title!r} is not known; give one of {known}')
+        elif name in self.names:
+            self.faults.append(f'column {name!r} stands there twice; delete one')
+        else:
+            self.columns.append(_Column(place, name, factor))
             if title != name:
                 in_si = '' if factor == 1.0 else f' (times {factor:.4g})'
-                mended.append(f'{title!r} as {name}{in_si}')
-        elif title:
-            ignored.append(title)
-    names = [column.name for column in columns]
-    missing = [name for name in ('slip', 'normal_load') if name not in names]
-    if not any(name in QUANTITIES for name in names):
-        missing += QUANTITIES
-    for title in list(ignored):
-        meant = _nearest(title) or _other_name(title, missing)
-        if meant and meant not in names:
-            unit = _unit_of(meant)
-            in_unit = '' if unit == '-' else f' [{unit}]'
-            faults.append(f'rename {title!r} to {meant!r}{in_unit} if that is what it holds')
-            ignored.remove(title)
-            missing = [name for name in missing if name != meant]
-    for name in ('slip', 'normal_load'):
-        if name in missing:
-            faults.append(f'no column {name!r} among {", ".join(header)}; it is required')
-    if set(QUANTITIES) <= set(missing):
-        faults.append(
-            f'none of sinkage, drawbar_pull, torque among {", ".join(header)}; add at least one'
-        )
-    if faults:
-        raise UserError(f'{path}, line 1: {"; ".join(faults)}')
-    if mended:
-        notes.append(f'read {", ".join(mended)}')
-    if ignored:
-        notes.append(f'columns not used: {", ".join(ignored)}')
-    for name in names:
-        if name in STD_COLUMNS and name.removesuffix('_std') not in names:
-            notes.append(f'{name} is not used: there is no column {name.removesuffix("_std")}')
-    return columns
+                self.mended.append(f'{title!r} as {name}{in_si}')
+
+    def look_for_missing(self, titles: Sequence[str]) -> None:
+        """Note the required columns that are missing, and which titles may be meant for them."""
+        names = self.names
+        missing = [name for name in ('slip', 'normal_load') if name not in names]
+        if not any(name in QUANTITIES for name in names):
+            missing += QUANTITIES
+        for title in list(self.unknown):
+            meant = _nearest(title) or _other_name(title, missing)
+            if meant and meant not in names:
+                unit = _unit_of(meant)
+                in_unit = '' if unit == '-' else f' [{unit}]'
+                self.faults.append(
+                    f'rename {title!r} to {meant!r}{in_unit} if that is what it holds'
+                )
+                self.unknown.remove(title)
+                missing = [name for name in missing if name != meant]
+        among = ', '.join(titles)
+        self.faults += [
+            f'no column {name!r} among {among}; it is required'
+            for name in ('slip', 'normal_load')
+            if name in missing
+        ]
+        if set(QUANTITIES) <= set(missing):
+            self.faults.append(
+                f'none of sinkage, drawbar_pull, torque among {among}; add at least one'
+            )
+
+    def notes(self) -> Iterator[str]:
+        """Yield what was read otherwise than it stands there, or not at all."""
+        if self.mended:
+            yield f'read {", ".join(self.mended)}'
+        if self.unknown:
+            yield f'columns not used: {", ".join(self.unknown)}'
+        for name in self.names:
+            quantity = name.removesuffix('_std')
+            if name in STD_COLUMNS and quantity not in self.names:
+                yield f'{name} is not used: there is no column {quantity}'
+
+
+def _read_header(path: str, titles: Sequence[str], notes: list[str]) -> list[_Column]:
+    """Return the columns to be read; raise with all faults of the header in one line."""
+    if not any(_column(title) for title in titles) and any(_is_number(title) for title in titles):
+        raise UserError(f'{path}, line 1: no header; the first line must name the columns')
+    header = _Header()
+    for place, title in enumerate(titles):
+        header.take(place, title)
+    header.look_for_missing(titles)
+    if header.faults:
+        raise UserError(f'{path}, line 1: {"; ".join(header.faults)}')
+    notes += header.notes()
+    return header.columns
 
 
 def _column(title: str) -> tuple[str, str] | None:
@@ -253,14 +286,7 @@ def _read_cells(
     columns: Sequence[_Column],
     rows: Sequence[tuple[int, list[str]]],
 ) -> dict[str, FloatArray]:
-    if rows:
-        line, cells = rows[0]
-        filled = [cells[c.place] for c in columns if c.place < len(cells) and cells[c.place]]
-        if len(filled) > 1 and not any(_is_number(cell) for cell in filled):
-            raise UserError(
-                f'{path}, line {line}: no numbers below the column names; delete the line '
-                '(units may stand in brackets behind the names: sinkage [mm])'
-            )
+    _check_first_row(path, columns, rows)
     values = {column.name: np.full(len(rows), np.nan) for column in columns}
     for index, (line, cells) in enumerate(rows):
         if len(cells) > len(header) and any(cells[len(header) :]):
@@ -270,20 +296,37 @@ def _read_cells(
             )
         for column in columns:
             cell = cells[column.place] if column.place < len(cells) else ''
-            if not cell or cell.lower() in ('nan', 'na', 'n/a', '-'):
-                continue
-            where = f'{path}, line {line}, column {column.name}'
-            try:
-                value = float(cell)
-            except ValueError:
-                raise UserError(f'{where}: {cell[:40]!r} is not a number; {_cure(cell)}') from None
-            if not np.isfinite(value):
-                raise UserError(
-                    f'{where}: {cell} is not finite; leave the cell empty where nothing was '
-                    'measured'
-                )
-            values[column.name][index] = column.factor * value
+            if cell and cell.lower() not in _NOT_MEASURED:
+                number = _number(cell, f'{path}, line {line}, column {column.name}')
+                values[column.name][index] = column.factor * number
     return values
+
+
+def _check_first_row(
+    path: str, columns: Sequence[_Column], rows: Sequence[tuple[int, list[str]]]
+) -> None:
+    """Raise where something else than numbers stands below the header."""
+    if not rows:
+        return
+    line, cells = rows[0]
+    filled = [cells[c.place] for c in columns if c.place < len(cells) and cells[c.place]]
+    if len(filled) > 1 and not any(_is_number(cell) for cell in filled):
+        raise UserError(
+            f'{path}, line {line}: no numbers below the column names; delete the line '
+            '(units may stand in brackets behind the names: sinkage [mm])'
+        )
+
+
+def _number(cell: str, where: str) -> float:
+    try:
+        value = float(cell)
+    except ValueError:
+        raise UserError(f'{where}: {cell[:40]!r} is not a number; {_cure(cell)}') from None
+    if not math.isfinite(value):
+        raise UserError(
+            f'{where}: {cell} is not finite; leave the cell empty where nothing was measured'
+        )
+    return value
 
 
 def _cure(cell: str) -> str:
