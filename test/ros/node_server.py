@@ -1,10 +1,10 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Nodes by fork: a process that has imported what they need forks one process for each.
+"""Nodes by fork: a process that has imported the estimator forks one process for each.
 
-To import rclpy, numpy and filterpy takes a node more than a second of processor time. The server
-has done so once, without ``rclpy.init``; what it forks is a process of its own as any other: own
-pid, signals, exit status, and its own participant of DDS.
+To import filterpy, and with it most of scipy, takes a node a second of processor time. The server
+has done so once; rclpy it leaves to what it forks, since its import starts threads, of which a fork
+keeps none. What it forks is a process as any other: own pid, signals, exit status, participant.
 
 Run as a program it is the server; `NodeServer` is what the tests talk to.
 """
@@ -26,13 +26,15 @@ from pathlib import Path
 from typing import IO, Any
 
 PACKAGE = 'wheel_terra_estimator.ros'
-PRELOADED = (  # what the nodes import, also late
-    f'{PACKAGE}.lifecycle_node',
-    f'{PACKAGE}.limiter_node',
-    f'{PACKAGE}.live_views',
-    'rclpy.executors',
-    'rclpy.experimental',
-    'rclpy.signals',
+PRELOADED = (  # what the nodes import beside rclpy, also late
+    'filterpy.kalman',
+    'scipy.linalg',
+    'scipy.special',
+    'wheel_terra_estimator.checks.watched_estimator',
+    'wheel_terra_estimator.configuration.soil_file',
+    'wheel_terra_estimator.estimation.traction_law',
+    'wheel_terra_estimator.estimation.wheel_soil_estimator',
+    'wheel_terra_estimator.messages.pipeline',
 )
 LONGEST_REQUEST = 65_536  # bytes
 LOOK_UP = 0.02  # [s] between two looks whether a process has ended
@@ -123,10 +125,6 @@ def _serve(connection: socket.socket) -> int:
     """Answer requests until the tests end; in a forked process, run the node instead."""
     for name in PRELOADED:
         importlib.import_module(name)
-    mains = {
-        f'{PACKAGE}.{name}': importlib.import_module(f'{PACKAGE}.{name}').main
-        for name in ('estimator_node', 'traction_limiter_node')
-    }
     assert len(list(Path('/proc/self/task').iterdir())) == 1, 'a fork keeps one thread only'
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the tests
     while True:
@@ -142,7 +140,7 @@ def _serve(connection: socket.socket) -> int:
             if not answer:
                 connection.close()
                 _become(request, *descriptors)
-                return mains[request['start']]()
+                return int(importlib.import_module(request['start']).main())
         for descriptor in descriptors:
             os.close(descriptor)
         connection.send(json.dumps(answer).encode())
