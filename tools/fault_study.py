@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""How many faults `wheel-terra check` finds: 30 kinds, each put into every recording given.
+"""How many faults `wheel-terra check` finds: 37 kinds, each put into every recording given.
 
 python tools/fault_study.py drive_a=generic_six_wheel drive_b=my_rover.yaml > table.txt
 
@@ -138,6 +138,13 @@ def _noisy(field: str, factor: float) -> Callable[[Any, Case], Any]:
     return make
 
 
+def _stepped(series: Any, case: Case) -> Any:
+    """Rates as of an encoder with two counts in the usual interval."""
+    size = np.abs(series.rate[np.isfinite(series.rate)])
+    step = 0.5 * float(np.median(size[size > 0.2 * np.quantile(size, 0.95)]))
+    return step * np.round(series.rate / step)
+
+
 def _late(seconds: float) -> Callable[[Any, Case], Any]:
     return lambda series, case: series.stamp + round(seconds * 1e9)
 
@@ -211,6 +218,9 @@ FAULTS = (
     Fault('rates in degrees', ('unit',), _joints(rate=lambda s, c: np.degrees(s.rate))),
     Fault('a frozen rate', ('frozen',), _joints(rate=_frozen), True),
     Fault('noisy rates', ('noise',), _joints(rate=_noisy('rate', 0.5))),
+    Fault('rates in coarse steps', ('noise',), _joints(rate=_stepped)),
+    Fault('rates in encoder counts', ('unit',), _joints(
+        rate=lambda s, c: s.rate * 4096 / (2.0 * math.pi))),
     Fault('gaps in the wheel rates', ('drop_outs',), _dropping('joints')),
     Fault('stamps that repeat', ('order',), _joints(
         stamp=lambda s, c: s.stamp[np.maximum(np.arange(s.stamp.size) // 2 * 2, 0)])),
@@ -236,6 +246,8 @@ FAULTS = (
     Fault('sinkage in millimetres', ('unit',), _channel(
         'sinkage', sinkage=lambda s, c: 1000.0 * s.sinkage)),
     Fault('sinkage reversed', ('sign',), _channel('sinkage', sinkage=lambda s, c: -s.sinkage)),
+    Fault('front sinkage sensors exchanged', ('exchanged_wheels',), _channel(
+        'sinkage', sinkage=lambda s, c: _swap(s, c, [(0, 1)], 'sinkage')), True),
     Fault('reference reversed', ('sign',), _channel(
         'reference', velocity=lambda s, c: -s.velocity)),
     Fault('reference 1 s late by its stamps', ('delay',), _channel(

@@ -17,6 +17,7 @@ from wheel_terra_estimator.configuration import reader
 
 NAMES = ('front_left', 'front_right', 'rear_left', 'rear_right')
 RADIUS, HALF_TRACK, HALF_BASE, MASS, GRAVITY = 0.2, 0.4, 0.1, 60.0, 9.80665
+DEPTH = 0.009  # sinkage [m]
 RESISTANCE = 0.08  # rolling resistance over weight
 START = 1_700_000_000_000_000_000
 RATE = 10.0  # [Hz]
@@ -44,6 +45,13 @@ class Motion:
     slope: np.ndarray  # uphill along the drive [rad]
 
 
+def rolling_radius():
+    """Speed over rate where shear along the contact vanishes in the mean: the mean of cos t is
+    sin(t1)/t1 from the front angle t1 to the bottom."""
+    front = np.arccos(1.0 - DEPTH / RADIUS)
+    return RADIUS * front / np.sin(front)
+
+
 def ten_minute_drive(turns=True):
     """Rest, forward, back, over a hill, then a circle to each side."""
     time = np.arange(0.0, 300.0, 1.0 / RATE)
@@ -64,7 +72,7 @@ def recording(motion=None, seed=0, **changes):
     stamp = START + np.round(m.time * 1e9).astype(np.int64)
     arrival = stamp + 2_000_000
     y = np.array([HALF_TRACK, -HALF_TRACK] * 2)
-    rate = (m.speed[:, None] - m.yaw_rate[:, None] * y) / RADIUS
+    rate = (m.speed[:, None] - m.yaw_rate[:, None] * y) / rolling_radius()
     acceleration = np.gradient(m.speed, m.time)
     demand = MASS * (acceleration + GRAVITY * np.sin(m.slope))
     resistance = RESISTANCE * MASS * GRAVITY * np.sign(np.round(rate, 6))
@@ -95,7 +103,7 @@ def recording(motion=None, seed=0, **changes):
         '/reference_odom', stamp[every], arrival[every] + 300_000_000, velocity,
         m.yaw_rate[every], np.full(velocity.shape[0], 1e-4),
     )  # fmt: skip
-    depth = 0.02 + 0.005 * np.sin(0.3 * m.time)[:, None] * np.ones(4)
+    depth = DEPTH + 0.002 * np.sin(0.3 * m.time)[:, None] * np.ones(4)
     sinkage = SinkageSeries('/sinkage', stamp, arrival, NAMES, depth + noise(depth.shape, 0.002))
     topics = (('/joint_states', 'sensor_msgs/msg/JointState', stamp.size),)
     whole = Recording('drive', topics, joints, imu, sinkage, reference, None)

@@ -229,10 +229,42 @@ def test_wrong_parameters_end_the_node_with_one_line(start, parameters, override
     assert 'Traceback' not in said
 
 
-def test_integer_where_a_number_is_wanted(start, parameters, listener):
+@pytest.fixture
+def proposal(tmp_path):
+    """The file of a law that no listed effect states, as a diagnosis writes it."""
+    from wheel_terra_estimator.configuration import reader
+
+    law = {
+        'enabled': True,
+        'targets': ['torque', 'exponent'],
+        'features': ['rim_speed', 'slip'],
+        'coefficients': [0.05, 0.4],
+        'coefficients_std': [0.01, 0.1],
+    }
+    values = {f'effects.learned_closure.{key}': value for key, value in law.items()}
+    path = tmp_path / 'proposal.yaml'
+    reader.from_parameters(values, complete=False).write(path)
+    return str(path)
+
+
+def test_a_proposed_law_is_a_further_file_and_an_integer_may_stand_for_a_number(
+    start, parameters, proposal, listener
+):
+    from rcl_interfaces.srv import GetParameters
     from std_msgs.msg import Bool
 
     node, until = listener
-    start('estimator_node', *ROVER, parameters, '-p', 'rover.mass:=20', '-p', 'use_sim_time:=true')
+    further = ['--params-file', proposal, '-p', 'rover.mass:=20', '-p', 'use_sim_time:=true']
+    start('estimator_node', *ROVER, parameters, *further)
     stuck = hear(node, Bool, f'{NODE}/stuck', latched())
     until(lambda: stuck)
+    get = node.create_client(GetParameters, f'{NODE}/get_parameters')
+    until(get.service_is_ready)
+    law = 'effects.learned_closure'
+    names = [f'{law}.enabled', f'{law}.targets', f'{law}.coefficients']
+    future = get.call_async(GetParameters.Request(names=names))
+    until(future.done)
+    enabled, targets, coefficients = future.result().values
+    assert enabled.bool_value
+    assert list(targets.string_array_value) == ['torque', 'exponent']
+    assert list(coefficients.double_array_value) == [0.05, 0.4]

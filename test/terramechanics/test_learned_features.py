@@ -32,6 +32,9 @@ BY_HAND = {
     'slip_over_02': 0.3,
     'slip_over_04': 0.1,
     'slip_over_06': 0.0,
+    'slip_near_02': 0.0,  # 0.3 away, beyond the foot at 0.25
+    'slip_near_04': 0.7056,  # (1 - 0.4^2)^2
+    'slip_near_06': 0.7056,
     'load': 1.0,  # a decade
     'lug': 0.05,
     'width': 0.5,

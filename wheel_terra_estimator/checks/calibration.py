@@ -24,6 +24,8 @@ WORTH_CHANGING = 0.2
 """Relative change of a noise or a rate below which the rover file keeps its number [-]."""
 NOISE_STD = 0.1
 """Relative deviation of a noise that a drive tells [-]."""
+BLUNT_REFERENCE = 0.005
+"""Deviation of the radius by the noise of the reference alone, as a share, that is told [-]."""
 
 NO_CENTRE_OF_GRAVITY = NotChecked(
     'mass',
@@ -202,6 +204,9 @@ def _radius(evidence: Evidence, report: CheckReport) -> tuple[list[Change], Evid
     reference = evidence.reference()
     assert reference is not None
     source = f'straight, steady, firm stretches against {reference.topic}'
+    bound = report.figures['rover.radius_bound_by_reference_m']
+    if bound > BLUNT_REFERENCE * float(np.mean(evidence.facts.radius)):
+        source += f' (its noise alone allows no better than +- {bound:.2g}: drive faster or longer)'
     change = Change('wheels.radius', _before(configuration, 'wheels.radius'), after, std, source)
     return [change], replace(evidence, facts=replace(evidence.facts, radius=rolling))
 

@@ -187,8 +187,10 @@ class Evidence:
         rate = self.common_rate
         width = max(round(SETTLING / max(self.period, 1e-3)), 1)
         change = np.zeros_like(rate)
-        if rate.size > width:
-            change[width:] = np.abs(rate[width:] - rate[:-width])
+        if rate.size > 2 * width:  # means over that time: noise is no change
+            total = np.concatenate([[0.0], np.cumsum(rate)])
+            mean = (total[width:] - total[:-width]) / width
+            change[2 * width - 1 :] = np.abs(mean[width:] - mean[:-width])
         calm = change < 0.15 * max(self.working_rate, 1e-9)
         return _shared(self.moving & _after(calm, self.period, SETTLING))
 

@@ -12,12 +12,13 @@ from numpy.typing import NDArray
 
 from wheel_terra_estimator.checks.evidence import Evidence
 from wheel_terra_estimator.checks.finding import Finding, NotChecked, Outcome
-from wheel_terra_estimator.checks.rover_facts import RoverFacts
+from wheel_terra_estimator.checks.sinkage import without_stated_errors
 from wheel_terra_estimator.checks.statistics import (
     Estimate,
     block_fit,
     confidence,
     correlation,
+    robust_std,
 )
 from wheel_terra_estimator.checks.torque import MOST_TRACTION, thrust
 
@@ -34,6 +35,11 @@ FIRM_SLIP = 0.12
 """Slip at the usual traction above which the ground is too soft to tell the radius [-]."""
 SLOPE_OF_SLIP = Estimate(0.2, 0.2)
 """Slip over traction of firm ground where the drive does not tell it: mean, deviation [-]."""
+FIRM_DEPTH = Estimate(0.02, 0.015)
+"""Sinkage over radius of firm ground where no sensor tells it: mean, deviation [-]."""
+DEEPEST_FIRM = 0.1
+"""The same, that a sensor may tell [-]."""
+LEAST_DEPTHS = 50
 LEAST_REFERENCES = 12
 LEAST_TRACK_ERROR = 0.08
 CLEAR_TURN = 0.95
@@ -56,6 +62,8 @@ def radius_ratio(evidence: Evidence, figures: dict[str, Any]) -> Estimate | NotC
         return NotChecked('radius', 'no reference velocity in it')
     if not facts.known:
         return NotChecked('radius', 'no rover file')
+    if 'wheels.rad_per_count' in figures:
+        return NotChecked('radius', 'rates in counts: a radius looks like other counts per turn')
     half = 0.25
     rim = evidence.rim_at(reference.stamp, evidence.rim, half)
     straight = evidence.rim_at(reference.stamp, evidence.straight.astype(float), half)
@@ -65,6 +73,10 @@ def radius_ratio(evidence: Evidence, figures: dict[str, Any]) -> Estimate | NotC
         return NotChecked('radius', 'no straight, steady stretch with a reference in it')
     rim, forward = rim[rows], forward[rows]
     plain = block_fit(rim[:, None], forward)[0]
+    # No estimator is better than the mean of independent readings of the reference.
+    noise = robust_std(np.diff(forward, 2)) / math.sqrt(6.0)
+    bound = noise / math.sqrt(max(float(rim @ rim), 1e-12))
+    figures['rover.radius_bound_by_reference_m'] = round(bound * float(np.mean(facts.radius)), 5)
     figures['rover.speed_over_rim_speed'] = round(plain.value, 4)
     if not np.isfinite(evidence.torque).any() or not np.any(np.nan_to_num(evidence.torque)):
         return _without_torque(evidence, plain)
@@ -76,17 +88,46 @@ def radius_ratio(evidence: Evidence, figures: dict[str, Any]) -> Estimate | NotC
         demand = along * sense / facts.gravity
     speeds = _Speeds(rim, forward, traction * sense / weight, demand)
     ratio = _with_torque(speeds, plain, figures)
-    return ratio if isinstance(ratio, NotChecked) else _between_rim_and_lugs(facts, ratio)
+    return ratio if isinstance(ratio, NotChecked) else _referred_to_slip_radius(evidence, ratio)
 
 
-def _between_rim_and_lugs(facts: RoverFacts, ratio: Estimate) -> Estimate:
-    """Refer a rolling radius to the slip radius: soil shears between the rim and the lug tips."""
-    assert facts.configuration is not None
-    wheels = facts.configuration.wheels
-    share = float(np.mean(wheels.lug_height / facts.radius))
-    if facts.configuration.slip_radius == 'rim':
-        share = -share
-    return Estimate(ratio.value * (1.0 + 0.5 * share), math.hypot(ratio.std, UNIFORM_STD * share))
+def _referred_to_slip_radius(evidence: Evidence, ratio: Estimate) -> Estimate:
+    """Take off the slip at which a wheel in soil rolls.
+
+    The soil shears at r + lambda h, between rim and lug tips, and over the contact from the front
+    angle t1 on its speed is v cos t, not v: shear vanishes in the mean at a slip of
+    (1 - lambda) h/(r + h) - t1^2/6, with t1^2/6 = z/(3 r). Where neither is known, lambda lies
+    anywhere in 0 to 1 and z/r is that of firm ground.
+    """
+    configuration = evidence.facts.configuration
+    assert configuration is not None
+    wheels = configuration.wheels
+    lugs = float(np.mean(wheels.lug_height / evidence.facts.radius))
+    stated = configuration.effects.get('lug_shear_radius', {}).get('lam')
+    shear = Estimate(0.5, UNIFORM_STD) if stated is None else Estimate(float(stated), 0.0)
+    depth = _depth(evidence)
+    tip = 0.0 if configuration.slip_radius == 'rim' else 1.0
+    slip = (tip - shear.value) * lugs - depth.value / 3.0
+    std = math.hypot(shear.std * lugs, depth.std / 3.0)
+    return Estimate(ratio.value * (1.0 + slip), math.hypot(ratio.std, std))
+
+
+def _depth(evidence: Evidence) -> Estimate:
+    """Return sinkage over radius on the straight."""
+    series, configuration = evidence.recording.sinkage, evidence.facts.configuration
+    assert configuration is not None
+    radius = float(np.mean(configuration.wheels.radius))
+    if series is not None and series.stamp.size:
+        straight = evidence.rim_at(series.stamp, evidence.straight.astype(float), 0.25) > 0.99
+        names = [name for name in series.names if name in configuration.wheels.names]
+        columns = [series.names.index(name) for name in names]
+        rows = without_stated_errors(configuration, names, series.sinkage[straight][:, columns])
+        if np.isfinite(rows).sum() >= LEAST_DEPTHS:
+            sensors = configuration.sensors
+            depth = float(np.nanmedian(rows)) / radius
+            std = max(float(sensors.sinkage_zero_std), float(sensors.sinkage_std) / 2.0) / radius
+            return Estimate(min(max(depth, 0.0), DEEPEST_FIRM), std)
+    return FIRM_DEPTH
 
 
 class _Speeds(NamedTuple):

@@ -10,12 +10,13 @@ start, so windows that speak against one count for long. Thresholds come from si
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from statistics import median
 from typing import NamedTuple
 
 from wheel_terra_estimator.checks.finding import Finding
+from wheel_terra_estimator.checks.online_delay import SpeedHistory
 from wheel_terra_estimator.checks.online_words import (
     GRAVITY_OFF,
     GRAVITY_SHARE,
@@ -119,7 +120,11 @@ RULES = {
     'torque_unit': Rule(4, 20),
     'sinkage': Rule(5, 20),
     'frozen': Rule(4, 2),
+    'reference_delay': Rule(2, 4),
 }
+
+REMARKS = frozenset({'reference_delay'})
+"""Faults that are told while slip is judged all the same."""
 
 Suspicion = tuple[str, int]
 """A name of RULES, and the wheel (-1: all)."""
@@ -161,6 +166,7 @@ class _Verdicts(NamedTuple):
     tallies: dict[Suspicion, Tally]
     figures: dict[Suspicion, float]  # what the last agreeing window showed
     findings: tuple[Finding, ...]
+    remarks: tuple[Finding, ...] = ()
     in_motion: int = 0  # windows in which wheels turned
 
 
@@ -229,12 +235,18 @@ class OnlineChecks:
             ABOVE_GROUND, 2.0 * float(sensors.sinkage_zero_std), float(sensors.sinkage_std)
         )
         self._sums = self._empty()
+        self._speeds = SpeedHistory()
         self._verdicts = _Verdicts({}, {}, ())
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """What stands now; empty: nothing."""
+        """What stands now and makes slip meaningless; empty: nothing."""
         return self._verdicts.findings
+
+    @property
+    def remarks(self) -> tuple[Finding, ...]:
+        """What stands now beside which slip is judged all the same."""
+        return self._verdicts.remarks
 
     @property
     def undecided(self) -> str:
@@ -242,35 +254,40 @@ class OnlineChecks:
         if self._verdicts.in_motion < TRIAL:
             return 'the first seconds of motion show whether signs and units are right'
         for (name, _), tally in self._verdicts.tallies.items():
-            if tally.score > 0 and not tally.stands:
+            if tally.score > 0 and not tally.stands and name not in REMARKS:
                 return f'a fault of the inputs is not excluded yet ({name.replace("_", " ")})'
         return ''
 
     def reset(self) -> None:
         """Forget everything."""
         self._sums = self._empty()
+        self._speeds = SpeedHistory()
         self._verdicts = _Verdicts({}, {}, ())
 
-    def snapshot(self) -> tuple[_Sums, _Verdicts]:
+    def snapshot(self) -> tuple[_Sums, SpeedHistory, _Verdicts]:
         """Return the state in a form that later steps leave alone."""
-        return self._sums.copy(), self._verdicts
+        return self._sums.copy(), self._speeds.copy(), self._verdicts
 
-    def restore(self, snapshot: tuple[_Sums, _Verdicts]) -> None:
+    def restore(self, snapshot: tuple[_Sums, SpeedHistory, _Verdicts]) -> None:
         """Return to a kept state."""
-        sums, self._verdicts = snapshot
-        self._sums = sums.copy()
+        sums, speeds, self._verdicts = snapshot
+        self._sums, self._speeds = sums.copy(), speeds.copy()
 
     def step(self, stamp: int, inputs: StepInputs) -> None:
         """Take all inputs of a stamp [ns], later than the one before."""
         sums = self._sums
         if sums.begin is None:
             sums.begin = stamp
+        delay = self._speeds.advance(stamp)
+        if delay is not None:
+            self._weigh([('reference_delay', -1, delay.late, delay.lag)])
         if inputs.wheel_odometry is not None:
             self._add_odometry(inputs.wheel_odometry)
         if inputs.inertial is not None:
             self._add_inertial(inputs.inertial)
         if inputs.reference is not None:
             self._add_reference(inputs.reference)
+            self._speeds.add_reference(stamp, inputs.reference.forward)
         if inputs.sinkage is not None:
             self._add_sinkage(inputs.sinkage)
         if stamp - sums.begin >= WINDOW:
@@ -302,6 +319,7 @@ class OnlineChecks:
         sums.last = tuple(heard)
         if not sizes:
             return
+        self._speeds.add_rim(sum(rim for rim in heard if rim == rim) / len(sizes))
         sizes.sort()
         size = sizes[len(sizes) // 2]
         sums.slowest = min(sums.slowest, size)
@@ -360,18 +378,25 @@ class OnlineChecks:
     # -- Judgement ------------------------------------------------------------------------------
 
     def _judge(self, window: _Window) -> None:
+        self._verdicts = self._verdicts._replace(in_motion=self._verdicts.in_motion + window.moving)
+        self._weigh(self._evidence(window))
+
+    def _weigh(self, evidence: Iterable[Evidence]) -> None:
+        """Bring the tallies up to date, and what stands."""
         tallies, figures = dict(self._verdicts.tallies), dict(self._verdicts.figures)
-        for name, wheel, agrees, figure in self._evidence(window):
+        for name, wheel, agrees, figure in evidence:
             key = name, wheel
             tallies[key] = RULES[name].after(tallies.get(key, Tally()), agrees)
             if agrees:
                 figures[key] = figure
         changed = tallies != self._verdicts.tallies
-        self._verdicts = self._verdicts._replace(
-            tallies=tallies, figures=figures, in_motion=self._verdicts.in_motion + window.moving
-        )
+        self._verdicts = self._verdicts._replace(tallies=tallies, figures=figures)
         if changed:
-            self._verdicts = self._verdicts._replace(findings=tuple(self._findings()))
+            told = list(self._findings())
+            self._verdicts = self._verdicts._replace(
+                findings=tuple(finding for name, finding in told if name not in REMARKS),
+                remarks=tuple(finding for name, finding in told if name in REMARKS),
+            )
 
     def _evidence(self, window: _Window) -> Iterator[Evidence]:
         if window.force is not None:
@@ -502,8 +527,8 @@ class OnlineChecks:
 
     # -- Findings -------------------------------------------------------------------------------
 
-    def _findings(self) -> Iterator[Finding]:
-        """Word what stands; what follows from another finding is left out."""
+    def _findings(self) -> Iterator[tuple[str, Finding]]:
+        """Word what stands, by rule; what follows from another finding is left out."""
         tallies = self._verdicts.tallies
         standing = {key: tally.score for key, tally in tallies.items() if tally.stands}
         backwards = tuple(wheel for name, wheel in standing if name == 'backwards')
@@ -514,10 +539,11 @@ class OnlineChecks:
             if name not in left_out:
                 seen = Seen(self._verdicts.figures[name, wheel], wheel, backwards)
                 sure = min(1.0 - 0.5 ** (score + 1), GREATEST_SURE)
-                yield self._wording.finding(name, seen, sure)
+                yield name, self._wording.finding(name, seen, sure)
 
 
 _CONSEQUENCES = {
+    'reference_sign': {'reference_delay'},
     'mounting': {'gyro_unit', 'sides', 'one_side_backwards', 'torque', 'torque_of_wheel'},
     'gravity': {'torque', 'torque_of_wheel'},
     'rate_unit': {'absurd_rate', 'rate_unit_in_turns', 'one_side_backwards'},

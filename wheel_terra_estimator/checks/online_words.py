@@ -181,6 +181,17 @@ class Wording:
             value=-1.0,
         )
 
+    def _delay_words(self, seen: Seen) -> _Said:
+        return _Said(
+            'delay',
+            'reference_odom',
+            f'velocity follows starts and stops of the wheels about {seen.figure:.1f} s late, by '
+            'the stamps',
+            f'take {seen.figure:.1f} s off its stamps: stamp the moment of the picture, not of the '
+            'result (wheel-terra check has the exact figure)',
+            value=round(seen.figure, 2),
+        )
+
     def _rate_unit_words(self, seen: Seen) -> _Said:
         unit = rate_unit(seen.figure)
         assert unit is not None
@@ -274,6 +285,7 @@ _WORDS: dict[str, Callable[[Wording, Seen], _Said]] = {
     'backwards': Wording._backwards_words,
     'one_side_backwards': Wording._one_side_words,
     'reference_sign': Wording._reference_words,
+    'reference_delay': Wording._delay_words,
     'rate_unit': Wording._rate_unit_words,
     'rate_unit_in_turns': Wording._turn_unit_words,
     'absurd_rate': Wording._absurd_words,

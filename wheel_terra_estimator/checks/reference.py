@@ -40,6 +40,8 @@ TOO_SMALL_STD = 4.0
 """Seen standard deviation over the stated one from which a variance that changes is too small."""
 LEAST_STD = 1e-4
 """Standard deviation [m/s] that is proposed at least."""
+LEAST_UNIT_RATIO = 1.3
+"""Speed over rim speed below which it may be the radius, not the unit [-]."""
 KNOWN_UNITS = {'kilometres per hour': 3.6, 'millimetres per second': 1000.0, 'knots': 1.9438}
 
 
@@ -151,7 +153,7 @@ def _unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         return [], evidence
     ratio = float(np.median(speed[rows] / rim[rows]))
     for unit, factor in KNOWN_UNITS.items():
-        if 0.55 * factor < ratio < 1.25 * factor:
+        if max(0.55 * factor, LEAST_UNIT_RATIO) < ratio < 1.25 * factor:
             mended = replace(reference, velocity=reference.velocity / factor)
             outcome = Finding(
                 kind='unit',

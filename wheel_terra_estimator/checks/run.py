@@ -19,9 +19,11 @@ from wheel_terra_estimator.checks import (
     geometry,
     imu,
     names,
+    rate_noise,
     reference,
     rover_facts,
     sinkage,
+    sinkage_order,
     torque,
     transport,
     wheel_rates,
@@ -167,7 +169,7 @@ def _wheels(evidence: Evidence, report: CheckReport) -> Evidence:
         # Wheels that count against each other hide the speed as well.
         unit, evidence = wheel_rates.check_unit(evidence, figures)
     report.take(unit)
-    report.take(wheel_rates.check_noise(evidence, figures))
+    report.take(rate_noise.check_noise(evidence, figures))
     return evidence
 
 
@@ -196,6 +198,7 @@ def _rest(evidence: Evidence, report: CheckReport) -> Evidence:
     report.take(alignment.check_clock(evidence, figures))
     report.take(imu.check_noise_and_zero(evidence, figures))
     report.take(sinkage.check_sinkage(evidence, figures))
+    report.take(sinkage_order.check_order(evidence, figures))
     report.take(geometry.check_radius(evidence, figures))
     report.take(geometry.check_track(evidence, figures))
     return evidence

@@ -55,7 +55,7 @@ def check_sinkage(evidence: Evidence, figures: dict[str, Any]) -> list[Outcome]:
     unit, table = _unit(evidence, table)
     found += unit
     if facts.configuration is not None:
-        table = _without_stated_errors(facts.configuration, names, table)
+        table = without_stated_errors(facts.configuration, names, table)
     middle = np.array([_median(column) for column in table.T])
     figures['sinkage.median_m'] = [round(float(m), 4) for m in middle]
     found += _sign_and_zero(evidence, names, table, middle)
@@ -63,9 +63,10 @@ def check_sinkage(evidence: Evidence, figures: dict[str, Any]) -> list[Outcome]:
     return found
 
 
-def _without_stated_errors(
+def without_stated_errors(
     configuration: Configuration, names: list[str], table: FloatArray
 ) -> FloatArray:
+    """Return readings (k, p) of the named wheels without the errors that the rover file states."""
     errors = SensorErrors(configuration).sinkage
     rows = [configuration.wheels.names.index(name) for name in names]
     return LinearErrors(errors.zero[rows], errors.gain[rows]).true(table)

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -76,6 +77,8 @@ class WatchedEstimator:
     def estimates(self) -> EstimateSet:
         """Return the estimates; slip is not judged while a finding stands."""
         estimates = self._with_misfits(self._estimator.estimates())
+        if self._checks.remarks:
+            estimates = replace(estimates, faults=_told(estimates.faults, self._checks.remarks))
         findings = self._checks.findings
         if findings:
             return without_judgement(estimates, findings)
@@ -122,12 +125,6 @@ class WatchedEstimator:
 
 def without_judgement(estimates: EstimateSet, findings: tuple[Finding, ...]) -> EstimateSet:
     """Return the set with classes unknown, no stuck warning, and the findings in words."""
-    faults = dict(estimates.faults)
-    for finding in findings:
-        subject = SUBJECT + finding.topic
-        wheel = f'{finding.wheel} ' if finding.wheel else ''
-        told = f'{wheel}{finding.words} ({100 * finding.confidence:.0f} %) -> {finding.cure}'
-        faults[subject] = f'{faults[subject]}; {told}' if subject in faults else told
     wheels = len(estimates.slip_class)
     return replace(
         estimates,
@@ -136,5 +133,16 @@ def without_judgement(estimates: EstimateSet, findings: tuple[Finding, ...]) -> 
         stuck_probability=np.zeros(wheels),
         rim_travel_left=np.full(wheels, NO_ENTRAPMENT_IN_SIGHT),
         reasons=(f'not judged: {findings[0].words}',) * wheels,
-        faults=faults,
+        faults=_told(estimates.faults, findings),
     )
+
+
+def _told(faults: Mapping[str, str], findings: tuple[Finding, ...]) -> dict[str, str]:
+    """Return the faults of a set with what was found, by topic."""
+    result = dict(faults)
+    for finding in findings:
+        subject = SUBJECT + finding.topic
+        wheel = f'{finding.wheel} ' if finding.wheel else ''
+        told = f'{wheel}{finding.words} ({100 * finding.confidence:.0f} %) -> {finding.cure}'
+        result[subject] = f'{result[subject]}; {told}' if subject in result else told
+    return result

@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Wheel rates: signs, sides, exchanged wheels, units, dead channels, noise."""
+"""Wheel rates: signs, sides, exchanged wheels, units, dead channels."""
 
 from __future__ import annotations
 
@@ -29,6 +29,8 @@ UNITS = {
     'revolutions per second': 2.0 * math.pi,
 }
 """Units that wheel rates come in by mistake: factor to rad/s."""
+MOST_COUNT = 0.07
+"""Speed over rim speed below which wheels that fit no unit are in counts (90 in a turn) [-]."""
 UNIT_TOLERANCE = 0.35
 """Share by which a speed ratio may lie off a unit's factor (slip makes it smaller)."""
 ORDINARY_TRACKS = (0.7, 5.0)
@@ -37,9 +39,6 @@ FROZEN_TIME = 5.0
 """A rate that does not change in the last digit for this long [s] while the others do."""
 LONG_FROZEN_TIME = 10.0
 """The same at a steady speed, where a coarse encoder may repeat itself [s]."""
-NOISE_FACTOR = 5.0
-LEAST_NOISE_SHARE = 0.08
-"""Noise of a rate that matters, as a share of the working rate."""
 LEAST_TURN_RATE = 0.02
 """Yaw rate below which sides are not compared [rad/s]."""
 CLEAR_SPEED = 5.0
@@ -159,7 +158,30 @@ def check_unit(evidence: Evidence, figures: dict[str, Any]) -> tuple[list[Outcom
                 cure=f'multiply velocity by {factor:.6g} in the driver (rad/s, REP 103)',
             )
             return [outcome], evidence.with_rate(evidence.rate * factor)
+    if ratio is not None and 0.0 < ratio < MOST_COUNT:
+        figures['wheels.rad_per_count'] = float(f'{ratio:.4g}')
+        return _counts(evidence, ratio, how)
     return [], evidence
+
+
+def _counts(evidence: Evidence, ratio: float, how: str) -> tuple[list[Outcome], Evidence]:
+    joints = evidence.recording.joints
+    assert joints is not None
+    outcome = Finding(
+        kind='unit',
+        topic=joints.topic,
+        value=float(f'{ratio:.3g}'),
+        confidence=0.9,
+        words=(
+            f'velocity is {1.0 / ratio:.0f} times what the {how} allows: counts of an encoder per '
+            f'second, about {2.0 * math.pi / ratio:.0f} in a turn of the wheel?'
+        ),
+        cure=(
+            f'multiply velocity by 2 pi / counts per turn (about {ratio:.3g}) in the driver '
+            '(rad/s, REP 103)'
+        ),
+    )
+    return [outcome], evidence.with_rate(evidence.rate * ratio)
 
 
 def _speed_ratio(evidence: Evidence) -> float | None:
@@ -518,43 +540,3 @@ def _exchanged(evidence: Evidence, turns: NDArray[np.bool_]) -> tuple[list[Outco
                 )
             )
     return found, evidence.with_rate(rate, torque)
-
-
-def check_noise(evidence: Evidence, figures: dict[str, Any]) -> list[Outcome]:
-    """Compare the noise of the rates with what the rover file states."""
-    configuration, joints = evidence.facts.configuration, evidence.recording.joints
-    rows = evidence.moving
-    if configuration is None or joints is None or rows.sum() < 60:
-        return []
-    stated = float(configuration.sensors.wheel_rate_std)
-    found: list[Outcome] = []
-    noises = {}
-    for index, name in enumerate(evidence.facts.names):
-        bend = np.diff(evidence.rate[:, index], 2)[rows[1:-1]] / math.sqrt(6.0)
-        bend = bend[np.isfinite(bend)]
-        if bend.size > 50:
-            noises[name] = max(robust_std(bend), 0.5 * float(np.std(bend)))
-    if not noises:
-        return []
-    typical = float(np.median(list(noises.values())))
-    figures['wheels.rate_noise_rad_s'] = float(f'{typical:.3g}')
-    limit = max(NOISE_FACTOR * stated, LEAST_NOISE_SHARE * evidence.working_rate)
-    for name, noise in noises.items():
-        alone = noise > 4.0 * typical
-        if noise > limit and (alone or name == next(iter(noises))):
-            found.append(
-                Finding(
-                    kind='noise',
-                    topic=joints.topic,
-                    wheel=name if alone else None,
-                    parameter='sensors.wheel_rate_std',
-                    value=float(f'{noise:.2g}'),
-                    confidence=0.95,
-                    words=(
-                        f'rate scatters by {noise:.2g} rad/s where the rover file has {stated:g} '
-                        '(noise, or steps of a coarse encoder)'
-                    ),
-                    cure=f'sensors.wheel_rate_std: {noise:.2g}',
-                )
-            )
-    return found

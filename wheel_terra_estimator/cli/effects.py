@@ -199,7 +199,7 @@ def _law_table() -> list[str]:
     lines += ['', '| feature | value | varies with |', '|---|---|---|']
     for name, feature in law.FEATURES.items():
         columns = ', '.join(feature.columns) or '-'
-        only = ' (`torque` and `drawbar_pull` only)' if feature.after_contact else ''
+        only = f' ({", ".join(f"`{t}`" for t in feature.targets)} only)' if feature.targets else ''
         lines.append(f'| `{name}` | {feature.meaning.replace("|", "&#124;")}{only} | {columns} |')
     return [*lines, '']
 

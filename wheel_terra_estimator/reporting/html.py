@@ -9,6 +9,7 @@ A report has a template that extends ``base.html`` and fills its blocks ``title`
 from __future__ import annotations
 
 import base64
+import re
 from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -67,5 +68,14 @@ def picture(figure: Figure) -> str:
     buffer = StringIO()
     with picture_style():  # text as text, and the same bytes for the same picture
         figure.savefig(buffer, format='svg', metadata={'Date': None})
-    image = for_dark_pages(buffer.getvalue()).encode()
+    image = for_dark_pages(_rounded(buffer.getvalue())).encode()
     return 'data:image/svg+xml;base64,' + base64.b64encode(image).decode()
+
+
+_PLACES = re.compile(r'(?<= )(?:d|x|y|points)="[^"]*"')
+_MORE_THAN_HUNDREDTHS = re.compile(r'(\.\d\d)\d+')
+
+
+def _rounded(svg: str) -> str:
+    """Return a picture whose places are told to 0.01 pt: half as large, to the eye the same."""
+    return _PLACES.sub(lambda match: _MORE_THAN_HUNDREDTHS.sub(r'\1', match[0]), svg)

@@ -43,12 +43,15 @@ def plate_sinkage(load: Any, area: Any, modulus: Any, exponent: Any) -> Any:
     return (load / (area * modulus)) ** (1.0 / exponent)
 
 
-def rolling_sinkage(load: Any, radius: Any, width: Any, modulus: Any, exponent: Any) -> Any:
+def rolling_sinkage(
+    load: Any, radius: Any, width: Any, modulus: Any, exponent: Any, maths: Any = np
+) -> Any:
     """Sinkage of a towed rigid wheel without slip [m] (Bekker 1969).
 
     z = [3 W / ((3 - n) b k sqrt(D))]^(2/(2n+1)); small sinkage, n below 1.3, stress in front only.
+    The series that it comes from ends before n = 3: beyond 2.8 it goes on with 3 - n = 0.2.
     """
-    force = (3.0 - exponent) * width * modulus * (2.0 * radius) ** 0.5
+    force = maths.maximum(3.0 - exponent, 0.2) * width * modulus * (2.0 * radius) ** 0.5
     return (3.0 * load / force) ** (2.0 / (2.0 * exponent + 1.0))
 
 

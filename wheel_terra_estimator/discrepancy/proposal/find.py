@@ -116,9 +116,11 @@ def promise_on_top(table: SteadyTable, setting: Setting, fitted: Fit) -> float:
     """Return the nats that the best term of an unlisted law promises on top of a fit.
 
     Near zero where the fit leaves noise alone; several nats where what is left has the shape of
-    some closure, so that the named effect is not the whole truth, or not the truth.
+    some closure, so that the named effect is not the whole truth, or not the truth. Bands of slip
+    are left out: the confidence that this is a feature of was fitted without them.
     """
-    terms = replace(setting, effects=_terms(table))
+    found = {name: term for name, term in _terms(table).items() if '_near_' not in name}
+    terms = replace(setting, effects=found)
     starts = linear_starts(terms, fitted, tuple(terms.effects))
     return max((promise for promise, _, _ in starts), default=0.0)
 

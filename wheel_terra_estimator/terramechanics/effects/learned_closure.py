@@ -24,6 +24,10 @@ NAME = 'learned_closure'
 REFERENCE_SPEED = 0.05  # rim speed at which the feature rim_speed is 0 [m/s]
 _BY = '_by_'
 _LEAST = 1e-9  # keeps logarithms finite
+_BAND = 0.25  # half width of a band of slip, at its foot [-]
+_AFTER_CONTACT = ('torque', 'drawbar_pull')  # may depend on the sinkage
+# Soil that peaks at some shear displacement and then softens, or a reading that is off there.
+_IN_A_BAND = ('friction', 'torque', 'drawbar_pull', 'sinkage')
 
 
 @dataclass(frozen=True)
@@ -63,15 +67,15 @@ class Feature:
         Columns of a table of which one must vary; none: always available.
     meaning : str
         For people.
-    after_contact : bool
-        True where it needs the sinkage, so that only ``torque`` and ``drawbar_pull`` may use it.
+    targets : tuple of str
+        Closures that may use it; none: all.
     """
 
     value: Callable[[Contact, Any], Any]
     spread: float
     columns: tuple[str, ...]
     meaning: str
-    after_contact: bool = False
+    targets: tuple[str, ...] = ()
 
 
 TARGETS: Mapping[str, Target] = {
@@ -96,6 +100,15 @@ def _over(onset: float) -> Callable[[Contact, Any], Any]:
     return excess
 
 
+def _near(middle: float) -> Callable[[Contact, Any], Any]:
+    def band(contact: Contact, maths: Any) -> Any:
+        away = (maths.abs(contact.slip) - middle) / _BAND
+        inside = maths.maximum(1.0 - away * away, 0.0)
+        return inside * inside
+
+    return band
+
+
 def _load(contact: Contact, maths: Any) -> Any:
     scale = contact.density * contact.gravity * contact.width * contact.radius * contact.radius
     return maths.log(maths.maximum(contact.stated_load / scale, _LEAST)) / maths.log(10.0)
@@ -114,6 +127,9 @@ FEATURES: Mapping[str, Feature] = {
     'slip_over_02': Feature(_over(0.2), 0.35, ('slip',), '|s| beyond 0.2'),
     'slip_over_04': Feature(_over(0.4), 0.25, ('slip',), '|s| beyond 0.4'),
     'slip_over_06': Feature(_over(0.6), 0.15, ('slip',), '|s| beyond 0.6'),
+    'slip_near_02': Feature(_near(0.2), 0.5, ('slip',), 'a band of |s| around 0.2', _IN_A_BAND),
+    'slip_near_04': Feature(_near(0.4), 0.5, ('slip',), 'a band of |s| around 0.4', _IN_A_BAND),
+    'slip_near_06': Feature(_near(0.6), 0.5, ('slip',), 'a band of |s| around 0.6', _IN_A_BAND),
     'load': Feature(_load, 0.3, ('normal_load',), 'log10 of W/(rho g b r^2)'),
     'lug': Feature(lambda c, m: c.lug_height / c.radius, 0.06, ('lug_height',), 'h/r'),
     'width': Feature(lambda c, m: c.width / c.radius, 0.3, ('wheel_width', 'wheel_radius'), 'b/r'),
@@ -123,17 +139,20 @@ FEATURES: Mapping[str, Feature] = {
     'pass': Feature(lambda c, m: c.pass_number - 1.0, 1.0, ('pass_number',), 'earlier passes'),
     'slope': Feature(lambda c, m: c.slope + 0.0 * c.slip, 0.2, ('slope',), 'slope [rad]'),
     'depth': Feature(
-        lambda c, m: 1.0 - m.cos(c.entrance_angle), 0.08, ('slip', 'normal_load'), 'z/r', True
+        lambda c, m: 1.0 - m.cos(c.entrance_angle),
+        0.08,
+        ('slip', 'normal_load'),
+        'z/r',
+        _AFTER_CONTACT,
     ),
 }
-_AFTER_CONTACT = ('torque', 'drawbar_pull')
 
 
 def allowed(target: str, feature: str) -> bool:
     """Whether the feature is known where the target is needed, and means something there."""
     # A constant change of a soil number is another soil, not a law.
     constant = feature == 'one' and target not in OUTPUTS
-    return not constant and (not FEATURES[feature].after_contact or target in _AFTER_CONTACT)
+    return not constant and target in (FEATURES[feature].targets or TARGETS)
 
 
 def term_name(target: str, feature: str) -> str:

@@ -20,7 +20,12 @@ def _widening(contact: Contact, p: SimpleNamespace, maths: Any) -> Any:
         contact.reference_depth**contact.sinkage_exponent
     )
     sinkage = rolling_sinkage(
-        contact.normal_load, contact.rim_radius, contact.width, modulus, contact.sinkage_exponent
+        contact.normal_load,
+        contact.rim_radius,
+        contact.width,
+        modulus,
+        contact.sinkage_exponent,
+        maths,
     )
     return 1.0 + p.compliance * contact.normal_load / maths.maximum(sinkage, _LEAST)
 

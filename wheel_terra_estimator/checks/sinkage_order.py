@@ -1,0 +1,133 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Whether two sinkage sensors go by each other's wheel.
+
+A wheel that sinks deeper than another, by a softer spot or by more load, takes more torque. So the
+differences of sinkage and of torque of two wheels go together; with exchanged sensors they go
+against each other. The difference that is always there (zero errors, the places of the wheels) is
+left out, and so are turns, in which the sides push against each other.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wheel_terra_estimator.checks.evidence import Evidence
+from wheel_terra_estimator.checks.finding import Finding, NotChecked, Outcome
+from wheel_terra_estimator.checks.series import SinkageSeries
+from wheel_terra_estimator.checks.statistics import (
+    averaged,
+    block_fit,
+    confidence,
+    correlation,
+    even_times,
+)
+
+FloatArray = NDArray[np.float64]
+
+WINDOW = 1.0
+"""Readings are averaged over this [s]."""
+LEAST_ROWS = 40
+CLEAR = 4.0
+"""Deviations by which a slope of torque over sinkage must differ from 0."""
+ALIKE = 0.5
+"""Correlation of the two differences that tells the order."""
+SHOWN = 3
+"""Pairs that are listed by name."""
+
+
+class Pair(NamedTuple):
+    """Two wheels, how their differences go together, and how many deviations that is off 0."""
+
+    first: str
+    second: str
+    correlation: float
+    sigmas: float
+
+
+def check_order(evidence: Evidence, figures: dict[str, Any]) -> list[Outcome]:
+    """Return sinkage sensors that go by each other's wheel."""
+    sinkage = evidence.recording.sinkage
+    if sinkage is None or not evidence.facts.known:
+        return []
+    if not np.isfinite(evidence.torque).any():
+        return [_not_told('without torques it does not show')]
+    compared = pairs(evidence, sinkage)
+    wrong = [p for p in compared if p.sigmas < -CLEAR and p.correlation < -ALIKE]
+    right = [p for p in compared if p.sigmas > CLEAR and p.correlation > ALIKE]
+    found: list[Outcome] = []
+    exchanged: set[str] = set()
+    for pair in sorted(wrong, key=lambda p: p.correlation):
+        if exchanged & {pair.first, pair.second}:
+            continue
+        exchanged |= {pair.first, pair.second}
+        found += [_finding(sinkage, pair, wheel) for wheel in (pair.first, pair.second)]
+    figures['sinkage.pairs_in_order'] = f'{len(right)} of {len(compared)}'
+    open_pairs = [p for p in compared if p not in right and p not in wrong]
+    if open_pairs or not compared:
+        shown = ', '.join(f'{p.first} / {p.second}' for p in open_pairs[:SHOWN])
+        listed = f' ({shown}{", ..." if len(open_pairs) > SHOWN else ""})' if shown else ''
+        found.append(
+            _not_told(
+                f'{len(open_pairs) or "all"} pairs of wheels do not show theirs{listed}; drive '
+                'straight over soft, patchy ground, up and down, or along a side slope'
+            )
+        )
+    return found
+
+
+def _not_told(reason: str) -> NotChecked:
+    return NotChecked('exchanged_wheels', f'order of the sinkage sensors: {reason}')
+
+
+def _finding(sinkage: SinkageSeries, pair: Pair, wheel: str) -> Finding:
+    other = pair.second if wheel == pair.first else pair.first
+    return Finding(
+        kind='exchanged_wheels',
+        topic=sinkage.topic,
+        wheel=wheel,
+        confidence=confidence(abs(pair.sigmas)),
+        words=(
+            f'its sinkage goes with the torque of {other}, and the other way round (correlation of '
+            f'the differences {pair.correlation:.2f})'
+        ),
+        cure=f'exchange {pair.first} and {pair.second} in the names of the sinkage message',
+    )
+
+
+def pairs(evidence: Evidence, sinkage: SinkageSeries) -> list[Pair]:
+    """Return every pair of wheels whose differences of sinkage and torque can be compared."""
+    names = [n for n in evidence.facts.names if n in sinkage.names]
+    time = even_times(evidence.time, WINDOW)
+    if time.size < LEAST_ROWS:
+        return []
+    straight = averaged(evidence.time, evidence.straight.astype(float)[:, None], time, WINDOW)
+    rows = straight[:, 0] > 0.99
+    if rows.sum() < LEAST_ROWS:
+        return []
+    at = np.asarray((sinkage.stamp - evidence.origin) * 1e-9, dtype=np.float64)
+    depth, thrust = {}, {}
+    sense = np.sign(evidence.rim)
+    for name in names:
+        index = evidence.facts.names.index(name)
+        column = sinkage.sinkage[:, sinkage.names.index(name)]
+        known = np.isfinite(column)
+        torque = evidence.torque[:, index] * sense
+        if known.sum() < LEAST_ROWS or not np.isfinite(torque).all():
+            continue
+        depth[name] = averaged(at[known], column[known, None], time, WINDOW)[rows, 0]
+        thrust[name] = averaged(evidence.time, torque[:, None], time, WINDOW)[rows, 0]
+    found = []
+    for first, second in itertools.combinations(depth, 2):
+        deeper = depth[first] - depth[second]
+        harder = thrust[first] - thrust[second]
+        deeper, harder = deeper - deeper.mean(), harder - harder.mean()
+        slope = block_fit(deeper[:, None], harder)[0]
+        sigmas = math.copysign(slope.sigmas_from(0.0), slope.value)
+        found.append(Pair(first, second, correlation(deeper, harder), sigmas))
+    return found
