@@ -1,11 +1,12 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Which faults raise the stuck warning before they are told while driving.
+"""Which faults are told while driving, and which raise the stuck warning before that.
 
 python tools/warning_study.py --seconds 60 drive_a=generic_six_wheel drive_b=my_rover.yaml
 
 The faults are those of `fault_study.py`. Each recording is played message by message through what
-node and replay share, first as it is, then with each fault. A run ends where the fault is told.
+node and replay share, first as it is, then with each fault. A run ends where the fault is told, by
+any words with a cure; a fault that shows in no window of this part of the drive is not told.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from __future__ import annotations
 import argparse
 import heapq
 import math
+from collections import defaultdict
 from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
@@ -26,6 +28,7 @@ from wheel_terra_estimator.checks.run import check_recording
 from wheel_terra_estimator.checks.series import Channel, Recording
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.messages.pipeline import Pipeline
+from wheel_terra_estimator.trials.trial import interval
 
 NOT_THERE = -1.0
 """First entry of a covariance where the message has no such value (REP 145)."""
@@ -121,6 +124,12 @@ def course(case: Case, seconds: float) -> Course:
     return Course(warned, math.nan)
 
 
+def share(right: int, count: int) -> str:
+    """Return a share with its 95 % interval (Wilson 1927)."""
+    low, high = interval(right, count)
+    return f'{right} of {count} ({100 * low:.0f} to {100 * high:.0f} %)'
+
+
 def main() -> None:
     """Print when each fault was told, and whether the warning came before."""
     parser = argparse.ArgumentParser(description=__doc__.partition('\n')[0])
@@ -129,7 +138,8 @@ def main() -> None:
     parser.add_argument('--faults', default='', metavar='WORD', help='only those with this word')
     arguments = parser.parse_args()
     faults = [fault for fault in FAULTS if arguments.faults in fault.name]
-    runs = untold = early = by_check = 0
+    runs = untold = early = by_check = false = 0
+    times: dict[str, list[float]] = defaultdict(list)
     for text in arguments.cases:
         path, _, files = text.partition('=')
         with open_bag(path) as bag:
@@ -137,6 +147,7 @@ def main() -> None:
         case = Case(recording, reader.load(files.split('+')))
         report = check_recording(case.recording, case.rover)
         as_it_is = course(case, arguments.seconds)
+        false += not math.isnan(as_it_is.told)
         print(f'{recording.name}: as it is: {as_it_is}', flush=True)
         for fault in faults:
             faulty = fault.put(case)
@@ -144,6 +155,7 @@ def main() -> None:
                 continue
             runs += 1
             found = course(faulty, arguments.seconds)
+            times[fault.name].append(found.told)
             if not math.isnan(found.warned) and math.isnan(as_it_is.warned):
                 late = not math.isnan(found.told)
                 before = late or outcome(fault, case, report) == 'found'
@@ -152,6 +164,16 @@ def main() -> None:
                 untold += not before
                 by = 'told while driving' if late else 'found by check' if before else 'not found'
                 print(f'{recording.name}: {fault.name}: {found}, {by}', flush=True)
+    print(f'\n{"fault":36}{"told":>7}{"runs":>7}{"first [s]":>12}{"last [s]":>12}')
+    for name, told in times.items():
+        known = [time for time in told if not math.isnan(time)] or [math.nan]
+        count = sum(not math.isnan(time) for time in told)
+        print(f'{name:36}{count:7}{len(told):7}{min(known):12.1f}{max(known):12.1f}')
+    everything = [time for told in times.values() for time in told]
+    print(
+        f'\ntold while driving: {share(sum(t == t for t in everything), len(everything))}; '
+        f'told without a fault: {share(false, len(arguments.cases))}'
+    )
     print(
         f'{runs} runs; warned before the fault was told: {early}; warned, not told while driving '
         f'but found by the checks that replay runs first: {by_check}; warned, not found: {untold}'

@@ -69,10 +69,20 @@ def test_from_a_recording_then_checked_and_calibrated(tmp_path, capsys):
     assert rover.wheels.names[0] == 'front_left_wheel_joint'
     assert np.allclose(rover.wheels.x, [0.25, 0.25, -0.25, -0.25])
     assert rover.wheels.passes.tolist() == [1, 1, 2, 2]
+    assert 'rover.centre_of_gravity is a guess' in capsys.readouterr().out
+    assert 'A GUESS, to be measured: centre of gravity' in output.read_text()
     better = tmp_path / 'calibrated.yaml'
     command = ['calibrate', str(PATHFINDER), '--config', str(output), '-o', str(better)]
     assert main(command) == 0
     assert np.allclose(reader.load([better]).wheels.radius, 0.117, atol=0.001)
+
+
+def test_all_measures_that_are_missing_are_named_at_once(tmp_path, capsys):
+    command = ['init', '--bag', str(PATHFINDER), '--mass', '22', '-o', str(tmp_path / 'rover.yaml')]
+    assert main(command) == 2
+    complaint = capsys.readouterr().err
+    assert all(name in complaint for name in ('--radius', '--track', '--wheelbase'))
+    assert '--mass' not in complaint and not (tmp_path / 'rover.yaml').exists()
 
 
 def test_config(capsys):

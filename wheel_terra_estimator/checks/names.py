@@ -99,6 +99,9 @@ def check_wheel_names(recording: Recording, facts: RoverFacts) -> list[Outcome]:
 def proposal(recording: Recording) -> dict[str, Any]:
     """Return what to write for a recording without a rover file: remaps and ``wheels.names``."""
     remaps = [o.cure for o in check_topics(recording, ()) if isinstance(o, Finding)]
+    reference = recording.reference
+    if reference is not None and 'truth' in reference.topic:
+        remaps.append(f'--remap reference_odom:={reference.topic}  (to compare with, or as reference)')
     names = wheel_names(recording.joints.names) if recording.joints is not None else ()
     return {'remaps': remaps, 'wheels.names': list(names)}
 

@@ -66,7 +66,8 @@ def as_text(recording: Recording, report: CheckReport, without_rover: bool) -> s
     """Return what the command prints."""
     from wheel_terra_estimator.checks.names import proposal
 
-    lines = [f'{recording.name}: {len(report.findings) or "no"} findings']
+    count = len(report.findings)
+    lines = [f'{recording.name}: {count or "no"} finding{"" if count == 1 else "s"}']
     lines += [f'  {finding}' for finding in report.findings]
     if without_rover:
         lines += ['', '  topics']

@@ -118,14 +118,19 @@ def _wheels_of(path: Path, limits: Limits) -> list[str]:
 def _from_measures(arguments: argparse.Namespace, wheels: list[str]) -> RoverSketch:
     from wheel_terra_estimator.checks.rover_facts import side_of
     from wheel_terra_estimator.configuration.rover_template import (
+        CENTRE_HEIGHT,
         DEFAULT_WIDTH_SHARE,
         RoverSketch,
     )
 
     measures = {name: getattr(arguments, name) for name, _, _ in _MEASURES}
-    for name, unit, meaning in _MEASURES:
+    missing = [name for name in _NEEDED if measures[name] is None]
+    if missing and not sys.stdin.isatty():
+        words = {name: f'--{name} {unit} ({meaning})' for name, unit, meaning in _MEASURES}
+        raise UserError(f'missing: {", ".join(words[name] for name in missing)}')
+    for name, _, meaning in _MEASURES:
         if measures[name] is None and name in _NEEDED:
-            measures[name] = _ask_number(name, unit, meaning)
+            measures[name] = _ask_number(name, meaning)
     sides = [side_of(name) for name in wheels]
     if 0 in sides:  # left before right, as the file has it
         sides = [1 if i % 2 == 0 else -1 for i in range(len(wheels))]
@@ -134,6 +139,7 @@ def _from_measures(arguments: argparse.Namespace, wheels: list[str]) -> RoverSke
     base, half = measures['wheelbase'], 0.5 * measures['track']
     x = [base * (0.5 - row / last) if last else 0.0 for row in rows]
     count = len(wheels)
+    guessed = {'rover.centre_of_gravity'} | (set() if measures['width'] else {'wheels.width'})
     return RoverSketch(
         name=arguments.name or 'my rover',
         wheels=wheels,
@@ -143,7 +149,8 @@ def _from_measures(arguments: argparse.Namespace, wheels: list[str]) -> RoverSke
         y=[round(half * side, 4) for side in sides],
         z=[measures['radius']] * count,
         mass=measures['mass'],
-        guessed=frozenset() if measures['width'] else frozenset({'wheels.width'}),
+        centre_of_gravity=(0.0, 0.0, round(CENTRE_HEIGHT * measures['radius'], 4)),
+        guessed=frozenset(guessed),
         source='wheel names from the recording, the rest as given' if arguments.bag else 'as given',
     )
 
@@ -156,15 +163,15 @@ def _ask_wheels() -> list[str]:
     return wheels
 
 
-def _ask_number(name: str, unit: str, meaning: str) -> float:
-    text = _ask(f'{meaning}: ', f'--{name} {unit} is missing ({meaning})')
+def _ask_number(name: str, meaning: str) -> float:
+    text = _ask(f'{meaning}: ')
     try:
         return _positive(text)
     except argparse.ArgumentTypeError as error:
         raise UserError(f'--{name}: {error}') from None
 
 
-def _ask(question: str, missing: str = 'give --urdf, --bag or --wheels') -> str:
+def _ask(question: str) -> str:
     if not sys.stdin.isatty():
-        raise UserError(missing)
+        raise UserError('give --urdf, --bag or --wheels')
     return input(question)

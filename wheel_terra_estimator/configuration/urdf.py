@@ -17,7 +17,11 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import NDArray
 
-from wheel_terra_estimator.configuration.rover_template import DEFAULT_WIDTH_SHARE, RoverSketch
+from wheel_terra_estimator.configuration.rover_template import (
+    CENTRE_HEIGHT,
+    DEFAULT_WIDTH_SHARE,
+    RoverSketch,
+)
 from wheel_terra_estimator.errors import UserError
 
 LARGEST_FILE = 20_000_000  # [byte]
@@ -63,7 +67,9 @@ def read_urdf(path: Path, wheels: Sequence[str] = ()) -> RoverSketch:
     radius = [r for r, _ in shapes]
     mass, centre = _mass(links, joints, base, path)
     if not mass:
-        guessed.add('rover.mass')
+        guessed |= {'rover.mass', 'rover.centre_of_gravity'}
+        ground = min(float(p[2, 3]) - r for p, r in zip(poses, radius, strict=True))
+        centre = [0.0, 0.0, round(ground + CENTRE_HEIGHT * max(radius), 4)]
     return RoverSketch(
         name=robot.get('name', path.stem),
         wheels=names,
