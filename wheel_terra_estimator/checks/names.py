@@ -101,7 +101,7 @@ def proposal(recording: Recording) -> dict[str, Any]:
     remaps = [o.cure for o in check_topics(recording, ()) if isinstance(o, Finding)]
     reference = recording.reference
     if reference is not None and 'truth' in reference.topic:
-        remaps.append(f'--remap reference_odom:={reference.topic}  (to compare with, or as reference)')
+        remaps.append(f'--remap reference_odom:={reference.topic}  (or kept to compare with)')
     names = wheel_names(recording.joints.names) if recording.joints is not None else ()
     return {'remaps': remaps, 'wheels.names': list(names)}
 
