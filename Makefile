@@ -11,7 +11,7 @@
 
 PYTHON ?= python3
 VENV ?= .venv
-PYTEST_ARGUMENTS ?= --numprocesses auto --dist loadfile
+PYTEST_ARGUMENTS ?= --numprocesses auto --dist loadfile --no-loadscope-reorder
 # With a sourced Jazzy, its own rclpy is used, and the numpy that it was built for.
 ifdef ROS_DISTRO
 RUNTIME ?= requirements/oldest.txt

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import io
+import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,36 @@ from wheel_terra_estimator.bags.message_factory import MessageFactory
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.messages.convert import INPUT_TYPES
+
+LONGEST = (
+    'ros/test_parity.py',
+    'ros/test_transport_faults.py',
+    'ros/test_soak.py',
+    'ros',
+    'discrepancy',
+    'estimation/test_wheel_soil_estimator.py',
+    'soilbin/test_engine.py',
+    'evaluation/test_closed_loop.py',
+)
+"""Files and folders that begin first, so that no worker ends long after the others."""
+
+
+def pytest_xdist_auto_num_workers() -> int:
+    """One more than cores: tests of nodes wait most of their time."""
+    return (os.cpu_count() or 1) + 1
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Sort the files, each as it stands: the longest first."""
+    here = Path(__file__).parent
+
+    def rank(item: pytest.Item) -> int:
+        path = item.path.relative_to(here) if item.path.is_relative_to(here) else item.path
+        names = {path.as_posix(), path.parts[0]}
+        return next((i for i, name in enumerate(LONGEST) if name in names), len(LONGEST))
+
+    items.sort(key=rank)
+
 
 NAMES = ('left', 'right')
 RATE = 2.0  # [rad/s]

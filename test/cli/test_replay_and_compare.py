@@ -69,7 +69,7 @@ def test_findings_come_before_anything_else(upside_down, tmp_path, capsys):
     assert said.startswith('finding: mounting') and 'imu_mounting_roll_deg: 180' in said
 
 
-def test_smoothed(tmp_path, capsys):
+def test_smoothed(tmp_path, capsys, undrawn):
     """Same sets at the same times, warnings and diagnostics as given live, both in the report."""
     from wheel_terra_estimator.bags.writer import NAMESPACE
 

@@ -396,7 +396,12 @@ def test_the_zero_of_the_pitch_gyro_does_not_reach_the_pulls():
 
 def test_a_steered_rover_is_judged_along_its_wheels():
     """On an arc the inner wheels of a steered rover are slow because they are on inner circles."""
-    drive = simulate(load('steered_turns'), 4, duration=38.0)
+    arcs = {
+        'drive__time': [0.0, 10.0, 12.0],
+        'drive__forward': [0.05, 0.05, 0.05],
+        'drive__turn_rate': [0.0, 0.0, 0.05],
+    }
+    drive = simulate(load('steered_turns', **arcs), 4, duration=24.0)
     truth, configuration = drive.truth, drive.configuration
     turning = np.abs(truth.yaw_rate) > 0.03
     assert turning.sum() > 100

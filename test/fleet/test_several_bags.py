@@ -165,7 +165,7 @@ def test_what_cannot_be_done_is_said_first(
 def test_ctrl_c_leaves_whole_outputs_and_the_next_run_goes_on(
     make_bag: Any, make_drive: Any, config: list[str], tmp_path: Path
 ) -> None:
-    long = make_bag(make_drive(500), name='long')
+    long = make_bag(make_drive(300), name='long')
     short = make_bag(name='short')
     out = tmp_path / 'out'
     program = [sys.executable, '-m', 'wheel_terra_estimator.cli.main']

@@ -197,7 +197,7 @@ def test_entrapment_needs_a_second_and_clears_after_three() -> None:
 
 
 def test_the_soft_patch_entraps() -> None:
-    truth = simulate(load('climb_soft_patch'), 5, 105.0).truth
+    truth = simulate(load('climb_soft_patch'), 5, 98.0).truth
     median = np.nanmedian(truth.slip[10:], axis=1)
     assert truth.stuck[-1]
     assert truth.sinkage[-1].max() > 2.0 * truth.sinkage[100].max()
