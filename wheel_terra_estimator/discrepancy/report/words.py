@@ -318,7 +318,7 @@ def sentence(
     """Return the verdict in words."""
     if verdict.word == 'undecided':
         return _undecided(gap or {}, nearest)
-    within = f', with a model-error floor of {100 * floor:.1f} % of the range'
+    within = f', with a model-error floor of {100 * floor:.2g} % of the range'
     if not floor:
         within = ' (model-error floor needed: none)'
     if verdict.word == 'agrees' and floor > _COARSE:
