@@ -80,7 +80,7 @@ _INDENT = re.compile(r'\n\s+')
 
 
 def _compact(svg: str) -> str:
-    """Return a picture less than half as large, to the eye the same: places to 0.01 pt, one font."""
+    """Return a picture half as large, to the eye the same: places to 0.01 pt, one font."""
     svg = _FONTS.sub("font-family: 'DejaVu Sans', Verdana, sans-serif", _METADATA.sub('', svg))
     svg = _PLACES.sub(_to_hundredths, svg)
     return _INDENT.sub('\n', svg)
