@@ -138,11 +138,16 @@ def _noisy(field: str, factor: float) -> Callable[[Any, Case], Any]:
     return make
 
 
-def _stepped(series: Any, case: Case) -> Any:
-    """Rates as of an encoder with two counts in the usual interval."""
+def _counted(series: Any, case: Case) -> Any:
+    """Rates of an encoder that counts twice in the usual interval at the usual rate."""
+    seconds = (series.stamp - series.stamp[0]) * 1e-9
+    interval = np.maximum(np.diff(seconds, prepend=-float(np.median(np.diff(seconds)))), 1e-3)
     size = np.abs(series.rate[np.isfinite(series.rate)])
-    step = 0.5 * float(np.median(size[size > 0.2 * np.quantile(size, 0.95)]))
-    return step * np.round(series.rate / step)
+    usual = float(np.median(size[size > 0.2 * np.quantile(size, 0.95)]))
+    angle = 0.5 * usual * float(np.median(interval))
+    turned = np.cumsum(np.nan_to_num(series.rate) * interval[:, None], axis=0)
+    counts = np.diff(np.floor(turned / angle), axis=0, prepend=0.0)
+    return np.where(np.isfinite(series.rate), angle * counts / interval[:, None], np.nan)
 
 
 def _late(seconds: float) -> Callable[[Any, Case], Any]:
@@ -218,7 +223,7 @@ FAULTS = (
     Fault('rates in degrees', ('unit',), _joints(rate=lambda s, c: np.degrees(s.rate))),
     Fault('a frozen rate', ('frozen',), _joints(rate=_frozen), True),
     Fault('noisy rates', ('noise',), _joints(rate=_noisy('rate', 0.5))),
-    Fault('rates in coarse steps', ('noise',), _joints(rate=_stepped)),
+    Fault('rates in coarse steps', ('noise',), _joints(rate=_counted)),
     Fault('rates in encoder counts', ('unit',), _joints(
         rate=lambda s, c: s.rate * 4096 / (2.0 * math.pi))),
     Fault('gaps in the wheel rates', ('drop_outs',), _dropping('joints')),

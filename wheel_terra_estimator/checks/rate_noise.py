@@ -111,6 +111,12 @@ def _intervals(time: FloatArray) -> FloatArray:
     return np.diff(time, prepend=2.0 * time[0] - time[1]) if time.size > 1 else np.ones(time.size)
 
 
+def common_step(rate: FloatArray, time: FloatArray) -> float:
+    """Return the usual step of the rates (k, n) of all wheels [rad/s]; 0 for none."""
+    interval = _intervals(time)
+    return float(np.median([rate_step(column, interval) for column in rate.T]))
+
+
 def rate_step(rate: FloatArray, interval: FloatArray) -> float:
     """Return the step of rates that are multiples of one number [rad/s]; 0 where they are not.
 
@@ -124,13 +130,13 @@ def rate_step(rate: FloatArray, interval: FloatArray) -> float:
     rate, interval = rate[known], interval[known]
     usual = float(np.median(interval)) if interval.size else 1.0
     for values in (rate, rate * interval / usual):
-        step = _common_step(values)
+        step = _step_of(values)
         if step:
             return step
     return 0.0
 
 
-def _common_step(values: FloatArray) -> float:
+def _step_of(values: FloatArray) -> float:
     top = float(np.abs(values).max()) if values.size else 0.0
     if not top:
         return 0.0

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from wheel_terra_estimator.checks.evidence import LEAST_MOVING_ROWS, Evidence, row_medians
 from wheel_terra_estimator.checks.finding import Finding, NotChecked, Outcome
+from wheel_terra_estimator.checks.rate_noise import common_step
 from wheel_terra_estimator.checks.statistics import (
     block_fit,
     confidence,
@@ -37,6 +38,9 @@ ORDINARY_TRACKS = (0.7, 5.0)
 """Effective over geometric track of rovers that turn by skidding [-]."""
 FROZEN_TIME = 5.0
 """A rate that does not change in the last digit for this long [s] while the others do."""
+FROZEN_CHANGE = 0.3
+"""Change of the other rates meanwhile, as a share of the working rate; steps of coarse encoders are
+none."""
 LONG_FROZEN_TIME = 10.0
 """The same at a steady speed, where a coarse encoder may repeat itself [s]."""
 LEAST_TURN_RATE = 0.02
@@ -70,6 +74,7 @@ def check_dead_wheels(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         return [], evidence
     joints = evidence.recording.joints
     assert joints is not None
+    change = max(FROZEN_CHANGE * working, 1.5 * common_step(rate[moving], evidence.time[moving]))
     for index, name in enumerate(evidence.facts.names):
         own = rate[:, index]
         others = np.delete(rate, index, axis=1)
@@ -84,7 +89,7 @@ def check_dead_wheels(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
                 beside = np.nanmedian(others[start : end + 1], axis=1)
                 changes = np.mean(np.diff(others[start : end + 1], axis=0) != 0.0)
                 lasting = evidence.time[end] - evidence.time[start] > LONG_FROZEN_TIME
-                lively = np.ptp(beside) > 0.3 * working or (lasting and changes > 0.5)
+                lively = np.ptp(beside) > change or (lasting and changes > 0.5)
             if lively:
                 longest = max(longest, float(evidence.time[end] - evidence.time[start]))
         repeats = np.mean(np.diff(own[moving]) == 0.0)
