@@ -98,6 +98,25 @@ def test_a_failing_filter_is_held_said_and_started_anew(how):
 
 
 @pytest.mark.filter_fails
+def test_a_step_that_fails_before_its_set_is_told_with_the_set():
+    told = []
+    for settled in (False, True):
+        config = configuration(output_rate=2.0)
+        core = EstimatorCore(config, Failing(config, 'raise'))
+        sets = []
+        for i in range(21):
+            sets += core.add(odometry(0.1 * i, rate=9.0 if i == 7 else 1.0))
+            if settled:
+                core.settle()
+        assert core.health()['filter_restarts'] == 1
+        told.append(
+            [(*found, sorted(s.faults)) for found, s in zip(essence(sets), sets, strict=True)]
+        )
+    assert told[0] == told[1]
+    assert any('filter' in faults for *_, faults in told[0])
+
+
+@pytest.mark.filter_fails
 def test_restarts_of_the_filter_and_of_the_core_add_up():
     class Both(Failing):
         def health(self):

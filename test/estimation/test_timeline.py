@@ -159,6 +159,38 @@ def test_each_set_is_what_a_run_in_order_through_the_inputs_so_far_gives(data):
             assert estimates.forward_velocity == expected.forward_velocity
 
 
+@settings(max_examples=20, deadline=None)
+@given(st.data())
+def test_steps_made_before_a_set_asks_for_them_change_no_number(data):
+    stream = drive(1.5)
+    rate = data.draw(st.sampled_from([0.0, 4.0, 20.0]))
+    delays = [data.draw(st.sampled_from([0.0, 0.0, 0.004, 0.03, 0.25, 0.7])) for _ in stream]
+    plain, _ = make_core(output_rate=rate)
+    expected = essence(play(plain, arriving(stream, delays)))
+    core, _ = make_core(output_rate=rate)
+    sets = []
+    for measurement in arriving(stream, delays):
+        sets += core.add(measurement)
+        if data.draw(st.booleans()):
+            core.settle()
+    assert essence(sets + core.flush()) == expected
+
+
+def test_a_late_input_that_was_settled_costs_the_next_set_one_step():
+    steps = []
+    for settled in (False, True):
+        core, fake = make_core(output_rate=10.0)
+        play(core, [odometry(0.1 * i) for i in range(20)], flush=False)
+        core.add(sinkage(1.87))
+        core.add(reference(1.95))
+        if settled:
+            core.settle()
+        before = fake.steps
+        assert len(core.add(odometry(2.0))) == 1
+        steps.append(fake.steps - before)
+    assert steps[1] == 1 < steps[0]
+
+
 def test_an_input_older_than_the_history_is_dropped_and_counted():
     core, _ = make_core(history=2.0)
     play(core, [odometry(0.1 * i) for i in range(40)], flush=False)

@@ -92,6 +92,10 @@ ReferenceVelocity
             return []
         return self._follow(self._watch.judge(channel, checked))
 
+    def settle(self) -> None:
+        """Take in at once what else the next set would wait for; no number changes."""
+        self._timeline.settle()
+
     def flush(self) -> list[EstimateSet]:
         """Return the sets that were held back for late inputs: no more will come."""
         sets = self._follow(self._watch.finish())

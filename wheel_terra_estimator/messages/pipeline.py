@@ -80,6 +80,10 @@ class Pipeline:
             self.on_measurement(measurement)
         return self._out(self.core.add(measurement))
 
+    def settle(self) -> None:
+        """Do beforehand what the next set would wait for; changes no number."""
+        self.core.settle()
+
     def refuse(self, topic: str, reason: str) -> None:
         """Count a message of an input topic that could not even be unpacked."""
         self.received[topic] += 1

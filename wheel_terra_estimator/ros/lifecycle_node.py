@@ -64,6 +64,9 @@ MESSAGE_TYPES = {
     'reference_odom': Odometry,
 }
 
+FREQUENT = ('joint_states', 'odom', 'imu/data')
+"""Topics that come many times between two sets; what else comes, often late, is run through at once
+and not when a set is due, which is then there sooner."""
 WATCH_PERIOD = 0.25  # [s]
 DIAGNOSTICS_PERIOD = 1.0  # [s] of the steady clock, while nothing is heard
 SILENCE = 1.5  # [s] of the steady clock without a set
@@ -276,6 +279,8 @@ class EstimatorNode(LifecycleNode):
             pipeline.transport_faults.pop(topic, None)  # no longer silent; the watch knows the rest
         for estimates in pipeline.hear(topic, message):
             self._take(estimates, now)
+        if topic not in FREQUENT:
+            pipeline.settle()
 
     def _take(self, estimates: EstimateSet, now: float) -> None:
         assert self._pipeline is not None and self._publisher is not None

@@ -189,6 +189,25 @@ class InputLog:
 
     def run_to(self, last: int) -> None:
         """Run up to and with the entry `last`."""
+        pending = self._run_steps(last)
+        if pending:
+            # The rest is taken in for this one set; the next step begins where this one did.
+            self._keep(always=True)
+            self._astray = True
+            self._step(self.entries[last].stamp, pending, self._walk)
+
+    def settle(self, last: int) -> None:
+        """Make the steps up to the entry `last` that the next run would make anyway."""
+        if self._position < 0:
+            return  # the first set begins the run
+        try:
+            self._run_steps(last)
+        except BaseException:
+            self._astray = True  # a step failed half way; the next run begins before it
+            raise
+
+    def _run_steps(self, last: int) -> list[list[Any]]:
+        """Make all whole steps up to the entry `last`; return what is left over of the next."""
         if self._position != self._ran or self._position < 0 or self._astray:
             self._go_back()
         entries = self.entries
@@ -206,12 +225,8 @@ class InputLog:
                 pending.clear()
                 self._position = self._ran = index + 1
                 self._keep()
-        if pending:
-            # The rest is taken in for this one set; the next step begins where this one did.
-            self._keep(always=True)
-            self._astray = True
-            self._step(entries[last].stamp, pending, self._walk)
         self.dirty = 0
+        return pending
 
     def begin_after(self, index: int) -> None:
         """Forget the state and all up to an entry: the estimator failed there."""

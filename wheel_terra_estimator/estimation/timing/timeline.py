@@ -11,6 +11,7 @@ between two sets costs one run.
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from enum import Enum
 
@@ -26,6 +27,8 @@ GREATEST_LENGTH = 100_000
 """Inputs that the log holds at most, so that no publisher can fill the memory."""
 ALLOWANCE = 2.0  # [s] over which steps that are run again may be saved up
 
+_FAILURES = (ArithmeticError, ValueError, IndexError, np.linalg.LinAlgError)
+"""What a step of the estimator may end with."""
 _SECOND = 1_000_000_000
 
 
@@ -181,6 +184,15 @@ class Timeline:
         self._insert_deferred(at_any_cost=True)
         return self._release(self._log.stamps[-1]) if self._log.stamps else []
 
+    def settle(self) -> None:
+        """Make the steps that the next set would have to make, while nobody waits for it.
+
+        Changes no number: a step that fails is made again, and told of, at the next set.
+        """
+        if self._released:
+            with suppress(*_FAILURES), np.errstate(all='ignore'):
+                self._log.settle(self._released - 1)
+
     # -- The log --------------------------------------------------------------------------------
 
     def _clear(self) -> None:
@@ -292,7 +304,7 @@ class Timeline:
             with np.errstate(all='ignore'):  # the result is judged below, number by number
                 self._log.run_to(index)
                 outcome = self._log.estimator.estimates()
-        except (ArithmeticError, ValueError, IndexError, np.linalg.LinAlgError) as error:
+        except _FAILURES as error:
             outcome = error
         self._last_set = stamp
         estimates, failed = self._finish(stamp, outcome, silent)
