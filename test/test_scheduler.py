@@ -56,8 +56,13 @@ def test_a_scheduler_that_does_not_answer_is_said(monkeypatch: Any) -> None:
         next(finished(root, [1.0], address='tcp://127.0.0.1:9'))
 
 
-def test_a_cluster_that_loses_a_worker_ends_all_tasks(tmp_path: Path) -> None:
+def test_a_cluster_that_loses_a_worker_ends_all_tasks(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from wheel_terra_estimator import scheduler
+
     distributed = pytest.importorskip('dask.distributed')
+    monkeypatch.setattr(scheduler, 'CONNECT_TIMEOUT', 60)  # on a machine that is busy
     with distributed.LocalCluster(
         n_workers=2, threads_per_worker=1, dashboard_address=None
     ) as cluster:
