@@ -163,11 +163,15 @@ def test_each_set_is_what_a_run_in_order_through_the_inputs_so_far_gives(data):
 @given(st.data())
 def test_steps_made_before_a_set_asks_for_them_change_no_number(data):
     stream = drive(1.5)
-    rate = data.draw(st.sampled_from([0.0, 4.0, 20.0]))
+    chosen = {
+        'output_rate': data.draw(st.sampled_from([0.0, 4.0, 20.0])),
+        'filter__rerun_rate': data.draw(st.sampled_from([5.0, 500.0])),  # 5: some are deferred
+        'max_lag': data.draw(st.sampled_from([0.0, -1.0])),
+    }
     delays = [data.draw(st.sampled_from([0.0, 0.0, 0.004, 0.03, 0.25, 0.7])) for _ in stream]
-    plain, _ = make_core(output_rate=rate)
+    plain, _ = make_core(**chosen)
     expected = essence(play(plain, arriving(stream, delays)))
-    core, _ = make_core(output_rate=rate)
+    core, _ = make_core(**chosen)
     sets = []
     for measurement in arriving(stream, delays):
         sets += core.add(measurement)

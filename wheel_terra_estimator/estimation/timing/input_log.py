@@ -70,6 +70,14 @@ class _Kept(NamedTuple):
     walk: _Walk
 
 
+class _Charged(NamedTuple):
+    """Where the last run ended: late inputs are charged from there, settled since or not."""
+
+    position: int  # entries[:position] made its state
+    end: int  # stamp of its last step [ns]
+    clean: int  # entries[:clean] have not changed since
+
+
 class Entry:
     """All inputs of one stamp."""
 
@@ -137,6 +145,7 @@ class InputLog:
         self._position = -1  # entries[:_position] made the state of the last step; -1: none did
         self._astray = False  # the estimator was taken beyond the last step
         self._walk = _Walk(0, -1, 0, None, 0)
+        self._account()
         self._last_kept = 0  # stamp of the newest kept state
         self._dense_until = 0
 
@@ -171,8 +180,11 @@ class InputLog:
             changed = True
         else:
             changed = self._merge(entries[index], channel, measurement)
-        if changed and index < self._ran:
+        charged = self._charged
+        if changed and index < charged.clean:
             self.dirty = max(self.dirty, self.steps_after(stamp))
+            self._charged = charged._replace(clean=index)
+        if changed and index < self._ran:
             if stamp > stamps[self._ran - 1] - DENSE_SPAN:
                 self._dense_until = stamps[self._ran - 1] + DENSE_DURATION
             self._ran = index
@@ -180,16 +192,18 @@ class InputLog:
 
     def steps_after(self, stamp: int) -> int:
         """Return how many steps would be made again for an input of this stamp [ns]."""
-        if self._position <= 0 or self.first is None or stamp > self._walk.end:
+        position, end, _ = self._charged
+        if position <= 0 or self.first is None or stamp > end:
             return 0
         if self.grid.every_stamp:
-            return max(self._position - bisect_left(self.stamps, stamp), 0)
+            return max(position - bisect_left(self.stamps, stamp), 0)
         before = self.grid.step_index(stamp - self.first)
-        return self.grid.step_index(self._walk.end - self.first) - before + 1
+        return self.grid.step_index(end - self.first) - before + 1
 
     def run_to(self, last: int) -> None:
         """Run up to and with the entry `last`."""
         pending = self._run_steps(last)
+        self._account()
         if pending:
             # The rest is taken in for this one set; the next step begins where this one did.
             self._keep(always=True)
@@ -197,9 +211,13 @@ class InputLog:
             self._step(self.entries[last].stamp, pending, self._walk)
 
     def settle(self, last: int) -> None:
-        """Make the steps up to the entry `last` that the next run would make anyway."""
-        if self._position < 0:
-            return  # the first set begins the run
+        """Make the steps up to the entry `last` that the next run would make anyway.
+
+        Once between two runs, so that however many inputs come late it costs no more than those.
+        """
+        if self._position < 0 or self._settled:
+            return  # the first run begins by itself
+        self._settled = True
         try:
             self._run_steps(last)
         except BaseException:
@@ -225,15 +243,20 @@ class InputLog:
                 pending.clear()
                 self._position = self._ran = index + 1
                 self._keep()
-        self.dirty = 0
         return pending
+
+    def _account(self) -> None:
+        """Begin to count what late inputs make dirty."""
+        self.dirty = 0
+        self._settled = False
+        self._charged = _Charged(self._position, self._walk.end, self._ran)
 
     def begin_after(self, index: int) -> None:
         """Forget the state and all up to an entry: the estimator failed there."""
         del self.entries[: index + 1], self.stamps[: index + 1]
         self._ran, self._position, self._astray = 0, -1, False
         self._origin = self._pristine, False
-        self.dirty = 0
+        self._account()
 
     def forget(self, horizon: int) -> int:
         """Take off what no input younger than `horizon` [ns] needs; return how many entries."""
@@ -250,6 +273,8 @@ class InputLog:
         self._origin = None
         self._ran -= index
         self._position -= index
+        position, end, clean = self._charged
+        self._charged = _Charged(position - index, end, clean - index)
         return index
 
     # -- Steps ----------------------------------------------------------------------------------
