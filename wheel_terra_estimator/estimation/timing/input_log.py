@@ -129,6 +129,8 @@ class InputLog:
         self._reference_period = reference_period
         self._merger = StepMerger()
         self._pristine = estimator.snapshot()
+        self._charged: _Charged
+        self._settled: bool  # since the last run
         self.clear(keep_soil=False)
 
     def clear(self, *, keep_soil: bool) -> None:
