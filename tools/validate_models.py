@@ -25,6 +25,7 @@ SECTIONS = (
     'cmu_wheel',
     'small_wheels',
     'transfer',
+    'rover_slope',
     'speed',
 )
 HEAD = """# Validation of the wheel-soil models

@@ -67,7 +67,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         if name == 'reproduce':
             study.add_argument(
                 '--part', action='append',
-                choices=('table7', 'table6', 'loads', 'moon', 'paper_speed'),
+                choices=('table7', 'table6', 'loads', 'moon', 'high_lugs', 'paper_speed'),
                 help='only this part (may be given several times); paper_speed, half an hour per '
                 'case and core, runs only where it is asked for',
             )  # fmt: skip

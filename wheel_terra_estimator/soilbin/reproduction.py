@@ -19,11 +19,13 @@ from wheel_terra_estimator.soilbin.metrics import Row
 from wheel_terra_estimator.soilbin.study import Job
 
 TABLE = 'reproduction.csv'
-PAGES = ('comparison.md', reproduced_figures.PICTURE)
-PARTS = ('table7', 'table6', 'loads', 'moon')
+PAGES = ('comparison.md', reproduced_figures.PAGE, reproduced_figures.PICTURE)
+PARTS = ('table7', 'table6', 'loads', 'moon', 'high_lugs')
+SPEED_SENTENCE = "Rim speed: eight times the paper's."
 PAPER_SPEED = 'paper_speed'
 """Part that runs only where it is asked for: some half an hour per case and core."""
-SLOPES_PAPER_SPEED = (25.0, 15.0, 0.0, 20.0, 10.0)  # of wheel 2, the most telling ones first
+SLOPES_PAPER_SPEED = (0.0, 25.0, 10.0, 20.0, 15.0)  # of wheel 2, the most telling ones first
+WHEELS_PAPER_SPEED = (8, 1, 5, 4, 7, 3, 6, 9)  # of table 7 beside wheel 2, the extremes first
 WHEELS = range(1, 10)
 SLOPES_TABLE6 = (0.0, 5.0, 10.0, 15.0)
 TABLE7_SLOPE = 25.0  # [deg]
@@ -31,6 +33,11 @@ MOON = EARTH_GRAVITY / 6
 MOON_PULLS = (0.0, 0.1, 0.2, 0.3)  # P/W on the level
 MOON_SLOPES = (10.0, 15.0, 21.0, 25.0)
 EARTH_SLOPES = (0.0, 15.0, 25.0)
+HIGH_LUGS = 8  # wheel of figures 12(b) and 13(b): lugs of 20 mm
+HIGH_LUG_SLOPES = (25.0, 0.0, 15.0)  # the most telling ones first
+HIGH_LUG_GRAINS = 2.0  # least grain scale of these figures
+OTHER_LOADS = (9.8, 14.7)  # [N] of figure 12, beside 19.6
+OTHER_WIDTHS = (0.05, 0.15)  # [m] of figure 13, beside 0.1
 FIGURES_TABLE7 = {
     'slip': 'slip',
     'H': 'gross_traction',
@@ -53,7 +60,7 @@ def wheel_case(wheel: int, slope_deg: float, seed: int, grain_scale: float) -> C
     )
 
 
-def _job(case: Case, part: str, wheel: int, slope_deg: float, **labels: object) -> Job:
+def _job(case: Case, part: str, wheel: int | str, slope_deg: float, **labels: object) -> Job:
     base: dict[str, object] = {
         'name': case.name,
         'part': part,
@@ -88,7 +95,7 @@ def jobs(arguments: argparse.Namespace) -> list[Job]:
                 _job(wheel_case(2, slope, seed, scale), 'table6', 2, slope) for slope in (7.1, 20.0)
             ]
         if 'loads' in parts:
-            for load in (9.8, 14.7):
+            for load in OTHER_LOADS:
                 for slope in (0.0, 15.0, 25.0):
                     case = wheel_case(2, slope, seed, scale).replace(
                         name=f'wheel 2, {load:g} N, {slope:g} deg, bed {seed}',
@@ -97,16 +104,40 @@ def jobs(arguments: argparse.Namespace) -> list[Job]:
                     found.append(_job(case, 'loads', 2, slope))
         if 'moon' in parts:
             found += _moon(seed, scale)
+        if 'high_lugs' in parts:
+            found += _high_lugs(seed, scale)
         if PAPER_SPEED in parts:
             found += _paper_speed(seed, scale)
     return found
+
+
+def _high_lugs(seed: int, scale: float) -> list[Job]:
+    """Figures 12(b) and 13(b): lugs of 20 mm under three loads and on wheels of other widths."""
+    found = []
+    for slope in HIGH_LUG_SLOPES:
+        base = wheel_case(HIGH_LUGS, slope, seed, max(scale, HIGH_LUG_GRAINS))
+        for load in (*OTHER_LOADS, base.operation.vertical_load):
+            name = f'wheel {HIGH_LUGS}, {load:g} N, {slope:g} deg, bed {seed}'
+            case = base.replace(name=name, operation__vertical_load=load)
+            found.append(_job(case, 'high_lugs', HIGH_LUGS, slope))
+        for width in OTHER_WIDTHS:
+            wheel = wider(HIGH_LUGS, width)
+            name = f'wheel {wheel}, {slope:g} deg, bed {seed}'
+            case = base.replace(name=name, wheel__width=width)
+            found.append(_job(case, 'high_lugs', wheel, slope))
+    return found
+
+
+def wider(wheel: int, width: float) -> str:
+    """Return how one of the paper's wheels is called at another width [m]."""
+    return f'{wheel} of {1000 * width:g} mm'
 
 
 def _paper_speed(seed: int, scale: float) -> list[Job]:
     """Wheel 2 over the slopes on every bed, the wheels of table 7 on the first."""
     cases = [(2, slope) for slope in SLOPES_PAPER_SPEED]
     if seed == 1:
-        cases += [(wheel, 25.0) for wheel in WHEELS if wheel != 2]
+        cases += [(wheel, TABLE7_SLOPE) for wheel in WHEELS_PAPER_SPEED]
     return [
         _job(
             wheel_case(wheel, slope, seed, scale).replace(
@@ -150,7 +181,7 @@ def _moon(seed: int, scale: float) -> list[Job]:
 
 
 def report(arguments: argparse.Namespace, rows: Sequence[Row], folder: Path) -> None:
-    """Write the comparison with the paper as a page, misses included."""
+    """Write the comparison with the paper, misses included, and the page of its figures."""
     from wheel_terra_estimator.soilbin.tables import page
 
     scales = sorted({row['grain_scale'] for row in rows})
@@ -159,13 +190,16 @@ def report(arguments: argparse.Namespace, rows: Sequence[Row], folder: Path) -> 
         f'{len(rows)} runs, grain scale {", ".join(scales) or "-"}; mean (deviation between beds). '
         'Written by `wheel-terra soilbin reproduce`.'
     )
-    parts += ['', *table7_lines(rows), '', *table6_lines(rows), '', *reproduced_figures.lines(rows)]
-    parts += ['', *load_lines(rows), '', *moon_lines(rows), '', *paper_speed_lines(rows)]
+    for lines in (table7_lines, table6_lines, reproduced_figures.lines, load_lines, moon_lines):
+        title, *body = lines(rows)
+        parts += ['', title, '', SPEED_SENTENCE, *body]
+    parts += ['', *paper_speed_lines(rows)]
     failed = [row for row in rows if row.get('stopped')]
     if failed:
         parts += ['', '## Runs that stopped early', '']
         parts += [f'- {row["name"]}: {row["stopped"]}' for row in failed]
     page(folder / 'comparison.md', parts)
+    page(folder / reproduced_figures.PAGE, reproduced_figures.page_lines(rows))
     reproduced_figures.draw(rows, folder / reproduced_figures.PICTURE)
 
 

@@ -3,7 +3,8 @@
 """The closed form of the contact: each side of the peak stress as one force at its centroid.
 
 Area and centroid of the normal stress follow from its exponent, the mobilised share of the shear
-strength from the shear displacement at that centroid (docs/models). Nothing is fitted.
+strength from the shear displacement at that centroid, that of cohesion from the one at the middle
+of the side (docs/models). Nothing is fitted.
 
 Where the rim skids, shear displacement turns back inside the contact and no one place stands for
 a side: there four nodes on each side take the place of the centroid.
@@ -99,10 +100,11 @@ class BranchForces:
 
     __slots__ = (
         '_abs', '_arc_front', '_arc_rear', '_cohesion_front', '_cohesion_rear', '_copysign',
-        '_edge_front', '_edge_rear', '_exponent', '_friction_front', '_friction_rear', '_half',
-        '_maths', '_middle_front', '_middle_rear', '_modulus', '_normal_front', '_normal_rear',
-        '_peak', '_place_front', '_place_rear', '_rim_front', '_rim_rear', '_roll',
-        '_shear_radius', '_sin', '_skid', '_skidding', '_sqrt', '_stress', '_width',
+        '_edge_front', '_edge_rear', '_exponent', '_friction_front', '_friction_rear', '_further',
+        '_half', '_maths', '_middle_front', '_middle_rear', '_minimum', '_modulus', '_nearer',
+        '_normal_front', '_normal_rear', '_peak', '_place_front', '_place_rear', '_rim_front',
+        '_rim_rear', '_roll', '_shear_radius', '_sin', '_skid', '_skidding', '_sqrt', '_stress',
+        '_turn', '_turns_back', '_width',
     )  # fmt: skip
 
     def __init__(
@@ -110,7 +112,7 @@ class BranchForces:
     ) -> None:
         self._maths = maths
         self._sin, self._sqrt = maths.sin, maths.sqrt
-        self._abs, self._copysign = maths.abs, maths.copysign
+        self._abs, self._copysign, self._minimum = maths.abs, maths.copysign, maths.minimum
         self._exponent = n = contact.sinkage_exponent
         front, rear = 1.0 - peak_share, peak_share - leaving_share
         area, centroid = branch_moments(n, front / (1.0 + peak_share))
@@ -124,12 +126,16 @@ class BranchForces:
         self._modulus = contact.shear_modulus
         self._shear_radius, self._width = R, contact.width
         self.set_speed(contact.velocity_ratio)
-        turn = R / self._modulus
+        self._turn = turn = R / self._modulus
         self._rim_front, self._rim_rear = turn * (1.0 - place_front), turn * (1.0 - place_rear)
         square_front, square_rear = front * front, rear * rear
         # A branch is an arc: its resultant is a little smaller than the sum of its stresses.
         self._arc_front, self._arc_rear = spread * square_front, spread * square_rear
         self._edge_front, self._edge_rear = square_front / 24.0, square_rear / 24.0
+        # Cohesion is spread evenly: a quarter of its mean displacement in front, and by how much it
+        # is larger behind, both per displacement at the stress's centroid.
+        self._nearer = 0.125 / centroid
+        self._further = (place_rear - self._middle_rear) / (1.0 - place_rear)
         self._stress = contact.bearing_modulus * (2.0 * r / contact.reference_depth) ** n
         self._peak = area * self._stress
         self._normal_front, self._normal_rear = r * front, r * rear
@@ -141,6 +147,7 @@ class BranchForces:
         """Change v/w [m]; all else stays as it is."""
         self._roll = velocity_ratio / self._modulus
         skid = velocity_ratio / self._shear_radius - 1.0
+        self._turns_back = bool(np.any(skid > 0.0)) if self._maths is np else skid > 0.0
         share = (skid - _TAKE_OVER_AT) / _TAKE_OVER
         if self._maths is np:
             share = np.minimum(np.maximum(share, 0.0), 1.0)
@@ -172,27 +179,43 @@ class BranchForces:
             return self.forces(angle)[0]
         sin, sqrt, roll, square = self._sin, self._sqrt, self._roll, angle * angle
         top, front, rear = sin(angle), sin(self._place_front * angle), sin(self._place_rear * angle)
-        x = self._rim_front * angle - roll * (top - front)
-        base = 1.0 / (1.0 + 0.125 * self._abs(x))
+        cos_rear = sqrt(1.0 - rear * rear)
+        x = self._rim_front * angle - roll * (top - front)  # j/K in front, y behind
+        y = self._rim_rear * angle - roll * (top - rear)
+        pace = self._turn - roll * cos_rear
+        wide = self._arc_rear * square * pace * pace
+        if self._turns_back:
+            sign_front, sign_rear = self._copysign(1.0, x), self._copysign(1.0, y)
+            x, y = x * sign_front, y * sign_rear
+            wide = self._minimum(wide, 0.25 * y * y)
+        base = 1.0 / (1.0 + 0.125 * x)
         base *= base
         base *= base
-        share_front = self._copysign(1.0 - base * base, x)
-        x = self._rim_rear * angle - roll * (top - rear)
-        base = 1.0 / (1.0 + 0.0625 * self._abs(x))
+        share_front = 1.0 - base * base
+        base = 1.0 / (1.0 + self._nearer * x)
         base *= base
-        base *= base
-        base *= base
-        share_rear = self._copysign(1.0 - base * base, x)
+        even_front = 1.0 - base * base
+        base = 1.0 / (1.0 + 0.0625 * y)
+        rest = base * base
+        rest *= rest
+        rest *= rest
+        rest *= rest
+        rest += rest * base * (wide - 0.03125 * y * y)
+        share_rear = 1.0 - rest
+        even_rear = 1.0 - rest * (1.0 - self._further * base * y)
+        if self._turns_back:
+            share_front, even_front = share_front * sign_front, even_front * sign_front
+            share_rear, even_rear = share_rear * sign_rear, even_rear * sign_rear
         middle = sin(self._middle_front * angle)
         peak = self._peak * (middle * sin(self._half * angle)) ** self._exponent
         stressed = (1.0 - self._arc_front * square) * (
             self._normal_front * sqrt(1.0 - front * front)
             + self._friction_front * share_front * front
         ) + (1.0 - self._arc_rear * square) * (
-            self._normal_rear * sqrt(1.0 - rear * rear) + self._friction_rear * share_rear * rear
+            self._normal_rear * cos_rear + self._friction_rear * share_rear * rear
         )
-        sticking = self._cohesion_front * share_front * (1.0 - self._edge_front * square) * middle
-        sticking = sticking + self._cohesion_rear * share_rear * (
+        sticking = self._cohesion_front * even_front * (1.0 - self._edge_front * square) * middle
+        sticking = sticking + self._cohesion_rear * even_rear * (
             1.0 - self._edge_rear * square
         ) * sin(self._middle_rear * angle)
         return self._width * angle * (peak * stressed + sticking)
@@ -201,18 +224,38 @@ class BranchForces:
         """Load [N], pull [N] and torque [N m] at an entrance angle."""
         sin, sqrt, roll, square = self._sin, self._sqrt, self._roll, angle * angle
         top, front, rear = sin(angle), sin(self._place_front * angle), sin(self._place_rear * angle)
-        # The shares are mean_share_front and _rear, written out: floats spend a third on calls.
-        x = self._rim_front * angle - roll * (top - front)
-        base = 1.0 / (1.0 + 0.125 * self._abs(x))
+        cos_rear = sqrt(1.0 - rear * rear)
+        # Mean shares of strength, written out: floats spend a third on calls. In front that of
+        # mean_share_front, behind that of mean_share_rear, corrected by `wide`, half the variance
+        # that j/K really has there: the mean of exp(-j/K) grows by P b/2 per variance, with
+        # P = b^16 and b = 1/(1 + y/16). Cohesion: (1 + x/4)^-4 at the middle in front (x from 0,
+        # evenly), a step from the centroid to the middle behind.
+        x = self._rim_front * angle - roll * (top - front)  # j/K in front, y behind
+        y = self._rim_rear * angle - roll * (top - rear)
+        pace = self._turn - roll * cos_rear
+        wide = self._arc_rear * square * pace * pace
+        if self._turns_back:
+            sign_front, sign_rear = self._copysign(1.0, x), self._copysign(1.0, y)
+            x, y = x * sign_front, y * sign_rear
+            wide = self._minimum(wide, 0.25 * y * y)
+        base = 1.0 / (1.0 + 0.125 * x)
         base *= base
         base *= base
-        share_front = self._copysign(1.0 - base * base, x)
-        x = self._rim_rear * angle - roll * (top - rear)
-        base = 1.0 / (1.0 + 0.0625 * self._abs(x))
+        share_front = 1.0 - base * base
+        base = 1.0 / (1.0 + self._nearer * x)
         base *= base
-        base *= base
-        base *= base
-        share_rear = self._copysign(1.0 - base * base, x)
+        even_front = 1.0 - base * base
+        base = 1.0 / (1.0 + 0.0625 * y)
+        rest = base * base
+        rest *= rest
+        rest *= rest
+        rest *= rest
+        rest += rest * base * (wide - 0.03125 * y * y)
+        share_rear = 1.0 - rest
+        even_rear = 1.0 - rest * (1.0 - self._further * base * y)
+        if self._turns_back:
+            share_front, even_front = share_front * sign_front, even_front * sign_front
+            share_rear, even_rear = share_rear * sign_rear, even_rear * sign_rear
         middle, mean = sin(self._middle_front * angle), sin(self._middle_rear * angle)
         peak = self._peak * (middle * sin(self._half * angle)) ** self._exponent
         arc_front, arc_rear = 1.0 - self._arc_front * square, 1.0 - self._arc_rear * square
@@ -221,14 +264,14 @@ class BranchForces:
         rub_front = self._friction_front * peak * share_front
         rub_rear = self._friction_rear * peak * share_rear
         friction_front, friction_rear = rub_front * arc_front, rub_rear * arc_rear
-        stick_front = self._cohesion_front * share_front
-        stick_rear = self._cohesion_rear * share_rear
+        stick_front = self._cohesion_front * even_front
+        stick_rear = self._cohesion_rear * even_rear
         cohesion_front = stick_front * (1.0 - self._edge_front * square)
         cohesion_rear = stick_rear * (1.0 - self._edge_rear * square)
         size = self._width * angle
         load = size * (
             normal_front * (cos_front := sqrt(1.0 - front * front))
-            + normal_rear * (cos_rear := sqrt(1.0 - rear * rear))
+            + normal_rear * cos_rear
             + friction_front * front
             + friction_rear * rear
             + cohesion_front * middle
