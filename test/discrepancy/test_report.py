@@ -20,6 +20,8 @@ from campaigns import Plan, make_campaign, scoring
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.discrepancy.report.model_file import write_model
 from wheel_terra_estimator.discrepancy.report.page import SOIL_WORDS, number, write_report
+from wheel_terra_estimator.discrepancy.report.words import _shrink
+from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES
 
 
 class Page(HTMLParser):
@@ -158,6 +160,10 @@ def test_numbers_are_those_of_the_diagnosis(page, named):
         gap = named.gap[quantity.replace(' ', '_')]
         cells = parsed.row(f'{quantity} [{unit}]')
         assert cells[1:4] == [number(scale * x) for x in (gap.before, gap.refit, gap.after)]
+        if gap.shrink is not None:
+            shares = [100 * x for x in (gap.shrink, gap.shrink_low, gap.shrink_high)]
+            assert '{:.0f} % ({:.0f} to {:.0f})'.format(*shares) in cells
+    assert any(gap.shrink is not None for gap in named.gap.values())
     for candidate in named.candidates:
         cells = parsed.row(candidate.full_label.replace('_', ' '))
         assert cells[1] == f'{candidate.log_evidence:.1f}'
@@ -291,3 +297,35 @@ def test_legends_stay_inside_the_picture(named):
         for legend in figure.legends:
             box = legend.get_window_extent(canvas.get_renderer())
             assert box.x1 <= figure.bbox.x1 and box.y0 > figure.axes[0].bbox.y1
+
+
+def test_the_gap_is_the_error_on_unseen_rows_and_its_share_above_the_noise(named):
+    measured = named.table.measured.copy()
+    for row, quantity, _ in named.outliers:
+        measured[row, QUANTITIES.index(quantity)] = np.nan
+    curves = named.curves
+    for q, item in enumerate(named.gap.values()):
+        for error, values in (
+            (item.before, curves.before),
+            (item.refit, curves.held_out_refit),
+            (item.after, curves.held_out_after),
+            (item.fitted, curves.after),
+        ):
+            expected = np.sqrt(np.nanmean((values - measured)[:, q] ** 2))
+            assert error == pytest.approx(expected, rel=1e-9)
+        noise = np.sqrt(np.mean(named.noise.std[np.isfinite(measured[:, q]), q] ** 2))
+        assert item.noise == pytest.approx(noise, rel=1e-6)
+        if item.shrink is not None:
+            left, whole = item.after**2 - item.noise**2, item.refit**2 - item.noise**2
+            assert item.shrink == pytest.approx(1.0 - np.sqrt(max(left, 0.0) / whole))
+            assert item.shrink_low <= item.shrink <= item.shrink_high
+    assert any(item.shrink is not None for item in named.gap.values())
+
+
+@pytest.mark.parametrize(
+    ('refit', 'after', 'share'),
+    [(5.0, 1.0, 1.0), (5.0, 2.0, 0.5), (5.0, 5.0, 0.0), (1.2, 1.0, None), (5.0, 0.5, 1.0)],
+)
+def test_share_of_the_gap_that_closed(refit, after, share):
+    """Squares above a noise of 1; what is hardly above it says nothing."""
+    assert _shrink(refit, after, 1.0) == (None if share is None else pytest.approx(share))

@@ -9,9 +9,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from scipy.stats import kstest, multivariate_normal
+from scipy.stats import chi2, kstest, multivariate_normal
 
 from wheel_terra_estimator.discrepancy.assessment import held_out
+from wheel_terra_estimator.discrepancy.assessment.where import locate
 from wheel_terra_estimator.discrepancy.fitting import noise, outliers
 from wheel_terra_estimator.discrepancy.fitting.coordinates import (
     EFFECT_SCALES,
@@ -92,17 +93,20 @@ def test_batched_model_is_the_package_model(forward):
             np.testing.assert_allclose(mine, theirs, atol=2e-3 + 0.02 * np.abs(theirs).max())
 
 
-def linear_fit(rng, problem, columns, coordinates):
+def linear_fit(rng, problem, columns, coordinates, at=0.0):
+    """A linear model, linearised where all parameters are `at`."""
     sensitivity = rng.standard_normal((problem.size, columns)) * problem.std[:, None]
     rotated = problem.rotate(sensitivity)
+    u, outputs = np.full(columns, at), np.zeros((problem.size // 3, 3))
+    outputs[problem.row, problem.quantity] = sensitivity @ u
     return Fit(
         ('e',),
         coordinates,
-        np.zeros(columns),
-        np.zeros((problem.size // 3, 3)),
+        u,
+        outputs,
         np.zeros(problem.size // 3),
         sensitivity,
-        problem.rotate(problem.observed),
+        problem.rotate(problem.observed - sensitivity @ u),
         rotated,
         np.ones(problem.size),
         0.0,
@@ -195,7 +199,7 @@ def test_held_out_groups_are_those_of_a_fit_without_them(setting):
     _, truth, std, inputs, scale = setting
     problem = build_problem(std * rng.standard_normal(truth.shape), std, inputs, scale)
     coordinates = (Coordinate('soil', 'a', 0.0, 1.0), Coordinate('soil', 'b', 0.0, 1.0))
-    model = linear_fit(rng, problem, 2, coordinates)
+    model = linear_fit(rng, problem, 2, coordinates, at=0.7)
     amplitude, observed = 0.02, problem.observed
     row, quantity = problem.row, problem.quantity
     smooth = kernel(inputs)[np.ix_(row, row)] * (quantity[:, None] == quantity[None, :])
@@ -316,3 +320,47 @@ def test_confidence_follows_what_speaks_for_a_name():
     # A structural error, a second effect and a remainder each leave several times the doubt.
     for change in ({'floor': 1.0}, {'two': 1.0}, {'remainder': 1.0}):
         assert 1.0 - of_name(**change) > 2.0 * (1.0 - of_name())
+
+
+def test_chi_square_is_that_of_the_best_parameters(setting):
+    """Soil parameters are drawn to their prior, an effect's strength is free and takes a degree."""
+    rng = np.random.default_rng(8)
+    _, truth, std, inputs, scale = setting
+    problem = build_problem(std * rng.standard_normal(truth.shape), std, inputs, scale)
+    coordinates = (
+        Coordinate('soil', 'a', 0.0, 1.0),
+        Coordinate('e', 'b', 0.0, 1.0, 0.0, 3.0, role='strength'),
+    )
+    model = linear_fit(rng, problem, 2, coordinates, at=0.4)
+    variance = np.full(problem.size, 1.3)
+    rows = np.vstack([model.jacobian / np.sqrt(1.3), [1.0, 0.0]])
+    right = np.append(problem.rotate(problem.observed) / np.sqrt(1.3), 0.0)
+    rest = right - rows @ np.linalg.lstsq(rows, right, rcond=None)[0]
+    expected = chi2.sf(float(rest @ rest), problem.size - 1)
+    assert gap_test.chi_square_p_value(model, variance) == pytest.approx(expected, rel=1e-6)
+
+
+def test_where_the_misfit_sits_is_told_only_beyond_chance(forward, setting):
+    """P-values of noise alone are those of chance; an error at high slip is found there."""
+    soil, truth, std, inputs, scale = setting
+    rng = np.random.default_rng(9)
+    columns = {'slip': forward.points.slip, 'normal_load': forward.points.normal_load}
+    found = []
+    for number in range(24):
+        measured = truth + std * rng.standard_normal(truth.shape)
+        if number == 0:
+            measured[forward.points.slip > 0.6, 1] += 12.0 * std[0, 1]
+        problem = build_problem(measured, std, inputs, scale)
+        one = np.ones(problem.size)
+        nothing = fit(
+            forward, problem, problem.observed, [((), soil)], [np.zeros(len(soil))], [one]
+        )[0]
+        named = dict(zip(('sinkage', 'drawbar_pull', 'torque'), measured.T, strict=True))
+        table = check_table('t', {**columns, **named})
+        found.append(locate(table, problem, nothing, problem.observed, len(table)))
+    spoilt, *clean = found
+    assert spoilt.quantity == 'drawbar_pull' and spoilt.p_value < 0.02
+    assert spoilt.share_of_gap > 0.6
+    assert {0.0 < w.p_value <= 1.0 for w in found} == {True}
+    assert kstest([w.p_value for w in clean], 'uniform').pvalue > 1e-3
+    assert sum(w.sentence == 'no region stands out from the noise' for w in clean) >= 20

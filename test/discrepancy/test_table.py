@@ -236,3 +236,12 @@ def test_many_rows_are_averaged_over_neighbouring_inputs():
     full = np.isfinite(table.measured[:, 0])
     assert np.allclose(bent[full], 1 + table.columns['slip'][full], atol=1e-9)
     assert len(averaged(table.select(np.arange(10)), 4)) == 4
+
+
+def test_a_unit_behind_an_unknown_name_makes_it_no_column(tmp_path):
+    text = HEADER.replace('sinkage', 'sinkage_mm') + ',temperature_n\n'
+    text += '\n'.join(f'{line},20' for line in lines()) + '\n'
+    with pytest.raises(UserError) as caught:
+        read_table(write(tmp_path, text))
+    said = str(caught.value)
+    assert "rename 'sinkage_mm' to 'sinkage'" in said and 'temperature' not in said

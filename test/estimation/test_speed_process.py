@@ -225,3 +225,22 @@ def test_without_a_reference_the_ratio_returns_to_the_usual_one_over_travel():
     gain, constant = twice.speed_gain, twice.constant
     assert gain * constant + constant == pytest.approx(after(length).constant), 'two halves'
     assert (gain**2 + 1.0) * twice.variance == pytest.approx(after(length).variance)
+
+
+@pytest.mark.parametrize('before', [0.0, 0.05])
+def test_wheels_alone_say_nothing_of_the_accelerometers_zero(before):
+    assert process([before] * 6).by_wheels(0.1, speeds([0.06] * 6), 0.0).bias_gain == 0.0
+
+
+@pytest.mark.parametrize(
+    ('speed', 'kept'),
+    [(0.0, False), (0.8 * 0.06 * 0.95, True), (0.8 * 0.06 * 1.05, True), (0.4, True)],
+)
+def test_a_jolt_at_a_start_is_undone_and_nothing_else(speed, kept):
+    """Far from what the wheels say, by less than the accelerometer's noise: that is a jolt."""
+    made = process([0.06] * 6)
+    ekf = Parts(reader.load(SAND)).filter()
+    ekf.set(SPEED, speed, 1e-6)
+    made.undo_jolt(ekf, 0.06)
+    expected = speed if kept else 0.8 * 0.06
+    assert ekf.mean[SPEED] == pytest.approx(expected)

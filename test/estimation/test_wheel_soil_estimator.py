@@ -116,6 +116,7 @@ def test_missing_inputs_widen_the_deviations_and_are_said(climb):
         assert key not in full.faults
         assert getattr(poor, field).mean() > getattr(full, field).mean()
     assert 'orientation' in estimate(climb, 'no_orientation')[-1].faults
+    assert 'orientation' not in full.faults
 
 
 def test_snapshot_comes_back_to_the_bit(climb):

@@ -226,6 +226,19 @@ def test_six_wheels_and_a_measured_leaving_angle() -> None:
     assert raised.drawbar_pull > low.drawbar_pull > flat.drawbar_pull
 
 
+def test_soil_without_shear_strength_takes_no_torque_and_resists() -> None:
+    """Without c and tan(phi) there are normal stresses alone: they turn nothing and push back."""
+    model = ConditionedForces(WHEEL, SAND)
+    found = model.forces(0, 0.5, 0.02, 80.0, 0.0, 0.0, 0.012)
+    assert not found.clamped
+    assert found.torque == pytest.approx(0.0, abs=1e-9)
+    assert -80.0 < found.drawbar_pull < -5.0
+    spinning = model.forces(0, 0.0, 0.02, 80.0, 250.0, 0.6, 0.012)
+    assert not spinning.clamped
+    nearly = model.forces(0, 1e-6, 0.02, 80.0, 250.0, 0.6, 0.012)
+    assert spinning.torque == pytest.approx(nearly.torque, rel=1e-5)
+
+
 def test_steady_sinkage_solves_the_closed_form_balance() -> None:
     for soil, effects, row in random_cases(60, 8):
         steady = WheelSoilModel(soil, effects, 'closed_form', strict=False).steady_state(row)
