@@ -288,3 +288,20 @@ def test_no_wheel_is_called_stuck_while_a_rover_drives_off_with_little_slip(seed
     sets = [s for _, m in sorted(stream, key=lambda pair: pair[0]) for s in core.add(m)]
     assert (sets[-1].slip_class == SlipClass.LOW).all()
     assert not any((s.slip_class == SlipClass.STUCK).any() for s in sets)
+
+
+def test_what_waits_longer_than_the_history_is_dropped_and_nothing_else():
+    """One step a second may be run again: after two seconds late inputs wait for their turn."""
+    slow = {**DEFAULT, 'max_lag': 0.0, 'filter__rerun_rate': 1.0, 'history': 2.0}
+    core, _ = make_core(**slow)
+    stream = [odometry(0.1 * i) for i in range(61)]
+    play(core, stream[:40], flush=False)
+    for late in (2.5, 2.7):  # the state is at 3.9
+        core.add(sinkage(late))
+    assert core.health()['late_inputs_deferred'] == 2
+    play(core, stream[40:], flush=False)  # at 6.0 both are older than the history
+    core.add(sinkage(5.0))
+    core.flush()
+    health = core.health()
+    assert health['late_inputs_dropped'] == 2
+    assert health['late_inputs_deferred'] == 3

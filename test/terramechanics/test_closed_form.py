@@ -226,6 +226,17 @@ def test_six_wheels_and_a_measured_leaving_angle() -> None:
     assert raised.drawbar_pull > low.drawbar_pull > flat.drawbar_pull
 
 
+def test_the_load_alone_is_that_of_all_forces() -> None:
+    """The short form, which a load balance asks for again and again."""
+    for soil, effects, row in random_cases(20, 9):
+        model = WheelSoilModel(soil, effects, 'closed_form', strict=False)
+        terms = Terms(model.effects)
+        form = closed_form.proportional_forces(build_contact(row, model._soil, 'bekker', terms))
+        for angle in (0.05, 0.3, 0.8):
+            angles = np.full(len(row.slip), angle)
+            np.testing.assert_allclose(form.load(angles), form.forces(angles)[0], rtol=1e-12)
+
+
 def test_soil_without_shear_strength_takes_no_torque_and_resists() -> None:
     """Without c and tan(phi) there are normal stresses alone: they turn nothing and push back."""
     model = ConditionedForces(WHEEL, SAND)

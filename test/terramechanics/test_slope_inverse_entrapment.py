@@ -18,6 +18,7 @@ from wheel_terra_estimator.terramechanics.entrapment import (
     rim_travel_to_depth,
 )
 from wheel_terra_estimator.terramechanics.inverse import (
+    PeakStresses,
     centroid_angle,
     entrance_angle,
     equivalent_soil,
@@ -158,6 +159,23 @@ def test_one_load_cannot_part_cohesion_from_friction() -> None:
     stresses = peak_stresses(answer.torque, 80.0, angles, r, r, SMOOTH.width)
     soil = equivalent_soil(stresses, angles, np.array([0.8, 0.6]) * r, r, r)
     assert not soil.separable and soil.cohesion == 0.0
+
+
+def test_three_loads_part_cohesion_from_friction() -> None:
+    """As many points as there are numbers: the stresses follow c + sigma tan(phi) exactly."""
+    cohesion, tangent, modulus = 300.0, 0.6, 0.02
+    radius = 0.2
+    angles = (np.array([0.3, 0.4, 0.5]), np.array([0.15, 0.2, 0.25]), np.zeros(3))
+    ratio = np.array([0.9, 0.7, 0.4]) * radius
+    normal = np.array([4e3, 9e3, 15e3])
+    j = radius * (angles[0] - angles[1]) - ratio * (np.sin(angles[0]) - np.sin(angles[1]))
+    shear = (cohesion + tangent * normal) * (1.0 - np.exp(-j / modulus))
+    unused = (np.zeros(3), np.zeros(3))
+    stresses = PeakStresses(normal, shear, unused, unused, np.ones(3, dtype=bool))
+    soil = equivalent_soil(stresses, angles, ratio, radius, radius, [modulus])
+    assert soil.separable
+    assert soil.cohesion == pytest.approx(cohesion, rel=1e-6)
+    assert soil.tan_friction == pytest.approx(tangent, rel=1e-6)
 
 
 def test_centroid_angle_is_the_centroid_of_the_stress() -> None:
