@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 from wheel_terra_estimator.cli.main import main
+from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.output_folder import new_folder
 
 
@@ -129,11 +130,12 @@ def test_json_is_the_report_and_nothing_else(tmp_path: Path, capsys: Any) -> Non
 def test_tables_with_soils_of_their_own_are_diagnosed_side_by_side(
     tmp_path: Path, capsys: Any
 ) -> None:
-    """The same digging in two soils: each table gets its soil, both favour the one effect."""
+    """The same friction of the drive in two soils: each table gets its soil, both the one size."""
     rig = ['--config', 'hit_wh3_lug10']
     for name, soil in (('sand', 'hit_lss1'), ('simulant', 'fjs1_ishigami')):
-        digging = ['-p', 'effects.lug_digging.enabled:=true', '-p', 'effects.lug_digging.kd:=0.9']
-        rows = ['predict', *rig, '--config', soil, *digging, '--slip', '0.05:0.7:8']
+        friction = 'effects.drivetrain_friction'
+        hidden = ['-p', f'{friction}.enabled:=true', '-p', f'{friction}.torque:=0.8']
+        rows = ['predict', *rig, '--config', soil, *hidden, '--slip', '0.05:0.7:8']
         rows += ['--load', '40,80', '--noise', '0.0003,0.6,0.06', '--seed', str(len(name))]
         assert main([*rows, '-o', str(tmp_path / f'{name}.csv')]) == 0
     tables = [str(tmp_path / f'{name}.csv') for name in ('sand', 'simulant')]
@@ -143,6 +145,9 @@ def test_tables_with_soils_of_their_own_are_diagnosed_side_by_side(
     assert main(arguments) == 0
     said = capsys.readouterr().out
     assert 'over all 2 tables, each with its own soil' in said
+    assert 'with one size' in said.splitlines()[-1]
+    shared = reader.load(['hit_lss1', tmp_path / 'out' / 'effect.yaml'], complete=False)
+    assert shared.effects['drivetrain_friction']['torque'] == pytest.approx(0.8, abs=0.1)
     stiffness = {}
     for name in ('sand', 'simulant'):
         report = json.loads((tmp_path / 'out' / name / 'report.json').read_text())

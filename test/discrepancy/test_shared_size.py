@@ -8,7 +8,12 @@ from types import SimpleNamespace
 import pytest
 from scipy import integrate, stats
 
-from wheel_terra_estimator.discrepancy.report.several import over_all, shared_size
+from wheel_terra_estimator.configuration import reader
+from wheel_terra_estimator.discrepancy.report.several import (
+    over_all,
+    shared_size,
+    write_shared_effect,
+)
 from wheel_terra_estimator.discrepancy.result import Candidate, FittedParameter
 from wheel_terra_estimator.terramechanics.effects import catalogue
 
@@ -62,3 +67,12 @@ def test_sizes_that_agree_count_for_more_than_sizes_that_do_not():
 def test_an_effect_that_a_table_does_not_list_has_no_shared_size():
     nothing = SimpleNamespace(candidates=table(1.0, 0.1).candidates[1:])
     assert shared_size({'a': table(1.0, 0.05), 'b': nothing}, NAME) is None
+
+
+def test_the_file_of_the_shared_effect_is_a_further_configuration(tmp_path):
+    path = tmp_path / 'effect.yaml'
+    write_shared_effect({'a': table(1.0, 0.05), 'b': table(1.5, 0.05)}, path)
+    assert not path.exists(), 'the sizes are not one'
+    write_shared_effect({'a': table(1.0, 0.05), 'b': table(1.1, 0.05)}, path)
+    effects = reader.load(['hit_wh1', 'hit_fit', path], complete=False).effects
+    assert effects[NAME][PARAMETER.name] == pytest.approx(1.05)

@@ -146,7 +146,11 @@ def _diagnosed(arguments: argparse.Namespace) -> Diagnosis:
 def _each_with_its_soil(arguments: argparse.Namespace, inputs: list[Path]) -> int:
     """Diagnose each table with a soil of its own, side by side, and sum up what they favour."""
     from wheel_terra_estimator.discrepancy.report.files import write_files
-    from wheel_terra_estimator.discrepancy.report.several import over_all, write_summary
+    from wheel_terra_estimator.discrepancy.report.several import (
+        over_all,
+        write_shared_effect,
+        write_summary,
+    )
 
     names = _folder_names(arguments.data)
     plain = {key: value for key, value in vars(arguments).items() if key != 'run'}
@@ -163,6 +167,7 @@ def _each_with_its_soil(arguments: argparse.Namespace, inputs: list[Path]) -> in
             (folder / name).mkdir()
             write_files(diagnosis, folder / name, pictures=not arguments.no_pictures)
         write_summary(found, folder / 'summary.csv')
+        write_shared_effect(found, folder / 'effect.yaml')
     if arguments.json:
         print(json.dumps({name: diagnosis.to_dict() for name, diagnosis in found.items()}))
         return 0

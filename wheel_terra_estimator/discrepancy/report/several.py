@@ -13,6 +13,8 @@ from pathlib import Path
 import numpy as np
 from scipy.special import chdtrc
 
+from wheel_terra_estimator.configuration.reader import from_parameters
+from wheel_terra_estimator.configuration.ros_yaml import Value
 from wheel_terra_estimator.discrepancy.effect_keys import effect_of
 from wheel_terra_estimator.discrepancy.fitting.coordinates import (
     EFFECT_SCALES,
@@ -54,6 +56,8 @@ class SharedSize:
 
     Attributes
     ----------
+    form : str
+        Name of its form; empty: the first.
     parameters : mapping
         Name of the parameter -> value and deviation that all tables give together.
     log_evidence : float
@@ -62,9 +66,15 @@ class SharedSize:
         Chance that sizes which are one scatter as much from table to table as these do.
     """
 
+    form: str
     parameters: Mapping[str, FittedParameter]
     log_evidence: float
     p_value: float
+
+    @property
+    def one(self) -> bool:
+        """Whether the sizes of the tables scatter no more than chance lets them."""
+        return self.p_value >= _APART
 
 
 def shared_size(found: Mapping[str, Diagnosis], name: str) -> SharedSize | None:
@@ -108,7 +118,7 @@ def shared_size(found: Mapping[str, Diagnosis], name: str) -> SharedSize | None:
         degrees += len(known) - 1
     if not parameters:
         return None
-    return SharedSize(parameters, evidence, float(chdtrc(degrees, distance)))
+    return SharedSize(form.form, parameters, evidence, float(chdtrc(degrees, distance)))
 
 
 def _log_prior(coordinate: Coordinate, value: float) -> float:
@@ -121,6 +131,29 @@ def _log_prior(coordinate: Coordinate, value: float) -> float:
     sides = 2.0 if 0.0 in (coordinate.lower, coordinate.upper) else 1.0
     density = sides * np.exp(-0.5 * u * u) / (scales * math.sqrt(2.0 * math.pi))
     return math.log(max(float(shares @ density), 1e-300))
+
+
+def write_shared_effect(found: Mapping[str, Diagnosis], path: Path) -> None:
+    """Write the effect that all tables favour most with one size: goes on top of any soil.
+
+    Nothing is written where no effect is favoured, or its sizes are not one.
+    """
+    total = evidence_over_all(found)
+    name = next(iter(total), '')
+    shared = shared_size(found, name) if name and total[name][0] > _CLEAR else None
+    if shared is None or not shared.one:
+        return
+    prefix = f'effects.{name}'
+    values: dict[str, Value] = {f'{prefix}.enabled': True}
+    if shared.form:
+        values[f'{prefix}.form'] = shared.form
+    for key, item in shared.parameters.items():
+        values[f'{prefix}.{key}'] = item.value
+        values[f'{prefix}.{key}_std'] = item.std
+    listed = ', '.join(found)
+    from_parameters(values, complete=False).write(
+        path, list(values), comment=f'One size of {name} in the soils of {listed}.'
+    )
 
 
 def over_all(found: Mapping[str, Diagnosis]) -> str:
@@ -144,7 +177,7 @@ def _in_words(shared: SharedSize | None) -> str:
         f'{name} = {item.value:.3g} +- {item.std:.2g}{"" if item.unit == "-" else " " + item.unit}'
         for name, item in shared.parameters.items()
     )
-    if shared.p_value < _APART:
+    if not shared.one:
         return f'; not one size: the tables differ, p = {shared.p_value:.1g}'
     return f'; with one size {shared.log_evidence:+.1f} nats, {values}'
 
