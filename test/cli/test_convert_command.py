@@ -8,9 +8,12 @@ import numpy as np
 import pytest
 import yaml
 
+from wheel_terra_estimator.bags import reader as bag_reader
 from wheel_terra_estimator.bags.series_reader import read_series
 from wheel_terra_estimator.bags.storage import open_bag
 from wheel_terra_estimator.cli.main import main
+from wheel_terra_estimator.configuration import reader
+from wheel_terra_estimator.estimation.measurements import WheelOdometry
 
 HEADER = 'time,rpm_fl,rpm_fr,torque_fl,torque_fr,ax,ay,az,gx,gy,gz,sinkage_fl,gps_speed'
 ROWS = [
@@ -46,6 +49,35 @@ def test_the_example_converts_units_and_signs(files):
     assert told.reference.velocity[:, 0].tolist() == [0.5]
     assert np.diff(told.joints.stamp).tolist() == [100_000_000]
     assert main(command(files)) == 2  # nothing is overwritten
+
+
+def test_steering_angles_reach_the_measurements(files):
+    columns = (files / 'map.yaml').read_text()
+    assert '\n# front_left_steering:' in columns
+    shown = columns.replace('\n# front_left_steering', '\n  front_left_steering').replace(
+        '\n#   position', '\n    position'
+    )
+    (files / 'map.yaml').write_text(shown)
+    rows = [HEADER + ',angle_fl', ROWS[0] + ',-30', ROWS[1] + ',']
+    (files / 'log.csv').write_text('\n'.join(rows))
+    assert main(command(files)) == 0
+    rover = reader.from_parameters(
+        {
+            'wheels.names': ['front_left', 'front_right'],
+            'wheels.y': [0.2, -0.2],
+            'wheels.steering_joints': ['front_left_steering', ''],
+        },
+        complete=False,
+    )
+    odometry = [
+        measured
+        for _, measured in bag_reader.read(files / 'bag', {}, rover)
+        if isinstance(measured, WheelOdometry)
+    ]
+    assert odometry[0].steering[0] == pytest.approx(math.radians(-30.0))
+    assert math.isnan(odometry[0].steering[1])
+    assert np.allclose(odometry[0].rate, 2.0 * math.pi)
+    assert odometry[1].steering is None or np.isnan(odometry[1].steering).all()
 
 
 @pytest.mark.parametrize('delimiter', [';', '\t'])

@@ -45,6 +45,34 @@ def test_from_a_urdf(tmp_path):
     assert main(command) == 2  # nothing is overwritten
 
 
+def test_what_steers_is_found_in_a_urdf(tmp_path, capsys):
+    # Between chassis and right wheel a knuckle: rolled over, so that its axis points down.
+    knuckle = (
+        '<link name="knuckle"/><joint name="steer_right" type="revolute"><parent link="chassis"/>'
+        '<child link="knuckle"/><origin rpy="3.1415926 0 0"/><axis xyz="0 0 {0}"/></joint>'
+    )
+    parts = [
+        '<link name="base_link"/><link name="chassis"/>',
+        '<joint name="rocker" type="revolute"><parent link="base_link"/><child link="chassis"/>'
+        '<axis xyz="0 1 0"/></joint>',
+        WHEEL.format('right', 0.3, -1.5707963).replace('parent link="chassis"', 'parent link="knuckle"'),
+        WHEEL.format('left', 0.3, -1.5707963),
+    ]
+    output = tmp_path / 'rover.yaml'
+    for axis, told in ((-1, False), (1, True)):
+        text = '<robot name="cart">' + knuckle.format(axis) + ''.join(parts) + '</robot>'
+        (tmp_path / 'cart.urdf').write_text(text)
+        command = ['init', '--urdf', str(tmp_path / 'cart.urdf'), '-o', str(output), '--overwrite']
+        assert main(command) == 0
+        rover = reader.load([output])
+        assert dict(zip(rover.wheels.names, rover.wheels.steering_joints, strict=True)) == {
+            'left_wheel_joint': '',
+            'right_wheel_joint': 'steer_right',
+        }
+        # An axis that points down counts to the right.
+        assert ('wheels.steering_joints' in capsys.readouterr().out) == told
+
+
 @pytest.mark.parametrize(
     ('text', 'word'),
     [

@@ -33,6 +33,8 @@ joint_states:                             # one entry per wheel, as in wheels.na
   front_right:
     velocity: {column: rpm_fr, unit: rpm, sign: -1}
     effort: {column: torque_fr, unit: N m, sign: -1}
+# front_left_steering:                    # a joint that steers (wheels.steering_joints)
+#   position: {column: angle_fl, unit: deg}  # rad or deg, positive left
 imu/data:                                 # leave out what there is not
   linear_acceleration.x: {column: ax, unit: g}   # m/s^2 or g, with gravity
   linear_acceleration.y: {column: ay, unit: g}
@@ -49,6 +51,7 @@ reference_odom:
 UNITS: dict[str, dict[str, float]] = {
     'time': {'s': 1.0, 'ms': 1e-3, 'us': 1e-6, 'ns': 1e-9},
     'rate': {'rad/s': 1.0, 'deg/s': math.pi / 180, 'rpm': math.pi / 30, 'rev/s': 2 * math.pi},
+    'angle': {'rad': 1.0, 'deg': math.pi / 180},
     'torque': {'N m': 1.0, 'N mm': 1e-3},
     'acceleration': {'m/s^2': 1.0, 'g': 9.80665},
     'length': {'m': 1.0, 'cm': 1e-2, 'mm': 1e-3},
@@ -63,7 +66,7 @@ _IMU = {
     **{f'orientation.{axis}': 'number' for axis in (*_AXES, 'w')},
 }
 _REFERENCE = {'linear.x': 'speed', 'variance': 'number'}
-_WHEEL = {'velocity': 'rate', 'effort': 'torque'}
+_JOINT = {'velocity': 'rate', 'effort': 'torque', 'position': 'angle'}
 _TOPICS = ('joint_states', 'imu/data', 'sinkage', 'reference_odom')
 
 
@@ -78,7 +81,7 @@ class Column:
 
 @dataclass(frozen=True)
 class ColumnMap:
-    """Columns by what they mean; joints and sinkage by wheel."""
+    """Columns by what they mean; joints (wheels, and what steers them) and sinkage by name."""
 
     time: Column
     joints: dict[str, dict[str, Column]]
@@ -152,12 +155,15 @@ def _read_map(path: Path, header: list[str], table: Path) -> ColumnMap:
             f'{path}: time and joint_states are needed; see wheel-terra convert --example'
         )
     joints = {
-        str(wheel): reader.group(f'joint_states.{wheel}', entry, _WHEEL)
-        for wheel, entry in reader.mapping('joint_states', document['joint_states']).items()
+        str(joint): reader.group(f'joint_states.{joint}', entry, _JOINT)
+        for joint, entry in reader.mapping('joint_states', document['joint_states']).items()
     }
-    for wheel, found in joints.items():
-        if 'velocity' not in found:
-            raise UserError(f'{path}: joint_states.{wheel}: velocity is missing')
+    for joint, found in joints.items():
+        if 'velocity' not in found and set(found) != {'position'}:
+            raise UserError(
+                f'{path}: joint_states.{joint}: velocity is missing (a joint that steers has '
+                'position alone)'
+            )
     sinkage = {
         str(wheel): reader.column(f'sinkage.{wheel}', entry, 'length')
         for wheel, entry in reader.mapping('sinkage', document.get('sinkage') or {}).items()
@@ -227,13 +233,18 @@ class _Sender:
             raise UserError(f'{self.table}: row {number}: {column}: no time from 0 on')
         stamp = max(round(seconds * 1e9), 1)  # 0 is no stamp
         header = self.make.header(stamp)
-        wheels = self.layout.joints
-        rates = [self.value(number, row, w['velocity']) for w in wheels.values()]
-        torques = [self.value(number, row, w.get('effort')) for w in wheels.values()]
-        told = [t for t in torques if not math.isnan(t)]
-        if any(not math.isnan(rate) for rate in rates):
+        joints = self.layout.joints
+        rates, torques, angles = (
+            [self.value(number, row, columns.get(field)) for columns in joints.values()]
+            for field in _JOINT
+        )
+        if _any_told(rates) or _any_told(angles):
             message = self.make.joint_state(
-                header, list(wheels), velocity=rates, effort=torques if told else ()
+                header,
+                list(joints),
+                velocity=rates,
+                effort=torques if _any_told(torques) else (),
+                position=angles if _any_told(angles) else (),
             )
             self.bag.write('/joint_states', message, stamp)
         self._imu(number, row, stamp)
@@ -274,7 +285,7 @@ class _Sender:
     def _sinkage(self, number: int, row: list[str], stamp: int) -> None:
         columns = self.layout.sinkage
         depths = [self.value(number, row, column) for column in columns.values()]
-        if any(not math.isnan(depth) for depth in depths):
+        if _any_told(depths):
             message = self.make.joint_state(self.make.header(stamp), list(columns), position=depths)
             self.bag.write('/sinkage', message, stamp)
 
@@ -289,3 +300,7 @@ class _Sender:
         twist = self.make.twist_with_covariance(speed, 0.0, covariance)
         message = self.make.odometry(self.make.header(stamp, 'odom'), twist)
         self.bag.write('/reference_odom', message, stamp)
+
+
+def _any_told(values: list[float]) -> bool:
+    return not all(math.isnan(value) for value in values)

@@ -34,6 +34,7 @@ class RoverSketch:
     mass: float  # [kg]
     centre_of_gravity: Sequence[float] = (0.0, 0.0, 0.0)  # [m]
     direction: Sequence[int] = ()
+    steering_joints: Sequence[str] = ()  # that steer each wheel, '' = not steered
     guessed: frozenset[str] = field(default_factory=frozenset)
     source: str = ''
 
@@ -52,6 +53,7 @@ def rover_file(sketch: RoverSketch) -> str:
         'wheels.y': [float(v) for v in sketch.y],
         'wheels.z': [float(v) for v in sketch.z],
         'wheels.direction': [int(v) for v in sketch.direction] or [1] * count,
+        **({'wheels.steering_joints': list(sketch.steering_joints)} if _steers(sketch) else {}),
         'wheels.passes': passes(sketch.x, sketch.y),
     }
     table = declared()
@@ -75,6 +77,10 @@ def rover_file(sketch: RoverSketch) -> str:
         unit = f' [{parameter.unit}]' if parameter.unit not in ('', '-') else ''
         lines.append(f'    # {key}: {format_value(shown)}  # {parameter.meaning}{unit}')
     return '\n'.join(lines) + '\n'
+
+
+def _steers(sketch: RoverSketch) -> bool:
+    return any(sketch.steering_joints)
 
 
 _WORTH_STATING = (

@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Wheels and mass of a rover from its URDF.
+"""Wheels, what steers them and mass of a rover from its URDF.
 
 A URDF may come from anywhere: documents with a DTD or entities are refused (they could blow up or
 read files), and the size is bounded.
@@ -27,6 +27,9 @@ from wheel_terra_estimator.errors import UserError
 LARGEST_FILE = 20_000_000  # [byte]
 DEEPEST_CHAIN = 1000
 BASE_LINKS = ('base_link', 'base_footprint')
+
+_UPRIGHT = 0.8
+"""Cosine between the axis of a joint that steers and the vertical, at least."""
 
 Pose = NDArray[np.float64]  # (4, 4)
 
@@ -65,6 +68,9 @@ def read_urdf(path: Path, wheels: Sequence[str] = ()) -> RoverSketch:
     shapes = [_cylinder(links, joints[name], path) for name in names]
     guessed = {'wheels.width'} if any(width is None for _, width in shapes) else set()
     radius = [r for r, _ in shapes]
+    steering = [_steering_joint(joints[name], joints, base, path) for name in names]
+    if any(axis < 0.0 for _, axis in steering):
+        guessed.add('wheels.steering_joints')
     mass, centre = _mass(links, joints, base, path)
     if not mass:
         guessed |= {'rover.mass', 'rover.centre_of_gravity'}
@@ -80,7 +86,8 @@ def read_urdf(path: Path, wheels: Sequence[str] = ()) -> RoverSketch:
         z=[round(float(p[2, 3]), 5) for p in poses],
         mass=round(mass, 3) or 50.0,
         centre_of_gravity=centre,
-        direction=[_direction(joints[n], p) for n, p in zip(names, poses, strict=True)],
+        direction=[_direction(joints[n], p, path) for n, p in zip(names, poses, strict=True)],
+        steering_joints=[joint for joint, _ in steering],
         guessed=frozenset(guessed),
         source=f'{path.name}, relative to {base}',
     )
@@ -228,13 +235,34 @@ def _cylinder(
     )
 
 
-def _direction(joint: ElementTree.Element, pose: Pose) -> int:
+def _direction(joint: ElementTree.Element, pose: Pose, path: Path) -> int:
     """Return 1 where a positive rate drives forward: the axis points left."""
+    return -1 if float((pose[:3, :3] @ _axis(joint, path))[1]) < -0.1 else 1
+
+
+def _steering_joint(
+    wheel: ElementTree.Element, joints: dict[str, ElementTree.Element], base: str, path: Path
+) -> tuple[str, float]:
+    """Return the joint that steers a wheel, and the z of its axis in the base: -1 counts right.
+
+    It is the nearest turning joint above the wheel whose axis is upright; '' and 0 for none.
+    """
+    above = {_child(joint): joint for joint in joints.values()}
+    joint = above.get(_parent(wheel))
+    for _ in range(DEEPEST_CHAIN):
+        if joint is None or _child(joint) == base:
+            break
+        if joint.get('type') in ('revolute', 'continuous'):
+            up = float((_pose(joint, joints, base, path)[:3, :3] @ _axis(joint, path))[2])
+            if abs(up) > _UPRIGHT:
+                return joint.get('name', ''), up
+        joint = above.get(_parent(joint))
+    return '', 0.0
+
+
+def _axis(joint: ElementTree.Element, path: Path) -> NDArray[np.float64]:
     axis = joint.find('axis')
-    xyz = (
-        [float(v) for v in (axis.get('xyz') or '1 0 0').split()] if axis is not None else [1, 0, 0]
-    )
-    return -1 if float((pose[:3, :3] @ np.array(xyz))[1]) < -0.1 else 1
+    return np.array(_numbers(axis.get('xyz') if axis is not None else None, (1.0, 0, 0), path))
 
 
 def _mass(
