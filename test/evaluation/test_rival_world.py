@@ -169,6 +169,30 @@ def test_truth_knows_rest_classes_and_entrapment():
     assert not truth.trapped(time, -slip).any()
 
 
+def test_steered_wheels_roll_round_where_they_are_told():
+    drive = rival_drive.simulate('steered', 1002, 30.0)
+    rover, t, c = drive.draw.vehicle, drive.truth, drive.course
+    front = np.abs(rover.x) == np.abs(rover.x).max()
+    time = (t.stamp - sensing.START) * 1e-9
+    spin = (time > 0.6 * 30.0) & (time < 0.65 * 30.0)
+    # On the spot a hub goes round the middle: across the line to it.
+    angle = c.at('steering', time)[spin][-1]
+    np.testing.assert_allclose(np.tan(angle[front]), -(rover.x / rover.y)[front], rtol=0.05)
+    # Wheels that need not skid turn the rover as their rims say, less their slip.
+    outer = np.hypot(rover.x, rover.y)[front]
+    rim = np.abs(t.wheel_rate[spin])[:, front] * rover.shape.tip_radius[front]
+    yaw = np.abs(t.yaw_rate[spin]).mean()
+    assert 0.75 < yaw / (rim / outer).mean() < 1.02
+    # What is read: angles of the wheels that steer, as the file names them.
+    read = [a.measurement for a in drive.arrivals if isinstance(a.measurement, WheelOdometry)]
+    last = read[-1].steering
+    np.testing.assert_array_equal(~np.isnan(last), drive.configuration.wheels.steered)
+    np.testing.assert_allclose(last[front], c.steering[-1][front], atol=0.05)
+    ground = t.wheel_rate * rover.shape.tip_radius - t.slip_velocity
+    lost = t.torque * t.wheel_rate - t.drawbar_pull * ground
+    assert lost.min() > -2e-3 * rover.weight * drive.draw.speed
+
+
 @pytest.mark.parametrize('kind', KINDS)
 def test_every_kind_starts(kind):
     drive = rival_drive.simulate(kind, 1002, 2.0)

@@ -44,6 +44,7 @@ _STANDING = 3.0  # [s] at rest before the first start
 _RAMP = 1.0  # [s]
 _HEADING_GAIN = 0.4  # [1/s], of the driver that keeps the heading
 _STEERING_SHARE = 0.3  # of the speed, at most, for that
+_STEERING_ZERO = np.radians(0.5)  # deviation of the zeros of steering angles [rad]
 _TRAPPING_SHARE = 0.85  # of the slope: what a patch that traps still carries the rover up
 
 
@@ -156,12 +157,13 @@ def _drive(
     rows: dict[str, list[FloatArray]] = {name: [] for name in (*_COLUMNS, 'silent')}
     while plant.state.time < length:
         share = plant.state.time / length
-        rate = driver.rim_speeds(plant.state) / vehicle.shape.tip_radius
+        speed, steering = driver.wheels(plant.state)
+        rate = speed / vehicle.shape.tip_radius
         locked, free, silent = (
             _out_of_order(plan, np.arange(vehicle.count), faulty, kind, share)
             for kind in ('locked', 'free', 'dead')
         )
-        plant.step(WheelCommand(rate, locked, free))
+        plant.step(WheelCommand(rate, locked, free, steering))
         rows['silent'].append(silent.astype(float))
         for name, values in zip(_COLUMNS, _row(plant.state, vehicle.x, vehicle.y), strict=True):
             rows[name].append(values)
@@ -185,8 +187,8 @@ class _Driver:
         self._plan, self._draw, self._length = plan, draw, length
         self._heading = 0.0
 
-    def rim_speeds(self, state: State) -> FloatArray:
-        """Return the speeds asked of the rims (n,) [m/s]."""
+    def wheels(self, state: State) -> tuple[FloatArray, FloatArray]:
+        """Return the speeds asked of the rims [m/s] and the headings of the wheels [rad], (n,)."""
         draw = self._draw
         forward, turn = _command(self._plan, draw, state.time, self._length)
         if turn != 0.0:
@@ -195,12 +197,19 @@ class _Driver:
             most = _STEERING_SHARE * abs(forward) / (0.5 * draw.track)
             error = self._heading - state.heading
             turn = float(np.clip(_HEADING_GAIN * error, -most, most))
-        return np.asarray(forward - turn * draw.vehicle.y)
+        ahead, aside = forward - turn * draw.vehicle.y, turn * draw.vehicle.x
+        if not draw.steered.any():
+            return ahead, np.zeros(draw.vehicle.count)
+        # Each steered wheel heads where its hub is to go, or away from it and turns backwards.
+        back = np.where(ahead < 0.0, -1.0, 1.0)
+        heading = np.where(draw.steered, np.arctan2(back * aside, np.abs(ahead)), 0.0)
+        heading = np.where(np.hypot(ahead, aside) > REST_SPEED, heading, state.steering)
+        return np.where(draw.steered, back * np.hypot(ahead, aside), ahead), heading
 
 
 _COLUMNS = (
     *('time', 'rate', 'torque', 'sinkage', 'speed', 'specific_force', 'slopes', 'tilt'),
-    *('heading', 'pull', 'load'),
+    *('heading', 'steering', 'pull', 'load'),
 )
 
 
@@ -219,6 +228,7 @@ def _row(state: State, x: FloatArray, y: FloatArray) -> tuple[FloatArray, ...]:
         np.array(state.slopes),
         np.array(tilt),
         np.asarray(state.heading),
+        state.steering.copy(),
         state.forces.pull.copy(),
         state.load.copy(),
     )
@@ -279,6 +289,11 @@ def draw_sensors(generator: np.random.Generator, plan: Kind, draw: Draw) -> Sens
         reference_scale=0.005 * float(generator.standard_normal()),
         reference_delay=0.2 if satellite else float(generator.uniform(0.3, 1.75)),
         stated_variance=stated**2 if generator.uniform() < 0.75 else 0.0,
+        steering_zero=np.where(
+            draw.steered,
+            _STEERING_ZERO * generator.standard_normal(n) if draw.steered.any() else 0.0,
+            np.nan,
+        ),
     )
 
 
@@ -321,7 +336,9 @@ def _truth(course: Course, rows: _TruthRows, sensors: SensorSet, draw: Draw) -> 
     time = odometry_times(course, sensors)
     speed, rate = course.at('speed', time), course.at('rate', time)
     rim = rate * vehicle.shape.tip_radius
-    ground = speed[:, :1] - speed[:, 2:] * vehicle.y
+    angle = course.at('steering', time)
+    ground = np.cos(angle) * (speed[:, :1] - speed[:, 2:] * vehicle.y)
+    ground += np.sin(angle) * (speed[:, 1:2] + speed[:, 2:] * vehicle.x)
     held = np.where(np.abs(ground) > REST_SPEED, -1.0, np.nan)
     slip = np.where(np.abs(rim) > REST_SPEED, slip_ratio(ground, rim), held)
     slip = np.where(resting(time, rim, ground), np.nan, slip)

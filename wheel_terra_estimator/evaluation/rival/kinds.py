@@ -163,6 +163,21 @@ KINDS: Mapping[str, Kind] = {
             (0.92, 1.0, 0.0),
         ),
     ),
+    'steered': Kind(
+        'arcs and a spin on the spot, wheels of the first and last axle steered',
+        rover=RoverClass(track=(0.7, 1.0), steered=True),
+        slopes=((0.0, 0.05), (0.6, 0.12)),
+        commands=_stages(
+            (0.0, 1.0, 0.0),
+            (0.2, 0.8, 0.25),
+            (0.4, 1.0, 0.0),
+            (0.5, 0.0, 0.0),
+            (0.54, 0.0, 0.5),
+            (0.66, 0.0, 0.0),
+            (0.7, 0.8, -0.3),
+            (0.9, 1.0, 0.0),
+        ),
+    ),
     'reversal': Kind(
         'forward, back and forward on a slope',
         slopes=((-1.0, 0.15), (1.0, 0.15)),

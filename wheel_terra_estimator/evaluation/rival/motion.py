@@ -30,6 +30,7 @@ STEP = 0.025
 _MOTOR_TIME = 0.15  # [s], in which a wheel follows its command
 _MOTOR_DROOP = 0.03  # loss of rate at the greatest torque
 _FREE_WHEEL_TIME = 0.1  # [s], in which a wheel without drive follows the ground
+_STEERING_RATE = 0.5  # [rad/s], at which a wheel turns to where it is told to head
 _NEWTON_ROUNDS = 25
 _BACK = 0.3  # what is kept of a step that made the residual larger
 _SMALLEST_CHANGE = 1e-9  # [m/s]
@@ -83,6 +84,7 @@ class State:
     force: ChassisForce
     slopes: tuple[float, float]  # ahead, to the left [rad]
     forces: SoilForces
+    steering: FloatArray  # (n,) headings of the wheels, positive left [rad]
 
     @property
     def sinkage(self) -> FloatArray:
@@ -97,6 +99,7 @@ class WheelCommand:
     rate: FloatArray  # (n,) [rad/s]
     locked: NDArray[np.bool_]
     free: NDArray[np.bool_]
+    steering: FloatArray  # (n,) asked headings, positive left [rad]
 
 
 class Plant:
@@ -115,8 +118,9 @@ class Plant:
         slopes = world.ground.slopes(0.0, 0.0, 0.0)
         force = _standing(vehicle.gravity, slopes)
         load = wheel_loads(vehicle, force, np.full(n, vehicle.mass * force.forward / n))
-        self._lever = np.stack([np.ones(n), np.zeros(n), -vehicle.y])
-        self._lateral_lever = np.stack([np.zeros(n), np.ones(n), vehicle.x])
+        self._ahead = np.stack([np.ones(n), np.zeros(n), -vehicle.y])
+        self._aside = np.stack([np.zeros(n), np.ones(n), vehicle.x])
+        self._lever, self._lateral_lever = self._ahead, self._aside
         behind = (vehicle.x[:, None] < vehicle.x) & (vehicle.y[:, None] * vehicle.y > 0.0)
         self._wheels_before = behind.sum(axis=1)
         self._inertia = np.array([vehicle.mass, vehicle.mass, vehicle.yaw_inertia])
@@ -136,12 +140,14 @@ class Plant:
             force=force,
             slopes=slopes,
             forces=forces,
+            steering=np.zeros(n),
         )
 
     def step(self, command: WheelCommand) -> State:
         """Go on by one step; return the state after it (the same object)."""
         s, world = self.state, self.world
         vehicle = world.vehicle
+        self._steer(command.steering)
         s.rate = self._wheel_rates(command)
         s.slopes = world.ground.slopes(s.x, s.y, s.heading)
         soil = self._soil(s.x, s.y, s.heading)
@@ -163,6 +169,14 @@ class Plant:
         """Return the slip ratios (n,), of the radius with lugs."""
         s = self.state
         return slip_ratio(s.speed @ self._lever, s.rate * self.world.vehicle.shape.tip_radius)
+
+    def _steer(self, asked: FloatArray) -> None:
+        """Turn the wheels towards the headings that are asked for (n,) [rad]."""
+        s, most = self.state, _STEERING_RATE * STEP
+        s.steering = s.steering + np.clip(asked - s.steering, -most, most)
+        cosine, sine = np.cos(s.steering), np.sin(s.steering)
+        self._lever = cosine * self._ahead + sine * self._aside
+        self._lateral_lever = cosine * self._aside - sine * self._ahead
 
     def _wheel_rates(self, command: WheelCommand) -> FloatArray:
         s, limit = self.state, self.world.torque_limit
@@ -200,7 +214,8 @@ class Plant:
 
     def _loads(self) -> FloatArray:
         s, world = self.state, self.world
-        loads = wheel_loads(world.vehicle, s.force, s.forces.pull)
+        forward = s.forces.pull * np.cos(s.steering) - s.forces.side * np.sin(s.steering)
+        loads = wheel_loads(world.vehicle, s.force, forward)
         place = np.asarray(s.x), np.asarray(s.y)
         errors = np.array([float(e.at(*place)) for e in world.load_errors])
         changed = loads * (1.0 + errors)

@@ -54,6 +54,7 @@ class RoverClass:
     speed: tuple[float, float] = (0.03, 0.1)  # [m/s]
     gravity: tuple[float, ...] = (EARTH,)
     track: tuple[float, float] = (0.7, 0.95)  # over the wheelbase
+    steered: bool = False  # the wheels of the first and the last axle
 
 
 @dataclass(frozen=True)
@@ -113,6 +114,7 @@ class Draw:
     file: dict[str, object]  # keys of the rover and the soil
     speed: float  # nominal [m/s]
     torque_limit: float  # [N m]
+    steered: NDArray[np.bool_]  # (n,) wheels that steer
 
     @property
     def track(self) -> float:
@@ -148,7 +150,11 @@ def draw_rover(
     speed = float(np.exp(generator.uniform(*np.log(rover.speed))))
     limit = 1.2 * vehicle.weight / vehicle.count * float(vehicle.shape.tip_radius[0])
     file = {**_rover_keys(generator, vehicle, limit), **_soil_keys(generator, nominal)}
-    return Draw(vehicle, soil, file, speed, limit)
+    steered = rover.steered & (np.abs(vehicle.x) == np.abs(vehicle.x).max())
+    if rover.steered:
+        names = [f'steering_{i + 1}' if turns else '' for i, turns in enumerate(steered)]
+        file['wheels.steering_joints'] = names
+    return Draw(vehicle, soil, file, speed, limit, steered)
 
 
 def traction_curve(vehicle: Vehicle, soil: TrueSoil, slip: FloatArray) -> FloatArray:

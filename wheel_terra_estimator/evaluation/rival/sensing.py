@@ -46,6 +46,7 @@ class Course:
     slopes: FloatArray  # (k, 2) ahead, to the left [rad]
     tilt: FloatArray  # (k, 2) of the chassis on its wheels: nose up, left side up [rad]
     heading: FloatArray  # (k,) [rad]
+    steering: FloatArray  # (k, n) [rad]
     silent: FloatArray  # (k, n) 1 where a wheel sends nothing
 
     def at(self, name: str, time: FloatArray) -> FloatArray:
@@ -87,6 +88,7 @@ class SensorSet:
     reference_scale: float
     reference_delay: float  # [s]
     stated_variance: float  # in its messages; 0 = none
+    steering_zero: FloatArray  # (n,) [rad], nan = not steered
 
 
 _WANDER_TIME = {'reference': 15.0, 'attitude': 60.0}  # [s]
@@ -141,10 +143,15 @@ def _wheel_odometry(
     torque = torque + sensors.torque_noise * generator.standard_normal(torque.shape)
     silent = course.at('silent', time) > 0.5
     rate, torque = np.where(silent, np.nan, rate), np.where(silent, np.nan, torque)
+    angles: list[FloatArray | None] = [None] * len(time)
+    if not np.isnan(sensors.steering_zero).all():
+        angles = list(course.at('steering', time) + sensors.steering_zero)
     # The difference of two counts belongs to the middle of its interval, but nobody stamps it so.
     late = generator.uniform(0.001, 0.006, len(time))
     return [
-        Arrival(int(stamp + 1e9 * delay), WheelOdometry(int(stamp), rate[i], torque[i]))
+        Arrival(
+            int(stamp + 1e9 * delay), WheelOdometry(int(stamp), rate[i], torque[i], angles[i])
+        )
         for i, (stamp, delay) in enumerate(zip(stamps(time), late, strict=True))
     ]
 
