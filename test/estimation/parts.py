@@ -7,8 +7,7 @@ from dataclasses import dataclass
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.contacts.loads import WheelLoads
 from wheel_terra_estimator.estimation.contacts.wheel_models import WheelModels
-from wheel_terra_estimator.estimation.filter.initial_state import initial_filter
-from wheel_terra_estimator.estimation.filter.state import StateLayout
+from wheel_terra_estimator.estimation.filter.initial_state import initial_filter, layout_of
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
 
 SAND = ['generic_six_wheel', 'dry_sand_ding2015']
@@ -23,7 +22,7 @@ class Parts:
     def __post_init__(self):
         self.rover = Rover.from_configuration(self.configuration)
         self.sensors = SensorFigures.from_configuration(self.configuration)
-        self.layout = StateLayout(self.rover.wheel_count)
+        self.layout = layout_of(self.rover, self.sensors)
         self.models = WheelModels(self.configuration)
 
     def filter(self):

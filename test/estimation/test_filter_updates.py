@@ -58,7 +58,7 @@ def window(force_x, force_z, readings=5, noise=0.0):
 
 def references(parts, ekf, speeds, torque_known=True, last_change=-1e9, acceleration=0.0):
     """Fuse one reference per second; return for each whether the speed was opened to it."""
-    update = ReferenceUpdate(parts.configuration, parts.rover, parts.sensors)
+    update = ReferenceUpdate(parts.configuration, parts.rover, parts.sensors, parts.layout)
     opened = []
     for i, speed in enumerate(speeds):
         ekf.widen(SPEED, 1e-8)
@@ -133,7 +133,7 @@ def test_references_beyond_the_fastest_wheel_hardly_count(parts, ekf):
 
 
 def test_a_reference_on_standing_wheels_says_whether_the_rover_slides(parts, ekf):
-    update = ReferenceUpdate(parts.configuration, parts.rover, parts.sensors)
+    update = ReferenceUpdate(parts.configuration, parts.rover, parts.sensors, parts.layout)
     for time, speed, sliding in ((0.0, 0.03, True), (10.0, 0.0, False)):
         update.update(
             ekf,
@@ -146,6 +146,43 @@ def test_a_reference_on_standing_wheels_says_whether_the_rover_slides(parts, ekf
             torque_known=True,
         )
         assert (update.state.sliding_until > time) is sliding
+
+
+def wandering(rng, count, dt, std, time):
+    """Return a first-order Gauss-Markov error at `count` times."""
+    hold, values = np.exp(-dt / time), [std * rng.standard_normal()]
+    for _ in range(count - 1):
+        values.append(hold * values[-1] + std * np.sqrt(1 - hold**2) * rng.standard_normal())
+    return values
+
+
+@pytest.mark.parametrize(('stated', 'least', 'most'), [(0.03, 0.85, 1.0), (0.0, 0.0, 0.4)])
+def test_readings_that_are_off_by_the_same_are_no_many_readings(stated, least, most):
+    """A satellite receiver at 5 Hz, off by 3 cm/s for 15 s at a time: its errors are covered."""
+    parts = Parts(
+        reader.load(SAND, [f'sensors.reference_wander_std:={stated}', 'filter.gate:=1e6'])
+    )
+    rng, dt, count, inside = np.random.default_rng(4), 0.2, 100, []
+    for _ in range(20):
+        ekf = parts.filter()
+        ekf.set(SPEED, 0.5 + 0.1 * rng.standard_normal(), 0.1**2)
+        update = ReferenceUpdate(parts.configuration, parts.rover, parts.sensors, parts.layout)
+        for i, error in enumerate(wandering(rng, count, dt, 0.03, 15.0)):
+            prediction = Prediction.unchanged(ekf.mean)
+            update.predict(prediction, dt if i else 0.0)
+            ekf.predict(*prediction)
+            update.update(
+                ekf,
+                dt * i,
+                ReferenceVelocity(0, 0.5 + error + 0.01 * rng.standard_normal(), 1e-4),
+                still=False,
+                fastest_rim=0.6,
+                rim_acceleration=0.0,
+                last_change=-1e9,
+                torque_known=True,
+            )
+        inside.append(abs(ekf.mean[SPEED] - 0.5) < 1.96 * np.sqrt(ekf.covariance[SPEED, SPEED]))
+    assert least <= np.mean(inside) <= most
 
 
 # -- Zero velocity ----------------------------------------------------------------------------

@@ -675,6 +675,21 @@ DECLARED: tuple[Parameter, ...] = (
         above=0.0,
     ),
     number(
+        'sensors.reference_wander_std',
+        0.0,
+        'm/s',
+        'error of the reference velocity that lasts from one reading to the next (satellite '
+        'receivers: some cm/s), beside its noise; 0 = none',
+        at_least=0.0,
+    ),
+    number(
+        'sensors.reference_wander_time',
+        15.0,
+        's',
+        'time over which that error lasts',
+        above=0.0,
+    ),
+    number(
         'sensors.reference_delay',
         0.4,
         's',

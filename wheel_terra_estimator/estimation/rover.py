@@ -105,6 +105,8 @@ class SensorFigures:
     leaving_angle_std: float  # [rad]
     reference_std: float  # [m/s]
     reference_std_floor: float
+    reference_wander_std: float  # of the error that lasts from reading to reading [m/s]
+    reference_wander_time: float  # [s]
 
     @classmethod
     def from_configuration(cls, configuration: Configuration) -> SensorFigures:

@@ -41,7 +41,11 @@ from wheel_terra_estimator.estimation.filter.force_balance import (
     SumOfPulls,
     rut_tilt,
 )
-from wheel_terra_estimator.estimation.filter.initial_state import initial_filter, with_soil_of
+from wheel_terra_estimator.estimation.filter.initial_state import (
+    initial_filter,
+    layout_of,
+    with_soil_of,
+)
 from wheel_terra_estimator.estimation.filter.observability import considered_entries
 from wheel_terra_estimator.estimation.filter.prediction import Prediction
 from wheel_terra_estimator.estimation.filter.reference import ReferenceUpdate
@@ -50,7 +54,7 @@ from wheel_terra_estimator.estimation.filter.sinkage import SinkageUpdate
 from wheel_terra_estimator.estimation.filter.sinkage_process import SinkageProcess
 from wheel_terra_estimator.estimation.filter.soil_process import SoilProcess
 from wheel_terra_estimator.estimation.filter.speed_process import RimSpeeds, SpeedProcess
-from wheel_terra_estimator.estimation.filter.state import GRAVITY_BIAS, SPEED, StateLayout
+from wheel_terra_estimator.estimation.filter.state import GRAVITY_BIAS, SPEED
 from wheel_terra_estimator.estimation.filter.torque import TorqueUpdate
 from wheel_terra_estimator.estimation.filter.zero_velocity import ZeroVelocityUpdate
 from wheel_terra_estimator.estimation.inputs.contact_sensors import (
@@ -153,7 +157,7 @@ class WheelSoilEstimator:
         self._configuration = configuration
         self._rover = rover = Rover.from_configuration(configuration)
         sensors = SensorFigures.from_configuration(configuration)
-        self._layout = layout = StateLayout(rover.wheel_count)
+        self._layout = layout = layout_of(rover, sensors)
         models = WheelModels(configuration)
         # Readings between two cycles.
         self._inertial = InertialInput(rover.gravity)
@@ -189,7 +193,7 @@ class WheelSoilEstimator:
         self._speed = SpeedProcess(configuration, rover, sensors)
         self._sinkage_process = SinkageProcess(rover, layout, models, angle_std)
         self._soil_process = SoilProcess(configuration, layout)
-        self._reference = ReferenceUpdate(configuration, rover, sensors)
+        self._reference = ReferenceUpdate(configuration, rover, sensors, layout)
         self._zero_velocity = ZeroVelocityUpdate(rover)
         self._sinkage = SinkageUpdate(configuration, sensors, layout)
         self._torque = TorqueUpdate(configuration, rover, sensors)
@@ -437,6 +441,7 @@ class WheelSoilEstimator:
             rim=cycle.unturned.typical,
             demand_change=cycle.demand_change if cycle.reference_known else 0.0,
         )
+        self._reference.predict(prediction, cycle.dt)
         if not cycle.still and cycle.dt > 0.0:
             travel = self._sinkage_process.predict(
                 prediction,
@@ -471,11 +476,9 @@ class WheelSoilEstimator:
     def _fuse_reference(self, cycle: _Cycle, reference: ReferenceVelocity) -> None:
         """Fuse a reference velocity; a speed that was wrong is no growth of the slip."""
         time, ekf = cycle.time, self._ekf
+        innovation, variance = self._reference.innovation(ekf, reference)
         self._noise.compare_reference(
-            time,
-            reference.forward - float(ekf.mean[SPEED]),
-            self._reference.variance(reference),
-            float(ekf.covariance[SPEED, SPEED]),
+            time, innovation, self._reference.variance(reference), variance
         )
         opened = self._reference.update(
             self._ekf,

@@ -109,6 +109,11 @@ class SoilPriors:
 _LEAST_SINE = 0.05  # of sin(phi) cos(phi): soil without friction
 
 
+def layout_of(rover: Rover, sensors: SensorFigures) -> StateLayout:
+    """Return what the state of a rover with such sensors consists of."""
+    return StateLayout(rover.wheel_count, sensors.reference_wander_std > 0.0)
+
+
 def initial_filter(
     configuration: Configuration,
     rover: Rover,
@@ -158,6 +163,8 @@ def initial_filter(
     own = tuning.own_stiffness_share * priors.stiffness_std
     P[layout.stiffness, layout.stiffness] = priors.stiffness_std**2 + np.eye(n) * own**2
     P[layout.shear_error, layout.shear_error] = priors.shear_error_covariance(n)
+    if layout.reference_error is not None:
+        P[layout.reference_error, layout.reference_error] = sensors.reference_wander_std**2
     return GatedFilter(mean, P, *bounds(rover, layout, tuning))
 
 
@@ -173,6 +180,8 @@ def bounds(rover: Rover, layout: StateLayout, tuning: PriorTuning) -> tuple[Floa
         tuning.most_stiffness,
         tuning.most_shear_error,
     )
+    if layout.reference_error is not None:
+        upper[layout.reference_error] = tuning.most_speed
     lower = -upper
     lower[SLIP_PER_DEMAND] = 0.0
     upper[layout.sinkage] = rover.rim_radius

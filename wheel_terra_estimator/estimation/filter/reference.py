@@ -8,11 +8,14 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
+import numpy as np
+
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.filter.consistency import CONSISTENT, smoothed_nis
-from wheel_terra_estimator.estimation.filter.ekf import GatedFilter, chi_square_gate
-from wheel_terra_estimator.estimation.filter.state import SPEED
+from wheel_terra_estimator.estimation.filter.ekf import GatedFilter, Row, chi_square_gate
+from wheel_terra_estimator.estimation.filter.prediction import Prediction
+from wheel_terra_estimator.estimation.filter.state import SPEED, StateLayout
 from wheel_terra_estimator.estimation.measurements import ReferenceVelocity
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
 from wheel_terra_estimator.estimation.scalars import clipped
@@ -76,11 +79,35 @@ class ReferenceUpdate(Component[ReferenceState]):
         configuration: Configuration,
         rover: Rover,
         sensors: SensorFigures,
+        layout: StateLayout,
         tuning: ReferenceTuning = ReferenceTuning(),
     ) -> None:
         super().__init__(ReferenceState())
+        self._error = layout.reference_error
+        self._reading = np.zeros(layout.size)  # of speed and of the error that lasts
+        self._reading[SPEED if self._error is None else [SPEED, self._error]] = 1.0
         self._gate = float(configuration.filter.gate)
         self._rover, self._sensors, self._tuning = rover, sensors, tuning
+
+    def predict(self, prediction: Prediction, dt: float) -> None:
+        """Add the error that lasts to a prediction over `dt` [s], if there is one."""
+        if self._error is None:
+            return
+        mean, F, Q = prediction
+        entry, sensors = self._error, self._sensors
+        hold = math.exp(-dt / sensors.reference_wander_time)
+        mean[entry] *= hold
+        F[entry, entry] = hold
+        Q[entry, entry] = sensors.reference_wander_std**2 * (1.0 - hold * hold)
+
+    def innovation(self, ekf: GatedFilter, reference: ReferenceVelocity) -> tuple[float, float]:
+        """Return what a reading says beyond the state [m/s], and the variance of the state's."""
+        if self._error is None:
+            state, variance = float(ekf.mean[SPEED]), float(ekf.covariance[SPEED, SPEED])
+        else:
+            state = float(self._reading @ ekf.mean)
+            variance = float(self._reading @ ekf.covariance @ self._reading)
+        return reference.forward - state, variance
 
     def known(self, time: float) -> bool:
         """Say whether a reference is young enough to tell slip and soil apart."""
@@ -153,8 +180,8 @@ class ReferenceUpdate(Component[ReferenceState]):
         self._note_time(time)
         if still:
             self._note_slide(ekf, time, reference.forward, variance)
-        residual = reference.forward - float(ekf.mean[SPEED])
-        total = float(ekf.covariance[SPEED, SPEED]) + variance
+        residual, prior = self.innovation(ekf, reference)
+        total = prior + variance
         nis = residual * residual / total
         score = clipped(residual / math.sqrt(total), -tuning.most_lean, tuning.most_lean)
         lean = self.state.lean + (score - self.state.lean) / tuning.lean_count
@@ -183,7 +210,7 @@ class ReferenceUpdate(Component[ReferenceState]):
             if self._excess(lean) > tuning.run_excess and nis > CONSISTENT:
                 # One more of a run to one side: the prediction is too sure of itself.
                 ekf.widen(SPEED, residual * residual / CONSISTENT - total)
-        ekf.fuse_entry(SPEED, reference.forward, variance)
+        ekf.fuse([Row(self.innovation(ekf, reference)[0], self._reading, variance)])
         self.state = state
         return opened
 

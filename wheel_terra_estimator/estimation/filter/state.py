@@ -29,6 +29,9 @@ stiffness (n)    ln     Factor on the bearing modulus, per wheel: wheels enter a
 shear_error (n)  ln     Error of the shear model, per wheel, first-order Gauss-Markov over travel.
                         It makes ten equal residuals at constant slip one piece of information,
                         and carries what torque says of a wheel's pull in another soil.
+reference_error  m/s    Only with ``sensors.reference_wander_std``: what lasts of the error of the
+                        reference velocity, first-order Gauss-Markov over time. Fifty readings of a
+                        satellite receiver that is off by 3 cm/s are off by 3 cm/s.
 ===============  =====  ===========================================================================
 
 Not in it: c and phi apart, n0 apart from the stiffness, torque zeros and sinkage zeros (constant,
@@ -62,14 +65,18 @@ class StateLayout:
     """Where each entry of the state vector is, for n wheels."""
 
     wheel_count: int
+    reference_wanders: bool = False
     size: int = field(init=False)
     sinkage: slice = field(init=False)
     stiffness: slice = field(init=False)
     shear_error: slice = field(init=False)
+    reference_error: int | None = field(init=False)  # None: it is not in it
 
     def __post_init__(self) -> None:
         n = self.wheel_count
-        object.__setattr__(self, 'size', _COMMON + 3 * n)
+        each = _COMMON + 3 * n
+        object.__setattr__(self, 'size', each + self.reference_wanders)
         object.__setattr__(self, 'sinkage', slice(_COMMON, _COMMON + n))
         object.__setattr__(self, 'stiffness', slice(_COMMON + n, _COMMON + 2 * n))
-        object.__setattr__(self, 'shear_error', slice(_COMMON + 2 * n, _COMMON + 3 * n))
+        object.__setattr__(self, 'shear_error', slice(_COMMON + 2 * n, each))
+        object.__setattr__(self, 'reference_error', each if self.reference_wanders else None)

@@ -29,8 +29,9 @@ from wheel_terra_estimator.estimation.contacts.loads import WheelLoads
 from wheel_terra_estimator.estimation.contacts.pulls import PullEvidence, Pulls
 from wheel_terra_estimator.estimation.estimates import EstimateSet, SlipClass
 from wheel_terra_estimator.estimation.filter.force_balance import rut_tilt
+from wheel_terra_estimator.estimation.filter.initial_state import layout_of
 from wheel_terra_estimator.estimation.filter.speed_process import least_slip_std
-from wheel_terra_estimator.estimation.filter.state import SPEED, StateLayout
+from wheel_terra_estimator.estimation.filter.state import SPEED
 from wheel_terra_estimator.estimation.judgement.slip import SlipJudge
 from wheel_terra_estimator.estimation.output_guard import OutputGuard
 from wheel_terra_estimator.estimation.outputs import MissingInputs, Outputs
@@ -173,7 +174,7 @@ class _Judges:
     def __init__(self, configuration: Configuration, tuning: SmootherTuning) -> None:
         self._rover = rover = Rover.from_configuration(configuration)
         sensors = SensorFigures.from_configuration(configuration)
-        self._layout = layout = StateLayout(rover.wheel_count)
+        self._layout = layout = layout_of(rover, sensors)
         self._tuning = tuning
         self._slips = SlipJudge(configuration, rover, sensors)
         self._pulls = Pulls(rover, sensors, WheelLoads(rover).state.load)
