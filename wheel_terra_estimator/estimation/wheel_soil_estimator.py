@@ -56,6 +56,7 @@ from wheel_terra_estimator.estimation.filter.soil_process import SoilProcess
 from wheel_terra_estimator.estimation.filter.speed_process import RimSpeeds, SpeedProcess
 from wheel_terra_estimator.estimation.filter.state import GRAVITY_BIAS, SPEED
 from wheel_terra_estimator.estimation.filter.torque import TorqueUpdate
+from wheel_terra_estimator.estimation.filter.whiteness import Whiteness
 from wheel_terra_estimator.estimation.filter.zero_velocity import ZeroVelocityUpdate
 from wheel_terra_estimator.estimation.inputs.contact_sensors import (
     LeavingAngleInput,
@@ -198,6 +199,7 @@ class WheelSoilEstimator:
         self._sinkage = SinkageUpdate(configuration, sensors, layout)
         self._torque = TorqueUpdate(configuration, rover, sensors)
         self._balance = ForceBalance(configuration, rover, sensors, layout)
+        self._whiteness = Whiteness()
         # What it means.
         self._slips = SlipJudge(configuration, rover, sensors)
         self._margin = PullMargin(sensors, layout, models)
@@ -230,6 +232,7 @@ class WheelSoilEstimator:
             self._sinkage,
             self._torque,
             self._balance,
+            self._whiteness,
             self._slips,
             self._margin,
             self._stuck,
@@ -329,6 +332,7 @@ class WheelSoilEstimator:
         )
 
         rows = self._sinkage.update(ekf, time, self._sinkages.take())
+        depths, torques = len(rows), 0
         self._compare_wheels(cycle)
         forces, total = None, None
         if cycle.still:
@@ -336,6 +340,7 @@ class WheelSoilEstimator:
         elif self._contact_age.settled:
             forces, total, force_rows = self._force_rows(cycle)
             rows += force_rows
+            torques = len(force_rows) - (total is not None)
         considered = considered_entries(
             layout,
             reference_known=self._reference.known(time),
@@ -343,6 +348,14 @@ class WheelSoilEstimator:
             unread=self._sinkage.unread(time),
         )
         ekf.fuse(rows, considered)
+        if rows:
+            self._whiteness.follow(
+                time,
+                ekf.innovations,
+                sinkage=depths,
+                torque=torques,
+                balance=len(rows) - depths - torques,
+            )
 
         self._speed.end_cycle(time, ekf, cycle.unturned, settled=self._contact_age.settled)
         self._sinkage_process.end_cycle(ekf, sinkage_before, cycle.dt)
@@ -490,6 +503,7 @@ class WheelSoilEstimator:
             last_change=self._speed.state.change_time,
             torque_known=self._wheels.torque_known(time),
         )
+        self._whiteness.follow(time, ekf.innovations, reference=1)
         if opened:
             self._stuck.forget_trend()
 
@@ -741,6 +755,7 @@ class WheelSoilEstimator:
         ):
             if nis is not None:
                 report[f'nis_{channel}'] = round(nis, 3)
+        report |= self._whiteness.report()
         zero = self._zero_velocity.state.zero
         report['gyro_zero_yaw_rad_s'] = float(f'{zero.yaw:.3g}')
         report['accelerometer_bias_m_s2'] = float(f'{float(self._ekf.mean[GRAVITY_BIAS]):.3g}')
