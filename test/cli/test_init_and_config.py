@@ -55,7 +55,9 @@ def test_what_steers_is_found_in_a_urdf(tmp_path, capsys):
         '<link name="base_link"/><link name="chassis"/>',
         '<joint name="rocker" type="revolute"><parent link="base_link"/><child link="chassis"/>'
         '<axis xyz="0 1 0"/></joint>',
-        WHEEL.format('right', 0.3, -1.5707963).replace('parent link="chassis"', 'parent link="knuckle"'),
+        WHEEL.format('right', 0.3, -1.5707963).replace(
+            'parent link="chassis"', 'parent link="knuckle"'
+        ),
         WHEEL.format('left', 0.3, -1.5707963),
     ]
     output = tmp_path / 'rover.yaml'

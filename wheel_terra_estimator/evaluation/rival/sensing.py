@@ -149,9 +149,7 @@ def _wheel_odometry(
     # The difference of two counts belongs to the middle of its interval, but nobody stamps it so.
     late = generator.uniform(0.001, 0.006, len(time))
     return [
-        Arrival(
-            int(stamp + 1e9 * delay), WheelOdometry(int(stamp), rate[i], torque[i], angles[i])
-        )
+        Arrival(int(stamp + 1e9 * delay), WheelOdometry(int(stamp), rate[i], torque[i], angles[i]))
         for i, (stamp, delay) in enumerate(zip(stamps(time), late, strict=True))
     ]
 
