@@ -381,7 +381,7 @@ def forces(parts, ekf):
 
 def torque_rows(parts, ekf, excess, doubt=0.0, repeats=1.0):
     update, (found, _) = (
-        TorqueUpdate(parts.configuration, parts.rover, parts.sensors),
+        TorqueUpdate(parts.configuration, parts.rover, parts.sensors, parts.layout),
         forces(parts, ekf),
     )
     return update.update(
@@ -404,6 +404,56 @@ def test_torques_are_rows_of_turning_wheels_that_were_read(parts, ekf):
     assert many[0].variance == pytest.approx(30.0 * noise, rel=1e-3)
 
 
+def test_the_zero_of_a_torque_sensor_is_told_from_the_soil_by_the_load(parts, ekf):
+    """A wheel's share of the load changes along the way: the soil's torque does, the zero not."""
+    zero, rng = 2.0 * parts.sensors.torque_zero_std, np.random.default_rng(2)
+    update = TorqueUpdate(parts.configuration, parts.rover, parts.sensors, parts.layout)
+    level = np.array(WheelLoads(parts.rover).state.load)
+    entries = range(parts.layout.size)
+    learned = {SHEAR_STRENGTH, *entries[parts.layout.torque_zero]}
+    for i in set(entries) - learned:
+        ekf.set(i, float(ekf.mean[i]), 1e-12)
+    strong = ekf.mean.copy()
+    strong[SHEAR_STRENGTH] = 0.1  # the soil is stronger than the file says
+    for _ in range(300):
+        loads = tuple((level * (0.3 + 1.4 * rng.random(6))).tolist())
+        found, true = (
+            Linearisation(parts.rover, parts.layout, parts.models, 0.0).update(
+                x,
+                turns=(True,) * 6,
+                yaw_rate=0.0,
+                headings=straight_headings(parts.rover),
+                rims=FORWARD,
+                loads=loads,
+                leaving_angles=(NAN,) * 6,
+            )
+            for x in (ekf.mean, strong)
+        )
+        torque = true.torque + np.array([zero, -zero, 0.0, 0.0, 0.0, 0.0])
+        rows = update.update(
+            ekf,
+            found,
+            torque=tuple(torque.tolist()),
+            turning=(True,) * 6,
+            model_variance=(0.0,) * 6,
+            repeats=1.0,
+        )
+        ekf.fuse(rows)
+    assert update.zeros(ekf.mean) == pytest.approx((zero, -zero, 0, 0, 0, 0), abs=0.15 * zero)
+    assert ekf.mean[SHEAR_STRENGTH] == pytest.approx(0.1, abs=0.01)
+
+
+def test_without_a_zero_stated_the_state_has_none(parts):
+    plain = Parts(reader.load(SAND, ['sensors.torque_zero_std:=0.0']))
+    assert parts.layout.size == plain.layout.size + 6
+    assert (
+        TorqueUpdate(plain.configuration, plain.rover, plain.sensors, plain.layout).zeros(
+            plain.filter().mean
+        )
+        == (0.0,) * 6
+    )
+
+
 def test_the_error_of_a_measured_leaving_angle_weakens_torque_and_balance(parts, ekf):
     """With 0.05 rad a row is as uncertain as half of what 0.1 rad change the force."""
     loads = WheelLoads(parts.rover).state.load
@@ -420,7 +470,7 @@ def test_the_error_of_a_measured_leaving_angle_weakens_torque_and_balance(parts,
             leaving_angles=(angle,) * 6,
         )
         given = {'model_variance': (0.0,) * 6, 'repeats': 1.0}
-        rows = TorqueUpdate(parts.configuration, parts.rover, parts.sensors).update(
+        rows = TorqueUpdate(parts.configuration, parts.rover, parts.sensors, parts.layout).update(
             ekf, found, torque=tuple(found.torque.tolist()), turning=(True,) * 6, **given
         )
         total = balance.sum_of_pulls(window(0.0, 9.8), loads, 0.0)
@@ -487,7 +537,8 @@ def test_what_is_not_seen_is_considered_and_not_learned(parts):
 
     assert entries() == set()
     assert entries(settled=False) == {SPEED}
-    assert entries(reference_known=False) == {SHEAR_STRENGTH, SHEAR_MODULUS}
+    zeros = range(layout.size)[layout.torque_zero]
+    assert entries(reference_known=False) == {SHEAR_STRENGTH, SHEAR_MODULUS, *zeros}
     one = entries(unread=[2])
     assert one == {layout.sinkage.start + 2, layout.stiffness.start + 2}
     assert SLIP_SINKAGE in entries(unread=list(range(6)))

@@ -197,7 +197,7 @@ class WheelSoilEstimator:
         self._reference = ReferenceUpdate(configuration, rover, sensors, layout)
         self._zero_velocity = ZeroVelocityUpdate(rover)
         self._sinkage = SinkageUpdate(configuration, sensors, layout)
-        self._torque = TorqueUpdate(configuration, rover, sensors)
+        self._torque = TorqueUpdate(configuration, rover, sensors, layout)
         self._balance = ForceBalance(configuration, rover, sensors, layout)
         self._whiteness = Whiteness()
         # What it means.
@@ -341,6 +341,8 @@ class WheelSoilEstimator:
             forces, total, force_rows = self._force_rows(cycle)
             rows += force_rows
             torques = len(force_rows) - (total is not None)
+        elif self._contact_age.sheared:
+            forces = self._forces(cycle)  # for the pulls of a spin on the spot
         considered = considered_entries(
             layout,
             reference_known=self._reference.known(time),
@@ -367,7 +369,14 @@ class WheelSoilEstimator:
             loads=cycle.loads,
             headings=self._steering.state.headings,
             turning=cycle.turns,
-            readings=self._wheels.state.torque,
+            readings=tuple(
+                [
+                    reading - zero
+                    for reading, zero in zip(
+                        self._wheels.state.torque, self._torque.zeros(ekf.mean), strict=True
+                    )
+                ]
+            ),
             stationary=self._pulls.state.stationary,
             lateral_motion=lateral_motion,
         )
@@ -467,7 +476,7 @@ class WheelSoilEstimator:
                 leaving_angles=cycle.leaving_angles,
                 reference_known=cycle.reference_known,
             )
-            self._contact_age.advance(travel)
+            self._contact_age.advance(travel, self._wheels.fastest() * cycle.dt)
             if travel > 0.0:
                 self._soil_process.predict(
                     prediction,
@@ -537,19 +546,21 @@ class WheelSoilEstimator:
         self._sinkage_process.forget_slopes()
         self._pulls.forget_stationary()
 
+    def _forces(self, cycle: _Cycle) -> ContactForces:
+        return self._linearisation.update(
+            self._ekf.mean,
+            turns=cycle.turns,
+            yaw_rate=self._turning.state.yaw_rate,
+            headings=self._steering.state.headings,
+            rims=cycle.rims,
+            loads=cycle.loads.load,
+            leaving_angles=cycle.leaving_angles,
+        )
+
     def _force_rows(self, cycle: _Cycle) -> tuple[ContactForces, SumOfPulls | None, list[Row]]:
         """Return forces, what is known of their sum, and the rows of torques and balance."""
         ekf, loads = self._ekf, cycle.loads.load
-        x, motion = ekf.mean, self._turning.state
-        forces = self._linearisation.update(
-            x,
-            turns=cycle.turns,
-            yaw_rate=motion.yaw_rate,
-            headings=self._steering.state.headings,
-            rims=cycle.rims,
-            loads=loads,
-            leaving_angles=cycle.leaving_angles,
-        )
+        forces = self._forces(cycle)
         stationary = self._stationary_pulls(cycle)
         start = self._contact_age.shear_variance
         model_variance = tuple(
@@ -577,7 +588,7 @@ class WheelSoilEstimator:
         )
         if not cycle.window.readings:
             return forces, None, rows
-        curvature = self._turning.curvature(float(x[SPEED]))
+        curvature = self._turning.curvature(float(ekf.mean[SPEED]))
         total = self._balance.sum_of_pulls(cycle.window, loads, curvature)
         balance = self._balance.update(
             ekf,

@@ -65,6 +65,7 @@ class PriorTuning:
     most_slip_per_demand: float = 8.0  # near the top of the traction curve
     most_stiffness: float = 3.0  # [ln]
     most_shear_error: float = 1.5  # [ln]
+    most_torque_zero: float = 1e4  # [N m]
     highest: float = 0.02  # a wheel above the surface, of the radius
 
 
@@ -111,7 +112,9 @@ _LEAST_SINE = 0.05  # of sin(phi) cos(phi): soil without friction
 
 def layout_of(rover: Rover, sensors: SensorFigures) -> StateLayout:
     """Return what the state of a rover with such sensors consists of."""
-    return StateLayout(rover.wheel_count, sensors.reference_wander_std > 0.0)
+    return StateLayout(
+        rover.wheel_count, sensors.torque_zero_std > 0.0, sensors.reference_wander_std > 0.0
+    )
 
 
 def initial_filter(
@@ -163,6 +166,8 @@ def initial_filter(
     own = tuning.own_stiffness_share * priors.stiffness_std
     P[layout.stiffness, layout.stiffness] = priors.stiffness_std**2 + np.eye(n) * own**2
     P[layout.shear_error, layout.shear_error] = priors.shear_error_covariance(n)
+    zeros = range(layout.size)[layout.torque_zero]
+    P[zeros, zeros] = sensors.torque_zero_std**2
     if layout.reference_error is not None:
         P[layout.reference_error, layout.reference_error] = sensors.reference_wander_std**2
     return GatedFilter(mean, P, *bounds(rover, layout, tuning))
@@ -180,6 +185,7 @@ def bounds(rover: Rover, layout: StateLayout, tuning: PriorTuning) -> tuple[Floa
         tuning.most_stiffness,
         tuning.most_shear_error,
     )
+    upper[layout.torque_zero] = tuning.most_torque_zero
     if layout.reference_error is not None:
         upper[layout.reference_error] = tuning.most_speed
     lower = -upper
@@ -196,6 +202,7 @@ def with_soil_of(
     kept = [GRAVITY_BIAS, SHEAR_STRENGTH, SHEAR_MODULUS, SLIP_SINKAGE, CENTROID, MOUND]
     kept.append(SLIP_PER_DEMAND)
     kept += range(layout.size)[layout.stiffness]
+    kept += range(layout.size)[layout.torque_zero]
     block = np.ix_(kept, kept)
     covariance, mean = start.covariance.copy(), start.mean.copy()
     share = tuning.kept_share

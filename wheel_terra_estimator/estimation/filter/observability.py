@@ -42,6 +42,7 @@ def considered_entries(
         entries.append(SPEED)
     if not reference_known:
         entries += [SHEAR_STRENGTH, SHEAR_MODULUS]
+        entries += range(layout.size)[layout.torque_zero]
     for part in (layout.sinkage, layout.stiffness):
         entries += [part.start + i for i in unread]
     if len(unread) == layout.wheel_count:

@@ -29,13 +29,15 @@ stiffness (n)    ln     Factor on the bearing modulus, per wheel: wheels enter a
 shear_error (n)  ln     Error of the shear model, per wheel, first-order Gauss-Markov over travel.
                         It makes ten equal residuals at constant slip one piece of information,
                         and carries what torque says of a wheel's pull in another soil.
+torque_zero (n)  N m    Zero of each torque sensor, constant. Seen where loads and slip change:
+                        the soil's share of a torque goes with the load, the zero does not.
 reference_error  m/s    Only with ``sensors.reference_wander_std``: what lasts of the error of the
                         reference velocity, first-order Gauss-Markov over time. Fifty readings of a
                         satellite receiver that is off by 3 cm/s are off by 3 cm/s.
 ===============  =====  ===========================================================================
 
-Not in it: c and phi apart, n0 apart from the stiffness, torque zeros and sinkage zeros (constant,
-not observable from forces at the same time as the soil: they enter the published deviations).
+Not in it: c and phi apart, n0 apart from the stiffness, zeros of sinkage sensors (constant, not
+observable at the same time as the soil: they enter the published deviations).
 """
 
 from __future__ import annotations
@@ -65,18 +67,22 @@ class StateLayout:
     """Where each entry of the state vector is, for n wheels."""
 
     wheel_count: int
+    torque_zeros: bool = False
     reference_wanders: bool = False
     size: int = field(init=False)
     sinkage: slice = field(init=False)
     stiffness: slice = field(init=False)
     shear_error: slice = field(init=False)
+    torque_zero: slice = field(init=False)  # empty: they are not in it
     reference_error: int | None = field(init=False)  # None: it is not in it
 
     def __post_init__(self) -> None:
         n = self.wheel_count
-        each = _COMMON + 3 * n
+        errors = _COMMON + 3 * n
+        each = errors + (n if self.torque_zeros else 0)
         object.__setattr__(self, 'size', each + self.reference_wanders)
         object.__setattr__(self, 'sinkage', slice(_COMMON, _COMMON + n))
         object.__setattr__(self, 'stiffness', slice(_COMMON + n, _COMMON + 2 * n))
-        object.__setattr__(self, 'shear_error', slice(_COMMON + 2 * n, each))
+        object.__setattr__(self, 'shear_error', slice(_COMMON + 2 * n, errors))
+        object.__setattr__(self, 'torque_zero', slice(errors, each))
         object.__setattr__(self, 'reference_error', each if self.reference_wanders else None)

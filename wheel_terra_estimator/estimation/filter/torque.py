@@ -12,7 +12,13 @@ from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.contacts.linearisation import ContactForces
 from wheel_terra_estimator.estimation.filter.consistency import distrusted, smoothed_nis
-from wheel_terra_estimator.estimation.filter.ekf import GatedFilter, Row, chi_square_gate
+from wheel_terra_estimator.estimation.filter.ekf import (
+    FloatArray,
+    GatedFilter,
+    Row,
+    chi_square_gate,
+)
+from wheel_terra_estimator.estimation.filter.state import StateLayout
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
 
 Floats = tuple[float, ...]
@@ -41,10 +47,22 @@ class ForceRows(Component['float | None']):
 class TorqueUpdate(ForceRows):
     """Turns the torques of turning wheels into rows of the update."""
 
-    def __init__(self, configuration: Configuration, rover: Rover, sensors: SensorFigures) -> None:
+    def __init__(
+        self,
+        configuration: Configuration,
+        rover: Rover,
+        sensors: SensorFigures,
+        layout: StateLayout,
+    ) -> None:
         super().__init__(configuration)
+        self._zeros = range(layout.size)[layout.torque_zero]
+        self._none = (0.0,) * layout.wheel_count
         self._variance = sensors.torque_std**2
         self._load_std = rover.load_std
+
+    def zeros(self, mean: FloatArray) -> Floats:
+        """Return the zeros of the sensors in a state [N m]."""
+        return tuple(mean[self._zeros].tolist()) if self._zeros else self._none
 
     def update(
         self,
@@ -74,7 +92,10 @@ class TorqueUpdate(ForceRows):
             Cycles that are one piece of information.
         """
         rows = []
-        H = forces.torque_rows
+        H, zeros = forces.torque_rows, self.zeros(ekf.mean)
+        if self._zeros:
+            H = H.copy()
+            H[range(len(H)), self._zeros] = 1.0
         priors = np.einsum('ij,ij->i', H @ ekf.covariance, H).tolist()
         models, noises = forces.torque.tolist(), forces.torque_noise.tolist()
         for i, reading in enumerate(torque):
@@ -84,5 +105,5 @@ class TorqueUpdate(ForceRows):
             noise = self._variance + (self._load_std * model) ** 2 + _FLOOR_VARIANCE
             variance = repeats * noise + model_variance[i] * model**2
             variance += noises[i] ** 2
-            rows.append(self.row(Row(reading - model, H[i], variance), priors[i]))
+            rows.append(self.row(Row(reading - zeros[i] - model, H[i], variance), priors[i]))
         return rows

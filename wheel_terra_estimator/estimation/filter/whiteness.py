@@ -26,7 +26,7 @@ class Innovations(NamedTuple):
     """Running means of the innovations of a channel, each over its deviation."""
 
     time: float = -math.inf  # of the last one [s]
-    count: int = 0
+    readings: int = 0
     last: float = 0.0
     mean: float = 0.0
     square: float = 0.0
@@ -35,11 +35,11 @@ class Innovations(NamedTuple):
     def and_then(self, time: float, scores: FloatArray) -> Innovations:
         """Return the means with the innovations of a cycle, which count as one."""
         score = clipped(float(scores.sum()) / math.sqrt(len(scores)), -_LARGEST, _LARGEST)
-        count = self.count + 1
-        gain = max(gain_of(time - self.time, _MEAN_TIME), 1.0 / count) if self.count else 1.0
+        readings = self.readings + 1
+        gain = max(gain_of(time - self.time, _MEAN_TIME), 1.0 / readings) if self.readings else 1.0
         return Innovations(
             time,
-            count,
+            readings,
             score,
             self.mean + gain * (score - self.mean),
             self.square + gain * (score * score - self.square),
@@ -82,7 +82,7 @@ class Whiteness(Component[WhitenessState]):
         """Return mean and correlation of one with the next by channel, once there are enough."""
         report = {}
         for channel, seen in self.state._asdict().items():
-            if seen.count >= _TOLD_AFTER:
+            if seen.readings >= _TOLD_AFTER:
                 report[f'innovation_mean_{channel}'] = round(seen.mean, 2)
                 report[f'innovation_lag_one_{channel}'] = round(seen.lag_one, 2)
         return report
