@@ -66,6 +66,7 @@ CLOSED = (
     r'INTERFACE\.md',
 )
 """Sources that a reader cannot open."""
+SOURCES = ('wheel_terra_estimator', 'config', 'launch', 'tools')
 
 
 @pytest.mark.parametrize('name', NAMES)
@@ -120,3 +121,13 @@ def test_python_of_the_readme_runs():
     for block in blocks:
         exec(compile(block, 'README.md', 'exec'), {})
     pyplot.close('all')
+
+
+def test_nor_in_the_code_and_its_files():
+    files = [f for ending in ('py', 'yaml', 'md') for f in ROOT.glob(f'*/**/*.{ending}')]
+    sources = [f for f in files if f.parts[len(ROOT.parts)] in SOURCES]
+    assert len(sources) > 300
+    for file in sources:
+        text = file.read_text(encoding='utf-8')
+        for words in CLOSED:
+            assert not re.search(words, text), f'{file.relative_to(ROOT)}: {words}'

@@ -61,7 +61,7 @@ def test_what_is_no_rover_and_no_scenario_is_refused_before_the_first_drive(opti
     assert words in capsys.readouterr().err
 
 
-def test_baselines_between_fixes():
+def test_baselines_between_references():
     rover = reader.load(['generic_six_wheel'])
     measurements, stamps = [], []
     level = np.array([0.0, 0.0, 0.0, 1.0])

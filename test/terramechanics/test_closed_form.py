@@ -248,6 +248,8 @@ def test_soil_without_shear_strength_takes_no_torque_and_resists() -> None:
     assert not spinning.clamped
     nearly = model.forces(0, 1e-6, 0.02, 80.0, 250.0, 0.6, 0.012)
     assert spinning.torque == pytest.approx(nearly.torque, rel=1e-5)
+    backwards = model.forces(0, -0.4, 0.02, 80.0, 250.0, 0.6, 0.012)
+    assert backwards.clamped and backwards.torque == spinning.torque
 
 
 def test_steady_sinkage_solves_the_closed_form_balance() -> None:

@@ -69,9 +69,9 @@ class _SchmidtFilter(ExtendedKalmanFilter):
         K = gain.T if not fails else np.linalg.solve(S, HP).T
         if considered:
             K[list(considered)] = 0.0
-        rest = self._I - K @ H
+        I_KH = self._I - K @ H
         self.x = self.x + K @ residual
-        self.P = rest @ self.P @ rest.T + (K * noise) @ K.T
+        self.P = I_KH @ self.P @ I_KH.T + (K * noise) @ K.T
         self.y, self.S, self.K = residual, S, K
 
 
