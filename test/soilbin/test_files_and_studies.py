@@ -18,6 +18,7 @@ from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.soilbin import (
     calibration,
     files,
+    output,
     reproduced_figures,
     reproduction,
     sensitivity,
@@ -204,6 +205,37 @@ def test_statements_of_the_papers_figures_hold_and_can_fail():
     failing = {f.name for f in reproduced_figures.FIGURES if not f.holds(f, swapped)}
     assert failing >= {'12(a)', '13(a)', '14', '15'}
     assert all(figure.holds(figure, []) is None for figure in reproduced_figures.FIGURES)
+
+
+def test_scatter_between_beds_bounds_the_rank_correlation():
+    values = [1.0, 2.0, 3.0, 4.0, 5.0]
+    assert reproduction.metrics.rank_spread(values, 1e-6, 3) == pytest.approx((1.0, 1.0, 1.0))
+    low, middle, high = reproduction.metrics.rank_spread(values, 1000.0, 3)
+    assert low == pytest.approx(-high, abs=0.2)  # nothing but scatter
+    assert abs(middle) < 0.1
+    one, many = (reproduction.metrics.rank_spread(values, 1.0, beds)[1] for beds in (1, 100))
+    assert 0.3 < one < many < 1.0
+
+
+def test_coarse_grains_say_how_far_they_are_from_full_scale():
+    """The slips that a run with coarse grains tells are those of the committed study."""
+    table = Path(__file__).parents[2] / 'docs' / 'soilbin' / 'convergence.csv'
+    with table.open(newline='') as stream:
+        rows = list(csv.DictReader(stream))
+    for slope in (15.0, 25.0):
+        told = output.COARSE_SLIP[slope]
+        for variant, words in zip(('coarse (grains x2)', 'full scale'), told, strict=True):
+            slips = [
+                100 * float(row['slip'])
+                for row in rows
+                if row['variant'] == variant and float(row['slope_deg']) == slope
+            ]
+            assert np.mean(slips) == pytest.approx(float(words), abs=0.6), (slope, variant)
+    quick = files.load(['calibrated', 'wheel_2', 'quick'])
+    assert 'slips 21 to 27 % with grains x2 and 31 % at full scale' in output.grain_note(quick)
+    steep = quick.replace(operation__slope=math.radians(22))
+    assert 'on 25 deg' in output.grain_note(steep)
+    assert output.grain_note(quick.replace(bed__grain_scale=1.0)) == ''
 
 
 def test_calibration_misfit_is_zero_on_the_papers_numbers():

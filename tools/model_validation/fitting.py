@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -88,6 +88,35 @@ def fit(
     found = least_squares(residual, expected, bounds=bounds, x_scale=scale)
     values = {name: float(value) for name, value in zip(names, found.x, strict=True)}
     return model.with_values(values), values
+
+
+def rows_of(
+    data: tuple[OperatingPoints, FloatArray], chosen: NDArray[np.bool_]
+) -> tuple[OperatingPoints, FloatArray]:
+    """Return some of the rows."""
+    points, measured = data
+
+    def part(of: Any) -> dict[str, Any]:
+        values = {item.name: getattr(of, item.name) for item in fields(of)}
+        return {name: v[chosen] for name, v in values.items() if np.ndim(v) == 1}
+
+    wheel = replace(points.wheel, **part(points.wheel))
+    return replace(points, wheel=wheel, **part(points)), measured[chosen]
+
+
+def left_out(
+    model: Model,
+    data: tuple[OperatingPoints, FloatArray],
+    sigma: Sequence[float],
+    free: Sequence[Free],
+) -> FloatArray:
+    """Predict each row by a fit to all others: (N, 3)."""
+    predicted = np.empty_like(data[1])
+    for k in range(len(predicted)):
+        one = np.arange(len(predicted)) == k
+        fitted, _ = fit(model, [rows_of(data, ~one)], sigma, free)
+        predicted[one] = fitted.predict(rows_of(data, one)[0])
+    return predicted
 
 
 def deviations(

@@ -135,7 +135,7 @@ def _run_one(arguments: argparse.Namespace, cache: Path | None) -> int:
     except OSError as error:
         raise UserError(f'{folder}: cannot be written: {error}; free some space') from error
     output.clean(work)
-    print(output.as_text(summary))
+    print(output.as_text(summary, case))
     if summary['stopped']:
         print(f'stopped early: {summary["stopped"]}')
     return 0

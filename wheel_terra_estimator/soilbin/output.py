@@ -47,6 +47,26 @@ FILES = (
 )
 """What a run may leave in its folder."""
 
+COARSE = 2.0  # grain scale of the slips below
+COARSE_SLIP = {10.0: ('21 to 27', '31'), 15.0: ('50', '52'), 25.0: ('73', '73')}
+"""Slope [deg] -> slip of wheel 2 under 19.6 N [%] with coarse grains and at full scale."""
+
+
+def grain_note(case: Case) -> str:
+    """Say how far coarse grains are from full scale at the nearest slope; '' at full scale.
+
+    From the case ``quick`` over three beds (10 deg) and the study ``convergence`` over two.
+    """
+    if case.bed.grain_scale < COARSE:
+        return ''
+    slope = math.degrees(case.operation.slope)
+    nearest = min(COARSE_SLIP, key=lambda known: abs(known - slope))
+    coarse, full = COARSE_SLIP[nearest]
+    return (
+        f'x{case.bed.grain_scale:g}: for trying things. Wheel 2 under 19.6 N on {nearest:g} deg '
+        f'slips {coarse} % with grains x{COARSE:g} and {full} % at full scale'
+    )
+
 
 def measurement_row(case: Case, summary: Mapping[str, object]) -> dict[str, float]:
     """Return the run as one row of a table of steady measurements.
@@ -104,7 +124,7 @@ def write_folder(
         pictures.draw_series(series, case, folder / 'time_series.png')
         if film:
             pictures.film(frames, case, summary, folder / 'film.gif')
-    report.write_report(folder, series, case, figures_of(summary))
+    report.write_report(folder, series, case, figures_of(summary, case))
     part = folder / 'summary.part'
     finite = {
         key: None if isinstance(value, float) and not math.isfinite(value) else value
@@ -123,12 +143,13 @@ def clean(work: Path) -> None:
     shutil.rmtree(work, ignore_errors=True)
 
 
-def figures_of(summary: Mapping[str, object]) -> dict[str, str]:
+def figures_of(summary: Mapping[str, object], case: Case) -> dict[str, str]:
     """Return the main figures of a run: words -> value with unit."""
 
     def number(name: str) -> float:
         return float(str(summary[name]))
 
+    note = grain_note(case)
     return {
         'slip (second half)': f'{100 * number("slip"):.1f} % '
         f'({100 * number("slip_second_half"):.1f} %)',
@@ -143,9 +164,9 @@ def figures_of(summary: Mapping[str, object]) -> dict[str, str]:
         f'{1000 * number("sinkage_average"):.1f} mm)',
         'power number': f'{number("power_number"):.3f}',
         'pull coefficient': f'{number("pull_coefficient"):.3f}',
-    }
+    } | ({'grains': note} if note else {})
 
 
-def as_text(summary: Mapping[str, object]) -> str:
+def as_text(summary: Mapping[str, object], case: Case) -> str:
     """Return the main figures, one a line."""
-    return '\n'.join(f'{words}: {value}' for words, value in figures_of(summary).items())
+    return '\n'.join(f'{words}: {value}' for words, value in figures_of(summary, case).items())

@@ -245,7 +245,29 @@ def table7_lines(rows: Sequence[Row]) -> list[str]:
             if (pairs := [(ours[w][key][0], paper[w][key]) for w in ours])
         )
         lines.append(f'Rank correlation with the paper over all wheels: {", ".join(agreement)}.')
+        lines += _rank_lines(rows, ours)
     return lines
+
+
+def _rank_lines(rows: Sequence[Row], ours: dict[int, dict[str, tuple[float, float]]]) -> list[str]:
+    """Return what the scatter between beds leaves of the rank correlation of z_a."""
+    import numpy as np
+
+    deviations = [ours[w]['sinkage_average'][1] for w in ours]
+    beds = min(len(of(rows, 'table7', w)) for w in ours)
+    if beds < 2 or not np.isfinite(deviations).all():
+        return []
+    deviation = float(np.sqrt(np.mean(np.square(deviations))))
+    published = metrics.published('table7')
+    low, middle, high = metrics.rank_spread(
+        [published[w]['sinkage_average'] for w in ours], deviation, beds
+    )
+    return [
+        '',
+        f'z_a scatters by {1000 * deviation:.1f} mm between beds. Were the wheels exactly as in '
+        f"the paper's table, that scatter alone, in one bed of theirs and {beds} of ours, would "
+        f'leave a rank correlation of {middle:.2f} ({low:.2f} to {high:.2f}, 5 to 95 %).',
+    ]
 
 
 def median_errors(
