@@ -135,8 +135,8 @@ def section(shared: Path, figures: Path) -> str:
             '',
             '![HIT wheel](figures/hit.svg)',
             '',
-            'Each row by a fit to the others: the rows at either end of the slip range are then '
-            'extrapolated, which is where the smooth wheel is worst.',
+            'Each row by a fit to the others: the last row, s = 0.6, is then extrapolated and the '
+            'worst of the smooth wheel.',
             '',
             'Targets: pull within 10 % of its range, sinkage within 1.5 mm rms. With the printed '
             'lug terms the pull misses its target, whatever reading. With two fitted lug '
