@@ -59,10 +59,9 @@ def _sinkage(**values: Any) -> Switch:
 
 
 SIGNS = (
-    'digging',
-    'exhausted',
+    'likely',
     'within_horizon',
-    'within_travel',
+    'digging',
     'deepening',
     'held',
     'bogging',

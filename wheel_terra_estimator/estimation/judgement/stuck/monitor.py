@@ -9,7 +9,7 @@ from math import isnan
 from typing import NamedTuple
 
 from wheel_terra_estimator.estimation.component import Component
-from wheel_terra_estimator.estimation.judgement.stuck.forecast import WheelForecast, forecast
+from wheel_terra_estimator.estimation.judgement.stuck.forecast import WheelForecast
 from wheel_terra_estimator.estimation.judgement.stuck.settings import StuckSettings
 from wheel_terra_estimator.estimation.judgement.stuck.signs import (
     SIGNS,
@@ -91,8 +91,7 @@ class StuckMonitor(Component[StuckState]):
             if time - clear_since >= self._settings.clear_time:
                 stuck, reason, clear_since = False, '', NAN
         self.state = StuckState(situation.observed, since, stuck, reason, clear_since)
-        wheels = forecast(situation, warned=stuck)
-        return StuckAssessment(stuck, reason, wheels, situation.stalled)
+        return StuckAssessment(stuck, reason, situation.outlook.wheels, situation.stalled)
 
     def _signs_at(self, time: float, situation: Situation) -> tuple[tuple[float, ...], list[Sign]]:
         """Return since when each sign is there, and the signs that have been for long enough."""

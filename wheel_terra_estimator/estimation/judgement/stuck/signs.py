@@ -16,11 +16,10 @@ from enum import Flag, auto
 from math import isnan
 
 from wheel_terra_estimator.estimation.judgement.classes import exceedance_probability
+from wheel_terra_estimator.estimation.judgement.stuck.forecast import ENTRAPPED_SLIP
 from wheel_terra_estimator.estimation.judgement.stuck.situation import Situation
 from wheel_terra_estimator.estimation.scalars import median
 
-ENTRAPPED_SLIP = 0.9
-"""Slip above which a rover makes no way that matters: class *stuck*."""
 ADVICE = 'stop, back out'
 """What to do where wheels dig themselves in: they climb their own ruts better than fresh soil."""
 _TOLD_TIME = 0.05
@@ -35,6 +34,7 @@ class SignTuning:
     (Dartmouth, 2021), where half of the wheels stall.
     """
 
+    likely: float = 0.5  # probability of an entrapment, as the contract of ``~/stuck`` has it
     digging_slip: float = 0.8
     sure_std: float = 0.25  # of the slip, to call it digging
     trend_doubt: float = 0.45
@@ -47,8 +47,6 @@ class SignTuning:
     ahead_std: float = 0.2  # of the slip
     least_deepening: int = 2  # wheels that dig themselves in
     spare_margin: float = 0.045  # of the load: with more left, no entrapment is near
-    exhausted_margin: float = 0.015
-    exhausted_slip: float = 0.6
     held_slip: float = 0.6
     bog_slip: float = 0.35
     bog_time: float = 6.0  # to a stand [s]
@@ -67,16 +65,14 @@ class Need(Flag):
 
     NOTHING = 0
     SPEED = auto()  # the speed rests on a reference
-    NO_SPEED = auto()  # it does not
     SLIP_TOLD = auto()  # a reference, a torque or a sinkage tells of the slip
     STRAIGHT = auto()  # the rover does not turn sharply: a spin in place is commanded
     PULLED_AWAY = auto()  # the wheels have turned at their own cruise since they stood
 
 
 # Plain numbers: arithmetic of flags is slow, and this is done at every stamp.
-_SPEED, _NO_SPEED, _SLIP_TOLD, _STRAIGHT, _PULLED_AWAY = (
-    need.value
-    for need in (Need.SPEED, Need.NO_SPEED, Need.SLIP_TOLD, Need.STRAIGHT, Need.PULLED_AWAY)
+_SPEED, _SLIP_TOLD, _STRAIGHT, _PULLED_AWAY = (
+    need.value for need in (Need.SPEED, Need.SLIP_TOLD, Need.STRAIGHT, Need.PULLED_AWAY)
 )
 
 
@@ -110,7 +106,7 @@ class Sign:
 
 def needs_met(s: Situation) -> int:
     """Return what of the needs of signs holds, as the value of a `Need`."""
-    met = _SPEED if s.speed_known else _NO_SPEED
+    met = _SPEED if s.speed_known else 0
     if s.motion.slip_told:
         met |= _SLIP_TOLD
     if not s.motion.turning:
@@ -128,9 +124,9 @@ def _digging(s: Situation, t: SignTuning) -> bool:
     return exceedance_probability(s.typical_slip, s.typical_std, t.digging_slip) > 0.5
 
 
-def _exhausted(s: Situation, t: SignTuning) -> bool:
-    """Find that the soil gives hardly more pull than is asked, at high slip."""
-    return s.motion.margin < t.exhausted_margin and s.typical_slip > t.exhausted_slip
+def _likely(s: Situation, t: SignTuning) -> bool:
+    """Find an entrapment within the horizon more likely than not."""
+    return s.settled and s.outlook.probability > t.likely
 
 
 def _time_to_entrapment(s: Situation, t: SignTuning) -> float:
@@ -157,14 +153,6 @@ def _within_horizon(s: Situation, t: SignTuning) -> bool:
         horizon = min(horizon, t.sudden_time)
     soon = s.typical_slip > t.sudden_slip and _time_to_entrapment(s, t) < horizon
     return soon and _slip_is_told(s, t)
-
-
-def _within_travel(s: Situation, t: SignTuning) -> bool:
-    """Find that a high median slip passes 0.9 within the rim travel."""
-    soon = s.typical_slip > t.ahead_slip and (
-        _time_to_entrapment(s, t) * s.fastest < s.settings.travel
-    )
-    return soon and s.settled and _slip_is_told(s, t)
 
 
 def _deepening(s: Situation, t: SignTuning) -> bool:
@@ -234,31 +222,27 @@ def _labouring(s: Situation, t: SignTuning) -> bool:
     )
 
 
-def _growth_in_words(s: Situation, t: SignTuning) -> str:
-    if s.typical_slip >= ENTRAPPED_SLIP:
-        return f'median slip {s.typical_slip:.2f}: hardly any way is made'
-    return f'median slip {s.typical_slip:.2f} grows by {s.trend:.2g} per second'
-
-
 def _bogging_in_words(s: Situation, t: SignTuning) -> str:
     time = _time_to_stand(s, t)
     soon = f'stands in {time:.1f} s' if time >= _TOLD_TIME else 'hardly moves'
     return f'bogging down: {soon}, wheels near their torque limit'
 
 
+def _likely_in_words(s: Situation, t: SignTuning) -> str:
+    return (
+        f'median slip {s.typical_slip:.2f}: entrapment within {s.settings.horizon:g} s '
+        f'{s.outlook.probability:.0%} likely'
+    )
+
+
+def _growth_in_words(s: Situation, t: SignTuning) -> str:
+    if s.typical_slip >= ENTRAPPED_SLIP:
+        return f'median slip {s.typical_slip:.2f}: hardly any way is made'
+    return f'median slip {s.typical_slip:.2f} grows by {s.trend:.2g} per second'
+
+
 def _digging_in_words(s: Situation, t: SignTuning) -> str:
     return f'median slip {s.typical_slip:.2f}: digging in'
-
-
-def _exhausted_in_words(s: Situation, t: SignTuning) -> str:
-    return f'median slip {s.typical_slip:.2f}, the soil is exhausted'
-
-
-def _travel_in_words(s: Situation, t: SignTuning) -> str:
-    return (
-        f'median slip {s.typical_slip:.2f} passes {ENTRAPPED_SLIP:g} within '
-        f'{s.settings.travel:g} m of rim travel'
-    )
 
 
 def _deepening_in_words(s: Situation, t: SignTuning) -> str:
@@ -293,18 +277,11 @@ def in_words(sign: Sign, s: Situation, t: SignTuning) -> str:
 
 SIGNS: tuple[Sign, ...] = (
     Sign(
-        name='digging',
-        hold=1.5,
+        name='likely',
+        hold=1.0,
         needs=Need.SLIP_TOLD,
-        present=_digging,
-        words=_digging_in_words,
-    ),
-    Sign(
-        name='exhausted',
-        hold=6.0,
-        needs=Need.NO_SPEED | Need.SLIP_TOLD,
-        present=_exhausted,
-        words=_exhausted_in_words,
+        present=_likely,
+        words=_likely_in_words,
     ),
     Sign(
         name='within_horizon',
@@ -314,11 +291,11 @@ SIGNS: tuple[Sign, ...] = (
         words=_growth_in_words,
     ),
     Sign(
-        name='within_travel',
-        hold=1.0,
+        name='digging',
+        hold=1.5,
         needs=Need.SLIP_TOLD,
-        present=_within_travel,
-        words=_travel_in_words,
+        present=_digging,
+        words=_digging_in_words,
     ),
     Sign(
         name='deepening',

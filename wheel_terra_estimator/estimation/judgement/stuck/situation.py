@@ -12,6 +12,7 @@ from math import isnan
 from typing import NamedTuple
 
 from wheel_terra_estimator.estimation.component import Component
+from wheel_terra_estimator.estimation.judgement.stuck.forecast import Outlook, outlook
 from wheel_terra_estimator.estimation.judgement.stuck.settings import StuckSettings
 from wheel_terra_estimator.estimation.judgement.stuck.windows import (
     Window,
@@ -149,6 +150,11 @@ class Situation:
                 )
             ]
         )
+
+    @cached_property
+    def outlook(self) -> Outlook:
+        """What lies ahead: probability, time and travel to an entrapment."""
+        return outlook(self)
 
     @property
     def speed_known(self) -> bool:
