@@ -34,7 +34,7 @@ class SignTuning:
     (Dartmouth, 2021), where half of the wheels stall.
     """
 
-    likely: float = 0.5  # probability of an entrapment, as the contract of ``~/stuck`` has it
+    likely: float = 0.5  # probability of an entrapment that raises ``~/stuck``
     digging_slip: float = 0.8
     sure_std: float = 0.25  # of the slip, to call it digging
     trend_doubt: float = 0.45
