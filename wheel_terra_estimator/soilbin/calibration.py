@@ -186,7 +186,8 @@ def report(arguments: argparse.Namespace, rows: Sequence[Row], folder: Path) -> 
         'Misfit: root mean square of the five deviations in units of 2 deg, 8 points and 25 %, '
         'where all five are there (- where slopes are still to be run: --resume). Not named: '
         'damping ratio 0.15, grains x2 in a bin of 0.9 m, load raised over 1 s, pull over 6 cm of '
-        'rim travel, rim speed x4, 30 s. Written by `wheel-terra soilbin calibrate`.'
+        "rim travel, 30 s, rim speed four times the paper's; eight times with pull at once and "
+        'standing. Written by `wheel-terra soilbin calibrate`.'
     )
     if scored:
         lines += ['', f'Best: {min(scored)[1]} (misfit {min(scored)[0]:.2f}).']

@@ -110,7 +110,8 @@ def report(arguments: argparse.Namespace, rows: Sequence[Row], folder: Path) -> 
     lines += ['## Section 6: wheel 5, W 14.7 N, level, 1/6 g, no pull', '']
     lines += ['Paper: slip 26.3 %.', '', *table([head[0], 'beds', *names], level), '']
     lines.append(
-        'Mean (deviation between beds), grains x2. Written by `wheel-terra soilbin sensitivity`.'
+        "Mean (deviation between beds), grains x2, rim speed eight times the paper's. Written by "
+        '`wheel-terra soilbin sensitivity`.'
     )
     page(folder / 'sensitivity_table.md', lines)
 
