@@ -72,6 +72,7 @@ def references(parts, ekf, speeds, torque_known=True, last_change=-1e9, accelera
                 rim_acceleration=acceleration,
                 last_change=last_change,
                 torque_known=torque_known,
+                reading_variance=parts.sensors.reference_std**2,
             )
         )
     return update, opened
@@ -144,6 +145,7 @@ def test_a_reference_on_standing_wheels_says_whether_the_rover_slides(parts, ekf
             rim_acceleration=0.0,
             last_change=-1e9,
             torque_known=True,
+            reading_variance=parts.sensors.reference_std**2,
         )
         assert (update.state.sliding_until > time) is sliding
 
@@ -180,6 +182,7 @@ def test_readings_that_are_off_by_the_same_are_no_many_readings(stated, least, m
                 rim_acceleration=0.0,
                 last_change=-1e9,
                 torque_known=True,
+                reading_variance=1e-4,
             )
         inside.append(abs(ekf.mean[SPEED] - 0.5) < 1.96 * np.sqrt(ekf.covariance[SPEED, SPEED]))
     assert least <= np.mean(inside) <= most
@@ -234,11 +237,12 @@ def test_wheels_that_turn_against_each_other_hold_the_body(parts, ekf):
 
 
 def test_a_spike_of_the_sinkage_is_dropped_and_eight_in_a_row_are_believed(parts, ekf):
-    update = SinkageUpdate(parts.configuration, parts.sensors, parts.layout)
+    noise = parts.sensors.sinkage_std**2
+    update = SinkageUpdate(parts.configuration, parts.layout)
     zi = parts.layout.sinkage.start
 
     def read(time, depth):
-        rows = update.update(ekf, time, SinkageSums((depth,) + (0.0,) * 5, (1,) + (0,) * 5))
+        rows = update.update(ekf, time, SinkageSums((depth,) + (0.0,) * 5, (1,) + (0,) * 5), noise)
         ekf.fuse(rows)
         return len(rows)
 
@@ -381,13 +385,14 @@ def forces(parts, ekf):
 
 def torque_rows(parts, ekf, excess, doubt=0.0, repeats=1.0):
     update, (found, _) = (
-        TorqueUpdate(parts.configuration, parts.rover, parts.sensors, parts.layout),
+        TorqueUpdate(parts.configuration, parts.rover, parts.layout),
         forces(parts, ekf),
     )
     return update.update(
         ekf,
         found,
         torque=(*(found.torque + excess).tolist()[:5], NAN),
+        variance=parts.sensors.torque_std**2,
         turning=(True,) * 4 + (False,) * 2,
         model_variance=(doubt,) * 6,
         repeats=repeats,
@@ -407,7 +412,7 @@ def test_torques_are_rows_of_turning_wheels_that_were_read(parts, ekf):
 def test_the_zero_of_a_torque_sensor_is_told_from_the_soil_by_the_load(parts, ekf):
     """A wheel's share of the load changes along the way: the soil's torque does, the zero not."""
     zero, rng = 2.0 * parts.sensors.torque_zero_std, np.random.default_rng(2)
-    update = TorqueUpdate(parts.configuration, parts.rover, parts.sensors, parts.layout)
+    update = TorqueUpdate(parts.configuration, parts.rover, parts.layout)
     level = np.array(WheelLoads(parts.rover).state.load)
     entries = range(parts.layout.size)
     learned = {SHEAR_STRENGTH, *entries[parts.layout.torque_zero]}
@@ -434,6 +439,7 @@ def test_the_zero_of_a_torque_sensor_is_told_from_the_soil_by_the_load(parts, ek
             ekf,
             found,
             torque=tuple(torque.tolist()),
+            variance=parts.sensors.torque_std**2,
             turning=(True,) * 6,
             model_variance=(0.0,) * 6,
             repeats=1.0,
@@ -447,9 +453,7 @@ def test_without_a_zero_stated_the_state_has_none(parts):
     plain = Parts(reader.load(SAND, ['sensors.torque_zero_std:=0.0']))
     assert parts.layout.size == plain.layout.size + 6
     assert (
-        TorqueUpdate(plain.configuration, plain.rover, plain.sensors, plain.layout).zeros(
-            plain.filter().mean
-        )
+        TorqueUpdate(plain.configuration, plain.rover, plain.layout).zeros(plain.filter().mean)
         == (0.0,) * 6
     )
 
@@ -470,8 +474,14 @@ def test_the_error_of_a_measured_leaving_angle_weakens_torque_and_balance(parts,
             leaving_angles=(angle,) * 6,
         )
         given = {'model_variance': (0.0,) * 6, 'repeats': 1.0}
-        rows = TorqueUpdate(parts.configuration, parts.rover, parts.sensors, parts.layout).update(
-            ekf, found, torque=tuple(found.torque.tolist()), turning=(True,) * 6, **given
+        noise = parts.sensors.torque_std**2
+        rows = TorqueUpdate(parts.configuration, parts.rover, parts.layout).update(
+            ekf,
+            found,
+            torque=tuple(found.torque.tolist()),
+            variance=noise,
+            turning=(True,) * 6,
+            **given,
         )
         total = balance.sum_of_pulls(window(0.0, 9.8), loads, 0.0)
         along = total._replace(along=float(found.pull.sum()))
@@ -556,10 +566,11 @@ def test_a_vibrating_accelerometer_weakens_the_balance(parts):
 
 def test_two_readings_of_the_sinkage_are_the_textbook_update(parts, ekf):
     """Information adds up: that of the state, and that of their mean with its floor."""
-    update = SinkageUpdate(parts.configuration, parts.sensors, parts.layout)
+    update = SinkageUpdate(parts.configuration, parts.layout)
     zi, floor = parts.layout.sinkage.start, SinkageUpdateTuning().floor_variance
     ekf.set(zi, 0.03, 0.002**2)
-    ekf.fuse(update.update(ekf, 0.0, SinkageSums((0.062,) + (0.0,) * 5, (2,) + (0,) * 5)))
+    sums = SinkageSums((0.062,) + (0.0,) * 5, (2,) + (0,) * 5)
+    ekf.fuse(update.update(ekf, 0.0, sums, parts.sensors.sinkage_std**2))
     noise = parts.sensors.sinkage_std**2 / 2.0 + floor
     information = 1.0 / 0.002**2 + 1.0 / noise
     assert float(ekf.covariance[zi, zi]) == pytest.approx(1.0 / information)

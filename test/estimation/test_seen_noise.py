@@ -37,6 +37,16 @@ def test_means_of_several_messages_tell_the_noise_of_one(noise):
     assert read(noise, 'gyro', 0.01, times, messages=10) == pytest.approx(0.01, rel=0.08)
 
 
+def test_noise_clearly_beyond_what_is_stated_is_taken_in_its_place(noise):
+    stated, times = noise.stated['torque'], 0.1 * np.arange(400)
+    for share, taken in ((0.5, False), (1.5, False), (4.0, True)):
+        noise.reset()
+        seen = read(noise, 'torque', share * stated, times)
+        assert noise.variance('torque') == pytest.approx((seen if taken else stated) ** 2)
+    # A message that states more than is seen is believed.
+    assert noise.variance('torque', 100.0 * stated**2) == 100.0 * stated**2
+
+
 def test_steps_and_gaps_are_no_noise(noise):
     times = 0.1 * np.arange(400)
     std = noise.stated['sinkage']

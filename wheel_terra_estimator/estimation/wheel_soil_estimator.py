@@ -196,8 +196,8 @@ class WheelSoilEstimator:
         self._soil_process = SoilProcess(configuration, layout)
         self._reference = ReferenceUpdate(configuration, rover, sensors, layout)
         self._zero_velocity = ZeroVelocityUpdate(rover)
-        self._sinkage = SinkageUpdate(configuration, sensors, layout)
-        self._torque = TorqueUpdate(configuration, rover, sensors, layout)
+        self._sinkage = SinkageUpdate(configuration, layout)
+        self._torque = TorqueUpdate(configuration, rover, layout)
         self._balance = ForceBalance(configuration, rover, sensors, layout)
         self._whiteness = Whiteness()
         # What it means.
@@ -331,7 +331,9 @@ class WheelSoilEstimator:
             yaw_rate=self._turning.state.yaw_rate,
         )
 
-        rows = self._sinkage.update(ekf, time, self._sinkages.take())
+        rows = self._sinkage.update(
+            ekf, time, self._sinkages.take(), self._noise.variance('sinkage')
+        )
         depths, torques = len(rows), 0
         self._compare_wheels(cycle)
         forces, total = None, None
@@ -499,9 +501,8 @@ class WheelSoilEstimator:
         """Fuse a reference velocity; a speed that was wrong is no growth of the slip."""
         time, ekf = cycle.time, self._ekf
         innovation, variance = self._reference.innovation(ekf, reference)
-        self._noise.compare_reference(
-            time, innovation, self._reference.variance(reference), variance
-        )
+        noise = self._noise.variance('reference', self._reference.variance(reference))
+        self._noise.compare_reference(time, innovation, noise, variance)
         opened = self._reference.update(
             self._ekf,
             time,
@@ -511,6 +512,7 @@ class WheelSoilEstimator:
             rim_acceleration=self._wheels.acceleration(),
             last_change=self._speed.state.change_time,
             torque_known=self._wheels.torque_known(time),
+            reading_variance=noise,
         )
         self._whiteness.follow(time, ekf.innovations, reference=1)
         if opened:
@@ -574,6 +576,7 @@ class WheelSoilEstimator:
             ekf,
             forces,
             torque=cycle.torque,
+            variance=self._noise.variance('torque'),
             turning=cycle.turns,
             model_variance=model_variance,
             repeats=repeats,

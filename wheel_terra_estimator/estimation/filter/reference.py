@@ -152,6 +152,7 @@ class ReferenceUpdate(Component[ReferenceState]):
         rim_acceleration: float,
         last_change: float,
         torque_known: bool,
+        reading_variance: float,
     ) -> bool:
         """Fuse a reference velocity; return whether the speed was opened to it.
 
@@ -173,10 +174,12 @@ class ReferenceUpdate(Component[ReferenceState]):
             When torque, slope or rim speed last said that the slip may change [s].
         torque_known : bool
             Whether there is a torque that could say so.
+        reading_variance : float
+            Of the reading: `variance`, or more where more is seen [(m/s)^2].
         """
         tuning = self._tuning
         witnessed = not (torque_known and time - last_change > tuning.witness_time)
-        variance = self.variance(reference) + (tuning.timing_std * rim_acceleration) ** 2
+        variance = reading_variance + (tuning.timing_std * rim_acceleration) ** 2
         self._note_time(time)
         if still:
             self._note_slide(ekf, time, reference.forward, variance)

@@ -16,7 +16,6 @@ from wheel_terra_estimator.estimation.filter.consistency import smoothed_nis
 from wheel_terra_estimator.estimation.filter.ekf import GatedFilter, Row
 from wheel_terra_estimator.estimation.filter.state import StateLayout
 from wheel_terra_estimator.estimation.inputs.contact_sensors import SinkageSums
-from wheel_terra_estimator.estimation.rover import SensorFigures
 
 
 @dataclass(frozen=True)
@@ -44,14 +43,12 @@ class SinkageUpdate(Component[SinkageUpdateState]):
     def __init__(
         self,
         configuration: Configuration,
-        sensors: SensorFigures,
         layout: StateLayout,
         tuning: SinkageUpdateTuning = SinkageUpdateTuning(),
     ) -> None:
         n = layout.wheel_count
         super().__init__(SinkageUpdateState((-math.inf,) * n, (0,) * n))
         self._gate = float(configuration.filter.gate)
-        self._variance = sensors.sinkage_std**2
         self._layout, self._tuning = layout, tuning
 
     def keep_count(self, rejected: int) -> None:
@@ -62,8 +59,13 @@ class SinkageUpdate(Component[SinkageUpdateState]):
         """Return the wheels whose sinkage was not read of late."""
         return [i for i, when in enumerate(self.state.time) if time - when >= self._tuning.age]
 
-    def update(self, ekf: GatedFilter, time: float, sums: SinkageSums) -> list[Row]:
-        """Return the rows of the readings of a cycle; opens the state where spikes are none."""
+    def update(
+        self, ekf: GatedFilter, time: float, sums: SinkageSums, reading_variance: float
+    ) -> list[Row]:
+        """Return the rows of the readings of a cycle; opens the state where spikes are none.
+
+        `reading_variance` is that of one reading [m^2].
+        """
         if not any(sums.readings):
             return []
         tuning = self._tuning
@@ -74,7 +76,7 @@ class SinkageUpdate(Component[SinkageUpdateState]):
             if not count:
                 continue
             index = self._layout.sinkage.start + i
-            variance = self._variance / count + tuning.floor_variance
+            variance = reading_variance / count + tuning.floor_variance
             residual = total / count - float(ekf.mean[index])
             nis = residual * residual / (float(ekf.covariance[index, index]) + variance)
             if when[i] > -math.inf and nis > self._gate:

@@ -19,7 +19,7 @@ from wheel_terra_estimator.estimation.filter.ekf import (
     chi_square_gate,
 )
 from wheel_terra_estimator.estimation.filter.state import StateLayout
-from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
+from wheel_terra_estimator.estimation.rover import Rover
 
 Floats = tuple[float, ...]
 _FLOOR_VARIANCE = 1e-6  # [N^2 m^2]
@@ -47,17 +47,10 @@ class ForceRows(Component['float | None']):
 class TorqueUpdate(ForceRows):
     """Turns the torques of turning wheels into rows of the update."""
 
-    def __init__(
-        self,
-        configuration: Configuration,
-        rover: Rover,
-        sensors: SensorFigures,
-        layout: StateLayout,
-    ) -> None:
+    def __init__(self, configuration: Configuration, rover: Rover, layout: StateLayout) -> None:
         super().__init__(configuration)
         self._zeros = range(layout.size)[layout.torque_zero]
         self._none = (0.0,) * layout.wheel_count
-        self._variance = sensors.torque_std**2
         self._load_std = rover.load_std
 
     def zeros(self, mean: FloatArray) -> Floats:
@@ -70,6 +63,7 @@ class TorqueUpdate(ForceRows):
         forces: ContactForces,
         *,
         torque: Floats,
+        variance: float,
         turning: tuple[bool, ...],
         model_variance: Floats,
         repeats: float,
@@ -84,6 +78,8 @@ class TorqueUpdate(ForceRows):
             Of all wheels.
         torque : tuple of float
             Readings [N m], nan = none.
+        variance : float
+            Of a reading [N^2 m^2].
         turning : tuple of bool
             Wheels for which the models hold.
         model_variance : tuple of float
@@ -102,8 +98,8 @@ class TorqueUpdate(ForceRows):
             if isnan(reading) or not turning[i]:
                 continue
             model = models[i]
-            noise = self._variance + (self._load_std * model) ** 2 + _FLOOR_VARIANCE
-            variance = repeats * noise + model_variance[i] * model**2
-            variance += noises[i] ** 2
-            rows.append(self.row(Row(reading - zeros[i] - model, H[i], variance), priors[i]))
+            noise = variance + (self._load_std * model) ** 2 + _FLOOR_VARIANCE
+            total = repeats * noise + model_variance[i] * model**2
+            total += noises[i] ** 2
+            rows.append(self.row(Row(reading - zeros[i] - model, H[i], total), priors[i]))
         return rows

@@ -41,6 +41,8 @@ class SeenNoiseTuning:
     told_after: int = 100  # readings before it is told
     told_references: int = 10
     much: float = 5.0  # times what is stated, to be said
+    clearly: float = 2.0
+    """Times what is stated, to be taken in its place: less may be the motion's own."""
 
 
 class ChannelState(NamedTuple):
@@ -175,6 +177,16 @@ class SeenNoise(Component[SeenNoiseState]):
         tuning = self._tuning
         least = tuning.told_references if sensor == 'reference' else tuning.told_after
         return math.sqrt(state.variance) if state.readings >= least else None
+
+    def variance(self, sensor: str, stated: float | None = None) -> float:
+        """Return the variance of one message: as stated, or as seen where that is clearly more.
+
+        `stated` is that of the message itself, where it states one.
+        """
+        seen = self.seen(sensor) or 0.0
+        if stated is None:
+            stated = self.stated[sensor] ** 2
+        return seen**2 if seen**2 > self._tuning.clearly**2 * stated else stated
 
     def report(self) -> dict[str, float]:
         """Return stated and seen noise by key, with the unit at its end."""
