@@ -37,6 +37,29 @@ def test_radius_track_and_mounting(seed):
     assert told['sensors.imu_mounting_pitch_deg'].after == pytest.approx(0.0, abs=0.3)
 
 
+@pytest.mark.parametrize('factor', [-1.0, 0.0, 1000.0])
+def test_a_wrong_sinkage_moves_the_radius_by_no_more_than_its_deviation(factor):
+    """Upside down, dead or in millimetres."""
+    sinkage = rolling.recording().sinkage
+    calibration, _ = calibrated(sinkage=replace(sinkage, sinkage=factor * sinkage.sinkage))
+    radius = next(c for c in calibration.changes if c.key == 'wheels.radius')
+    assert radius.after[0] == pytest.approx(rolling.RADIUS, rel=0.02)
+
+
+def test_a_reference_whose_noise_alone_is_too_much_is_said():
+    rough = rolling.recording().reference
+    noise = 0.1 * np.random.default_rng(3).standard_normal(rough.velocity.shape[0])
+    velocity = rough.velocity + np.column_stack([noise, 0.0 * noise, 0.0 * noise])
+    calibration, configuration = calibrated(reference=replace(rough, velocity=velocity))
+    radius = next(c for c in calibration.changes if c.key == 'wheels.radius')
+    assert 'its noise alone allows no better' in radius.source
+    assert radius.std > calibration.figures['rover.radius_bound_by_reference_m'] > 0.0
+    fine = next(c for c in calibrated()[0].changes if c.key == 'wheels.radius')
+    assert 'noise alone' not in fine.source and 'noise alone' in as_file(
+        calibration, configuration, 'drive'
+    )
+
+
 def test_the_scale_of_the_torques():
     joints = rolling.recording().joints
     calibration, _ = calibrated(joints=replace(joints, torque=1.2 * joints.torque))

@@ -37,8 +37,8 @@ SLOPE_OF_SLIP = Estimate(0.2, 0.2)
 """Slip over traction of firm ground where the drive does not tell it: mean, deviation [-]."""
 FIRM_DEPTH = Estimate(0.02, 0.015)
 """Sinkage over radius of firm ground where no sensor tells it: mean, deviation [-]."""
-DEEPEST_FIRM = 0.1
-"""The same, that a sensor may tell [-]."""
+DEEPEST = 0.3
+"""The same, beyond which a sensor is not believed (another unit) [-]."""
 LEAST_DEPTHS = 50
 LEAST_REFERENCES = 12
 LEAST_TRACK_ERROR = 0.08
@@ -126,7 +126,8 @@ def _depth(evidence: Evidence) -> Estimate:
             sensors = configuration.sensors
             depth = float(np.nanmedian(rows)) / radius
             std = max(float(sensors.sinkage_zero_std), float(sensors.sinkage_std) / 2.0) / radius
-            return Estimate(min(max(depth, 0.0), DEEPEST_FIRM), std)
+            if depth < DEEPEST:
+                return Estimate(max(depth, 0.0), std)
     return FIRM_DEPTH
 
 

@@ -32,6 +32,7 @@ from wheel_terra_estimator.discrepancy.selection.signatures import against_soil
 from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES, SteadyTable
 from wheel_terra_estimator.terramechanics.effects.base import Effect
 from wheel_terra_estimator.terramechanics.effects.learned_closure import (
+    BANDS,
     EFFECT,
     FEATURES,
     NAME,
@@ -119,7 +120,7 @@ def promise_on_top(table: SteadyTable, setting: Setting, fitted: Fit) -> float:
     some closure, so that the named effect is not the whole truth, or not the truth. Bands of slip
     are left out: the confidence that this is a feature of was fitted without them.
     """
-    found = {name: term for name, term in _terms(table).items() if '_near_' not in name}
+    found = {name: term for name, term in _terms(table).items() if pair_of(name)[1] not in BANDS}
     terms = replace(setting, effects=found)
     starts = linear_starts(terms, fitted, tuple(terms.effects))
     return max((promise for promise, _, _ in starts), default=0.0)

@@ -120,6 +120,12 @@ def _rim_speed(contact: Contact, maths: Any) -> Any:
     return maths.where(maths.isnan(contact.rim_speed), 0.0, decades)
 
 
+BANDS: Mapping[str, Feature] = {
+    'slip_near_02': Feature(_near(0.2), 0.5, ('slip',), 'a band of |s| around 0.2', _IN_A_BAND),
+    'slip_near_04': Feature(_near(0.4), 0.5, ('slip',), 'a band of |s| around 0.4', _IN_A_BAND),
+    'slip_near_06': Feature(_near(0.6), 0.5, ('slip',), 'a band of |s| around 0.6', _IN_A_BAND),
+}
+
 FEATURES: Mapping[str, Feature] = {
     'one': Feature(lambda c, m: 1.0 + 0.0 * c.slip, 1.0, (), 'everywhere alike'),
     'slip': Feature(lambda c, m: m.abs(c.slip), 0.5, ('slip',), '|s|'),
@@ -127,9 +133,7 @@ FEATURES: Mapping[str, Feature] = {
     'slip_over_02': Feature(_over(0.2), 0.35, ('slip',), '|s| beyond 0.2'),
     'slip_over_04': Feature(_over(0.4), 0.25, ('slip',), '|s| beyond 0.4'),
     'slip_over_06': Feature(_over(0.6), 0.15, ('slip',), '|s| beyond 0.6'),
-    'slip_near_02': Feature(_near(0.2), 0.5, ('slip',), 'a band of |s| around 0.2', _IN_A_BAND),
-    'slip_near_04': Feature(_near(0.4), 0.5, ('slip',), 'a band of |s| around 0.4', _IN_A_BAND),
-    'slip_near_06': Feature(_near(0.6), 0.5, ('slip',), 'a band of |s| around 0.6', _IN_A_BAND),
+    **BANDS,
     'load': Feature(_load, 0.3, ('normal_load',), 'log10 of W/(rho g b r^2)'),
     'lug': Feature(lambda c, m: c.lug_height / c.radius, 0.06, ('lug_height',), 'h/r'),
     'width': Feature(lambda c, m: c.width / c.radius, 0.3, ('wheel_width', 'wheel_radius'), 'b/r'),
