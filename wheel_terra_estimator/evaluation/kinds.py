@@ -3,8 +3,8 @@
 """Kinds of simulated drives on which the estimator is tuned and judged.
 
 The estimator is told the nominal soil, which each seed puts off by about 20 % in stiffness,
-cohesion, friction, shear modulus and slip-sinkage, and a model without mound, bulldozing or
-compaction by earlier wheels. Tuning seeds and test seeds are apart.
+cohesion, friction, shear deformation modulus and slip-sinkage, and a model without mound,
+bulldozing or compaction by earlier wheels. Tuning seeds and test seeds are apart.
 """
 
 from __future__ import annotations

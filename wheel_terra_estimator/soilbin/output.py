@@ -160,7 +160,7 @@ def figures_of(summary: Mapping[str, object], case: Case) -> dict[str, str]:
         'torque H r_w; on the body': f'{number("torque_gross"):.3f} N m; '
         f'{number("torque_body"):.3f} N m',
         'sinkage below the undisturbed surface': f'{1000 * number("sinkage"):.1f} mm '
-        f'(static {1000 * number("sinkage_static"):.1f} mm, z_a '
+        f'(before rotation {1000 * number("sinkage_static"):.1f} mm, z_a '
         f'{1000 * number("sinkage_average"):.1f} mm)',
         'power number': f'{number("power_number"):.3f}',
         'pull coefficient': f'{number("pull_coefficient"):.3f}',

@@ -90,7 +90,7 @@ def report(arguments: argparse.Namespace, rows: Sequence[Row], folder: Path) -> 
     """Write the two tables."""
     from wheel_terra_estimator.soilbin.tables import page, table
 
-    names = ['slip [%]', 'H [N]', 'R_r [N]', 'z_a [cm]', 'static sinkage [cm]']
+    names = ['slip [%]', 'H [N]', 'R_r [N]', 'z_a [cm]', 'sinkage before rotation [cm]']
     head = ['changed against the calibrated case', 'beds', 'slip at 15 deg [%]']
     head += ['slip at 25 deg [%]', *names[1:]]
     steep = []
