@@ -38,6 +38,20 @@ def test_nothing_is_found_where_nothing_is_wrong(seed):
     assert report.figures['rover.rolling_radius_m'] == pytest.approx(rolling.RADIUS, rel=0.01)
 
 
+@pytest.mark.parametrize('seconds', [0.35, 0.6, 1.5, 3.9, 5.5, 9.0])
+@pytest.mark.parametrize('side', [1.0, -1.0])
+def test_short_recordings_at_100_hz_are_checked_as_far_as_they_go(seconds, side):
+    time = np.arange(0.0, seconds, 0.01)
+    speed = 0.3 * np.minimum(time, 1.0)
+    yaw = np.where(time > 0.5 * seconds, 0.2, 0.0)
+    whole = rolling.recording(rolling.Motion(time, speed, yaw, 0.0 * time))
+    joints = whole.joints
+    joints = replace(joints, rate=side * joints.rate, torque=side * joints.torque)
+    report = check_recording(replace(whole, joints=joints), rolling.rover())
+    assert report.not_checked
+    assert side < 0.0 or not report.findings, [str(f) for f in report.findings]
+
+
 def test_one_wheel_backwards():
     joints = WHOLE.joints
     flip = np.array([1.0, 1.0, -1.0, 1.0])

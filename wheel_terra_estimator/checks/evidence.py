@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from wheel_terra_estimator.checks.rover_facts import RoverFacts
 from wheel_terra_estimator.checks.series import Recording, VelocitySeries
-from wheel_terra_estimator.checks.statistics import averaged, robust_std
+from wheel_terra_estimator.checks.statistics import averaged, moving_mean, robust_std
 from wheel_terra_estimator.estimation.sensor_errors import SensorErrors
 
 FloatArray = NDArray[np.float64]
@@ -221,7 +221,7 @@ class Evidence:
         difference = self.side_difference
         if np.isfinite(difference).any():
             width = max(round(SETTLING / max(self.period, 1e-3)), 1)
-            smooth = np.convolve(difference, np.ones(width) / width, mode='same')
+            smooth = moving_mean(difference, width)
             rows &= np.abs(smooth) < STRAIGHT_SHARE * rim
         if self.gyro is not None and self.facts.known:
             yaw = np.abs(self.gyro[:, 2] - np.median(self.gyro[:, 2]))
@@ -317,7 +317,7 @@ def _after(condition: Mask, period: float, duration: float) -> Mask:
 def _smooth(values: FloatArray, width: int) -> FloatArray:
     if values.size < width:
         return np.full(values.shape, np.nanmean(values)) if values.size else values
-    return np.asarray(np.convolve(np.nan_to_num(values), np.ones(width) / width, mode='same'))
+    return moving_mean(np.nan_to_num(values), width)
 
 
 def row_medians(values: FloatArray) -> FloatArray:

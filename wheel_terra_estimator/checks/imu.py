@@ -24,6 +24,7 @@ from wheel_terra_estimator.checks.statistics import (
     block_fit,
     confidence,
     correlation,
+    moving_mean,
     robust_std,
 )
 
@@ -353,7 +354,7 @@ def small_tilt(evidence: Evidence) -> Mounting | None:
     step = np.diff(evidence.time, prepend=evidence.time[0])
     heading = np.cumsum(yaw * np.minimum(step, 1.0))
     width = max(round(2.0 / evidence.period), 1)
-    smooth = np.convolve(yaw, np.ones(width) / width, mode='same')
+    smooth = moving_mean(yaw, width)
     turning = np.abs(smooth) > 0.5 * float(np.quantile(np.abs(smooth), 0.97))
     covered = float(np.sum(np.abs(yaw[turning]) * np.minimum(step[turning], 1.0)))
     if covered < LEAST_TURN or turning.sum() < 100 or _evenness(heading[turning]) > 0.6:
@@ -391,14 +392,11 @@ def yaw_mounting(evidence: Evidence) -> Estimate | None:
         return None
     period = evidence.period
     width = max(round(0.4 / period), 1)
-    kernel = np.ones(width) / width
-    speed = np.convolve(evidence.rim, kernel, mode='same')
+    speed = moving_mean(evidence.rim, width)
     change = np.gradient(speed, period)
-    curve = speed * np.convolve(evidence.gyro[:, 2], kernel, mode='same')
+    curve = speed * moving_mean(evidence.gyro[:, 2], width)
     motion = _without_drift(change + 1j * curve, period)
-    horizontal = np.array(
-        [np.convolve(evidence.force[:, axis], kernel, mode='same') for axis in (0, 1)]
-    )
+    horizontal = [moving_mean(evidence.force[:, axis], width) for axis in (0, 1)]
     seen = _without_drift(horizontal[0] + 1j * horizontal[1], period)
     blocks = np.array_split(np.arange(seen.size), 10)
     parts = np.array([np.vdot(motion[b], seen[b]) for b in blocks])
@@ -413,8 +411,7 @@ def yaw_mounting(evidence: Evidence) -> Estimate | None:
 def _without_drift(values: NDArray[np.complex128], period: float) -> NDArray[np.complex128]:
     """Return values less their mean over 6 s: slopes change more slowly than speeds."""
     width = max(round(6.0 / period), 3)
-    kernel = np.ones(width) / width
-    return np.asarray(values - np.convolve(values, kernel, mode='same'))
+    return np.asarray(values - moving_mean(values, width))
 
 
 def check_mounting(evidence: Evidence, figures: dict[str, Any]) -> tuple[list[Outcome], FloatArray]:

@@ -19,6 +19,7 @@ from wheel_terra_estimator.checks.statistics import (
     correlation,
     even_times,
     lag,
+    moving_mean,
     robust_std,
 )
 
@@ -224,10 +225,8 @@ def _delay(evidence: Evidence, reference: VelocitySeries, figures: dict[str, Any
     rim = averaged(evidence.time, np.nan_to_num(evidence.rim)[:, None], time, 2 * step)[:, 0]
     speed = np.interp(time, at[order], reference.velocity[order, 0])
     # Between its stamps the reference is a straight line: the rims are smoothed as much.
-    width = min(max(round(period / step), 1), time.size)
-    kernel = np.ones(width) / width
     for _ in range(2):
-        rim = np.convolve(rim, kernel, mode='same')
+        rim = moving_mean(rim, round(period / step))
     if period > 1.5 or float(np.std(rim)) < 0.1 * float(np.abs(rim).mean() + 1e-9):
         return [NotChecked('delay', 'reference: hardly a change of speed in it; stop and go')]
     found = lag(time, rim, speed, 3.0)

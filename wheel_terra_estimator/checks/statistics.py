@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -100,6 +100,15 @@ def _solve(normal: FloatArray, right: FloatArray) -> FloatArray:
     size = np.sqrt(np.maximum(np.diag(normal), 1e-300))
     scaled = normal / np.outer(size, size) + 1e-12 * np.eye(size.size)
     return np.asarray(np.linalg.solve(scaled, right / size) / size)
+
+
+def moving_mean(values: NDArray[Any], width: int) -> NDArray[Any]:
+    """Return the mean of (k,) values over so many rows around each, zeros beyond the ends.
+
+    Of a record that is shorter, over as many rows as there are.
+    """
+    width = max(min(width, values.size), 1)
+    return np.asarray(np.convolve(values, np.ones(width) / width, mode='same'))
 
 
 def correlation(first: FloatArray, second: FloatArray) -> float:

@@ -12,7 +12,13 @@ from numpy.typing import NDArray
 
 from wheel_terra_estimator.checks.evidence import LEAST_MOVING_ROWS, Evidence
 from wheel_terra_estimator.checks.finding import Finding, NotChecked, Outcome
-from wheel_terra_estimator.checks.statistics import Estimate, block_fit, confidence, correlation
+from wheel_terra_estimator.checks.statistics import (
+    Estimate,
+    block_fit,
+    confidence,
+    correlation,
+    moving_mean,
+)
 from wheel_terra_estimator.estimation.sensor_errors import SensorErrors
 
 FloatArray = NDArray[np.float64]
@@ -163,12 +169,11 @@ def _slope_fit(evidence: Evidence) -> Estimate | None:
     """Return thrust over mass times specific force: torque gain times true over stated mass."""
     assert evidence.force is not None
     rows = evidence.straight
-    # Noise of a regressor makes a slope look flat: both sides are means over the same time.
-    kernel = np.ones(SMOOTH_ROWS) / SMOOTH_ROWS
     if rows.sum() < 3 * LEAST_MOVING_ROWS:
         return None
-    along = np.convolve(evidence.force[:, 0], kernel, mode='same')[rows]
-    pushed = np.convolve(thrust(evidence), kernel, mode='same')[rows]
+    # Noise of a regressor makes a slope look flat: both sides are means over the same time.
+    along = moving_mean(evidence.force[:, 0], SMOOTH_ROWS)[rows]
+    pushed = moving_mean(thrust(evidence), SMOOTH_ROWS)[rows]
     if float(np.std(along)) < LEAST_SLOPE_STD:
         return None
     sense = np.sign(evidence.rim[rows])

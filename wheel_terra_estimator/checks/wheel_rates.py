@@ -19,6 +19,7 @@ from wheel_terra_estimator.checks.statistics import (
     block_fit,
     confidence,
     correlation,
+    moving_mean,
     robust_std,
 )
 
@@ -353,11 +354,9 @@ def _told_direction(evidence: Evidence, signs: FloatArray) -> _Told:
         by_reference = fit if abs(fit) > 0.5 else None
     if evidence.force is not None and evidence.time.size > 100:
         width = max(round(0.4 / evidence.period), 1)
-        kernel = np.ones(width) / width
-        change = np.gradient(np.convolve(speed, kernel, mode='same'), evidence.period)
-        slow = np.ones(10 * width) / (10 * width)
-        force = np.convolve(evidence.force[:, 0], kernel, mode='same')
-        force = force - np.convolve(force, slow, mode='same')
+        change = np.gradient(moving_mean(speed, width), evidence.period)
+        force = moving_mean(evidence.force[:, 0], width)
+        force = force - moving_mean(force, 10 * width)
         parts = np.array(
             [
                 float(a @ b)
