@@ -56,7 +56,7 @@ def test_it_runs(capsys, monkeypatch, processes):
     assert main(['bench', '--quick', '--json']) == 0
     told = capsys.readouterr().out
     figures = json.loads(told)['figures']
-    assert len(figures) == 11
+    assert len(figures) == 13
     assert all(entry['seconds'] > 0 and entry['times_as_fast'] > 0 for entry in figures)
     assert processes or {'diagnose', '--help', 'predict'} <= {c[3] for c in started if len(c) > 3}
 

@@ -37,20 +37,31 @@ REPEATS = 20
 RADIUS, WIDTH = 0.135, 0.165
 """Wheel of the wheel tests on HIT-LSS1 [m] (Ding et al. 2011)."""
 ROW_SEED = 1
+TABLE_FILES = ('hit_wh3', 'hit_fit')
+LOADS = ('60', '80', '100')
+"""On the wheel of the tables that are diagnosed [N]."""
+NOISE = '3e-4,0.5,0.1'
+"""Of their sinkage [m], pull [N] and torque [N m]."""
+MISSING = 'effects.soil_mound.enabled:=true'
+"""What they have and the model that they are compared with has not."""
 
 
 @dataclass(frozen=True)
 class Size:
-    """How much is done: length of the drive [s], pairs, wheels in a batch, peers among them."""
+    """How much is done.
+
+    Length of the drive [s], pairs, wheels in a batch, peers among them, rows of two tables.
+    """
 
     drive: float = 120.0
     pairs: int = 5
     batch: int = 10_000
     peers: int = 20
     rows: int = 60
+    many_rows: int = 20_001
 
 
-QUICK = Size(drive=4.0, pairs=1, batch=200, peers=2)
+QUICK = Size(drive=4.0, pairs=1, batch=200, peers=2, many_rows=90)
 
 
 def figures(size: Size) -> Iterator[Figure]:
@@ -169,9 +180,6 @@ def forces(soil: Soil, method: str, slip: np.ndarray, load: np.ndarray) -> np.nd
 
 
 def _commands(folder: Path, size: Size) -> Iterator[Figure]:
-    table = folder / 'rows.csv'
-    _write_rows(table, size.rows)
-
     environment = dict(os.environ)
     if sys.dont_write_bytecode:
         # An installed package has its bytecode; the first call, which does not count, makes it.
@@ -185,27 +193,36 @@ def _commands(folder: Path, size: Size) -> Iterator[Figure]:
     def command(*arguments: str) -> None:
         process('-m', 'wheel_terra_estimator.cli.main', *arguments)
 
-    files = [word for name in FILES for word in ('--config', name)]
-    diagnose = ['diagnose', str(table), *files, '-o', str(folder / 'diagnosis'), '--overwrite']
+    def files(*names: str) -> list[str]:
+        return [word for name in names for word in ('--config', name)]
+
+    def rows(count: int) -> str:
+        path = str(folder / f'rows_{count}.csv')
+        slips = ['--slip', f'0.05:0.6:{count // len(LOADS)}', '--load', ','.join(LOADS)]
+        command(
+            'predict', *files(*TABLE_FILES), '-p', MISSING, *slips, '--noise', NOISE, '-o', path
+        )  # fmt: skip
+        return path
+
+    def diagnose(table: str, *more: str) -> list[str]:
+        output = ['-o', str(folder / 'diagnosis'), '--overwrite', *more]
+        return ['diagnose', table, *files(*TABLE_FILES), *output]
+
+    few, many = rows(size.rows), rows(size.many_rows)
+    fitting, drawing = 'import scipy.optimize', 'import scipy.optimize, matplotlib.pyplot'
     for name, arguments, code in (
-        (f'diagnose, {size.rows} rows', diagnose, 'import scipy.optimize, matplotlib.pyplot'),
+        (f'diagnose, {size.rows} rows, without pictures', diagnose(few, '--no-pictures'), fitting),
+        (f'diagnose, {size.rows} rows', diagnose(few), drawing),
+        (
+            f'diagnose, {size.many_rows} rows, without pictures',
+            diagnose(many, '--no-pictures'),
+            fitting,
+        ),
         ('--help', ['--help'], 'import argparse'),
-        ('predict', ['predict', *files, '--load', '80'], 'import numpy'),
+        ('predict', ['predict', *files(*FILES), '--load', '80'], 'import numpy'),
     ):
         yield timed_pairs(
             f'command: {name}', (lambda a=arguments: command(*a), 1),  # type: ignore[misc]
             f'python -c "{code}"', (lambda c=code: process('-c', c), 1),  # type: ignore[misc]
             size.pairs,
         )  # fmt: skip
-
-
-def _write_rows(path: Path, count: int) -> None:
-    """Write a table of the smooth wheel with noise of a tenth of a percent to a percent."""
-    random = np.random.default_rng(ROW_SEED)
-    slip, load = np.tile(np.linspace(0.05, 0.6, count // 3), 3), np.repeat([60.0, 80.0, 100.0], 20)
-    values = forces(reader.load(FILES).soil, 'quadrature', slip, load)
-    values += random.standard_normal(values.shape) * np.array([3e-4, 0.5, 0.1])
-    header = 'slip,normal_load,wheel_radius,wheel_width,lug_height,sinkage,drawbar_pull,torque'
-    same = np.tile([RADIUS, WIDTH, 0.0], (count, 1))
-    rows = np.column_stack([slip, load, same, values])
-    np.savetxt(path, rows, delimiter=',', header=header, comments='', fmt='%.6g')
