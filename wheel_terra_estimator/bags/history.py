@@ -53,6 +53,11 @@ _TOPIC_FIELDS = {
 }
 
 
+_ROW = np.full(256, list(SlipClass).index(SlipClass.UNKNOWN), dtype=np.intp)
+"""Class to its place among all."""
+_ROW[list(SlipClass)] = np.arange(len(SlipClass))
+
+
 @dataclass(frozen=True)
 class StuckWarning:
     """One stuck warning: from, to [ns] (None: until the end), and why, in words."""
@@ -71,8 +76,6 @@ class DriveFigures:
         Number of sets.
     duration : float
         From the first set to the latest stamp [s].
-    seconds_in_class : dict
-        Class to the time of each wheel in it [s].
     max_slip : (n,) array
         Greatest |slip| outside of class unknown [-].
     max_sinkage, max_sinkage_std : (n,) array
@@ -84,7 +87,8 @@ class DriveFigures:
     def __init__(self, wheels: int) -> None:
         self.sets = 0
         self.duration = 0.0
-        self.seconds_in_class = {c: np.zeros(wheels) for c in SlipClass}
+        self._seconds = np.zeros((len(SlipClass), wheels))
+        self._wheel = np.arange(wheels)
         self.max_slip = np.zeros(wheels)
         self.max_sinkage = np.full(wheels, -np.inf)
         self.max_sinkage_std = np.zeros(wheels)
@@ -93,6 +97,11 @@ class DriveFigures:
         self._known = np.zeros(wheels)
         self._first = self._stamp = 0
         self._class: NDArray[np.uint8] = np.zeros(wheels, dtype=np.uint8)
+
+    @property
+    def seconds_in_class(self) -> dict[SlipClass, FloatArray]:
+        """Class to the time of each wheel in it [s]."""
+        return dict(zip(SlipClass, self._seconds, strict=True))
 
     @property
     def mean_pull(self) -> FloatArray:
@@ -108,8 +117,7 @@ class DriveFigures:
         else:
             step = (stamp - self._stamp) * 1e-9
             if 0.0 <= step <= LONGEST_STEP:
-                for c, seconds in self.seconds_in_class.items():
-                    seconds += step * (self._class == c)
+                self._seconds[_ROW[self._class], self._wheel] += step
         self.sets += 1
         self._stamp, self._class = stamp, slip_class
         self.duration = max(self.duration, (stamp - self._first) * 1e-9)

@@ -99,13 +99,17 @@ def thin(x: FloatArray, y: FloatArray, points: int = 1200) -> tuple[FloatArray, 
     """
     if x.size <= points:
         return x, y
-    chosen = [0]
-    for stretch in np.array_split(np.arange(x.size), points // 2):
-        values = y[stretch]
-        if np.isnan(values).all():
-            chosen.append(int(stretch[0]))
-        else:
-            chosen += sorted(int(stretch[f(values)]) for f in (np.nanargmin, np.nanargmax))
-    chosen.append(x.size - 1)
-    kept = np.unique(chosen)
+    chosen = [np.array([0, x.size - 1])]
+    length, longer = divmod(x.size, points // 2)
+    # The first stretches are one point longer, so that all points are in one.
+    for begin, end, size in (
+        (0, longer * (length + 1), length + 1),
+        (longer * (length + 1), x.size, length),
+    ):
+        stretches = y[begin:end].reshape(-1, size)
+        first = begin + size * np.arange(len(stretches))
+        for extreme, missing in ((np.argmin, np.inf), (np.argmax, -np.inf)):
+            known = np.where(np.isnan(stretches), missing, stretches)
+            chosen.append(first + extreme(known, axis=1))
+    kept = np.unique(np.concatenate(chosen))
     return x[kept], y[kept]
