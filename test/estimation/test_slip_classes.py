@@ -56,6 +56,11 @@ def test_badly_known_slip_needs_a_larger_excess():
     assert run([0.1] * 5 + [0.34] * 10, std=0.3)[-1] == 0
 
 
+def test_a_guess_is_no_high_slip():
+    assert run([0.1] * 5 + [1.0] * 10, std=0.45)[-1] == 1
+    assert run([0.1] * 5 + [0.9] * 10, std=0.3)[-1] == 2
+
+
 def test_sliding_back_is_stuck():
     assert run([1.0] * 5, sliding_back=True)[-1] == 3
 

@@ -18,6 +18,9 @@ UNKNOWN = int(SlipClass.UNKNOWN)
 _TIME_ROUNDING = 1e-9  # [s]
 _KNOWN_STD = 0.05  # deviation up to which a slip is well known; tuned, seeds 1000 to 1019
 _BAND_PER_STD, _WIDEST_BAND = 0.25, 0.1  # band added for each deviation beyond, at most
+_GUESS_STD, _BAND_PER_GUESS = 0.25, 2.0
+"""Deviation from which a slip is a guess, and what of it must lie beyond the border of a higher
+class: nobody is told of high slip by a guess."""
 _LEAST_STD = 1e-6
 
 
@@ -110,7 +113,8 @@ class SlipClassifier:
         doubt = _BAND_PER_STD * max(slip_std - _KNOWN_STD, 0.0)
         band = self._half_band + min(doubt, _WIDEST_BAND)
         target = current
-        while target < top and magnitude > self._borders[target] + band:
+        rising = band + _BAND_PER_GUESS * max(slip_std - _GUESS_STD, 0.0)
+        while target < top and magnitude > self._borders[target] + rising:
             target += 1
         while target > 0 and magnitude <= self._borders[target - 1] - band:
             target -= 1
