@@ -35,6 +35,8 @@ LAG_GAIN = 1.15
 """By how much the unlike part has to shrink for a lag to count; a slow reference is ragged."""
 LEAST_DELAY = 0.25
 """Delays below this [s] are left to jitter and filters of encoders."""
+LEAST_DELAY_PERIODS = 0.5
+"""The same in periods of the reference: between its stamps nothing is known."""
 COVARIANCE_FACTOR = 6.0
 """Ratio of stated to seen standard deviation that makes a covariance a placeholder."""
 TOO_SMALL_STD = 4.0
@@ -234,9 +236,9 @@ def _delay(evidence: Evidence, reference: VelocitySeries, figures: dict[str, Any
         return [NotChecked('delay', 'reference: does not follow the wheels closely enough')]
     figures['reference.delay_s'] = round(float(found.value), 3)
     figures['reference.delay_std_s'] = round(found.std, 3)
-    if abs(found.value) < max(LEAST_DELAY, 0.4 * period, 3.0 * found.std) or not found.clear(
-        LAG_GAIN
-    ):
+    if abs(found.value) < max(
+        LEAST_DELAY, LEAST_DELAY_PERIODS * period, 3.0 * found.std
+    ) or not found.clear(LAG_GAIN):
         return []
     return [
         Finding(

@@ -40,6 +40,8 @@ GAIN_MODEL_STD = 0.05
 """What rolling resistance, larger uphill, adds to the scale (firm drives of the simulator)."""
 SMOOTH_ROWS = 20
 """Rows over which slopes are averaged."""
+AXES_APART = math.radians(20.0)
+"""No heading by the torques is told where the slopes vary along another axis than it [rad]."""
 LEAST_BACK_ROWS = 10
 """Rows of wheels turning back in the air that tell zero and friction apart."""
 LEAST_GAIN_ERROR = 0.15
@@ -366,4 +368,13 @@ def heading_of_torque(evidence: Evidence) -> Estimate | None:
         return None
     if not 0.5 < size / evidence.facts.mass < 2.0:
         return None  # the soil's own resistance is at work, not the slope
-    return Estimate(math.atan2(across.value, along.value), max(along.std, across.std) / size)
+    heading = Estimate(math.atan2(across.value, along.value), max(along.std, across.std) / size)
+    apart = abs((heading.value - _axis_of(horizontal) + 0.5 * math.pi) % math.pi - 0.5 * math.pi)
+    return heading if apart < AXES_APART else None
+
+
+def _axis_of(horizontal: FloatArray) -> float:
+    """Return the direction in which the slope (k, 2) varies most [rad], either way round."""
+    along, across = (_smooth(column) for column in horizontal.T)
+    (xx, xy), (_, yy) = np.cov(along, across)
+    return 0.5 * math.atan2(2.0 * xy, xx - yy)
