@@ -114,7 +114,7 @@ def linear_starts(
     The promise comes from the signatures at the base fit. An effect's second parameter (an onset, a
     depth) has no gradient while its strength is nil, so a few values of it compete.
     """
-    trials: list[tuple[str, tuple[Coordinate, ...], FloatArray]] = []
+    trials: list[Trial] = []
     for name in names:
         own = effect_coordinates(setting.effects[name])
         for shape in shapes(own, setting.deepest, 0.0):
@@ -122,18 +122,12 @@ def linear_starts(
     if not trials:
         return []
     coordinates = [(*base.coordinates, *own) for _, own, _ in trials]
-    state = setting.forward.solve(
-        coordinates,
-        [np.concatenate([base.u, shape]) for _, _, shape in trials],
-        np.broadcast_to(base.angle, (len(trials), len(base.angle))),
-        # At neutral strength everything but the strength has the derivatives of the base.
-        by=[[len(base.u)]] * len(trials),
-    )
+    responses = _strength_responses(setting, base, trials)
     problem, fixed = setting.problem, len(base.u)
     best: dict[str, tuple[float, tuple[str, ...], FloatArray]] = {}
     for index, (name, own, shape) in enumerate(trials):
-        outputs = state.outputs[index]
-        own_column = problem.flat(state.jacobian[index])
+        outputs, angle, column = responses[index]
+        own_column = problem.flat(column)
         sensitivity = np.concatenate([base.sensitivity, own_column], axis=1)
         residual = problem.rotate(setting.observed - problem.flat(outputs))
         keep = [*range(fixed), fixed]  # the strength only: the shape has no gradient here
@@ -142,7 +136,7 @@ def linear_starts(
             tuple(coordinates[index][k] for k in keep),
             np.concatenate([base.u, shape])[keep],
             outputs,
-            state.angle[index],
+            angle,
             sensitivity,
             residual,
             problem.rotate(sensitivity),
@@ -168,6 +162,37 @@ def linear_starts(
         if name not in best or score > best[name][0]:
             best[name] = (score, (*base.names, name), full)
     return list(best.values())
+
+
+Trial = tuple[str, tuple[Coordinate, ...], FloatArray]
+"""Name, its coordinates, and the values at which it starts."""
+
+
+def _strength_responses(
+    setting: Setting, base: Fit, trials: Sequence[Trial]
+) -> list[tuple[FloatArray, FloatArray, FloatArray]]:
+    """Return outputs (N, 3), entrance angle (N,) and derivative (N, 3, 1) by strength of each.
+
+    At neutral strength everything but the strength has the derivatives of the base. Terms of a
+    sparse law have nothing but a strength, so that all of them stand in one model side by side.
+    """
+    fixed = len(base.u)
+    if all(setting.effects[name].sparse for name, _, _ in trials):
+        together = (*base.coordinates, *(own[0] for _, own, _ in trials))
+        starts = np.concatenate([base.u, *(shape for _, _, shape in trials)])
+        by = [range(fixed, len(together))]
+        state = setting.forward.solve([together], [starts], base.angle[None], by=by)
+        return [
+            (state.outputs[0], state.angle[0], state.jacobian[0][..., k : k + 1])
+            for k in range(len(trials))
+        ]
+    state = setting.forward.solve(
+        [(*base.coordinates, *own) for _, own, _ in trials],
+        [np.concatenate([base.u, shape]) for _, _, shape in trials],
+        np.broadcast_to(base.angle, (len(trials), len(base.angle))),
+        by=[[fixed]] * len(trials),
+    )
+    return list(zip(state.outputs, state.angle, state.jacobian, strict=True))
 
 
 def _linear_gain(precision: FloatArray, mean: FloatArray, strength: float, reduced: Fit) -> float:
