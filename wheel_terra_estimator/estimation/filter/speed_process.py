@@ -25,6 +25,7 @@ from typing import NamedTuple
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.contacts.steering import LEAST_ALONG, Headings
+from wheel_terra_estimator.estimation.contacts.usual_slip import UsualSlip
 from wheel_terra_estimator.estimation.filter.ekf import GatedFilter
 from wheel_terra_estimator.estimation.filter.prediction import Prediction
 from wheel_terra_estimator.estimation.filter.state import GRAVITY_BIAS, SLIP_PER_DEMAND, SPEED
@@ -81,11 +82,8 @@ class SpeedTuning:
     least_slope: float = 1e-3  # of the traction curve [-]
     restless_change: float = 0.02  # of the rim speed in a cycle: the command changes
     restless_share: float = 0.05  # of the rim speed: an inflation that tells of new contacts
-    usual_slip: float = 0.12  # of a rover in loose soil on level ground
-    usual_slip_std: float = 0.2
+    usual_slip_std: float = 0.2  # about that of the configured soil on such a slope
     usual_length: float = 1.5  # rim travel over which slip returns to it [m]
-    slip_per_demand: float = 1.2  # uphill: slip for each share of the load that is asked
-    slip_per_brake: float = 0.4  # downhill
     least_usual_slip: float = -0.2
     most_usual_slip: float = 0.8
     start_share: float = 0.5
@@ -181,6 +179,7 @@ class SpeedProcess(Component[SpeedState]):
             )
         )
         self._rover, self._tuning = rover, tuning
+        self._usual_slip = UsualSlip(configuration, rover)
         rate = max(sensors.imu_rate, 1.0)
         attitude = rover.gravity * sensors.orientation_std
         self._stated_noise = sensors.specific_force_std**2 / rate
@@ -410,14 +409,9 @@ class SpeedProcess(Component[SpeedState]):
         if not abs(rim) >= self._rover.low_rim:
             return step
         tuning = self._tuning
-        demand = direction * slope_share
-        per_demand = tuning.slip_per_demand if demand > 0.0 else tuning.slip_per_brake
-        slip = clipped(
-            tuning.usual_slip + per_demand * demand,
-            tuning.least_usual_slip,
-            tuning.most_usual_slip,
-        )
-        usual = 1.0 - slip
+        most = tuning.most_usual_slip
+        slip = self._usual_slip.at(direction * slope_share, beyond=most)
+        usual = 1.0 - clipped(slip, tuning.least_usual_slip, most)
         keep = math.exp(-abs(rim) * dt / tuning.usual_length)
         return SpeedStep(
             keep * step.speed_gain,
