@@ -8,6 +8,7 @@ from parts import SAND, Parts
 
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.estimation.inputs.seen_noise import SeenNoise
+from wheel_terra_estimator.estimation.measurements import StepInputs, WheelOdometry
 
 NAN = float('nan')
 RATES = {'accelerometer': 100.0, 'gyro': 100.0, 'wheel_rate': 10.0, 'torque': 10.0, 'sinkage': 10.0}
@@ -45,6 +46,29 @@ def test_noise_clearly_beyond_what_is_stated_is_taken_in_its_place(noise):
         assert noise.variance('torque') == pytest.approx((seen if taken else stated) ** 2)
     # A message that states more than is seen is believed.
     assert noise.variance('torque', 100.0 * stated**2) == 100.0 * stated**2
+
+
+def test_noise_that_nobody_stated_is_taken_as_it_is_seen():
+    parts, times = Parts(reader.load(SAND)), 0.1 * np.arange(400)
+    default = parts.sensors.torque_std
+    silent = SeenNoise(parts.sensors, RATES, given={'sensors.sinkage_std'})
+    assert silent.variance('torque') == default**2
+    seen = read(silent, 'torque', 0.1 * default, times)
+    assert silent.variance('torque') == pytest.approx(seen**2)
+    assert seen == pytest.approx(0.1 * default, rel=0.1)
+    read(silent, 'sinkage', 0.1 * silent.stated['sinkage'], times)
+    assert silent.variance('sinkage') == silent.stated['sinkage'] ** 2
+
+
+def test_what_nobody_stated_is_known_after_the_first_seconds():
+    sensors, rng = Parts(reader.load(SAND)).sensors, np.random.default_rng(8)
+    told, silent = SeenNoise(sensors, RATES), SeenNoise(sensors, RATES, given=())
+    for i in range(120):
+        odometry = WheelOdometry(0, np.full(6, 0.5), 3.0 + 0.02 * rng.normal(size=6))
+        for noise in (told, silent):
+            noise.take(0.1 * i, StepInputs(wheel_odometry=odometry))
+    assert told.seen('torque') is None
+    assert silent.seen('torque') == pytest.approx(0.02, rel=0.1)
 
 
 def test_steps_and_gaps_are_no_noise(noise):

@@ -175,6 +175,7 @@ class WheelSoilEstimator:
                 'torque': figures.wheel_odometry_rate,
                 'sinkage': figures.sinkage_rate,
             },
+            given=configuration.stated,
         )
         # Wheels on the ground.
         self._steering = Steering(rover)

@@ -11,6 +11,7 @@ another by the noise of two references.
 from __future__ import annotations
 
 import math
+from collections.abc import Collection, Container
 from dataclasses import dataclass
 from math import isnan
 from typing import NamedTuple
@@ -30,6 +31,7 @@ class SeenNoiseTuning:
     """How slowly it is learned, and within which bounds."""
 
     one_second_in: int = 4  # is learned from; the noise of sensors changes slowly
+    first_seconds: float = 12.0  # of a run; of what nobody stated they are all learned from
     readings: float = 200.0  # over which the mean goes
     references: float = 30.0
     most_jump: float = 4.0
@@ -88,12 +90,29 @@ KEYS = {
 
 
 class SeenNoise(Component[SeenNoiseState]):
-    """Learns the noise of a message of each sensor; readings are means of those of a step."""
+    """Learns the noise of a message of each sensor; readings are means of those of a step.
+
+    Parameters
+    ----------
+    sensors : SensorFigures
+        What is stated, or the defaults.
+    rates : dict
+        Messages a second, by sensor.
+    tuning : SeenNoiseTuning, optional
+        How it is learned.
+    given : container of str
+        Keys that somebody stated, as against defaults; all of them by default.
+    """
 
     def __init__(
-        self, sensors: SensorFigures, rates: dict[str, float], tuning: SeenNoiseTuning | None = None
+        self,
+        sensors: SensorFigures,
+        rates: dict[str, float],
+        tuning: SeenNoiseTuning | None = None,
+        given: Container[str] = frozenset(KEYS.values()),
     ) -> None:
         super().__init__(SeenNoiseState())
+        self._defaults = {sensor for sensor, key in KEYS.items() if key not in given}
         self._tuning = tuning or SeenNoiseTuning()
         self._rates = rates  # messages a second, by sensor
         self.stated = {
@@ -106,17 +125,28 @@ class SeenNoise(Component[SeenNoiseState]):
         }
 
     def take(self, time: float, inputs: StepInputs) -> None:
-        """Take the readings of a step at a time [s]: one second in four is enough to learn from."""
-        if int(time) % self._tuning.one_second_in:
-            return
+        """Take the readings of a step at a time [s]; one second in four is enough to learn from.
+
+        Of what nobody stated the first seconds are all learned from.
+        """
+        tuning = self._tuning
+        skipped: Collection[str] = ()
+        if int(time) % tuning.one_second_in:
+            if time > tuning.first_seconds:
+                return
+            skipped = KEYS.keys() - self._defaults
+        found: dict[str, Floats] = {}
         if inputs.inertial is not None:
-            self.read('accelerometer', time, (float(inputs.inertial.specific_force[0]),))
-            self.read('gyro', time, (float(inputs.inertial.angular_rate[2]),))
+            found['accelerometer'] = (float(inputs.inertial.specific_force[0]),)
+            found['gyro'] = (float(inputs.inertial.angular_rate[2]),)
         if inputs.wheel_odometry is not None:
-            self.read('wheel_rate', time, tuple(inputs.wheel_odometry.rate.tolist()))
-            self.read('torque', time, tuple(inputs.wheel_odometry.torque.tolist()))
+            found['wheel_rate'] = tuple(inputs.wheel_odometry.rate.tolist())
+            found['torque'] = tuple(inputs.wheel_odometry.torque.tolist())
         if inputs.sinkage is not None:
-            self.read('sinkage', time, tuple(inputs.sinkage.sinkage.tolist()))
+            found['sinkage'] = tuple(inputs.sinkage.sinkage.tolist())
+        for sensor, values in found.items():
+            if sensor not in skipped:
+                self.read(sensor, time, values)
 
     def read(self, sensor: str, time: float, values: Floats) -> None:
         """Take a reading (one value per wheel or axis, nan = none) at a time [s]."""
@@ -181,11 +211,14 @@ class SeenNoise(Component[SeenNoiseState]):
     def variance(self, sensor: str, stated: float | None = None) -> float:
         """Return the variance of one message: as stated, or as seen where that is clearly more.
 
-        `stated` is that of the message itself, where it states one.
+        Where nobody stated one, as seen once it is; the default before. `stated` is that of the
+        message itself, where it states one.
         """
         seen = self.seen(sensor) or 0.0
         if stated is None:
             stated = self.stated[sensor] ** 2
+            if seen and sensor in self._defaults:
+                return seen**2
         return seen**2 if seen**2 > self._tuning.clearly**2 * stated else stated
 
     def report(self) -> dict[str, float]:
