@@ -249,6 +249,8 @@ def track_ratio(evidence: Evidence) -> Estimate | NotChecked:
 
 def check_track(evidence: Evidence, figures: dict[str, Any]) -> list[Outcome]:
     """Return a track that the turns contradict."""
+    if 'wheels.rad_per_count' in figures:
+        return [NotChecked('track', 'rates in counts: a track looks like other counts per turn')]
     ratio = track_ratio(evidence)
     if isinstance(ratio, NotChecked):
         return [ratio]

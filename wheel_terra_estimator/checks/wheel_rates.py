@@ -33,6 +33,10 @@ UNITS = {
 """Units that wheel rates come in by mistake: factor to rad/s."""
 MOST_COUNT = 0.07
 """Speed over rim speed below which wheels that fit no unit are in counts (90 in a turn) [-]."""
+MOST_TRACK = 500.0
+"""Effective over geometric track above which wheels are in counts [-]."""
+USUAL_TRACK = 2.0
+"""The same, of rovers that turn by skidding [-]."""
 UNIT_TOLERANCE = 0.35
 """Share by which a speed ratio may lie off a unit's factor (slip makes it smaller)."""
 ORDINARY_TRACKS = (0.7, 5.0)
@@ -167,6 +171,10 @@ def check_unit(evidence: Evidence, figures: dict[str, Any]) -> tuple[list[Outcom
     if ratio is not None and 0.0 < ratio < MOST_COUNT:
         figures['wheels.rad_per_count'] = float(f'{ratio:.4g}')
         return _counts(evidence, ratio, how)
+    if ratio is None and track is not None and abs(track) > MOST_TRACK:
+        usual = USUAL_TRACK / abs(track)  # told to a factor of two: turns skid
+        figures['wheels.rad_per_count'] = float(f'{usual:.1g}')
+        return _counts(evidence, usual, 'gyro in turns')
     return [], evidence
 
 
