@@ -12,6 +12,7 @@ import pytest
 from scipy.stats import chi2, kstest, multivariate_normal
 
 from wheel_terra_estimator.discrepancy.assessment import held_out
+from wheel_terra_estimator.discrepancy.assessment.next_measurement import _menu
 from wheel_terra_estimator.discrepancy.assessment.where import locate
 from wheel_terra_estimator.discrepancy.fitting import noise, outliers
 from wheel_terra_estimator.discrepancy.fitting.coordinates import (
@@ -364,3 +365,24 @@ def test_where_the_misfit_sits_is_told_only_beyond_chance(forward, setting):
     assert {0.0 < w.p_value <= 1.0 for w in found} == {True}
     assert kstest([w.p_value for w in clean], 'uniform').pvalue > 1e-3
     assert sum(w.sentence == 'no region stands out from the noise' for w in clean) >= 20
+
+
+def test_rows_that_a_laboratory_could_add_are_what_they_are_called(forward, setting):
+    blocks = dict(_menu(SimpleNamespace(forward=forward)))
+    radius, width, lug = WHEEL.radius, WHEEL.width, WHEEL.lug_height
+    load = float(np.median(forward.points.normal_load))
+    expected = {
+        'three times the load': (radius, width, lug, 3.0 * load),
+        'a third of the load': (radius, width, lug, load / 3.0),
+        'a wheel of 0.6 times the radius': (0.6 * radius, width, lug, load),
+        'a wheel of twice the width': (radius, 2.0 * width, lug, load),
+        'the wheel without lugs': (radius, width, 0.0, load),
+        'lugs 1.6 times as high': (radius, width, 1.6 * lug, load),
+        'the same rows again': (radius, width, lug, load),
+    }
+    for name, numbers in expected.items():
+        block = blocks[name]
+        found = (*(getattr(block.wheel, k) for k in ('radius', 'width', 'lug_height')),)
+        assert (*found, block.normal_load) == pytest.approx(numbers), name
+    assert (blocks['braking rows, slip -0.3 to -0.02'].slip < 0.0).all()
+    assert np.degrees(blocks['a slope of 12 degrees'].slope) == pytest.approx(12.0)
