@@ -322,6 +322,18 @@ def test_the_gap_is_the_error_on_unseen_rows_and_its_share_above_the_noise(named
     assert any(item.shrink is not None for item in named.gap.values())
 
 
+def test_what_the_confidence_follows_from_is_of_the_gap_and_of_the_signature(named):
+    """How far the name worsens a quantity, and how much of it lies where nothing was off."""
+    features = named.effects[0].features
+    change = named.curves.after - named.curves.refit
+    gaps = list(named.gap.values())
+    worse = [(g.after**2 - g.refit**2) / g.noise**2 for g in gaps]
+    assert features['worse'] == pytest.approx(max(0.0, *worse), rel=1e-6)
+    sizes = [np.mean(change[:, q] ** 2) / g.noise**2 for q, g in enumerate(gaps)]
+    idle = [size for size, g in zip(sizes, gaps, strict=True) if g.refit < 1.2 * g.noise]
+    assert features['idle'] == pytest.approx(sum(idle) / sum(sizes), rel=1e-6)
+
+
 @pytest.mark.parametrize(
     ('refit', 'after', 'share'),
     [(5.0, 1.0, 1.0), (5.0, 2.0, 0.5), (5.0, 5.0, 0.0), (1.2, 1.0, None), (5.0, 0.5, 1.0)],

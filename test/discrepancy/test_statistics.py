@@ -12,6 +12,7 @@ import pytest
 from scipy.stats import chi2, kstest, multivariate_normal
 
 from wheel_terra_estimator.discrepancy.assessment import held_out
+from wheel_terra_estimator.discrepancy.assessment.along import changed_stretch
 from wheel_terra_estimator.discrepancy.assessment.next_measurement import _menu
 from wheel_terra_estimator.discrepancy.assessment.where import locate
 from wheel_terra_estimator.discrepancy.fitting import noise, outliers
@@ -359,9 +360,13 @@ def test_where_the_misfit_sits_is_told_only_beyond_chance(forward, setting):
         named = dict(zip(('sinkage', 'drawbar_pull', 'torque'), measured.T, strict=True))
         table = check_table('t', {**columns, **named})
         found.append(locate(table, problem, nothing, problem.observed, len(table)))
+        if number == 0:
+            cells = (problem.observed - problem.flat(nothing.outputs)) / problem.std
+            pull = cells[problem.quantity == 1] ** 2
     spoilt, *clean = found
     assert spoilt.quantity == 'drawbar_pull' and spoilt.p_value < 0.02
     assert spoilt.share_of_gap > 0.6
+    assert spoilt.share_of_gap == pytest.approx(pull[spoilt.rows].sum() / pull.sum())
     assert {0.0 < w.p_value <= 1.0 for w in found} == {True}
     assert kstest([w.p_value for w in clean], 'uniform').pvalue > 1e-3
     assert sum(w.sentence == 'no region stands out from the noise' for w in clean) >= 20
@@ -386,3 +391,27 @@ def test_rows_that_a_laboratory_could_add_are_what_they_are_called(forward, sett
         assert (*found, block.normal_load) == pytest.approx(numbers), name
     assert (blocks['braking rows, slip -0.3 to -0.02'].slip < 0.0).all()
     assert np.degrees(blocks['a slope of 12 degrees'].slope) == pytest.approx(12.0)
+
+
+def test_soil_that_does_not_change_along_the_way_is_not_said_to(forward, setting):
+    """Of noise alone some stretch always gains: the choice of it is paid for."""
+    soil, truth, std, inputs, scale = setting
+    rng = np.random.default_rng(10)
+    order = np.argsort(rng.random(len(truth)))
+    told = []
+    for number in range(40):
+        measured = truth + std * rng.standard_normal(truth.shape)
+        if number == 0:  # half of the way on soil that is half as stiff
+            weak = WheelSoilModel(replace(SOIL, frictional_modulus=1.2e6), {})
+            rows = order < 8
+            measured[rows] = weak.steady_state(forward.points).outputs()[rows]
+        problem = build_problem(measured, std, inputs, scale)
+        one = np.ones(problem.size)
+        nothing = fit(
+            forward, problem, problem.observed, [((), soil)], [np.zeros(len(soil))], [one]
+        )[0]
+        table = SimpleNamespace(columns={'time': order.astype(float)})
+        work = SimpleNamespace(problem=problem, observed=problem.observed)
+        told.append(changed_stretch(table, work, nothing, one))
+    assert told[0] is not None and 0.3 < told[0].stiffness < 0.8
+    assert sum(stretch is not None for stretch in told[1:]) <= 1
