@@ -81,9 +81,8 @@ def run(arguments: argparse.Namespace) -> int:
 
     truth = drive.truth
     distance = abs(float(truth.position[-1, 0] - truth.position[0, 0]))
-    print(
-        f'{scenario.name}, seed {arguments.seed}: {duration:g} s, {distance:.2f} m along the path'
-    )
+    title = Path(scenario.name).stem
+    print(f'{title}, seed {arguments.seed}: {duration:g} s, {distance:.2f} m along the path')
     for name, share in truth.time_in_class().items():
         print(f'  {name:8s} {100.0 * share:5.1f} % of the wheel time')
     stuck = truth.first_stuck()
