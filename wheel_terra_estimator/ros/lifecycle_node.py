@@ -113,6 +113,7 @@ class EstimatorNode(LifecycleNode):
     def __init__(self, **options: Any) -> None:
         super().__init__(NODE, automatically_declare_parameters_from_overrides=True, **options)
         self._given = parameters.overrides(self)
+        self._known = parameters.known()
         self._full_name = self.get_fully_qualified_name().lstrip('/')
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._pipeline: Pipeline | None = None
@@ -200,7 +201,7 @@ class EstimatorNode(LifecycleNode):
         self._set_at = self._diagnostics_at = float('-inf')
         self._incompatible: dict[str, str] = {}
         self._numbered: set[str] = set()
-        self._same_name = False
+        self._same_name = self._said_ready = False
         self._pipeline.transport_values = self._transport_values
         self._publisher = EstimatePublisher(self, self._pipeline.names)
         self._publisher.publish_stuck(self._stuck.state.stuck)
@@ -214,6 +215,12 @@ class EstimatorNode(LifecycleNode):
                 (SAVE_PERIOD, self._save_now_and_then),
             )
         ]
+
+    def _say_ready(self) -> None:
+        """Log what is listened to; not before the first sets, since rclpy's first line is slow."""
+        if self._said_ready or self._pipeline is None:
+            return
+        self._said_ready = True
         self.get_logger().info(
             f'ready: {len(self._pipeline.names)} wheels, '
             f'listening to {", ".join(self._pipeline.converter.layout.topics)}'
@@ -449,6 +456,7 @@ class EstimatorNode(LifecycleNode):
     def _watch(self) -> None:
         """Keep diagnostics going when stamps do not: silence, or a slowly played bag."""
         assert self._pipeline is not None
+        self._say_ready()
         now = self._seconds()
         self._look_at_transport(now)
         silent = now - self._set_at > SILENCE
@@ -541,7 +549,7 @@ class EstimatorNode(LifecycleNode):
         if self._pipeline is None:
             self._given.update(values)
             return SetParametersResult(successful=True)
-        values = {key: v for key, v in values.items() if key in parameters.known()}
+        values = {key: v for key, v in values.items() if key in self._known}
         fixed = [key for key in values if not parameters.is_tuning(key)]
         if fixed:
             reason = f'{fixed[0]} is read-only while the node is configured (clean it up first)'

@@ -52,6 +52,7 @@ def run_node(make: Callable[[], Callable[[], Node]], args: list[str] | None = No
     args : list of str, optional
         Arguments of ROS; default: those of the process.
     """
+    gc.disable()  # until the node stands: what is made so far lives as long as it does
     signals = _Signals() if threading.current_thread() is threading.main_thread() else None
     factory = make()
     import rclpy
@@ -72,8 +73,8 @@ def run_node(make: Callable[[], Callable[[], Node]], args: list[str] | None = No
         node = factory()
         if signals is not None:
             signals.serving = True
-        gc.collect()
-        gc.freeze()  # what lives as long as the node needs no more looking at
+        gc.freeze()
+        gc.enable()
         _spin(node, lambda: signals is not None and signals.stopped)
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
@@ -81,6 +82,7 @@ def run_node(make: Callable[[], Callable[[], Node]], args: list[str] | None = No
         print(f'[FATAL] {error}', file=sys.stderr)
         status = 2
     finally:
+        gc.enable()
         if node is not None:
             node.destroy_node()
         try_shutdown()
