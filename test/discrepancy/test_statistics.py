@@ -393,18 +393,20 @@ def test_rows_that_a_laboratory_could_add_are_what_they_are_called(forward, sett
     assert np.degrees(blocks['a slope of 12 degrees'].slope) == pytest.approx(12.0)
 
 
-def test_soil_that_does_not_change_along_the_way_is_not_said_to(forward, setting):
-    """Of noise alone some stretch always gains: the choice of it is paid for."""
+def test_soil_that_changes_along_the_way_is_told_when_the_choice_of_the_stretch_is_paid_for(
+    forward, setting
+):
+    """Rows in a shuffled order, the first half on soil of another stiffness, or on the same."""
     soil, truth, std, inputs, scale = setting
     rng = np.random.default_rng(10)
-    order = np.argsort(rng.random(len(truth)))
-    told = []
-    for number in range(40):
+    order = rng.permutation(len(truth))
+    stretches = sum(len(truth) - rows + 1 for rows in range(4, len(truth) - 4 + 1))
+
+    def told(stiffness):
         measured = truth + std * rng.standard_normal(truth.shape)
-        if number == 0:  # half of the way on soil that is half as stiff
-            weak = WheelSoilModel(replace(SOIL, frictional_modulus=1.2e6), {})
-            rows = order < 8
-            measured[rows] = weak.steady_state(forward.points).outputs()[rows]
+        other = WheelSoilModel(replace(SOIL, frictional_modulus=2.4e6 * stiffness), {})
+        rows = order < len(truth) // 2
+        measured[rows] += (other.steady_state(forward.points).outputs() - truth)[rows]
         problem = build_problem(measured, std, inputs, scale)
         one = np.ones(problem.size)
         nothing = fit(
@@ -412,6 +414,10 @@ def test_soil_that_does_not_change_along_the_way_is_not_said_to(forward, setting
         )[0]
         table = SimpleNamespace(columns={'time': order.astype(float)})
         work = SimpleNamespace(problem=problem, observed=problem.observed)
-        told.append(changed_stretch(table, work, nothing, one))
-    assert told[0] is not None and 0.3 < told[0].stiffness < 0.8
-    assert sum(stretch is not None for stretch in told[1:]) <= 1
+        return changed_stretch(table, work, nothing, one)
+
+    assert 0.3 < told(0.5).stiffness < 0.8
+    found = [told(stiffness) for stiffness in np.linspace(0.6, 1.0, 30)]
+    sure = [stretch.gain - np.log(stretches) for stretch in found if stretch is not None]
+    assert 3 < len(sure) < 27
+    assert min(sure) >= 5.0

@@ -35,9 +35,9 @@ class ReferenceTuning:
     moving_rest: float = 2.0  # times ``rest_speed``
     slide_gaps: float = 2.0  # gaps for which a slide on standing wheels is believed
     shortest_slide: float = 1.0  # [s]
-    lean_count: float = 6.0
+    mean_count: float = 6.0
     """References over which their innovations' mean is taken."""
-    most_lean: float = 3.0  # deviations that one reference counts for in it
+    most_deviations: float = 3.0  # deviations that one reference counts for in it
     most_doubt: float = 100.0
     run_excess: float = 4.0
     """Square of that mean over its variance above which the references run to one side."""
@@ -67,7 +67,7 @@ class ReferenceState(NamedTuple):
     rejected_in_a_row: int = 0
     last_rejected: float = 0.0  # innovation of the last rejected one [m/s]
     nis: float | None = None  # running mean; None = none came yet
-    lean: float = 0.0
+    mean_innovation: float = 0.0
     """Running mean of the innovations, each over its deviation."""
 
 
@@ -125,15 +125,15 @@ class ReferenceUpdate(Component[ReferenceState]):
     def model_doubt(self) -> float:
         """Factor on the variance of the wheel-soil models [-]: 1 while the references scatter.
 
-        Innovations of a filter that is right are white. Where they lean one way for several
+        Innovations of a filter that is right are white. Where they keep to one side for several
         references, the models hold the speed against them; a gate on single ones cannot see it.
         The running mean of white innovations has variance 1 / (2 n - 1) over n.
         """
-        return clipped(self._excess(self.state.lean) ** 2, 1.0, self._tuning.most_doubt)
+        return clipped(self._excess(self.state.mean_innovation) ** 2, 1.0, self._tuning.most_doubt)
 
-    def _excess(self, lean: float) -> float:
+    def _excess(self, mean: float) -> float:
         """Return the square of a mean of innovations over the variance of white ones [-]."""
-        return lean * lean * (2.0 * self._tuning.lean_count - 1.0)
+        return mean * mean * (2.0 * self._tuning.mean_count - 1.0)
 
     def believes(self, agreeing: int, *, beyond: bool, witnessed: bool) -> bool:
         """Say whether so many references in a row that disagree by the same amount are right."""
@@ -186,9 +186,11 @@ class ReferenceUpdate(Component[ReferenceState]):
         residual, prior = self.innovation(ekf, reference)
         total = prior + variance
         nis = residual * residual / total
-        score = clipped(residual / math.sqrt(total), -tuning.most_lean, tuning.most_lean)
-        lean = self.state.lean + (score - self.state.lean) / tuning.lean_count
-        state = self.state._replace(nis=smoothed_nis(self.state.nis, nis), lean=lean)
+        most = tuning.most_deviations
+        mean = self.state.mean_innovation
+        mean += (clipped(residual / math.sqrt(total), -most, most) - mean) / tuning.mean_count
+        smoothed = smoothed_nis(self.state.nis, nis)
+        state = self.state._replace(nis=smoothed, mean_innovation=mean)
         opened = False
         if nis > self._gate:
             beyond = abs(reference.forward) > (
@@ -210,7 +212,7 @@ class ReferenceUpdate(Component[ReferenceState]):
             )
         else:
             state = state._replace(rejected_in_a_row=0)
-            if self._excess(lean) > tuning.run_excess and nis > CONSISTENT:
+            if self._excess(mean) > tuning.run_excess and nis > CONSISTENT:
                 # One more of a run to one side: the prediction is too sure of itself.
                 ekf.widen(SPEED, residual * residual / CONSISTENT - total)
         ekf.fuse([Row(self.innovation(ekf, reference)[0], self._reading, variance)])
