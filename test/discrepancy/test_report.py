@@ -163,7 +163,9 @@ def test_numbers_are_those_of_the_diagnosis(page, named):
         if gap.shrink is not None:
             shares = [100 * x for x in (gap.shrink, gap.shrink_low, gap.shrink_high)]
             assert '{:.0f} % ({:.0f} to {:.0f})'.format(*shares) in cells
-    assert any(gap.shrink is not None for gap in named.gap.values())
+    closed = sorted(100 * gap.shrink for gap in named.gap.values() if gap.shrink is not None)
+    ends = dict.fromkeys((f'{closed[0]:.0f}', f'{closed[-1]:.0f}'))
+    assert ' to '.join(ends) + ' %' in parsed.text
     for candidate in named.candidates:
         cells = parsed.row(candidate.full_label.replace('_', ' '))
         assert cells[1] == f'{candidate.log_evidence:.1f}'
