@@ -105,16 +105,28 @@ def test_references_that_agree_with_one_another_are_believed_after_their_count(p
         assert fresh.mean[SPEED] == pytest.approx(0.02, abs=0.003)
 
 
-def test_models_are_doubted_while_the_references_lean_one_way(parts, ekf):
-    """Each of these is within its gate; six of them one way are none by chance (0.4 %)."""
+def test_a_rover_that_drives_faster_than_its_wheels_is_not_believed(parts):
+    """Rims run at 0.05 m/s: two readings that agree are followed at 0.06, not at 0.13 m/s."""
+    found = {}
+    for speed in (0.06, 0.13):
+        fresh = parts.filter()
+        fresh.set(SPEED, 0.045, 0.001**2)
+        references(parts, fresh, [0.045] * 5 + [speed] * 3)
+        found[speed] = fresh.mean[SPEED]
+    assert found[0.06] > 0.053
+    assert found[0.13] == pytest.approx(0.045, abs=0.002)
+
+
+def test_models_are_doubted_while_the_references_keep_to_one_side(parts, ekf):
+    """Each of these is within its gate; six to one side are none by chance (0.4 %)."""
     rng = np.random.default_rng(7)
-    speeds = {'white': rng.normal(0.045, 0.003, 6), 'leaning': np.full(6, 0.049)}
+    speeds = {'white': rng.normal(0.045, 0.003, 6), 'one side': np.full(6, 0.049)}
     doubt = {}
     for name, values in speeds.items():
         fresh = parts.filter()
         fresh.set(SPEED, 0.045, 1e-8)
         doubt[name] = references(parts, fresh, values)[0].model_doubt
-    assert doubt['leaning'] > 5.0
+    assert doubt['one side'] > 5.0
     assert doubt['white'] < 2.0
 
 
