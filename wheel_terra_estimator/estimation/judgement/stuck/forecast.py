@@ -33,6 +33,7 @@ LONGEST_TIME = 600.0
 """Time to entrapment that is said where none is in sight [s]."""
 _LEAST_RIM = 1e-3
 """Rim speed [m/s] below which no travel is foreseen."""
+_LEAST_VARIANCE = 1e-12  # of a slip
 _LONGEST_HORIZON = 60.0
 """Time within which a crawling rover is looked at over ``filter.stuck_travel`` [s]."""
 
@@ -94,9 +95,7 @@ def outlook(s: Situation, tuning: ForecastTuning = ForecastTuning()) -> Outlook:
     horizon = max(s.settings.horizon, min(s.settings.travel / rim, _LONGEST_HORIZON))
     sinking = [d.growth for d in s.observed.deepening]
     digging = max(median(sinking), 0.0) if sinking else 0.0
-    within = [
-        _ahead(part * horizon, s, rim, digging, tuning) for part in (*tuning.parts, *tuning.beyond)
-    ]
+    within = _way_ahead(s, rim, horizon, digging, tuning)
     wheels = tuple(
         [
             _of_wheel(wheel, stands, room, s.trend, within, tuning)
@@ -111,15 +110,22 @@ def outlook(s: Situation, tuning: ForecastTuning = ForecastTuning()) -> Outlook:
     return Outlook(wheels, median(telling) if telling else 0.0)
 
 
-def _ahead(time: float, s: Situation, rim: float, digging: float, t: ForecastTuning) -> _Ahead:
-    """Return what moves the slips until a time [s]; `digging`: sinkage over rim travel."""
-    keep = math.exp(-rim * time / t.return_length)
-    reach = t.growth_time * (1.0 - math.exp(-time / t.growth_time))
+def _way_ahead(
+    s: Situation, rim: float, horizon: float, digging: float, t: ForecastTuning
+) -> list[_Ahead]:
+    """Return what moves the slips until some times; `digging`: sinkage over rim travel."""
     doubt, usual = (t.growth_doubt * s.typical_std) ** 2, t.growth_scatter**2
     believed = usual / (usual + doubt)
-    shift = believed * s.trend * reach + t.digging_gain * digging * t.return_length * (1.0 - keep)
-    variance = believed * doubt * reach**2 + t.slip_scatter**2 * (1.0 - keep * keep)
-    return _Ahead(time, keep, shift, variance)
+    growth, doubt = believed * s.trend, believed * doubt
+    dug, scatter = t.digging_gain * digging * t.return_length, t.slip_scatter**2
+    found = []
+    for part in (*t.parts, *t.beyond):
+        time = part * horizon
+        keep = math.exp(-rim * time / t.return_length)
+        reach = t.growth_time * (1.0 - math.exp(-time / t.growth_time))
+        shift = growth * reach + dug * (1.0 - keep)
+        found.append(_Ahead(time, keep, shift, doubt * reach**2 + scatter * (1.0 - keep * keep)))
+    return found
 
 
 def _of_wheel(
@@ -136,16 +142,19 @@ def _of_wheel(
         probability, time = 0.0, LONGEST_TIME
     else:
         # A slip that is hardly known is worth no more than what slips usually are.
-        known = t.slip_scatter**2 / (t.slip_scatter**2 + wheel.slip_std**2)
-        off, variance = known * (wheel.slip - t.usual_slip), known * wheel.slip_std**2
-        slips = [t.usual_slip + off * a.keep + a.shift for a in ahead]
-        probability = max(
-            exceedance_probability(
-                slip, math.sqrt(variance * a.keep**2 + a.variance), ENTRAPPED_SLIP
-            )
-            for slip, a in zip(slips, ahead[: len(t.parts)], strict=False)
+        square, usual = wheel.slip_std * wheel.slip_std, t.slip_scatter * t.slip_scatter
+        known = usual / (usual + square)
+        off, variance = known * (wheel.slip - t.usual_slip), max(known * square, _LEAST_VARIANCE)
+        lacking = ENTRAPPED_SLIP - t.usual_slip
+        # The worst of the times, in deviations: one error function does for all of them.
+        nearest = min(
+            [
+                (lacking - off * keep - shift) / math.sqrt(variance * keep * keep + more)
+                for _, keep, shift, more in ahead[: len(t.parts)]
+            ]
         )
-        time = _time_left(wheel.slip, slips, ahead)
+        probability = exceedance_probability(-nearest, 1.0, 0.0)
+        time = _time_left(wheel.slip, off, lacking, ahead)
         if trend > t.least_trend and wheel.slip > t.least_slip:
             # On with the present growth: what an operator who drives on should be told.
             time = min(time, max(ENTRAPPED_SLIP - wheel.slip, 0.0) / trend)
@@ -157,14 +166,17 @@ def _of_wheel(
     return WheelForecast(probability, time, travel)
 
 
-def _time_left(slip: float, slips: list[float], ahead: list[_Ahead]) -> float:
-    """Return the time until the expected slip passes that of an entrapment [s]."""
-    before, since = slip, 0.0
-    if before >= ENTRAPPED_SLIP:
+def _time_left(slip: float, off: float, lacking: float, ahead: list[_Ahead]) -> float:
+    """Return the time until the expected slip passes that of an entrapment [s].
+
+    `off` and `lacking` are the present slip and that of an entrapment, both less the usual one.
+    """
+    before, since = slip - ENTRAPPED_SLIP, 0.0
+    if before >= 0.0:
         return 0.0
-    for after, a in zip(slips, ahead, strict=True):
-        if after >= ENTRAPPED_SLIP:
-            share = (ENTRAPPED_SLIP - before) / (after - before)
-            return min(since + share * (a.time - since), LONGEST_TIME)
-        before, since = after, a.time
+    for time, keep, shift, _ in ahead:
+        after = off * keep + shift - lacking
+        if after >= 0.0:
+            return min(since + before / (before - after) * (time - since), LONGEST_TIME)
+        before, since = after, time
     return LONGEST_TIME
