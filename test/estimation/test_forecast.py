@@ -1,0 +1,112 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""The stuck probability against simulated courses of the slip, and what moves it."""
+
+import math
+
+import numpy as np
+import pytest
+
+from wheel_terra_estimator.estimation.judgement.stuck.forecast import ForecastTuning
+from wheel_terra_estimator.estimation.judgement.stuck.monitor import StuckMonitor
+from wheel_terra_estimator.estimation.judgement.stuck.settings import StuckSettings
+from wheel_terra_estimator.estimation.judgement.stuck.situation import (
+    RoverMotion,
+    SituationObserver,
+    WheelMotion,
+)
+
+RIM = 0.05  # [m/s]
+TUNING, DEFAULTS = ForecastTuning(), StuckSettings()
+
+
+def motion(slip, sunk=0.01, std=0.03):
+    wheel = WheelMotion(slip, std, RIM, True, math.nan, sunk, 0.12)
+    return RoverMotion(RIM * (1.0 - slip), True, (wheel,) * 6)
+
+
+def situation(slip, growth=0.0, rate=0.0, std=0.03, seconds=20.0, settings=DEFAULTS):
+    """Return the situation after a drive in which slip and sinkage grew steadily up to now."""
+    observer, steps = SituationObserver(settings), round(10 * seconds)
+    for i in range(steps + 1):
+        left = seconds - 0.1 * i
+        there = motion(slip - rate * left, 0.03 - growth * RIM * left, std)
+        found = observer.update(0.1 * i, there)
+    return found
+
+
+@pytest.mark.parametrize(
+    ('slip', 'growth', 'std'), [(0.4, 0.02, 0.05), (0.7, 0.01, 0.03), (0.3, 0.03, 0.15)]
+)
+def test_the_probability_is_that_of_simulated_courses(slip, growth, std):
+    """Ten thousand courses of the stated law, step by step; they end highest at the horizon."""
+    rng = np.random.default_rng(1)
+    t, horizon, step = TUNING, 15.0, 0.05
+    scatter = t.slip_scatter
+    # The present slip: what is seen and what slips usually are, each with its own weight.
+    weight = scatter**2 / (scatter**2 + std**2)
+    s = t.usual_slip + weight * (slip - t.usual_slip)
+    s = s + math.sqrt(weight) * std * rng.standard_normal(10_000)
+    for _ in range(round(horizon / step)):
+        x = RIM * step
+        s = s + (-(s - t.usual_slip) / t.return_length + t.digging_gain * growth) * x
+        s += scatter * math.sqrt(2.0 * x / t.return_length) * rng.standard_normal(s.size)
+    # The growth of the slip is not known: its doubt alone.
+    believed = t.growth_scatter**2 / (t.growth_scatter**2 + (t.growth_doubt * std) ** 2)
+    reach = t.growth_time * (1.0 - math.exp(-horizon / t.growth_time))
+    s += math.sqrt(believed) * t.growth_doubt * std * reach * rng.standard_normal(s.size)
+    found = situation(slip, growth, std=std).outlook
+    assert found.probability == pytest.approx((s > 0.9).mean(), abs=0.02)
+    assert all(w.probability == found.probability for w in found.wheels)
+
+
+def test_high_slip_and_sinking_wheels_make_it_likely():
+    chances = [situation(s).outlook.probability for s in (0.1, 0.4, 0.7, 0.95)]
+    assert chances == sorted(chances)
+    assert chances[0] < 0.05
+    assert chances[3] > 0.9  # it is there already
+    sinking = [situation(0.4, growth).outlook.probability for growth in (0.0, 0.01, 0.03, 0.05)]
+    assert sinking == sorted(sinking)
+    assert sinking[3] > 0.6
+
+
+def test_a_growth_that_is_known_counts_for_more():
+    def added(std):
+        grown, still = (situation(0.6, rate=r, std=std).outlook.probability for r in (0.02, 0.0))
+        return grown - still
+
+    assert added(0.01) > 2.0 * added(0.15) > 0.0
+
+
+def test_a_longer_look_ahead_sees_more_of_wheels_that_sink():
+    near, far = (
+        situation(0.4, 0.04, settings=StuckSettings(horizon=h, travel=0.01)).outlook.probability
+        for h in (2.0, 15.0)
+    )
+    assert near < 0.2 < far
+    by_travel = situation(0.4, 0.04, settings=StuckSettings(horizon=2.0, travel=15.0 * RIM))
+    assert by_travel.outlook.probability == pytest.approx(far)
+
+
+def test_the_time_left_is_that_of_the_expected_slip():
+    ahead = situation(0.4, 0.05).outlook
+    t, x = TUNING, RIM * ahead.wheels[0].time
+    keep = math.exp(-x / t.return_length)
+    expected = t.usual_slip + 0.28 * keep + t.digging_gain * 0.05 * t.return_length * (1.0 - keep)
+    assert expected == pytest.approx(0.9, abs=0.03)  # straight between the times looked at
+    assert ahead.wheels[0].travel == pytest.approx(x)
+    assert situation(0.1).outlook.wheels[0].time == 600.0
+
+
+def test_more_likely_than_not_for_a_second_raises_the_warning():
+    monitor, since = StuckMonitor(), None
+    for i in range(400):
+        time = 0.1 * i
+        found = monitor.update(time, motion(0.45, 0.01 + 0.045 * RIM * time))
+        likely = found.wheels[0].probability > 0.5
+        since = (time if since is None else since) if likely else None
+        if found.stuck:
+            break
+    assert found.stuck
+    assert since is not None and time - since == pytest.approx(1.0, abs=0.11)
+    assert 'likely' in found.reason
