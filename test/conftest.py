@@ -6,6 +6,8 @@ from __future__ import annotations
 
 import io
 import os
+import signal
+import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -52,6 +54,13 @@ NAMES = ('left', 'right')
 RATE = 2.0  # [rad/s]
 START = 1_700_000_000_000_000_000  # [ns]
 STEP = 100_000_000  # [ns]
+
+
+def pytest_configure() -> None:
+    """Let Ctrl-C reach what the tests start: shells start jobs in the background without it."""
+    ignored = signal.getsignal(signal.SIGINT) is signal.SIG_IGN
+    if ignored and threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.fixture(scope='session')
