@@ -110,3 +110,19 @@ def test_more_likely_than_not_for_a_second_raises_the_warning():
     assert found.stuck
     assert since is not None and time - since == pytest.approx(1.0, abs=0.11)
     assert 'likely' in found.reason
+
+
+def test_wheels_that_dig_in_a_spin_on_the_spot_are_no_entrapment():
+    def warned(turning):
+        monitor = StuckMonitor()
+        found = [
+            monitor.update(
+                0.1 * i,
+                motion(0.6, 0.01 + 0.0006 * max(i - 60, 0))._replace(turning=turning and i > 60),
+            )
+            for i in range(120)
+        ]
+        return any(a.stuck for a in found[62:])
+
+    assert warned(turning=False)
+    assert not warned(turning=True)

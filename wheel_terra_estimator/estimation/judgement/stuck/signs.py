@@ -279,7 +279,7 @@ SIGNS: tuple[Sign, ...] = (
     Sign(
         name='likely',
         hold=1.0,
-        needs=Need.SLIP_TOLD,
+        needs=Need.SLIP_TOLD | Need.STRAIGHT,  # wheels that spin on the spot dig by command
         present=_likely,
         words=_likely_in_words,
     ),

@@ -247,7 +247,12 @@ class SituationObserver(Component[Observed]):
             speeds=self._speeds(time, motion),
             fastest=rims,
             typical=self._typical_rims(time, motion, moving),
-            deepening=self._deepened(motion.wheels, dt, fresh=rim_travel < tuning.settling_travel),
+            deepening=self._deepened(
+                motion.wheels,
+                dt,
+                # Wheels that turn on the spot dig by command.
+                fresh=motion.turning or rim_travel < tuning.settling_travel,
+            ),
         )
         self.state = observed
         return Situation(
