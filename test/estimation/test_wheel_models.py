@@ -29,7 +29,7 @@ def forces(models, ratio=0.7, z=0.02, load=290.0, a=0.1, k=-0.2, centroid=0.02, 
     return models.forces(0, WheelState(ratio, z, load, a, k, centroid, mound, 0.05))
 
 
-@pytest.mark.parametrize('ratio', [0.15, 0.7, 0.95, 1.2])
+@pytest.mark.parametrize('ratio', [-0.5, 0.15, 0.7, 0.95, 1.2])
 def test_derivatives_against_differences(models, ratio):
     state = {'ratio': ratio, 'z': 0.02, 'a': 0.1, 'k': -0.2, 'centroid': 0.02, 'mound': 0.3}
     there = forces(models, **state)
@@ -91,3 +91,11 @@ def test_never_nan_outside_the_valid_range(models, z, ratio):
     answer = models.forces(0, state)
     assert np.isfinite([answer.torque, answer.pull, *answer.d_torque, *answer.d_pull]).all()
     assert models.bearing(0, state).load > 0.0
+
+
+@pytest.mark.parametrize('ratio', [-0.01, -1.0, -2.0])
+def test_a_speed_against_the_rim_is_slip_one(models, ratio):
+    at_stand, back = (forces(models, ratio=r, mound=0.3) for r in (0.0, ratio))
+    assert (back.torque, back.pull) == (at_stand.torque, at_stand.pull)
+    assert back.d_torque[0] == back.d_pull[0] == 0.0
+    assert (back.d_torque[1:], back.d_pull[1:]) == (at_stand.d_torque[1:], at_stand.d_pull[1:])

@@ -228,23 +228,56 @@ def test_locked_wheel_is_dragged_along():
     assert pull == pytest.approx(true_pull, abs=0.12 * load.mean())
 
 
-def test_sliding_back_is_class_stuck():
-    run = load({'configuration': SAND}).configuration
-    estimator = WheelSoilEstimator(run)
-    for i in range(100):
-        stamp = 10**12 + i * 10**8
-        estimator.step(
-            stamp,
-            StepInputs(
-                wheel_odometry=WheelOdometry(stamp, np.full(6, 0.4), np.full(6, 20.0)),
-                inertial=InertialReading(stamp, np.array([3.0, 0.0, 9.3]), np.zeros(3), None),
-                reference=ReferenceVelocity(stamp, -0.01, 1e-6) if i % 5 == 0 else None,
-            ),
-        )
-    s = estimator.estimates()
-    assert s.slip == pytest.approx(np.ones(6))
+@pytest.fixture(scope='module')
+def slide():
+    """Wheels turn forward on 20 degrees; from 10 s on a rover that is followed slides back."""
+    configuration = load({'configuration': SAND}).configuration
+    force = 9.81 * np.array([np.sin(np.radians(20.0)), 0.0, np.cos(np.radians(20.0))])
+
+    def run(followed):
+        estimator, sets = WheelSoilEstimator(configuration), []
+        for i in range(200):
+            stamp, speed = 10**12 + i * 10**8, np.clip(0.02 - 0.02 * (0.1 * i - 10.0), -0.1, 0.02)
+            given = ReferenceVelocity(stamp, float(speed), 1e-6) if followed and not i % 5 else None
+            estimator.step(
+                stamp,
+                StepInputs(
+                    wheel_odometry=WheelOdometry(stamp, np.full(6, 0.4), np.full(6, 20.0)),
+                    inertial=InertialReading(stamp, force, np.zeros(3), None),
+                    reference=given,
+                ),
+            )
+            sets.append(estimator.estimates())
+        return sets
+
+    return configuration, run, float(force[0])
+
+
+def finite(s):
+    numbers = [getattr(s, f.name) for f in fields(s)]
+    return all(np.isfinite(v).all() for v in numbers if isinstance(v, (float, np.ndarray)))
+
+
+def test_sliding_back_is_class_stuck(slide):
+    configuration, run, force = slide
+    sets = run(followed=True)
+    assert all(map(finite, sets))
+    s = sets[-1]
+    assert s.forward_velocity == pytest.approx(-0.1, abs=0.01)
+    assert s.slip == pytest.approx(np.ones(6), abs=0.0)
     assert (s.slip_class == SlipClass.STUCK).all()
     assert s.stuck
+    # At constant speed the pulls carry the rover's weight along the slope.
+    weight = float(configuration.rover.mass) * force
+    assert s.drawbar_pull.sum() == pytest.approx(weight, rel=0.1)
+    assert np.all(s.drawbar_pull_std < 0.15 * weight / np.sin(np.radians(20.0)) / 6.0)
+
+
+def test_torques_alone_carry_no_rover_backwards(slide):
+    sets = slide[1](followed=False)
+    assert all(map(finite, sets))
+    assert min(s.forward_velocity for s in sets) > -0.002  # the least rim speed that turns
+    assert np.all(sets[-1].slip_std > 0.15)  # of the slip nothing is known
 
 
 def test_one_wild_reference_in_ten_costs_little(climb):

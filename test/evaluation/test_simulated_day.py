@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from wheel_terra_estimator.cli.main import main
+from wheel_terra_estimator.cli.main import INTERRUPTED, main
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.estimation.filter.ekf import GatedFilter
 from wheel_terra_estimator.evaluation.long_drive import (
@@ -125,6 +125,20 @@ def test_the_command_drives_and_refuses_a_folder_that_is_there(tmp_path, capsys)
     assert main([*command, '--resume']) == 0
     assert main(['evaluate', '--hours', '1']) == 2
     assert '-o' in capsys.readouterr().err
+
+
+def test_the_command_says_how_to_go_on_when_interrupted(tmp_path, monkeypatch, capsys):
+    command = ['evaluate', '--hours', '0.0006', '-o', str(tmp_path / 'day')]
+    with monkeypatch.context() as during:
+
+        def interrupt(drive, span):
+            raise KeyboardInterrupt
+
+        during.setattr(LongDrive, 'go_on', interrupt)
+        assert main(command) == INTERRUPTED
+    assert '--hours 0.0006 -o' in (said := capsys.readouterr().out) and '--resume' in said
+    assert main([*command, '--resume']) == 0
+    assert (tmp_path / 'day' / 'hours.jsonl').read_text().count('\n') == 1
 
 
 @pytest.mark.slow

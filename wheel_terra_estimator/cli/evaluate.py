@@ -102,7 +102,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help='one drive of so many hours with slopes, turns, stops and sensor faults; -o DIR keeps '
         'a line of JSON per hour (an hour takes about three minutes)',
     )
-    parser.add_argument('--resume', action='store_true', help='go on with an interrupted --hours')
+    parser.add_argument(
+        '--resume',
+        action='store_true',
+        help='go on with an interrupted --hours behind its last full hour',
+    )
     parser.add_argument(
         '--json', action='store_true', help='print the figures of simulated kinds as JSON'
     )

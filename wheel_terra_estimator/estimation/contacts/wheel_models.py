@@ -147,6 +147,11 @@ class WheelModels:
             Index.
         state : WheelState
             Its state; stiffness and slip-sinkage have no part in it.
+
+        Notes
+        -----
+        Where the speed opposes the rim the forces are those of slip 1, and they tell nothing of the
+        speed: the shear is saturated.
         """
         ratio, sinkage, load, strength, modulus, centroid, mound, rim_speed, leaving_angle = state[
             :9
@@ -155,14 +160,15 @@ class WheelModels:
         cohesion, friction = self._cohesion * factor, self._tan_friction * factor
         shear_modulus = self._shear_modulus * math.exp(modulus)
         span = self._mound_span
-        high = max(span - ratio, 0.0) / span
+        within = clipped(ratio, 0.0, _MOST_RATIO)
+        high = max(span - within, 0.0) / span
         depth = clipped(sinkage, _LEAST_SINKAGE, self._radius[wheel])
         angle = math.acos(1.0 - depth / self._radius[wheel])
         shift = centroid - mound * high * high
         by_depth = shift / (self._radius[wheel] * math.sin(angle)) if depth == sinkage else 0.0
         torque, pull, d_torque, d_pull, _ = self._forces.forces(
             wheel,
-            clipped(ratio, 0.0, _MOST_RATIO),
+            within,
             sinkage,
             load,
             cohesion,
@@ -176,7 +182,7 @@ class WheelModels:
         by_ratio = 2.0 * mound * high / span * angle
         t, f = (
             (
-                d[0] + d[6] * by_ratio,
+                d[0] + d[6] * by_ratio if ratio >= 0.0 else 0.0,
                 d[1] + d[6] * by_depth,
                 d[3] * cohesion + d[4] * friction,
                 d[5] * shear_modulus,
