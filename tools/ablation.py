@@ -38,7 +38,8 @@ from wheel_terra_estimator.evaluation.tables import table  # noqa: E402
 
 AS_IT_IS = 'as it is'
 ALLOWED = 0.02
-"""Loss of slip or pull RMSE that a treatment must save, beyond two standard errors, to stay."""
+"""Loss of slip or pull RMSE that a treatment must save, beyond two standard errors, to stay; or
+the share of classes told too high."""
 LATER = 0.05
 """By so much a warning may come later [s] without that anybody asks why."""
 FIRST_SEED = TEST_SEEDS.start + 500  # seeds of no other study
@@ -112,6 +113,7 @@ def report(rows: Rows) -> str:
         by_verdict[verdict].append(treatment.name)
         cells = [_percent(*pair) for pair in loss.values()]
         cells.append(f'{100 * (_coverage(found, names) - _coverage(base, names)):+.1f}')
+        cells.append(f'{100 * (_too_high(found, names) - _too_high(base, names)):+.1f}')
         cells += [f'{_more(base, found, names, key):+.0f}' for key in ('false', 'missed')]
         warned = [n for n in names if base[n].get('lead') and found[n].get('lead')]
         sooner = _more(base, found, warned, 'lead') / len(warned) if warned else float('nan')
@@ -124,6 +126,7 @@ def report(rows: Rows) -> str:
         *('kind', 'treatment', 'slip [%]', *(f'{w} [%]' for w in _WORLDS), 'pull [%]'),
         *(
             'coverage [points]',
+            'classes too high [points]',
             'false warnings',
             'missed',
             'lead [s]',
@@ -146,7 +149,7 @@ def report(rows: Rows) -> str:
 
 _VERDICTS = {
     'yes': f'Earns its place (a loss above {ALLOWED:.0%} plus two standard errors in slip or pull, '
-    'or a warning gets worse)',
+    'that share of classes told too high, or a warning that gets worse)',
     'open': f'Open (within that, but some drive loses more than {ALLOWED:.0%} or is warned '
     'later: more drives needed)',
     'no': f'Worth nothing on these drives (no drive loses more than {ALLOWED:.0%})',
@@ -171,6 +174,8 @@ def _verdict(
         return 'yes'
     if any(value > ALLOWED + 2.0 * error for value, error in loss.values()):
         return 'yes'
+    if _too_high(found, names) - _too_high(base, names) > ALLOWED:
+        return 'yes'
     if all(_same(base[n], found[n]) for n in names):
         return 'did not act'
     if any(found[n].get('lead', 0.0) < base[n].get('lead', 0.0) - LATER for n in names):
@@ -180,7 +185,7 @@ def _verdict(
 
 
 def _same(one: dict[str, float], other: dict[str, float]) -> bool:
-    keys = ('slip_square', 'pull_square', 'covered', 'false', 'missed', 'lead')
+    keys = ('slip_square', 'pull_square', 'covered', 'class_too_high', 'false', 'missed', 'lead')
     return all(np.isclose(one.get(k, 0.0), other.get(k, 0.0), rtol=1e-9) for k in keys)
 
 
@@ -216,9 +221,17 @@ def _percent(value: float, error: float) -> str:
 
 
 def _coverage(rows: Figures, names: Sequence[str]) -> float:
-    counted = [n for n in names if rows[n].get('slip_count', 0.0) > 0.0]
+    return _share(rows, names, 'covered')
+
+
+def _too_high(rows: Figures, names: Sequence[str]) -> float:
+    return _share(rows, names, 'class_too_high')
+
+
+def _share(rows: Figures, names: Sequence[str], key: str) -> float:
+    counted = [n for n in names if rows[n].get('slip_count', 0.0) > 0.0 and key in rows[n]]
     total = sum(rows[n]['slip_count'] for n in counted)
-    return sum(rows[n]['covered'] for n in counted) / total if total else float('nan')
+    return sum(rows[n][key] for n in counted) / total if total else float('nan')
 
 
 def _worst(base: Figures, found: Figures, names: Sequence[str]) -> tuple[float, str]:

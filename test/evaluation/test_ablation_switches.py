@@ -86,5 +86,12 @@ def test_table_says_what_earns_its_place():
     lines = {line.split('|')[2].strip(): line for line in text.splitlines() if line.count('|') > 5}
     assert lines[silent].endswith('| did not act |')
     assert lines[doubtful].endswith('| open |')
+    for name in base:
+        base[name]['class_too_high'] = 2.0
+    rows[silent] = {name: {**figures, 'class_too_high': 5.0} for name, figures in base.items()}
+    text = ablation.report(rows)
+    assert '+3.0' in text
+    assert f'{silent}.' not in text.splitlines()[-1]
+    rows[silent] = dict(base)
     rows[silent]['own 1'] = {**base['own 1'], 'missed': 1.0}
     assert f'{silent}.' not in ablation.report(rows).splitlines()[-1]

@@ -14,6 +14,7 @@ import numpy as np
 
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.estimation.estimates import SlipClass
 from wheel_terra_estimator.estimation.measurements import Measurement
 from wheel_terra_estimator.evaluation import bench, real_drives, scores
 from wheel_terra_estimator.evaluation.runner import record, run_estimator
@@ -153,4 +154,10 @@ def _figures(score: bench.DriveScore) -> Figures:
         'false': float(score.warnings.false_alarms),
         'missed': float(missed),
         'lead': float(score.warnings.lead_time or 0.0),
+        'class_too_high': float(_too_high(data).sum()),
     }
+
+
+def _too_high(data: scores.Samples) -> Any:
+    """Return where a class is told that is higher than the true one."""
+    return (data.said_class != SlipClass.UNKNOWN) & (data.said_class > data.true_class)

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from ablations.switches import Switch, patched, tuned, without_sign
+from wheel_terra_estimator.estimation.filter.state import StateLayout
+from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
 
 NEVER = 1e9
 
@@ -32,6 +34,15 @@ def _none_of_it(*_: Any, **__: Any) -> float:
 
 def _plain_row(self: Any, ekf: Any, row: Any) -> Any:
     return row
+
+
+def _without_torque_zeros(rover: Rover, sensors: SensorFigures) -> StateLayout:
+    wanders = sensors.reference_wander_std > 0.0
+    return StateLayout(rover.wheel_count, reference_wanders=wanders)
+
+
+def _as_stated(self: Any, sensor: str, stated: float | None = None) -> float:
+    return float(self.stated[sensor] ** 2) if stated is None else stated
 
 
 def _speed(**values: Any) -> Switch:
@@ -105,6 +116,11 @@ TREATMENTS: tuple[Treatment, ...] = (
         patched('filter.torque:ForceRows.row', _plain_row),
     ),
     Treatment(
+        'noise as seen where stated too small',
+        _GATE,
+        patched('inputs.seen_noise:SeenNoise.variance', _as_stated),
+    ),
+    Treatment(
         'sinkage readings rejected',
         _GATE,
         tuned('filter.sinkage:SinkageUpdateTuning', believed_after=1),
@@ -129,6 +145,9 @@ TREATMENTS: tuple[Treatment, ...] = (
         _HOLD,
         patched('contacts.contact_age:ContactAge.settled', property(lambda self: True)),
     ),
+    Treatment(
+        'no higher class by a guess', _HOLD, patched('judgement.classes:_BAND_PER_GUESS', 0.0)
+    ),
     Treatment('sinkage tells half of the slip', _HOLD, _sinkage(law_share=1.0)),
     Treatment('bearing law frozen at high slip', _HOLD, _sinkage(steady_slip=2.0)),
     Treatment(
@@ -149,6 +168,16 @@ TREATMENTS: tuple[Treatment, ...] = (
     ),
     Treatment('wider slip in turns', _AFTER, tuned('judgement.slip:SlipTuning', turning_std=0.0)),
     Treatment('scrub of turns in the force rows', _MODEL, _turning(scrub=0.0)),
+    Treatment(
+        'zeros of torque sensors as states',
+        _MODEL,
+        patched('wheel_soil_estimator:layout_of', _without_torque_zeros),
+    ),
+    Treatment(
+        'pulls of spins on the spot from the models',
+        _MODEL,
+        patched('contacts.contact_age:ContactAge.sheared', property(lambda self: False)),
+    ),
     Treatment('curvature of the ground', _MODEL, _turning(steepest=0.0)),
     Treatment(
         'wheels without load',
