@@ -287,6 +287,19 @@ def test_torques_that_do_not_fit_are_told_and_slip_is_still_judged(nis, told):
     np.testing.assert_array_equal(estimates.slip_class, some_estimates(6).slip_class)
 
 
+@pytest.mark.parametrize(('than', 'told'), [('default', False), ('stated', True)])
+def test_noise_beyond_what_is_stated_is_told_with_its_parameter(than, told):
+    class Noisy(StuckAfter):
+        def health(self):
+            return {f'noise_beyond_{than}': 'torque noise 8 times it (sensors.torque_std: 4.8)'}
+
+    watched = WatchedEstimator(Wheels().configuration, Noisy(0))
+    watched.step(1, StepInputs())
+    estimates = watched.estimates()
+    assert ('sensors.torque_std: 4.8' in estimates.faults.get('noise', '')) is told
+    np.testing.assert_array_equal(estimates.slip_class, some_estimates(6).slip_class)
+
+
 def test_kinds_are_those_of_the_checks_of_a_recording(drives):
     from wheel_terra_estimator.checks.finding import KINDS
 

@@ -87,7 +87,7 @@ def test_steps_and_gaps_are_no_noise(noise):
 def test_what_was_hardly_heard_is_not_told(noise):
     assert read(noise, 'torque', 0.8, 0.1 * np.arange(50)) is None
     assert noise.report() == {}
-    assert noise.in_words() == ''
+    assert noise.in_words() == {}
 
 
 @pytest.mark.parametrize('factor', [0.5, 1.0, 4.0])
@@ -109,6 +109,26 @@ def test_a_vibrating_rover_is_told_in_words(noise):
     std = 20.0 * noise.stated['accelerometer']
     read(noise, 'accelerometer', std, 0.01 * np.arange(6000))
     assert noise.report()['accelerometer_noise_seen_m_s2'] == pytest.approx(std, rel=0.15)
-    words = noise.in_words()
+    assert list(noise.in_words()) == ['stated']
+    words = noise.in_words()['stated']
     assert 'accelerometer noise' in words
-    assert 'sensors.specific_force_std' in words
+    assert 'sensors.specific_force_std: 0.' in words
+
+
+def test_beyond_a_default_is_not_beyond_what_is_stated():
+    silent = SeenNoise(Parts(reader.load(SAND)).sensors, RATES, given=())
+    read(silent, 'torque', 20.0 * silent.stated['torque'], 0.1 * np.arange(400))
+    assert list(silent.in_words()) == ['default']
+    assert 'sensors.torque_std' in silent.in_words()['default']
+
+
+@pytest.mark.parametrize(('share', 'told'), [(1.0, False), (0.1, True)])
+def test_a_reference_is_held_against_its_own_covariance(noise, share, told):
+    rng, std = np.random.default_rng(7), 20.0 * noise.stated['reference']
+    for i in range(300):
+        innovation = std * rng.normal()
+        noise.compare_reference(float(i), innovation, std**2, 1e-6 * std**2, (share * std) ** 2)
+    assert noise.report()['reference_noise_stated_m_s'] == pytest.approx(share * std)
+    assert noise.seen('reference') == pytest.approx(std, rel=0.3)
+    assert ('covariance of reference_odom' in noise.in_words().get('stated', '')) is told
+    assert 'default' not in noise.in_words()

@@ -33,6 +33,8 @@ _MISFITS = {
     'nis_balance': ('fit of balance', 'torques, weight and slope do not fit each other'),
 }
 """Figure of the filter -> subject and words of the fault."""
+_NOISE = 'noise_beyond_stated'
+"""What the filter says of sensors much noisier than a file or a message states."""
 
 
 class _Warning(NamedTuple):
@@ -88,7 +90,7 @@ class WatchedEstimator:
         return estimates
 
     def _with_misfits(self, estimates: EstimateSet) -> EstimateSet:
-        """Say where torque or balance are far from what the filter expects of them."""
+        """Say where torque, balance or noise are far from what the filter expects of them."""
         health = self.health()
         told = {
             subject: f'{words} (NIS {health[key]:.0f}, usual below 1): sign or scale of the '
@@ -96,6 +98,8 @@ class WatchedEstimator:
             for key, (subject, words) in _MISFITS.items()
             if health.get(key, 0.0) > FAR_NIS
         }
+        if _NOISE in health:
+            told['noise'] = f'{health[_NOISE]} -> state it so'
         return replace(estimates, faults={**estimates.faults, **told}) if told else estimates
 
     def snapshot(self) -> Any:

@@ -503,7 +503,7 @@ class WheelSoilEstimator:
         time, ekf = cycle.time, self._ekf
         innovation, variance = self._reference.innovation(ekf, reference)
         noise = self._noise.variance('reference', self._reference.variance(reference))
-        self._noise.compare_reference(time, innovation, noise, variance)
+        self._noise.compare_reference(time, innovation, noise, variance, reference.variance)
         opened = self._reference.update(
             self._ekf,
             time,
@@ -775,6 +775,6 @@ class WheelSoilEstimator:
         report['gyro_zero_yaw_rad_s'] = float(f'{zero.yaw:.3g}')
         report['accelerometer_bias_m_s2'] = float(f'{float(self._ekf.mean[GRAVITY_BIAS]):.3g}')
         report |= self._noise.report()
-        if words := self._noise.in_words():
-            report['noise_beyond_stated'] = words
+        for than, words in self._noise.in_words().items():
+            report[f'noise_beyond_{than}'] = words
         return report

@@ -67,6 +67,7 @@ class SeenNoiseState(NamedTuple):
     torque: ChannelState = ChannelState()
     sinkage: ChannelState = ChannelState()
     reference: ChannelState = ChannelState()
+    reference_stated: float = math.nan  # by its last message [m/s], nan = by none
 
 
 UNITS = {
@@ -84,9 +85,9 @@ KEYS = {
     'wheel_rate': 'sensors.wheel_rate_std',
     'torque': 'sensors.torque_std',
     'sinkage': 'sensors.sinkage_std',
-    'reference': 'the covariance of reference_odom, or sensors.reference_std,',
+    'reference': 'sensors.reference_std',
 }
-"""Sensor -> where its noise is stated."""
+"""Sensor -> where its noise is stated; the covariance of a reference's message comes first."""
 
 
 class SeenNoise(Component[SeenNoiseState]):
@@ -169,11 +170,19 @@ class SeenNoise(Component[SeenNoiseState]):
                 variance, count = self._mean(sensor, variance, count, seen, tuning.readings)
         self._keep(sensor, ChannelState(time, gap, values, state.last, variance, count))
 
-    def compare_reference(self, time: float, innovation: float, variance: float, P: float) -> None:
+    def compare_reference(
+        self,
+        time: float,
+        innovation: float,
+        variance: float,
+        P: float,
+        stated: float = math.nan,
+    ) -> None:
         """Take the innovation of a reference [m/s], its variance and that of the speed [(m/s)^2].
 
-        The speed took over the share K = P / (P + R) of the innovation before, so that the
-        difference of two has the variance (1 + (1 + K)^2) R.
+        `stated` is the variance in the message [(m/s)^2]; not above zero or nan: none. The speed
+        took over the share K = P / (P + R) of the innovation before, so that the difference of two
+        has the variance (1 + (1 + K)^2) R.
         """
         state = self.state.reference
         seen_variance, count = state.variance, state.readings
@@ -185,6 +194,8 @@ class SeenNoise(Component[SeenNoiseState]):
             )
         kept = (innovation, P / (P + variance))
         self._keep('reference', ChannelState(time, 0.0, kept, (), seen_variance, count))
+        own = math.sqrt(stated) if stated > 0.0 else math.nan
+        self.state = self.state._replace(reference_stated=own)
 
     def _mean(
         self, sensor: str, variance: float, count: int, seen: float, length: float
@@ -221,22 +232,38 @@ class SeenNoise(Component[SeenNoiseState]):
                 return seen**2
         return seen**2 if seen**2 > self._tuning.clearly**2 * stated else stated
 
+    def _stated(self, sensor: str) -> tuple[float, bool]:
+        """Return the deviation of a message as stated, and whether somebody stated it."""
+        own = self.state.reference_stated
+        if sensor == 'reference' and not isnan(own):
+            return own, True
+        return self.stated[sensor], sensor not in self._defaults
+
     def report(self) -> dict[str, float]:
         """Return stated and seen noise by key, with the unit at its end."""
         found = {}
         for sensor, unit in UNITS.items():
             seen = self.seen(sensor)
             if seen is not None:
-                found[f'{sensor}_noise_stated_{unit}'] = self.stated[sensor]
+                found[f'{sensor}_noise_stated_{unit}'] = float(f'{self._stated(sensor)[0]:.3g}')
                 found[f'{sensor}_noise_seen_{unit}'] = float(f'{seen:.3g}')
         return found
 
-    def in_words(self) -> str:
-        """Return what is much noisier than stated; empty where nothing is."""
-        words = []
+    def in_words(self) -> dict[str, str]:
+        """Return what is much noisier than stated, and than a default; empty where nothing is."""
+        words: dict[str, list[str]] = {'stated': [], 'default': []}
         for sensor in UNITS:
-            seen, stated = self.seen(sensor), self.stated[sensor]
+            seen, (stated, given) = self.seen(sensor), self._stated(sensor)
             if seen is not None and stated > 0.0 and seen > self._tuning.much * stated:
-                name = sensor.replace('_', ' ')
-                words.append(f'{name} noise {seen / stated:.0f} times what {KEYS[sensor]} states')
-        return '; '.join(words)
+                than = 'what is stated' if given else 'the default'
+                words['stated' if given else 'default'].append(
+                    f'{sensor.replace("_", " ")} noise {seen / stated:.0f} times {than} '
+                    f'({self._where(sensor)}: {seen:.2g})'
+                )
+        return {than: '; '.join(found) for than, found in words.items() if found}
+
+    def _where(self, sensor: str) -> str:
+        """Return where the noise of a sensor can be stated, as far as that counts."""
+        if sensor == 'reference' and not isnan(self.state.reference_stated):
+            return 'covariance of reference_odom, or sensors.reference_std_floor'
+        return KEYS[sensor]
