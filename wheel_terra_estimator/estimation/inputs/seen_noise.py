@@ -14,7 +14,7 @@ import math
 from collections.abc import Collection, Container
 from dataclasses import dataclass
 from math import isnan
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.measurements import StepInputs
@@ -210,7 +210,8 @@ class SeenNoise(Component[SeenNoiseState]):
         return clipped(variance, low, high), count
 
     def _keep(self, sensor: str, channel: ChannelState) -> None:
-        self.state = self.state._replace(**{sensor: channel})
+        changed: dict[str, Any] = {sensor: channel}
+        self.state = self.state._replace(**changed)
 
     def seen(self, sensor: str) -> float | None:
         """Return the deviation of one message as seen; None while too few came."""
