@@ -12,8 +12,13 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / 'tools'))
 
+from discrepancy_demonstrations import cmu_fitted
 from model_validation import cmu_wheel, ding_statements, grc3_wheel, hit_wheels
 from model_validation.fitting import Misfit, fit
+
+from wheel_terra_estimator.configuration import reader
+from wheel_terra_estimator.discrepancy.report.files import write_files
+from wheel_terra_estimator.discrepancy.workflow import diagnose
 
 pytestmark = pytest.mark.shared
 
@@ -38,6 +43,17 @@ def test_plates_predict_the_rolling_cmu_wheel(shared: Path) -> None:
     model = cmu_wheel.Model(soil, {})
     depth = model.predict(cmu_wheel.OperatingPoints(0.0, 24.5, cmu_wheel.WHEEL))[0, 0]
     assert depth == pytest.approx(0.0144, rel=0.15)  # mean of the measured rolling rows
+
+
+def test_shipped_cmu_sand_agrees_with_its_own_rows(shared: Path, tmp_path: Path) -> None:
+    case = cmu_fitted(shared.parent)
+    diagnosis = diagnose(case.table, case.configuration)
+    assert diagnosis.verdict == 'agrees'
+    assert diagnosis.gap['sinkage'].before < 0.0016
+    assert diagnosis.gap['drawbar_pull'].before < 0.85
+    write_files(diagnosis, tmp_path, pictures=False)
+    written = reader.load([tmp_path / 'model.yaml'], complete=False)
+    assert diagnose(case.table, written).verdict == 'agrees'
 
 
 def test_mound_predicts_the_rows_it_did_not_see_on_grc3(shared: Path) -> None:

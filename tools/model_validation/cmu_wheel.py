@@ -31,6 +31,11 @@ FREE = (
 )
 SKID_EXPONENT = Free('effects.slip_sinkage_exponent.n2', 0.0, 0.5, -2.0, 3.0)
 SKID_PEAK = Free('effects.stress_peak_shift.skid', 0.0, 0.5, -1.0, 1.0)
+# Soil that rises behind a wheel at high slip: needed by a model of all slips, driving and braking.
+MOUND = (
+    Free('effects.soil_mound.kappa', 1.0, 2.0, 0.0, 8.0),
+    Free('effects.soil_mound.onset', 0.5, 0.2, 0.0, 0.9),
+)
 BULLDOZING = Free('effects.bulldozing.kb', 0.5, 0.5, 0.0, 5.0)
 # Terms of the braking wheel, fitted one set after the other.
 BRAKING = {

@@ -54,7 +54,7 @@ def main() -> None:
     soil, points, measured = cmu_wheel.rows(shared)
     turning = points.slip > -0.99
     data = [(cmu_wheel.chosen(points, turning), measured[turning])]
-    free = (*cmu_wheel.FREE, cmu_wheel.SKID_PEAK)
+    free = (*cmu_wheel.FREE, cmu_wheel.SKID_PEAK, *cmu_wheel.MOUND)
     report('cmu_sand_fit', Model(soil, cmu_wheel.EFFECTS), data, cmu_wheel.SIGMA, free)
     slip, pull = grc3_wheel.read(shared)
     points = replace(grc3_wheel.points_at(slip), slip_radius='rim')
