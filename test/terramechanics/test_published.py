@@ -9,14 +9,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / 'tools'))
 
 from discrepancy_demonstrations import cmu_fitted
-from model_validation import cmu_wheel, ding_statements, grc3_wheel, hit_wheels
-from model_validation.fitting import Misfit, fit
+from model_validation import cmu_wheel, ding_statements, grc3_wheel, hit_wheels, shipped_soils
+from model_validation.fitting import Misfit, deviations, fit
 
 from wheel_terra_estimator.configuration import reader
+from wheel_terra_estimator.configuration.shipped import configuration_folder
 from wheel_terra_estimator.discrepancy.report.files import write_files
 from wheel_terra_estimator.discrepancy.workflow import diagnose
 
@@ -43,6 +45,26 @@ def test_plates_predict_the_rolling_cmu_wheel(shared: Path) -> None:
     model = cmu_wheel.Model(soil, {})
     depth = model.predict(cmu_wheel.OperatingPoints(0.0, 24.5, cmu_wheel.WHEEL))[0, 0]
     assert depth == pytest.approx(0.0144, rel=0.15)  # mean of the measured rolling rows
+
+
+@pytest.mark.parametrize(
+    ('name', 'case'), [('cmu_sand_fit', shipped_soils.cmu_sand), ('grc3_fit', shipped_soils.grc3)]
+)
+def test_shipped_soil_is_its_fit_and_states_its_deviations(name, case, shared: Path) -> None:
+    model, data, sigma, free = case(shared.parent)
+    fitted, values = fit(model, data, sigma, free)
+    std = deviations(fitted, data, sigma, free)
+    text = (configuration_folder() / 'soils' / f'{name}.yaml').read_text(encoding='utf-8')
+    stated = yaml.safe_load(text)['/**']['ros__parameters']
+    for key, value in values.items():
+        *folders, last = key.split('.')
+        place = stated
+        for folder in folders:
+            place = place[folder]
+        angle = last.endswith('friction_angle')
+        unit, ending = (np.degrees(1.0), '_deg') if angle else (1.0, '')
+        assert place[f'{last}{ending}'] == pytest.approx(unit * value, abs=0.05 * unit * std[key])
+        assert place[f'{last}_std{ending}'] == pytest.approx(unit * std[key], rel=0.2)
 
 
 def test_shipped_cmu_sand_agrees_with_its_own_rows(shared: Path, tmp_path: Path) -> None:

@@ -21,6 +21,25 @@ from model_validation import cmu_wheel, grc3_wheel, hit_wheels, small_wheels
 from model_validation.fitting import FloatArray, Free, Model, deviations, fit
 from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
 
+Case = tuple[Model, list[tuple[OperatingPoints, FloatArray]], Sequence[float], Sequence[Free]]
+
+
+def cmu_sand(shared: Path) -> Case:
+    """Return start, rows, weights and free parameters of cmu_sand_fit."""
+    soil, points, measured = cmu_wheel.rows(shared)
+    turning = points.slip > -0.99
+    data = [(cmu_wheel.chosen(points, turning), measured[turning])]
+    free = (*cmu_wheel.FREE, cmu_wheel.SKID_PEAK, *cmu_wheel.MOUND)
+    return Model(soil, cmu_wheel.EFFECTS), data, cmu_wheel.SIGMA, free
+
+
+def grc3(shared: Path) -> Case:
+    """Return start, rows, weights and free parameters of grc3_fit."""
+    slip, pull = grc3_wheel.read(shared)
+    points = replace(grc3_wheel.points_at(slip), slip_radius='rim')
+    free = (*grc3_wheel.SOIL, *grc3_wheel.MOUND)
+    return grc3_wheel.BASE, [(points, pull)], grc3_wheel.SIGMA, free
+
 
 def report(
     name: str,
@@ -51,15 +70,8 @@ def main() -> None:
     free_kls = (*small_wheels.BEARING, *small_wheels.KLS_EXTRA, small_wheels.TORQUE)
     rows = [hit_wheels.read(table, 'KLS1_smooth')]
     report('kls1_fit', kls, rows, small_wheels.SIGMA, free_kls)
-    soil, points, measured = cmu_wheel.rows(shared)
-    turning = points.slip > -0.99
-    data = [(cmu_wheel.chosen(points, turning), measured[turning])]
-    free = (*cmu_wheel.FREE, cmu_wheel.SKID_PEAK, *cmu_wheel.MOUND)
-    report('cmu_sand_fit', Model(soil, cmu_wheel.EFFECTS), data, cmu_wheel.SIGMA, free)
-    slip, pull = grc3_wheel.read(shared)
-    points = replace(grc3_wheel.points_at(slip), slip_radius='rim')
-    free = (*grc3_wheel.SOIL, *grc3_wheel.MOUND)
-    report('grc3_fit', grc3_wheel.BASE, [(points, pull)], grc3_wheel.SIGMA, free)
+    report('cmu_sand_fit', *cmu_sand(shared))
+    report('grc3_fit', *grc3(shared))
 
 
 if __name__ == '__main__':
