@@ -10,6 +10,7 @@ import struct
 import zlib
 from dataclasses import replace
 from html.parser import HTMLParser
+from types import SimpleNamespace
 
 import campaign_tools  # noqa: F401
 import matplotlib as mpl
@@ -18,9 +19,11 @@ import pytest
 from campaigns import Plan, make_campaign, scoring
 
 from wheel_terra_estimator.configuration import reader
+from wheel_terra_estimator.discrepancy import workflow
 from wheel_terra_estimator.discrepancy.report.model_file import write_model
-from wheel_terra_estimator.discrepancy.report.page import SOIL_WORDS, number, write_report
-from wheel_terra_estimator.discrepancy.report.words import _shrink
+from wheel_terra_estimator.discrepancy.report.page import SOIL_WORDS, _cards, number, write_report
+from wheel_terra_estimator.discrepancy.report.words import _cell_noise, _shrink
+from wheel_terra_estimator.discrepancy.result import QuantityGap
 from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES
 
 
@@ -343,3 +346,43 @@ def test_what_the_confidence_follows_from_is_of_the_gap_and_of_the_signature(nam
 def test_share_of_the_gap_that_closed(refit, after, share):
     """Squares above a noise of 1; what is hardly above it says nothing."""
     assert _shrink(refit, after, 1.0) == (None if share is None else pytest.approx(share))
+
+
+def test_two_shares_of_the_gap_that_closed_are_shown_as_percentages(named):
+    gap = dict(named.gap)
+    gap['sinkage'] = replace(gap['sinkage'], shrink=0.25)
+    gap['torque'] = replace(gap['torque'], shrink=0.5)
+    gap['drawbar_pull'] = replace(gap['drawbar_pull'], shrink=None)
+    shown = {card['label']: card['value'] for card in _cards(replace(named, gap=gap))}
+    (closed,) = (shown[label] for label in shown if label.startswith('of the gap above the noise'))
+    assert closed == '25 to 50 %'
+
+
+def test_how_far_a_name_worsens_a_quantity_is_in_squares_of_its_noise(monkeypatch):
+    """Errors of 3 where there were 2, at a noise of 5: (9 - 4) / 25."""
+    monkeypatch.setattr(workflow.significance, 'chi_square_p_value', lambda *_: 1.0)
+    monkeypatch.setattr(workflow.significance, 'soil_p_value', lambda *_: 1.0)
+    findings = SimpleNamespace(
+        nothing=SimpleNamespace(outputs=np.zeros((4, 3))),
+        noise=SimpleNamespace(std=np.ones((4, 3))),
+    )
+    fitted = SimpleNamespace(outputs=np.ones((4, 3)), variance=None)
+    gap = {'torque': QuantityGap(4.0, 2.0, 3.0, 5.0)}
+    found = workflow._what_rows_show(findings, fitted, gap)
+    assert found['worse'] == pytest.approx(np.tanh(0.2))
+
+
+def test_noise_of_a_cell_is_its_own_part_of_the_covariance():
+    """Slip errors tie the cells of a row together: the diagonal is what each of them has."""
+    covariance = np.array([[4.0, 1.0, 0.5], [1.0, 9.0, -2.0], [0.5, -2.0, 1.0]])
+    problem = SimpleNamespace(
+        std=np.ones(3),
+        block=np.array([-1, -1, -1]),
+        rotation=np.linalg.inv(np.linalg.cholesky(covariance)),
+        row=np.zeros(3, dtype=int),
+        quantity=np.arange(3),
+    )
+    findings = SimpleNamespace(
+        setting=SimpleNamespace(problem=problem), noise=SimpleNamespace(std=np.full((2, 3), 7.0))
+    )
+    assert _cell_noise(findings) == pytest.approx(np.array([[2.0, 3.0, 1.0], [7.0, 7.0, 7.0]]))

@@ -12,6 +12,7 @@ import pytest
 from scipy.stats import chi2, kstest, multivariate_normal
 
 from wheel_terra_estimator.discrepancy.assessment import held_out
+from wheel_terra_estimator.discrepancy.assessment import next_measurement as proposals
 from wheel_terra_estimator.discrepancy.assessment.along import changed_stretch
 from wheel_terra_estimator.discrepancy.assessment.next_measurement import _menu
 from wheel_terra_estimator.discrepancy.assessment.where import locate
@@ -38,6 +39,8 @@ from wheel_terra_estimator.discrepancy.result import Noise
 from wheel_terra_estimator.discrepancy.selection import confidence
 from wheel_terra_estimator.discrepancy.selection import significance as gap_test
 from wheel_terra_estimator.discrepancy.selection.signatures import signatures
+from wheel_terra_estimator.discrepancy.selection.verdict import _rivals
+from wheel_terra_estimator.discrepancy.selection.weights import default_floors
 from wheel_terra_estimator.discrepancy.tables.checks import check_table
 from wheel_terra_estimator.terramechanics.effects import catalogue
 from wheel_terra_estimator.terramechanics.model import WheelSoilModel
@@ -421,3 +424,42 @@ def test_soil_that_changes_along_the_way_is_told_when_the_choice_of_the_stretch_
     sure = [stretch.gain - np.log(stretches) for stretch in found if stretch is not None]
     assert 3 < len(sure) < 27
     assert min(sure) >= 5.0
+
+
+def test_a_rival_explains_more_than_an_empty_place():
+    """By a nat: evidence of nothing 0, so that 2 is a rival and 0 is none."""
+    names = ((), ('lug_support',), ('multipass',), ('cohesion',))
+    evidence = (0.0, 5.0, 2.0, 0.0)
+    selection = SimpleNamespace(
+        explanations=[
+            SimpleNamespace(names=n, log_evidence=e) for n, e in zip(names, evidence, strict=True)
+        ]
+    )
+    total = np.full(4, 1.0)  # alike otherwise
+    assert set(_rivals(selection, total, ('lug_support',), 'lug_support')) == {'multipass'}
+
+
+def test_no_row_is_proposed_in_which_the_wheel_sinks_beyond_three_fifths_of_its_radius(monkeypatch):
+    radius = WHEEL.radius
+    shallow, deep = (OperatingPoints(np.array([s]), 60.0, WHEEL) for s in (0.1, 0.9))
+    outputs = [np.full((2, 1, 3), share * radius) for share in (0.5, 0.7)]
+    monkeypatch.setattr(proposals, '_menu', lambda _: [('shallow', shallow), ('deep', deep)])
+    monkeypatch.setattr(
+        proposals, '_predicted', lambda *_: [(values, [None, None]) for values in outputs]
+    )
+    monkeypatch.setattr(proposals, '_with_rows', lambda *_: 5.0)
+    monkeypatch.setattr(proposals, '_distance', lambda *_: 1.0)
+    chosen, rival = (SimpleNamespace(names=(name,)) for name in ('multipass', 'cohesion'))
+    found = proposals.propose(None, chosen, [rival], np.ones(3))
+    assert [block.what for block in found] == ['shallow']
+
+
+def test_an_error_that_a_good_model_may_have_is_smaller_than_one_that_asks_for_a_name():
+    floors = default_floors()
+    allowed = [floor for floor in floors if not floor.unexplained]
+    everywhere = [f for f in floors if f.unexplained and len(set(f.amplitude)) == 1]
+    assert max(f.largest for f in allowed) < min(f.largest for f in everywhere)
+    # Whatever the user allows, the priors are probabilities.
+    for greatest in (0.0, 0.02, 0.2):
+        total = sum(np.exp(floor.log_prior) for floor in default_floors(greatest))
+        assert total == pytest.approx(1.0)

@@ -3,6 +3,7 @@
 """Wheels on the ground: turning, wheels without load or standing, smoothed slopes, pulls."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -436,3 +437,11 @@ def test_the_doubt_of_the_shear_model_is_the_stated_one_at_a_contact_length(part
     assert variances[0] == pytest.approx(tuning.start_variance)
     assert variances[1] / variances[0] == pytest.approx(np.exp(-tuning.decay))
     assert variances[2] / variances[1] == pytest.approx(np.exp(-tuning.decay))
+
+
+def test_half_of_an_excess_of_twice_the_noise_is_believed(parts):
+    """James and Stein (1961) by hand: 1 - 2 noise / excess^2, the noise the sensor's zero alone."""
+    parts.sensors = replace(parts.sensors, torque_std=0.0, torque_gain_std=0.0, torque_zero_std=0.5)
+    pull, forces = published_pull(parts, 1.0)  # 1 - 2 * 0.5^2 / 1^2 = 0.5
+    gain = forces.pull_rows[:, SHEAR_STRENGTH] / forces.torque_rows[:, SHEAR_STRENGTH]
+    assert pull - forces.pull == pytest.approx(0.5 * gain, rel=1e-2)

@@ -14,7 +14,11 @@ from wheel_terra_estimator.estimation.contacts.steering import straight_headings
 from wheel_terra_estimator.estimation.filter.force_balance import ForceBalance
 from wheel_terra_estimator.estimation.filter.observability import considered_entries
 from wheel_terra_estimator.estimation.filter.prediction import Prediction
-from wheel_terra_estimator.estimation.filter.reference import ReferenceUpdate
+from wheel_terra_estimator.estimation.filter.reference import (
+    ReferenceState,
+    ReferenceTuning,
+    ReferenceUpdate,
+)
 from wheel_terra_estimator.estimation.filter.repetition import repetitions
 from wheel_terra_estimator.estimation.filter.sinkage import SinkageUpdate, SinkageUpdateTuning
 from wheel_terra_estimator.estimation.filter.sinkage_process import SinkageProcess
@@ -30,6 +34,7 @@ from wheel_terra_estimator.estimation.filter.zero_velocity import ZeroVelocityUp
 from wheel_terra_estimator.estimation.inputs.contact_sensors import SinkageSums
 from wheel_terra_estimator.estimation.inputs.inertial import InertialWindow
 from wheel_terra_estimator.estimation.measurements import ReferenceVelocity
+from wheel_terra_estimator.estimation.outputs import Outputs
 
 NAN = float('nan')
 FORWARD = (0.05,) * 6
@@ -626,3 +631,23 @@ def test_the_jacobian_of_a_settled_sinkage_is_its_derivative(parts, ekf, entry):
         assert 1.0 - stated == pytest.approx(1.0 - difference, rel=0.25)
     else:
         assert stated == pytest.approx(difference, rel=0.1)
+
+
+def test_a_stiffer_soil_has_both_moduli_of_sinkage_larger_by_the_same_factor():
+    """k_c / b + k_phi is what the wheel feels: twice of it is twice of each."""
+    parts = Parts(reader.load(SAND, ['soil.cohesive_modulus:=2000.0']))
+    outputs = Outputs(parts.configuration, parts.rover, parts.sensors, parts.layout)
+    size = parts.layout.size
+    names, before, _ = outputs.learned_soil(np.zeros(size), np.zeros((size, size)))
+    mean = np.zeros(size)
+    mean[parts.layout.stiffness] = np.log(2.0)
+    _, after, _ = outputs.learned_soil(mean, np.zeros((size, size)))
+    ratio = dict(zip(names, after / before, strict=True))
+    assert before[names.index('soil.cohesive_modulus')] == pytest.approx(2000.0)
+    for name in ('soil.cohesive_modulus', 'soil.frictional_modulus'):
+        assert ratio[name] == pytest.approx(2.0)
+    assert ratio['soil.shear_modulus'] == pytest.approx(1.0)
+
+
+def test_references_an_hour_apart_are_no_more_than_the_longest_gap():
+    assert ReferenceState().gap == ReferenceTuning().longest_gap

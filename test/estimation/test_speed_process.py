@@ -244,3 +244,15 @@ def test_a_jolt_at_a_start_is_undone_and_nothing_else(speed, kept):
     made.undo_jolt(ekf, 0.06)
     expected = speed if kept else 0.8 * 0.06
     assert ekf.mean[SPEED] == pytest.approx(expected)
+
+
+@pytest.mark.parametrize('lateral_motion', [1.0, 3.0])
+def test_a_turn_adds_to_the_least_slip_deviation_at_most_what_a_spin_on_the_spot_does(
+    lateral_motion,
+):
+    made, tuning = process([0.06] * 6), SpeedTuning()
+    ekf = Parts(reader.load(SAND)).filter()
+    ekf.set(SPEED, 0.05, 1e-12)
+    made.keep_least_variance(ekf, (0.06,) * 6, lateral_motion)
+    expected = 0.06 * (tuning.least_slip_std + tuning.turning_slip_std)
+    assert np.sqrt(ekf.covariance[SPEED, SPEED]) == pytest.approx(expected)

@@ -226,3 +226,18 @@ def test_registering_refuses_taken_names_and_empty_effects(tmp_path: Path) -> No
         load_file(broken)
     with pytest.raises(ValueError, match='not a Python file'):
         load_file(tmp_path / 'missing.py')
+
+
+def test_instruments_are_what_a_hard_floor_would_show_as_well() -> None:
+    """Errors of the four readings and the friction of the drive; all others are of the soil."""
+    readings = {
+        'pull_gain',
+        'pull_zero',
+        'torque_gain',
+        'sinkage_gain',
+        'sinkage_offset',
+        'wheel_radius_bias',
+        'pitch_bias',
+        'drivetrain_friction',
+    }
+    assert {name for name, effect in catalogue().items() if effect.instrument} == readings

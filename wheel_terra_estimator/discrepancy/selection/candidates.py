@@ -69,7 +69,7 @@ class Setting:
     effects: Mapping[str, Effect]
     floors: tuple[Floor, ...]
     noise_freedom: FloatArray
-    deepest: float = 0.02
+    deepest: float
 
     def coordinates(self, names: Iterable[str]) -> tuple[Coordinate, ...]:
         """Return nuisance coordinates followed by those of the effects."""
