@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -347,3 +348,26 @@ def test_the_turn_from_rolling_to_skid_is_smooth() -> None:
     steps = np.diff(pull)
     assert (steps > 0.0).all()
     assert np.max(np.abs(np.diff(steps))) < 0.25 * np.max(steps)
+
+
+def test_shear_that_changes_its_sign_in_the_contact_is_shared_evenly() -> None:
+    """With n = 1 and no cohesion both stresses are then triangles, whose pull is exact."""
+    t1, tm, t2, load, radius = 0.7, 0.3, 0.0, 80.0, 0.157
+    contact = SimpleNamespace(
+        entrance_angle=t1,
+        peak_angle=tm,
+        leaving_angle=t2,
+        radius=radius,
+        shear_radius=radius,
+        width=0.16,
+        sinkage_exponent=1.0,
+        cohesion=0.0,
+        tan_friction=0.6,
+        shear_modulus=0.01,
+        normal_load=load,
+        velocity_ratio=radius * np.linspace(1.145, 1.155, 21),  # a skid in which the sign changes
+    )
+    for torque in (-4.0, 1.0):
+        shaped = closed_form.decoupled_pull_shaped(torque, contact)
+        even = closed_form.decoupled_pull(torque, load, t1, tm, t2, radius)
+        assert shaped == pytest.approx(np.full(21, even), abs=0.005 * load)
