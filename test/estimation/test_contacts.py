@@ -18,7 +18,7 @@ from wheel_terra_estimator.estimation.contacts.pulls import PullEvidence, Pulls
 from wheel_terra_estimator.estimation.contacts.stationary_wheels import StationaryWheels
 from wheel_terra_estimator.estimation.contacts.steering import headings, straight_headings
 from wheel_terra_estimator.estimation.contacts.torque_change import TorqueChange
-from wheel_terra_estimator.estimation.contacts.turning import Turning
+from wheel_terra_estimator.estimation.contacts.turning import Turning, sides_oppose
 from wheel_terra_estimator.estimation.contacts.unloaded_wheels import UnloadedWheels
 from wheel_terra_estimator.estimation.contacts.wheel_models import WheelState
 from wheel_terra_estimator.estimation.filter.force_balance import SumOfPulls
@@ -445,3 +445,17 @@ def test_half_of_an_excess_of_twice_the_noise_is_believed(parts):
     pull, forces = published_pull(parts, 1.0)  # 1 - 2 * 0.5^2 / 1^2 = 0.5
     gain = forces.pull_rows[:, SHEAR_STRENGTH] / forces.torque_rows[:, SHEAR_STRENGTH]
     assert pull - forces.pull == pytest.approx(0.5 * gain, rel=1e-2)
+
+
+@pytest.mark.parametrize(
+    ('rims', 'spins'),
+    [
+        ((-0.1, -0.1, -0.1, 0.1, 0.1, 0.1), True),
+        ((-0.1, 0.1, -0.1, 0.06, 0.06, math.nan), True),  # one wheel of a side decides nothing
+        ((-0.04, -0.04, -0.04, 0.1, 0.1, 0.1), False),  # a sharp turn about a wheel's side
+        ((0.1, 0.1, 0.1, 0.1, 0.1, -0.1), False),
+        ((math.nan,) * 3 + (0.1,) * 3, False),
+    ],
+)
+def test_sides_that_turn_against_each_other_ask_for_a_spin(rims, spins):
+    assert sides_oppose(rims, (-0.3,) * 3 + (0.3,) * 3) is spins

@@ -31,7 +31,7 @@ from wheel_terra_estimator.estimation.contacts.stationary_wheels import (
 )
 from wheel_terra_estimator.estimation.contacts.steering import Steering
 from wheel_terra_estimator.estimation.contacts.torque_change import TorqueChange
-from wheel_terra_estimator.estimation.contacts.turning import Turning
+from wheel_terra_estimator.estimation.contacts.turning import Turning, sides_oppose
 from wheel_terra_estimator.estimation.contacts.unloaded_wheels import UnloadedWheels
 from wheel_terra_estimator.estimation.contacts.wheel_models import WheelModels
 from wheel_terra_estimator.estimation.estimates import EstimateSet
@@ -674,7 +674,8 @@ class WheelSoilEstimator:
                 slip_told=self._reference.known(time)
                 or wheels.torque_known(time)
                 or len(self._sinkage.unread(time)) < rover.wheel_count,
-                turning=motion.lateral_motion > _SHARP_TURN,
+                turning=motion.lateral_motion > _SHARP_TURN
+                or sides_oppose(rims, body.headings.by_yaw_rate),
                 margin=self._margin.share(loads, torque_known=wheels.torque_known(time)),
             ),
         )

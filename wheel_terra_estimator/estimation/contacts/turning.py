@@ -12,7 +12,7 @@ from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.contacts.steering import Headings
 from wheel_terra_estimator.estimation.inputs.inertial import InertialWindow
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
-from wheel_terra_estimator.estimation.scalars import clipped, gain_of, known
+from wheel_terra_estimator.estimation.scalars import clipped, gain_of, known, median
 
 Floats = tuple[float, ...]
 
@@ -48,6 +48,29 @@ class TurningTuning:
     scrub: float = 10.0
     """Variance of a shear model, over its square, at full lateral motion: ten cycles of it are one
     piece of information."""
+
+
+_OPPOSED = 0.5
+"""Slower side over the faster one from which rims of opposite signs are a spin on the spot [-]."""
+
+
+def sides_oppose(rims: Floats, by_yaw_rate: Floats) -> bool:
+    """Tell whether the wheels ask for a spin on the spot, however little the body follows.
+
+    Parameters
+    ----------
+    rims : tuple of float
+        Rim speeds [m/s]; nan = unknown.
+    by_yaw_rate : tuple of float
+        Speed of each contact over the yaw rate [m], see `Headings`: its sign tells the side.
+    """
+    pairs = [(rim, y) for rim, y in zip(rims, by_yaw_rate, strict=True) if not math.isnan(rim)]
+    left, right = [rim for rim, y in pairs if y < 0.0], [rim for rim, y in pairs if y > 0.0]
+    if not left or not right:
+        return False
+    sides = median(left), median(right)
+    slower, faster = sorted(map(abs, sides))
+    return sides[0] * sides[1] < 0.0 and slower >= _OPPOSED * faster
 
 
 class TurningState(NamedTuple):
