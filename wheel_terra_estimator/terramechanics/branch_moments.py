@@ -173,58 +173,12 @@ class BranchForces:
             setattr(part, name, chosen(getattr(self, name)))
         return part
 
-    def load(self, angle: Any) -> Any:
-        """Vertical force at an entrance angle [N]: as ``forces``, half as long."""
-        if self._skidding:
-            return self.forces(angle)[0]
-        sin, sqrt, roll, square = self._sin, self._sqrt, self._roll, angle * angle
-        top, front, rear = sin(angle), sin(self._place_front * angle), sin(self._place_rear * angle)
-        cos_rear = sqrt(1.0 - rear * rear)
-        x = self._rim_front * angle - roll * (top - front)  # j/K in front, y behind
-        y = self._rim_rear * angle - roll * (top - rear)
-        pace = self._turn - roll * cos_rear
-        wide = self._arc_rear * square * pace * pace
-        if self._turns_back:
-            sign_front, sign_rear = self._copysign(1.0, x), self._copysign(1.0, y)
-            x, y = x * sign_front, y * sign_rear
-            wide = self._minimum(wide, 0.25 * y * y)
-        base = 1.0 / (1.0 + 0.125 * x)
-        base *= base
-        base *= base
-        share_front = 1.0 - base * base
-        base = 1.0 / (1.0 + self._nearer * x)
-        base *= base
-        even_front = 1.0 - base * base
-        base = 1.0 / (1.0 + 0.0625 * y)
-        rest = base * base
-        rest *= rest
-        rest *= rest
-        rest *= rest
-        rest += rest * base * (wide - 0.03125 * y * y)
-        share_rear = 1.0 - rest
-        even_rear = 1.0 - rest * (1.0 - self._further * base * y)
-        if self._turns_back:
-            share_front, even_front = share_front * sign_front, even_front * sign_front
-            share_rear, even_rear = share_rear * sign_rear, even_rear * sign_rear
-        middle = sin(self._middle_front * angle)
-        peak = self._peak * (middle * sin(self._half * angle)) ** self._exponent
-        stressed = (1.0 - self._arc_front * square) * (
-            self._normal_front * sqrt(1.0 - front * front)
-            + self._friction_front * share_front * front
-        ) + (1.0 - self._arc_rear * square) * (
-            self._normal_rear * cos_rear + self._friction_rear * share_rear * rear
-        )
-        sticking = self._cohesion_front * even_front * (1.0 - self._edge_front * square) * middle
-        sticking = sticking + self._cohesion_rear * even_rear * (
-            1.0 - self._edge_rear * square
-        ) * sin(self._middle_rear * angle)
-        return self._width * angle * (peak * stressed + sticking)
+    def _mobilised(self, angle: Any, top: Any, front: Any, rear: Any, cos_rear: Any) -> Any:
+        """Return mean mobilised shares [-]: friction in front and behind, cohesion likewise.
 
-    def forces(self, angle: Any) -> tuple[Any, Any, Any]:
-        """Load [N], pull [N] and torque [N m] at an entrance angle."""
-        sin, sqrt, roll, square = self._sin, self._sqrt, self._roll, angle * angle
-        top, front, rear = sin(angle), sin(self._place_front * angle), sin(self._place_rear * angle)
-        cos_rear = sqrt(1.0 - rear * rear)
+        Given are the sines of the entrance angle and of the places of both centroids.
+        """
+        roll, square = self._roll, angle * angle
         # Mean shares of strength, written out: floats spend a third on calls. In front that of
         # mean_share_front, behind that of mean_share_rear, corrected by `wide`, half the variance
         # that j/K really has there: the mean of exp(-j/K) grows by P b/2 per variance, with
@@ -256,6 +210,40 @@ class BranchForces:
         if self._turns_back:
             share_front, even_front = share_front * sign_front, even_front * sign_front
             share_rear, even_rear = share_rear * sign_rear, even_rear * sign_rear
+        return share_front, share_rear, even_front, even_rear
+
+    def load(self, angle: Any) -> Any:
+        """Vertical force at an entrance angle [N]: as ``forces``, half as long."""
+        if self._skidding:
+            return self.forces(angle)[0]
+        sin, sqrt, square = self._sin, self._sqrt, angle * angle
+        top, front, rear = sin(angle), sin(self._place_front * angle), sin(self._place_rear * angle)
+        cos_rear = sqrt(1.0 - rear * rear)
+        share_front, share_rear, even_front, even_rear = self._mobilised(
+            angle, top, front, rear, cos_rear
+        )
+        middle = sin(self._middle_front * angle)
+        peak = self._peak * (middle * sin(self._half * angle)) ** self._exponent
+        stressed = (1.0 - self._arc_front * square) * (
+            self._normal_front * sqrt(1.0 - front * front)
+            + self._friction_front * share_front * front
+        ) + (1.0 - self._arc_rear * square) * (
+            self._normal_rear * cos_rear + self._friction_rear * share_rear * rear
+        )
+        sticking = self._cohesion_front * even_front * (1.0 - self._edge_front * square) * middle
+        sticking = sticking + self._cohesion_rear * even_rear * (
+            1.0 - self._edge_rear * square
+        ) * sin(self._middle_rear * angle)
+        return self._width * angle * (peak * stressed + sticking)
+
+    def forces(self, angle: Any) -> tuple[Any, Any, Any]:
+        """Load [N], pull [N] and torque [N m] at an entrance angle."""
+        sin, sqrt, square = self._sin, self._sqrt, angle * angle
+        top, front, rear = sin(angle), sin(self._place_front * angle), sin(self._place_rear * angle)
+        cos_rear = sqrt(1.0 - rear * rear)
+        share_front, share_rear, even_front, even_rear = self._mobilised(
+            angle, top, front, rear, cos_rear
+        )
         middle, mean = sin(self._middle_front * angle), sin(self._middle_rear * angle)
         peak = self._peak * (middle * sin(self._half * angle)) ** self._exponent
         arc_front, arc_rear = 1.0 - self._arc_front * square, 1.0 - self._arc_rear * square
