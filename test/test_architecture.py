@@ -137,6 +137,7 @@ MAY_USE = {
     ),
     # The truth of a trial knows nothing of the models that are to find it.
     'trials': ({'configuration', 'discrepancy', 'reporting'}, {'numpy'} | PICTURES),
+    # Limits of rates are quantiles of scipy.
     'evaluation': (
         {
             'configuration',
@@ -147,7 +148,7 @@ MAY_USE = {
             'bags',
             'reporting',
         },
-        {'numpy'} | PICTURES,
+        {'numpy', 'scipy'} | PICTURES,
     ),
     # Discrete elements know nothing of the models that they are to judge.
     'soilbin': (

@@ -28,6 +28,7 @@ EXAMPLES = (
     'wheel-terra evaluate --limiter --seeds 10 -o limiter.md',
     'wheel-terra evaluate --hours 24 -o day',
     'wheel-terra evaluate --hours 24 -o day --resume',
+    'wheel-terra evaluate --hours 10 --world both --kinds firm --modes reference -o firm',
 )
 
 
@@ -100,12 +101,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=float,
         metavar='N',
         help='one drive of so many hours with slopes, turns, stops and sensor faults; -o DIR keeps '
-        'a line of JSON per hour (an hour takes about three minutes)',
+        'a line of JSON per hour (an hour takes about three minutes). With --kinds drives of these '
+        'kinds, seed after seed, until so many hours are driven in each mode, a line per drive',
     )
     parser.add_argument(
         '--resume',
         action='store_true',
-        help='go on with an interrupted --hours behind its last full hour',
+        help='go on with an interrupted --hours behind its last line',
     )
     parser.add_argument(
         '--json', action='store_true', help='print the figures of simulated kinds as JSON'
@@ -229,32 +231,63 @@ def _simulated(arguments: argparse.Namespace) -> _Told:
 
 
 def _drive_for_hours(arguments: argparse.Namespace) -> int:
-    """Run one long drive, or go on with it."""
-    from wheel_terra_estimator.evaluation import kinds, long_drive
+    """Run one long drive or many of some kinds, or go on with them."""
+    from wheel_terra_estimator.evaluation import long_drive, many_drives
 
-    other = (arguments.measured, arguments.limiter, arguments.rover, arguments.kinds)
-    if any(other) or arguments.world != 'own':
-        raise UserError('--hours is a drive of its own: only -o, --tuning, --resume go with it')
+    if any((arguments.measured, arguments.limiter, arguments.rover)):
+        raise UserError('--hours goes with neither --measured nor --limiter nor --rover')
+    if arguments.world != 'own' and not arguments.kinds:
+        raise UserError(f'--hours --world {arguments.world} needs --kinds')
     if arguments.output is None:
         raise UserError('--hours needs -o DIR, where its figures are kept')
     if not 0.0 < arguments.hours <= MOST_HOURS:
         raise UserError(f'--hours {arguments.hours:g}: must be above 0, at most {MOST_HOURS:g}')
-    seeds = kinds.TUNING_SEEDS if arguments.tuning else kinds.TEST_SEEDS
+    report = many_drives.report if arguments.kinds else long_drive.report
     try:
-        rows = long_drive.drive_for_hours(
-            arguments.output,
-            arguments.hours,
-            seeds.start,
-            resume=arguments.resume,
-            overwrite=arguments.overwrite,
-        )
+        rows = _hours_of_kinds(arguments) if arguments.kinds else _one_long_drive(arguments)
     except KeyboardInterrupt:
+        which = ''
+        if arguments.kinds:
+            kinds, modes = ' '.join(arguments.kinds), ' '.join(arguments.modes)
+            which = f'--world {arguments.world} --kinds {kinds} --modes {modes} '
         print(
-            f'interrupted; go on with: --hours {arguments.hours:g} -o {arguments.output} --resume'
+            f'interrupted; go on with: --hours {arguments.hours:g} {which}-o {arguments.output} '
+            '--resume'
         )
         return INTERRUPTED
-    print(long_drive.report(rows))
-    return FILTER_FAILED if rows[-1]['filter_restarts'] else 0
+    print(report(rows))
+    return FILTER_FAILED if any(row['filter_restarts'] for row in rows) else 0
+
+
+def _one_long_drive(arguments: argparse.Namespace) -> list[dict[str, Any]]:
+    from wheel_terra_estimator.evaluation import long_drive
+
+    return long_drive.drive_for_hours(
+        arguments.output,
+        arguments.hours,
+        _seeds(arguments).start,
+        resume=arguments.resume,
+        overwrite=arguments.overwrite,
+    )
+
+
+def _hours_of_kinds(arguments: argparse.Namespace) -> list[dict[str, Any]]:
+    from wheel_terra_estimator.evaluation import many_drives, runner
+
+    chosen = _chosen(arguments.world, arguments.kinds)
+    _check_names(arguments.modes, runner.MODES, 'mode')
+    smoothed = [mode for mode in arguments.modes if mode.startswith(runner.SMOOTHED)]
+    if smoothed:
+        raise UserError(f'--hours does not go with the mode {smoothed[0]}')
+    return many_drives.drive_kinds_for_hours(
+        arguments.output,
+        arguments.hours,
+        chosen,
+        arguments.modes,
+        _seeds(arguments).start,
+        resume=arguments.resume,
+        overwrite=arguments.overwrite,
+    )
 
 
 def _chosen(world: str, kinds: list[str] | None) -> list[tuple[str, str]]:

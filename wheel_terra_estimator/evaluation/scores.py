@@ -24,6 +24,9 @@ LEAST_SPEED, FIRST_SECONDS, NEAR_BORDER = 0.005, 10.0, 0.05
 SCORING_PERIOD = 0.1
 """Of a denser truth one row per period [s] is scored, so that drives count by their length."""
 
+WITHIN = 1.96
+"""Deviations that hold 95 % of a Gaussian."""
+
 SLOW_TIME = 20.0
 """The slow part of an error is its mean over blocks of this length [s]."""
 
@@ -98,13 +101,8 @@ def samples(
     truth: Truth, record: Record, baselines: BaselineSlips, slip_radius: FloatArray
 ) -> Samples:
     """Return the scored samples of a drive."""
-    position = np.clip(np.searchsorted(record.stamp, truth.stamp), 0, len(record.stamp) - 1)
-    matched = record.stamp[position] == truth.stamp
+    position, scored = scored_rows(truth, record, slip_radius)
     rim = np.abs(truth.wheel_rate) * slip_radius
-    ground = np.abs(truth.wheel_rate * slip_radius - truth.slip_velocity)
-    late = (truth.stamp - truth.stamp[0]) * 1e-9 > FIRST_SECONDS
-    scored = (np.maximum(rim, ground) > LEAST_SPEED) & ~np.isnan(truth.slip)
-    scored &= (late & matched & _one_per_period(truth.stamp, matched))[:, None]
     load = truth.normal_load
     carried = load > LEAST_LOAD * load.mean()
     total = truth.drawbar_pull.sum(axis=1, keepdims=True)
@@ -138,6 +136,20 @@ def samples(
         pitch_filter_std=take(pitch.std),
         shared_pull_error=over_load(shared - truth.drawbar_pull),
     )
+
+
+def scored_rows(
+    truth: Truth, record: Record, slip_radius: FloatArray
+) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """Return (k,) the set of each row of the truth, and (k, n) which wheels of it are scored."""
+    position = np.clip(np.searchsorted(record.stamp, truth.stamp), 0, len(record.stamp) - 1)
+    matched = record.stamp[position] == truth.stamp
+    rim = np.abs(truth.wheel_rate) * slip_radius
+    ground = np.abs(truth.wheel_rate * slip_radius - truth.slip_velocity)
+    late = (truth.stamp - truth.stamp[0]) * 1e-9 > FIRST_SECONDS
+    scored = (np.maximum(rim, ground) > LEAST_SPEED) & ~np.isnan(truth.slip)
+    scored &= (late & matched & _one_per_period(truth.stamp, matched))[:, None]
+    return position, scored
 
 
 def _since_start(stamp: NDArray[np.int64], rim: FloatArray) -> FloatArray:
@@ -219,7 +231,7 @@ def coverage(error: FloatArray, std: FloatArray) -> float:
     """Return the share of errors within the 95 % interval."""
     there = ~np.isnan(error) & ~np.isnan(std)
     return (
-        float((np.abs(error[there]) <= 1.96 * std[there]).mean()) if there.any() else float('nan')
+        float((np.abs(error[there]) <= WITHIN * std[there]).mean()) if there.any() else float('nan')
     )
 
 
