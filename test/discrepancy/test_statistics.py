@@ -460,6 +460,6 @@ def test_an_error_that_a_good_model_may_have_is_smaller_than_one_that_asks_for_a
     everywhere = [f for f in floors if f.unexplained and len(set(f.amplitude)) == 1]
     assert max(f.largest for f in allowed) < min(f.largest for f in everywhere)
     # Whatever the user allows, the priors are probabilities.
-    for greatest in (0.0, 0.02, 0.2):
+    for greatest in (None, 0.0, 0.02, 0.2):
         total = sum(np.exp(floor.log_prior) for floor in default_floors(greatest))
         assert total == pytest.approx(1.0)

@@ -12,6 +12,7 @@ import pytest
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / 'tools'))
 
 import ablation
+from ablations.drives import SIMULATED, simulated
 from ablations.switches import ROOT, patched, tuned, without_sign
 from ablations.treatments import SIGNS, TREATMENTS
 
@@ -95,3 +96,10 @@ def test_table_says_what_earns_its_place():
     rows[silent] = dict(base)
     rows[silent]['own 1'] = {**base['own 1'], 'missed': 1.0}
     assert f'{silent}.' not in ablation.report(rows).splitlines()[-1]
+
+
+def test_drives_of_both_worlds_are_made():
+    durations = {'rival': 1.0, 'own': 1.0}
+    for drive, (world, kind, _) in zip(simulated(2, 1000, durations), SIMULATED, strict=False):
+        assert drive.name.startswith(f'{world} {kind} 1000')
+        assert drive.run()['slip_count'] >= 0.0

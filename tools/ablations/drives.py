@@ -70,7 +70,7 @@ def simulated(count: int, seed: int, duration: Mapping[str, float]) -> Iterator[
     for i in range(count):
         world, kind, mode = SIMULATED[i % len(SIMULATED)]
         number = seed + i // len(SIMULATED)
-        drive = WORLDS[world].simulate(kind, number, duration[world])
+        drive = WORLDS[world].simulate(kind, number, duration[world], None)
 
         run = partial(_scored, world, kind, number, mode, drive)
         name = f'{world} {kind} {number}' + ('' if mode == 'reference' else ' without reference')

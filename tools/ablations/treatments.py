@@ -166,7 +166,6 @@ TREATMENTS: tuple[Treatment, ...] = (
         _AFTER,
         patched('contacts.pulls:Pulls.distributed', lambda self, pull, *_: list(pull)),
     ),
-    Treatment('wider slip in turns', _AFTER, tuned('judgement.slip:SlipTuning', turning_std=0.0)),
     Treatment('scrub of turns in the force rows', _MODEL, _turning(scrub=0.0)),
     Treatment(
         'zeros of torque sensors as states',

@@ -33,10 +33,11 @@ PRIOR_NOTHING, PRIOR_ONE, PRIOR_TWO = 0.50, 0.45, 0.05
 PRIOR_MORE = 0.2  # each further effect, relative to one effect less
 MOST_EFFECTS = 6
 MISFIT = 0.5  # probability of a misfit that asks for a name, from which more effects are tried
-# Prior of the structural error: floors that a good model may have ...
+# Prior of the structural error: floors that a good model may have, with their shares of what the
+# misfits below leave over ...
 _FLOORS = ((0.0, 0.60), (0.007, 0.10), (0.015, 0.12), (0.025, 0.10), (0.04, 0.04))
 # ... and smooth misfits that ask for a name, in all quantities or in one of them.
-_UNEXPLAINED_PRIOR = 0.10
+_UNEXPLAINED_PRIOR = 0.094
 _UNEXPLAINED = (0.08, 0.16, 0.35)
 _UNEXPLAINED_SOME = (0.015, 0.03, 0.06, 0.15, 0.4)
 _SOME = ((1, 0, 0), (0, 1, 0), (0, 0, 1), (0, 1, 1))
@@ -57,12 +58,10 @@ def default_floors(greatest: float | None = None) -> tuple[Floor, ...]:
     greatest : float, optional
         Amplitude up to which an error counts as floor; given by the user or by a reference table.
     """
-    floors = [Floor((a, a, a), math.log(p), False) for a, p in _FLOORS]
-    if greatest is not None:
-        kept = [(a, p) for a, p in _FLOORS if a <= greatest] or [_FLOORS[0]]
-        total = sum(p for _, p in kept)
-        share = (1.0 - _UNEXPLAINED_PRIOR) / total
-        floors = [Floor((a, a, a), math.log(p * share), False) for a, p in kept]
+    most = math.inf if greatest is None else greatest
+    kept = [(a, p) for a, p in _FLOORS if a <= most] or [_FLOORS[0]]
+    share = (1.0 - _UNEXPLAINED_PRIOR) / sum(p for _, p in kept)
+    floors = [Floor((a, a, a), math.log(p * share), False) for a, p in kept]
     patterns = [(a, a, a) for a in _UNEXPLAINED]
     patterns += [
         (a * z, a * f, a * t) for (z, f, t), a in itertools.product(_SOME, _UNEXPLAINED_SOME)

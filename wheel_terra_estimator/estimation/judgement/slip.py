@@ -28,8 +28,6 @@ _TIME_ROUNDING = 1e-6  # [s]
 class SlipTuning:
     """Deviations of the slip that no model of the filter has."""
 
-    turning_std: float = 0.05
-    """At full lateral motion: turning scrubs the soil sideways (tuned, seeds 1000 to 1019)."""
     drift: float = 0.05
     """Sideways over forward speed that no sensor of a steered rover reads: 3 degrees."""
     forgetting: float = 0.02  # growth of the deviation per stamp where no rate is known
@@ -110,7 +108,6 @@ class SlipJudge(Component[tuple[WheelSlip, ...]]):
         if abs(rim) < rest and abs(v) < max(rest, 2.0 * v_std):
             return self._at_rest(before, time)
         slip, std = slip_and_deviation(rim, v, v_std, self._rim_std[i], rest)
-        std = math.hypot(std, self._tuning.turning_std * body.lateral_motion)
         slip_class = before.slip_class
         if std >= 1.0 and slip_class.current == UNKNOWN:
             slip_class = ClassState()  # nothing is known of it yet
