@@ -28,6 +28,8 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check install -qq
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
+# Compiled tests are kept: each worker would compile all of them anew, for five seconds.
+unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: help demo test lint docs clean
 help:

@@ -13,6 +13,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import yaml
+from rosbags.rosbag2 import writer as bag_writer
 
 from wheel_terra_estimator.bags.bag_file import BagFile
 from wheel_terra_estimator.bags.message_factory import MessageFactory
@@ -86,6 +88,38 @@ def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
             file.write(b'picture')
 
     monkeypatch.setattr(Figure, 'savefig', savefig)
+
+
+class CompiledYaml:
+    """What rosbags uses of ruamel.yaml to write metadata, with the compiled writer of PyYAML.
+
+    The same but for a line break before hashes, and 0.05 s sooner for each bag.
+    """
+
+    default_flow_style: bool | None = None
+
+    def __init__(self, typ: str) -> None:
+        assert typ == 'safe'
+
+    def dump(self, data: Any, stream: Any) -> None:
+        yaml.dump(data, stream, yaml.CSafeDumper, default_flow_style=self.default_flow_style)
+
+
+LIBRARY_YAML = bag_writer.YAML
+
+
+@pytest.fixture(scope='session', autouse=True)
+def quick_metadata() -> Iterator[None]:
+    """Bags of the tests are closed sooner; those of `library_metadata` as they always are."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(bag_writer, 'YAML', CompiledYaml)
+        yield
+
+
+@pytest.fixture
+def library_metadata(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Write metadata as the library does: for tests of what is written."""
+    monkeypatch.setattr(bag_writer, 'YAML', LIBRARY_YAML)
 
 
 @pytest.fixture(scope='session')

@@ -17,6 +17,8 @@ from wheel_terra_estimator.bags.storage import open_bag
 from wheel_terra_estimator.bags.writer import EstimateBagWriter
 from wheel_terra_estimator.errors import UserError
 
+pytestmark = pytest.mark.usefixtures('library_metadata')
+
 NAMES = ('left', 'right')
 SECOND = 1_000_000_000
 

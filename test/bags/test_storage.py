@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import yaml
 
 from wheel_terra_estimator.bags.raw_messages import RawMessage
 from wheel_terra_estimator.bags.storage import open_bag
@@ -23,6 +24,19 @@ def contents(path: Path) -> list[RawMessage]:
 @pytest.fixture
 def whole(make_bag: Any) -> list[RawMessage]:
     return contents(make_bag(name='whole'))
+
+
+def test_bags_of_the_tests_are_closed_as_the_library_does_it(
+    make_bag: Any, request: pytest.FixtureRequest
+) -> None:
+    stated = []
+    for number in range(2):
+        if number:
+            request.getfixturevalue('library_metadata')
+        folder = make_bag(name=f'{number}')
+        text = (folder / 'metadata.yaml').read_text()
+        stated.append((yaml.safe_load(text.replace(f'{number}.mcap', 'x')), contents(folder)))
+    assert stated[0] == stated[1]
 
 
 @pytest.mark.parametrize('storage', ['mcap', 'sqlite3'])
