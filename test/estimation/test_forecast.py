@@ -14,6 +14,7 @@ from wheel_terra_estimator.estimation.judgement.stuck.situation import (
     RoverMotion,
     SituationObserver,
     WheelMotion,
+    driving_share,
 )
 
 RIM = 0.05  # [m/s]
@@ -68,6 +69,34 @@ def test_high_slip_and_sinking_wheels_make_it_likely():
     sinking = [situation(0.4, growth).outlook.probability for growth in (0.0, 0.01, 0.03, 0.05)]
     assert sinking == sorted(sinking)
     assert sinking[3] > 0.6
+
+
+def entering(sinking, wheels=4):
+    """Return the situation after so many wheels have sunk by 0.15 m per metre for 0.1 m."""
+    observer = SituationObserver(DEFAULTS)
+    for i in range(201):
+        rolled = max(RIM * 0.1 * (i - 180), 0.0)
+        there = motion(0.35)
+        into = there.wheels[0]._replace(sinkage=0.01 + 0.15 * rolled)
+        rest = there.wheels[: wheels - sinking]
+        found = observer.update(0.1 * i, there._replace(wheels=(into,) * sinking + rest))
+    return found
+
+
+def test_the_first_axle_of_two_that_enters_loose_soil_is_no_entrapment():
+    patch, trap = entering(2).outlook.probability, entering(3).outlook.probability
+    assert patch < 0.15 < 0.5 < trap
+    assert patch == pytest.approx(entering(0).outlook.probability)
+    # The middle two of six wheels are more than half with the last two.
+    assert entering(4, 6).outlook.probability > 0.5 > entering(3, 6).outlook.probability
+
+
+@pytest.mark.parametrize(('rim', 'share'), [(0.05, 0.75), (-0.05, -0.75)])
+def test_a_torque_against_the_way_is_a_drag(rim, share):
+    assert driving_share(30.0, 40.0, rim) == share
+    assert driving_share(-30.0, 40.0, rim) == -share
+    assert math.isnan(driving_share(math.nan, 40.0, rim))
+    assert math.isnan(driving_share(30.0, 0.0, rim))
 
 
 def test_a_growth_that_is_known_counts_for_more():

@@ -219,15 +219,60 @@ def test_fixes_that_disagree_by_chance_are_no_bogging_down():
     assert first(found) is None
 
 
-def test_a_fast_loss_of_speed_near_the_torque_limit_is_bogging_down():
-    monitor = StuckMonitor()
-    found = []
-    for i in range(100):
-        slip = 0.3 if i < 50 else min(0.3 + 0.02 * (i - 50), 0.85)
-        wheels = [wheel(slip, rim=1.0, torque=0.6)] * 4
-        found.append(judge(monitor, 0.1 * i, 1.0 - slip, True, wheels))
-    assert 5.0 < first(found) < 6.5
-    assert 'bogging down' in next(a.reason for a in found if a.stuck)
+def test_a_fast_loss_of_speed_near_the_torque_limit_is_bogging_down_where_drives_slow_down():
+    def run(slowing):
+        """Slip grows by 0.2 a second from 5 s on; rim speeds fall by so much a second."""
+        monitor, found = StuckMonitor(), []
+        for i in range(75):
+            since = 0.1 * max(i - 50, 0)
+            slip, rim = 0.3 + 0.2 * since, 1.0 - slowing * since
+            # The first wheel is the fastest: it holds its speed.
+            wheels = [wheel(slip, torque=0.6, rim=r) for r in (1.0, rim, rim, rim)]
+            found.append(judge(monitor, 0.1 * i, rim * (1.0 - slip), True, wheels))
+        return found
+
+    assert 5.0 < first(run(0.2)) < 6.5
+    assert 'bogging down' in next(a.reason for a in run(0.2) if a.stuck)
+    # Drives that hold their rim speed lose way by slip alone, which other signs judge.
+    assert not any('bogging down' in a.reason for a in run(0.0))
+
+
+@pytest.mark.parametrize('held', [True, False])
+def test_a_wheel_that_is_held_changes_the_slip_of_the_others_and_is_no_entrapment(held):
+    """The others take over its share: slip grows to 0.6 within a second, wheels sink by 3 mm."""
+
+    def row(i):
+        share = min(max(0.1 * (i - 100), 0.0), 1.0)
+        others = wheel(0.2 + 0.4 * share)._replace(sinkage=0.02 + 0.003 * share)
+        stands = wheel(-1.0, rim=0.0, known=False, torque=-0.9)
+        return [others] * 5 + [stands if held and share > 0.0 else others]
+
+    assert (first(course([row(i) for i in range(200)])) is None) == held
+
+
+def test_a_wheel_that_sends_nothing_for_a_while_changes_nothing():
+    """What a wheel does that tells no rate is not known: the trend of the others is followed."""
+    silent = wheel(0.0, rim=0.0, known=False)._replace(rate_told=False)
+    slips = [0.2] * 100 + [min(0.2 + 0.1 * 0.1 * i, 0.7) for i in range(80)]
+    rows = [[wheel(s)] * 5 + [silent if i // 7 % 2 else wheel(s)] for i, s in enumerate(slips)]
+    assert first(course(rows)) == pytest.approx(first(course([[wheel(s)] * 6 for s in slips])))
+
+
+def test_a_wheel_that_is_dragged_is_not_stalled():
+    """Its torque is as great as that of a stalled wheel and works against the drive."""
+
+    def stalled(torque):
+        monitor = StuckMonitor()
+        rolling = [wheel(0.2, rim=1.0, torque=0.4)] * 4
+        stands = [wheel(-1.0, rim=0.0, known=False, torque=torque)] * 2
+        for i in range(30):
+            judge(monitor, 0.1 * i, 0.8, False, rolling)
+        for i in range(15):
+            found = judge(monitor, 3.0 + 0.1 * i, 0.5, False, stands + rolling[:2])
+        return found
+
+    assert stalled(0.9).stuck and stalled(0.9).stalled == (True, True, False, False)
+    assert not any(stalled(-0.9).stalled)
 
 
 def test_a_slip_that_nobody_knows_is_not_digging():

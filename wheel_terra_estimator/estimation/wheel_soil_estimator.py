@@ -75,6 +75,7 @@ from wheel_terra_estimator.estimation.judgement.stuck.settings import StuckSetti
 from wheel_terra_estimator.estimation.judgement.stuck.situation import (
     RoverMotion,
     WheelMotion,
+    driving_share,
 )
 from wheel_terra_estimator.estimation.learned import Learned
 from wheel_terra_estimator.estimation.measurements import ReferenceVelocity, StepInputs
@@ -650,7 +651,7 @@ class WheelSoilEstimator:
         slips = self._slips.update(time, rims, body)
         ekf = self._ekf
         sinkage = ekf.mean[self._layout.sinkage].tolist()
-        seen = []
+        seen, onward = [], max(known(rims), key=abs, default=0.0)
         for i, (wheel, rim) in enumerate(zip(slips, rims, strict=True)):
             limit, torque = rover.torque_limit[i], wheels.state.torque[i]
             seen.append(
@@ -659,9 +660,11 @@ class WheelSoilEstimator:
                     wheel.std,
                     0.0 if isnan(rim) else rim,
                     abs(rim) > rover.rest_speed and not wheel.resting,
-                    abs(torque) / limit if limit > 0.0 else NAN,
+                    # A wheel that stands is held, or dragged, in the direction of the others.
+                    driving_share(torque, limit, rim if abs(rim) > rover.rest_speed else onward),
                     sinkage[i],
                     rover.rim_radius[i],
+                    rate_told=not isnan(rim),
                 )
             )
         loads = self._loads.state

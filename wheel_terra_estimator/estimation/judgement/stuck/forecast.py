@@ -93,8 +93,7 @@ def outlook(s: Situation, tuning: ForecastTuning = ForecastTuning()) -> Outlook:
     """Return what lies ahead in a situation."""
     rim = max(s.fastest, _LEAST_RIM)
     horizon = max(s.settings.horizon, min(s.settings.travel / rim, _LONGEST_HORIZON))
-    sinking = [d.growth for d in s.observed.deepening]
-    digging = max(median(sinking), 0.0) if sinking else 0.0
+    digging = max(_growth_of_most([d.growth for d in s.observed.deepening]), 0.0)
     within = _way_ahead(s, rim, horizon, digging, tuning)
     wheels = tuple(
         [
@@ -108,6 +107,15 @@ def outlook(s: Situation, tuning: ForecastTuning = ForecastTuning()) -> Outlook:
         if motion.known or stands
     ]
     return Outlook(wheels, median(telling) if telling else 0.0)
+
+
+def _growth_of_most(growths: list[float]) -> float:
+    """Return the growth of the sinkage that more than half of the wheels exceed or have [-].
+
+    Half of the wheels sink where the first axle of two enters other soil: that is a step, and no
+    rover that digs itself in.
+    """
+    return sorted(growths)[(len(growths) - 1) // 2] if growths else 0.0
 
 
 def _way_ahead(

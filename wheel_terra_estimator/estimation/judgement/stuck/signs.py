@@ -189,9 +189,14 @@ def _time_to_stand(s: Situation, t: SignTuning) -> float:
 
 
 def _bogging(s: Situation, t: SignTuning) -> bool:
-    """Find wheels near their limit while the rover loses speed against its fastest wheel."""
+    """Find wheels near their limit that slow down, the rover still more than its fastest wheel.
+
+    Drives that hold their rim speed are not stalling, whatever the slip.
+    """
     # Two wheels or more: one alone may stand against a stone.
     if not (s.second_strongest > t.bog_torque and s.moving and s.fastest > 0.0):
+        return False
+    if s.typical_rim >= t.labour_ratio * s.cruise_rim:
         return False
     return _lost_share(s) > t.bog_slip and _time_to_stand(s, t) < t.bog_time
 

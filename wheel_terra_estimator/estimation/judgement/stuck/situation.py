@@ -46,6 +46,7 @@ class SituationTuning:
     standing_share: float = 0.2  # below which it has stopped
     pull_away_time: float = 1.0  # [s]: pulling away from rest looks like a stall
     stall_ratio: float = 0.6  # of the fastest rim speed: a wheel below it is held
+    standing_ratio: float = 0.1  # of it: a wheel below it stands among wheels that turn
     stall_torque: float = 0.7  # of the torque limit
     loss_window: float = 1.5  # over which the loss of speed is taken [s]
     loss_window_rounding: float = 1e-6
@@ -68,9 +69,21 @@ class WheelMotion(NamedTuple):
     slip_std: float
     rim_speed: float  # [m/s], signed
     known: bool  # a rate is known and the wheel is not at rest
-    torque_share: float  # |torque| over its limit, nan = unknown
+    torque_share: float
+    """Torque over its limit; negative where the soil turns or drags the wheel against its drive;
+    nan = unknown."""
     sinkage: float  # [m]
     radius: float  # [m]
+    rate_told: bool = True
+    """Whether a rate came of late; without one the rim speed is 0."""
+
+
+def driving_share(torque: float, limit: float, rim_speed: float) -> float:
+    """Return `WheelMotion.torque_share`; nan without a limit or a torque [N m].
+
+    `rim_speed` tells the direction [m/s]: that of the wheel, or of those that turn.
+    """
+    return math.copysign(torque, torque * rim_speed) / limit if limit > 0.0 else NAN
 
 
 class RoverMotion(NamedTuple):
@@ -109,6 +122,7 @@ class Observed(NamedTuple):
     fastest: Window = ()  # fastest rim speed over time
     typical: Window = ()  # typical rim speed over time
     deepening: tuple[Deepening, ...] = ()
+    standing: tuple[bool, ...] = ()  # wheels that stand while others turn
 
 
 @dataclass(frozen=True)
@@ -229,8 +243,11 @@ class SituationObserver(Component[Observed]):
         cruise = max(fastest, tuning.cruise_decay * old.cruise)
         rolling_since = self._rolling_since(time, fastest, cruise)
         stalled = self._stalled(motion.wheels, fastest, time - rolling_since)
-        # Slip settles over the first travel after a start: its growth there says nothing.
-        rim_travel = old.rim_travel + fastest * dt if moving else 0.0
+        standing = self._standing(motion.wheels, fastest)
+        # Slip settles over the first travel after a start: its growth there says nothing. So it
+        # does where a wheel is held or comes free: the others take over its share, and more.
+        settles_anew = not moving or standing != old.standing
+        rim_travel = 0.0 if settles_anew else old.rim_travel + fastest * dt
         settled = rim_travel > tuning.settling_travel
         effective = [w.slip for w in moving]
         effective += [1.0 for w, s in zip(motion.wheels, stalled, strict=True) if s and not w.known]
@@ -246,6 +263,7 @@ class SituationObserver(Component[Observed]):
             trend=trend,
             speeds=self._speeds(time, motion),
             fastest=rims,
+            standing=standing,
             typical=self._typical_rims(time, motion, moving),
             deepening=self._deepened(
                 motion.wheels,
@@ -291,6 +309,19 @@ class SituationObserver(Component[Observed]):
                 w.torque_share >= tuning.stall_torque
                 and abs(w.rim_speed) < tuning.stall_ratio * fastest
                 for w in wheels
+            ]
+        )
+
+    def _standing(self, wheels: Sequence[WheelMotion], fastest: float) -> tuple[bool, ...]:
+        """Return which wheels stand; as before where a wheel tells no rate or none turns."""
+        before = self.state.standing or (False,) * len(wheels)
+        if fastest <= 0.0:
+            return before
+        slow = self._tuning.standing_ratio * fastest
+        return tuple(
+            [
+                abs(w.rim_speed) < slow if w.rate_told else stood
+                for w, stood in zip(wheels, before, strict=True)
             ]
         )
 
