@@ -107,6 +107,7 @@ def test_every_command_says_what_is_damaged(
         assert 'whole messages recovered' in said.out + said.err, command
 
 
+@pytest.mark.slow
 @pytest.mark.shared
 def test_measured_drive_with_a_lost_sector(
     shared: Path, tmp_path: Path, capsys: Any, undrawn: None

@@ -120,9 +120,9 @@ def test_places_that_cannot_be_written_are_one_line_before_anything_is_computed(
 def test_full_disk_of_the_real_command(
     make_bag: Any, make_drive: Any, rover: Any, tmp_path: Path, capsys: Any
 ) -> None:
-    """A drive of two minutes onto a disk with room for little more than a megabyte."""
+    """A drive of a minute and a half onto a disk with room for little more than a megabyte."""
     rover.write(tmp_path / 'rover.yaml')
-    bag = make_bag(messages=make_drive(1400), name='long')
+    bag = make_bag(messages=make_drive(900), name='long')
     out = tmp_path / 'out'
     with largest_file(1_200_000):
         command = ['replay', str(bag), '--config', str(tmp_path / 'rover.yaml'), '-o', str(out)]

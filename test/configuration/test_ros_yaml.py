@@ -6,7 +6,7 @@ import math
 
 import pytest
 import yaml
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from wheel_terra_estimator.configuration import ros_yaml
@@ -167,6 +167,7 @@ lists = st.one_of(
 )
 
 
+@settings(max_examples=50)
 @given(st.one_of(scalars, lists))
 def test_what_is_written_is_read_back(value):
     read = ros_yaml.parse_value(ros_yaml.format_value(value), 'test')

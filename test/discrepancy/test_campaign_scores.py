@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Campaigns with something (or nothing) hidden: the workflow stays within its bands.
 
-The slow study (``tools/discrepancy_study.py``) measures the figures; twenty campaigns, or the
+The slow study (``tools/discrepancy_study.py``) measures the figures; eighteen campaigns, or the
 sixty of ``-m slow``, can only say that nothing has broken. Bands are set so that a workflow which
 meets the targets passes sixty with a probability above 99 %, and one that names by chance, or
 always, or never, passes neither.
@@ -17,9 +17,9 @@ from campaigns.groups import GROUPS
 
 FIRST_SEED = 3_000_000  # neither the seeds of tuning nor those of the study
 # Group -> campaigns per design. The heavier designs have fewer.
-TWENTY = {
-    'one': {'basic16': 6, 'sweep40': 1, 'lugs48': 1},
-    'none': {'basic16': 4, 'sweep40': 1},
+EIGHTEEN = {
+    'one': {'basic16': 6, 'lugs48': 1},
+    'none': {'basic16': 3},
     'other formula': {'basic16': 2},
     'outliers': {'sweep40': 1},
     'two': {'basic16': 3},
@@ -34,7 +34,7 @@ SIXTY = {
     'outside': {'basic16': 6},
 }
 PLANS = [
-    pytest.param(TWENTY, id='twenty'),
+    pytest.param(EIGHTEEN, id='eighteen'),
     pytest.param(SIXTY, id='sixty', marks=[pytest.mark.slow, pytest.mark.timeout(900)]),
 ]
 
@@ -59,7 +59,7 @@ def of(records, group, least=0.0, most=float('inf')):
 
 def test_hidden_effects_are_named_first(records):
     seen = of(records, 'one', 5.0)
-    assert len(seen) >= 6
+    assert len(seen) >= 5
     right = summary.share(seen, summary.first)
     assert right.value >= 0.75, right
     assert summary.share(seen, summary.in_set).value >= 0.85

@@ -20,6 +20,7 @@ from campaigns import Plan, make_campaign, scoring
 
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.discrepancy import workflow
+from wheel_terra_estimator.discrepancy.report import page as page_module
 from wheel_terra_estimator.discrepancy.report.model_file import write_model
 from wheel_terra_estimator.discrepancy.report.page import SOIL_WORDS, _cards, number, write_report
 from wheel_terra_estimator.discrepancy.report.words import _cell_noise, _shrink
@@ -97,15 +98,26 @@ def named():
 
 @pytest.fixture(scope='module')
 def written(named, tmp_path_factory):
-    """Folder of a report, and matplotlib's settings before it was written."""
+    """Folder of a report, its pictures, and matplotlib's settings before it was written."""
     folder, settings = tmp_path_factory.mktemp('report'), dict(mpl.rcParams)
-    write_report(named, folder)
-    return folder, settings
+    drawn, draw = [], page_module._figures
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(
+            page_module, '_figures', lambda *given: drawn.append(draw(*given)) or drawn[0]
+        )
+        write_report(named, folder)
+    return folder, drawn[0], settings
+
+
+@pytest.fixture
+def same_pictures(written, monkeypatch):
+    """Those of the module's report again: for tests of words."""
+    monkeypatch.setattr(page_module, '_figures', lambda *_: written[1])
 
 
 @pytest.fixture
 def page(written):
-    folder, _ = written
+    folder = written[0]
     return Page((folder / 'report.html').read_text(encoding='utf-8')), folder
 
 
@@ -202,7 +214,14 @@ def test_changed_keys_are_those_of_the_model_file(page, named, tmp_path):
     assert float(before) == pytest.approx(named.configuration.flat()[key], rel=1e-3)
 
 
-@pytest.mark.parametrize('plan', [{'hide': 'none'}, {'drop': 'torque'}, {'noise_given': False}])
+@pytest.mark.parametrize(
+    'plan',
+    [
+        {'hide': 'none'},
+        {'drop': 'torque'},
+        pytest.param({'noise_given': False}, marks=pytest.mark.slow),
+    ],
+)
 def test_every_kind_of_diagnosis_has_a_report(plan, tmp_path, undrawn):
     diagnosis = campaign_diagnosis(4, 'basic16', **plan)
     parsed = Page(write_report(diagnosis, tmp_path).read_text(encoding='utf-8'))
@@ -213,21 +232,21 @@ def test_every_kind_of_diagnosis_has_a_report(plan, tmp_path, undrawn):
         assert not any(row and row[0].strip() == 'torque [N m]' for row in parsed.rows)
 
 
-def test_unexplained_says_so(named, tmp_path, undrawn):
+def test_unexplained_says_so(named, tmp_path, same_pictures):
     odd = replace(named, verdict='unexplained', effects=(), sentence='None of the known effects.')
     parsed = Page(write_report(odd, tmp_path).read_text(encoding='utf-8'))
     assert 'Unexplained. None of the known effects.' in re.sub(r'\s+', ' ', parsed.text)
     assert 'What was added' not in parsed.text
 
 
-def test_names_from_the_table_cannot_break_the_page(named, tmp_path, undrawn):
+def test_names_from_the_table_cannot_break_the_page(named, tmp_path, same_pictures):
     table = replace(named.table, name='<b>&"x".csv')
     parsed = Page(write_report(replace(named, table=table), tmp_path).read_text(encoding='utf-8'))
     assert '<b>&"x".csv' in parsed.text
 
 
 def test_global_picture_settings_stay(written):
-    assert dict(mpl.rcParams) == written[1]
+    assert dict(mpl.rcParams) == written[2]
 
 
 @pytest.mark.parametrize(
@@ -260,8 +279,9 @@ def test_cards_show_what_the_soil_does_and_what_the_effect_does(page, named):
     assert f'{100 * min(closed):.0f}' in shown
 
 
-def test_curves_only_where_slip_was_swept(tmp_path, undrawn):
+def test_curves_only_where_slip_was_swept(tmp_path, undrawn, monkeypatch):
     """Scattered inputs make no curves, and the page does without the picture."""
+    monkeypatch.setattr(page_module.pictures, 'colour_inputs', lambda _: [])
     scattered = campaign_diagnosis(5, 'full56')
     write_report(scattered, tmp_path)
     assert not (tmp_path / 'curves_over_slip.png').exists()

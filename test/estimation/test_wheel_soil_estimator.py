@@ -71,12 +71,26 @@ def climb():
     return drive(**{'slope.angle_deg': [8.0]})
 
 
+@pytest.fixture(scope='module')
+def climbed(climb):
+    """Sets of the climb by what was told."""
+    modes = ('reference', 'no_reference', 'no_torque', 'no_sinkage', 'no_orientation')
+    return {mode: estimate(climb, mode) for mode in modes}
+
+
 def last(values, seconds=5):
     return np.mean(values[-10 * seconds :], axis=0)
 
 
-@pytest.mark.parametrize('slope', [4.0, -4.0])
-@pytest.mark.parametrize('speed', [0.05, -0.05])
+@pytest.mark.parametrize(
+    ('slope', 'speed'),
+    [
+        (4.0, 0.05),
+        (-4.0, -0.05),
+        pytest.param(-4.0, 0.05, marks=pytest.mark.slow),
+        pytest.param(4.0, -0.05, marks=pytest.mark.slow),
+    ],
+)
 def test_each_quadrant_has_the_right_signs(slope, speed):
     run = drive(**{'slope.angle_deg': [slope], 'drive.forward': [speed]})
     sets, truth = estimate(run), run.truth
@@ -93,9 +107,9 @@ def test_each_quadrant_has_the_right_signs(slope, speed):
     assert not any(s.stuck for s in sets)
 
 
-def test_every_output_is_finite_from_the_first_step(climb):
-    for mode in ('reference', 'no_reference', 'no_torque', 'no_sinkage', 'no_orientation'):
-        for s in estimate(climb, mode)[::5]:
+def test_every_output_is_finite_from_the_first_step(climbed):
+    for mode, sets in climbed.items():
+        for s in sets[::5]:
             for entry in fields(s):
                 value = getattr(s, entry.name)
                 if isinstance(value, np.ndarray):
@@ -104,18 +118,18 @@ def test_every_output_is_finite_from_the_first_step(climb):
                         assert (value >= 0.0).all()
 
 
-def test_missing_inputs_widen_the_deviations_and_are_said(climb):
-    full = estimate(climb)[-1]
+def test_missing_inputs_widen_the_deviations_and_are_said(climbed):
+    full = climbed['reference'][-1]
     for mode, key, field in (
         ('no_reference', 'reference', 'slip_std'),
         ('no_torque', 'torque', 'drawbar_pull_std'),
         ('no_sinkage', 'sinkage', 'sinkage_std'),
     ):
-        poor = estimate(climb, mode)[-1]
+        poor = climbed[mode][-1]
         assert key in poor.faults
         assert key not in full.faults
         assert getattr(poor, field).mean() > getattr(full, field).mean()
-    assert 'orientation' in estimate(climb, 'no_orientation')[-1].faults
+    assert 'orientation' in climbed['no_orientation'][-1].faults
     assert 'orientation' not in full.faults
 
 
@@ -311,7 +325,10 @@ def test_parts_of_the_wheels_and_nan_are_taken():
 
 @pytest.mark.parametrize(
     ('kind', 'mode', 'most'),
-    [('firm', 'reference', 0.04), ('cruise', 'no_reference', 0.05)],
+    [
+        pytest.param('firm', 'reference', 0.04, marks=pytest.mark.slow),
+        ('cruise', 'no_reference', 0.05),
+    ],
 )
 def test_nothing_drifts_along_the_ridge_of_slip_and_strength(kind, mode, most):
     """One contact, looked at ten times a second, must not tell slip, strength and K apart."""

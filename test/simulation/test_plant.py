@@ -38,7 +38,7 @@ def drive(plant: RoverPlant, seconds: float, forward: float = 0.05, turn: float 
     return truth
 
 
-@pytest.mark.parametrize('slope', [-8.0, 7.0, 13.0])
+@pytest.mark.parametrize('slope', [-8.0, pytest.param(7.0, marks=pytest.mark.slow), 13.0])
 def test_steady_climb_is_the_steady_state_of_the_reference(plant: MakePlant, slope: float) -> None:
     configuration = rover()
     truth = drive(plant(configuration, slope_deg=slope), 35.0)

@@ -173,7 +173,7 @@ def test_reproduction_covers_the_papers_tables():
     assert all(job.case.bed.rows == 40 for job in lunar)
 
 
-def test_comparison_page_tells_misses(tmp_path):
+def test_comparison_page_tells_misses(tmp_path, undrawn):
     arguments = argparse.Namespace(part=['table7'], seeds=1, grain_scale=0.0)
     rows = []
     for job in reproduction.jobs(arguments):

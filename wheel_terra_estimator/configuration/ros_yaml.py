@@ -46,7 +46,11 @@ class _Null:
 _NO_VALUE = _Null()
 
 
-class _RosLoader(yaml.SafeLoader):
+# That of libyaml where it is compiled in: the parser of ROS itself, and four times as fast.
+_SafeLoader: Any = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
+
+
+class _RosLoader(_SafeLoader):
     """Safe loader whose plain scalars follow ROS; resolvers are its own."""
 
     yaml_implicit_resolvers: dict[str, list[Any]] = {}  # noqa: RUF012  (PyYAML's attribute)

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import difflib
+import functools
 import importlib.metadata
 import os
 from collections.abc import Iterable, Iterator
@@ -65,7 +66,11 @@ def _candidates(top: str) -> Iterator[Path]:
 
 def files(folder: Path | None = None) -> dict[str, Path]:
     """Return the shipped files by name relative to the folder, without suffix."""
-    folder = folder or configuration_folder()
+    return dict(_files_below(folder or configuration_folder()))
+
+
+@functools.cache
+def _files_below(folder: Path) -> dict[str, Path]:
     found = sorted(p for p in folder.rglob('*') if p.suffix in ('.yaml', '.yml'))
     return {p.relative_to(folder).with_suffix('').as_posix(): p for p in found}
 

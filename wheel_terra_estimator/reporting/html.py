@@ -9,6 +9,7 @@ A report has a template that extends ``base.html`` and fills its blocks ``title`
 from __future__ import annotations
 
 import base64
+import functools
 import re
 from io import StringIO
 from pathlib import Path
@@ -18,6 +19,7 @@ from wheel_terra_estimator import __version__
 from wheel_terra_estimator.errors import UserError
 
 if TYPE_CHECKING:
+    from jinja2 import Environment
     from matplotlib.figure import Figure
 
 TEMPLATES = Path(__file__).parent / 'templates'
@@ -35,16 +37,21 @@ def render(template: str, folder: Path = TEMPLATES, **context: Any) -> str:
     **context
         Values for the template; ``version`` is added.
     """
+    return _environment(folder).get_template(template).render(version=__version__, **context)
+
+
+@functools.cache
+def _environment(folder: Path) -> Environment:
+    """Return what renders the templates of a folder; each is compiled once."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-    environment = Environment(
+    return Environment(
         loader=FileSystemLoader([folder, TEMPLATES]),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    return environment.get_template(template).render(version=__version__, **context)
 
 
 def write_page(path: Path, page: str) -> None:
