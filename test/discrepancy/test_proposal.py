@@ -18,6 +18,7 @@ from wheel_terra_estimator.terramechanics.conditioned import ConditionedForces
 from wheel_terra_estimator.terramechanics.effects.learned_closure import (
     EFFECT,
     REFERENCE_SPEED,
+    TARGETS,
     coefficients_of,
 )
 from wheel_terra_estimator.terramechanics.model import WheelSoilModel
@@ -116,6 +117,43 @@ def test_strangers_that_listed_effects_imitate_are_not_named_with_confidence(see
     assert all(effect.confidence <= 0.8 for effect in found.effects)
 
 
+def test_where_only_an_unbelievable_soil_fits_the_law_leaves_one_that_can_be_believed(tmp_path):
+    """A cohesion of 650 Pa more that may not be named: a soil 14 deviations off fits, too far."""
+    campaign = make_campaign(1070, 'lugs48', Plan(noise='mixed', missing=0.03, forms=True))
+    assert campaign.hidden == ('cohesion',)
+    found = diagnose_campaign(campaign, campaign.hidden)
+    assert found.verdict == 'unexplained'
+    assert 'too far from the configured one' in found.sentence
+    law = found.proposal
+    assert law.soil_held
+    assert law.to_dict()['soil_held']
+    far, near = (sum(shift.pull**2 for shift in soil) for soil in (found.soil, law.soil))
+    assert near < 0.2 * far
+    for quantity in ('drawbar_pull', 'torque'):
+        gap = law.gap[quantity]
+        assert gap.noise < gap.refit
+        assert gap.after < 0.9 * gap.refit
+        assert gap.after < 1.2 * gap.noise
+    configuration = reader.from_parameters(campaign.settings(), complete=False)
+    write_proposal(found, law, tmp_path / 'proposal.yaml')
+    rows = predicted(found.table.columns, configuration, tmp_path, 'proposal.yaml')
+    for q, quantity in enumerate(QUANTITIES):
+        error = np.sqrt(np.nanmean((rows[:, q] - found.table.measured[:, q]) ** 2))
+        assert error == pytest.approx(law.gap[quantity].fitted, rel=2e-2)
+
+
+def test_a_torque_sensor_that_bends_is_a_law_of_its_own_reading():
+    """Second-order sensor: T' = T - a T |T| / (W r), as a calibration curve has it."""
+    points = _points(slip=np.array([-0.3, 0.3, 0.6]))
+    lever = points.normal_load * points.wheel.radius
+    plain = WheelSoilModel(SOIL, {}).steady_state(points).torque
+    law = {'learned_closure': {'torque_by_torque_squared': -0.2}}
+    bent = WheelSoilModel(SOIL, law).steady_state(points).torque
+    x = -0.2 * plain * np.abs(plain) / lever**2
+    bound = TARGETS['torque'].bound
+    assert bent == pytest.approx(plain + lever * bound * x / (bound + np.abs(x)), rel=1e-9)
+
+
 def _points(**changes):
     wheel = Wheel(0.15, 0.15, 0.01, 20)
     given = {'slip': np.array([0.1, 0.3, 0.6]), 'normal_load': np.full(3, 80.0), 'wheel': wheel}
@@ -128,6 +166,8 @@ LAW = {
     'exponent_by_slip': 0.2,
     'torque_by_rim_speed': 0.03,
     'drawbar_pull_by_depth': -0.4,
+    'torque_by_torque_squared': -0.2,
+    'drawbar_pull_by_pull_squared': 0.3,
 }
 
 

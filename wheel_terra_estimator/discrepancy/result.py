@@ -233,6 +233,9 @@ class Proposal:
         As in ``Diagnosis``, refitted with the law.
     fit : Fit or None
         The fitted model, law included.
+    soil_held : bool
+        Refit and law hold the soil where it can be believed: another soil alone would leave no
+        gap, but is too far from the configured one.
     """
 
     words: str
@@ -247,11 +250,13 @@ class Proposal:
     soil: tuple[SoilShift, ...] = ()
     refitted: Mapping[str, FittedParameter] = field(default_factory=dict)
     fit: Fit | None = None
+    soil_held: bool = False
 
     def to_dict(self) -> dict[str, Any]:
         """Return the keys of ``report.json``."""
         return {
             'words': self.words,
+            'soil_held': self.soil_held,
             'targets': list(self.targets),
             'features': list(self.features),
             'coefficients': list(self.coefficients),

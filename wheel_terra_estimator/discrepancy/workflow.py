@@ -471,7 +471,7 @@ def _proposal(
     """Return a law where something is missing and no name is given; not on top of another."""
     if verdict.word not in OPEN or NAME in findings.setting.forward.base_effects:
         return None
-    found = propose(table, findings, gap, variance)
+    found = propose(table, findings, gap, variance, hold_soil=verdict.left.only_soil)
     if found is None or found.fit is None:
         return None
     covariance = np.asarray(np.linalg.inv(found.fit.precision()), dtype=float)

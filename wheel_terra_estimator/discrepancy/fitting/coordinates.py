@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +34,9 @@ LEAVING_RATIO_STD = 0.03
 # evidence weighs both widths.
 WIDENING = 2.5
 WORSE_SHARE = 0.15  # prior probability of the wider one
+# (width in units of the coordinates, prior probability): as stated, and worse.
+SOIL_WIDTHS = ((1.0 / WIDENING, 1.0 - WORSE_SHARE), (1.0, WORSE_SHARE))
+AS_THEY_ARE = ((1.0, 1.0),)  # of coordinates that are held on purpose
 # The same for the strength of an effect: small, large and very large ones (the catalogue cannot
 # know the size of the machine) are weighed against each other, with these shares.
 EFFECT_SCALES = (0.3, 2.0, 10.0)
@@ -177,6 +180,16 @@ def soil_coordinates(soil: Soil, stated: Mapping[str, float]) -> tuple[Coordinat
             -1.2,
             0.0,
         ),
+    )
+
+
+def narrowed(coordinates: Sequence[Coordinate], factor: float) -> tuple[Coordinate, ...]:
+    """Return the coordinates with the soil's prior so many times narrower."""
+    return tuple(
+        replace(c, scale=c.scale / factor, lower=factor * c.lower, upper=factor * c.upper)
+        if c.owner == 'soil'
+        else c
+        for c in coordinates
     )
 
 

@@ -9,6 +9,7 @@ the share of the posterior inside them over the share of the prior.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,8 +19,7 @@ from scipy.special import log_ndtr
 from wheel_terra_estimator.discrepancy.fitting.coordinates import (
     EFFECT_SCALES,
     EFFECT_SHARES,
-    WIDENING,
-    WORSE_SHARE,
+    SOIL_WIDTHS,
 )
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
 from wheel_terra_estimator.discrepancy.fitting.problem import Problem
@@ -79,6 +79,7 @@ def evidence(
     fitted: Fit,
     floors: tuple[Floor, ...],
     noise_freedom: FloatArray,
+    soil_widths: Sequence[tuple[float, float]] = SOIL_WIDTHS,
 ) -> Posterior:
     """Return the evidence of a fit for every floor.
 
@@ -89,6 +90,8 @@ def evidence(
     ----------
     noise_freedom : numpy.ndarray
         (3,) degrees of freedom with which the noise of each quantity is known (inf = given).
+    soil_widths : sequence of (width, share)
+        Widths of the soil's prior in units of its coordinates, with their probabilities.
     """
     jacobian = fitted.jacobian
     target = fitted.residual + jacobian @ fitted.u
@@ -101,7 +104,7 @@ def evidence(
     weighted = jacobian[None] / variance[:, :, None]
     information = np.swapaxes(weighted, 1, 2) @ jacobian  # (F, P, P)
     right = (target / variance) @ jacobian
-    priors, weights = _prior_precisions(fitted)  # (S, P), (S,)
+    priors, weights = _prior_precisions(fitted, soil_widths)  # (S, P), (S,)
     precision = information[None] + priors[:, None, :, None] * np.eye(len(fitted.u))
     covariance = np.asarray(np.linalg.inv(precision), dtype=float)
     mean = np.einsum('sfpq,fq->sfp', covariance, right)
@@ -133,13 +136,15 @@ def _variances(problem: Problem, floors: tuple[Floor, ...], factor: FloatArray) 
     return problem.variance(np.array([floor.amplitude for floor in floors]), factor)
 
 
-def _prior_precisions(fitted: Fit) -> tuple[FloatArray, FloatArray]:
+def _prior_precisions(
+    fitted: Fit, soil_widths: Sequence[tuple[float, float]]
+) -> tuple[FloatArray, FloatArray]:
     """(S, P) prior precisions of u for all combinations of scales; (S,) their shares."""
     soil = np.array([c.role == 'soil' for c in fitted.coordinates])
     strength = np.array([c.role == 'strength' for c in fitted.coordinates])
     sizes = list(zip(EFFECT_SCALES, EFFECT_SHARES, strict=True)) if strength.any() else [(1.0, 1.0)]
     combinations, weights = [], []
-    for width, share in ((1.0 / WIDENING, 1.0 - WORSE_SHARE), (1.0, WORSE_SHARE)):
+    for width, share in soil_widths:
         for size, part in sizes:
             scale = np.where(soil, width, np.where(strength, size, 1.0))
             combinations.append(scale**-2)

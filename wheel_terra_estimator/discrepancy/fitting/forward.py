@@ -171,56 +171,68 @@ class Forward:
         start: FloatArray | None = None,
         jacobian: bool = True,
         by: Sequence[Sequence[int]] | None = None,
+        known: FloatArray | None = None,
     ) -> State:
         """Solve the load balance of every hypothesis; with Jacobians by u unless told otherwise.
 
-        ``by`` names the coordinates of each hypothesis by which to differentiate (default: all).
+        Parameters
+        ----------
+        start : numpy.ndarray, optional
+            (B, N) or (N,) entrance angles near the solution [rad].
+        by : sequence, optional
+            Coordinates of each hypothesis by which to differentiate (default: all).
+        known : numpy.ndarray, optional
+            (N, 3) outputs of all hypotheses where ``start`` is the solution: nothing is solved.
         """
         if by is None:
             by = [range(len(h)) for h in hypotheses]
         if start is not None:
             start = np.broadcast_to(start, (len(u), len(self.points)))
-        dear = [self._acts_on_stress(h) for h in hypotheses]
-        if any(dear) and not all(dear):
-            return self._split(hypotheses, u, start, jacobian, by, dear)
+        groups: dict[frozenset[str], list[int]] = {}
+        for b, hypothesis in enumerate(hypotheses):
+            groups.setdefault(self._acting_on_stress(hypothesis), []).append(b)
+        if len(groups) > 1:
+            return self._apart(hypotheses, u, start, jacobian, by, known, list(groups.values()))
         columns = [
             {c.key: float(c.value(x)) for c, x in zip(h, values, strict=True)}
             for h, values in zip(hypotheses, u, strict=True)
         ]
-        angle, outputs = self._balance(hypotheses, columns, start)
+        if known is None or start is None:
+            angle, outputs = self._balance(hypotheses, columns, start)
+        else:
+            angle, outputs = start, np.broadcast_to(known, (*start.shape, 3))
         if not jacobian:
             return State([np.asarray(x) for x in u], angle, outputs, [], [])
         return self._differences(hypotheses, u, by, columns, angle, outputs)
 
-    def _acts_on_stress(self, hypothesis: Sequence[Coordinate]) -> bool:
-        """Whether a term of the hypothesis works at every node of the quadrature, at a price."""
+    def _acting_on_stress(self, hypothesis: Sequence[Coordinate]) -> frozenset[str]:
+        """Terms of the hypothesis that work at every node of the quadrature, at a price."""
         owners = {c.owner for c in hypothesis} - {'soil'} - self.base_effects.keys()
-        return any(self.catalogue[name].on_normal_stress is not None for name in owners)
+        return frozenset(n for n in owners if self.catalogue[n].on_normal_stress is not None)
 
-    def _split(
+    def _apart(
         self,
         hypotheses: Sequence[Sequence[Coordinate]],
         u: Sequence[FloatArray],
         start: FloatArray | None,
         jacobian: bool,
         by: Sequence[Sequence[int]],
-        dear: Sequence[bool],
+        known: FloatArray | None,
+        groups: Sequence[Sequence[int]],
     ) -> State:
-        """Solve the dear hypotheses apart, so that the others need not pay for them."""
+        """Solve groups of hypotheses apart, so that none pays for the dear terms of others."""
         angle = np.empty((len(u), len(self.points)))
         outputs = np.empty((*angle.shape, 3))
         jacobians: list[FloatArray] = [np.empty(0)] * (len(u) if jacobian else 0)
         slopes = list(jacobians)
-        for group in (
-            [b for b, d in enumerate(dear) if d],
-            [b for b, d in enumerate(dear) if not d],
-        ):
+        for group in groups:
             part = self.solve(
                 [hypotheses[b] for b in group],
                 [u[b] for b in group],
                 None if start is None else start[group],
                 jacobian,
                 [by[b] for b in group],
+                known,
             )
             angle[group], outputs[group] = part.angle, part.outputs
             for k, b in enumerate(group if jacobian else ()):
@@ -320,6 +332,12 @@ class Forward:
                 contact, terms = self._contact(hypotheses, [columns[int(b)] for b in live])
             balance, outputs = self._response(contact, terms, angle)
             relative = balance / contact.normal_load
+            done = np.max(np.abs(relative), axis=1) < _TOLERANCE
+            narrow = np.max(high - low, axis=1) < 1e-12
+            finished = done | narrow | (iteration == _ITERATIONS - 1)
+            angles[live[finished]], solved[live[finished]] = angle[finished], outputs[finished]
+            if finished.all():
+                break
             with np.errstate(divide='ignore', invalid='ignore'):
                 ratio = np.log(np.maximum(1.0 + relative, 1e-9))
                 if iteration == 0:
@@ -331,12 +349,6 @@ class Forward:
                     usable = np.isfinite(secant) & (secant > 0.2) & (np.abs(ratio) > 1e-9)
                     exponent = np.where(usable, secant, exponent)
                 proposal = angle * np.exp(-ratio / exponent)
-            done = np.max(np.abs(relative), axis=1) < _TOLERANCE
-            narrow = np.max(high - low, axis=1) < 1e-12
-            finished = done | narrow | (iteration == _ITERATIONS - 1)
-            angles[live[finished]], solved[live[finished]] = angle[finished], outputs[finished]
-            if finished.all():
-                break
             low = np.where(relative < 0.0, np.maximum(low, angle), low)
             high = np.where(relative >= 0.0, np.minimum(high, angle), high)
             before, old_ratio = angle, ratio

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from wheel_terra_estimator.discrepancy.assessment.held_out import hold_out, slip_groups
 from wheel_terra_estimator.discrepancy.effect_keys import effect_of
+from wheel_terra_estimator.discrepancy.fitting.coordinates import AS_THEY_ARE, narrowed
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
 from wheel_terra_estimator.discrepancy.proposal.words import law_in_words, limits_of_trust
 from wheel_terra_estimator.discrepancy.result import LeftOut, Proposal, QuantityGap
@@ -27,12 +28,15 @@ from wheel_terra_estimator.discrepancy.selection.candidates import (
     Setting,
     linear_starts,
 )
+from wheel_terra_estimator.discrepancy.selection.remainder import IMPROBABLE_SOIL
 from wheel_terra_estimator.discrepancy.selection.search import Findings
 from wheel_terra_estimator.discrepancy.selection.signatures import against_soil
+from wheel_terra_estimator.discrepancy.selection.significance import soil_p_value
 from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES, SteadyTable
 from wheel_terra_estimator.terramechanics.effects.base import Effect
 from wheel_terra_estimator.terramechanics.effects.learned_closure import (
     BANDS,
+    BENT_READINGS,
     EFFECT,
     FEATURES,
     NAME,
@@ -49,7 +53,9 @@ _LEVELS = 6  # levels of an input that are left out one at a time, at most
 _CLOSED = 0.15  # share of the gap on what was left out that a law must close
 _SMALL_FLOOR = 0.015  # structural error that stays beside a law [share of the range]
 _WORSE = 1.1  # times the soil refit: an error of one quantity that no law may reach ...
-_FINE = 1.35  # ... unless it is no more than so many times the noise
+_FINE = 1.35  # ... unless it is no more than so many times the noise, ...
+_PAYS = 5.0  # ... or so many times as much (in squared noise deviations) goes from the others
+_HOLDS = (2.5, 5.0, 10.0, 20.0, 40.0)  # times narrower: until the refitted soil can be believed
 _ALIKE = 0.8  # cosine of two signatures from which one resembles the other
 _RESEMBLING = 3
 # Terms that are the law of a named effect.
@@ -60,6 +66,8 @@ _SAME = {
     'torque_by_one': 'drivetrain_friction',
     'drawbar_pull_by_one': 'pull_zero',
     'drawbar_pull_by_load': 'pull_zero',
+    'torque_by_torque_squared': 'torque_gain',
+    'drawbar_pull_by_pull_squared': 'pull_gain',
     'sinkage_by_one': 'sinkage_offset',
     'shear_modulus_by_load': 'shear_deformation',
     'bearing_pressure_by_pass': 'multipass',
@@ -77,7 +85,12 @@ _LEVEL_INPUTS = (
 
 
 def propose(
-    table: SteadyTable, findings: Findings, gap: Mapping[str, QuantityGap], variance: FloatArray
+    table: SteadyTable,
+    findings: Findings,
+    gap: Mapping[str, QuantityGap],
+    variance: FloatArray,
+    *,
+    hold_soil: bool = False,
 ) -> Proposal | None:
     """Return the law that the rows ask for; None where none predicts what was left out.
 
@@ -89,11 +102,20 @@ def propose(
         As reported: ``before``, ``noise`` and the range of each quantity are taken from it.
     variance : numpy.ndarray
         (m,) of the rotated axes, for the predictions of what was left out.
+    hold_soil : bool
+        Hold the soil where it can be believed, in the refit as well: where only another soil leaves
+        no gap, the law has to do without it, or is none.
     """
     # A large smooth error would take up what the law is to say.
     floors = tuple(floor for floor in findings.setting.floors if floor.largest <= _SMALL_FLOOR)
     setting = replace(findings.setting, effects=_terms(table), floors=floors)
     plain = setting.fit([()], [findings.nothing.u], findings.nothing.angle)[0]
+    for factor in _HOLDS if hold_soil else ():
+        if _soil_is_believed(plain, findings):
+            break
+        narrow = narrowed(findings.setting.nuisance, factor)
+        setting = replace(setting, nuisance=narrow, soil_widths=AS_THEY_ARE)
+        plain = setting.fit([()], [np.zeros(len(plain.u))], findings.nothing.angle)[0]
     nothing = setting.explain(plain)
     refit = setting.fit([()], [plain.u], plain.angle, variance)[0]
     groupings = _groupings(table, len(setting.forward.points))
@@ -101,6 +123,8 @@ def propose(
     for law in _search(setting, nothing):
         fitted = setting.fit([law.names], [law.fitted.u], law.fitted.angle, variance)[0]
         fits = [refit, fitted]
+        if hold_soil and not _soil_is_believed(fitted, findings):
+            continue
         judged = {
             name: _left_out(setting, fits, variance, groups, findings, table)
             for name, groups in groupings.items()
@@ -110,7 +134,31 @@ def propose(
             best, most = (fits, judged), closed
     if best is None:
         return None
-    return _proposal(table, findings, setting, *best, gap)
+    found = _proposal(table, findings, setting, *best, gap)
+    if not hold_soil:
+        return found
+    return replace(found, soil_held=True, fit=_widened(best[0][1], findings))
+
+
+def _soil_is_believed(fitted: Fit, findings: Findings) -> bool:
+    return soil_p_value(_widened(fitted, findings)) > IMPROBABLE_SOIL
+
+
+def _widened(fitted: Fit, findings: Findings) -> Fit:
+    """Return a fit whose soil was held in the usual, wide coordinates."""
+    wide = findings.setting.nuisance
+    factor = np.ones(len(fitted.u))
+    factor[: len(wide)] = [
+        c.scale / w.scale for c, w in zip(fitted.coordinates, wide, strict=False)
+    ]
+    return replace(
+        fitted,
+        coordinates=(*wide, *fitted.coordinates[len(wide) :]),
+        u=fitted.u * factor,
+        sensitivity=fitted.sensitivity / factor,
+        jacobian=fitted.jacobian / factor,
+        prior=fitted.prior / factor**2,
+    )
 
 
 def promise_on_top(table: SteadyTable, setting: Setting, fitted: Fit) -> float:
@@ -118,9 +166,10 @@ def promise_on_top(table: SteadyTable, setting: Setting, fitted: Fit) -> float:
 
     Near zero where the fit leaves noise alone; several nats where what is left has the shape of
     some closure, so that the named effect is not the whole truth, or not the truth. Bands of slip
-    are left out: the confidence that this is a feature of was fitted without them.
+    and bent readings are left out: the confidence that this is a feature of was fitted without.
     """
-    found = {name: term for name, term in _terms(table).items() if pair_of(name)[1] not in BANDS}
+    late = {*BANDS, *BENT_READINGS}
+    found = {name: term for name, term in _terms(table).items() if pair_of(name)[1] not in late}
     terms = replace(setting, effects=found)
     starts = linear_starts(terms, fitted, tuple(terms.effects))
     return max((promise for promise, _, _ in starts), default=0.0)
@@ -234,14 +283,19 @@ def _measured(table: SteadyTable, findings: Findings) -> FloatArray:
 
 def _closed(judged: Mapping[str, Mapping[str, LeftOut]], gap: Mapping[str, QuantityGap]) -> float:
     """Share of the gap on what was left out that a law closes; 0 where it worsens a quantity."""
-    open_refit = open_law = 0.0
+    open_refit = open_law = lost = gained = 0.0
+    worsened = False
     for quantities in judged.values():
         for name, item in quantities.items():
             noise = gap[name].noise or 1e-9
-            if item.law > max(_WORSE * item.refit, _FINE * noise):
-                return 0.0
-            open_refit += max(item.refit**2 / noise**2 - 1.0, 0.0)
-            open_law += max(item.law**2 / noise**2 - 1.0, 0.0)
+            worsened |= item.law > max(_WORSE * item.refit, _FINE * noise)
+            refit, law = (item.refit / noise) ** 2, (item.law / noise) ** 2
+            lost += max(law - refit, 0.0)
+            gained += max(refit - law, 0.0)
+            open_refit += max(refit - 1.0, 0.0)
+            open_law += max(law - 1.0, 0.0)
+    if worsened and gained < _PAYS * lost:
+        return 0.0
     return 1.0 - math.sqrt(open_law / open_refit) if open_refit > 0.0 else 0.0
 
 

@@ -148,6 +148,11 @@ def in_words(diagnosis: Diagnosis) -> dict[str, list[str]]:
         following.append(f'Look first where the gap is largest: {diagnosis.where.sentence}.')
     if diagnosis.verdict in OPEN:
         following += _to_settle(diagnosis)
+    if diagnosis.proposal and diagnosis.proposal.soil_held:
+        following.append(
+            'The proposed law leaves a soil that can be believed; the refit without a law does not. '
+            'A measured soil number decides between the two.'
+        )
     if diagnosis.proposal:
         following.append(
             'Until then proposal.yaml may stand in, inside the range of these rows only.'

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wheel_terra_estimator.discrepancy.fitting.coordinates import (
+    SOIL_WIDTHS,
     Coordinate,
     effect_coordinates,
     loose_precision,
@@ -60,6 +61,8 @@ class Setting:
         The visible effects.
     deepest : float
         Greatest rim sinkage of the baseline [m].
+    soil_widths : sequence of (width, share)
+        Of the soil's prior, as in ``evidence``.
     """
 
     forward: Forward
@@ -70,6 +73,7 @@ class Setting:
     floors: tuple[Floor, ...]
     noise_freedom: FloatArray
     deepest: float
+    soil_widths: Sequence[tuple[float, float]] = SOIL_WIDTHS
 
     def coordinates(self, names: Iterable[str]) -> tuple[Coordinate, ...]:
         """Return nuisance coordinates followed by those of the effects."""
@@ -102,7 +106,9 @@ class Setting:
 
     def explain(self, fitted: Fit) -> Explanation:
         """Weigh a fit."""
-        posterior = evidence(self.problem, fitted, self.floors, self.noise_freedom)
+        posterior = evidence(
+            self.problem, fitted, self.floors, self.noise_freedom, self.soil_widths
+        )
         return Explanation(fitted, posterior, marginal(posterior, self.floors))
 
 
@@ -186,13 +192,23 @@ def _strength_responses(
             (state.outputs[0], state.angle[0], state.jacobian[0][..., k : k + 1])
             for k in range(len(trials))
         ]
-    state = setting.forward.solve(
-        [(*base.coordinates, *own) for _, own, _ in trials],
-        [np.concatenate([base.u, shape]) for _, _, shape in trials],
-        np.broadcast_to(base.angle, (len(trials), len(base.angle))),
-        by=[[fixed]] * len(trials),
-    )
-    return list(zip(state.outputs, state.angle, state.jacobian, strict=True))
+    # At rest everything but the strength stands where the base does.
+    at_rest = [shape[0] == own[0].coordinate(own[0].neutral) for _, own, shape in trials]
+    found: dict[int, tuple[FloatArray, FloatArray, FloatArray]] = {}
+    for known in (base.outputs, None):
+        places = [k for k, rests in enumerate(at_rest) if rests == (known is not None)]
+        if not places:
+            continue
+        state = setting.forward.solve(
+            [(*base.coordinates, *trials[k][1]) for k in places],
+            [np.concatenate([base.u, trials[k][2]]) for k in places],
+            base.angle,
+            by=[[fixed]] * len(places),
+            known=known,
+        )
+        answers = zip(state.outputs, state.angle, state.jacobian, strict=True)
+        found.update(zip(places, answers, strict=True))
+    return [found[k] for k in range(len(trials))]
 
 
 def _linear_gain(precision: FloatArray, mean: FloatArray, strength: float, reduced: Fit) -> float:

@@ -35,7 +35,6 @@ from wheel_terra_estimator.discrepancy.selection.weights import (
     MISFIT,
     MOST_EFFECTS,
     Selection,
-    explain_fewer,
     explain_members,
     explain_more,
     explain_pairs,
@@ -53,10 +52,11 @@ _ROBUST_FLOOR = 0.02  # floor of the later ones
 _PASSES = 5
 _LATENT_FLOOR = 0.03  # structural error allowed while slips are moved [share of range]
 _CELLS = 8  # measured cells for each effect of a set, at least
-_SEEDS = 3  # sets to which one effect more is added
+_SEEDS = 3  # sets of each size to which one effect more is added
+_BEHIND = 3.0  # nats behind the best of all, up to which that is done
+_ROUNDS = 2  # of adding and swapping
 _SWAPS = 3  # sets in which others are put in the place of each effect, at most
 _NEAR = 2.0  # nats behind the best one, up to which that is done
-_GAIN = 0.5  # nats by which a larger set must be better to be gone on from
 _FARTHEST = 2.0  # a slip is moved by at most so many of its deviations
 
 
@@ -221,7 +221,7 @@ def _select(setting: Setting, nothing: Fit) -> Selection:
     explanations += explain_pairs(setting, singles, incompatible)
     selection = weigh(explanations, setting.floors, setting.effects)
     if len(selection.explanations[0].names) < 2:
-        if selection.misfit < MISFIT:
+        if selection.misfit < MISFIT and not _seeds(selection, 2):
             return selection
         return _with_more(setting, selection, incompatible)
     # A pair may have found a layer's depth or a mound's onset that its member alone had missed.
@@ -238,24 +238,49 @@ def _select(setting: Setting, nothing: Fit) -> Selection:
 def _with_more(
     setting: Setting, selection: Selection, incompatible: Mapping[str, frozenset[str]]
 ) -> Selection:
-    """Go on from the best sets: one effect more, then each of the set left out, while that helps.
+    """Go on from the best sets of each size: one effect more, while that is near the best of all.
 
-    The best sets are those that would be if no misfit asked for a name, though none of them may be
-    good enough yet.
+    A set that costs more than it gains may lead to one that gains, so that sets some nats behind
+    are gone on from as well. Then each effect of the best set is left out, and others are put in
+    its place; where that changes it, once more from there. The best sets are those that would be
+    if no misfit asked for a name, though none of them may be good enough yet.
     """
     most = min(MOST_EFFECTS, setting.problem.size // _CELLS)
-    for _ in range(most):
-        leaders = selection.without_misfit(_SEEDS)
-        before = leaders[0][0]
-        seeds = [e for _, e in leaders if 1 <= len(e.names) < most]
-        selection = _joined_by(
-            setting, selection, [e for s in seeds for e in explain_more(setting, s, incompatible)]
-        )
-        after, top = selection.without_misfit(1)[0]
-        if after < before + _GAIN or len(top.names) < 2:
+    extended: set[tuple[str, ...]] = set()
+    swapped: set[frozenset[str]] = set()
+    for _ in range(_ROUNDS):
+        for size in range(1, most):
+            seeds = [e for e in _seeds(selection, size) if e.names not in extended]
+            extended |= {e.names for e in seeds}
+            more = [e for seed in seeds for e in explain_more(setting, seed, incompatible)]
+            selection = _joined_by(setting, selection, more)
+        before = selection.without_misfit(1)[0][1].names
+        selection = _with_swaps(setting, selection, incompatible, swapped)
+        top = selection.without_misfit(1)[0][1]
+        if top.names == before or len(top.names) >= most:
             break
-        selection = _joined_by(setting, selection, explain_fewer(setting, top))
-    done: set[frozenset[str]] = set()
+    return selection
+
+
+def _seeds(selection: Selection, size: int) -> list[Explanation]:
+    """Return the best sets of a size that are not far behind the best of all, in one form each."""
+    leaders = selection.without_misfit(len(selection.explanations))
+    found: dict[frozenset[str], Explanation] = {}
+    for weight, explanation in leaders:
+        if weight < leaders[0][0] - _BEHIND:
+            break
+        if len(explanation.names) == size:
+            found.setdefault(_effects(explanation), explanation)
+    return list(found.values())[:_SEEDS]
+
+
+def _with_swaps(
+    setting: Setting,
+    selection: Selection,
+    incompatible: Mapping[str, frozenset[str]],
+    done: set[frozenset[str]],
+) -> Selection:
+    """Put others in the place of each effect of the best sets."""
     for _ in range(_SWAPS):
         leaders = selection.without_misfit(_SEEDS)
         best = next(

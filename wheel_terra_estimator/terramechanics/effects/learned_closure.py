@@ -120,10 +120,34 @@ def _rim_speed(contact: Contact, maths: Any) -> Any:
     return maths.where(maths.isnan(contact.rim_speed), 0.0, decades)
 
 
+def _signed_square(share: Any, maths: Any) -> Any:
+    return share * maths.abs(share)
+
+
+def _torque_squared(contact: Contact, maths: Any) -> Any:
+    scale = maths.maximum(contact.stated_load * contact.radius, _LEAST)
+    return _signed_square(contact.direction * contact.torque / scale, maths)
+
+
+def _pull_squared(contact: Contact, maths: Any) -> Any:
+    scale = maths.maximum(contact.stated_load, _LEAST)
+    return _signed_square(contact.direction * contact.drawbar_pull / scale, maths)
+
+
 BANDS: Mapping[str, Feature] = {
     'slip_near_02': Feature(_near(0.2), 0.5, ('slip',), 'a band of |s| around 0.2', _IN_A_BAND),
     'slip_near_04': Feature(_near(0.4), 0.5, ('slip',), 'a band of |s| around 0.4', _IN_A_BAND),
     'slip_near_06': Feature(_near(0.6), 0.5, ('slip',), 'a band of |s| around 0.6', _IN_A_BAND),
+}
+
+# The curve of a sensor that bends: the first term beyond a gain, odd so that both ways are alike.
+BENT_READINGS: Mapping[str, Feature] = {
+    'torque_squared': Feature(
+        _torque_squared, 0.15, ('slip', 'normal_load'), 'T |T| / (W r)^2', ('torque',)
+    ),
+    'pull_squared': Feature(
+        _pull_squared, 0.1, ('slip', 'normal_load'), 'F |F| / W^2', ('drawbar_pull',)
+    ),
 }
 
 FEATURES: Mapping[str, Feature] = {
@@ -149,6 +173,7 @@ FEATURES: Mapping[str, Feature] = {
         'z/r',
         _AFTER_CONTACT,
     ),
+    **BENT_READINGS,
 }
 
 
