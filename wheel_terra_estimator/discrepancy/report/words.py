@@ -150,7 +150,7 @@ def in_words(diagnosis: Diagnosis) -> dict[str, list[str]]:
         following += _to_settle(diagnosis)
     if diagnosis.proposal and diagnosis.proposal.soil_held:
         following.append(
-            'The proposed law leaves a soil that can be believed; the refit without a law does not. '
+            'The proposed law leaves a soil that can be believed; the refit without it does not. '
             'A measured soil number decides between the two.'
         )
     if diagnosis.proposal:
