@@ -90,6 +90,7 @@ def test_never_nan_outside_the_valid_range(models, z, ratio):
     state = WheelState(ratio, z, 100.0, 0.0, 0.0, rim_speed=0.05)
     answer = models.forces(0, state)
     assert np.isfinite([answer.torque, answer.pull, *answer.d_torque, *answer.d_pull]).all()
+    assert models.pull(0, state) == answer.pull
     assert models.bearing(0, state).load > 0.0
 
 

@@ -285,6 +285,10 @@ def test_the_filter_s_forces_from_the_sinkage_agree_with_the_model(name: str, sl
     known = {'rim_speed': 2.0 * WHEEL.radius}
     args = [ratio, steady.sinkage[0], 150.0, SAND.cohesion, TAN, SAND.shear_modulus]
     forces = wheel.forces(0, *args, **known)
+    for way in ({}, {'direction': -1.0}, {'leaving_angle': -0.2}):
+        full = wheel.forces(0, *args, **known, **way)
+        alone = wheel.forces(0, *args, **known, **way, derivatives=False)
+        assert (alone.torque, alone.drawbar_pull) == (full.torque, full.drawbar_pull)
     # In skid the filter's form keeps one place per side, the model takes four.
     share = 2e-3 if slip > 0.0 else 0.03
     assert forces.torque == pytest.approx(steady.torque[0], rel=share, abs=0.01)

@@ -53,6 +53,8 @@ def test_speed_ratio_is_the_inverse() -> None:
     assert slip_of_speed_ratio(speed_ratio(slip)) == pytest.approx(slip)
     for value in (-0.7, 0.0, 0.4, 1.0):
         assert speed_ratio(value, ScalarMaths) == pytest.approx(float(speed_ratio(np.array(value))))
+    for ratio in (-1.0, -0.0, 0.3, 1.0, 2.5):  # opposed, standing, driving, rolling, braking
+        assert slip_of_speed_ratio(ratio, ScalarMaths) == float(slip_of_speed_ratio(ratio))
 
 
 def test_change_of_radius() -> None:

@@ -38,6 +38,7 @@ _LEAST = (0.0, 1e-3, 0.0, 0.0, 1e-6)
 # Smallest size of speed ratio, load, c, tan(phi), K for the finite steps through the effects.
 _FLOORS = (1.0, 1.0, 100.0, 0.1, 0.01)
 _BEHIND, _AHEAD = -0.5 * math.pi, 0.25 * math.pi  # of a measured leaving angle [rad]
+_NOWHERE = (0.0,) * 5  # rates that are not asked for
 _LARGEST_COSINE = math.cos(SMALLEST_ANGLE)
 
 
@@ -126,6 +127,7 @@ class ConditionedForces(ScalarWheels):
         pass_number: float = 1.0,
         slope: float = 0.0,
         direction: float = 1.0,
+        derivatives: bool = True,
     ) -> Forces:
         """Torque and pull of wheel `index`, positive forward; travel along `direction`.
 
@@ -143,6 +145,8 @@ class ConditionedForces(ScalarWheels):
             Rotation of the stress centroid, positive towards the front [rad].
         leaving_angle, rim_speed, pass_number, slope, direction
             As in ``OperatingPoints``; nan = not known; direction is +1 or -1.
+        derivatives : bool
+            False leaves them out, at half the cost: the answer's are empty.
         """
         contact, slip_radius = self._wheels[index]
         contact.rim_speed, contact.pass_number = rim_speed, pass_number
@@ -172,6 +176,9 @@ class ConditionedForces(ScalarWheels):
             leaving = None
         elif not _BEHIND <= leaving_angle <= _AHEAD:
             leaving, clamped = min(max(leaving_angle, _BEHIND), _AHEAD), True
+        if not derivatives:
+            torque, pull, outside = self._alone(index, given, sinkage, leaving, centroid_shift)
+            return Forces(torque, pull, (), (), clamped or outside)
         if self._plain and leaving is None:
             angle, outside = self._inputs(index, given, sinkage)
             by_angle = _set_shares(contact, angle)
@@ -201,6 +208,25 @@ class ConditionedForces(ScalarWheels):
             return self._with_force_terms(index, answer, given, sinkage, leaving)
         return answer
 
+    def _alone(
+        self,
+        index: int,
+        given: tuple[float, ...],
+        sinkage: float,
+        leaving: float | None,
+        shift: float,
+    ) -> tuple[float, float, bool]:
+        """Return torque and pull; whether the sinkage is outside the model."""
+        contact = self._wheels[index][0]
+        angle, outside = self._inputs(index, given, sinkage)
+        self._place(contact, angle, leaving)
+        torque, pull, _, _ = balanced_forces(contact, shift, _NOWHERE, _NOWHERE)
+        if contact.direction < 0.0:
+            torque, pull = -torque, -pull
+        if self._on_forces:
+            torque, pull = self._read(index, given, sinkage, leaving, torque, pull)
+        return torque, pull, outside
+
     def _chain(
         self, index: int, given: tuple[float, ...], sinkage: float, leaving: float | None
     ) -> tuple[Direction, tuple[float, float], tuple[float, ...], bool]:
@@ -217,10 +243,12 @@ class ConditionedForces(ScalarWheels):
         """
         contact = self._wheels[index][0]
         u, load, cohesion, friction, modulus = given
-        du, d_load, d_cohesion, d_friction, d_modulus = [
-            _STEP * (value if value > floor else floor)
-            for value, floor in zip(given, _FLOORS, strict=True)
-        ]  # fmt: skip
+        of_u, of_load, of_cohesion, of_friction, of_modulus = _FLOORS
+        du = _STEP * (u if u > of_u else of_u)
+        d_load = _STEP * (load if load > of_load else of_load)
+        d_cohesion = _STEP * (cohesion if cohesion > of_cohesion else of_cohesion)
+        d_friction = _STEP * (friction if friction > of_friction else of_friction)
+        d_modulus = _STEP * (modulus if modulus > of_modulus else of_modulus)
         further = load if self._load_moves_soil else load + d_load  # else `_by_load` has it
         moved = (
             u + du, further, cohesion + d_cohesion, friction + d_friction, modulus + d_modulus
@@ -262,10 +290,16 @@ class ConditionedForces(ScalarWheels):
         contact = self._wheels[index][0]
         step = _STEP * max(given[1], _FLOORS[1])
         angle, _ = self._inputs(index, (given[0], given[1] + step, *given[2:]), sinkage)
-        self._set_angles(contact, angle, leaving)
-        nowhere = (0.0,) * 5
-        torque, pull, _, _ = balanced_forces(contact, shift, nowhere, nowhere)
+        self._place(contact, angle, leaving)
+        torque, pull, _, _ = balanced_forces(contact, shift, _NOWHERE, _NOWHERE)
         return (torque - base[0]) / step, (pull - base[1]) / step
+
+    def _place(self, contact: Contact, angle: float, leaving: float | None) -> None:
+        """Set the angles, as `_set_angles` without the rates."""
+        if self._proportional and leaving is None:
+            _set_shares(contact, angle)
+        else:
+            set_angles(contact, angle, leaving, self._terms, ScalarMaths)
 
     def _set_angles(
         self, contact: Contact, angle: float, leaving: float | None
@@ -314,39 +348,48 @@ class ConditionedForces(ScalarWheels):
         leaving: float | None,
     ) -> Forces:
         """Apply the terms that act on torque and pull, and to their derivatives (finite steps)."""
-        contact = self._wheels[index][0]
-
-        def read(
-            inputs: tuple[float, ...], depth: float, torque: float, pull: float
-        ) -> tuple[float, float]:
-            t1, _ = self._inputs(index, inputs, depth)
-            set_angles(contact, t1, leaving, self._terms, ScalarMaths)
-            contact.torque, contact.drawbar_pull = torque, pull
-            for term, parameters in self._on_forces:
-                term(contact, parameters, ScalarMaths)
-            return contact.torque, contact.drawbar_pull
-
+        rim_radius = self._wheels[index][0].rim_radius
         soil = forces.torque, forces.drawbar_pull
-        base = read(given, sinkage, *soil)
+        base = self._read(index, given, sinkage, leaving, *soil)
         rows = (list(forces.d_torque), list(forces.d_pull))
         # Columns of INPUTS; the last is the sinkage, the others the entries of ``given``.
         for position, column in enumerate((0, 2, 3, 4, 5, 1, 6)):
             inputs, depth, step = list(given), sinkage, _STEP
             if column == 1:
-                step = _STEP * contact.rim_radius
+                step = _STEP * rim_radius
                 depth += step
             elif column < 6:
                 step = _STEP * max(given[position], _FLOORS[position])
                 inputs[position] += step
-            moved = read(
+            moved = self._read(
+                index,
                 tuple(inputs),
                 depth,
+                leaving,
                 soil[0] + step * forces.d_torque[column],
                 soil[1] + step * forces.d_pull[column],
             )
             for k in (0, 1):
                 rows[k][column] = (moved[k] - base[k]) / step
         return Forces(*base, tuple(rows[0]), tuple(rows[1]), forces.clamped)
+
+    def _read(
+        self,
+        index: int,
+        given: tuple[float, ...],
+        sinkage: float,
+        leaving: float | None,
+        torque: float,
+        pull: float,
+    ) -> tuple[float, float]:
+        """Return torque and pull as the terms on them make them read."""
+        contact = self._wheels[index][0]
+        angle, _ = self._inputs(index, given, sinkage)
+        set_angles(contact, angle, leaving, self._terms, ScalarMaths)
+        contact.torque, contact.drawbar_pull = torque, pull
+        for term, parameters in self._on_forces:
+            term(contact, parameters, ScalarMaths)
+        return contact.torque, contact.drawbar_pull
 
 
 def _set_shares(contact: Contact, angle: float) -> tuple[float, float]:

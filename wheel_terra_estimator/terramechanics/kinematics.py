@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from wheel_terra_estimator.terramechanics.maths import ScalarMaths
+
 # A locked wheel (s = -1) has v/w without bound; this floor on 1 + s keeps it finite, with a shear
 # that is saturated long before.
 _LOCKED = 1e-6
@@ -53,6 +55,10 @@ def speed_ratio(slip: Any, maths: Any = np) -> Any:
 
 def slip_of_speed_ratio(ratio: Any, maths: Any = np) -> Any:
     """Return the slip ratio for u = v/(r w); the inverse of `speed_ratio` for u >= 0 [-]."""
+    if maths is ScalarMaths:  # what the filter asks for most often, and nothing is worked out twice
+        if ratio <= 1.0:
+            return 1.0 - ratio if ratio >= 0.0 else 1.0
+        return 1.0 / ratio - 1.0 if ratio >= 1.0 else 0.0
     driving = 1.0 - maths.maximum(ratio, 0.0)
     braking = 1.0 / maths.maximum(ratio, 1.0) - 1.0
     return maths.where(ratio <= 1.0, driving, braking)

@@ -132,12 +132,16 @@ class Pulls(Component[PullState]):
         n = self._rover.wheel_count
         pull, std = [0.0] * n, [0.0] * n
         torque, excess = list(state.torque), list(state.torque_excess)
-        own = np.zeros(n)  # variances that no other wheel shares
+        own = [0.0] * n  # variances that no other wheel shares
         joint = np.zeros((n, n))
         scrub = [(tuning.scrub_std * lateral_motion * load) ** 2 for load in loads.load]
         if forces is not None:
-            pulls, torques = forces.moved_to(mean)
+            pulls, torques = [moved.tolist() for moved in forces.moved_to(mean)]
             joint = forces.pull_rows @ covariance @ forces.pull_rows.T
+            shared = joint.diagonal().tolist()
+            pull_by_strength = forces.pull_rows[:, SHEAR_STRENGTH].tolist()
+            torque_by_strength = forces.torque_rows[:, SHEAR_STRENGTH].tolist()
+            noises = forces.pull_noise.tolist()
         for i, load in enumerate(loads.load):
             if not turning[i]:
                 # Static friction carries the slope, or it is dragged along.
@@ -153,21 +157,20 @@ class Pulls(Component[PullState]):
                 guess = math.hypot(tuning.guess_std, tuning.fresh_scrub_std * lateral_motion)
                 std[i] = guess * load + tuning.floor_std
             else:
-                excess[i] = self._smoothed_excess(excess[i], readings[i], float(torques[i]))
+                excess[i] = self._smoothed_excess(excess[i], readings[i], torques[i])
                 beyond = self._believed(excess[i], readings[i], lateral_motion)
-                by_strength = float(forces.torque_rows[i, SHEAR_STRENGTH])
-                if beyond and by_strength:
+                if beyond and torque_by_strength[i]:
                     torques[i] += beyond
-                    pulls[i] += beyond * forces.pull_rows[i, SHEAR_STRENGTH] / by_strength
+                    pulls[i] += beyond * pull_by_strength[i] / torque_by_strength[i]
                 # First order from far away overshoots: no soil gives more than the load.
-                pull[i] = clipped(float(pulls[i]), -load, load)
+                pull[i] = clipped(pulls[i], -load, load)
                 most = tuning.most_torque * load * self._rover.shear_radius[i]
-                torque[i] = clipped(float(torques[i]), -most, most)
+                torque[i] = clipped(torques[i], -most, most)
                 own[i] = self._own_variance(
                     i, pull[i], torque[i], load, level=not loads.force_known
                 )
-                own[i] += forces.pull_noise[i] ** 2
-                std[i] = math.sqrt(max(float(joint[i, i]), 0.0) + own[i] + scrub[i])
+                own[i] += noises[i] ** 2
+                std[i] = math.sqrt(max(shared[i], 0.0) + own[i] + scrub[i])
         model_pull = tuple(pull)
         if forces is not None and total is not None:
             along = np.array(headings.along)

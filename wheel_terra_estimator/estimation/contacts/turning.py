@@ -64,6 +64,8 @@ def sides_oppose(rims: Floats, by_yaw_rate: Floats) -> bool:
     by_yaw_rate : tuple of float
         Speed of each contact over the yaw rate [m], see `Headings`: its sign tells the side.
     """
+    if not (any(rim > 0.0 for rim in rims) and any(rim < 0.0 for rim in rims)):
+        return False  # most of the time
     pairs = [(rim, y) for rim, y in zip(rims, by_yaw_rate, strict=True) if not math.isnan(rim)]
     left, right = [rim for rim, y in pairs if y < 0.0], [rim for rim, y in pairs if y > 0.0]
     if not left or not right:

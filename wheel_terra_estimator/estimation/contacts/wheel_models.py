@@ -31,6 +31,7 @@ from wheel_terra_estimator.terramechanics.terms import Terms, set_angles
 _NOT_IN_FILTER = frozenset({'slope_gravity', 'pitch_bias', 'pull_zero', 'pull_gain'})
 _CONTACT_INPUTS = tuple(f.name for f in fields(Contact) if f.default is MISSING)
 _LEAST_BEARING = 0.05  # of the normal stress's part: cohesion alone carries no wheel
+_Soil = tuple[float, float, float, float]
 _MOST_RATIO = 3.0
 """v/(r w) beyond which the shear is saturated: more changes nothing [-]."""
 _LEAST_SINKAGE = 1e-4  # [m]
@@ -67,15 +68,6 @@ class WheelForces(NamedTuple):
     """By v/(r w), sinkage, ln shear strength, ln K, centroid, mound."""
 
 
-class _Soil(NamedTuple):
-    """Soil under one wheel, what is learned of it included."""
-
-    bearing_modulus: float
-    cohesion: float  # [Pa]
-    tan_friction: float
-    shear_modulus: float  # [m]
-
-
 class Bearing(NamedTuple):
     """What the bearing law says at a sinkage."""
 
@@ -101,6 +93,8 @@ class WheelModels:
             wheels.wheel, soil, effects, configuration.slip_radius, gravity
         )
         self._terms = Terms(effects)
+        self._on_inputs = self._terms.stages['on_inputs']
+        self._on_outputs = self._terms.stages['on_outputs']
         self._cohesion = float(soil.cohesion)
         self._tan_friction = math.tan(float(soil.friction_angle))
         self._shear_modulus = float(soil.shear_modulus)
@@ -161,9 +155,7 @@ class WheelModels:
         shear_modulus = self._shear_modulus * math.exp(modulus)
         span = self._mound_span
         within = clipped(ratio, 0.0, _MOST_RATIO)
-        high = max(span - within, 0.0) / span
-        depth = clipped(sinkage, _LEAST_SINKAGE, self._radius[wheel])
-        angle = math.acos(1.0 - depth / self._radius[wheel])
+        high, depth, angle = self._contact(wheel, within, sinkage)
         shift = centroid - mound * high * high
         by_depth = shift / (self._radius[wheel] * math.sin(angle)) if depth == sinkage else 0.0
         torque, pull, d_torque, d_pull, _ = self._forces.forces(
@@ -193,6 +185,32 @@ class WheelModels:
         )
         return WheelForces(torque, pull, t, f)
 
+    def pull(self, wheel: int, state: WheelState) -> float:
+        """Return the pull of `forces` alone [N], at half the cost."""
+        _, cohesion, friction, shear_modulus = self._soil_under(wheel, state)
+        within = clipped(state.speed_ratio, 0.0, _MOST_RATIO)
+        high, _, angle = self._contact(wheel, within, state.sinkage)
+        return self._forces.forces(
+            wheel,
+            within,
+            state.sinkage,
+            state.load,
+            cohesion,
+            friction,
+            shear_modulus,
+            (state.centroid - state.mound * high * high) * angle,
+            leaving_angle=state.leaving_angle,
+            rim_speed=state.rim_speed,
+            pass_number=self._passes[wheel],
+            derivatives=False,
+        ).drawbar_pull
+
+    def _contact(self, wheel: int, ratio: float, sinkage: float) -> tuple[float, float, float]:
+        """Return (s - onset)+ / (1 - onset), the sinkage in its bounds and the entrance angle."""
+        radius, span = self._radius[wheel], self._mound_span
+        depth = clipped(sinkage, _LEAST_SINKAGE, radius)
+        return max(span - ratio, 0.0) / span, depth, math.acos(1.0 - depth / radius)
+
     def bearing(self, wheel: int, state: WheelState) -> Bearing:
         """Return the load that the bearing law carries at the sinkage of a wheel.
 
@@ -217,8 +235,9 @@ class WheelModels:
         )
 
     def _soil_under(self, wheel: int, state: WheelState) -> _Soil:
+        """Return bearing modulus, c [Pa], tan(phi) and K [m], what is learned included."""
         factor = math.exp(state.strength)
-        return _Soil(
+        return (
             self._modulus[wheel] * math.exp(state.stiffness),
             self._cohesion * factor,
             self._tan_friction * factor,
@@ -237,11 +256,10 @@ class WheelModels:
         c.sinkage_exponent = self._exponent + state.slip_sinkage * abs(slip)
         c.bearing_modulus, c.cohesion, c.tan_friction, c.shear_modulus = soil
         c.peak_ratio, c.leaving_ratio = self._peak_ratio, self._leaving_ratio
-        stages = self._terms.stages
-        for term, values in stages['on_inputs']:
+        for term, values in self._on_inputs:
             term(c, values, m)
         c.sinkage = c.drawbar_pull = c.torque = c.entrance_angle = 0.0
-        for term, values in stages['on_outputs']:
+        for term, values in self._on_outputs:
             term(c, values, m)
         depth = clipped(sinkage - c.sinkage, 0.0, _MOST_SINKAGE * c.radius)
         entrance = max(math.acos(1.0 - depth / c.radius), 10.0 * SMALLEST_ANGLE)

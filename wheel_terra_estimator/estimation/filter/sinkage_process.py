@@ -150,13 +150,16 @@ class SinkageProcess(Component[SinkageState]):
         share = 1.0 if reference_known else tuning.law_share
         travels = []
         slopes = list(self.state.slopes)
+        entries = x.tolist()
+        body, strength, modulus = entries[SPEED], entries[SHEAR_STRENGTH], entries[SHEAR_MODULUS]
+        slip_sinkage, stiffness = entries[SLIP_SINKAGE], entries[layout.stiffness]
         for i, rim in enumerate(rims):
             zi = layout.sinkage.start + i
             if isnan(rim) or abs(rim) < self._rover.rest_speed:
                 prediction.Q[zi, zi] = tuning.resting_walk * dt
                 continue
             direction = 1.0 if rim > 0.0 else -1.0
-            speed = direction * headings.speed(i, float(x[SPEED]), yaw_rate)
+            speed = direction * headings.speed(i, body, yaw_rate)
             rim = abs(rim)
             travels.append(abs(speed) + tuning.spin_travel * abs(rim - speed))
             if loads[i] <= tuning.least_load:
@@ -164,13 +167,13 @@ class SinkageProcess(Component[SinkageState]):
                 continue
             wheel = WheelState(
                 speed / rim,
-                float(x[zi]),
+                entries[zi],
                 loads[i],
-                float(x[SHEAR_STRENGTH]),
-                float(x[SHEAR_MODULUS]),
+                strength,
+                modulus,
                 leaving_angle=leaving_angles[i],
-                stiffness=float(x[layout.stiffness.start + i]),
-                slip_sinkage=float(x[SLIP_SINKAGE]),
+                stiffness=stiffness[i],
+                slip_sinkage=slip_sinkage,
             )
             step, slopes[i] = self._relaxed(i, wheel, speed, rim, dt)
             prediction.mean[zi] = step.mean

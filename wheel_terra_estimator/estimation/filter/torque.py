@@ -49,13 +49,17 @@ class TorqueUpdate(ForceRows):
 
     def __init__(self, configuration: Configuration, rover: Rover, layout: StateLayout) -> None:
         super().__init__(configuration)
-        self._zeros = range(layout.size)[layout.torque_zero]
+        self._zeros = layout.torque_zero
+        # Where the zeros stand in the rows, as indices that numpy need not convert in each cycle.
+        columns = np.arange(layout.size)[layout.torque_zero]
+        self._ones = (np.arange(len(columns)), columns)
+        self._known = bool(len(columns))
         self._none = (0.0,) * layout.wheel_count
         self._load_std = rover.load_std
 
     def zeros(self, mean: FloatArray) -> Floats:
         """Return the zeros of the sensors in a state [N m]."""
-        return tuple(mean[self._zeros].tolist()) if self._zeros else self._none
+        return tuple(mean[self._zeros].tolist()) if self._known else self._none
 
     def update(
         self,
@@ -89,9 +93,9 @@ class TorqueUpdate(ForceRows):
         """
         rows = []
         H, zeros = forces.torque_rows, self.zeros(ekf.mean)
-        if self._zeros:
+        if self._known:
             H = H.copy()
-            H[range(len(H)), self._zeros] = 1.0
+            H[self._ones] = 1.0
         priors = np.einsum('ij,ij->i', H @ ekf.covariance, H).tolist()
         models, noises = forces.torque.tolist(), forces.torque_noise.tolist()
         for i, reading in enumerate(torque):

@@ -10,6 +10,7 @@ a correlation that something slow is not.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from wheel_terra_estimator.estimation.component import Component
@@ -32,9 +33,9 @@ class Innovations(NamedTuple):
     square: float = 0.0
     product: float = 0.0  # of one and the next
 
-    def and_then(self, time: float, scores: FloatArray) -> Innovations:
+    def and_then(self, time: float, scores: Sequence[float]) -> Innovations:
         """Return the means with the innovations of a cycle, which count as one."""
-        score = clipped(float(scores.sum()) / math.sqrt(len(scores)), -_LARGEST, _LARGEST)
+        score = clipped(sum(scores) / math.sqrt(len(scores)), -_LARGEST, _LARGEST)
         readings = self.readings + 1
         gain = max(gain_of(time - self.time, _MEAN_TIME), 1.0 / readings) if self.readings else 1.0
         return Innovations(
@@ -70,11 +71,11 @@ class Whiteness(Component[WhitenessState]):
 
     def follow(self, time: float, scores: FloatArray, **counts: int) -> None:
         """Take innovations over their deviations (m,): so many of each channel, in this order."""
-        first, found = 0, {}
+        first, found, values = 0, {}, scores.tolist()
         for channel, count in counts.items():
             if count:
                 before: Innovations = getattr(self.state, channel)
-                found[channel] = before.and_then(time, scores[first : first + count])
+                found[channel] = before.and_then(time, values[first : first + count])
             first += count
         self.state = self.state._replace(**found)
 

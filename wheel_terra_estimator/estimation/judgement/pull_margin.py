@@ -103,6 +103,6 @@ class PullMargin(Component[MarginState]):
             float(x[MOUND]),
         )
         return max(
-            self._models.forces(i, state._replace(speed_ratio=1.0 - slip)).pull
+            self._models.pull(i, state._replace(speed_ratio=1.0 - slip))
             for slip in self._tuning.slips
         )

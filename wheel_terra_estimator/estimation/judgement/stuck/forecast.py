@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from math import exp, sqrt
 from typing import TYPE_CHECKING, NamedTuple
 
 from wheel_terra_estimator.estimation.estimates import NO_ENTRAPMENT_IN_SIGHT
@@ -80,13 +81,9 @@ class Outlook(NamedTuple):
     probability: float  # median of the wheels that tell [-]
 
 
-class _Ahead(NamedTuple):
-    """What moves the slip of all wheels alike after some time."""
-
-    time: float  # [s]
-    keep: float  # share of what a slip is off the usual one [-]
-    shift: float  # by its growth and by digging [-]
-    variance: float  # without that of the present slip
+_Ahead = tuple[float, float, float, float]
+"""What moves the slip of all wheels alike: after which time [s], share that is kept of what a slip
+is off the usual one, shift by growth and digging, variance without that of the present slip."""
 
 
 def outlook(s: Situation, tuning: ForecastTuning = ForecastTuning()) -> Outlook:
@@ -129,10 +126,10 @@ def _way_ahead(
     found = []
     for part in (*t.parts, *t.beyond):
         time = part * horizon
-        keep = math.exp(-rim * time / t.return_length)
-        reach = t.growth_time * (1.0 - math.exp(-time / t.growth_time))
+        keep = exp(-rim * time / t.return_length)
+        reach = t.growth_time * (1.0 - exp(-time / t.growth_time))
         shift = growth * reach + dug * (1.0 - keep)
-        found.append(_Ahead(time, keep, shift, doubt * reach**2 + scatter * (1.0 - keep * keep)))
+        found.append((time, keep, shift, doubt * reach**2 + scatter * (1.0 - keep * keep)))
     return found
 
 
@@ -144,6 +141,7 @@ def _of_wheel(
     ahead: list[_Ahead],
     t: ForecastTuning,
 ) -> WheelForecast:
+    near = len(t.parts)
     if stalled:
         probability, time = 1.0, 0.0
     elif not wheel.known or wheel.slip <= 0.0 or wheel.slip_std >= t.untold_std:
@@ -157,8 +155,8 @@ def _of_wheel(
         # The worst of the times, in deviations: one error function does for all of them.
         nearest = min(
             [
-                (lacking - off * keep - shift) / math.sqrt(variance * keep * keep + more)
-                for _, keep, shift, more in ahead[: len(t.parts)]
+                (lacking - off * keep - shift) / sqrt(variance * keep * keep + more)
+                for _, keep, shift, more in ahead[:near]
             ]
         )
         probability = exceedance_probability(-nearest, 1.0, 0.0)
