@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from wheel_terra_estimator.configuration import reader
+from wheel_terra_estimator.discrepancy.drives.series import collect
 from wheel_terra_estimator.discrepancy.drives.windows import (
     GOOD,
     block_moments,
@@ -322,3 +323,26 @@ def test_variance_of_the_mean_of_a_block(length):
     assert np.mean([(d[1:] * d[:-1]).sum() for d in left]) == pytest.approx(
         neighbours, abs=0.05 * squares
     )
+
+
+def test_two_readings_of_each_sensor_are_a_drive_and_one_is_none():
+    zero = np.zeros(4)
+    drive = [
+        m
+        for t in (10**9, 2 * 10**9)
+        for m in (
+            WheelOdometry(t, zero + 0.4, zero),
+            InertialReading(t, np.array([0.0, 0.0, 9.8]), np.zeros(3), None),
+            ReferenceVelocity(t, 0.1, 1e-4),
+        )
+    ]
+    found = collect(drive, 4, 'a drive')
+    assert found.rate.time.tolist() == [0.0, 1.0]
+    for kind, topic in (
+        (WheelOdometry, 'wheel odometry'),
+        (InertialReading, 'imu/data'),
+        (ReferenceVelocity, 'reference_odom'),
+    ):
+        first = next(m for m in drive if isinstance(m, kind))
+        with pytest.raises(UserError, match=topic):
+            collect([m for m in drive if m is not first], 4, 'a drive')

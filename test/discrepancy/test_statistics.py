@@ -405,10 +405,11 @@ def test_soil_that_changes_along_the_way_is_told_when_the_choice_of_the_stretch_
     order = rng.permutation(len(truth))
     stretches = sum(len(truth) - rows + 1 for rows in range(4, len(truth) - 4 + 1))
 
-    def told(stiffness):
+    half = order < len(truth) // 2
+
+    def told(stiffness, rows=half):
         measured = truth + std * rng.standard_normal(truth.shape)
         other = WheelSoilModel(replace(SOIL, frictional_modulus=2.4e6 * stiffness), {})
-        rows = order < len(truth) // 2
         measured[rows] += (other.steady_state(forward.points).outputs() - truth)[rows]
         problem = build_problem(measured, std, inputs, scale)
         one = np.ones(problem.size)
@@ -420,6 +421,8 @@ def test_soil_that_changes_along_the_way_is_told_when_the_choice_of_the_stretch_
         return changed_stretch(table, work, nothing, one)
 
     assert 0.3 < told(0.5).stiffness < 0.8
+    patch = told(0.4, (order >= 5) & (order <= 7))  # three rows: too few for a soil of their own
+    assert patch.end - patch.start + 1.0 == 4.0
     found = [told(stiffness) for stiffness in np.linspace(0.6, 1.0, 30)]
     sure = [stretch.gain - np.log(stretches) for stretch in found if stretch is not None]
     assert 3 < len(sure) < 27
@@ -463,3 +466,8 @@ def test_an_error_that_a_good_model_may_have_is_smaller_than_one_that_asks_for_a
     for greatest in (None, 0.0, 0.02, 0.2):
         total = sum(np.exp(floor.log_prior) for floor in default_floors(greatest))
         assert total == pytest.approx(1.0)
+
+
+def test_sizes_that_an_effect_may_have_share_one_probability():
+    assert sum(EFFECT_SHARES) == pytest.approx(1.0)
+    assert len(EFFECT_SHARES) == len(EFFECT_SCALES)

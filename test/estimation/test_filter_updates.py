@@ -12,6 +12,7 @@ from wheel_terra_estimator.estimation.contacts.loads import WheelLoads
 from wheel_terra_estimator.estimation.contacts.stationary_wheels import StationaryPull
 from wheel_terra_estimator.estimation.contacts.steering import straight_headings
 from wheel_terra_estimator.estimation.filter.force_balance import ForceBalance
+from wheel_terra_estimator.estimation.filter.initial_state import PriorTuning
 from wheel_terra_estimator.estimation.filter.observability import considered_entries
 from wheel_terra_estimator.estimation.filter.prediction import Prediction
 from wheel_terra_estimator.estimation.filter.reference import (
@@ -651,3 +652,18 @@ def test_a_stiffer_soil_has_both_moduli_of_sinkage_larger_by_the_same_factor():
 
 def test_references_an_hour_apart_are_no_more_than_the_longest_gap():
     assert ReferenceState().gap == ReferenceTuning().longest_gap
+
+
+def test_what_is_assumed_at_the_start_lies_within_its_bounds():
+    """A prior that reaches its bound is a bound: half of it at most."""
+    t = PriorTuning()
+    for spread, bound in (
+        (t.slip_sinkage_std, t.most_slip_sinkage),
+        (t.centroid_std, t.most_centroid),
+        (t.mound_mean + t.mound_std, t.most_mound),
+        (t.slip_per_demand_mean + t.slip_per_demand_std, t.most_slip_per_demand),
+        (t.least_strength_std, t.most_strength),
+        (t.least_shear_modulus_std, t.most_shear_modulus),
+        (t.least_stiffness_std, t.most_stiffness),
+    ):
+        assert 0.0 < spread <= 0.5 * bound

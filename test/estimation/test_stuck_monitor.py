@@ -10,7 +10,12 @@ from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.estimation.judgement.stuck.monitor import StuckMonitor
 from wheel_terra_estimator.estimation.judgement.stuck.settings import StuckSettings
 from wheel_terra_estimator.estimation.judgement.stuck.signs import SIGNS
-from wheel_terra_estimator.estimation.judgement.stuck.situation import RoverMotion, WheelMotion
+from wheel_terra_estimator.estimation.judgement.stuck.situation import (
+    RoverMotion,
+    SituationObserver,
+    SituationTuning,
+    WheelMotion,
+)
 
 
 def wheel(slip, rim=0.05, known=True, torque=math.nan):
@@ -452,3 +457,14 @@ def test_the_words_say_what_is_seen_and_what_to_do():
     plain = next(a.reason for a in course([[wheel(0.95)] * 6] * 100) if a.stuck)
     assert plain.endswith('; stop, back out')
     assert 'sink' not in plain and 'pull left' not in plain and '0.000' not in plain
+
+
+def test_the_growth_of_the_slip_is_known_from_the_first_sample_that_spans_enough():
+    """A tenth a second: 0 until a second is covered."""
+    tuning = SituationTuning(shortest_trend=1.0, trend_spacing=0.25)
+    observer, found = SituationObserver(StuckSettings(), tuning), []
+    for time in (0.0, 0.25, 0.5, 0.75, 1.0):
+        slips, trend = observer._trend(time, 0.2 + 0.1 * time, follow=True)
+        observer.state = observer.state._replace(slips=slips, trend=trend)
+        found.append(trend)
+    assert found == pytest.approx([0.0, 0.0, 0.0, 0.0, 0.1])

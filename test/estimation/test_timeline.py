@@ -22,6 +22,13 @@ from hypothesis import strategies as st
 
 from wheel_terra_estimator.estimation.estimates import SlipClass
 from wheel_terra_estimator.estimation.measurements import WheelOdometry
+from wheel_terra_estimator.estimation.timing.clock_watch import ClockWatch
+from wheel_terra_estimator.estimation.timing.input_checks import (
+    CHANNELS,
+    INERTIAL,
+    REFERENCE,
+    WHEEL_ODOMETRY,
+)
 
 
 def times(sets):
@@ -455,3 +462,14 @@ def test_stamps_strictly_increase_within_a_run_whatever_comes(stream, max_lag, h
         assert backwards <= core.health()['clock_steps_back']
     stamps += [s.stamp for s in core.flush()]
     assert sum(b <= a for a, b in pairwise(stamps)) <= core.health()['clock_steps_back']
+
+
+def test_a_second_topic_bears_out_a_step_of_the_clock():
+    watch = ClockWatch(channels=len(CHANNELS), clock_step=SECOND, max_lag=0, history=2 * SECOND)
+    for channel, first in ((WHEEL_ODOMETRY, odometry(60.0)), (INERTIAL, imu(60.01))):
+        assert watch.judge(channel, first).accepted
+    assert watch.judge(REFERENCE, reference(60.02)).accepted
+    assert watch.judge(INERTIAL, imu(10.0)).accepted == []  # held: it may be a stray
+    borne_out = watch.judge(REFERENCE, reference(10.01))
+    assert borne_out.stepped_back
+    assert [channel for channel, _ in borne_out.accepted] == [INERTIAL, REFERENCE]

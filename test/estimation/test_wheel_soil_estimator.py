@@ -469,3 +469,24 @@ def test_a_steered_rover_is_judged_along_its_wheels():
         errors.append(float(np.sqrt(np.mean(np.square(error)))))
     assert errors[0] < 0.06
     assert errors[0] < 0.4 * errors[1]
+
+
+def test_what_a_standing_wheel_pulled_is_forgotten_when_all_have_stood():
+    estimator = WheelSoilEstimator(load({'configuration': SAND}).configuration)
+    known = []
+    for i in range(90):
+        stamp, rate = 10**12 + i * 10**8, np.full(6, 0.4 if i < 60 else 0.0)
+        rate[5] = 0.0
+        torque = np.where(rate > 0.0, 4.0, -4.0)
+        estimator.step(
+            stamp,
+            StepInputs(
+                wheel_odometry=WheelOdometry(stamp, rate, torque),
+                inertial=InertialReading(stamp, np.array([0.0, 0.0, 9.8]), np.zeros(3), None),
+                reference=ReferenceVelocity(stamp, 0.1 * rate[0], 1e-6),
+            ),
+        )
+        estimator.estimates()
+        known.append(~np.isnan(estimator._pulls.state.stationary))
+    assert known[59].tolist() == [False] * 5 + [True]
+    assert not known[-1].any()

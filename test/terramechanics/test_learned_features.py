@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from wheel_terra_estimator.terramechanics.effects.learned_closure import FEATURES
+from wheel_terra_estimator.terramechanics.effects.learned_closure import FEATURES, TARGETS
 from wheel_terra_estimator.terramechanics.maths import ScalarMaths
 
 CONTACT = {
@@ -56,3 +56,9 @@ def test_a_feature_is_what_it_says(name):
 def test_a_rim_speed_that_was_not_recorded_is_the_usual_one():
     contact = SimpleNamespace(**{**CONTACT, 'rim_speed': math.nan})
     assert FEATURES['rim_speed'].value(contact, ScalarMaths) == 0.0
+
+
+@pytest.mark.parametrize('name', TARGETS)
+def test_a_correction_of_the_usual_size_is_far_from_its_bound(name):
+    """Three prior deviations: a bound that is nearer would be the prior."""
+    assert TARGETS[name].bound >= 3.0 * TARGETS[name].usual

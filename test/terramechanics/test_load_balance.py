@@ -1,0 +1,105 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""The angle at which the soil carries a load, against laws with a known inverse."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from terra_tools import SAND, WHEEL, points, state
+
+from wheel_terra_estimator.terramechanics import load_balance
+from wheel_terra_estimator.terramechanics import model as model_module
+from wheel_terra_estimator.terramechanics.load_balance import balance, solve_entrance_angle
+from wheel_terra_estimator.terramechanics.model import WheelSoilModel
+from wheel_terra_estimator.terramechanics.soil import PRESSURE_LAWS
+from wheel_terra_estimator.terramechanics.steady_sinkage import SteadySinkage
+
+
+@pytest.mark.parametrize('load', [1e-6, 1.0, 1e6])
+def test_a_load_is_met_to_a_share_of_itself(load: float) -> None:
+    """However light: the force is a power of the angle, 0.3 rad at the load."""
+    angle, carries = solve_entrance_angle(
+        lambda t: load * (t / 0.3) ** 2.2, np.array([load]), np.array([0.5])
+    )
+    assert carries.all()
+    assert angle == pytest.approx(0.3, rel=1e-9)
+
+
+def test_what_three_angles_do_not_settle_goes_to_the_bracketed_solver() -> None:
+    """A force that is no power of the angle: W = exp(20 t) - 1, so that t = ln(1 + W) / 20."""
+
+    def form(count: int) -> Any:
+        def forces(t: Any) -> tuple[Any, Any, Any]:
+            return np.expm1(20.0 * t), 2.0 * t, 3.0 * t
+
+        return SimpleNamespace(
+            exponent=np.full(count, 1.0),
+            small_angle=lambda load: np.full(len(load), 0.02),
+            forces=forces,
+            load=lambda t: forces(t)[0],
+            take=lambda rest: form(int(rest.sum())),
+        )
+
+    load = np.array([0.5, 50.0, 1e6])
+    angle, pull, torque, carries = balance(form(3), load)
+    expected = np.log1p(load) / 20.0
+    assert carries.all()
+    np.testing.assert_allclose(angle, expected, rtol=1e-8)
+    np.testing.assert_allclose(pull, 2.0 * expected, rtol=1e-8)
+    np.testing.assert_allclose(torque, 3.0 * expected, rtol=1e-8)
+
+
+@pytest.mark.parametrize('law', PRESSURE_LAWS)
+def test_the_first_guess_is_near_in_either_pressure_law(
+    law: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    guesses: list[Any] = []
+
+    def watched(contact: Any) -> Any:
+        guesses.append(load_balance.explicit_entrance_angle(contact))
+        return guesses[-1]
+
+    monkeypatch.setattr(model_module, 'explicit_entrance_angle', watched)
+    soil = replace(SAND, cohesive_modulus=0.0)
+    if law == 'reece':
+        # The same pressure: gamma b k' (z/b)^n is k z^n.
+        weight = SAND.density * 9.80665
+        share = WHEEL.width ** (SAND.sinkage_exponent - 1.0) / weight
+        modulus = SAND.frictional_modulus * share
+        soil = replace(soil, pressure_law=law, frictional_modulus=modulus)
+    found = WheelSoilModel(soil).steady_state(points(np.array([0.05, 0.1]), 80.0))
+    np.testing.assert_allclose(guesses[0], found.entrance_angle, rtol=0.4)
+
+
+@pytest.mark.parametrize('slip', [-0.3, 0.2, 0.8])
+def test_a_wheel_of_half_a_newton_sinks_as_the_arrays_say(slip: float) -> None:
+    soil = replace(SAND, cohesion=2000.0)
+    ratio = 1.0 - slip if slip >= 0.0 else 1.0 / (1.0 + slip)
+    found, _, carried = SteadySinkage(WHEEL, soil).sinkage(0, ratio, 0.5)
+    assert carried
+    expected = state(slip, 0.5, soil=soil, method='closed_form').sinkage
+    assert found == pytest.approx(float(expected[0]), rel=1e-4)
+
+
+def test_a_derivative_within_the_range_is_taken_to_both_sides() -> None:
+    soil = {'cohesion': 250.0, 'shear_modulus': 0.0114, 'sinkage_exponent': 1.1}
+    names = [f'soil.{name}' for name in soil]
+    batch = model_module._Batch(soil, {}, points(np.array([0.2]), 80.0), names)
+    for index, (name, value) in enumerate(soil.items()):
+        moved = np.asarray(batch.soil[name])[:, 0]
+        raised, lowered = moved[index], moved[index + len(names)]
+        assert raised - value == pytest.approx(value - lowered) != 0.0
+        assert batch.steps[index] == pytest.approx(raised - lowered)
+
+
+def test_soil_without_weight_does_not_bulldoze() -> None:
+    light = replace(SAND, density=0.0, cohesion=0.0)
+    plain, pushed = (
+        state(0.3, soil=light, effects=effects) for effects in (None, {'bulldozing': {'kb': 1.0}})
+    )
+    assert plain.drawbar_pull == pytest.approx(pushed.drawbar_pull)
