@@ -4,6 +4,7 @@
 
     python tools/diagnosis_score.py run score.jsonl --first-seed 2200 --rounds 12
     python tools/diagnosis_score.py show score.jsonl
+    python tools/diagnosis_score.py judge score.jsonl    # what the same data allow
 
 Campaigns of all five designs by the independent quadrature; every form of every effect is drawn.
 ``kind left out``: the truth is taken out of the effects that may be named, so that any name is
@@ -30,13 +31,22 @@ sys.path.insert(0, str(Path(__file__).parent))
 import numpy as np  # noqa: E402
 from campaigns import make_campaign, scoring  # noqa: E402
 from campaigns.groups import GROUPS  # noqa: E402
+from scipy.special import ndtr  # noqa: E402
 
+from wheel_terra_estimator.discrepancy.effect_keys import effect_of  # noqa: E402
+from wheel_terra_estimator.trials.campaign import Campaign  # noqa: E402
 from wheel_terra_estimator.trials.designs import DESIGNS  # noqa: E402
+from wheel_terra_estimator.trials.detectability import Ruler, listed_kinds  # noqa: E402
+from wheel_terra_estimator.trials.forms import FORMS  # noqa: E402
 from wheel_terra_estimator.trials.hidden import LISTED  # noqa: E402
 from wheel_terra_estimator.trials.trial import interval  # noqa: E402
+from wheel_terra_estimator.trials.truth import SOIL_SD  # noqa: E402
 
 LEFT_OUT = 'kind left out'
 OPEN = ('unexplained', 'undecided')
+_SEED, _DRAWS = 1, 1000  # of names that are right exactly as often as stated
+_SOIL_STEP = 0.2  # stated deviations
+_TELLABLE = 3.5  # d' from which the evidence pays the prior of a further effect (some six nats)
 Record = dict[str, Any]
 _ONE = replace(GROUPS['one'].plan, forms=True)
 PLANS = {
@@ -51,8 +61,8 @@ PLANS = {
 }
 
 
-def record(group: str, design: str, seed: int) -> Record:
-    """Diagnose a campaign and return what is scored."""
+def campaign_of(group: str, design: str, seed: int) -> Campaign:
+    """Return the campaign of a group, design and seed."""
     plan = PLANS[group]
     if group == 'several':
         rng = np.random.default_rng([seed, 77])
@@ -64,7 +74,12 @@ def record(group: str, design: str, seed: int) -> Record:
         ]
         names = tuple(str(name) for name in rng.choice(pool, count, replace=False))
         plan = replace(plan, names=names, least=6.0)
-    campaign = make_campaign(seed, design, plan)
+    return make_campaign(seed, design, plan)
+
+
+def record(group: str, design: str, seed: int) -> Record:
+    """Diagnose a campaign and return what is scored."""
+    campaign = campaign_of(group, design, seed)
     started = time.process_time()
     found = scoring.diagnose(campaign, campaign.hidden if group == LEFT_OUT else ())
     proposal = found.proposal
@@ -108,6 +123,68 @@ def run(file: Path, first: int, rounds: int) -> None:
                     stream.flush()
 
 
+def nearest_rival(campaign: Campaign) -> tuple[float, str]:
+    """Return d' between a hidden effect and the nearest other one, refitted, and its name.
+
+    By the campaigns' own model, soil under its stated deviations, no noise.
+    """
+    ruler = Ruler(campaign.rows, campaign.soil, campaign.std)
+    kinds = listed_kinds(campaign.rows, {**LISTED, **FORMS})
+    found = [
+        (ruler.distance(campaign.effects, (kind,)), effect_of(name))
+        for name, kind in kinds.items()
+        if effect_of(name) not in campaign.hidden
+    ]
+    return min(found)
+
+
+def beyond_the_others(campaign: Campaign) -> list[float]:
+    """Return d' of each hidden effect beyond soil and sizes of the others (linear in these)."""
+    ruler = Ruler(campaign.rows, campaign.soil, campaign.std)
+    zero = np.zeros(len(SOIL_SD))
+    everything = ruler.whitened(zero, campaign.effects)
+    # The change by leaving an effect out stands for its direction: sizes enter nearly linearly.
+    changes = [
+        everything - ruler.whitened(zero, campaign.effects[:k] + campaign.effects[k + 1 :])
+        for k in range(len(campaign.effects))
+    ]
+    soil = [
+        (ruler.whitened(_SOIL_STEP * unit, campaign.effects) - everything) / _SOIL_STEP
+        for unit in np.eye(len(SOIL_SD))
+    ]
+    found = []
+    for k, change in enumerate(changes):
+        others = np.column_stack([*soil, *changes[:k], *changes[k + 1 :]])
+        prior = np.diag([1.0] * len(soil) + [0.0] * (len(changes) - 1))
+        fitted = np.linalg.solve(others.T @ others + prior + 1e-9 * np.eye(len(prior)), others.T)
+        found.append(float(np.sqrt(max(change @ (change - others @ (fitted @ change)), 0.0))))
+    return found
+
+
+def judge(file: Path) -> None:
+    """Print what anybody could find in the same campaigns, who knows noise and soil deviations.
+
+    One effect: the likelihood of the truth exceeds that of a rival at a distance d' with the
+    probability Phi(d'/2). Several: an effect that stands less than `_TELLABLE` beyond soil and the
+    others does not pay the price of a further effect.
+    """
+    everything = [json.loads(line) for line in file.read_text().splitlines()]
+    shares, misses, distances = [], [], []
+    for r in everything:
+        if r['group'] == 'one' and r['distances'][0] > 5.0:
+            distance, rival = nearest_rival(campaign_of(*r['key']))
+            shares.append(float(ndtr(0.5 * distance)))
+            if not set(r['names'][:1]) & set(r['hidden']):
+                misses.append(f'{r["hidden"][0]} as {r["names"][:1]}: {rival} at {distance:.1f}')
+        elif r['group'] == 'several':
+            distances += beyond_the_others(campaign_of(*r['key']))
+    if shares:
+        print(f'one effect: {100 * np.mean(shares):.0f} % allowed at most (n {len(shares)})')
+        print('\n'.join(f"  {text} (nearest effect, d')" for text in misses))
+    far = sum(d > _TELLABLE for d in distances)
+    print(f"three to five: {_share(far, len(distances))} stand d' > {_TELLABLE} beyond the others")
+
+
 def _share(right: int, count: int) -> str:
     low, high = interval(right, count)
     if not count:
@@ -134,12 +211,25 @@ def _calibration(records: list[Record]) -> str:
     sure, right = _names(records)
     if not sure.size:
         return '-'
-    place = np.minimum((sure * 10).astype(int), 9)
-    error = sum(
-        abs(sure[place == k].mean() - right[place == k].mean()) * np.mean(place == k)
-        for k in np.unique(place)
+    error = _calibration_error(sure, right)
+    rng = np.random.default_rng(_SEED)
+    drawn = [_calibration_error(sure, rng.random(sure.size) < sure) for _ in range(_DRAWS)]
+    beyond = math.sqrt(max(error**2 - float(np.mean(np.square(drawn))), 0.0))
+    return (
+        f'{error:.3f} (n {sure.size}; stated {sure.mean():.2f}, right {right.mean():.2f}; names '
+        f'that are right as often as stated: {np.mean(drawn):.3f}, up to '
+        f'{np.quantile(drawn, 0.95):.3f}; beyond that scatter {beyond:.3f})'
     )
-    return f'{error:.3f} (n {sure.size}; stated {sure.mean():.2f}, right {right.mean():.2f})'
+
+
+def _calibration_error(sure: np.ndarray, right: np.ndarray) -> float:
+    place = np.minimum((sure * 10).astype(int), 9)
+    return float(
+        sum(
+            abs(sure[place == k].mean() - right[place == k].mean()) * np.mean(place == k)
+            for k in np.unique(place)
+        )
+    )
 
 
 def show(file: Path) -> None:
@@ -212,10 +302,13 @@ def main() -> None:
     runner.add_argument('file', type=Path)
     runner.add_argument('--first-seed', type=int, default=2300)
     runner.add_argument('--rounds', type=int, default=12, help='of all groups and designs')
-    commands.add_parser('show').add_argument('file', type=Path)
+    for name in ('show', 'judge'):
+        commands.add_parser(name).add_argument('file', type=Path)
     arguments = parser.parse_args()
     if arguments.command == 'run':
         run(arguments.file, arguments.first_seed, arguments.rounds)
+    elif arguments.command == 'judge':
+        judge(arguments.file)
     else:
         show(arguments.file)
 

@@ -10,10 +10,13 @@ always, or never, passes neither.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import campaign_tools  # noqa: F401
 import pytest
 from campaigns import make_campaign, scoring, summary
 from campaigns.groups import GROUPS
+from diagnosis_score import beyond_the_others
 
 FIRST_SEED = 3_000_000  # neither the seeds of tuning nor those of the study
 # Group -> campaigns per design. The heavier designs have fewer.
@@ -142,3 +145,12 @@ def test_study_resumes(tmp_path, monkeypatch):
     discrepancy_study.run(arguments)
     assert path.read_text().startswith(once) and path.read_text().count('\n') == 3
     assert [r['seed'] for r in summary.read(path)] == [7, 8]
+
+
+def test_what_anybody_could_tell_of_a_set_agrees_with_the_refits():
+    """Alone an effect stands as far as the nonlinear refit of the soil says; twice, nowhere."""
+    campaign = make_campaign(3, 'basic16', replace(GROUPS['one'].plan, names=('pull_gain',)))
+    effect = campaign.effects[0]
+    (alone,) = beyond_the_others(campaign)
+    assert alone == pytest.approx(campaign.distances[0], rel=0.1)
+    assert max(beyond_the_others(replace(campaign, effects=(effect, effect)))) < 0.05 * alone

@@ -18,6 +18,7 @@ from wheel_terra_estimator.discrepancy.tables.steady_table import (
 from wheel_terra_estimator.terramechanics.effects.learned_closure import TARGETS, pair_of
 from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
 
+_TWICE = math.log(2.0)  # from which a growth is said as a factor
 # Feature -> for which step of it a change is stated, and that step.
 _PER = {
     'one': ('everywhere alike', 1.0),
@@ -54,6 +55,10 @@ def law_in_words(
         law = TARGETS[target]
         per, step = _PER[feature]
         change = value * step
+        change *= law.bound / (law.bound + abs(change))
+        if law.factor and change > _TWICE:
+            parts.append(f'{law.meaning} grows to {math.exp(change):.2g} times as much {per}')
+            continue
         if law.factor:
             size = f'{100 * abs(math.expm1(change)):.2g} %'
         elif law.unit == '-':
