@@ -117,6 +117,7 @@ def test_places_that_cannot_be_written_are_one_line_before_anything_is_computed(
         assert said.count('\n') == 1
 
 
+@pytest.mark.slow
 def test_full_disk_of_the_real_command(
     make_bag: Any, make_drive: Any, rover: Any, tmp_path: Path, capsys: Any
 ) -> None:

@@ -111,7 +111,8 @@ def corrected(tmp_path_factory):
 
 
 @pytest.mark.timeout(1800)
-@pytest.mark.parametrize('seeds', [(3,), pytest.param(range(4, 8), marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize('seeds', [(3,), range(4, 8)])
 def test_a_drive_is_estimated_better_with_the_corrected_model(corrected, seeds):
     base, better = corrected
     drives = [drive_uphill(seed) for seed in seeds]

@@ -78,7 +78,7 @@ def test_a_linear_drive_smoothed_is_its_least_squares_solution():
 
 @pytest.fixture(scope='module')
 def drive():
-    return simulate(load('climb_soft_patch'), seed=1025, duration=24.0)
+    return simulate(load('climb_soft_patch'), seed=1025, duration=18.0)
 
 
 def run(drive, measurements):

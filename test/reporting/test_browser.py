@@ -108,6 +108,7 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_an_hour_of_driving_stays_a_small_file_that_needs_nothing_else(report: Path) -> None:
     text = report.read_text(encoding='utf-8')
     assert report.stat().st_size < LARGEST_FILE

@@ -196,6 +196,7 @@ def test_entrapment_needs_a_second_and_clears_after_three() -> None:
     assert not entrapped(stamp, -np.abs(slip)).any()  # skidding is no entrapment
 
 
+@pytest.mark.slow
 def test_the_soft_patch_entraps() -> None:
     truth = simulate(load('climb_soft_patch'), 5, 98.0).truth
     median = np.nanmedian(truth.slip[10:], axis=1)
@@ -205,6 +206,7 @@ def test_the_soft_patch_entraps() -> None:
     assert truth.stamp[truth.stuck][0] - truth.stamp[10 + high] > 3e9
 
 
+@pytest.mark.slow
 def test_the_descent_skids() -> None:
     truth = simulate(load('downhill_skid'), 0, 35.0).truth
     assert np.nanmedian(truth.slip[-1]) < -0.03

@@ -170,6 +170,7 @@ def test_forces_balance_and_bed_is_plausible(coarse_run):
     assert found['entrance_angle'] > 0.3 > -0.1 > found['leaving_angle']
 
 
+@pytest.mark.slow
 def test_wheel_stands_under_its_whole_weight_before_it_turns(coarse_run, tmp_path):
     output, cache = coarse_run
     standing = json.loads((output / 'summary.json').read_text())['summary']
