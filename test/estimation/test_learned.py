@@ -2,18 +2,25 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a drive taught, as the next drive starts from it."""
 
+import math
+
 import numpy as np
 import pytest
 from fake_estimator import SECOND
 
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.configuration.soil_file import read_values, write_values
+from wheel_terra_estimator.estimation.contacts.steepest_climb import Climbed, SteepestClimb
+from wheel_terra_estimator.estimation.contacts.usual_slip import UsualSlip
 from wheel_terra_estimator.estimation.core import EstimatorCore
+from wheel_terra_estimator.estimation.filter.state import SHEAR_STRENGTH
 from wheel_terra_estimator.estimation.measurements import (
     InertialReading,
     ReferenceVelocity,
     WheelOdometry,
 )
+from wheel_terra_estimator.estimation.rover import Rover
+from wheel_terra_estimator.estimation.wheel_soil_estimator import WheelSoilEstimator
 from wheel_terra_estimator.simulation.drive import simulate
 from wheel_terra_estimator.simulation.scenario import load
 
@@ -136,3 +143,42 @@ def test_the_bias_of_the_accelerometer_has_the_sign_of_the_sensor():
 
 def test_nothing_before_the_first_set():
     assert EstimatorCore(reader.load(['frostyboy'])).learned() == {}
+
+
+def test_the_soil_that_is_kept_carries_what_its_drive_was_seen_to_climb():
+    """Strength learned too low beside errors that the file does not hold: the slip seen decides."""
+    configuration = reader.load(['generic_six_wheel', 'hit_lss1'])
+    estimator = WheelSoilEstimator(configuration)
+    rover = Rover.from_configuration(configuration)
+    mean, covariance = estimator._ekf.mean.copy(), estimator._ekf.covariance
+    mean[SHEAR_STRENGTH] = -0.5
+    zero = estimator._zero_velocity.state.zero
+
+    def usual(found, demand):
+        return UsualSlip(configuration.replace(found), rover).at(demand, 0.8)
+
+    pulls, slips = UsualSlip(configuration, rover).curve
+    demand, slip = 0.8 * pulls[slips.index(0.3)], 0.3
+    without = estimator._learned.values(mean, covariance, zero)
+    kept = estimator._learned.values(mean, covariance, zero, Climbed(demand, slip))
+    assert usual(without, demand) > slip + 0.05
+    assert usual(kept, demand) == pytest.approx(slip, abs=0.005)
+    # Never stronger than stated, and as learned where that is enough.
+    beyond = estimator._learned.values(mean, covariance, zero, Climbed(2.0 * pulls[-1], slip))
+    key = 'soil.friction_angle_deg'
+    assert beyond[key] == pytest.approx(configuration.flat()[key], rel=1e-3)
+    enough = estimator._learned.values(mean, covariance, zero, Climbed(0.01, 0.9))
+    assert enough[key] == without[key]
+
+
+def test_the_steepest_climb_is_a_mean_over_seconds_of_steady_driving():
+    climb = SteepestClimb()
+    for i in range(600):
+        spike = 0.4 if i in (300, 301) else 0.0
+        climb.update(0.2 + spike, 0.3, 0.1)
+    assert climb.state.demand == pytest.approx(0.2, abs=0.02)
+    assert climb.state.slip == pytest.approx(0.3)
+    told = climb.state[:2]
+    for _ in range(100):
+        climb.update(0.5, math.nan, 0.1)  # no reference tells the slip
+    assert climb.state[:2] == told

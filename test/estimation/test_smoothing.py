@@ -158,6 +158,37 @@ def test_a_late_reference_is_smoothed_at_its_own_stamp(drive):
         np.testing.assert_allclose(one[i][0].sinkage, other[i][0].sinkage, atol=1e-4)
 
 
+def test_the_way_before_a_reversal_knows_nothing_of_the_way_back():
+    """Soil learned downhill says nothing of the climb, which is smoothed as if the drive ended."""
+    scenario = load(
+        {
+            'configuration': ['generic_six_wheel', 'hit_lss1'],
+            'duration': 16.0,
+            'slope.angle_deg': [6.0],
+            'drive.time': [0.0, 8.0, 9.0],
+            'drive.forward': [0.05, 0.05, -0.05],
+        }
+    )
+    drive = simulate(scenario, 1)
+    turned = drive.truth.stamp[0] + round(8.6e9)  # the commands cross zero at 8.5 s
+
+    def slips(until):
+        smoother = DriveSmoother(drive.configuration)
+        core = EstimatorCore(drive.configuration, smoother.estimator)
+        for arrival in drive.arrivals:
+            if arrival.measurement.stamp > until:
+                break
+            for estimates in core.add(arrival.measurement):
+                smoother.keep(estimates)
+        sets = [kept.estimates for kept in smoother.sets()]
+        return {s.stamp: s.slip for s in sets if s.stamp < turned - round(2e9)}
+
+    whole, climb = slips(drive.truth.stamp[-1]), slips(turned)
+    assert len(whole) > 50
+    for stamp, slip in climb.items():
+        np.testing.assert_allclose(whole[stamp], slip, atol=0.01)
+
+
 def test_a_spool_forgets_what_is_wound_back():
     spool = Spool()
     for item in range(10):

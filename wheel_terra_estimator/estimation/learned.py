@@ -6,12 +6,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.estimation.contacts.steepest_climb import Climbed
+from wheel_terra_estimator.estimation.contacts.usual_slip import steady_pull
+from wheel_terra_estimator.estimation.contacts.wheel_models import WheelModels
 from wheel_terra_estimator.estimation.filter.initial_state import PriorTuning
 from wheel_terra_estimator.estimation.filter.state import (
     GRAVITY_BIAS,
@@ -20,8 +24,10 @@ from wheel_terra_estimator.estimation.filter.state import (
     StateLayout,
 )
 from wheel_terra_estimator.estimation.inputs.inertial import GyroZero
+from wheel_terra_estimator.estimation.rover import Rover
 
 FloatArray = NDArray[np.float64]
+_LEVEL = Climbed()
 NamedSoil = Callable[[FloatArray, FloatArray], tuple[tuple[str, ...], FloatArray, FloatArray]]
 
 
@@ -57,6 +63,8 @@ class Learned:
         What is added to the deviations of the soil.
     """
 
+    _BISECTIONS = 12  # of the strength: to a ten-thousandth
+
     def __init__(
         self,
         configuration: Configuration,
@@ -68,15 +76,27 @@ class Learned:
         self._configuration, self._layout = configuration, layout
         self._start, self._named_soil, self._spread = start.copy(), named_soil, spread
 
-    def values(self, mean: FloatArray, covariance: FloatArray, zero: GyroZero) -> dict[str, Any]:
+    def values(
+        self,
+        mean: FloatArray,
+        covariance: FloatArray,
+        zero: GyroZero,
+        climbed: Climbed = _LEVEL,
+    ) -> dict[str, Any]:
         """Return configuration key -> value, with the deviations ``_std``.
 
         Soil: the values of ``~/soil``, with deviations widened to hold in another place. Biases:
         those stated plus what was learned; torques and sinkages: as stated, since a zero of theirs
         is not told from the soil. The deviations of sensors are those stated: a start may bring
         another bias of the same kind.
+
+        The filter learns the strength beside errors of its models that no parameter of the soil
+        holds; without them it may be one that could not have carried the rover. Then it is the
+        least that would have, at the slip seen.
         """
         found: dict[str, Any] = {}
+        mean = mean.copy()
+        mean[SHEAR_STRENGTH] = self._strength_that_carried(mean, climbed)
         names, soil, stds = self._named_soil(mean, self._widened(covariance))
         for key, value, std in zip(names, soil.tolist(), stds.tolist(), strict=True):
             found[key] = value
@@ -94,6 +114,37 @@ class Learned:
             found[f'sensors.{name}'] = values.tolist()
             found[f'sensors.{name}_std'] = float(getattr(sensors, f'{name}_std'))
         return found
+
+    def _strength_that_carried(self, mean: FloatArray, climbed: Climbed) -> float:
+        """Return the learned strength, or the least at which the soil gives what it gave."""
+        learned = float(mean[SHEAR_STRENGTH])
+        stated = 0.0  # of the configured soil
+        if not climbed.slip > 0.0 or learned >= stated:
+            return learned
+        models, rover = self._models
+
+        def lacks(strength: float) -> bool:
+            pull = steady_pull(
+                models,
+                rover,
+                min(climbed.slip, 1.0),
+                strength=strength,
+                shear_modulus=float(mean[SHEAR_MODULUS]),
+                stiffness=float(mean[self._layout.stiffness].mean()),
+            )
+            return pull < climbed.demand
+
+        if not lacks(learned):
+            return learned
+        low, high = learned, stated
+        for _ in range(self._BISECTIONS):
+            middle = 0.5 * (low + high)
+            low, high = (middle, high) if lacks(middle) else (low, middle)
+        return high
+
+    @cached_property
+    def _models(self) -> tuple[WheelModels, Rover]:
+        return WheelModels(self._configuration), Rover.from_configuration(self._configuration)
 
     def _force_bias(self, mean: FloatArray) -> float:
         """Return the part of the state's bias that is the accelerometer's [m/s^2].

@@ -29,6 +29,7 @@ from wheel_terra_estimator.estimation.contacts.stationary_wheels import (
     StationaryPull,
     StationaryWheels,
 )
+from wheel_terra_estimator.estimation.contacts.steepest_climb import SteepestClimb
 from wheel_terra_estimator.estimation.contacts.steering import Steering
 from wheel_terra_estimator.estimation.contacts.torque_change import TorqueChange
 from wheel_terra_estimator.estimation.contacts.turning import Turning, sides_oppose
@@ -186,6 +187,7 @@ class WheelSoilEstimator:
         self._contact_age = ContactAge(rover)
         self._unloaded = UnloadedWheels(rover, sensors)
         self._demand = Demand()
+        self._climb = SteepestClimb()
         self._torque_change = TorqueChange(rover, sensors)
         angle_std = sensors.leaving_angle_std * self._leaving_angles.noise_share
         self._linearisation = Linearisation(rover, layout, models, angle_std)
@@ -223,6 +225,7 @@ class WheelSoilEstimator:
             self._contact_age,
             self._unloaded,
             self._demand,
+            self._climb,
             self._torque_change,
             self._linearisation,
             self._pulls,
@@ -420,9 +423,13 @@ class WheelSoilEstimator:
         )
         if event.reversed:
             speed.turn_back(ekf, self._demand.state, demand)
+            if self._tape is not None:
+                # The soil that was learned downhill is not that of the climb before it.
+                self._tape.cut()
         elif event.new_direction:
             speed.forget_ratio()
         demand_change = self._demand.update(demand, dt, settled=self._contact_age.settled)
+        self._note_climb(demand, unturned.typical, dt, told=reference_known)
         speed.begin(ekf, unturned)
         speed.follow_sides(unturned, dt)
         speed.note_change(time, unturned)
@@ -441,6 +448,13 @@ class WheelSoilEstimator:
             reference_known=reference_known,
             demand_change=demand_change,
         )
+
+    def _note_climb(self, demand: float, rim: float, dt: float, *, told: bool) -> None:
+        """Note what is asked and the slip, where a reference tells it and the rover rolls on."""
+        steady = told and self._contact_age.settled and abs(rim) >= self._rover.low_rim
+        straight = self._turning.state.lateral_motion <= _SHARP_TURN
+        slip = 1.0 - float(self._ekf.mean[SPEED]) / rim if steady and straight else NAN
+        self._climb.update(demand, slip, dt)
 
     def _predict(self, cycle: _Cycle) -> None:
         """Predict speed, sinkage, soil and errors of the shear model to the time of a cycle."""
@@ -756,7 +770,8 @@ class WheelSoilEstimator:
     def learned(self) -> dict[str, Any]:
         """Return what was learned: configuration key -> value, deviations ``_std`` too."""
         ekf = self._ekf
-        return self._learned.values(ekf.mean, ekf.covariance, self._zero_velocity.state.zero)
+        zero, climbed = self._zero_velocity.state.zero, self._climb.state
+        return self._learned.values(ekf.mean, ekf.covariance, zero, climbed)
 
     def health(self) -> dict[str, Any]:
         """Return counters and consistency figures for diagnostics."""

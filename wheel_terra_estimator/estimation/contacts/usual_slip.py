@@ -56,16 +56,10 @@ class UsualSlip:
     def curve(self) -> tuple[list[float], list[float]]:
         """Pull over load and slip, both increasing, up to the greatest pull."""
         models, rover = WheelModels(self._configuration), self._rover
-        loads = rover.load.loads((0.0, 0.0, rover.gravity)).tolist()
         pulls: list[float] = []
         slips: list[float] = []
         for slip in _SLIPS:
-            pull = 0.0
-            for i, load in enumerate(loads):
-                ratio = 1.0 - slip if slip >= 0.0 else 1.0 / (1.0 + slip)
-                sinkage = _steady_sinkage(models, i, load, ratio, rover.rim_radius[i])
-                pull += models.forces(i, WheelState(ratio, sinkage, load, 0.0, 0.0)).pull
-            share = pull / sum(loads)
+            share = steady_pull(models, rover, slip)
             if pulls and share <= pulls[-1]:
                 continue
             pulls.append(share)
@@ -73,14 +67,35 @@ class UsualSlip:
         return pulls, slips
 
 
-def _steady_sinkage(
-    models: WheelModels, wheel: int, load: float, ratio: float, radius: float
+def steady_pull(
+    models: WheelModels,
+    rover: Rover,
+    slip: float,
+    *,
+    strength: float = 0.0,
+    shear_modulus: float = 0.0,
+    stiffness: float = 0.0,
 ) -> float:
-    """Return the sinkage at which the bearing law carries a load [N] at v / rim speed [m]."""
+    """Return the pull of the whole rover over its load on level ground [-].
+
+    The three factors are those of the filter's state: logarithms, 0 for the configured soil.
+    """
+    loads = rover.load.loads((0.0, 0.0, rover.gravity)).tolist()
+    ratio = 1.0 - slip if slip >= 0.0 else 1.0 / (1.0 + slip)
+    pull = 0.0
+    for i, load in enumerate(loads):
+        wheel = WheelState(ratio, 0.0, load, strength, shear_modulus, stiffness=stiffness)
+        sinkage = _steady_sinkage(models, i, wheel, rover.rim_radius[i])
+        pull += models.forces(i, wheel._replace(sinkage=sinkage)).pull
+    return pull / sum(loads)
+
+
+def _steady_sinkage(models: WheelModels, index: int, wheel: WheelState, radius: float) -> float:
+    """Return the sinkage at which the bearing law carries the load of a wheel [m]."""
     low, high = _SHALLOWEST, _DEEPEST * radius
     for _ in range(_BISECTIONS):
         z = math.sqrt(low * high)
-        if models.bearing(wheel, WheelState(ratio, z, load, 0.0, 0.0)).load < load:
+        if models.bearing(index, wheel._replace(sinkage=z)).load < wheel.load:
             low = z
         else:
             high = z
