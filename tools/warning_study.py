@@ -65,7 +65,7 @@ def _stream(place: int, topic: str, series: Channel, make: Any) -> Iterator[Hear
 
 
 def _joints(series: Any, row: int) -> SimpleNamespace:
-    known = [i for i, rate in enumerate(series.rate[row]) if rate == rate]
+    known = [i for i, rate in enumerate(series.rate[row]) if not math.isnan(rate)]
     return SimpleNamespace(
         name=tuple(series.names[i] for i in known),
         velocity=series.rate[row, known],
@@ -170,8 +170,9 @@ def main() -> None:
         count = sum(not math.isnan(time) for time in told)
         print(f'{name:36}{count:7}{len(told):7}{min(known):12.1f}{max(known):12.1f}')
     everything = [time for told in times.values() for time in told]
+    heard = sum(not math.isnan(time) for time in everything)
     print(
-        f'\ntold while driving: {share(sum(t == t for t in everything), len(everything))}; '
+        f'\ntold while driving: {share(heard, len(everything))}; '
         f'told without a fault: {share(false, len(arguments.cases))}'
     )
     print(

@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
+from math import isnan
 from statistics import median
 from typing import NamedTuple
 
@@ -187,7 +188,7 @@ class _Window:
     @property
     def typical(self) -> float:
         """Median rim speed, signed; nan where no wheel is known."""
-        known = [rim for rim in self.rims if rim == rim]
+        known = [rim for rim in self.rims if not isnan(rim)]
         return median(known) if known else math.nan
 
     @property
@@ -198,7 +199,7 @@ class _Window:
     @property
     def size(self) -> float:
         """Median size of the rim speeds; 0 where no wheel is known."""
-        known = [abs(rim) for rim in self.rims if rim == rim]
+        known = [abs(rim) for rim in self.rims if not isnan(rim)]
         return median(known) if known else 0.0
 
 
@@ -311,7 +312,7 @@ class OnlineChecks:
             rim = rate * self._radius[i]
             heard.append(rim)
             changes[i] += not abs(rim - last[i]) <= SAME * abs(rim)
-            if rim == rim:
+            if not isnan(rim):
                 sizes.append(abs(rim))
             rims[i] += rim  # nan stays: the wheel is not known in this window
             torques[i] += torque
@@ -319,7 +320,7 @@ class OnlineChecks:
         sums.last = tuple(heard)
         if not sizes:
             return
-        self._speeds.add_rim(sum(rim for rim in heard if rim == rim) / len(sizes))
+        self._speeds.add_rim(sum(rim for rim in heard if not isnan(rim)) / len(sizes))
         sizes.sort()
         size = sizes[len(sizes) // 2]
         sums.slowest = min(sums.slowest, size)
@@ -328,7 +329,7 @@ class OnlineChecks:
     def _add_inertial(self, reading: InertialReading) -> None:
         sums = self._sums
         x, y, z = reading.specific_force.tolist()
-        if math.isnan(x) or math.isnan(float(reading.angular_rate[2])):
+        if isnan(x) or isnan(float(reading.angular_rate[2])):
             return
         sums.force_x += x
         sums.force_y += y
@@ -344,7 +345,7 @@ class OnlineChecks:
         sums.references += 1
 
     def _add_sinkage(self, reading: SinkageReading) -> None:
-        known = [z for z in reading.sinkage.tolist() if z == z]
+        known = [z for z in reading.sinkage.tolist() if not isnan(z)]
         if known:
             self._sums.depth += sum(known) / len(known)
             self._sums.depths += 1
@@ -424,14 +425,14 @@ class OnlineChecks:
     def _of_turning(self, window: _Window) -> Iterator[Evidence]:
         """Rolling without slip, right less left rim speed is yaw rate times track."""
         yaw_rate = window.yaw_rate
-        if not self._track or yaw_rate != yaw_rate:
+        if not self._track or isnan(yaw_rate):
             return
         left = _mean(window.rims, self._left)
         right = _mean(window.rims, self._right)
         difference, turn = right - left, yaw_rate * self._track
-        if difference != difference:
+        if isnan(difference):
             return
-        fastest = max(abs(rim) for rim in window.rims if rim == rim)
+        fastest = max(abs(rim) for rim in window.rims if not isnan(rim))
         slower, faster = sorted((abs(left), abs(right)))
         if left * right < 0.0 and slower > UNLIKE_SIDES * faster:
             if abs(turn) < 0.1 * abs(difference):
@@ -463,8 +464,8 @@ class OnlineChecks:
             return
         found = []
         for i, rim in enumerate(window.rims):
-            others = [r for j, r in enumerate(window.rims) if j != i and r == r]
-            if rim != rim or len(others) < 2:
+            others = [r for j, r in enumerate(window.rims) if j != i and not isnan(r)]
+            if isnan(rim) or len(others) < 2:
                 continue
             beside = median(others)
             if abs(beside) > LEAST_RIM_SPEED:
@@ -480,12 +481,12 @@ class OnlineChecks:
         """A rate that stays the very same number while the others change."""
         for i, (rim, changes) in enumerate(zip(window.rims, window.changes, strict=True)):
             others = [n for j, n in enumerate(window.changes) if j != i]
-            if rim == rim and rim != 0.0 and len(others) > 1 and median(others) >= BUSY:
+            if not isnan(rim) and rim != 0.0 and len(others) > 1 and median(others) >= BUSY:
                 yield 'frozen', i, changes == 0, rim
 
     def _of_the_reference(self, window: _Window) -> Iterator[Evidence]:
         typical, reference = window.typical, window.reference
-        if reference != reference or abs(typical) < LEAST_RIM_SPEED:
+        if isnan(reference) or abs(typical) < LEAST_RIM_SPEED:
             return
         if not self._straight(window):
             return
@@ -508,7 +509,7 @@ class OnlineChecks:
     def _of_torque(self, window: _Window) -> Iterator[Evidence]:
         """On the level or uphill driven wheels take torque; a flipped one mirrors the others."""
         force, torques, typical = window.force, window.torques, window.typical
-        if force is None or any(t != t for t in torques) or abs(typical) < LEAST_RIM_SPEED:
+        if force is None or any(isnan(t) for t in torques) or abs(typical) < LEAST_RIM_SPEED:
             return
         sense = math.copysign(1.0, typical)
         if force[0] * sense < LEVEL * self._gravity or not self._straight(window):
@@ -557,5 +558,5 @@ _CONSEQUENCES = {
 
 
 def _mean(values: Floats, indices: list[int]) -> float:
-    known = [values[i] for i in indices if values[i] == values[i]]
+    known = [values[i] for i in indices if not isnan(values[i])]
     return sum(known) / len(known) if known else math.nan

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
+from math import isnan
 from typing import NamedTuple
 
 BIN = 100_000_000
@@ -95,7 +96,7 @@ class SpeedHistory:
 
     def _judged(self) -> Verdict | None:
         """Compare the references of the block with the rims of each lag before them."""
-        known = [rim for rim in self.rims if rim == rim]
+        known = [rim for rim in self.rims if not isnan(rim)]
         top = max(map(abs, known), default=0.0)
         if len(known) < len(self.rims) or top < LEAST_RIM_SPEED:
             return None

@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Rovers and mountings at the edge: one wheel, an IMU upside down."""
+"""Rigs and mountings at the edge: one wheel, one axle, an IMU upside down, exact sensors."""
 
 import numpy as np
 import pytest
