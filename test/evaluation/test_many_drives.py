@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Drives of some kinds for so many hours: which they are, going on, limit of a rate."""
 
+import functools
 import json
 import math
 from dataclasses import replace
@@ -15,20 +16,27 @@ from wheel_terra_estimator.evaluation.many_drives import drive_kinds_for_hours, 
 from wheel_terra_estimator.evaluation.scores import coverage, rms
 
 SEED = 1090
-LENGTH = 14.0  # of a drive [s]; the first ten are not scored
+LENGTH = 12.0  # of a drive [s]; the first ten are not scored
 HOURS = 3.5 * LENGTH / 3600.0
 CHOSEN = [('own', 'cruise'), ('own', 'climb')]
 
 
+OWN = worlds.WORLDS['own']
+
+
+@functools.cache
+def drive_of(kind, seed, rover):
+    return OWN.simulate(kind, seed, LENGTH, rover)
+
+
 @pytest.fixture
 def short(monkeypatch):
-    """Make every drive short."""
-    own = worlds.WORLDS['own']
+    """Make every drive short, and once."""
 
     def simulate(kind, seed, duration, rover):
-        return own.simulate(kind, seed, LENGTH, rover)
+        return drive_of(kind, seed, rover)
 
-    monkeypatch.setitem(worlds.WORLDS, 'own', replace(own, simulate=simulate))
+    monkeypatch.setitem(worlds.WORLDS, 'own', replace(OWN, simulate=simulate))
 
 
 def without_process(rows):

@@ -11,10 +11,13 @@ import pytest
 from wheel_terra_estimator.terramechanics.effects.learned_closure import FEATURES, TARGETS
 from wheel_terra_estimator.terramechanics.maths import ScalarMaths
 
+LOAD = 10.0 * 1600.0 * 9.8 * 0.1 * 0.2**2  # ten times rho g b r^2
 CONTACT = {
     'slip': -0.5,
-    # Ten times rho g b r^2.
-    'stated_load': 10.0 * 1600.0 * 9.8 * 0.1 * 0.2**2,
+    'stated_load': LOAD,
+    'direction': -1.0,
+    'torque': 0.3 * LOAD * 0.2,
+    'drawbar_pull': -0.2 * LOAD,
     'density': 1600.0,
     'gravity': 9.8,
     'width': 0.1,
@@ -42,6 +45,8 @@ BY_HAND = {
     'pass': 2.0,  # earlier ones
     'slope': 0.1,
     'depth': 0.25,  # z/r = 1 - cos(t1)
+    'torque_squared': -0.09,  # against the way, of W r
+    'pull_squared': 0.04,  # along the way, of W
 }
 
 
