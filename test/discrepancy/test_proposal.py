@@ -143,13 +143,14 @@ def test_where_only_an_unbelievable_soil_fits_the_law_leaves_one_that_can_be_bel
 
 
 def test_a_torque_sensor_that_bends_is_a_law_of_its_own_reading():
-    """Second-order sensor: T' = T - a T |T| / (W r), as a calibration curve has it."""
-    points = _points(slip=np.array([-0.3, 0.3, 0.6]))
+    """Second-order sensor: T' = T - a T |T|, whatever the load, as a calibration curve has it."""
+    points = _points(slip=np.array([-0.3, 0.3, 0.6]), normal_load=np.array([40.0, 80.0, 60.0]))
     lever = points.normal_load * points.wheel.radius
     plain = WheelSoilModel(SOIL, {}).steady_state(points).torque
     law = {'learned_closure': {'torque_by_torque_squared': -0.2}}
     bent = WheelSoilModel(SOIL, law).steady_state(points).torque
-    x = -0.2 * plain * np.abs(plain) / lever**2
+    soil = float(SOIL.density) * 9.81 * 0.15 * 0.15**3  # rho g b r^3 [N m]
+    x = -0.2 * plain * np.abs(plain) / (lever * soil)
     bound = TARGETS['torque'].bound
     assert bent == pytest.approx(plain + lever * bound * x / (bound + np.abs(x)), rel=1e-9)
 

@@ -47,6 +47,7 @@ FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.intp]
 
 MOST_TERMS = 4
+_BRANCHES = 3  # first terms that are gone on from, where laws do not predict what was left out
 _TRIED = 6  # terms of the greatest promise that are fitted in each step
 _WORTH = 3.0  # nats by which a term must raise the evidence beyond the choice among all terms
 _LEVELS = 6  # levels of an input that are left out one at a time, at most
@@ -120,18 +121,24 @@ def propose(
     refit = setting.fit([()], [plain.u], plain.angle, variance)[0]
     groupings = _groupings(table, len(setting.forward.points))
     best, most = None, _CLOSED
-    for law in _search(setting, nothing):
-        fitted = setting.fit([law.names], [law.fitted.u], law.fitted.angle, variance)[0]
-        fits = [refit, fitted]
-        if hold_soil and not _soil_is_believed(fitted, findings):
-            continue
-        judged = {
-            name: _left_out(setting, fits, variance, groups, findings, table)
-            for name, groups in groupings.items()
-        }
-        closed = _closed(judged, gap)
-        if closed > most:
-            best, most = (fits, judged), closed
+    begun: list[str] = []  # first terms of laws that did not predict what was left out
+    while best is None and len(begun) < _BRANCHES:
+        laws = _search(setting, nothing, begun)
+        if not laws:
+            break
+        begun.append(laws[0].names[0])
+        for law in laws:
+            fitted = setting.fit([law.names], [law.fitted.u], law.fitted.angle, variance)[0]
+            fits = [refit, fitted]
+            if hold_soil and not _soil_is_believed(fitted, findings):
+                continue
+            judged = {
+                name: _left_out(setting, fits, variance, groups, findings, table)
+                for name, groups in groupings.items()
+            }
+            closed = _closed(judged, gap)
+            if closed > most:
+                best, most = (fits, judged), closed
     if best is None:
         return None
     found = _proposal(table, findings, setting, *best, gap)
@@ -195,13 +202,13 @@ def _levels(table: SteadyTable, column: str) -> FloatArray:
     return np.unique(np.round(values[np.isfinite(values)], 9))
 
 
-def _search(setting: Setting, nothing: Explanation) -> list[Explanation]:
-    """Return laws of one, two, ... terms, each with the greatest evidence."""
+def _search(setting: Setting, nothing: Explanation, begun: Sequence[str] = ()) -> list[Explanation]:
+    """Return laws of one, two, ... terms, each with the greatest evidence, not with `begun`."""
     price = math.log(max(len(setting.effects), 1)) + _WORTH
     best, score = nothing, nothing.log_evidence
     found = []
     for _ in range(MOST_TERMS):
-        others = [name for name in setting.effects if name not in best.names]
+        others = [name for name in setting.effects if name not in {*best.names, *begun}]
         starts = sorted(linear_starts(setting, best.fitted, others), key=lambda s: -s[0])[:_TRIED]
         fits = setting.fit([n for _, n, _ in starts], [u for _, _, u in starts], best.fitted.angle)
         tried = [setting.explain(f) for f in fits]

@@ -37,8 +37,11 @@ _PER = {
     'pass': ('per earlier pass', 1.0),
     'slope': ('per 10 degrees of slope', math.radians(10.0)),
     'depth': ('per 0.01 r of sinkage', 0.01),
-    'torque_squared': ('with the square of the torque, where it is 0.5 W r', 0.25),
-    'pull_squared': ('with the square of the pull, where it is 0.3 W', 0.09),
+    'torque_squared': (
+        'with the square of the torque, where T^2 is 0.1 W r times rho g b r^3',
+        0.1,
+    ),
+    'pull_squared': ('with the square of the pull, where F^2 is 0.1 W times rho g b r^2', 0.1),
 }
 
 

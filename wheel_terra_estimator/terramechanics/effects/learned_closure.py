@@ -109,9 +109,14 @@ def _near(middle: float) -> Callable[[Contact, Any], Any]:
     return band
 
 
+def _weight(contact: Contact) -> Any:
+    """Weight of soil of the wheel's size, rho g b r^2 [N]: what loads are compared with."""
+    return contact.density * contact.gravity * contact.width * contact.radius * contact.radius
+
+
 def _load(contact: Contact, maths: Any) -> Any:
-    scale = contact.density * contact.gravity * contact.width * contact.radius * contact.radius
-    return maths.log(maths.maximum(contact.stated_load / scale, _LEAST)) / maths.log(10.0)
+    share = contact.stated_load / _weight(contact)
+    return maths.log(maths.maximum(share, _LEAST)) / maths.log(10.0)
 
 
 def _rim_speed(contact: Contact, maths: Any) -> Any:
@@ -120,18 +125,16 @@ def _rim_speed(contact: Contact, maths: Any) -> Any:
     return maths.where(maths.isnan(contact.rim_speed), 0.0, decades)
 
 
-def _signed_square(share: Any, maths: Any) -> Any:
-    return share * maths.abs(share)
-
-
 def _torque_squared(contact: Contact, maths: Any) -> Any:
-    scale = maths.maximum(contact.stated_load * contact.radius, _LEAST)
-    return _signed_square(contact.direction * contact.torque / scale, maths)
+    lever = maths.maximum(contact.stated_load * contact.radius, _LEAST)
+    square = contact.torque * maths.abs(contact.torque) * contact.direction
+    return square / (lever * _weight(contact) * contact.radius)
 
 
 def _pull_squared(contact: Contact, maths: Any) -> Any:
-    scale = maths.maximum(contact.stated_load, _LEAST)
-    return _signed_square(contact.direction * contact.drawbar_pull / scale, maths)
+    load = maths.maximum(contact.stated_load, _LEAST)
+    square = contact.drawbar_pull * maths.abs(contact.drawbar_pull) * contact.direction
+    return square / (load * _weight(contact))
 
 
 BANDS: Mapping[str, Feature] = {
@@ -140,13 +143,14 @@ BANDS: Mapping[str, Feature] = {
     'slip_near_06': Feature(_near(0.6), 0.5, ('slip',), 'a band of |s| around 0.6', _IN_A_BAND),
 }
 
-# The curve of a sensor that bends: the first term beyond a gain, odd so that both ways are alike.
+# The curve of a sensor that bends: the first term beyond a gain (the reading changes with the
+# square of the reading, whatever the load), odd so that both ways are alike.
 BENT_READINGS: Mapping[str, Feature] = {
     'torque_squared': Feature(
-        _torque_squared, 0.15, ('slip', 'normal_load'), 'T |T| / (W r)^2', ('torque',)
+        _torque_squared, 0.15, ('slip', 'normal_load'), 'T |T| / (W r * rho g b r^3)', ('torque',)
     ),
     'pull_squared': Feature(
-        _pull_squared, 0.1, ('slip', 'normal_load'), 'F |F| / W^2', ('drawbar_pull',)
+        _pull_squared, 0.1, ('slip', 'normal_load'), 'F |F| / (W * rho g b r^2)', ('drawbar_pull',)
     ),
 }
 
