@@ -149,7 +149,7 @@ def test_a_torque_sensor_that_bends_is_a_law_of_its_own_reading():
     plain = WheelSoilModel(SOIL, {}).steady_state(points).torque
     law = {'learned_closure': {'torque_by_torque_squared': -0.2}}
     bent = WheelSoilModel(SOIL, law).steady_state(points).torque
-    soil = float(SOIL.density) * 9.81 * 0.15 * 0.15**3  # rho g b r^3 [N m]
+    soil = SOIL.density * points.gravity * 0.15 * 0.15**3  # rho g b r^3 [N m]
     x = -0.2 * plain * np.abs(plain) / (lever * soil)
     bound = TARGETS['torque'].bound
     assert bent == pytest.approx(plain + lever * bound * x / (bound + np.abs(x)), rel=1e-9)
