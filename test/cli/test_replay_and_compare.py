@@ -23,7 +23,7 @@ CONFIG = ['--config', 'generic_six_wheel', '--config', 'test_sand']
 @pytest.fixture(scope='module')
 def drive(tmp_path_factory):
     path = tmp_path_factory.mktemp('drive') / 'drive'
-    write_simulated_drive(simulate(scenario.load('turns'), seed=5, duration=15.0), path)
+    write_simulated_drive(simulate(scenario.load('turns'), seed=5, duration=13.0), path)
     return path
 
 
@@ -69,12 +69,10 @@ def test_findings_come_before_anything_else(upside_down, tmp_path, capsys):
     assert said.startswith('finding: mounting') and 'imu_mounting_roll_deg: 180' in said
 
 
-def test_smoothed(tmp_path, capsys, undrawn):
+def test_smoothed(drive, tmp_path, capsys, undrawn):
     """Same sets at the same times, warnings and diagnostics as given live, both in the report."""
     from wheel_terra_estimator.bags.writer import NAMESPACE
 
-    drive = tmp_path / 'short'
-    write_simulated_drive(simulate(scenario.load('turns'), seed=5, duration=14.0), drive)
     page, table = tmp_path / 'page.html', tmp_path / 'table.csv'
     ways = ['--track', str(tmp_path / 'way.geojson')]
     for name, extra in (

@@ -42,7 +42,9 @@ def predicted(table, configuration, tmp_path, *files):
     ('hidden', 'design'),
     [
         (('slip_sinkage_exponent',), 'sweep40'),
-        (('slip_sinkage_exponent', 'drivetrain_friction'), 'sweep40'),
+        pytest.param(
+            ('slip_sinkage_exponent', 'drivetrain_friction'), 'sweep40', marks=pytest.mark.slow
+        ),
         ((), 'lugs48'),
     ],
 )

@@ -155,6 +155,7 @@ def test_the_whole_set_of_ding_s_wheel_is_found_in_one_run():
         assert gap.after < 1.3 * gap.noise < gap.refit
 
 
+@pytest.mark.slow
 def test_as_many_effects_as_the_rows_carry():
     """Four at once, two of them of the instruments: all are found, none is false."""
     hidden = (

@@ -55,7 +55,8 @@ def test_snow_events_are_warned_without_any_speed(names, least, most_late):
     assert np.mean([s.lead for s in found]) >= -1.1
 
 
-@pytest.mark.parametrize('rate', [pytest.param(1.0, marks=pytest.mark.slow), 0.0])
+@pytest.mark.slow
+@pytest.mark.parametrize('rate', [1.0, 0.0])
 def test_firm_ground_raises_no_warning(rate):
     bag = MEASURED / 'bags' / 'wvu_pathfinder_test17_mcap'
     assert not real_drives.pathfinder_record(bag, rate).stuck.any()

@@ -94,7 +94,7 @@ def without_process(rows):
 
 
 def test_an_interrupted_run_goes_on_with_equal_figures(tmp_path):
-    hours, span = 6.0 / HOUR, 2.0
+    hours, span = 3.0 / HOUR, 1.0
     whole = drive_for_hours(tmp_path / 'whole', hours, SEED, span=span, progress=str)
 
     def interrupt(line):
