@@ -62,7 +62,7 @@ def window(force_x, force_z, readings=5, noise=0.0):
 # -- Reference velocity -----------------------------------------------------------------------
 
 
-def references(parts, ekf, speeds, torque_known=True, last_change=-1e9, acceleration=0.0):
+def references(parts, ekf, speeds, torque_tells=True, last_change=-1e9, acceleration=0.0):
     """Fuse one reference per second; return for each whether the speed was opened to it."""
     update = ReferenceUpdate(parts.configuration, parts.rover, parts.sensors, parts.layout)
     opened = []
@@ -77,7 +77,7 @@ def references(parts, ekf, speeds, torque_known=True, last_change=-1e9, accelera
                 fastest_rim=0.05,
                 rim_acceleration=acceleration,
                 last_change=last_change,
-                torque_known=torque_known,
+                torque_tells=torque_tells,
                 reading_variance=parts.sensors.reference_std**2,
             )
         )
@@ -102,10 +102,10 @@ def test_a_reference_within_a_ramp_counts_less(parts, ekf):
 
 def test_references_that_agree_with_one_another_are_believed_after_their_count(parts, ekf):
     good = [0.045] * 10
-    for torque_known, last_change, count in ((True, -1e9, 3), (False, -1e9, 2), (True, 9.9, 2)):
+    for torque_tells, last_change, count in ((True, -1e9, 3), (False, -1e9, 2), (True, 9.9, 2)):
         fresh = parts.filter()
         fresh.set(SPEED, 0.045, 0.005**2)
-        update, opened = references(parts, fresh, good + [0.02] * 3, torque_known, last_change)
+        update, opened = references(parts, fresh, good + [0.02] * 3, torque_tells, last_change)
         assert opened.index(True) == 9 + count
         assert update.state.rejected == count
         assert fresh.mean[SPEED] == pytest.approx(0.02, abs=0.003)
@@ -162,7 +162,7 @@ def test_a_reference_on_standing_wheels_says_whether_the_rover_slides(parts, ekf
             fastest_rim=0.0,
             rim_acceleration=0.0,
             last_change=-1e9,
-            torque_known=True,
+            torque_tells=True,
             reading_variance=parts.sensors.reference_std**2,
         )
         assert (update.state.sliding_until > time) is sliding
@@ -199,7 +199,7 @@ def test_readings_that_are_off_by_the_same_are_no_many_readings(stated, least, m
                 fastest_rim=0.6,
                 rim_acceleration=0.0,
                 last_change=-1e9,
-                torque_known=True,
+                torque_tells=True,
                 reading_variance=1e-4,
             )
         inside.append(abs(ekf.mean[SPEED] - 0.5) < 1.96 * np.sqrt(ekf.covariance[SPEED, SPEED]))

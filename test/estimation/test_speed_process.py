@@ -131,11 +131,14 @@ def test_combination_is_better_than_either():
 
 def test_the_slip_walks_as_the_demand_over_the_slope_of_the_traction_curve():
     made = process([0.05] * 6)
-    walks = []
+    assert not made.on_plateau  # nothing is known of it yet
+    walks, plateau = [], []
     for slope in (0.001, 0.4, 10.0):
         made.follow_traction_curve(slope, travel=10.0, dragging=False)
         walks.append(made.state.ratio_walk)
+        plateau.append(made.on_plateau)
     assert walks == pytest.approx([0.13, 0.025 / 0.4, 0.03])
+    assert plateau == [True, True, False]
 
 
 def test_a_rover_that_must_pull_more_slips_more_at_once():

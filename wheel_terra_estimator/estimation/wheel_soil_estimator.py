@@ -527,7 +527,7 @@ class WheelSoilEstimator:
             fastest_rim=self._wheels.fastest(),
             rim_acceleration=self._wheels.acceleration(),
             last_change=self._speed.state.change_time,
-            torque_known=self._wheels.torque_known(time),
+            torque_tells=self._wheels.torque_known(time) and not self._speed.on_plateau,
             reading_variance=noise,
         )
         self._whiteness.follow(time, ekf.innovations, reference=1)

@@ -48,7 +48,7 @@ class ReferenceTuning:
     count_unwitnessed: int = 3
     """References that must agree where torque, slope and rim speed witness no change: a real change
     of slip shows in them unless the traction curve is flat."""
-    count: int = 2  # where there is a witness, or no torque to ask
+    count: int = 2  # where there is a witness, or no torque to ask, or none that could tell
     witness_time: float = 2.5  # [s] for which a change of the contacts is a witness
     timing_std: float = 0.1
     """Doubt of when the wheels were as fast as they say, against the reference [s]: a ramp makes of
@@ -151,7 +151,7 @@ class ReferenceUpdate(Component[ReferenceState]):
         fastest_rim: float,
         rim_acceleration: float,
         last_change: float,
-        torque_known: bool,
+        torque_tells: bool,
         reading_variance: float,
     ) -> bool:
         """Fuse a reference velocity; return whether the speed was opened to it.
@@ -172,13 +172,13 @@ class ReferenceUpdate(Component[ReferenceState]):
             Of the wheels at that time [m/s^2].
         last_change : float
             When torque, slope or rim speed last said that the slip may change [s].
-        torque_known : bool
-            Whether there is a torque that could say so.
+        torque_tells : bool
+            Whether there is a torque, and a traction curve so steep that it could say so.
         reading_variance : float
             Of the reading: `variance`, or more where more is seen [(m/s)^2].
         """
         tuning = self._tuning
-        witnessed = not (torque_known and time - last_change > tuning.witness_time)
+        witnessed = not (torque_tells and time - last_change > tuning.witness_time)
         variance = reading_variance + (tuning.timing_std * rim_acceleration) ** 2
         self._note_time(time)
         if still:

@@ -80,6 +80,9 @@ class SpeedTuning:
     """Of gravity times the error of the attitude: what of it changes along the way."""
     leak_rate: float = 0.1  # of that change [1/s]
     least_slope: float = 1e-3  # of the traction curve [-]
+    plateau_slope: float = 0.5
+    """Slope of the traction curve below which torque shows no change of the slip [-]: it is 1 to 2
+    at low slip. Tuned on entrapments of both worlds."""
     restless_change: float = 0.02  # of the rim speed in a cycle: the command changes
     restless_share: float = 0.05  # of the rim speed: an inflation that tells of new contacts
     usual_slip_std: float = 0.2  # about that of the configured soil on such a slope
@@ -277,6 +280,11 @@ class SpeedProcess(Component[SpeedState]):
         least = max(start, tuning.drag_walk if dragging else 0.0)
         walk = max(clipped(walk, self._least_walk, self._most_walk), least)
         self.state = self.state._replace(traction_slope=slope, ratio_walk=walk)
+
+    @property
+    def on_plateau(self) -> bool:
+        """Whether the traction curve is so flat that torque shows no change of the slip."""
+        return 0.0 < self.state.traction_slope < self._tuning.plateau_slope
 
     # -- Prediction ------------------------------------------------------------------------------
 
