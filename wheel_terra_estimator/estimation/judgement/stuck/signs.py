@@ -22,6 +22,8 @@ from wheel_terra_estimator.estimation.scalars import median
 
 ADVICE = 'stop, back out'
 """What to do where wheels dig themselves in: they climb their own ruts better than fresh soil."""
+_TWO_READINGS = 0.1
+"""Of wheel odometry at 10 Hz, in a row [s]: what these signs look at are means already."""
 _TOLD_TIME = 0.05
 """Time below which a tenth of a second says nothing [s]."""
 
@@ -311,7 +313,7 @@ SIGNS: tuple[Sign, ...] = (
     ),
     Sign(
         name='held',
-        hold=0.4,
+        hold=_TWO_READINGS,
         needs=Need.SPEED | Need.PULLED_AWAY,
         while_stopping=True,
         present=_held,
@@ -319,7 +321,7 @@ SIGNS: tuple[Sign, ...] = (
     ),
     Sign(
         name='bogging',
-        hold=0.2,
+        hold=_TWO_READINGS,
         needs=Need.STRAIGHT | Need.PULLED_AWAY,
         while_stopping=True,
         present=_bogging,
@@ -327,7 +329,7 @@ SIGNS: tuple[Sign, ...] = (
     ),
     Sign(
         name='stall',
-        hold=0.4,
+        hold=_TWO_READINGS,
         while_stopping=True,
         present=_stalling,
         words=_stalling_in_words,
