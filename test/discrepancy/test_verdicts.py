@@ -7,9 +7,11 @@ from __future__ import annotations
 import campaign_tools  # noqa: F401
 import numpy as np
 import pytest
+from campaigns.scoring import diagnose as diagnose_campaign
 from test_workflow import make, run
 
 from wheel_terra_estimator.configuration import reader
+from wheel_terra_estimator.discrepancy import workflow
 from wheel_terra_estimator.discrepancy.report.words import channels_off, sentence
 from wheel_terra_estimator.discrepancy.result import QuantityGap
 from wheel_terra_estimator.discrepancy.tables.checks import check_table
@@ -18,6 +20,7 @@ from wheel_terra_estimator.discrepancy.workflow import Options, diagnose, operat
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.terramechanics.effects import catalogue
 from wheel_terra_estimator.terramechanics.model import WheelSoilModel
+from wheel_terra_estimator.trials.campaign import Plan, make_campaign
 
 
 def with_effect(design, seed, name, **parameters):
@@ -173,3 +176,17 @@ def test_a_name_leaves_room_for_an_effect_that_looks_like_it_and_was_not_tried()
     assert narrow.effects[0].confidence <= 0.5
     assert any('bulldozing' in note and 'not tried' in note for note in narrow.notes)
     assert not any('not tried' in note for note in free.notes)
+
+
+def test_a_patchwork_of_doubtful_names_is_not_given(monkeypatch):
+    """Digging that may not be named: of the pair that patches it no name reaches one third."""
+    campaign = make_campaign(1070, 'basic16', Plan(noise='mixed', missing=0.03, forms=True))
+    assert campaign.hidden == ('lug_digging',)
+    found = diagnose_campaign(campaign, campaign.hidden)
+    assert found.verdict == 'unexplained'
+    assert not found.effects
+    assert found.nearest
+    monkeypatch.setattr(workflow, '_PATCHWORK', 0.0)
+    patched = diagnose_campaign(campaign, campaign.hidden)
+    assert len(patched.effects) > 1
+    assert max(effect.confidence for effect in patched.effects) < 1.0 / 3.0
