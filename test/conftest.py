@@ -102,7 +102,8 @@ class CompiledYaml:
         assert typ == 'safe'
 
     def dump(self, data: Any, stream: Any) -> None:
-        yaml.dump(data, stream, yaml.CSafeDumper, default_flow_style=self.default_flow_style)
+        dumper = getattr(yaml, 'CSafeDumper', yaml.SafeDumper)
+        yaml.dump(data, stream, dumper, default_flow_style=self.default_flow_style)
 
 
 LIBRARY_YAML = bag_writer.YAML
