@@ -171,7 +171,6 @@ LAW = {
     'torque_by_rim_speed': 0.03,
     'drawbar_pull_by_depth': -0.4,
     'torque_by_torque_squared': -0.2,
-    'drawbar_pull_by_pull_squared': 0.3,
 }
 
 

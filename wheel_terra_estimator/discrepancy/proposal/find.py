@@ -36,7 +36,7 @@ from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES, St
 from wheel_terra_estimator.terramechanics.effects.base import Effect
 from wheel_terra_estimator.terramechanics.effects.learned_closure import (
     BANDS,
-    BENT_READINGS,
+    BENT_READING,
     EFFECT,
     FEATURES,
     NAME,
@@ -68,7 +68,6 @@ _SAME = {
     'drawbar_pull_by_one': 'pull_zero',
     'drawbar_pull_by_load': 'pull_zero',
     'torque_by_torque_squared': 'torque_gain',
-    'drawbar_pull_by_pull_squared': 'pull_gain',
     'sinkage_by_one': 'sinkage_offset',
     'shear_modulus_by_load': 'shear_deformation',
     'bearing_pressure_by_pass': 'multipass',
@@ -173,9 +172,9 @@ def promise_on_top(table: SteadyTable, setting: Setting, fitted: Fit) -> float:
 
     Near zero where the fit leaves noise alone; several nats where what is left has the shape of
     some closure, so that the named effect is not the whole truth, or not the truth. Bands of slip
-    and bent readings are left out: the confidence that this is a feature of was fitted without.
+    and a bent reading are left out: the confidence that this is a feature of was fitted without.
     """
-    late = {*BANDS, *BENT_READINGS}
+    late = {*BANDS, *BENT_READING}
     found = {name: term for name, term in _terms(table).items() if pair_of(name)[1] not in late}
     terms = replace(setting, effects=found)
     starts = linear_starts(terms, fitted, tuple(terms.effects))

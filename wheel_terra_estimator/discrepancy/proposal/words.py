@@ -41,7 +41,6 @@ _PER = {
         'with the square of the torque, where T^2 is 0.1 W r times rho g b r^3',
         0.1,
     ),
-    'pull_squared': ('with the square of the pull, where F^2 is 0.1 W times rho g b r^2', 0.1),
 }
 
 

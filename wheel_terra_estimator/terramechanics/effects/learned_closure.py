@@ -131,26 +131,17 @@ def _torque_squared(contact: Contact, maths: Any) -> Any:
     return square / (lever * _weight(contact) * contact.radius)
 
 
-def _pull_squared(contact: Contact, maths: Any) -> Any:
-    load = maths.maximum(contact.stated_load, _LEAST)
-    square = contact.drawbar_pull * maths.abs(contact.drawbar_pull) * contact.direction
-    return square / (load * _weight(contact))
-
-
 BANDS: Mapping[str, Feature] = {
     'slip_near_02': Feature(_near(0.2), 0.5, ('slip',), 'a band of |s| around 0.2', _IN_A_BAND),
     'slip_near_04': Feature(_near(0.4), 0.5, ('slip',), 'a band of |s| around 0.4', _IN_A_BAND),
     'slip_near_06': Feature(_near(0.6), 0.5, ('slip',), 'a band of |s| around 0.6', _IN_A_BAND),
 }
 
-# The curve of a sensor that bends: the first term beyond a gain (the reading changes with the
-# square of the reading, whatever the load), odd so that both ways are alike.
-BENT_READINGS: Mapping[str, Feature] = {
+# The curve of a torque sensor that bends: the first term beyond a gain (the reading changes with
+# the square of the reading, whatever the load), odd so that both ways are alike.
+BENT_READING: Mapping[str, Feature] = {
     'torque_squared': Feature(
         _torque_squared, 0.15, ('slip', 'normal_load'), 'T |T| / (W r * rho g b r^3)', ('torque',)
-    ),
-    'pull_squared': Feature(
-        _pull_squared, 0.1, ('slip', 'normal_load'), 'F |F| / (W * rho g b r^2)', ('drawbar_pull',)
     ),
 }
 
@@ -177,7 +168,7 @@ FEATURES: Mapping[str, Feature] = {
         'z/r',
         _AFTER_CONTACT,
     ),
-    **BENT_READINGS,
+    **BENT_READING,
 }
 
 
