@@ -10,6 +10,7 @@ from typing import Any
 from ablations.switches import Switch, patched, tuned, without_sign
 from wheel_terra_estimator.estimation.filter.state import StateLayout
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
+from wheel_terra_estimator.estimation.scalars import median
 
 NEVER = 1e9
 
@@ -43,6 +44,10 @@ def _without_torque_zeros(rover: Rover, sensors: SensorFigures) -> StateLayout:
 
 def _as_stated(self: Any, sensor: str, stated: float | None = None) -> float:
     return float(self.stated[sensor] ** 2) if stated is None else stated
+
+
+def _median_of(values: list[float]) -> float:
+    return median(values) if values else 0.0
 
 
 def _speed(**values: Any) -> Switch:
@@ -187,6 +192,18 @@ TREATMENTS: tuple[Treatment, ...] = (
         'sliding on standing wheels believed',
         _MODEL,
         _reference(slide_gaps=0.0, shortest_slide=0.0),
+    ),
+    Treatment(
+        'others settle anew where a wheel is held',
+        _SIGN,
+        tuned('judgement.stuck.situation:SituationTuning', standing_ratio=0.0),
+        warnings_only=True,
+    ),
+    Treatment(
+        'sinkage grows where that of more than half does',
+        _SIGN,
+        patched('judgement.stuck.forecast:_growth_of_most', _median_of),
+        warnings_only=True,
     ),
     *(Treatment(f'sign {name}', _SIGN, without_sign(name), warnings_only=True) for name in SIGNS),
 )
