@@ -361,21 +361,26 @@ def test_a_wheel_sunk_to_its_hub_is_followed():
     assert found.sinkage[1] < 0.5 * sunk
 
 
-def test_two_wild_references_that_agree_need_a_witness(climb):
-    """Torque, slope and rim speed say that nothing changed: a third one would have to agree."""
-    wild = [a.measurement for a in climb.arrivals]
+def test_two_wild_references_that_agree_need_a_witness():
+    """Torque, slope and rim speed say that nothing changed: a third one would have to agree.
+
+    So it is where the traction curve is steep; on its plateau torque shows no change of the slip.
+    """
+    run = drive(configuration=['generic_six_wheel', 'test_sand'])
+    wild = [a.measurement for a in run.arrivals]
     references = [i for i, m in enumerate(wild) if isinstance(m, ReferenceVelocity)]
     for i in references[8:10]:
         wild[i] = replace(wild[i], forward=wild[i].forward + 0.03)
     worst = 0.0
-    row = {int(stamp): i for i, stamp in enumerate(climb.truth.stamp)}
-    estimator = WheelSoilEstimator(climb.configuration)
+    row = {int(stamp): i for i, stamp in enumerate(run.truth.stamp)}
+    estimator = WheelSoilEstimator(run.configuration)
     for stamp, inputs in merged(wild):
         estimator.step(stamp, inputs)
         if stamp > wild[references[8]].stamp and stamp in row:
-            error = estimator.estimates().slip - climb.truth.slip[row[stamp]]
+            error = estimator.estimates().slip - run.truth.slip[row[stamp]]
             worst = max(worst, np.abs(np.median(error)))
-    assert worst < 0.25  # of the 0.6 that the references say
+    assert not estimator._speed.on_plateau
+    assert worst < 0.25  # of the 0.4 that the references say
 
 
 def errors_of(kind, duration, mode, of, truth):

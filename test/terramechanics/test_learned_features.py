@@ -45,8 +45,7 @@ BY_HAND = {
     'pass': 2.0,  # earlier ones
     'slope': 0.1,
     'depth': 0.25,  # z/r = 1 - cos(t1)
-    'torque_squared': -0.09,  # against the way, of W r
-    'pull_squared': 0.04,  # along the way, of W
+    'torque_squared': -0.9,  # against the way: 0.3^2 of W r, ten times as heavy as rho g b r^2
 }
 
 
