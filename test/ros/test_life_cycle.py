@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Life cycle, services, live parameters, what is kept over a restart, and signals."""
 
+import itertools
 import json
 import os
 import signal
@@ -20,9 +21,28 @@ STALE = b'\x03'
 def call(node, until, kind, name, request):
     client = node.create_client(kind, f'{NODE}/{name}')
     until(client.service_is_ready)
+    until(answer_to_a_question(node))
     future = client.call_async(request)
     until(future.done)
     return future.result()
+
+
+def answer_to_a_question(node):
+    """Return whether the node answers: then it has heard of each client that was made before.
+
+    An answer to a client of which it has not heard yet is lost; a question may be asked again.
+    """
+    from lifecycle_msgs.srv import GetState
+
+    client = node.create_client(GetState, f'{NODE}/get_state')
+    asked, turns = [], itertools.count()
+
+    def answered():
+        if client.service_is_ready() and next(turns) % 20 == 0:
+            asked.append(client.call_async(GetState.Request()))
+        return any(future.done() for future in asked)
+
+    return answered
 
 
 def test_life_cycle_services_and_live_parameters(start, parameters, listener, tmp_path):
