@@ -115,6 +115,7 @@ TREATMENTS: tuple[Treatment, ...] = (
         _reference(count=1, count_unwitnessed=1, count_beyond=1),
     ),
     Treatment('witness for a reference', _GATE, _reference(count_unwitnessed=2)),
+    Treatment('no witness on the plateau', _GATE, _speed(plateau_slope=0.0)),
     Treatment(
         'force rows weakened by gate and NIS',
         _GATE,
