@@ -190,6 +190,28 @@ def test_comparison_page_tells_misses(tmp_path, undrawn):
     assert 'slip 1.00, H 1.00' in page
 
 
+def test_rows_at_the_papers_speed_are_in_order_and_tell_the_largest_miss():
+    """The paper's own figures, but for one wheel's slip; depths in the opposite order."""
+    arguments = argparse.Namespace(part=['paper_speed'], seeds=1, grain_scale=0.0)
+    rows = []
+    for job in reproduction.jobs(arguments):
+        paper = reproduction.metrics.published('table7')[job.labels['wheel']]
+        row = {k: str(v) for k, v in job.labels.items()} | {'slip': str(paper['slip'])}
+        row['gross_traction'] = str(paper['gross_traction'])
+        row['sinkage_average'] = str(-paper['sinkage_average'])
+        rows.append(row)
+    fastest = min(rows, key=lambda row: float(row['slip']))
+    fastest['slip'] = str(float(fastest['slip']) - 0.0123)  # it stays the one that slips least
+    lines = reproduction.paper_speed_lines(rows)
+    order = [tuple(float(cell) for cell in line.split('|')[1:3]) for line in lines[4:-3]]
+    assert order == sorted(order)
+    assert [wheel for wheel, slope in order if slope == 25.0] == list(range(1, 10))
+    said = lines[-1]
+    assert '9 wheels on 25 degrees is at most 1.2 points' in said
+    assert 'slip 1.00, H 1.00, z_a -1.00' in said
+    assert len(reproduction.paper_speed_lines(rows[:5])) == len(lines) - 9  # wheel 2: no order yet
+
+
 def test_statements_of_the_papers_figures_hold_and_can_fail():
     """The published rows do what the paper's text says; with two wheels exchanged they do not."""
     table = Path(__file__).parents[2] / 'docs' / 'soilbin' / 'reproduction.csv'

@@ -33,6 +33,7 @@ MOON = EARTH_GRAVITY / 6
 MOON_PULLS = (0.0, 0.1, 0.2, 0.3)  # P/W on the level
 MOON_SLOPES = (10.0, 15.0, 21.0, 25.0)
 EARTH_SLOPES = (0.0, 15.0, 25.0)
+LEAST_WHEELS_IN_ORDER = 5  # fewer have no order to speak of
 HIGH_LUGS = 8  # wheel of figures 12(b) and 13(b): lugs of 20 mm
 HIGH_LUG_SLOPES = (25.0, 0.0, 15.0)  # the most telling ones first
 HIGH_LUG_GRAINS = 2.0  # least grain scale of these figures
@@ -382,8 +383,8 @@ def paper_speed_lines(rows: Sequence[Row]) -> list[str]:
 
     paper = metrics.published('table7')
     body = []
-    for wheel, slope in dict.fromkeys(
-        (int(row['wheel']), float(row['slope_deg'])) for row in of(rows, PAPER_SPEED)
+    for wheel, slope in sorted(
+        {(int(row['wheel']), float(row['slope_deg'])) for row in of(rows, PAPER_SPEED)}
     ):
         slow = [r for r in of(rows, PAPER_SPEED, wheel) if float(r['slope_deg']) == slope]
         beds = {row['seed'] for row in slow}
@@ -406,4 +407,32 @@ def paper_speed_lines(rows: Sequence[Row]) -> list[str]:
     title = "## At the paper's rim speed: W 19.6 N"
     if not body:
         return [title, '', 'Not computed yet.']
-    return [title, '', *table(head, body), '', 'The same beds at both speeds.']
+    said = ['The same beds at both speeds.', *_agreement_at_paper_speed(rows)]
+    return [title, '', *table(head, body), '', *said]
+
+
+def _agreement_at_paper_speed(rows: Sequence[Row]) -> list[str]:
+    """Return how far table 7's wheels are from the paper's at its speed, and their order."""
+    paper = metrics.published('table7')
+    steep = [r for r in of(rows, PAPER_SPEED) if float(r['slope_deg']) == TABLE7_SLOPE]
+    wheels = sorted({int(row['wheel']) for row in steep})
+    if len(wheels) < LEAST_WHEELS_IN_ORDER:
+        return []
+
+    def pairs(key: str) -> tuple[list[float], list[float]]:
+        ours = [
+            metrics.spread(metrics.number(r, key) for r in of(steep, PAPER_SPEED, wheel))[0]
+            for wheel in wheels
+        ]
+        return ours, [paper[wheel][key] for wheel in wheels]
+
+    apart = [100.0 * abs(a - b) for a, b in zip(*pairs('slip'), strict=True)]
+    order = ', '.join(
+        f'{name} {metrics.rank_correlation(*pairs(key)):.2f}'
+        for name, key in FIGURES_TABLE7.items()
+        if name != 'R_r'  # the slope fixes H - R_r
+    )
+    return [
+        f'Slip of the {len(wheels)} wheels on {TABLE7_SLOPE:g} degrees is at most {max(apart):.1f} '
+        f"points from the paper's; rank correlations: {order}."
+    ]
