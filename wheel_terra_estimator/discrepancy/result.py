@@ -20,6 +20,7 @@ from wheel_terra_estimator.terramechanics.effects.base import FORM_MARK
 
 if TYPE_CHECKING:
     from wheel_terra_estimator.configuration.reader import Configuration
+    from wheel_terra_estimator.discrepancy.assessment.structural_error import StructuralError
     from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
 
 FloatArray = NDArray[np.float64]
@@ -475,6 +476,8 @@ class Diagnosis:
         Where nothing was named: the effects that come nearest.
     proposal : Proposal or None
         A law for what no listed effect explains, where one helps.
+    structural_error : StructuralError or None
+        Smooth misfit that is left at the rows, beyond the law where one is proposed.
     seconds : float
         Time the diagnosis took.
     """
@@ -503,6 +506,7 @@ class Diagnosis:
     refitted: Mapping[str, FittedParameter] = field(default_factory=dict)
     nearest: tuple[str, ...] = ()
     proposal: Proposal | None = None
+    structural_error: StructuralError | None = None
     not_tried: Mapping[str, str] = field(default_factory=dict)
     seconds: float = 0.0
 
@@ -547,6 +551,9 @@ class Diagnosis:
                 'refitted': {key: value.to_dict() for key, value in self.refitted.items()},
                 'nearest': list(self.nearest),
                 'proposal': None if self.proposal is None else self.proposal.to_dict(),
+                'structural_error': (
+                    None if self.structural_error is None else self.structural_error.to_dict()
+                ),
                 'notes': list(self.notes),
                 'rows': len(self.table.lines),
                 'table': self.table.name,

@@ -16,6 +16,7 @@ from wheel_terra_estimator.configuration.readings import Readings
 from wheel_terra_estimator.discrepancy.assessment import next_measurement
 from wheel_terra_estimator.discrepancy.assessment.along import changed_stretch
 from wheel_terra_estimator.discrepancy.assessment.held_out import hold_out, log_scores, slip_groups
+from wheel_terra_estimator.discrepancy.assessment.structural_error import structural_error
 from wheel_terra_estimator.discrepancy.assessment.where import locate
 from wheel_terra_estimator.discrepancy.effect_keys import effect_of
 from wheel_terra_estimator.discrepancy.fitting.coordinates import (
@@ -330,6 +331,8 @@ def _report(
         )
     candidates = _candidates(findings, verdict, shown, gains, floor_index)
     stretch = changed_stretch(both, setting, after, variance)
+    proposal = _proposal(table, findings, verdict, gap, variance)
+    law = None if proposal is None else proposal.fit
     return Diagnosis(
         verdict=verdict.word,
         sentence=words.sentence(verdict, effects, gap_p_value, left, floor, stretch, gap, nearest),
@@ -359,7 +362,15 @@ def _report(
         base_effects=tuple(configuration.effects),
         refitted=_parameters(after, covariance, base=True),
         nearest=nearest,
-        proposal=_proposal(table, findings, verdict, gap, variance),
+        proposal=proposal,
+        structural_error=structural_error(
+            problem,
+            both.scaled_inputs(),
+            law or after,
+            selection.floors,
+            len(table),
+            beyond_law=law is not None,
+        ),
     )
 
 

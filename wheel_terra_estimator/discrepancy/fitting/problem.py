@@ -11,7 +11,7 @@ that all amplitudes cost one decomposition.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -77,6 +77,22 @@ class Problem:
         """Whiten and rotate (m,) or (m, P) cells."""
         return self.rotation @ cells
 
+    def under(self, correlation: FloatArray) -> Problem:
+        """Return the same cells and noise with another (N, N) correlation of the floor."""
+        size = self.scale[self.quantity]
+        smooth = np.where(
+            self.quantity[:, None] == self.quantity[None, :],
+            correlation[np.ix_(self.row, self.row)] * np.outer(size, size),
+            0.0,
+        )
+        rotation, roughness = np.empty_like(self.rotation), np.empty(self.size)
+        for block in np.unique(self.block):
+            mine = np.flatnonzero(self.block == block)
+            part = self.rotation[mine]
+            values, vectors = np.linalg.eigh(part @ smooth @ part.T)
+            rotation[mine], roughness[mine] = vectors.T @ part, np.maximum(values, 0.0)
+        return replace(self, rotation=rotation, roughness=roughness)
+
     def variance(self, amplitude: ArrayLike, noise: ArrayLike = 1.0) -> FloatArray:
         """Return (m,) variances of the rotated axes.
 
@@ -115,8 +131,10 @@ class CommonError:
     group: IndexArray
 
 
-def kernel(inputs: FloatArray) -> FloatArray:
+def kernel(inputs: FloatArray, shortened: float = 1.0) -> FloatArray:
     """(N, N) correlation of a structural error between rows.
+
+    `shortened` is a factor on the lengths over which it is smooth.
 
     Parameters
     ----------
@@ -128,7 +146,9 @@ def kernel(inputs: FloatArray) -> FloatArray:
     square = ((inputs[:, None, :] - inputs[None, :, :]) ** 2).sum(axis=-1)
     # Among many inputs all rows are far apart: lengths grow, or smooth would mean white.
     square /= max(1.0, 0.5 * inputs.shape[1])
-    return np.mean([np.exp(-0.5 * square / length**2) for length in _LENGTHS], axis=0)
+    return np.mean(
+        [np.exp(-0.5 * square / (shortened * length) ** 2) for length in _LENGTHS], axis=0
+    )
 
 
 def slip_features(inputs: FloatArray, slip: int | None) -> FloatArray:

@@ -324,6 +324,38 @@ def signature(diagnosis: Diagnosis, narrow: bool = False) -> Figure | None:
     return figure
 
 
+def structural_error(diagnosis: Diagnosis, narrow: bool = False) -> Figure | None:
+    """Draw what the last model leaves, and the smooth part of it, row by row over slip."""
+    left, table = diagnosis.structural_error, diagnosis.table
+    if left is None:
+        return None
+    slip = table.columns['slip']
+    with _style():
+        names = ['measured minus model', 'smooth part, with two standard deviations']
+        lines = _legend_lines(names, table.quantities, narrow)
+        figure, axes = _panels(1, table.quantities, height=2.5, legend=lines, narrow=narrow)
+        for axis, name in zip(axes[0], table.quantities, strict=True):
+            q, (scale, unit) = QUANTITIES.index(name), SHOWN[name]
+            inside = ~_set_apart(diagnosis, q)
+            dots = axis.plot(
+                slip[inside], scale * left.residual[inside, q], 'o', ms=3.5, color=GREY
+            )
+            bars = axis.errorbar(
+                slip,
+                scale * left.mean[:, q],
+                2 * scale * left.std[:, q],
+                fmt='D',
+                ms=3.5,
+                color=BLUE,
+                elinewidth=0.9,
+            )
+            axis.axhline(0.0, color=INK, lw=0.8)
+            axis.set(xlabel='slip', title=words(name))
+            axis.set_ylabel(f'[{unit}]')
+        _legend(figure, [dots[0], bars], names, lines=lines)
+    return figure
+
+
 def gap(diagnosis: Diagnosis, narrow: bool = False) -> Figure:
     """Draw the error on unseen rows: as configured, soil refitted, effect added, noise floor."""
     names = list(diagnosis.gap)

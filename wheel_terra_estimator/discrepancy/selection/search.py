@@ -192,15 +192,6 @@ def _ranges(table: SteadyTable) -> FloatArray:
     return scale
 
 
-def _inputs(table: SteadyTable) -> FloatArray:
-    """(N, d) varying inputs, each scaled to a range of 1."""
-    columns = []
-    for name in table.varying():
-        values = np.nan_to_num(table.columns[name], nan=float(np.nanmean(table.columns[name])))
-        columns.append((values - values.min()) / np.ptp(values))
-    return np.column_stack(columns) if columns else np.zeros((len(table), 0))
-
-
 def _fit_nothing(
     forward: Forward,
     problem: Problem,
@@ -355,7 +346,7 @@ class _Builder:
         self.forward = forward
         self.scale = scale
         self.noise_std = noise_std
-        self.inputs = _inputs(table)
+        self.inputs = table.scaled_inputs()
         names = table.varying()
         self.narrow = slip_features(self.inputs, names.index('slip') if 'slip' in names else None)
         self.latent = bool((table.slip_std > 0.0).any())

@@ -101,6 +101,14 @@ class SteadyTable:
                 found.append(name)
         return tuple(found)
 
+    def scaled_inputs(self) -> FloatArray:
+        """(N, d) varying inputs, each scaled to a range of 1; what is not stated at its mean."""
+        columns = []
+        for name in self.varying():
+            values = np.nan_to_num(self.columns[name], nan=float(np.nanmean(self.columns[name])))
+            columns.append((values - values.min()) / np.ptp(values))
+        return np.column_stack(columns) if columns else np.zeros((len(self), 0))
+
     def select(self, rows: NDArray[np.intp] | NDArray[np.bool_]) -> SteadyTable:
         """Return the table of these rows."""
         return SteadyTable(

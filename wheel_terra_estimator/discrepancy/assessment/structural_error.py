@@ -1,0 +1,125 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""What no effect and no law explains: the smooth part of the residual, with its band.
+
+The structural error d is the Gaussian process over the rows of ``fitting.problem``; given the
+fitted model, its mean is the part of the residual that noise would not leave. It says nothing
+outside the range of the rows: its mean falls back to zero there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wheel_terra_estimator.discrepancy.fitting.evidence import Floor
+from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
+from wheel_terra_estimator.discrepancy.fitting.problem import Problem, kernel
+from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES
+
+FloatArray = NDArray[np.float64]
+_SHORTENED = (1.0, 0.5, 0.25)
+"""Factors on the lengths over which a structural error is smooth: a hump needs shorter ones."""
+
+
+@dataclass(frozen=True)
+class StructuralError:
+    """Smooth misfit of the fitted model at the rows of the table.
+
+    Attributes
+    ----------
+    amplitude : tuple of float
+        Its most probable standard deviation as a share of the range of each quantity [-].
+    residual, mean, std : numpy.ndarray
+        (N, 3) sinkage [m], drawbar pull [N], torque [N m]: measured minus model, the structural
+        error in it and its standard deviation, the parameters taken as fitted. nan = not measured.
+    beyond_law : bool
+        True where the model is the one with the proposed law.
+    """
+
+    amplitude: tuple[float, float, float]
+    residual: FloatArray
+    mean: FloatArray
+    std: FloatArray
+    beyond_law: bool = False
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the keys of ``report.json``; mean and deviation row by row."""
+        measured = [q for q in range(len(QUANTITIES)) if np.isfinite(self.mean[:, q]).any()]
+        return {
+            'beyond_law': self.beyond_law,
+            'quantities': {
+                QUANTITIES[q]: {
+                    'amplitude': self.amplitude[q],
+                    'mean': self.mean[:, q].tolist(),
+                    'std': self.std[:, q].tolist(),
+                }
+                for q in measured
+            },
+        }
+
+
+def structural_error(
+    problem: Problem,
+    inputs: FloatArray,
+    fitted: Fit,
+    floors: Sequence[Floor],
+    rows: int,
+    *,
+    beyond_law: bool = False,
+) -> StructuralError | None:
+    """Return the structural error that a fit leaves in the first rows of its table.
+
+    In the rotated cells of `problem` covariances are diagonal: with the smooth variance s and the
+    noise 1, the share s / (s + 1) of a residual is structural error, and its variance is the same.
+
+    Parameters
+    ----------
+    inputs : numpy.ndarray
+        (N, d) inputs of the rows, each scaled to a range of 1.
+    floors : sequence of Floor
+        Amplitudes that are possible, with their prior probabilities.
+    rows : int
+        Number of rows wanted; the rows of a reference table stand behind them.
+
+    Returns
+    -------
+    StructuralError or None
+        None where the most probable amplitude is nothing.
+    """
+    if not any(_most_probable(problem, fitted.residual, floors)[1]):
+        return None
+    best, own, amplitude = -np.inf, problem, (0.0, 0.0, 0.0)
+    cells = np.linalg.solve(problem.rotation, fitted.residual)
+    for shortened in _SHORTENED:
+        view = problem.under(kernel(inputs, shortened))
+        value, sizes = _most_probable(view, view.rotate(cells), floors)
+        if value > best:
+            best, own, amplitude = value, view, sizes
+    noise, variance = own.variance(0.0), own.variance(amplitude)
+    share = (variance - noise) / variance
+    back = np.linalg.inv(own.rotation)
+    smooth = back @ (share * own.rotate(cells))
+    std = np.sqrt(back**2 @ (share * noise))
+    shape = (int(problem.row.max()) + 1, len(QUANTITIES))
+    values = []
+    for flat in (cells, smooth, std):
+        values.append(np.full(shape, np.nan))
+        values[-1][problem.row, problem.quantity] = flat
+    residual, mean, deviation = (value[:rows] for value in values)
+    return StructuralError(amplitude, residual, mean, deviation, beyond_law)
+
+
+def _most_probable(
+    problem: Problem, residual: FloatArray, floors: Sequence[Floor]
+) -> tuple[float, tuple[float, float, float]]:
+    """Return the amplitudes under which a residual is most probable, and that probability (log)."""
+    variance = problem.variance(np.array([floor.amplitude for floor in floors]))
+    fits = -0.5 * (np.log(variance) + residual**2 / variance).sum(axis=1)
+    fits += [floor.log_prior for floor in floors]
+    best = int(np.argmax(fits))
+    return float(fits[best]), floors[best].amplitude
