@@ -94,7 +94,7 @@ def structural_error(
     if not any(_most_probable(problem, fitted.residual, floors)[1]):
         return None
     best, own, amplitude = -np.inf, problem, (0.0, 0.0, 0.0)
-    cells = np.linalg.solve(problem.rotation, fitted.residual)
+    cells = np.asarray(np.linalg.solve(problem.rotation, fitted.residual), dtype=float)
     for shortened in _SHORTENED:
         view = problem.under(kernel(inputs, shortened))
         value, sizes = _most_probable(view, view.rotate(cells), floors)
@@ -102,7 +102,7 @@ def structural_error(
             best, own, amplitude = value, view, sizes
     noise, variance = own.variance(0.0), own.variance(amplitude)
     share = (variance - noise) / variance
-    back = np.linalg.inv(own.rotation)
+    back = np.asarray(np.linalg.inv(own.rotation), dtype=float)
     smooth = back @ (share * own.rotate(cells))
     std = np.sqrt(back**2 @ (share * noise))
     shape = (int(problem.row.max()) + 1, len(QUANTITIES))
