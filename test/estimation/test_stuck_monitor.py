@@ -111,6 +111,22 @@ def test_two_stalled_wheels_of_four_raise_it_without_any_speed():
     assert 'stalled' in found[-1].reason
 
 
+@pytest.mark.parametrize('spinning', [True, False])
+def test_a_side_that_turns_round_behind_a_spin_is_no_stall(spinning):
+    """Left wheels from -0.3 to 0.5 rad/s within a second, near their torque limit at zero."""
+    monitor = StuckMonitor()
+    right = wheel(0.1, rim=0.05, torque=0.3)
+    before = [wheel(0.5, rim=-0.045 if spinning else 0.045, torque=0.3), right] * 3
+    found = [
+        judge(monitor, 0.1 * i, 0.0 if spinning else 0.045, True, before, turning=spinning)
+        for i in range(40)
+    ]
+    assert first(found) is None
+    held = [wheel(0.2, rim=0.003, torque=0.9), right] * 3
+    found = [judge(monitor, 4.0 + 0.1 * i, 0.012, True, held) for i in range(6)]
+    assert found[-1].stuck is not spinning
+
+
 def test_pulling_away_from_rest_is_no_stall():
     monitor = StuckMonitor()
     slow, quick = ([wheel(0.1, rim=k * i, torque=0.95) for i in range(9)] for k in (0.1, 0.2))

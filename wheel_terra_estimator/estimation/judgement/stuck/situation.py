@@ -241,7 +241,7 @@ class SituationObserver(Component[Observed]):
         moving = tuple([w for w in motion.wheels if w.known])
         fastest = max([abs(w.rim_speed) for w in moving], default=0.0)
         cruise = max(fastest, tuning.cruise_decay * old.cruise)
-        rolling_since = self._rolling_since(time, fastest, cruise)
+        rolling_since = self._rolling_since(time, fastest, cruise, anew=motion.turning)
         stalled = self._stalled(motion.wheels, fastest, time - rolling_since)
         standing = self._standing(motion.wheels, fastest)
         # Slip settles over the first travel after a start: its growth there says nothing. So it
@@ -288,14 +288,15 @@ class SituationObserver(Component[Observed]):
             tuning=tuning,
         )
 
-    def _rolling_since(self, time: float, fastest: float, cruise: float) -> float:
+    def _rolling_since(self, time: float, fastest: float, cruise: float, *, anew: bool) -> float:
         """Return since when the fastest wheel turns at half of its own cruise, nan = it does not.
 
-        It rests on rim speed alone, so that no unaided body speed decides.
+        It rests on rim speed alone, so that no unaided body speed decides. A sharp turn begins it
+        `anew`: behind a spin one side stands for a moment and pulls away the other way round.
         """
         since, tuning = self.state.rolling_since, self._tuning
         if fastest > tuning.rolling_share * cruise and fastest > 0.0:
-            return time if isnan(since) else since
+            return time if anew or isnan(since) else since
         return NAN if fastest < tuning.standing_share * cruise else since
 
     def _stalled(
