@@ -105,7 +105,7 @@ def structural_error(
     back = np.asarray(np.linalg.inv(own.rotation), dtype=float)
     smooth = back @ (share * own.rotate(cells))
     std = np.sqrt(back**2 @ (share * noise))
-    shape = (int(problem.row.max()) + 1, len(QUANTITIES))
+    shape = (max(rows, int(problem.row.max()) + 1), len(QUANTITIES))
     values = []
     for flat in (cells, smooth, std):
         values.append(np.full(shape, np.nan))
