@@ -22,8 +22,8 @@ from wheel_terra_estimator.discrepancy.fitting.problem import Problem, kernel
 from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES
 
 FloatArray = NDArray[np.float64]
-_SHORTENED = (1.0, 0.5, 0.25)
-"""Factors on the lengths over which a structural error is smooth: a hump needs shorter ones."""
+_SHORTENED = (0.5, 0.25)
+"""Further factors on the lengths over which a structural error is smooth: a hump is shorter."""
 
 
 @dataclass(frozen=True)
@@ -91,12 +91,12 @@ def structural_error(
     StructuralError or None
         None where the most probable amplitude is nothing.
     """
-    if not any(_most_probable(problem, fitted.residual, floors)[1]):
+    own, (best, amplitude) = problem, _most_probable(problem, fitted.residual, floors)
+    if not any(amplitude):
         return None
-    best, own, amplitude = -np.inf, problem, (0.0, 0.0, 0.0)
     cells = np.asarray(np.linalg.solve(problem.rotation, fitted.residual), dtype=float)
     for shortened in _SHORTENED:
-        view = problem.under(kernel(inputs, shortened))
+        view = problem.under(kernel(inputs / shortened))
         value, sizes = _most_probable(view, view.rotate(cells), floors)
         if value > best:
             best, own, amplitude = value, view, sizes

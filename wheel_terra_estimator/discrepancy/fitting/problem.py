@@ -79,12 +79,7 @@ class Problem:
 
     def under(self, correlation: FloatArray) -> Problem:
         """Return the same cells and noise with another (N, N) correlation of the floor."""
-        size = self.scale[self.quantity]
-        smooth = np.where(
-            self.quantity[:, None] == self.quantity[None, :],
-            correlation[np.ix_(self.row, self.row)] * np.outer(size, size),
-            0.0,
-        )
+        smooth = _floor_covariance(correlation, self.row, self.quantity, self.scale)
         rotation, roughness = np.empty_like(self.rotation), np.empty(self.size)
         for block in np.unique(self.block):
             mine = np.flatnonzero(self.block == block)
@@ -131,10 +126,8 @@ class CommonError:
     group: IndexArray
 
 
-def kernel(inputs: FloatArray, shortened: float = 1.0) -> FloatArray:
+def kernel(inputs: FloatArray) -> FloatArray:
     """(N, N) correlation of a structural error between rows.
-
-    `shortened` is a factor on the lengths over which it is smooth.
 
     Parameters
     ----------
@@ -146,8 +139,17 @@ def kernel(inputs: FloatArray, shortened: float = 1.0) -> FloatArray:
     square = ((inputs[:, None, :] - inputs[None, :, :]) ** 2).sum(axis=-1)
     # Among many inputs all rows are far apart: lengths grow, or smooth would mean white.
     square /= max(1.0, 0.5 * inputs.shape[1])
-    return np.mean(
-        [np.exp(-0.5 * square / (shortened * length) ** 2) for length in _LENGTHS], axis=0
+    return np.mean([np.exp(-0.5 * square / length**2) for length in _LENGTHS], axis=0)
+
+
+def _floor_covariance(
+    correlation: FloatArray, row: IndexArray, quantity: IndexArray, scale: FloatArray
+) -> FloatArray:
+    """(m, m) covariance of the floor between cells at amplitude 1; quantities are independent."""
+    return np.where(
+        quantity[:, None] == quantity[None, :],
+        correlation[np.ix_(row, row)] * np.outer(scale[quantity], scale[quantity]),
+        0.0,
     )
 
 
@@ -223,11 +225,7 @@ def build_problem(
             together = error.group[row][:, None] == error.group[row][None, :]
             noise += np.where(together, np.outer(size, size), 0.0)
         lower = np.linalg.cholesky(noise)
-        smooth = np.where(
-            quantity[:, None] == quantity[None, :],
-            correlation[np.ix_(row, row)] * np.outer(scale[quantity], scale[quantity]),
-            0.0,
-        )
+        smooth = _floor_covariance(correlation, row, quantity, scale)
         whitening = np.linalg.inv(lower)
         values, vectors = np.linalg.eigh(whitening @ smooth @ whitening.T)
         rotation, roughness = vectors.T @ whitening, np.maximum(values, 0.0)
