@@ -62,8 +62,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--seeds', type=int, default=20, metavar='N', help='drives of each kind (default 20)'
     )
-    parser.add_argument(
+    seeds = parser.add_mutually_exclusive_group()
+    seeds.add_argument(
         '--tuning', action='store_true', help='tuning seeds; the default are the test seeds'
+    )
+    seeds.add_argument(
+        '--first-seed',
+        type=int,
+        metavar='N',
+        help='the first of the seeds, for drives that nothing was chosen on',
     )
     parser.add_argument(
         '--modes',
@@ -174,7 +181,11 @@ def _measured(arguments: argparse.Namespace) -> _Told:
 def _seeds(arguments: argparse.Namespace) -> range:
     from wheel_terra_estimator.evaluation import kinds
 
-    first = (kinds.TUNING_SEEDS if arguments.tuning else kinds.TEST_SEEDS).start
+    first = arguments.first_seed
+    if first is None:
+        first = (kinds.TUNING_SEEDS if arguments.tuning else kinds.TEST_SEEDS).start
+    elif first < 0:
+        raise UserError(f'--first-seed {first}: must be 0 or more')
     return range(first, first + arguments.seeds)
 
 
@@ -247,9 +258,13 @@ def _drive_for_hours(arguments: argparse.Namespace) -> int:
         rows = _hours_of_kinds(arguments) if arguments.kinds else _one_long_drive(arguments)
     except KeyboardInterrupt:
         which = ''
+        if arguments.tuning:
+            which = '--tuning '
+        elif arguments.first_seed is not None:
+            which = f'--first-seed {arguments.first_seed} '
         if arguments.kinds:
             kinds, modes = ' '.join(arguments.kinds), ' '.join(arguments.modes)
-            which = f'--world {arguments.world} --kinds {kinds} --modes {modes} '
+            which += f'--world {arguments.world} --kinds {kinds} --modes {modes} '
         print(
             f'interrupted; go on with: --hours {arguments.hours:g} {which}-o {arguments.output} '
             '--resume'
