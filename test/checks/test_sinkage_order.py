@@ -3,12 +3,16 @@
 """Sinkage sensors under each other's name, on ground whose soft spots each wheel meets alone."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 import rolling_rover as rolling
 
+from wheel_terra_estimator.bags.series_reader import read_series
+from wheel_terra_estimator.bags.storage import open_bag
 from wheel_terra_estimator.checks.run import check_recording
+from wheel_terra_estimator.configuration import reader
 
 WHOLE = rolling.recording()
 
@@ -68,3 +72,18 @@ def test_without_torques_it_is_said():
     blind = replace(WHOLE, joints=replace(joints, torque=np.full_like(joints.torque, np.nan)))
     findings, said = found(blind)
     assert not findings and 'without torques' in said[0]
+
+
+def test_wheels_that_dig_themselves_in_are_not_taken_for_exchanged_sensors():
+    """At high slip the deepest wheels take the least torque; the truth has these depths."""
+    folder = Path(__file__).parents[2] / 'data' / 'demo' / 'entrapment'
+    with open_bag(folder) as bag:
+        recording = read_series(bag, {}, folder.name)
+    report = check_recording(recording, reader.load(['generic_six_wheel', 'test_sand']))
+    assert not report.findings
+    assert any('order of the sinkage' in entry.reason for entry in report.not_checked)
+
+
+def test_without_a_reference_it_is_said():
+    findings, said = found(replace(patchy((1, 0, 2, 3)), reference=None))
+    assert not findings and 'without a reference velocity' in said[0]

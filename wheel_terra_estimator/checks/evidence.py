@@ -168,11 +168,9 @@ class Evidence:
     @cached_property
     def in_air(self) -> Mask:
         """Rows in which the wheels turn freely while the reference says that the rover stands."""
-        reference, facts = self.reference(), self.facts
-        if reference is None or not facts.known or not np.isfinite(self.torque).any():
+        speed, facts = self.reference_speed, self.facts
+        if speed is None or not facts.known or not np.isfinite(self.torque).any():
             return np.zeros(self.time.size, dtype=bool)
-        at = (reference.stamp - self.origin) * 1e-9
-        speed = np.abs(np.interp(self.time, at, _smooth(reference.velocity[:, 0], SMOOTH_ROWS)))
         size = row_medians(np.abs(self.rate * facts.radius))
         taken = np.nansum(np.abs(self.torque) / facts.radius, axis=1)
         free = _smooth(taken, SMOOTH_ROWS) < FREE_TRACTION * facts.mass * facts.gravity
@@ -239,6 +237,16 @@ class Evidence:
     def reference(self) -> VelocitySeries | None:
         """Return the slip-free velocity."""
         return self.recording.reference
+
+    @cached_property
+    def reference_speed(self) -> FloatArray | None:
+        """Size of the slip-free velocity, smoothed (k,) [m/s]; None without a reference."""
+        reference = self.reference()
+        if reference is None:
+            return None
+        at = (reference.stamp - self.origin) * 1e-9
+        smooth = _smooth(reference.velocity[:, 0], SMOOTH_ROWS)
+        return _shared(np.abs(np.interp(self.time, at, smooth)))
 
     def rim_at(self, stamp: NDArray[np.int64], values: FloatArray, half: float) -> FloatArray:
         """Return means of (k,) values within ``half`` [s] around stamps [ns]; nan for none."""

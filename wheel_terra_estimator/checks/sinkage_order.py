@@ -5,7 +5,9 @@
 A wheel that sinks deeper than another, by a softer spot or by more load, takes more torque. So the
 differences of sinkage and of torque of two wheels go together; with exchanged sensors they go
 against each other. The difference that is always there (zero errors, the places of the wheels) is
-left out, and so are turns, in which the sides push against each other.
+left out, and so are turns, in which the sides push against each other, and high slip: there the
+shear of the soil is used up, and a wheel that digs itself in takes no more torque but less, the
+others its share.
 """
 
 from __future__ import annotations
@@ -37,8 +39,12 @@ CLEAR = 4.0
 """Deviations by which a slope of torque over sinkage must differ from 0."""
 ALIKE = 0.5
 """Correlation of the two differences that tells the order."""
+HIGH_SLIP = 0.3
+"""Slip of the rover above which a deeper wheel may take less torque: left out."""
 SHOWN = 3
 """Pairs that are listed by name."""
+_STANDING = 1e-6
+"""Rim speed [m/s]; slower rows are not straight driving and are left out."""
 
 
 class Pair(NamedTuple):
@@ -57,6 +63,8 @@ def check_order(evidence: Evidence, figures: dict[str, Any]) -> list[Outcome]:
         return []
     if not np.isfinite(evidence.torque).any():
         return [_not_told('without torques it does not show')]
+    if evidence.reference_speed is None:
+        return [_not_told('without a reference velocity high slip is not seen')]
     compared = pairs(evidence, sinkage)
     wrong = [p for p in compared if p.sigmas < -CLEAR and p.correlation < -ALIKE]
     right = [p for p in compared if p.sigmas > CLEAR and p.correlation > ALIKE]
@@ -107,7 +115,7 @@ def pairs(evidence: Evidence, sinkage: SinkageSeries) -> list[Pair]:
     if time.size < LEAST_ROWS:
         return []
     straight = averaged(evidence.time, evidence.straight.astype(float)[:, None], time, WINDOW)
-    rows = straight[:, 0] > 0.99
+    rows = (straight[:, 0] > 0.99) & (_slip(evidence, time) < HIGH_SLIP)
     if rows.sum() < LEAST_ROWS:
         return []
     at = np.asarray((sinkage.stamp - evidence.origin) * 1e-9, dtype=np.float64)
@@ -131,3 +139,11 @@ def pairs(evidence: Evidence, sinkage: SinkageSeries) -> list[Pair]:
         sigmas = math.copysign(slope.sigmas_from(0.0), slope.value)
         found.append(Pair(first, second, correlation(deeper, harder), sigmas))
     return found
+
+
+def _slip(evidence: Evidence, time: FloatArray) -> FloatArray:
+    """Return the slip of the rover in the windows around some times [-]."""
+    assert evidence.reference_speed is not None
+    speeds = np.column_stack([evidence.reference_speed, np.abs(evidence.rim)])
+    speed, rim = averaged(evidence.time, speeds, time, WINDOW).T
+    return 1.0 - speed / np.maximum(rim, _STANDING)
