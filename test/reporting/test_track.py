@@ -15,6 +15,7 @@ from wheel_terra_estimator.bags.storage import open_bag
 from wheel_terra_estimator.bags.track import COLUMNS, TrackRecorder, read_odometry
 from wheel_terra_estimator.cli.main import main
 from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.estimation.estimates import SlipClass
 from wheel_terra_estimator.estimation.measurements import InertialReading
 from wheel_terra_estimator.messages.convert import ODOMETRY
 from wheel_terra_estimator.reporting.track_picture import has_map, map_of
@@ -107,6 +108,16 @@ def test_table_and_map(rover, tmp_path):
     drawn = map_of(track)
     drawn.savefig(tmp_path / 'map.svg')
     assert len(drawn.axes) == 3
+
+
+def test_a_stretch_whose_class_is_not_known_has_no_slip(rover):
+    sets = drive(rover, 40)
+    unknown = np.full(2, SlipClass.UNKNOWN, dtype=np.uint8)
+    sets[:20] = [replace(s, slip_class=unknown, slip=np.full(2, 0.99)) for s in sets[:20]]
+    first, second = as_geojson(recorded(rover, sets).track(), (0.0, 0.0))['features']
+    assert first['properties']['slip_class'] == 'unknown'
+    assert first['properties']['mean_slip'] is None
+    assert second['properties']['mean_slip'] == pytest.approx(float(np.median(sets[-1].slip)))
 
 
 def test_an_odometry_in_the_recording(rover, factory, tmp_path):

@@ -113,5 +113,10 @@ def _of_stretch(track: Track, rows: slice) -> dict[str, Any]:
         'mean_soil_stiffness': values['soil_stiffness'].mean(),
         'greatest_stuck_probability': values['stuck_probability'].max(),
     }
-    rounded = {name: float(f'{value:.{STRETCH_DIGITS}g}') for name, value in figures.items()}
-    return {'slip_class': SlipClass(int(values['slip_class'][0])).name.lower(), **rounded}
+    rounded: dict[str, float | None] = {
+        name: float(f'{value:.{STRETCH_DIGITS}g}') for name, value in figures.items()
+    }
+    kind = SlipClass(int(values['slip_class'][0]))
+    if kind is SlipClass.UNKNOWN:
+        rounded['mean_slip'] = None  # at rest and in the first instant it is no slip
+    return {'slip_class': kind.name.lower(), **rounded}
