@@ -8,6 +8,7 @@ from parts import SAND, Parts
 
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.estimation.inputs.seen_noise import SeenNoise
+from wheel_terra_estimator.estimation.inputs.stated_noise import StatedNoise
 from wheel_terra_estimator.estimation.measurements import StepInputs, WheelOdometry
 
 NAN = float('nan')
@@ -58,6 +59,20 @@ def test_noise_that_nobody_stated_is_taken_as_it_is_seen():
     assert seen == pytest.approx(0.1 * default, rel=0.1)
     read(silent, 'sinkage', 0.1 * silent.stated['sinkage'], times)
     assert silent.variance('sinkage') == silent.stated['sinkage'] ** 2
+
+
+def test_noise_that_messages_of_the_imu_state_is_told_as_stated():
+    noise, times = (
+        SeenNoise(Parts(reader.load(SAND)).sensors, RATES, given=()),
+        0.1 * np.arange(400),
+    )
+    noise.take_stated(StatedNoise(angular_rate_std=0.0005))
+    seen = read(noise, 'gyro', 0.02, times)
+    assert noise.report()['gyro_noise_stated_rad_s'] == 0.0005
+    words = noise.in_words()
+    assert list(words) == ['default']  # vibration is no fault
+    assert f'gyro noise {seen / 0.0005:.0f} times what is stated' in words['default']
+    assert '(covariance of imu/data, or sensors.angular_rate_std: ' in words['default']
 
 
 def test_what_nobody_stated_is_known_after_the_first_seconds():

@@ -16,6 +16,7 @@ from wheel_terra_estimator.estimation.filter.speed_process import (
 )
 from wheel_terra_estimator.estimation.filter.state import SLIP_PER_DEMAND, SPEED
 from wheel_terra_estimator.estimation.inputs.inertial import InertialWindow
+from wheel_terra_estimator.estimation.inputs.stated_noise import StatedNoise
 
 NAN = float('nan')
 
@@ -47,7 +48,7 @@ def step(speed, before=0.05, now=0.05, inflation=0.0, window=None):
 
 
 def noise(parts_keys=()):
-    return process([0.0] * 6, keys=parts_keys).acceleration_noise
+    return process([0.0] * 6, keys=parts_keys).acceleration_noise(StatedNoise()).density
 
 
 def test_slow_rover_follows_its_wheels_through_a_ramp():
@@ -97,7 +98,7 @@ def test_wheels_that_disagree_leave_the_speed_to_the_accelerometer():
     apart = made.step(0.1, speeds([0.25, 0.25, 0.35, 0.35]), window, inflated=True)
     assert together.speed_gain * 0.1 + together.constant > 0.103
     assert apart.speed_gain * 0.1 + apart.constant == pytest.approx(0.1, abs=0.001)
-    assert apart.variance <= made.acceleration_noise**2 * 0.1
+    assert apart.variance <= made.acceleration_noise(StatedNoise()).density ** 2 * 0.1
 
 
 @pytest.mark.parametrize(

@@ -191,6 +191,48 @@ def test_mounting_turns_the_imu_into_base_link(rover: Any, factory: Any) -> None
     np.testing.assert_allclose(measured.angular_rate, [0.01, 0.02, 0.03], atol=1e-12)
 
 
+def _with_variances(factory: Any, **fields: tuple[float, float, float]) -> Any:
+    upright = (0.0, 0.0, 0.0, 1.0)
+    message = factory.imu(factory.header(STAMP), (0.0, 0.0, 9.8), (0.0, 0.0, 0.0), upright)
+    for field, diagonal in fields.items():
+        setattr(message, f'{field}_covariance', np.diag(diagonal).reshape(9))
+    return message
+
+
+def test_imu_states_its_variances_along_the_axes_of_the_rover(rover: Any, factory: Any) -> None:
+    message = _with_variances(
+        factory,
+        linear_acceleration=(0.01, 0.04, 0.09),
+        angular_velocity=(1e-4, 4e-4, 9e-4),
+        orientation=(1e-4, 2e-4, 5e-2),  # heading, the last, is not used
+    )
+    level = InputConverter(input_layout(rover)).convert('imu/data', message)
+    assert level.variance == (0.01, 9e-4, 2e-4)
+    # Half a right angle about z mixes x and y; a sensor on its side turns its y about the vertical.
+    for angles, expected in (
+        ({'yaw': 45.0}, (0.025, 9e-4, 2e-4)),
+        ({'roll': 90.0}, (0.01, 4e-4, 2e-4)),
+    ):
+        keys = {f'sensors.imu_mounting_{name}_deg': angle for name, angle in angles.items()}
+        turned = InputConverter(input_layout(rover.replace(keys))).convert('imu/data', message)
+        assert turned.variance == pytest.approx(expected)
+
+
+@pytest.mark.parametrize(
+    'diagonal',
+    [(0.0,) * 3, (1.0,) * 3, (-1.0, 0.0, 0.0), (math.nan,) * 3, (0.1, -0.1, 0.1), (math.inf,) * 3],
+)
+def test_placeholders_in_an_imu_state_nothing(
+    converter: InputConverter, factory: Any, diagonal: tuple[float, float, float]
+) -> None:
+    message = _with_variances(
+        factory, linear_acceleration=diagonal, angular_velocity=diagonal, orientation=diagonal
+    )
+    if diagonal[0] == -1.0:  # that field is not there at all; one of them has to be
+        message.linear_acceleration_covariance = np.zeros(9)
+    assert converter.convert('imu/data', message).variance == (0.0, 0.0, 0.0)
+
+
 def test_orientation_of_base_link_agrees_with_the_turned_vectors(rover: Any, factory: Any) -> None:
     """World vectors do not depend on how the sensor is mounted: R_base f_base = R_imu f_imu."""
     turned = rover.replace(

@@ -564,7 +564,8 @@ DECLARED: tuple[Parameter, ...] = (
         'sensors.specific_force_std',
         0.05,
         'm/s^2',
-        'noise of the accelerometer, one standard deviation per message',
+        'noise of the accelerometer, one standard deviation per message; where no file states it, '
+        'the covariance of imu/data comes before this default',
         at_least=0.0,
     ),
     number(
@@ -585,7 +586,8 @@ DECLARED: tuple[Parameter, ...] = (
         'sensors.angular_rate_std',
         0.005,
         'rad/s',
-        'noise of the gyroscope, one standard deviation per message',
+        'noise of the gyroscope, one standard deviation per message; where no file states it, '
+        'the covariance of imu/data comes before this default',
         at_least=0.0,
     ),
     number(
@@ -606,7 +608,8 @@ DECLARED: tuple[Parameter, ...] = (
         'sensors.orientation_std_deg',
         0.3,
         'deg',
-        'error of the roll and pitch of the orientation, one standard deviation',
+        'error of the roll and pitch of the orientation, one standard deviation; where no file '
+        'states it, the covariance of imu/data comes before this default',
         at_least=0.0,
     ),
     *(

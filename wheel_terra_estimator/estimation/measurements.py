@@ -9,7 +9,7 @@ z up) in SI units. ``nan`` marks a wheel that the message did not hold or could 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +41,17 @@ class WheelOdometry:
     steering: FloatArray | None = None
 
 
+class InertialVariance(NamedTuple):
+    """Variances that the message of an IMU states; 0 = not stated."""
+
+    specific_force: float = 0.0  # along x of base_link [(m/s^2)^2]
+    angular_rate: float = 0.0  # about z [(rad/s)^2]
+    orientation: float = 0.0  # of roll or pitch, the larger [rad^2]
+
+
+NO_VARIANCE = InertialVariance()
+
+
 @dataclass(frozen=True)
 class InertialReading:
     """One IMU message, already turned into ``base_link``; a vector that is unknown is nan.
@@ -55,12 +66,15 @@ class InertialReading:
         (3,) angular rate [rad/s].
     orientation : numpy.ndarray or None
         (4,) unit quaternion x, y, z, w of ``base_link`` in the world; None when not reported.
+    variance : InertialVariance
+        As the message states it.
     """
 
     stamp: int
     specific_force: FloatArray
     angular_rate: FloatArray
     orientation: FloatArray | None
+    variance: InertialVariance = NO_VARIANCE
 
 
 @dataclass(frozen=True)

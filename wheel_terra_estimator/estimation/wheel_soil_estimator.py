@@ -43,6 +43,7 @@ from wheel_terra_estimator.estimation.filter.force_balance import (
     rut_tilt,
 )
 from wheel_terra_estimator.estimation.filter.initial_state import (
+    gravity_bias_std,
     initial_filter,
     layout_of,
     with_soil_of,
@@ -65,6 +66,7 @@ from wheel_terra_estimator.estimation.inputs.contact_sensors import (
 )
 from wheel_terra_estimator.estimation.inputs.inertial import InertialInput, InertialWindow
 from wheel_terra_estimator.estimation.inputs.seen_noise import SeenNoise
+from wheel_terra_estimator.estimation.inputs.stated_noise import NOTHING_STATED, StatedNoise
 from wheel_terra_estimator.estimation.inputs.wheel_odometry import WheelOdometryInput
 from wheel_terra_estimator.estimation.judgement.pull_margin import PullMargin
 from wheel_terra_estimator.estimation.judgement.slip import BodyMotion, SlipJudge
@@ -160,10 +162,11 @@ class WheelSoilEstimator:
         self._configuration = configuration
         self._rover = rover = Rover.from_configuration(configuration)
         sensors = SensorFigures.from_configuration(configuration)
+        self._sensors = sensors
         self._layout = layout = layout_of(rover, sensors)
         models = WheelModels(configuration)
         # Readings between two cycles.
-        self._inertial = InertialInput(rover.gravity)
+        self._inertial = InertialInput(rover.gravity, given=configuration.stated)
         self._wheels = WheelOdometryInput(rover, sensors)
         self._sinkages = SinkageInput(rover.wheel_count)
         self._leaving_angles = LeavingAngleInput(rover.wheel_count)
@@ -258,10 +261,13 @@ class WheelSoilEstimator:
         """Start anew at a stamp [ns]; with `keep_soil` soil and biases are kept, widened."""
         soil, gyro = self._ekf.snapshot(), self._zero_velocity.snapshot()
         rejected = self._reference.state.rejected, self._sinkage.state.rejected
+        stated = self._inertial.stated
         for part in self._parts:
             part.reset()
         self._clock = _Clock(stamp, stamp)
         if keep_soil:
+            self._inertial.keep_stated(stated)
+            self._begin_with(stated)
             self._ekf.restore(with_soil_of(soil, self._ekf.snapshot(), self._layout))
             self._zero_velocity.keep_zero_of(gyro)
             self._reference.keep_count(rejected[0])
@@ -297,7 +303,10 @@ class WheelSoilEstimator:
         """Take in the measurements of a stamp, `time` [s] after the start of the run."""
         self._noise.take(time, inputs)
         if inputs.inertial is not None:
+            before = self._inertial.stated
             self._inertial.update(time, inputs.inertial, self._zero_velocity.state.zero)
+            if self._inertial.stated is not before:
+                self._begin_with(self._inertial.stated, before)
         if inputs.sinkage is not None:
             self._sinkages.update(inputs.sinkage)
         if inputs.leaving_angle is not None:
@@ -306,6 +315,13 @@ class WheelSoilEstimator:
             self._wheels.update(time, inputs.wheel_odometry)
             if inputs.wheel_odometry.steering is not None:
                 self._steering.update(inputs.wheel_odometry.steering)
+
+    def _begin_with(self, stated: StatedNoise, before: StatedNoise = NOTHING_STATED) -> None:
+        """Start from what the messages of the IMU state of their noise."""
+        self._noise.take_stated(stated)
+        if stated.orientation_std != before.orientation_std:
+            std = gravity_bias_std(self._rover, self._sensors, stated.orientation_std)
+            self._ekf.set(GRAVITY_BIAS, float(self._ekf.mean[GRAVITY_BIAS]), std**2)
 
     def _cycle_is_due(self, time: float) -> bool:
         before = self._speed.state.cycle_time
@@ -321,7 +337,7 @@ class WheelSoilEstimator:
 
         self._predict(cycle)
         if not cycle.reference_known and not self._contact_age.settled:
-            self._speed.undo_jolt(ekf, cycle.unturned.typical)
+            self._speed.undo_jolt(ekf, cycle.unturned.typical, cycle.window.stated)
 
         if reference is not None:
             self._fuse_reference(cycle, reference)
@@ -480,6 +496,7 @@ class WheelSoilEstimator:
             cycle.dt,
             rim=cycle.unturned.typical,
             demand_change=cycle.demand_change if cycle.reference_known else 0.0,
+            stated=cycle.window.stated,
         )
         self._reference.predict(prediction, cycle.dt)
         if not cycle.still and cycle.dt > 0.0:

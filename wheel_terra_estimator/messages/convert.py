@@ -22,6 +22,7 @@ from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.estimates import EstimateSet
 from wheel_terra_estimator.estimation.measurements import (
     InertialReading,
+    InertialVariance,
     LeavingAngleReading,
     Measurement,
     ReferenceVelocity,
@@ -123,6 +124,9 @@ class InputConverter:
         self._reversed = bool(np.any(layout.directions != 1.0))
         self._mounted = not np.allclose(layout.imu_mounting, (0.0, 0.0, 0.0, 1.0), atol=0.0)
         self._rotation = rotation_matrix(layout.imu_mounting)
+        squares = np.square(self._rotation)
+        self._shares = squares[0].tolist(), squares[2].tolist()
+        """Of the variances along the sensor's axes in those along x and z of ``base_link``."""
         self._methods = {
             'joint_states': self.joint_states,
             'odom': self.odom,
@@ -211,7 +215,22 @@ class InputConverter:
         if self._mounted:
             with np.errstate(all='ignore'):
                 force, rate = self._rotation @ force, self._rotation @ rate
-        return InertialReading(stamp_of(message), force, rate, orientation)
+        variance = self._inertial_variance(message)
+        return InertialReading(stamp_of(message), force, rate, orientation, variance)
+
+    def _inertial_variance(self, message: Any) -> InertialVariance:
+        """Return the variances in an Imu along the axes that count; 0 where it states none.
+
+        A sensor that measures along other axes than x and z has its own there; its orientation is
+        about level axes, however it is mounted.
+        """
+        force = _diagonal(message.linear_acceleration_covariance)
+        rate = _diagonal(message.angular_velocity_covariance)
+        x, y, _ = _diagonal(message.orientation_covariance)
+        if not self._mounted:
+            return InertialVariance(force[0], rate[2], max(x, y))
+        along, about = self._shares
+        return InertialVariance(_weighted(along, force), _weighted(about, rate), max(x, y))
 
     def sinkage(self, message: Any) -> SinkageReading | None:
         """Measured sinkage of the wheels."""
@@ -285,6 +304,22 @@ def stamp_of(message: Any) -> int:
 
 def _vector(vector: Any) -> FloatArray:
     return np.array([vector.x, vector.y, vector.z], dtype=np.float64)
+
+
+def _diagonal(covariance: Sequence[float]) -> tuple[float, float, float]:
+    """Return the three variances of a covariance, zeros where it states none.
+
+    All zeros mean that it is unknown, -1 that there is no such quantity (sensor_msgs/Imu); an
+    identity matrix is a placeholder, and so is what no variance can be.
+    """
+    x, y, z = float(covariance[0]), float(covariance[4]), float(covariance[8])
+    if min(x, y, z) > 0.0 and max(x, y, z) < math.inf and not x == y == z == 1.0:
+        return x, y, z
+    return 0.0, 0.0, 0.0
+
+
+def _weighted(shares: Sequence[float], variances: Sequence[float]) -> float:
+    return sum(share * variance for share, variance in zip(shares, variances, strict=True))
 
 
 def rotation_matrix(quaternion: FloatArray) -> FloatArray:

@@ -98,11 +98,7 @@ class Turning(Component[TurningState]):
     def __init__(
         self, rover: Rover, sensors: SensorFigures, tuning: TurningTuning = TurningTuning()
     ) -> None:
-        per_cycle = max(sensors.imu_rate * rover.period, 1.0)
-        noise = sensors.angular_rate_std / math.sqrt(per_cycle)
-        self._gyro_std = math.hypot(
-            tuning.least_yaw_noise_share * noise, sensors.angular_rate_bias_std
-        )
+        self._per_cycle = max(sensors.imu_rate * rover.period, 1.0)
         super().__init__(TurningState())
         self._rover, self._sensors, self._tuning = rover, sensors, tuning
         skids = rover.skids
@@ -125,7 +121,7 @@ class Turning(Component[TurningState]):
         """
         state, tuning = self.state, self._tuning
         if window.rates:
-            yaw_rate, std = self._yaw_rate(window), self._gyro_std
+            yaw_rate, std = self._yaw_rate(window), self._gyro_std(window)
         elif known(rims or ()):
             # No gyro: the difference of the sides, which turns a rover that skids less.
             yaw_rate = self._skid_share * headings.yaw_rate(rims or ())
@@ -179,11 +175,21 @@ class Turning(Component[TurningState]):
             return abs(yaw_rate) * self._rover.curvature_length
         return max(abs(side) for side in headings.side_speeds(speed, yaw_rate))
 
+    def _noise(self, window: InertialWindow) -> float:
+        """Return the noise of a message of the gyro [rad/s]."""
+        return window.stated.angular_rate_std or self._sensors.angular_rate_std
+
+    def _gyro_std(self, window: InertialWindow) -> float:
+        """Return the deviation of the smoothed yaw rate [rad/s]."""
+        noise = self._noise(window) / math.sqrt(self._per_cycle)
+        left = self._tuning.least_yaw_noise_share * noise
+        return math.hypot(left, self._sensors.angular_rate_bias_std)
+
     def _yaw_rate(self, window: InertialWindow) -> float:
         """Return the yaw rate: smoothed where its change may be noise, followed where not."""
         tuning, old = self._tuning, self.state.yaw_rate
         now = window.yaw_rate / window.rates
-        noise = max(self._sensors.angular_rate_std / math.sqrt(window.rates), tuning.least_noise)
+        noise = max(self._noise(window) / math.sqrt(window.rates), tuning.least_noise)
         gain = clipped(tuning.least_gain * abs(now - old) / noise, tuning.least_gain, 1.0)
         return old + gain * (now - old)
 

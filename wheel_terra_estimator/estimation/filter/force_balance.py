@@ -65,7 +65,8 @@ class ForceBalance(ForceRows):
         force = window.mean_force()
         weight = rover.mass * force[2]
         uphill = curvature * sum(w * x for w, x in zip(loads, rover.longitudinal, strict=True))
-        noise = sensors.specific_force_std**2 / window.readings
+        std = window.stated.specific_force_std or sensors.specific_force_std
+        noise = std**2 / window.readings
         if window.duration > 0.0:
             noise = max(noise, window.noise_density / window.duration)
         noise += sensors.specific_force_bias_std**2

@@ -107,6 +107,11 @@ class SoilPriors:
         return own + self.shear_error_common_std**2
 
 
+def gravity_bias_std(rover: Rover, sensors: SensorFigures, orientation_std: float) -> float:
+    """Return what is not known of accelerometer bias and gravity leaking in at first [m/s^2]."""
+    return math.hypot(sensors.specific_force_bias_std, rover.gravity * orientation_std)
+
+
 _LEAST_SINE = 0.05  # of sin(phi) cos(phi): soil without friction
 
 
@@ -144,9 +149,7 @@ def initial_filter(
     mean = np.zeros(layout.size)
     deviations = {
         SPEED: tuning.speed_std,
-        GRAVITY_BIAS: math.hypot(
-            sensors.specific_force_bias_std, rover.gravity * sensors.orientation_std
-        ),
+        GRAVITY_BIAS: gravity_bias_std(rover, sensors, sensors.orientation_std),
         SHEAR_STRENGTH: priors.strength_std,
         SHEAR_MODULUS: priors.shear_modulus_std,
         SLIP_SINKAGE: tuning.slip_sinkage_std,

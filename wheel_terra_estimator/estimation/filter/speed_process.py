@@ -30,6 +30,7 @@ from wheel_terra_estimator.estimation.filter.ekf import GatedFilter
 from wheel_terra_estimator.estimation.filter.prediction import Prediction
 from wheel_terra_estimator.estimation.filter.state import GRAVITY_BIAS, SLIP_PER_DEMAND, SPEED
 from wheel_terra_estimator.estimation.inputs.inertial import InertialWindow
+from wheel_terra_estimator.estimation.inputs.stated_noise import NOTHING_STATED, StatedNoise
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
 from wheel_terra_estimator.estimation.scalars import NAN, clipped, gain_of, known, median
 
@@ -156,6 +157,19 @@ class SpeedState(NamedTuple):
     change_time: float = -math.inf  # when contacts or commands last changed [s]
 
 
+class AccelerationNoise(NamedTuple):
+    """Noise of the specific force less gravity, as stated."""
+
+    force: float  # of the accelerometer, density of white noise squared [(m/s^2)^2 s]
+    attitude: float  # of gravity by errors of the attitude, the same
+    bias_walk: float  # of what the bias changes, per second [(m/s^2)^2/s]
+
+    @property
+    def density(self) -> float:
+        """White noise density of accelerometer and attitude [m/s^2 sqrt(s)]."""
+        return math.sqrt(self.force + self.attitude)
+
+
 class SpeedProcess(Component[SpeedState]):
     """Predicts the body speed."""
 
@@ -181,18 +195,36 @@ class SpeedProcess(Component[SpeedState]):
                 slow_rims=unknown.each,
             )
         )
-        self._rover, self._tuning = rover, tuning
+        self._rover, self._sensors, self._tuning = rover, sensors, tuning
         self._usual_slip = UsualSlip(configuration, rover)
-        rate = max(sensors.imu_rate, 1.0)
-        attitude = rover.gravity * sensors.orientation_std
-        self._stated_noise = sensors.specific_force_std**2 / rate
-        self._attitude_noise = attitude**2 * tuning.attitude_time
-        self.acceleration_noise = math.sqrt(self._stated_noise + self._attitude_noise)
-        """White noise density of accelerometer and attitude as stated [m/s^2 sqrt(s)]."""
+        self._noise = self._acceleration_noise(
+            StatedNoise(sensors.specific_force_std, 0.0, sensors.orientation_std)
+        )
+        self._rim_noise = tuning.rate_noise * sensors.wheel_rate_std * max(rover.slip_radius)
+
+    def acceleration_noise(self, stated: StatedNoise) -> AccelerationNoise:
+        """Return the noise of the specific force less gravity; what is not stated by default."""
+        if not any(stated):
+            return self._noise
+        sensors = self._sensors
+        return self._acceleration_noise(
+            StatedNoise(
+                stated.specific_force_std or sensors.specific_force_std,
+                0.0,
+                stated.orientation_std or sensors.orientation_std,
+            )
+        )
+
+    def _acceleration_noise(self, stated: StatedNoise) -> AccelerationNoise:
+        tuning = self._tuning
+        attitude = self._rover.gravity * stated.orientation_std
         # The residual of gravity changes as the rover drives over rough ground.
         leak = tuning.leaking_share * attitude
-        self._bias_walk = tuning.bias_walk**2 + leak**2 * tuning.leak_rate
-        self._rim_noise = tuning.rate_noise * sensors.wheel_rate_std * max(rover.slip_radius)
+        return AccelerationNoise(
+            stated.specific_force_std**2 / max(self._sensors.imu_rate, 1.0),
+            attitude**2 * tuning.attitude_time,
+            tuning.bias_walk**2 + leak**2 * tuning.leak_rate,
+        )
 
     # -- What other parts tell -------------------------------------------------------------------
 
@@ -324,6 +356,7 @@ class SpeedProcess(Component[SpeedState]):
         *,
         rim: float,
         demand_change: float,
+        stated: StatedNoise = NOTHING_STATED,
     ) -> None:
         """Add speed, gravity bias and slip per demand to a prediction.
 
@@ -339,6 +372,8 @@ class SpeedProcess(Component[SpeedState]):
             Typical rim speed [m/s]; nan = unknown.
         demand_change : float
             By how much more the ground asks, as a share of the load [-].
+        stated : StatedNoise
+            By the messages of the IMU.
         """
         mean, F, Q = prediction
         mean[SPEED] = (
@@ -347,7 +382,7 @@ class SpeedProcess(Component[SpeedState]):
         F[SPEED, SPEED] = step.speed_gain
         F[SPEED, GRAVITY_BIAS] = step.bias_gain
         Q[SPEED, SPEED] = step.variance
-        Q[GRAVITY_BIAS, GRAVITY_BIAS] = self._bias_walk * dt
+        Q[GRAVITY_BIAS, GRAVITY_BIAS] = self.acceleration_noise(stated).bias_walk * dt
         if demand_change and not isnan(rim):
             # v = (1 - s) rim, and ds = slip_per_demand times the change of the demand.
             gain = -step.wheel_weight * rim * demand_change
@@ -386,7 +421,8 @@ class SpeedProcess(Component[SpeedState]):
         # A stretch that the IMU left out is filled with its mean.
         accelerated = window.speed_change * dt / covered
         # A vibrating rover is as noisy as it is seen to be, whatever its file states.
-        noise = max(self._stated_noise, window.noise_density) + self._attitude_noise
+        stated = self.acceleration_noise(window.stated)
+        noise = max(stated.force, window.noise_density) + stated.attitude
         noise *= dt
         weight = noise / (noise + step.variance)  # of the wheels
         return SpeedStep(
@@ -459,7 +495,7 @@ class SpeedProcess(Component[SpeedState]):
             spread = max(self._tuning.first_sight_share * abs(rims.typical), self._rover.rest_speed)
             ekf.set(SPEED, self.state.ratio * rims.typical, spread * spread)
 
-    def undo_jolt(self, ekf: GatedFilter, rim: float) -> None:
+    def undo_jolt(self, ekf: GatedFilter, rim: float, stated: StatedNoise = NOTHING_STATED) -> None:
         """Let a rover that starts without a reference velocity roll as it did before.
 
         A jolt of the accelerometer weighs much while the wheels turn slowly, and from a speed of
@@ -469,7 +505,7 @@ class SpeedProcess(Component[SpeedState]):
         state, tuning = self.state, self._tuning
         usual = state.ratio * rim
         off = abs(float(ekf.mean[SPEED]) - usual)
-        noise = tuning.start_noise * self.acceleration_noise
+        noise = tuning.start_noise * self.acceleration_noise(stated).density
         if abs(rim) > self._rover.low_rim and tuning.start_share * abs(usual) < off < noise:
             ekf.set(SPEED, usual, (state.ratio_std * rim) ** 2)
 

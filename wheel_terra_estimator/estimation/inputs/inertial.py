@@ -5,11 +5,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Container
 from dataclasses import dataclass
 from math import isnan
 from typing import NamedTuple
 
 from wheel_terra_estimator.estimation.component import Component
+from wheel_terra_estimator.estimation.inputs.stated_noise import KEYS, NOTHING_STATED, StatedNoise
 from wheel_terra_estimator.estimation.measurements import FloatArray, InertialReading
 from wheel_terra_estimator.estimation.scalars import NAN, clipped, gain_of
 
@@ -49,6 +51,8 @@ class InertialWindow(NamedTuple):
     noise_density: float = 0.0
     """Square of the white noise density that the specific force along the body is seen to have,
     vibration included [(m/s^2)^2 s]."""
+    stated: StatedNoise = NOTHING_STATED
+    """What the messages state of their noise, where no file does."""
 
     def mean_force(self) -> tuple[float, float, float]:
         """Return the mean specific force [m/s^2]; `tells_force` holds."""
@@ -93,17 +97,40 @@ class InertialInput(Component[InertialState]):
     ----------
     gravity : float
         [m/s^2].
+    tuning : InertialTuning, optional
+        Times.
+    given : container of str
+        Keys that a file states, as against defaults; all of them by default.
     """
 
-    def __init__(self, gravity: float, tuning: InertialTuning = InertialTuning()) -> None:
+    def __init__(
+        self,
+        gravity: float,
+        tuning: InertialTuning = InertialTuning(),
+        given: Container[str] = frozenset(KEYS),
+    ) -> None:
         super().__init__(InertialState())
         self._gravity = gravity
         self._tuning = tuning
+        self._given = given
+
+    @property
+    def stated(self) -> StatedNoise:
+        """What the messages state of their noise, where no file does."""
+        return self.state.window.stated
+
+    def keep_stated(self, stated: StatedNoise) -> None:
+        """Go on with what messages stated in an old run."""
+        self.state = InertialState(window=InertialWindow(stated=stated))
 
     def update(self, time: float, reading: InertialReading, zero: GyroZero) -> None:
         """Take a reading at a time [s]."""
         before, force_time, rate_time, window, attitude, last_force = self.state
         dt = time - before if before > -math.inf else 0.0
+        if any(reading.variance) and not all(window.stated):
+            stated = window.stated.completed(reading.variance, self._given)
+            if stated != window.stated:
+                window = window._replace(stated=stated)
         attitude = self.attitude_after(attitude, reading, dt)
         force_x, force_y, force_z = reading.specific_force.tolist()
         _, pitch_rate, yaw_rate = reading.angular_rate.tolist()
@@ -148,7 +175,7 @@ class InertialInput(Component[InertialState]):
     def take(self) -> InertialWindow:
         """Return the sums since the last call, and begin new ones."""
         window = self.state.window
-        empty = InertialWindow(noise_density=window.noise_density)
+        empty = InertialWindow(noise_density=window.noise_density, stated=window.stated)
         self.state = self.state._replace(window=empty)
         return window
 

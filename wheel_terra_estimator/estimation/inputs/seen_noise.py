@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""How noisy the sensors are seen to be, beside what their file states.
+"""How noisy the sensors are seen to be, beside what their file or their messages state.
 
 Three readings in step differ from a straight line by their noise and by how the quantity bends:
 x1 - 2 x2 + x3 has six times the variance of white noise, and hardly any of slow motion. A reference
@@ -17,6 +17,7 @@ from math import isnan
 from typing import Any, NamedTuple
 
 from wheel_terra_estimator.estimation.component import Component
+from wheel_terra_estimator.estimation.inputs.stated_noise import NOTHING_STATED, StatedNoise
 from wheel_terra_estimator.estimation.measurements import StepInputs
 from wheel_terra_estimator.estimation.rover import SensorFigures
 from wheel_terra_estimator.estimation.scalars import clipped
@@ -68,6 +69,7 @@ class SeenNoiseState(NamedTuple):
     sinkage: ChannelState = ChannelState()
     reference: ChannelState = ChannelState()
     reference_stated: float = math.nan  # by its last message [m/s], nan = by none
+    by_imu: StatedNoise = NOTHING_STATED  # what its messages state, where no file does
 
 
 UNITS = {
@@ -233,11 +235,28 @@ class SeenNoise(Component[SeenNoiseState]):
                 return seen**2
         return seen**2 if seen**2 > self._tuning.clearly**2 * stated else stated
 
+    def take_stated(self, by_imu: StatedNoise) -> None:
+        """Take what the messages of the IMU state, where no file does."""
+        self.state = self.state._replace(by_imu=by_imu)
+
+    def _own(self, sensor: str) -> float:
+        """Return the deviation that the sensor's messages state; 0 = none that counts."""
+        if sensor == 'reference':
+            own = self.state.reference_stated
+            return 0.0 if isnan(own) else own
+        by_imu = self.state.by_imu
+        own_ones = {'accelerometer': by_imu.specific_force_std, 'gyro': by_imu.angular_rate_std}
+        return own_ones.get(sensor, 0.0)
+
     def _stated(self, sensor: str) -> tuple[float, bool]:
-        """Return the deviation of a message as stated, and whether somebody stated it."""
-        own = self.state.reference_stated
-        if sensor == 'reference' and not isnan(own):
-            return own, True
+        """Return the deviation of a message as stated, and whether more than that is a fault.
+
+        It is where a file or the message of a reference states it. The message of an IMU states
+        what its sensors have at rest: a rover that vibrates is no fault of anybody.
+        """
+        own = self._own(sensor)
+        if own:
+            return own, sensor == 'reference'
         return self.stated[sensor], sensor not in self._defaults
 
     def report(self) -> dict[str, float]:
@@ -251,12 +270,15 @@ class SeenNoise(Component[SeenNoiseState]):
         return found
 
     def in_words(self) -> dict[str, str]:
-        """Return what is much noisier than stated, and than a default; empty where nothing is."""
+        """Return what is much noisier than stated, and than a default; empty where nothing is.
+
+        An IMU that is noisier than its messages state is among the latter.
+        """
         words: dict[str, list[str]] = {'stated': [], 'default': []}
         for sensor in UNITS:
             seen, (stated, given) = self.seen(sensor), self._stated(sensor)
             if seen is not None and stated > 0.0 and seen > self._tuning.much * stated:
-                than = 'what is stated' if given else 'the default'
+                than = 'what is stated' if given or self._own(sensor) else 'the default'
                 words['stated' if given else 'default'].append(
                     f'{sensor.replace("_", " ")} noise {seen / stated:.0f} times {than} '
                     f'({self._where(sensor)}: {seen:.2g})'
@@ -265,6 +287,8 @@ class SeenNoise(Component[SeenNoiseState]):
 
     def _where(self, sensor: str) -> str:
         """Return where the noise of a sensor can be stated, as far as that counts."""
-        if sensor == 'reference' and not isnan(self.state.reference_stated):
+        if not self._own(sensor):
+            return KEYS[sensor]
+        if sensor == 'reference':
             return 'covariance of reference_odom, or sensors.reference_std_floor'
-        return KEYS[sensor]
+        return f'covariance of imu/data, or {KEYS[sensor]}'

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from wheel_terra_estimator.configuration import Configuration
+from wheel_terra_estimator.estimation.inputs.stated_noise import credible
 from wheel_terra_estimator.estimation.measurements import (
     FloatArray,
     InertialReading,
@@ -146,6 +147,8 @@ class InputChecks:
 
     def _inertial(self, m: InertialReading) -> InertialReading | None:
         """Keep the good fields of a message; nan stands for one that is not there."""
+        if any(m.variance) and (variance := credible(m.variance)) != m.variance:
+            m = replace(m, variance=variance)
         x, y, z = m.specific_force.tolist()
         force = math.sqrt(x * x + y * y + z * z)
         x, y, z = m.angular_rate.tolist()

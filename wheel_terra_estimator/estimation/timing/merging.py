@@ -13,6 +13,7 @@ import numpy as np
 from wheel_terra_estimator.estimation.measurements import (
     FloatArray,
     InertialReading,
+    InertialVariance,
     LeavingAngleReading,
     Measurement,
     ReferenceVelocity,
@@ -139,14 +140,22 @@ def _single(measurements: list[_Some]) -> _Some | None:
 
 
 def _inertial(stamp: int, readings: list[InertialReading]) -> InertialReading:
-    """Return mean specific force and rate, and the newest attitude."""
+    """Return mean specific force and rate, the newest attitude, and the first variances stated."""
     orientations = [r.orientation for r in readings if r.orientation is not None]
     return InertialReading(
         stamp,
         _mean([reading.specific_force for reading in readings]),
         _mean([reading.angular_rate for reading in readings]),
         orientations[-1] if orientations else None,
+        _first_stated([reading.variance for reading in readings]),
     )
+
+
+def _first_stated(variances: list[InertialVariance]) -> InertialVariance:
+    if not any(map(any, variances)):
+        return variances[0]
+    columns = zip(*variances, strict=True)
+    return InertialVariance(*[next(filter(None, column), 0.0) for column in columns])
 
 
 def _mean(rows: list[FloatArray]) -> FloatArray:
