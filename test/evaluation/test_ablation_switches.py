@@ -12,9 +12,14 @@ import pytest
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / 'tools'))
 
 import ablation
-from ablations.drives import SIMULATED, simulated
-from ablations.switches import ROOT, patched, tuned, without_sign
+import numpy as np
+from ablations.drives import PLANS, WHOLE_PLANS, Plan, simulated
+from ablations.switches import ROOT, both, patched, tuned, without_sign
 from ablations.treatments import SIGNS, TREATMENTS
+from ablations.warnings import listening
+
+NEVER_ACTED: tuple[str, ...] = ()
+SEEN = ('slip', 'slip_std', 'drawbar_pull', 'drawbar_pull_std', 'sinkage', 'slip_class', 'stuck')
 
 
 def module(name):
@@ -58,8 +63,82 @@ def test_patch_wants_what_is_there():
         pass
 
 
+def short(world, kind, seconds, **more):
+    """Return a short drive of a tuning seed."""
+    return next(simulated([Plan(world, kind, seconds=seconds, **more)], 1000))
+
+
+def differ(one, other):
+    return any(
+        not np.array_equal(getattr(one, name), getattr(other, name), equal_nan=True)
+        for name in SEEN
+    )
+
+
+def test_estimator_runs_with_everything_switched_off():
+    case = short('own', 'climb', 12.0).make()
+    kept = ablation._run(case)
+    with both(*(t.off for t in TREATMENTS))():
+        bare = ablation._run(case)
+    assert np.isfinite(bare.slip).all()
+    assert differ(bare, kept)
+    assert not differ(ablation._run(case), kept)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize('treatment', TREATMENTS, ids=lambda t: t.name)
+def test_each_switch_changes_what_is_estimated(treatment, cases):
+    if treatment.name in NEVER_ACTED:
+        pytest.skip('acted on no drive of the study either')
+    drives = [d for d in simulated(PLANS, 1003) if treatment.acts_in(d)]
+    if treatment.warning_only:
+        drives = list(simulated(WHOLE_PLANS, 1003, whole=True))
+    for drive in drives:
+        case, kept, told = cases(drive)
+        with treatment.off():
+            if treatment.warning_only:
+                acted = (told.played(case.configuration) != told.said).any()
+            else:
+                acted = differ(ablation._run(case), kept)
+        if acted:
+            return
+    pytest.fail('changed nothing on any drive')
+
+
+@pytest.fixture(scope='module')
+def cases():
+    """Return what makes a drive and runs it once: case, record, what the warning was told."""
+    made = {}
+
+    def make(drive):
+        if drive.name not in made:
+            case = drive.make()
+            with listening() as told:
+                made[drive.name] = case, ablation._run(case), told
+        return made[drive.name]
+
+    return make
+
+
+def test_warning_told_again_is_the_same_and_feels_its_own_switches():
+    # Late references: steps are made again, from kept states.
+    case = short('rival', 'climb', 10.0).make()
+    always = both(
+        tuned('judgement.stuck.signs:SignTuning', likely=-1.0),
+        tuned('judgement.stuck.situation:SituationTuning', settling_travel=0.0),
+    )
+    with always(), listening() as told:
+        kept = ablation._run(case)
+        assert kept.health['steps_repeated'] > 0
+        assert 0 < kept.stuck.sum() < told.said.sum() < len(kept.stuck)  # checks hold it back
+    with always():
+        assert (told.played(case.configuration) == told.said).all()
+        assert (ablation._with_warning(case, told, kept).stuck == kept.stuck).all()
+    assert not told.played(case.configuration).any()
+
+
 def row(treatment, drive, world, slip, **more):
-    figures = {'slip_square': 100.0 * slip**2, 'slip_count': 100.0, 'covered': 95.0, **more}
+    figures = {'slip_square': 100.0 * slip**2, 'slip_count': 100.0, 'slip_covered': 95.0, **more}
     return {'treatment': treatment, 'drive': drive, 'world': world, **figures}
 
 
@@ -98,8 +177,66 @@ def test_table_says_what_earns_its_place():
     assert f'{silent}.' not in ablation.report(rows).splitlines()[-1]
 
 
-def test_drives_of_both_worlds_are_made():
-    durations = {'rival': 1.0, 'own': 1.0}
-    for drive, (world, kind, _) in zip(simulated(2, 1000, durations), SIMULATED, strict=False):
-        assert drive.name.startswith(f'{world} {kind} 1000')
-        assert drive.run()['slip_count'] >= 0.0
+def test_deviation_that_is_too_small_without_a_treatment_earns_its_place():
+    wide, narrow = TREATMENTS[0].name, TREATMENTS[1].name
+    base = {f'own {i}': row('', f'own {i}', 'own', 0.03) for i in range(4)}
+    rows = {
+        ablation.AS_IT_IS: base,
+        wide: {name: {**figures, 'slip_covered': 92.0} for name, figures in base.items()},
+        # More within their intervals than need be: no loss.
+        narrow: {name: {**figures, 'slip_covered': 99.0} for name, figures in base.items()},
+    }
+    assert ablation._verdict(base, rows[wide], list(base)) == 'yes'
+    assert ablation._verdict(base, rows[narrow], list(base)) == 'no'
+
+
+def test_warning_that_comes_later_earns_its_place():
+    base = {f'own {i}': {**row('', f'own {i}', 'own', 0.03), 'lead': 10.0 + i} for i in range(4)}
+    later = {name: {**figures, 'lead': figures['lead'] - 2.0} for name, figures in base.items()}
+    once = {**base, 'own 1': {**base['own 1'], 'lead': 10.8}}
+    assert ablation._verdict(base, later, list(base)) == 'yes'
+    assert ablation._verdict(base, once, list(base)) == 'open'
+
+
+def test_treatment_is_tried_where_it_can_act():
+    by_name = {t.name: t for t in TREATMENTS}
+    blind = next(simulated([Plan('own', 'climb', mode='no_reference')], 1000))
+    seeing = next(simulated([Plan('own', 'climb')], 1000))
+    usual = by_name['return to the usual slip']
+    assert usual.acts_in(blind)
+    assert not usual.acts_in(seeing)
+    whole = next(simulated(WHOLE_PLANS, 1000, whole=True))
+    assert by_name['sign stall'].acts_in(whole)
+    assert not by_name['own stiffness of each wheel'].acts_in(whole)
+    # Each has drives of the study on which it is tried.
+    drives = [*simulated(PLANS, 1000), *simulated(WHOLE_PLANS, 1000, whole=True)]
+    assert [t.name for t in TREATMENTS if not any(map(t.acts_in, drives))] == []
+
+
+@pytest.mark.parametrize(
+    'plan',
+    [
+        Plan('rival', 'spin', mode='no_torque_no_reference'),
+        Plan('own', 'wild_stops'),
+    ],
+    ids=lambda p: p.kind,
+)
+def test_drives_of_both_worlds_are_made(plan):
+    drive = short(plan.world, plan.kind, 1.0, mode=plan.mode)
+    assert drive.name.startswith(f'{plan.world} {plan.kind} 1000')
+    case = drive.make()
+    references = [m for m in case.measurements if hasattr(m, 'forward')]
+    assert bool(references) == ('no_reference' not in plan.mode)
+    assert ablation._tried(drive, [], known=False).__next__()[1]['slip_count'] >= 0.0
+
+
+def test_towed_rover_moves_on_standing_wheels():
+    drive = short('own', 'towed', 26.0)
+    case = drive.make()
+    kept = ablation._run(case)
+    late = kept.stamp[0] + 20_000_000_000
+    pulled = [m.forward for m in case.measurements if hasattr(m, 'forward') and m.stamp > late]
+    assert np.median(pulled) == pytest.approx(0.04, abs=0.005)
+    towed = kept.stamp > late
+    assert np.median(kept.speed[towed]) == pytest.approx(0.04, abs=0.01)
+    assert case.figures(kept)['slip_count'] > 0.0

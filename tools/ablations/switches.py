@@ -67,6 +67,19 @@ def patched(place: str, value: Any) -> Switch:
     return switched
 
 
+def both(*switches: Switch) -> Switch:
+    """Return a switch that throws several."""
+
+    @contextlib.contextmanager
+    def switched() -> Iterator[None]:
+        with contextlib.ExitStack() as stack:
+            for switch in switches:
+                stack.enter_context(switch())
+            yield
+
+    return switched
+
+
 def without_sign(name: str) -> Switch:
     """Return a switch that leaves a stuck sign out."""
 

@@ -433,17 +433,15 @@ class WheelSoilEstimator:
         rims = self._wheels.rim_speeds(time)
         unturned = RimSpeeds.of(rims, turning.yaw_rate, headings)
         reference_known = self._reference.known(time)
-        event = self._contact_age.update(unturned.typical)
+        reverses = self._contact_age.update(unturned.typical)
         demand = (
             self._contact_age.state.direction * loads.slope_share if window.tells_force else NAN
         )
-        if event.reversed:
+        if reverses:
             speed.turn_back(ekf, self._demand.state, demand)
             if self._tape is not None:
                 # The soil that was learned downhill is not that of the climb before it.
                 self._tape.cut()
-        elif event.new_direction:
-            speed.forget_ratio()
         demand_change = self._demand.update(demand, dt, settled=self._contact_age.settled)
         self._note_climb(demand, unturned.typical, dt, told=reference_known)
         speed.begin(ekf, unturned)

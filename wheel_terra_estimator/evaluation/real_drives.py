@@ -125,6 +125,11 @@ def score_snow_event(event: SnowEvent, reference_rate: float) -> tuple[EventScor
         if reference_rate > 0.0 or not isinstance(m, ReferenceVelocity)
     )
     kept = record(*run_estimator(configuration, given))
+    return event_score(event, kept), kept
+
+
+def event_score(event: SnowEvent, kept: Record) -> EventScore:
+    """Return when the estimator warned of an event, from its record."""
     time = (kept.stamp - _START) * 1e-9
     rises = np.flatnonzero(np.diff(np.concatenate([[0], kept.stuck.astype(int)])) == 1)
     last = int(np.searchsorted(kept.stamp, event.stamp[event.stop]))
@@ -135,18 +140,15 @@ def score_snow_event(event: SnowEvent, reference_rate: float) -> tuple[EventScor
         if time[min(last, len(time) - 1)] - rise <= LONGEST_LEAD:
             warned = rise
     late, runs = _late_classes(event, kept)
-    return (
-        EventScore(
-            name=event.name,
-            warned=warned,
-            author=(event.stamp[event.author] - _START) * 1e-9,
-            start=(event.stamp[event.start] - _START) * 1e-9,
-            stop=(event.stamp[event.stop] - _START) * 1e-9,
-            all_warnings=tuple(float(time[r]) for r in rises),
-            late_classes=late,
-            high_slip_runs=runs,
-        ),
-        kept,
+    return EventScore(
+        name=event.name,
+        warned=warned,
+        author=(event.stamp[event.author] - _START) * 1e-9,
+        start=(event.stamp[event.start] - _START) * 1e-9,
+        stop=(event.stamp[event.stop] - _START) * 1e-9,
+        all_warnings=tuple(float(time[r]) for r in rises),
+        late_classes=late,
+        high_slip_runs=runs,
     )
 
 

@@ -28,13 +28,6 @@ class ContactAgeState(NamedTuple):
     rim_travel: float = 0.0  # [m] since the wheels last stood
 
 
-class ContactEvent(NamedTuple):
-    """What a cycle brought."""
-
-    new_direction: bool = False
-    reversed: bool = False  # the direction is the opposite one of a drive before
-
-
 class ContactAge(Component[ContactAgeState]):
     """Travel since the contacts formed."""
 
@@ -42,15 +35,18 @@ class ContactAge(Component[ContactAgeState]):
         super().__init__(ContactAgeState())
         self._rover, self._tuning = rover, tuning
 
-    def update(self, rim_speed: float) -> ContactEvent:
-        """Take the typical rim speed of a cycle [m/s], nan = unknown."""
+    def update(self, rim_speed: float) -> bool:
+        """Take the typical rim speed of a cycle [m/s], nan = unknown.
+
+        Return whether the direction became the opposite one of a drive before.
+        """
         if not abs(rim_speed) >= self._rover.low_rim:
-            return ContactEvent()
+            return False
         travel, before, rim_travel = self.state
         direction = 1.0 if rim_speed > 0.0 else -1.0
         turned = direction != before
         self.state = ContactAgeState(0.0 if turned else travel, direction, rim_travel)
-        return ContactEvent(turned, turned and before != 0.0)
+        return turned and before != 0.0
 
     def advance(self, travel: float, rim_travel: float) -> None:
         """Add the travel of a cycle and that of the fastest rim [m]."""

@@ -252,10 +252,6 @@ class SpeedProcess(Component[SpeedState]):
         apart = spread([now - old for old, now in zip(slow, rims.each, strict=True)])
         self.inflate(tuning.side_change * max(apart - self._rim_noise, 0.0))
 
-    def forget_ratio(self) -> None:
-        """Forget how well v / rim speed is known: the first drive in a direction begins."""
-        self.state = self.state._replace(ratio_std=self._tuning.first_ratio_std)
-
     def turn_back(self, ekf: GatedFilter, before: float, now: float) -> None:
         """Carry v / rim speed over to the other direction: up becomes down.
 
