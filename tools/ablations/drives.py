@@ -248,7 +248,7 @@ def recorded(measured: Path) -> Iterator[Drive]:
             yield Drive(
                 'recorded',
                 name.removesuffix('_mcap'),
-                _REAL | _inputs('reference no_torque no_sinkage'),
+                _REAL | {'imu_covariance'} | _inputs('reference no_torque no_sinkage'),
                 partial(_firm, measured / 'bags' / name),
             )
 

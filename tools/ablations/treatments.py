@@ -264,6 +264,12 @@ _FILTER = (
         patched('inputs.seen_noise:SeenNoise.variance', _as_stated),
     ),
     Treatment(
+        'noise of the IMU as its messages state it',
+        _GATE,
+        patched('inputs.stated_noise:StatedNoise.completed', lambda self, *_: self),
+        'imu_covariance',
+    ),
+    Treatment(
         'accelerometer as noisy as it is seen',
         _GATE,
         tuned('inputs.inertial:InertialTuning', noise_time=NEVER),
