@@ -15,7 +15,11 @@ import numpy as np
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.estimates import SlipClass
-from wheel_terra_estimator.estimation.measurements import Measurement, ReferenceVelocity
+from wheel_terra_estimator.estimation.measurements import (
+    InertialReading,
+    Measurement,
+    ReferenceVelocity,
+)
 from wheel_terra_estimator.evaluation import kinds, real_drives, scores
 from wheel_terra_estimator.evaluation.runner import Record, inputs_of_mode
 from wheel_terra_estimator.evaluation.two_state_filters import SlipCourse
@@ -75,6 +79,7 @@ PLANS = (
     _plan('rival', 'climb', 'slope', mode=NEITHER),
     _plan('own', 'towed', 'slope stops slides'),
     _plan('rival', 'field', 'slope fast wander', mode=WANDER_TOLD),
+    _plan('own', 'jolts', 'slope stops', mode='no_reference'),
 )
 """Any head of the list is a fair sample of both worlds."""
 
@@ -97,21 +102,23 @@ WHOLE_PLANS = (
 """Drives at full length, on which only treatments of the warning are tried."""
 
 _STOPS = kinds.KINDS['stop_and_go']
+_TWO_STOPS = {
+    **_STOPS,
+    'drive.time': [0.0, 14.0, 15.0, 21.0, 22.0, 32.0, 33.0, 39.0, 40.0],
+    'drive.forward': [0.05, 0.05, 0, 0, 0.06, 0.06, 0, 0, 0.05],
+}
 _OWN: Mapping[str, Mapping[str, Any]] = {
-    'wild_stops': {
-        **_STOPS,
-        'sensors.reference_outliers': 0.15,
-        'drive.time': [0.0, 14.0, 15.0, 21.0, 22.0, 32.0, 33.0, 39.0, 40.0],
-        'drive.forward': [0.05, 0.05, 0, 0, 0.06, 0.06, 0, 0, 0.05],
-    },
+    'wild_stops': {**_TWO_STOPS, 'sensors.reference_outliers': 0.15},
+    'jolts': _TWO_STOPS,
     'towed': {
         **_STOPS,
         'drive.time': [0.0, 14.0, 15.0, 31.0, 32.0],
         'drive.forward': [0.05, 0.05, 0, 0, 0.05],
     },
 }
-"""Kinds of the own world for this study alone: stops among wild references, and a rover that is
-pulled along on standing wheels."""
+"""Kinds of the own world for this study alone: stops among wild references, starts that jolt, and
+a rover that is pulled along on standing wheels."""
+_JOLTS, _JOLT_TIME, _JOLT = (0.1, 21.3, 39.3), 0.3, -0.3  # [s], [s], [m/s^2]
 _TOWED_FROM, _TOWED_TO, _TOWED_SPEED, _TOWED_RAMP = 18.0, 28.0, 0.04, 1.0  # [s], [m/s], [s]
 
 _HUSKY = {
@@ -192,7 +199,27 @@ def _bench_drive(plan: Plan, seed: int, seconds: float | None) -> BenchDrive:
     drive = own_world.simulate(load(_OWN[plan.kind]), seed, seconds)
     if plan.kind == 'towed':
         return _towed(drive)
+    if plan.kind == 'jolts':
+        return _jolted(drive)
     return BenchDrive(drive.configuration, drive.arrivals, drive.truth)
+
+
+def _jolted(drive: own_world.SimulatedDrive) -> BenchDrive:
+    """Return a drive whose accelerometer takes a jolt as the wheels begin to turn."""
+    start = int(drive.truth.stamp[0])
+
+    def jolt(stamp: int) -> Any:
+        time = (stamp - start) * 1e-9
+        now = any(begin < time < begin + _JOLT_TIME for begin in _JOLTS)
+        return np.array([_JOLT if now else 0.0, 0.0, 0.0])
+
+    arrivals = [
+        a._replace(measurement=replace(m, specific_force=m.specific_force + jolt(m.stamp)))
+        if isinstance(m := a.measurement, InertialReading)
+        else a
+        for a in drive.arrivals
+    ]
+    return BenchDrive(drive.configuration, arrivals, drive.truth)
 
 
 def _towed(drive: own_world.SimulatedDrive) -> BenchDrive:
