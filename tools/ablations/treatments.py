@@ -367,6 +367,9 @@ _FILTER = (
         patched('filter.speed_process:SpeedProcess.turn_back', _nothing),
         'reversal',
     ),
+    Treatment(
+        'half of the slip behind a reversal', _MODEL, _speed(reversed_slip_share=1.0), 'reversal'
+    ),
     Treatment('curvature of the ground', _MODEL, _turning(steepest=0.0)),
     Treatment(
         'wheels without load',

@@ -47,6 +47,10 @@ class SpeedTuning:
     first_ratio_std: float = 0.3
     least_reversed_ratio: float = 0.2
     most_reversed_ratio: float = 1.1
+    reversed_slip_share: float = 0.5
+    """Of the slip to be expected with the new direction: behind a reversal ruts and shear form
+    anew, and the slip grows with them. Tuned on stops and reversals of both worlds, seeds 1000 to
+    1005."""
     first_sight_share: float = 0.3
     """Deviation of the speed over the rim speed when the wheels are first heard."""
     least_ratio: float = -0.5  # remembered v / rim speed
@@ -256,7 +260,8 @@ class SpeedProcess(Component[SpeedState]):
         """Carry v / rim speed over to the other direction: up becomes down.
 
         It is that of the last drive in this direction, else of the drive that ended. The slip
-        changes by the learned slip per demand times what is asked less (or more) than there.
+        changes by the learned slip per demand times what is asked less (or more) than there, and
+        begins with a share of that.
 
         Parameters
         ----------
@@ -272,7 +277,8 @@ class SpeedProcess(Component[SpeedState]):
         change = now - known_one.demand
         if isnan(change):
             change = 0.0
-        ratio = known_one.ratio - float(ekf.mean[SLIP_PER_DEMAND]) * change
+        slip = 1.0 - known_one.ratio + float(ekf.mean[SLIP_PER_DEMAND]) * change
+        ratio = 1.0 - tuning.reversed_slip_share * slip
         gain_std = math.sqrt(float(ekf.covariance[SLIP_PER_DEMAND, SLIP_PER_DEMAND]))
         self.state = state._replace(
             ratio=clipped(ratio, tuning.least_reversed_ratio, tuning.most_reversed_ratio),
