@@ -96,6 +96,12 @@ def test_remap_is_for_bags(tmp_path: Path, capsys: Any) -> None:
     assert 'rig.csv is a table' in capsys.readouterr().err
 
 
+def test_smoothing_is_for_bags(tmp_path: Path, capsys: Any) -> None:
+    command = ['diagnose', _table(tmp_path / 'rig.csv'), '-o', str(tmp_path / 'out')]
+    assert main([*command, '--smooth']) == 2
+    assert '--smooth: goes with a bag' in capsys.readouterr().err
+
+
 def test_wheel_of_another_model_file(tmp_path: Path, capsys: Any) -> None:
     table = tmp_path / 'rig.csv'
     _table(table)

@@ -5,14 +5,17 @@
 from __future__ import annotations
 
 import functools
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.discrepancy.drives.series import collect
+from wheel_terra_estimator.discrepancy.drives.smoothed_speed import SpeedSmoother
 from wheel_terra_estimator.discrepancy.drives.windows import (
     GOOD,
+    SMOOTHED,
     block_moments,
     pooled_correlation,
     rows_from_bag,
@@ -241,8 +244,8 @@ def test_many_windows_are_merged_and_know_more():
     assert np.nanmedian(rows.columns['torque_std']) < 0.8 * single
 
 
-def test_simulated_rover():
-    """Slip, loads and pull of the simulator's own truth."""
+@functools.cache
+def simulated():
     from wheel_terra_estimator.simulation import drive, scenario
 
     stairs = scenario.load(
@@ -255,19 +258,75 @@ def test_simulated_rover():
             'slope.angle_deg': [0.0, 0.0, 6.0],
         }
     )
-    driven = drive.simulate(stairs, seed=2)
+    return drive.simulate(stairs, seed=2)
+
+
+def true_slip(window):
+    truth = simulated().truth
+    time = (truth.stamp - truth.stamp[0]) * 1e-9
+    inside = (time >= window.start) & (time < window.end)
+    return np.nanmean(truth.slip[inside], axis=0)
+
+
+def test_simulated_rover():
+    """Slip, loads and pull of the simulator's own truth."""
+    driven = simulated()
     rows = rows_from_measurements([a.measurement for a in driven.arrivals], driven.configuration)
     truth, time = driven.truth, (driven.truth.stamp - driven.truth.stamp[0]) * 1e-9
     assert len(rows.windows) >= 3
     for window in rows.windows:
         inside = (time >= window.start) & (time < window.end)
-        slip = np.nanmean(truth.slip[inside], axis=0)
-        assert np.all(np.abs(window.slip - slip) < 4 * window.std['slip'])
+        assert np.all(np.abs(window.slip - true_slip(window)) < 4 * window.std['slip'])
         assert window.normal_load == pytest.approx(
             truth.normal_load[inside].mean(0), rel=0.12, abs=5
         )
         load = truth.normal_load[inside].mean()
         assert window.pull == pytest.approx(truth.drawbar_pull[inside].mean(), abs=0.012 * load)
+
+
+@pytest.mark.slow
+def test_smoothed_slip_is_nearer_the_truth():
+    driven = simulated()
+    heard = [a.measurement for a in driven.arrivals]
+    plain = rows_from_measurements(heard, driven.configuration)
+    smooth = rows_from_measurements(heard, driven.configuration, smooth=True)
+    assert SMOOTHED in smooth.notes and SMOOTHED not in plain.notes
+    errors = [
+        np.sqrt(np.mean([(w.slip - true_slip(w)) ** 2 for w in rows.windows]))
+        for rows in (plain, smooth)
+    ]
+    assert errors[1] < errors[0]
+    for window in smooth.windows:
+        assert np.all(np.abs(window.slip - true_slip(window)) < 2 * window.std['slip'])
+
+
+def test_the_smoothed_speed_owes_nothing_to_torque_and_sinkage():
+    def speed(measurements):
+        smoother = SpeedSmoother(settings())
+        passed_on = list(smoother.hear(measurements))
+        assert all(a is b for a, b in zip(passed_on, measurements, strict=True))
+        return smoother.speed()
+
+    heard = list(up_the_stairs()[:240])
+    other = [
+        replace(m, torque=2.0 * m.torque) if isinstance(m, WheelOdometry) else m
+        for m in heard
+        if not isinstance(m, SinkageReading)
+    ]
+    before, after = speed(heard), speed(other)
+    assert len(before.time) > 50 and before.time.tolist() == after.time.tolist()
+    assert before.values.tolist() == after.values.tolist()
+
+
+def test_silent_references_give_no_window_to_the_smoother_either():
+    heard = [
+        m
+        for m in Drive([{'slip': 0.1, 'slope': 0.0, 'duration': 34.0}]).measurements
+        if not (isinstance(m, ReferenceVelocity) and 12e9 < m.stamp < 28e9)
+    ]
+    smooth = rows_from_measurements(heard, settings(), smooth=True)
+    assert smooth.seconds['no reference'] > 5.0
+    assert not any(w.start > 14.0 and w.end < 26.0 for w in smooth.windows)
 
 
 @pytest.mark.shared

@@ -26,6 +26,7 @@ def diagnose(
     reference: Any = None,
     effects: Sequence[str] | None = None,
     remaps: Mapping[str, str] | None = None,
+    smooth: bool = False,
 ) -> Diagnosis:
     """Find where measurements and a model disagree, and name the effect that is missing.
 
@@ -42,6 +43,8 @@ def diagnose(
         Effects that may be named; default: all of the catalogue.
     remaps : mapping, optional
         For a bag: the estimator's topic -> the bag's.
+    smooth : bool
+        For a bag: slip from the fixed-interval smoother, see ``docs/discrepancy/drives.md``.
 
     Returns
     -------
@@ -66,10 +69,10 @@ def diagnose(
     from wheel_terra_estimator.discrepancy.workflow import diagnose as run
 
     configuration = _configuration(model)
-    table = _table(data, 'data', configuration, remaps or {})
-    before = (
-        None if reference is None else _table(reference, 'reference', configuration, remaps or {})
-    )
+    table = _table(data, 'data', configuration, remaps or {}, smooth)
+    before = None
+    if reference is not None:
+        before = _table(reference, 'reference', configuration, remaps or {}, smooth)
     options = Options(tuple(effects) if effects is not None else None)
     return run(table, configuration, before, options)
 
@@ -96,7 +99,7 @@ def _configuration(
 
 
 def _table(
-    data: Any, name: str, configuration: Configuration, remaps: Mapping[str, str]
+    data: Any, name: str, configuration: Configuration, remaps: Mapping[str, str], smooth: bool
 ) -> SteadyTable:
     from wheel_terra_estimator.discrepancy.tables.checks import check_table
     from wheel_terra_estimator.discrepancy.tables.parsing import read_table
@@ -116,4 +119,4 @@ def _table(
         return read_table(path)
     from wheel_terra_estimator.discrepancy.drives.windows import rows_from_bag
 
-    return rows_from_bag(path, configuration, remaps).table()
+    return rows_from_bag(path, configuration, remaps, smooth=smooth).table()

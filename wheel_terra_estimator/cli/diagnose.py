@@ -84,6 +84,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     bag_arguments.add_arguments(parser, 'for a bag: ')
     parser.add_argument(
+        '--smooth',
+        action='store_true',
+        help='for a bag: slip from the fixed-interval smoother, which knows all references of the '
+        'drive and hears neither torque nor sinkage (1.7 times the time of a replay)',
+    )
+    parser.add_argument(
         '--no-pictures', action='store_true', help='write report.json and model.yaml only'
     )
     parser.add_argument('--json', action='store_true', help='print report.json and nothing else')
@@ -105,11 +111,14 @@ def run(arguments: argparse.Namespace) -> int:
             f'--allowed-error {arguments.allowed_error:g}: must be a share between 0 and 0.5'
         )
     given = [*arguments.data, *([arguments.reference] if arguments.reference else [])]
-    if arguments.remap and not any(_is_bag(Path(path)) for path in given):
-        raise UserError(
-            f'--remap {arguments.remap[0]}: renames topics of a bag, but {given[0]} is a table; '
-            'leave it out'
-        )
+    if not any(_is_bag(Path(path)) for path in given):
+        if arguments.remap:
+            raise UserError(
+                f'--remap {arguments.remap[0]}: renames topics of a bag, but {given[0]} is a '
+                'table; leave it out'
+            )
+        if arguments.smooth:
+            raise UserError(f'--smooth: goes with a bag, but {given[0]} is a table; leave it out')
     if arguments.soil == 'own' and len(arguments.data) > 1:
         return _each_with_its_soil(arguments, inputs)
     diagnosis = _diagnosed(arguments)
@@ -244,7 +253,9 @@ def _read(data: str, arguments: argparse.Namespace, configuration: Configuration
         from wheel_terra_estimator.discrepancy.drives.windows import rows_from_bag
 
         remaps, limits = parse_remaps(arguments.remap), bag_limits.from_arguments(arguments)
-        return rows_from_bag(path, configuration, remaps, limits=limits).table()
+        return rows_from_bag(
+            path, configuration, remaps, limits=limits, smooth=arguments.smooth
+        ).table()
     from wheel_terra_estimator.discrepancy.tables.parsing import read_table
 
     return read_table(path)

@@ -62,6 +62,8 @@ class DriveSeries:
         (k, n) [m], nan = no reading.
     reference : Channel
         (k, 2) forward velocity of the body [m/s] and its stated variance [(m/s)^2].
+    smoothed : Channel or None
+        The same of the fixed-interval smoother: the slip comes from it where it is there.
     """
 
     rate: Channel
@@ -70,6 +72,24 @@ class DriveSeries:
     yaw_rate: Channel
     sinkage: Channel
     reference: Channel
+    smoothed: Channel | None = None
+
+    @property
+    def speed(self) -> Channel:
+        """Forward velocity from which the slip comes, as ``reference``."""
+        return self.reference if self.smoothed is None else self.smoothed
+
+    def speed_std(self, start: float, end: float) -> float:
+        """Return the stated deviation of the mean speed of a stretch [m/s]; 0: none is stated.
+
+        Errors of references are apart, those of the smoother are one and the same all along.
+        """
+        variances = self.speed.within(start, end)[:, 1]
+        stated = variances[variances > 0]
+        if not stated.size:
+            return 0.0
+        apart = len(stated) if self.smoothed is None else 1
+        return float(np.sqrt(stated.mean() / apart))
 
 
 def collect(measurements: Iterable[Measurement], wheels: int, name: str) -> DriveSeries:

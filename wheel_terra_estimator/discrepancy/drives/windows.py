@@ -38,6 +38,7 @@ from numpy.typing import NDArray
 
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.discrepancy.drives.series import Channel, DriveSeries, collect
+from wheel_terra_estimator.discrepancy.drives.smoothed_speed import SpeedSmoother
 from wheel_terra_estimator.discrepancy.tables.checks import check_table
 from wheel_terra_estimator.discrepancy.tables.steady_table import SteadyTable
 from wheel_terra_estimator.errors import UserError
@@ -66,6 +67,7 @@ SETTLING_TRAVEL = 0.5  # rim travel after standing, in wheel radii, that is not 
 _DRIFT = {'wheel rate': (0.10, 0.01), 'slip': (0.10, 0.02), 'slope': (0.0, 0.0035)}
 _CREEP = (0.10, 0.5e-3, 0.02)  # share of the sinkage, least [m], most in wheel radii
 
+SMOOTHED = 'slip: from the fixed-interval smoother, which heard neither torque nor sinkage'
 GOOD = 'steady'
 QUALITIES = (
     GOOD,
@@ -104,7 +106,8 @@ class Window:
     series : mapping
         As ``scatter``: (segments, n) means, from which the correlation is pooled.
     reference_std : float
-        Standard deviation of the mean reference velocity as its messages state it [m/s].
+        Standard deviation of the mean reference velocity as its messages, or the smoother, state
+        it [m/s].
     """
 
     start: float
@@ -159,6 +162,8 @@ def rows_from_bag(
     configuration: Configuration,
     remaps: Mapping[str, str] | None = None,
     limits: Limits | None = None,
+    *,
+    smooth: bool = False,
 ) -> DriveRows:
     """Return the steady rows of a rosbag2.
 
@@ -172,6 +177,9 @@ def rows_from_bag(
         Estimator's topic -> the bag's.
     limits : bags.limits.Limits, optional
         What of the recording is unpacked and held.
+    smooth : bool
+        Whether the slip comes from the fixed-interval smoother in place of the references alone;
+        it takes about 1.7 times as long as a replay.
 
     Raises
     ------
@@ -184,17 +192,26 @@ def rows_from_bag(
 
     with open_bag(path, limits or LIMITS) as bag:
         read = MeasurementReader(bag, remaps or {}, configuration).measurements()
-        rows = rows_from_measurements((item for _, item in read), configuration, str(path))
+        heard = (item for _, item in read)
+        rows = rows_from_measurements(heard, configuration, str(path), smooth=smooth)
         return replace(rows, notes=(*bag.notes, *rows.notes))
 
 
 def rows_from_measurements(
-    measurements: Iterable[Measurement], configuration: Configuration, name: str = 'drive'
+    measurements: Iterable[Measurement],
+    configuration: Configuration,
+    name: str = 'drive',
+    *,
+    smooth: bool = False,
 ) -> DriveRows:
-    """Return the steady rows of a drive; see `rows_from_bag`."""
+    """Return the steady rows of a drive; see `rows_from_bag`. To smooth, in order of arrival."""
     wheels = configuration.wheels
-    corrected = map(SensorErrors(configuration).corrected, measurements)
+    smoother = SpeedSmoother(configuration) if smooth else None
+    heard = measurements if smoother is None else smoother.hear(measurements)
+    corrected = map(SensorErrors(configuration).corrected, heard)
     series = collect(corrected, wheels.count, name)
+    if smoother is not None:
+        series = replace(series, smoothed=smoother.speed())
     finder = _WindowFinder(series, configuration)
     windows = _with_deviations(finder.search(), configuration)
     if not windows:
@@ -320,8 +337,6 @@ class _WindowFinder:
         along = force[:, 0] * np.cos(tilt) - force[:, 2] * np.sin(tilt)
         pull = direction * mass / wheels * along
         mean = force.mean(0)
-        references = s.reference.within(start, end)
-        stated = references[references[:, 1] > 0, 1]
         return GOOD, Window(
             start,
             end,
@@ -335,7 +350,7 @@ class _WindowFinder:
             float(slope.mean()),
             count,
             {'slip': slip, 'torque': torque, 'sinkage': sinkage, 'pull': pull[:, None]},
-            float(np.sqrt(stated.mean() / len(stated))) if stated.size else 0.0,
+            s.speed_std(start, end),
         )
 
     def _loads(self, force: FloatArray, torque: FloatArray, along: float) -> FloatArray:
@@ -351,7 +366,7 @@ class _WindowFinder:
         s = self.series
         edges = np.linspace(start, end, count + 1)
         middle = 0.5 * (edges[1:] + edges[:-1])
-        forward = np.interp(middle, s.reference.time, s.reference.values[:, 0])
+        forward = np.interp(middle, s.speed.time, s.speed.values[:, 0])
         yaw = np.interp(middle, s.yaw_rate.time, s.yaw_rate.values[:, 0])
         lateral = np.asarray(self.settings.lateral)
         ground = forward[:, None] - yaw[:, None] * lateral
@@ -657,6 +672,8 @@ def _notes(
         notes.append('not used: ' + ', '.join(rest))
     if len(merged) < len(windows):
         notes.append(f'windows of like slip, slope and rate merged into {len(merged)}')
+    if finder.series.smoothed is not None:
+        notes.append(SMOOTHED)
     notes.append(
         'pull: mean over the wheels (the accelerometer gives no more), in rows of their own'
     )
