@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from parts import SAND
 
+from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.estimation.core import EstimatorCore
 from wheel_terra_estimator.estimation.estimates import SlipClass
 from wheel_terra_estimator.estimation.measurements import (
@@ -495,3 +496,20 @@ def test_what_a_standing_wheel_pulled_is_forgotten_when_all_have_stood():
         known.append(~np.isnan(estimator._pulls.state.stationary))
     assert known[59].tolist() == [False] * 5 + [True]
     assert not known[-1].any()
+
+
+def test_torques_open_the_speed_where_contacts_are_formed_not_while_they_form():
+    """The same jump, from 2 to 6 N m, well into a drive and a few centimetres behind a restart."""
+    opened = {}
+    for jump in (6.0, 9.6):
+        estimator = WheelSoilEstimator(reader.load(SAND))
+        estimator.begin_run(10**9, keep_soil=False)
+        for i in range(round(10 * jump) + 3):
+            time = 0.1 * i
+            rate = np.full(6, 0.0 if 7.0 < time < 9.0 else 0.5)
+            wheels = WheelOdometry(0, rate, np.full(6, 2.0 if time < jump else 6.0))
+            reference = ReferenceVelocity(0, 0.09 * float(rate[0]), 1e-6)
+            estimator.step(10**9 + i * 10**8, StepInputs(wheels, None, None, None, reference))
+        opened[jump] = estimator._speed.state.inflation
+    assert opened[6.0] > 0.001
+    assert opened[9.6] == 0.0

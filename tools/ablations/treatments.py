@@ -194,6 +194,12 @@ _FILTER = (
         'reference torque',
     ),
     Treatment(
+        'no opening by torques that build up',
+        _OPENING,
+        patched('wheel_soil_estimator:WheelSoilEstimator._torques_tell', lambda _: True),
+        'reference torque stops',
+    ),
+    Treatment(
         'opening on a change of turning',
         _OPENING,
         _turning(speed_change=0.0),

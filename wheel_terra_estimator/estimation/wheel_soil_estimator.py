@@ -569,8 +569,12 @@ class WheelSoilEstimator:
             loads=cycle.loads.load,
             traction_slope=self._speed.state.traction_slope,
         )
-        if change:
+        if change and self._torques_tell():
             self._speed.inflate(change * max(abs(cycle.rims[i]) for i in rolling))
+
+    def _torques_tell(self) -> bool:
+        """Say whether torques that change tell of the ground: behind a start they build up."""
+        return self._contact_age.settled
 
     def _forget_contacts(self) -> None:
         """Let the contacts form anew: all wheels stand."""
