@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import importlib
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -286,6 +287,10 @@ def test_messages_of_rclpy_and_of_rosbags_are_the_same_measurements(
 
     store = MessageFactory().store
     for topic, message, _ in drive[:6]:
+        if topic == '/imu/data':
+            stated = np.diag([1e-2, 2e-2, 3e-2]).reshape(9)
+            message = replace(message, linear_acceleration_covariance=stated)
+            assert converter.convert('imu/data', message).variance == (1e-2, 0.0, 0.0)
         kind = INPUT_TYPES[topic[1:]]
         package, _, name = kind.split('/')
         cls = getattr(importlib.import_module(f'{package}.msg'), name)
