@@ -274,11 +274,12 @@ def _losses(base: Figures, found: Figures, names: Sequence[str]) -> dict[str, tu
 
 
 def _same(one: dict[str, Any], other: dict[str, Any]) -> bool:
-    return all(np.isclose(one.get(k, 0.0), other.get(k, 0.0), rtol=1e-9) for k in _COMPARED)
+    common = [key for key in _COMPARED if key in one and key in other]
+    return all(np.isclose(one[key], other[key], rtol=1e-9) for key in common)
 
 
 _COMPARED = (
-    *(f'{what}_{sum_}' for what in ('slip', 'pull') for sum_ in ('square', 'covered')),
+    *(f'{what}_{sum_}' for what in ('slip', 'pull') for sum_ in ('square', 'covered', 'std')),
     *('class_wrong', 'class_too_high', 'false', 'missed', 'lead'),
 )
 

@@ -4,28 +4,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ablations import odd_drives
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.estimates import SlipClass
-from wheel_terra_estimator.estimation.measurements import (
-    InertialReading,
-    Measurement,
-    ReferenceVelocity,
-)
-from wheel_terra_estimator.evaluation import kinds, real_drives, scores
+from wheel_terra_estimator.estimation.measurements import Measurement, ReferenceVelocity
+from wheel_terra_estimator.evaluation import real_drives, scores
 from wheel_terra_estimator.evaluation.runner import Record, inputs_of_mode
 from wheel_terra_estimator.evaluation.two_state_filters import SlipCourse
 from wheel_terra_estimator.evaluation.worlds import WORLDS, BenchDrive
-from wheel_terra_estimator.simulation import drive as own_world
-from wheel_terra_estimator.simulation.scenario import load
 
 Figures = dict[str, float]
 SHORT, LONG = 25.0, 42.0
@@ -80,6 +75,16 @@ PLANS = (
     _plan('own', 'towed', 'slope stops slides'),
     _plan('rival', 'field', 'slope fast wander', mode=WANDER_TOLD),
     _plan('own', 'jolts', 'slope stops', mode='no_reference'),
+    _plan('rival', 'entrapment', 'slope entraps', seconds=45.0),
+    _plan('own', 'climb', 'slope', mode='no_torque'),
+    _plan('rival', 'turns', 'turning'),
+    _plan('own', 'jumps', 'slope wild'),
+    _plan('rival', 'soft_patch', 'slope', mode='no_torque'),
+    _plan('own', 'fast_stops', 'stops fast'),
+    _plan('own', 'mixed_soil', 'slope', mode='no_torque'),
+    _plan('own', 'scenarios/stalled_wheel', 'slope faults', seconds=62.0),
+    _plan('own', 'scenarios/free_spinning_wheel', 'slope faults', seconds=62.0),
+    _plan('own', 'scenarios/steered_turns', 'slope turning steered', seconds=52.0),
 )
 """Any head of the list is a fair sample of both worlds."""
 
@@ -88,38 +93,18 @@ WHOLE_PLANS = (
     _plan('own', 'entrapment_patch', 'entraps'),
     _plan('rival', 'creeping_entrapment', 'entraps'),
     _plan('own', 'entrapment_slope', 'entraps'),
-    _plan('rival', 'spin'),
+    _plan('rival', 'spin', 'spin'),
     _plan('own', 'near_stuck'),
     _plan('rival', 'entrapment', 'entraps', mode='no_reference'),
     _plan('own', 'wheel_faults'),
     _plan('rival', 'wheel_faults'),
-    _plan('own', 'turns'),
+    _plan('own', 'turns', 'spin'),
     _plan('rival', 'recovery'),
     _plan('own', 'entrapment_slope', 'entraps', mode='no_reference'),
     _plan('rival', 'stop_and_go'),
     _plan('own', 'sensor_faults'),
 )
 """Drives at full length, on which only treatments of the warning are tried."""
-
-_STOPS = kinds.KINDS['stop_and_go']
-_TWO_STOPS = {
-    **_STOPS,
-    'drive.time': [0.0, 14.0, 15.0, 21.0, 22.0, 32.0, 33.0, 39.0, 40.0],
-    'drive.forward': [0.05, 0.05, 0, 0, 0.06, 0.06, 0, 0, 0.05],
-}
-_OWN: Mapping[str, Mapping[str, Any]] = {
-    'wild_stops': {**_TWO_STOPS, 'sensors.reference_outliers': 0.15},
-    'jolts': _TWO_STOPS,
-    'towed': {
-        **_STOPS,
-        'drive.time': [0.0, 14.0, 15.0, 31.0, 32.0],
-        'drive.forward': [0.05, 0.05, 0, 0, 0.05],
-    },
-}
-"""Kinds of the own world for this study alone: stops among wild references, starts that jolt, and
-a rover that is pulled along on standing wheels."""
-_JOLTS, _JOLT_TIME, _JOLT = (0.1, 21.3, 39.3), 0.3, -0.3  # [s], [s], [m/s^2]
-_TOWED_FROM, _TOWED_TO, _TOWED_SPEED, _TOWED_RAMP = 18.0, 28.0, 0.04, 1.0  # [s], [m/s], [s]
 
 _HUSKY = {
     'rover.mass': 50.0,
@@ -194,61 +179,9 @@ def _simulated(plan: Plan, seed: int, whole: bool) -> Case:
 
 
 def _bench_drive(plan: Plan, seed: int, seconds: float | None) -> BenchDrive:
-    if plan.kind not in _OWN:
-        return WORLDS[plan.world].simulate(plan.kind, seed, seconds, None)
-    drive = own_world.simulate(load(_OWN[plan.kind]), seed, seconds)
-    if plan.kind == 'towed':
-        return _towed(drive)
-    if plan.kind == 'jolts':
-        return _jolted(drive)
-    return BenchDrive(drive.configuration, drive.arrivals, drive.truth)
-
-
-def _jolted(drive: own_world.SimulatedDrive) -> BenchDrive:
-    """Return a drive whose accelerometer takes a jolt as the wheels begin to turn."""
-    start = int(drive.truth.stamp[0])
-
-    def jolt(stamp: int) -> Any:
-        time = (stamp - start) * 1e-9
-        now = any(begin < time < begin + _JOLT_TIME for begin in _JOLTS)
-        return np.array([_JOLT if now else 0.0, 0.0, 0.0])
-
-    arrivals = [
-        a._replace(measurement=replace(m, specific_force=m.specific_force + jolt(m.stamp)))
-        if isinstance(m := a.measurement, InertialReading)
-        else a
-        for a in drive.arrivals
-    ]
-    return BenchDrive(drive.configuration, arrivals, drive.truth)
-
-
-def _towed(drive: own_world.SimulatedDrive) -> BenchDrive:
-    """Return a drive whose rover is pulled along while its wheels stand; its pulls are unknown."""
-    truth = drive.truth
-    start = int(truth.stamp[0])
-
-    def speed(stamp: Any) -> Any:
-        time = (stamp - start) * 1e-9
-        ramp = np.minimum(time - _TOWED_FROM, _TOWED_TO - time) / _TOWED_RAMP
-        return _TOWED_SPEED * np.clip(ramp, 0.0, 1.0)
-
-    pulled = speed(truth.stamp)[:, None]
-    towed = np.broadcast_to(pulled > scores.LEAST_SPEED, truth.slip.shape)
-    top_class = np.full(truth.slip.shape, int(SlipClass.STUCK), dtype=np.uint8)
-    truth = replace(
-        truth,
-        slip=np.where(towed, -1.0, truth.slip),
-        slip_velocity=truth.slip_velocity - pulled,
-        slip_class=np.where(towed, top_class, truth.slip_class),
-        drawbar_pull=np.where(towed, np.nan, truth.drawbar_pull),
-    )
-    arrivals = [
-        a._replace(measurement=replace(m, forward=m.forward + float(speed(m.stamp))))
-        if isinstance(m := a.measurement, ReferenceVelocity)
-        else a
-        for a in drive.arrivals
-    ]
-    return BenchDrive(drive.configuration, arrivals, truth)
+    if plan.kind in odd_drives.KINDS:
+        return odd_drives.simulated(plan.kind, seed, seconds)
+    return WORLDS[plan.world].simulate(plan.kind, seed, seconds, None)
 
 
 def _measurements(drive: BenchDrive, mode: str) -> Iterator[Measurement]:
@@ -336,10 +269,11 @@ def _figures(drive: BenchDrive, kept: Record) -> Figures:
 
 
 def _errors(what: str, error: Any, std: Any) -> Figures:
-    """Return square, count and coverage of the errors that are known, as sums."""
+    """Return square, count, coverage and deviation of the errors that are known, as sums."""
     there = ~np.isnan(error)
     return {
         f'{what}_square': float(np.sum(error[there] ** 2)),
         f'{what}_count': float(there.sum()),
         f'{what}_covered': float((np.abs(error) <= scores.WITHIN * std)[there].sum()),
+        f'{what}_std': float(np.nansum(std[there])),
     }

@@ -54,7 +54,7 @@ class Treatment:
 
     def acts_in(self, drive: Drive) -> bool:
         """Say whether a drive is one on which it can act and is to be tried."""
-        tried = self.warning_only or not drive.warning_only
+        tried = not drive.warning_only or self.warning_only or self.group == _GUARD
         return tried and drive.tags.issuperset(self.needs.split())
 
 
