@@ -76,7 +76,7 @@ Rows = dict[str, Figures]  # treatment -> drive -> figures
 def run(arguments: argparse.Namespace) -> None:
     """Run what is not there yet."""
     rows = _rows(arguments.file)
-    chosen = [t for t in TREATMENTS if not arguments.groups or t.group in arguments.groups]
+    chosen = [t for t in TREATMENTS if any(word in t.name for word in arguments.treatments)]
     if arguments.special:
         chosen = [t for t in chosen if t.special]
     if arguments.undecided:
@@ -371,7 +371,7 @@ def main() -> None:
     runs.add_argument('--rounds', type=int, default=1, help='over all drives (default 1)')
     runs.add_argument('--drives', type=int, help='of each list, in each round; default: all')
     runs.add_argument('--special', action='store_true', help='those that act on some drives alone')
-    runs.add_argument('--groups', nargs='+', choices=sorted({t.group for t in TREATMENTS}))
+    runs.add_argument('--treatments', nargs='+', default=[''], help='words in their names')
     runs.add_argument('--undecided', action='store_true', help='none that earned its place so far')
     runs.add_argument('--measured', type=Path, help='folder of the recorded drives')
     runs.set_defaults(command=run)
