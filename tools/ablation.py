@@ -224,6 +224,7 @@ _VERDICTS = {
     'open': f'Open (within that, but some drive loses more than {ALLOWED:.0%}, has '
     f'{UNCOVERED_DRIVE:.0%} more errors outside, or is warned later: more drives needed)',
     'no': f'Worth nothing on these drives (no drive loses more than {ALLOWED:.0%})',
+    'seldom': f'Lost nothing, but acted on fewer than {FEWEST_DRIVES} drives: more needed',
     'did not act': 'Changed nothing at all, so nothing is known',
     'not run': 'Not run',
 }
@@ -242,18 +243,25 @@ def _verdict(base: Figures, found: Figures, names: Sequence[str]) -> str:
         return 'yes'
     if any(value > ALLOWED + 2.0 * error for value, error in _losses(base, found, names).values()):
         return 'yes'
-    if any(_more_share(base, found, names, *pair) > ALLOWED for pair in _SHARES[2:]):
+    if len(names) >= FEWEST_DRIVES and _judged_worse(base, found, names):
         return 'yes'
-    if any(_more_outside(base, found, names, *pair) > UNCOVERED for pair in _SHARES[:2]):
-        return 'yes'
-    later = _later(base, found, names)
-    if len(later) >= FEWEST_DRIVES:
-        error = later.std(ddof=1) / np.sqrt(len(later))
-        if later.mean() > LATER + 2.0 * error:
-            return 'yes'
-    if any(later > LATER):
+    if any(_later(base, found, names) > LATER) or any(_loses(base, found, n) for n in names):
         return 'open'
-    return 'open' if any(_loses(base, found, name) for name in names) else 'no'
+    acted = sum(not _same(base[n], found[n]) for n in names)
+    return 'no' if acted >= FEWEST_DRIVES else 'seldom'
+
+
+def _judged_worse(base: Figures, found: Figures, names: Sequence[str]) -> bool:
+    """Return whether classes, intervals or warnings get worse by more than is allowed."""
+    if any(_more_share(base, found, names, *pair) > ALLOWED for pair in _SHARES[2:]):
+        return True
+    if any(_more_outside(base, found, names, *pair) > UNCOVERED for pair in _SHARES[:2]):
+        return True
+    later = _later(base, found, names)
+    if len(later) < FEWEST_DRIVES:
+        return False
+    error = later.std(ddof=1) / np.sqrt(len(later))
+    return bool(later.mean() > LATER + 2.0 * error)
 
 
 def _loses(base: Figures, found: Figures, name: str) -> bool:

@@ -194,8 +194,11 @@ def test_warning_that_comes_later_earns_its_place():
     base = {f'own {i}': {**row('', f'own {i}', 'own', 0.03), 'lead': 10.0 + i} for i in range(4)}
     later = {name: {**figures, 'lead': figures['lead'] - 2.0} for name, figures in base.items()}
     once = {**base, 'own 1': {**base['own 1'], 'lead': 10.8}}
+    seldom = {**base, 'own 1': {**base['own 1'], 'lead': 11.01}}
     assert ablation._verdict(base, later, list(base)) == 'yes'
     assert ablation._verdict(base, once, list(base)) == 'open'
+    assert ablation._verdict(base, seldom, list(base)) == 'seldom'
+    assert ablation._verdict(base, base, list(base)) == 'did not act'
 
 
 def test_treatment_is_tried_where_it_can_act():
