@@ -84,6 +84,8 @@ def run(arguments: argparse.Namespace) -> None:
     commit = _commit()
     with arguments.file.open('a', encoding='utf-8') as stream:
         for drive in _drives(arguments):
+            if not drive.tags.issuperset(arguments.tags):
+                continue
             missing = [t for t in chosen if t.acts_in(drive) and drive.name not in rows[t.name]]
             if not missing:
                 continue
@@ -155,16 +157,14 @@ def show(arguments: argparse.Namespace) -> None:
 
 def _of_this_run(base: Figures) -> str:
     """Say in words which drives were run, with which filter."""
-
-    def words(key: str) -> str:
-        return ', '.join(sorted({str(row[key]) for row in base.values() if row.get(key)}))
-
+    commits = ', '.join(sorted({str(row['commit']) for row in base.values()}))
+    seeds = sorted({row['seed'] for row in base.values() if row['seed']})
     whole = sum(row.get('whole', False) for row in base.values())
     count = Counter(row['world'] for row in base.values() if not row.get('whole'))
     drives = ', '.join(f'{count[w]} {w}' for w in _WORLDS)
     return (
-        f'Filter of commit {words("commit")}; seeds {words("seed")}; drives: {drives}, and {whole} '
-        'at full length for the warning alone.\n'
+        f'Filter of commit {commits}; {len(seeds)} seeds, {seeds[0]} to {seeds[-1]}; drives: '
+        f'{drives}, and {whole} at full length for the warning alone.\n'
     )
 
 
@@ -380,6 +380,7 @@ def main() -> None:
     runs.add_argument('--drives', type=int, help='of each list, in each round; default: all')
     runs.add_argument('--special', action='store_true', help='those that act on some drives alone')
     runs.add_argument('--treatments', nargs='+', default=[''], help='words in their names')
+    runs.add_argument('--tags', nargs='+', default=[], help='drives that have them all')
     runs.add_argument('--undecided', action='store_true', help='none that earned its place so far')
     runs.add_argument('--measured', type=Path, help='folder of the recorded drives')
     runs.set_defaults(command=run)
