@@ -42,8 +42,8 @@ from wheel_terra_estimator.evaluation.tables import table  # noqa: E402
 
 AS_IT_IS = 'as it is'
 ALLOWED = 0.02
-"""Loss of slip or pull RMSE that a treatment must save, beyond two standard errors, to stay; or
-the share of classes told wrong or too high."""
+"""Loss of slip, pull or sinkage RMSE that a treatment must save, beyond two standard errors, to
+stay; or the share of classes told wrong or too high."""
 UNCOVERED, UNCOVERED_DRIVE = 0.01, 0.05
 """Share of errors outside their 95 % interval, beyond those that may be, that it must save: over
 all drives; of one drive, to be open."""
@@ -194,7 +194,8 @@ def report(rows: Rows) -> str:
         lines.append((worst, (treatment.group, treatment.name, *cells, verdict)))
     lines.sort(key=lambda pair: -pair[0])
     head = (
-        *('kind', 'treatment', 'acted on', 'slip [%]', *(f'{w} [%]' for w in _WORLDS), 'pull [%]'),
+        *('kind', 'treatment', 'acted on', 'slip [%]', *(f'{w} [%]' for w in _WORLDS)),
+        *('pull [%]', 'sinkage [%]'),
         *('coverage of slip [points]', 'of pull', 'classes wrong [points]', 'too high'),
         *('false warnings', 'missed', 'lead [s]', 'slip of the drive hit most', 'earns its place'),
     )
@@ -218,9 +219,9 @@ _SHARES = (
 )
 """Counts, and what they are shares of."""
 _VERDICTS = {
-    'yes': f'Earns its place (a loss above {ALLOWED:.0%} plus two standard errors in slip or pull, '
-    f'over all drives or those of a world; {ALLOWED:.0%} of the classes, {UNCOVERED:.0%} more '
-    'errors outside their interval; a warning that gets worse)',
+    'yes': f'Earns its place (a loss above {ALLOWED:.0%} plus two standard errors in slip, pull or '
+    f'sinkage, over all drives or those of a world; {ALLOWED:.0%} of the classes, '
+    f'{UNCOVERED:.0%} more errors outside their interval; a warning that gets worse)',
     'open': f'Open (within that, but some drive loses more than {ALLOWED:.0%}, has '
     f'{UNCOVERED_DRIVE:.0%} more errors outside, or is warned later: more drives needed)',
     'no': f'Worth nothing on these drives (no drive loses more than {ALLOWED:.0%})',
@@ -266,18 +267,19 @@ def _judged_worse(base: Figures, found: Figures, names: Sequence[str]) -> bool:
 
 def _loses(base: Figures, found: Figures, name: str) -> bool:
     """Return whether a drive is worse by more than is allowed."""
-    if any(_change(base, found, [name], what)[0] > ALLOWED for what in ('slip', 'pull')):
+    if any(_change(base, found, [name], what)[0] > ALLOWED for what in ('slip', 'pull', 'sinkage')):
         return True
     return any(_more_outside(base, found, [name], *pair) > UNCOVERED_DRIVE for pair in _SHARES[:2])
 
 
 def _losses(base: Figures, found: Figures, names: Sequence[str]) -> dict[str, tuple[float, float]]:
-    """Return the change and its standard error of slip, slip by world, and pull."""
+    """Return the change and its standard error of slip, slip by world, pull and sinkage."""
     losses = {'slip': _change(base, found, names, 'slip')}
     for world in _WORLDS:
         here = [n for n in names if base[n]['world'] == world]
         losses[world] = _change(base, found, here, 'slip')
-    losses['pull'] = _change(base, found, names, 'pull')
+    for what in ('pull', 'sinkage'):
+        losses[what] = _change(base, found, names, what)
     return losses
 
 
@@ -287,7 +289,11 @@ def _same(one: dict[str, Any], other: dict[str, Any]) -> bool:
 
 
 _COMPARED = (
-    *(f'{what}_{sum_}' for what in ('slip', 'pull') for sum_ in ('square', 'covered', 'std')),
+    *(
+        f'{what}_{sum_}'
+        for what in ('slip', 'pull', 'sinkage')
+        for sum_ in ('square', 'covered', 'std')
+    ),
     *('class_wrong', 'class_too_high', 'false', 'missed', 'lead'),
 )
 
@@ -307,7 +313,8 @@ def _change(base: Figures, found: Figures, names: Sequence[str], what: str) -> t
 
     The error of fewer than three drives is not known: infinite.
     """
-    names = [n for n in names if base[n].get(f'{what}_count', 0.0) > 0.0]
+    count = f'{what}_count'
+    names = [n for n in names if base[n].get(count, 0.0) > 0.0 and count in found[n]]
     if not names:
         return float('nan'), float('nan')
     # Each drive by its mean square, so that the long and the wild do not decide alone.

@@ -260,6 +260,7 @@ def _figures(drive: BenchDrive, kept: Record) -> Figures:
     return {
         **_errors('slip', data.slip_error, data.slip_std),
         **_errors('pull', data.pull_error, data.pull_std),
+        **_errors('sinkage', data.sinkage_error, data.sinkage_std),
         'false': float(warnings.false_alarms),
         'missed': float(warnings.entrapped is not None and warnings.lead_time is None),
         'lead': float(warnings.lead_time or 0.0),
