@@ -185,7 +185,8 @@ def report(rows: Rows) -> str:
         acted = sum(not _same(base[n], found[n]) for n in names)
         cells = [f'{acted} of {len(names)}', *(_percent(*pair) for pair in loss.values())]
         for key, over in _SHARES:
-            cells.append(f'{100 * _more_share(base, found, names, key, over):+.1f}')
+            more = 100.0 * _more_share(base, found, names, key, over)
+            cells.append('-' if np.isnan(more) else f'{more:+.1f}')
         cells += [f'{_more(base, found, names, key):+.0f}' for key in ('false', 'missed')]
         later = _later(base, found, names)
         cells.append(f'{-later.mean():+.1f}' if len(later) else '-')

@@ -18,7 +18,24 @@ from ablations.switches import ROOT, both, patched, tuned, without_sign
 from ablations.treatments import SIGNS, TREATMENTS
 from ablations.warnings import listening
 
-NEVER_ACTED: tuple[str, ...] = ()
+NEVER_ACTED = (
+    'witness for a reference',
+    'no witness on the plateau',
+    'a fast rover may slide on',
+    'a spin is one by its wheels',
+    'others settle anew where a wheel is held',
+    'pulling away is no stall',
+    'a sharp turn begins pulling away anew',
+    'a sharp turn says nothing of an entrapment',
+    'no warning while wheels are stopped',
+    'a speed that was wrong is no growth',
+    'no trend of a guess while pull is left',
+    'no trend of a doubtful slip',
+    'trend followed far at high slip alone',
+    'digging only by a slip that is sure',
+    'sign deepening',
+)
+"""On no drive of the study either (docs/development/ablation.md)."""
 SEEN = ('slip', 'slip_std', 'drawbar_pull', 'drawbar_pull_std', 'sinkage', 'slip_class', 'stuck')
 
 
