@@ -18,24 +18,6 @@ from ablations.switches import ROOT, both, patched, tuned, without_sign
 from ablations.treatments import SIGNS, TREATMENTS
 from ablations.warnings import listening
 
-NEVER_ACTED = (
-    'witness for a reference',
-    'no witness on the plateau',
-    'a fast rover may slide on',
-    'a spin is one by its wheels',
-    'others settle anew where a wheel is held',
-    'pulling away is no stall',
-    'a sharp turn begins pulling away anew',
-    'a sharp turn says nothing of an entrapment',
-    'no warning while wheels are stopped',
-    'a speed that was wrong is no growth',
-    'no trend of a guess while pull is left',
-    'no trend of a doubtful slip',
-    'trend followed far at high slip alone',
-    'digging only by a slip that is sure',
-    'sign deepening',
-)
-"""On no drive of the study either (docs/development/ablation.md)."""
 SEEN = ('slip', 'slip_std', 'drawbar_pull', 'drawbar_pull_std', 'sinkage', 'slip_class', 'stuck')
 
 
@@ -93,48 +75,13 @@ def differ(one, other):
 
 
 def test_estimator_runs_with_everything_switched_off():
-    case = short('own', 'climb', 12.0).make()
+    case = short('own', 'climb', 8.0).make()
     kept = ablation._run(case)
     with both(*(t.off for t in TREATMENTS))():
         bare = ablation._run(case)
     assert np.isfinite(bare.slip).all()
     assert differ(bare, kept)
     assert not differ(ablation._run(case), kept)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize('treatment', TREATMENTS, ids=lambda t: t.name)
-def test_each_switch_changes_what_is_estimated(treatment, cases):
-    if treatment.name in NEVER_ACTED or treatment.needs == 'imu_covariance':
-        pytest.skip('acts on none of these drives')
-    drives = [d for d in simulated(PLANS, 1003) if treatment.acts_in(d)]
-    if treatment.warning_only:
-        drives = list(simulated(WHOLE_PLANS, 1003, whole=True))
-    for drive in drives:
-        case, kept, told = cases(drive)
-        with treatment.off():
-            if treatment.warning_only:
-                acted = (told.played(case.configuration) != told.said).any()
-            else:
-                acted = differ(ablation._run(case), kept)
-        if acted:
-            return
-    pytest.fail('changed nothing on any drive')
-
-
-@pytest.fixture(scope='module')
-def cases():
-    """Return what makes a drive and runs it once: case, record, what the warning was told."""
-    made = {}
-
-    def make(drive):
-        if drive.name not in made:
-            case = drive.make()
-            with listening() as told:
-                made[drive.name] = case, ablation._run(case), told
-        return made[drive.name]
-
-    return make
 
 
 def test_warning_told_again_is_the_same_and_feels_its_own_switches():
@@ -252,7 +199,7 @@ def test_drives_of_both_worlds_are_made(plan):
 
 
 def test_towed_rover_moves_on_standing_wheels():
-    drive = short('own', 'towed', 26.0)
+    drive = short('own', 'towed', 22.0)
     case = drive.make()
     kept = ablation._run(case)
     late = kept.stamp[0] + 20_000_000_000
