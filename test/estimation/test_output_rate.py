@@ -19,7 +19,7 @@ from fake_estimator import (
     sinkage,
     stamp_at,
 )
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from wheel_terra_estimator.configuration import reader
@@ -31,10 +31,13 @@ DEFAULT = {'output_rate': 20.0, 'max_lag': -1.0}
 
 
 def by_the_letter(stamps, rate):
-    """Stamps of the sets by the words of the topics page, one multiple after the other."""
+    """Stamps of the sets by the words of the topics page, one multiple after the other.
+
+    Multiples are in whole nanoseconds: a source of 30 Hz cannot stamp a third of one.
+    """
     first, found = min(stamps), []
     for k in range(math.ceil((max(stamps) - first) * rate / 1e9) + 1):
-        due = [s for s in stamps if s >= first + k * 1e9 / rate]
+        due = [s for s in stamps if s >= first + k * 10**9 // int(rate)]
         if due and (not found or min(due) > found[-1]):
             found.append(min(due))
     return found
@@ -64,6 +67,8 @@ def arriving(stream, delays):
 
 
 @settings(max_examples=25, deadline=None)
+@example([1, 9_999_998], 100.0)  # a nanosecond early
+@example([33_333_333, 33_333_334, 33_333_333], 30.0)
 @given(
     st.lists(st.integers(1, 90_000_000), min_size=1, max_size=150),
     st.sampled_from([20.0, 10.0, 7.0, 30.0, 100.0]),

@@ -16,12 +16,11 @@ LEAST_STEP_RATE = 20.0  # [Hz] at which a rover's speed and slip are followed
 LONGEST_STEP = 120_000_000
 """Without wheel odometry to end it, a step ends after this time [ns]."""
 
-_ROUNDING = 1  # stamps are whole nanoseconds, multiples of a period are not
-_SECOND = 1_000_000_000
+_SECOND = 1_000_000_000  # [ns]
 
 
 class StepGrid:
-    """Multiples of the periods of steps and sets.
+    """Multiples of the periods of steps and sets, in whole nanoseconds as stamps are.
 
     Parameters
     ----------
@@ -34,11 +33,13 @@ class StepGrid:
         rate = output_rate or LEAST_STEP_RATE
         self._steps_per_set = max(math.ceil(LEAST_STEP_RATE / rate - 1e-9), 1)
         self.step_rate = rate * self._steps_per_set
-        self._per_nanosecond = self.step_rate / _SECOND
+        self._steps, seconds = self.step_rate.as_integer_ratio()
+        self._nanoseconds = seconds * _SECOND  # of so many steps
 
     def step_index(self, elapsed: int) -> int:
         """Return the last multiple of the step's period at or before a time [ns] of the run."""
-        return math.floor((elapsed + _ROUNDING) * self._per_nanosecond)
+        # The greatest k with floor(k * period) <= elapsed, that is k * period < elapsed + 1.
+        return ((elapsed + 1) * self._steps - 1) // self._nanoseconds
 
     def set_index(self, elapsed: int) -> int:
         """Return the last multiple of the set's period at or before a time [ns] of the run."""
