@@ -560,11 +560,11 @@ def test_what_is_not_seen_is_considered_and_not_learned(parts):
     layout = parts.layout
 
     def entries(**changes):
-        given = {'reference_known': True, 'settled': True, 'unread': []}
+        given = {'reference_known': True, 'settled': True, 'opposes_rims': False, 'unread': []}
         return set(considered_entries(layout, **(given | changes)))
 
     assert entries() == set()
-    assert entries(settled=False) == {SPEED}
+    assert entries(settled=False) == entries(opposes_rims=True) == {SPEED}
     zeros = range(layout.size)[layout.torque_zero]
     assert entries(reference_known=False) == {SHEAR_STRENGTH, SHEAR_MODULUS, *zeros}
     one = entries(unread=[2])

@@ -13,6 +13,7 @@ from typing import Any
 
 from ablations.drives import Drive
 from ablations.switches import Switch, both, patched, tuned, without_sign
+from wheel_terra_estimator.estimation.filter.observability import considered_entries
 from wheel_terra_estimator.estimation.filter.soil_process import SoilProcess
 from wheel_terra_estimator.estimation.filter.speed_process import SpeedProcess
 from wheel_terra_estimator.estimation.filter.state import StateLayout
@@ -97,6 +98,10 @@ def _walk_most(self: Any, slope: float, travel: float, **more: Any) -> None:
     _follow_traction_curve(self, slope, travel, **more)
     walk = max(self.state.ratio_walk, self._most_walk)
     self.state = self.state._replace(ratio_walk=walk)
+
+
+def _speed_learned_back(layout: StateLayout, *, opposes_rims: bool, **more: Any) -> list[int]:
+    return considered_entries(layout, opposes_rims=False, **more)
 
 
 def _walk_on(self: Any, prediction: Any, travel: float, **known: bool) -> None:
@@ -297,6 +302,11 @@ _FILTER = (
         patched('wheel_soil_estimator:considered_entries', lambda *_, **__: []),
     ),
     Treatment(
+        'forces teach no speed against the wheels',
+        _HOLD,
+        patched('wheel_soil_estimator:considered_entries', _speed_learned_back),
+    ),
+    Treatment(
         'soil stays as it was learned without a reference',
         _HOLD,
         patched('filter.soil_process:SoilProcess.predict', _walk_on),
@@ -319,8 +329,6 @@ _FILTER = (
     ),
     Treatment('a new contact is one at once', _HOLD, _slopes(new_contact=NEVER), 'faults'),
     Treatment('sinkage tells half of the slip', _HOLD, _sinkage(law_share=1.0), 'no_reference'),
-    Treatment('bearing law frozen at high slip', _HOLD, _sinkage(steady_slip=2.0)),
-    Treatment('digs on at the pace seen last', _HOLD, _sinkage(dig_persistence=0.0)),
     Treatment(
         'jolt at a start undone',
         _AFTER,

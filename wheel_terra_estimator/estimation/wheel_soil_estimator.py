@@ -370,6 +370,7 @@ class WheelSoilEstimator:
             layout,
             reference_known=self._reference.known(time),
             settled=self._contact_age.settled,
+            opposes_rims=float(ekf.mean[SPEED]) * cycle.unturned.typical < 0.0,
             unread=self._sinkage.unread(time),
         )
         ekf.fuse(rows, considered)

@@ -20,7 +20,12 @@ from wheel_terra_estimator.estimation.filter.state import (
 
 
 def considered_entries(
-    layout: StateLayout, *, reference_known: bool, settled: bool, unread: Sequence[int]
+    layout: StateLayout,
+    *,
+    reference_known: bool,
+    settled: bool,
+    opposes_rims: bool,
+    unread: Sequence[int],
 ) -> list[int]:
     """Return the indices of what is considered, not learned.
 
@@ -33,12 +38,14 @@ def considered_entries(
     settled : bool
         Whether the contacts are those of a steady drive. The rut that forms at a start, or is left
         behind after a spin on the spot, tells no speed.
+    opposes_rims : bool
+        Whether the rover moves against its wheels: their forces are the same at any such speed.
     unread : sequence of int
         Wheels without a sinkage reading: their sinkage and the errors of their shear model are not
         told apart.
     """
     entries = []
-    if not settled:
+    if not settled or opposes_rims:
         entries.append(SPEED)
     if not reference_known:
         entries += [SHEAR_STRENGTH, SHEAR_MODULUS]

@@ -53,9 +53,6 @@ class SinkageTuning:
     longest_step: float = 0.7  # ln of the sinkage in one cycle
     relaxation_slope: float = 0.9  # of the relaxation that acts on the covariance
     least_memory: float = 0.05  # of the sinkage in the covariance
-    steady_slip: float = 0.95  # no steady state where the wheel stands and digs
-    steady_band: float = 0.15
-    dig_persistence: float = 0.9  # of the rate seen last, where it digs
     law_share: float = 0.5
     """Of the slip that the bearing law would see in the sinkage, without reference: its errors (n0,
     n1, the zero of the sensor) stay the same all the way, readings do not average them out."""
@@ -220,14 +217,7 @@ class SinkageProcess(Component[SinkageState]):
         )
         z_floor = max(z, tuning.least_sinkage)
         target = z_floor * math.exp(growth)
-        # No steady state where the wheel stands and digs: the sensor leads.
-        trust = clipped((tuning.steady_slip - slip) / tuning.steady_band, 0.0, 1.0)
-        mean = z + trust * alpha * (target - z)
-        if trust < 1.0:
-            # It digs at its own pace: carry on with the rate seen last.
-            rate = max(self.state.rate[i], 0.0)
-            mean += tuning.dig_persistence * (1.0 - trust) * rate * dt
-        sensitivity = trust * alpha * target / power
+        sensitivity = alpha * target / power
         raw = (
             math.log(bearing.load / slower.load) / tuning.ratio_step,
             abs(slip) * bearing.log_depth,
@@ -242,9 +232,9 @@ class SinkageProcess(Component[SinkageState]):
             there = self._models.bearing(i, wheel._replace(leaving_angle=angle))
             noise += (sensitivity * math.log(bearing.load / there.load)) ** 2
         step = _Step(
-            mean,
+            z + alpha * (target - z),
             noise,
-            memory=max(1.0 - trust * alpha * tuning.relaxation_slope, tuning.least_memory),
+            memory=max(1.0 - alpha * tuning.relaxation_slope, tuning.least_memory),
             by_stiffness=-sensitivity,
             by_slip_sinkage=-sensitivity * by_slip_sinkage,
             by_speed=-sensitivity * by_ratio / rim,
