@@ -62,12 +62,19 @@ def window(force_x, force_z, readings=5, noise=0.0):
 # -- Reference velocity -----------------------------------------------------------------------
 
 
-def references(parts, ekf, speeds, torque_tells=True, last_change=-1e9, acceleration=0.0):
-    """Fuse one reference per second; return for each whether the speed was opened to it."""
+def references(
+    parts, ekf, speeds, torque_tells=True, last_change=-1e9, acceleration=0.0, held=None
+):
+    """Fuse one reference per second; return for each whether the speed was opened to it.
+
+    Something else may hold the speed at a value.
+    """
     update = ReferenceUpdate(parts.configuration, parts.rover, parts.sensors, parts.layout)
     opened = []
     for i, speed in enumerate(speeds):
         ekf.widen(SPEED, 1e-8)
+        if held is not None:
+            ekf.set(SPEED, held, 1e-8)
         opened.append(
             update.update(
                 ekf,
@@ -134,6 +141,16 @@ def test_models_are_doubted_while_the_references_keep_to_one_side(parts, ekf):
         doubt[name] = references(parts, fresh, values)[0].model_doubt
     assert doubt['one side'] > 5.0
     assert doubt['white'] < 2.0
+
+
+def test_models_are_doubted_where_a_small_lean_lasts(parts):
+    """Half a deviation to one side: within what six references scatter, no chance over sixty."""
+    noise = 0.003 * (-1.0) ** np.arange(60)
+    lean, white = (
+        references(parts, parts.filter(), 0.045 + by + noise, held=0.045)[0].model_doubt
+        for by in (0.0015, 0.0)
+    )
+    assert lean > 10.0 > 2.0 > white
 
 
 def test_a_run_of_references_to_one_side_opens_the_speed(parts):
@@ -273,7 +290,9 @@ def test_a_spike_of_the_sinkage_is_dropped_and_eight_in_a_row_are_believed(parts
     assert update.unread(9.0) == list(range(6))
 
 
-def relaxed(parts, ekf, seconds, loads=None, reference_known=True, speed=0.05, start=None):
+def relaxed(
+    parts, ekf, seconds, loads=None, reference_known=True, speed=0.05, start=None, model_doubt=1.0
+):
     process = SinkageProcess(parts.rover, parts.layout, parts.models, 0.0)
     loads = loads or WheelLoads(parts.rover).state.load
     x, travel = ekf.mean.copy(), 0.0
@@ -292,6 +311,7 @@ def relaxed(parts, ekf, seconds, loads=None, reference_known=True, speed=0.05, s
             headings=straight_headings(parts.rover),
             leaving_angles=(NAN,) * 6,
             reference_known=reference_known,
+            model_doubt=model_doubt,
         )
         x = prediction.mean
     return x[parts.layout.sinkage], travel, prediction
@@ -322,6 +342,7 @@ def test_the_error_of_a_measured_leaving_angle_loosens_the_sinkage(parts, ekf):
             headings=straight_headings(parts.rover),
             leaving_angles=(angle,) * 6,
             reference_known=True,
+            model_doubt=1.0,
         )
         return prediction.mean[part], np.diagonal(prediction.Q)[part]
 
@@ -342,6 +363,15 @@ def test_sinkage_tells_half_as_much_of_the_slip_without_a_reference(parts, ekf):
     ]
     assert (columns[0] != 0.0).all()
     assert columns[1] == pytest.approx(0.5 * columns[0])
+
+
+def test_sinkage_tells_less_of_the_slip_the_more_the_models_are_doubted(parts, ekf):
+    columns = [
+        relaxed(parts, ekf, 0.1, model_doubt=doubt, speed=0.035)[2].F[parts.layout.sinkage, SPEED]
+        for doubt in (1.0, 4.0)
+    ]
+    assert (columns[0] != 0.0).all()
+    assert columns[1] == pytest.approx(0.25 * columns[0])
 
 
 def test_a_wheel_in_the_air_keeps_its_sinkage(parts, ekf):
@@ -622,6 +652,7 @@ def test_the_jacobian_of_a_settled_sinkage_is_its_derivative(parts, ekf, entry):
             headings=straight_headings(parts.rover),
             leaving_angles=(NAN,) * 6,
             reference_known=True,
+            model_doubt=1.0,
         )
         return prediction
 

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -30,6 +30,8 @@ NEITHER = 'no_torque_no_reference'
 """Mode without torque and reference, beside those of the bench."""
 WANDER_TOLD = 'reference_wander_told'
 """Mode whose file says that the error of the reference lasts."""
+NO_SOIL = 'reference_no_soil'
+"""Mode whose file states no soil."""
 _WANDER_STD = 0.02  # [m/s], of the satellite velocities of the rival world
 
 
@@ -85,6 +87,10 @@ PLANS = (
     _plan('own', 'scenarios/stalled_wheel', 'slope faults', seconds=62.0),
     _plan('own', 'scenarios/free_spinning_wheel', 'slope faults', seconds=62.0),
     _plan('own', 'scenarios/steered_turns', 'slope turning steered', seconds=52.0),
+    _plan('own', 'firm', 'slope', mode=NO_SOIL, seconds=60.0),
+    _plan('rival', 'firm', 'slope', mode=NO_SOIL),
+    _plan('own', 'soft_patch', 'slope', mode=NO_SOIL),
+    _plan('rival', 'soft_patch', 'slope', mode=NO_SOIL),
 )
 """Any head of the list is a fair sample of both worlds."""
 
@@ -162,7 +168,7 @@ def simulated(plans: Sequence[Plan], first: int, *, whole: bool = False) -> Iter
 
 def _inputs(mode: str) -> frozenset[str]:
     """Return tags of what a mode has, `reference`, and of what it lacks, `no_reference`."""
-    names = ('reference', 'torque', 'sinkage')
+    names = ('reference', 'torque', 'sinkage', 'soil')
     return frozenset(f'no_{name}' if f'no_{name}' in mode else name for name in names)
 
 
@@ -172,7 +178,10 @@ def _simulated(plan: Plan, seed: int, whole: bool) -> Case:
     configuration = drive.configuration
     if plan.mode == WANDER_TOLD:
         configuration = configuration.replace({'sensors.reference_wander_std': _WANDER_STD})
-    mode = plan.mode
+    if plan.mode == NO_SOIL:
+        stated = frozenset(key for key in configuration.stated if not key.startswith('soil.'))
+        configuration = replace(configuration, stated=stated).replace({})
+    mode = 'reference' if plan.mode == NO_SOIL else plan.mode
     if plan.world == 'rival' and mode == 'reference':
         mode = 'reference_at_once'
     return Case(configuration, list(_measurements(drive, mode)), partial(_figures, drive))

@@ -116,6 +116,10 @@ def _as_if_straight(self: Any, time: float, motion: Any) -> Any:
     return _update_monitor(self, time, motion._replace(turning=False))
 
 
+def _undoubted(self: Any, reference_known: bool, model_doubt: float) -> float:
+    return 1.0 if reference_known else float(self._tuning.law_share)
+
+
 def _speed(**values: Any) -> Switch:
     return tuned('filter.speed_process:SpeedTuning', **values)
 
@@ -224,6 +228,29 @@ _FILTER = (
     Treatment('noise with a change of rim speed', _OPENING, _speed(rim_change=0.0)),
     Treatment(
         'models doubted while references lean', _OPENING, _reference(most_doubt=1.0), 'reference'
+    ),
+    Treatment(
+        'models doubted for a small lean that lasts',
+        _OPENING,
+        _reference(lasting_count=NEVER),
+        'reference',
+    ),
+    Treatment(
+        'sinkage doubted with the models',
+        _OPENING,
+        patched('filter.sinkage_process:SinkageProcess._told_of_slip', _undoubted),
+        'reference sinkage',
+    ),
+    Treatment(
+        'a soil that nobody states is wide',
+        _OPENING,
+        tuned(
+            'filter.initial_state:PriorTuning',
+            unstated_strength_std=0.13,
+            unstated_shear_modulus_std=0.3,
+            unstated_stiffness_std=0.2,
+        ),
+        'no_soil',
     ),
     Treatment('own stiffness of each wheel', _OPENING, _soil(own_stiffness_walk=0.01)),
     Treatment('soft ground is weak', _OPENING, _soil(soft_is_weak=0.0), 'no_torque'),

@@ -166,6 +166,11 @@ class Configuration:
     stated: frozenset[str]
     _values: Mapping[str, Value]
 
+    @property
+    def soil_stated(self) -> bool:
+        """Whether anybody stated a soil, or how well it is known; else the default is a guess."""
+        return any(key.startswith('soil.') and key != 'soil.name' for key in self.stated)
+
     @classmethod
     def from_values(cls, values: Mapping[str, Value], stated: Iterable[str]) -> Configuration:
         """Build from checked values of all declared keys (see ``reader``)."""

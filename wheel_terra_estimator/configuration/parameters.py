@@ -488,7 +488,8 @@ DECLARED: tuple[Parameter, ...] = (
         'soil.relative_std',
         0.1,
         '-',
-        'standard deviation of a soil parameter whose own is not stated, as a share of its value',
+        'standard deviation of a soil parameter whose own is not stated, as a share of its value; '
+        'where no soil.* is stated at all the estimator takes the spread of the shipped soils',
         at_least=0.0,
         at_most=10.0,
     ),

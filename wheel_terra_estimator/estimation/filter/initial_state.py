@@ -53,6 +53,12 @@ class PriorTuning:
     least_strength_std: float = 0.1  # [ln]
     least_shear_modulus_std: float = 0.3  # [ln]
     least_stiffness_std: float = 0.2  # [ln]
+    unstated_strength_std: float = 0.3
+    """Where nobody states a soil: the spread of the shipped soils (config/soils) [ln]."""
+    unstated_shear_modulus_std: float = 1.0  # [ln]
+    unstated_stiffness_std: float = 1.3  # of the pressure one centimetre deep [ln]
+    most_deviations: float = 3.0
+    """Of the soil from the configured one, in prior deviations, where that is beyond the bounds."""
     kept_share: float = 0.5
     """Share of the old covariance, against that of a start, where soil is kept in a new run."""
     most_speed: float = 20.0  # [m/s]
@@ -84,21 +90,31 @@ class SoilPriors:
         cls, configuration: Configuration, tuning: PriorTuning = PriorTuning()
     ) -> SoilPriors:
         """Derive them from the deviations of the configured soil."""
+        figures = configuration.filter
+        errors = math.hypot(
+            float(figures.shear_error_std), float(configuration.sensors.torque_gain_std)
+        )
+        common = float(figures.shear_error_common_std)
+        if not configuration.soil_stated:
+            return cls(
+                tuning.unstated_strength_std,
+                tuning.unstated_shear_modulus_std,
+                tuning.unstated_stiffness_std,
+                errors,
+                common,
+            )
         soil, std = configuration.soil, configuration.soil_std
         phi = float(soil.friction_angle)
         # d ln tan(phi) = d phi / (sin phi cos phi)
         strength = std['friction_angle'] / max(math.sin(phi) * math.cos(phi), _LEAST_SINE)
         stiffness = std['frictional_modulus'] / max(float(soil.frictional_modulus), 1.0)
         modulus = std['shear_modulus'] / float(soil.shear_modulus)
-        figures = configuration.filter
         return cls(
-            strength_std=max(strength, tuning.least_strength_std),
-            shear_modulus_std=max(modulus, tuning.least_shear_modulus_std),
-            stiffness_std=max(stiffness, tuning.least_stiffness_std),
-            shear_error_std=math.hypot(
-                float(figures.shear_error_std), float(configuration.sensors.torque_gain_std)
-            ),
-            shear_error_common_std=float(figures.shear_error_common_std),
+            max(strength, tuning.least_strength_std),
+            max(modulus, tuning.least_shear_modulus_std),
+            max(stiffness, tuning.least_stiffness_std),
+            errors,
+            common,
         )
 
     def shear_error_covariance(self, wheel_count: int) -> FloatArray:
@@ -173,21 +189,23 @@ def initial_filter(
     P[zeros, zeros] = sensors.torque_zero_std**2
     if layout.reference_error is not None:
         P[layout.reference_error, layout.reference_error] = sensors.reference_wander_std**2
-    return GatedFilter(mean, P, *bounds(rover, layout, tuning))
+    return GatedFilter(mean, P, *bounds(rover, layout, priors, tuning))
 
 
-def bounds(rover: Rover, layout: StateLayout, tuning: PriorTuning) -> tuple[FloatArray, FloatArray]:
+def bounds(
+    rover: Rover, layout: StateLayout, priors: SoilPriors, tuning: PriorTuning
+) -> tuple[FloatArray, FloatArray]:
     """Return the lower and upper bounds of the state, (size,) each."""
     upper = np.zeros(layout.size)
+    most = tuning.most_deviations
     upper[[SPEED, GRAVITY_BIAS]] = tuning.most_speed, tuning.most_gravity_bias
-    upper[[SHEAR_STRENGTH, SHEAR_MODULUS]] = tuning.most_strength, tuning.most_shear_modulus
+    upper[SHEAR_STRENGTH] = max(tuning.most_strength, most * priors.strength_std)
+    upper[SHEAR_MODULUS] = max(tuning.most_shear_modulus, most * priors.shear_modulus_std)
     upper[SLIP_SINKAGE] = tuning.most_slip_sinkage
     upper[[CENTROID, MOUND]] = tuning.most_centroid, tuning.most_mound
     upper[SLIP_PER_DEMAND] = tuning.most_slip_per_demand
-    upper[layout.stiffness], upper[layout.shear_error] = (
-        tuning.most_stiffness,
-        tuning.most_shear_error,
-    )
+    upper[layout.stiffness] = max(tuning.most_stiffness, most * priors.stiffness_std)
+    upper[layout.shear_error] = tuning.most_shear_error
     upper[layout.torque_zero] = tuning.most_torque_zero
     if layout.reference_error is not None:
         upper[layout.reference_error] = tuning.most_speed

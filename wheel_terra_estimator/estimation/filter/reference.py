@@ -37,6 +37,8 @@ class ReferenceTuning:
     shortest_slide: float = 1.0  # [s]
     mean_count: float = 6.0
     """References over which their innovations' mean is taken."""
+    lasting_count: float = 30.0
+    """The same of a lean that lasts: smaller, and over longer."""
     most_deviations: float = 3.0  # deviations that one reference counts for in it
     most_doubt: float = 100.0
     run_excess: float = 4.0
@@ -69,6 +71,7 @@ class ReferenceState(NamedTuple):
     nis: float | None = None  # running mean; None = none came yet
     mean_innovation: float = 0.0
     """Running mean of the innovations, each over its deviation."""
+    lasting_innovation: float = 0.0  # the same over more of them
 
 
 class ReferenceUpdate(Component[ReferenceState]):
@@ -129,11 +132,12 @@ class ReferenceUpdate(Component[ReferenceState]):
         references, the models hold the speed against them; a gate on single ones cannot see it.
         The running mean of white innovations has variance 1 / (2 n - 1) over n.
         """
-        return clipped(self._excess(self.state.mean_innovation) ** 2, 1.0, self._tuning.most_doubt)
-
-    def _excess(self, mean: float) -> float:
-        """Return the square of a mean of innovations over the variance of white ones [-]."""
-        return mean * mean * (2.0 * self._tuning.mean_count - 1.0)
+        tuning, state = self._tuning, self.state
+        excess = max(
+            _excess(state.mean_innovation, tuning.mean_count),
+            _excess(state.lasting_innovation, tuning.lasting_count),
+        )
+        return clipped(excess**2, 1.0, tuning.most_doubt)
 
     def believes(self, agreeing: int, *, beyond: bool, witnessed: bool) -> bool:
         """Say whether so many references in a row that disagree by the same amount are right."""
@@ -187,10 +191,13 @@ class ReferenceUpdate(Component[ReferenceState]):
         total = prior + variance
         nis = residual * residual / total
         most = tuning.most_deviations
-        mean = self.state.mean_innovation
-        mean += (clipped(residual / math.sqrt(total), -most, most) - mean) / tuning.mean_count
-        smoothed = smoothed_nis(self.state.nis, nis)
-        state = self.state._replace(nis=smoothed, mean_innovation=mean)
+        score = clipped(residual / math.sqrt(total), -most, most)
+        state = self.state
+        mean, lasting = state.mean_innovation, state.lasting_innovation
+        mean += (score - mean) / tuning.mean_count
+        lasting += (score - lasting) / tuning.lasting_count
+        smoothed = smoothed_nis(state.nis, nis)
+        state = state._replace(nis=smoothed, mean_innovation=mean, lasting_innovation=lasting)
         opened = False
         if nis > self._gate:
             beyond = abs(reference.forward) > (
@@ -212,7 +219,7 @@ class ReferenceUpdate(Component[ReferenceState]):
             )
         else:
             state = state._replace(rejected_in_a_row=0)
-            if self._excess(mean) > tuning.run_excess and nis > CONSISTENT:
+            if _excess(mean, tuning.mean_count) > tuning.run_excess and nis > CONSISTENT:
                 # One more of a run to one side: the prediction is too sure of itself.
                 ekf.widen(SPEED, residual * residual / CONSISTENT - total)
         ekf.fuse([Row(self.innovation(ekf, reference)[0], self._reading, variance)])
@@ -242,3 +249,8 @@ class ReferenceUpdate(Component[ReferenceState]):
             until += max(tuning.slide_gaps * self.state.gap, tuning.shortest_slide)
             ekf.widen(SPEED, forward**2)
         self.state = self.state._replace(sliding_until=until)
+
+
+def _excess(mean: float, count: float) -> float:
+    """Return the square of a mean of `count` innovations over the variance of white ones [-]."""
+    return mean * mean * (2.0 * count - 1.0)

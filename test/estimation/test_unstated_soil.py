@@ -1,0 +1,102 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""A rover file that states no soil: the prior spans soils, and firm ground is no entrapment."""
+
+import numpy as np
+import pytest
+
+from wheel_terra_estimator.configuration import reader, shipped
+from wheel_terra_estimator.estimation.core import EstimatorCore
+from wheel_terra_estimator.estimation.filter.initial_state import PriorTuning, SoilPriors
+from wheel_terra_estimator.estimation.measurements import (
+    InertialReading,
+    ReferenceVelocity,
+    SinkageReading,
+    WheelOdometry,
+)
+
+RADIUS, MASS, GRAVITY = 0.12, 40.0, 9.81
+TEN_LINES = {
+    'rover.mass': MASS,
+    'wheels.names': ['fl', 'fr', 'ml', 'mr', 'rl', 'rr'],
+    'wheels.radius': [RADIUS] * 6,
+    'wheels.width': [0.1] * 6,
+    'wheels.x': [0.4, 0.4, 0.0, 0.0, -0.4, -0.4],
+    'wheels.y': [0.35, -0.35] * 3,
+    'sensors.reference_rate': 0.5,
+    'sensors.sinkage_std': 0.002,
+    'sensors.torque_std': 0.1,
+}
+SLIP = 0.01  # of a wheel that rolls on hard ground
+SPEED = 0.17  # [m/s]
+
+
+def pressure(configuration, depth, width=0.1):
+    """Plate pressure [Pa] by Bekker (1969) or Reece (1965)."""
+    soil = configuration.soil
+    if soil.pressure_law == 'bekker':
+        modulus = soil.cohesive_modulus / width + soil.frictional_modulus
+        return modulus * depth**soil.sinkage_exponent
+    modulus = soil.cohesion * soil.cohesive_modulus
+    modulus += soil.density * GRAVITY * width * soil.frictional_modulus
+    return modulus * (depth / width) ** soil.sinkage_exponent
+
+
+def test_the_prior_of_a_soil_that_nobody_states_is_the_spread_of_the_shipped_ones():
+    found = []
+    for path in sorted(shipped.find('soils/kls1_proxy').parent.glob('*.yaml')):
+        configuration = reader.load(['generic_six_wheel', str(path)], [])
+        assert configuration.soil_stated
+        soil = configuration.soil
+        found.append(
+            (np.tan(soil.friction_angle), soil.shear_modulus, pressure(configuration, 0.01))
+        )
+    strength, modulus, stiffness = np.std(np.log(found), axis=0)
+    priors = SoilPriors.from_configuration(reader.from_parameters(TEN_LINES))
+    assert priors.strength_std == pytest.approx(strength, rel=0.1)
+    assert priors.shear_modulus_std == pytest.approx(modulus, rel=0.1)
+    assert priors.stiffness_std == pytest.approx(stiffness, rel=0.1)
+
+
+def test_a_soil_that_somebody_states_is_known_as_well_as_he_says():
+    stated = reader.from_parameters({**TEN_LINES, 'soil.shear_modulus': 0.02})
+    assert SoilPriors.from_configuration(stated).shear_modulus_std == pytest.approx(
+        PriorTuning().least_shear_modulus_std
+    )
+    named = reader.from_parameters({**TEN_LINES, 'soil.name': 'beach'})
+    assert not named.soil_stated
+
+
+def rolling(rng, seconds):
+    """Measurements of a rover that rolls on hard, level ground, in order of their stamps."""
+    load = MASS * GRAVITY / 6
+    zero = rng.normal(0.0, 0.002, 6)  # of the sinkage sensors [m]
+    for k in range(round(20 * seconds)):
+        t = k / 20
+        stamp = round(t * 1e9)
+        rim = SPEED * min(max(t - 2.0, 0.0), 1.0)
+        pushed = 0.03 * load * RADIUS * (rim > 0.0)  # rolling resistance
+        yield WheelOdometry(
+            stamp,
+            rim / RADIUS + 0.005 * rng.standard_normal(6) * (rim > 0.0),
+            pushed + 0.1 * rng.standard_normal(6),
+        )
+        force = np.array([0.03, 0.0, GRAVITY]) + 0.05 * rng.standard_normal(3)
+        yield InertialReading(stamp, force, 0.003 * rng.standard_normal(3), None)
+        if k % 2 == 0:
+            yield SinkageReading(stamp, 5e-4 + zero + 0.002 * rng.standard_normal(6))
+        if k % 40 == 20:
+            speed = (1.0 - SLIP) * rim
+            yield ReferenceVelocity(stamp, speed + 0.01 * rng.standard_normal(), 1e-4)
+
+
+@pytest.mark.parametrize('seed', [1, 2])
+def test_sinkage_readings_below_their_zero_stop_no_rover_on_hard_ground(seed):
+    core = EstimatorCore(reader.from_parameters(TEN_LINES))
+    sets = []
+    for measurement in rolling(np.random.default_rng(seed), 30.0):
+        sets += core.add(measurement)
+    sets += core.flush()
+    assert not any(s.stuck for s in sets)
+    slip = np.array([s.slip for s in sets if s.stamp > 8e9])
+    assert np.sqrt(np.mean((slip - SLIP) ** 2)) < 0.06
