@@ -50,7 +50,9 @@ def window(yaw=0.0, pitch=0.0, force=(0.0, 0.0, 9.8), readings=5):
 def turned(parts, yaw, seconds=10.0, pitch=0.0, speed=0.05):
     turning = Turning(parts.rover, parts.sensors)
     for _ in range(round(10 * seconds)):
-        turning.update(window(yaw, pitch), 0.1, speed, 0.05, straight_headings(parts.rover))
+        turning.update(
+            window(yaw, pitch), 0.1, speed, 0.05, straight_headings(parts.rover), FORWARD
+        )
     return turning
 
 
@@ -67,7 +69,9 @@ def test_a_steady_turn_weakens_the_shear_models_by_its_lateral_motion(parts):
 def test_a_change_of_the_turning_may_change_the_speed_for_a_second(parts):
     turning = turned(parts, 0.0)
     changes = [
-        turning.update(window(0.05), 0.1, 0.05, 0.05, straight_headings(parts.rover)).speed_change
+        turning.update(
+            window(0.05), 0.1, 0.05, 0.05, straight_headings(parts.rover), FORWARD
+        ).speed_change
         for _ in range(60)
     ]
     side = 0.05 * parts.rover.curvature_length / 0.05
@@ -78,12 +82,12 @@ def test_a_change_of_the_turning_may_change_the_speed_for_a_second(parts):
 def test_the_contacts_form_anew_over_a_contact_length(parts):
     turning = turned(parts, 0.0)
     for _ in range(3):
-        turning.update(window(0.05), 0.1, 0.05, 0.05, straight_headings(parts.rover))
+        turning.update(window(0.05), 0.1, 0.05, 0.05, straight_headings(parts.rover), FORWARD)
     before = turning.state.transient
     assert before > 0.1
     cycles = round(3.0 * parts.rover.contact_length / 0.005)
     for _ in range(cycles):
-        turning.update(window(0.05), 0.1, 0.05, 0.05, straight_headings(parts.rover))
+        turning.update(window(0.05), 0.1, 0.05, 0.05, straight_headings(parts.rover), FORWARD)
     assert turning.state.transient < 0.4 * before
 
 
@@ -177,17 +181,78 @@ def test_angles_of_nought_are_those_of_a_rover_that_does_not_steer(parts):
         assert gains == pytest.approx(expected)
 
 
+def test_wheels_that_roll_ask_for_the_speed_of_the_body(parts):
+    rover, yaw_rate = parts.rover, 0.03
+    distance = 2.0 - np.array(rover.lateral)
+    angles = np.arctan2(rover.longitudinal, distance)
+    found = headings(rover, angles.tolist())
+    rims = yaw_rate * np.hypot(rover.longitudinal, distance)
+    asked = [found.body_speed(i, rim, yaw_rate) for i, rim in enumerate(rims)]
+    assert asked == pytest.approx([2.0 * yaw_rate] * 6)
+    assert math.isnan(found.body_speed(0, NAN, yaw_rate))
+
+
+@pytest.mark.parametrize('degrees', [5.0, 49.0, 80.0])
+def test_wheels_that_push_against_one_another_ask_for_little_way(parts, degrees):
+    """Corner wheels turned inwards, as behind a spin: the motion with the least of all slips."""
+    rover, rim = parts.rover, 0.04
+    x, y = np.array(rover.longitudinal), np.array(rover.lateral)
+    angles = math.radians(degrees) * -np.sign(x * y)
+    assert np.abs(angles).max() > 0.0
+    found = headings(rover, angles.tolist())
+    ahead = np.column_stack(
+        [np.cos(angles), np.sin(angles), x * np.sin(angles) - y * np.cos(angles)]
+    )
+    aside = np.column_stack(
+        [-np.sin(angles), np.cos(angles), x * np.cos(angles) + y * np.sin(angles)]
+    )
+    wanted = np.concatenate([np.full(6, rim), np.zeros(6)])
+    (speed, drift, yaw_rate), *_ = np.linalg.lstsq(np.vstack([ahead, aside]), wanted, rcond=None)
+    assert (drift, yaw_rate) == pytest.approx((0.0, 0.0), abs=1e-12)
+    asked = [found.body_speed(i, rim, 0.0) for i in range(6)]
+    assert np.mean(asked) == pytest.approx(speed)
+
+
+def followed(parts, rims_told):
+    """Return the errors of the yaw rate through a turn that begins within a second [rad/s]."""
+    turning, straight = Turning(parts.rover, parts.sensors), straight_headings(parts.rover)
+    errors = []
+    for yaw in np.concatenate([np.zeros(10), np.linspace(0.0, 0.03, 11), np.full(10, 0.03)]):
+        # A rover that skids turns at a share of what its wheels ask for.
+        rims = tuple([0.05 - yaw / 0.6 * y if rims_told else NAN for y in parts.rover.lateral])
+        state = turning.update(window(yaw), 0.1, 0.05, 0.05, straight, rims)
+        errors.append(abs(state.yaw_rate - yaw))
+    return errors
+
+
+def test_a_turn_that_begins_is_told_by_the_wheels_without_delay(parts):
+    assert max(followed(parts, rims_told=False)) > 0.001
+    assert max(followed(parts, rims_told=True)) < 1e-9
+
+
+def test_a_wheel_that_spins_up_alone_is_no_turn(parts):
+    turning, straight = turned(parts, 0.0), straight_headings(parts.rover)
+    rims = (0.15, *FORWARD[1:])
+    asked = 0.6 * straight.yaw_rate(rims)
+    found = [
+        turning.update(window(0.0), 0.1, 0.05, 0.15, straight, rims).yaw_rate for _ in range(10)
+    ]
+    assert abs(asked) > 0.01
+    assert abs(found[0]) < 0.5 * abs(asked)  # the gyro knows better
+    assert abs(found[-1]) < 0.1 * abs(asked)
+
+
 def test_without_a_gyro_the_sides_tell_the_yaw_rate(parts):
     """Wheels that roll: exact. A rover that has to skid turns less, by an unknown share."""
     straight = straight_headings(parts.rover)
     rims = tuple([0.05 - 0.04 * y for y in parts.rover.lateral])
     assert straight.yaw_rate(rims) == pytest.approx(0.04)
     turning = Turning(parts.rover, parts.sensors)
-    turning.update(InertialWindow(), 0.1, 0.05, 0.06, straight, rims)
+    turning.update(InertialWindow(), 0.1, 0.05, 0.06, straight, rims, gyro_silent=True)
     assert turning.state.yaw_rate == pytest.approx(0.6 * 0.04)
     assert turning.state.yaw_rate_std > 0.3 * turning.state.yaw_rate
-    # With a gyro the wheels are not asked.
-    turning.update(window(0.01), 0.1, 0.05, 0.06, straight, None)
+    # With a gyro nothing but their changes count.
+    turning.update(window(0.01), 0.1, 0.05, 0.06, straight, rims)
     assert turning.state.yaw_rate < 0.6 * 0.04
 
 

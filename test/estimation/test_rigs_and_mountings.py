@@ -43,7 +43,12 @@ def test_a_rover_with_one_axle_has_no_curvature_before_it_has_moved():
     turning = Turning(parts.rover, parts.sensors)
     assert turning.curvature(0.05) == 0.0
     turning.update(
-        InertialWindow(5, 0.0, 0.0, 49.0, rates=5), 0.1, 0.0, 0.05, straight_headings(parts.rover)
+        InertialWindow(5, 0.0, 0.0, 49.0, rates=5),
+        0.1,
+        0.0,
+        0.05,
+        straight_headings(parts.rover),
+        (0.05,),
     )
     assert turning.curvature(0.05) == 0.0
 

@@ -263,3 +263,17 @@ def test_a_turn_adds_to_the_least_slip_deviation_at_most_what_a_spin_on_the_spot
     made.keep_least_variance(ekf, (0.06,) * 6, lateral_motion)
     expected = 0.06 * (tuning.least_slip_std + tuning.turning_slip_std)
     assert np.sqrt(ekf.covariance[SPEED, SPEED]) == pytest.approx(expected)
+
+
+@pytest.mark.parametrize(
+    ('rims', 'speed', 'expected'),
+    [
+        ((0.05, 0.04, NAN), -0.01, True),  # slides back
+        ((-0.05, -0.04, -0.05), 0.01, True),
+        ((0.05, 0.04, 0.05), 0.01, False),
+        ((0.05, -0.05, 0.05), -0.01, False),  # a spin on the spot
+        ((NAN, NAN, NAN), -0.01, False),
+    ],
+)
+def test_a_speed_opposes_the_wheels_where_it_opposes_all(rims, speed, expected):
+    assert speeds(rims).oppose(speed) is expected

@@ -13,6 +13,7 @@ from typing import Any
 
 from ablations.drives import Drive
 from ablations.switches import Switch, both, patched, tuned, without_sign
+from wheel_terra_estimator.estimation.contacts.turning import Turning
 from wheel_terra_estimator.estimation.filter.observability import considered_entries
 from wheel_terra_estimator.estimation.filter.soil_process import SoilProcess
 from wheel_terra_estimator.estimation.filter.speed_process import SpeedProcess
@@ -88,6 +89,8 @@ def _median_of(values: list[float]) -> float:
     return median(values) if values else 0.0
 
 
+_LEAST_ALONG = 0.2  # wheel speed for each body speed [-]
+_yaw_rate = Turning._yaw_rate
 _follow_traction_curve = SpeedProcess.follow_traction_curve
 _predict_soil = SoilProcess.predict
 _rolling_since = SituationObserver._rolling_since
@@ -118,6 +121,16 @@ def _as_if_straight(self: Any, time: float, motion: Any) -> Any:
 
 def _undoubted(self: Any, reference_known: bool, model_doubt: float) -> float:
     return 1.0 if reference_known else float(self._tuning.law_share)
+
+
+def _by_gyro_alone(self: Any, window: Any, change: float) -> float:
+    return float(_yaw_rate(self, window, 0.0))
+
+
+def _as_if_rolling(self: Any, wheel: int, rim: float, yaw_rate: float) -> float:
+    along = float(self.by_speed[wheel])
+    told = along >= _LEAST_ALONG  # else it heads across
+    return (rim - yaw_rate * float(self.by_yaw_rate[wheel])) / along if told else NAN
 
 
 def _speed(**values: Any) -> Switch:
@@ -442,6 +455,18 @@ _FILTER = (
         patched('filter.zero_velocity:ZeroVelocityUpdate._learn_zero', _nothing),
     ),
     Treatment('yaw rate smoothed while it is steady', _INPUT, _turning(least_gain=1.0)),
+    Treatment(
+        'yaw rate carried on by the wheels',
+        _INPUT,
+        patched('contacts.turning:Turning._yaw_rate', _by_gyro_alone),
+        'turning',
+    ),
+    Treatment(
+        'steered wheels that push against one another make less way',
+        _MODEL,
+        patched('contacts.steering:Headings.body_speed', _as_if_rolling),
+        'steered',
+    ),
     Treatment('rim speeds carried on along a ramp', _INPUT, _odometry(longest_carried=-1.0)),
     Treatment('rim speeds of fast odometry smoothed', _INPUT, _odometry(longest_smoothed=0.0)),
     Treatment(

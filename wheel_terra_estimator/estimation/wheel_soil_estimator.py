@@ -370,7 +370,7 @@ class WheelSoilEstimator:
             layout,
             reference_known=self._reference.known(time),
             settled=self._contact_age.settled,
-            opposes_rims=float(ekf.mean[SPEED]) * cycle.unturned.typical < 0.0,
+            opposes_rims=cycle.unturned.oppose(float(ekf.mean[SPEED])),
             unread=self._sinkage.unread(time),
         )
         ekf.fuse(rows, considered)
@@ -417,21 +417,21 @@ class WheelSoilEstimator:
         window = self._inertial.take()
         fastest = self._wheels.fastest()
         headings = self._steering.state.headings
-        no_gyro = time - self._inertial.state.rate_time > rover.silence
+        rims = self._wheels.rim_speeds(time)
         turning = self._turning.update(
             window,
             dt,
             float(ekf.mean[SPEED]),
             fastest,
             headings,
-            self._wheels.rim_speeds(time) if no_gyro else None,
+            rims,
+            gyro_silent=time - self._inertial.state.rate_time > rover.silence,
         )
         pulls = self._pulls.state
         loads = self._loads.update(
             window, pulls.model_pull, pulls.torque, self._unloaded.state.unloaded, headings
         )
         speed.inflate(turning.speed_change)
-        rims = self._wheels.rim_speeds(time)
         unturned = RimSpeeds.of(rims, turning.yaw_rate, headings)
         reference_known = self._reference.known(time)
         reverses = self._contact_age.update(unturned.typical)

@@ -29,8 +29,6 @@ from wheel_terra_estimator.estimation.measurements import FloatArray
 from wheel_terra_estimator.estimation.rover import Rover
 
 Floats = tuple[float, ...]
-LEAST_ALONG = 0.2
-"""Wheel speed for each body speed below which a wheel tells nothing of it: it heads across [-]."""
 _LEAST_SQUARE = 1e-3  # mean of cos^2 d: all wheels across
 
 
@@ -49,6 +47,17 @@ class Headings(NamedTuple):
     def speed(self, wheel: int, speed: float, yaw_rate: float) -> float:
         """Return the ground speed of a wheel along its heading [m/s]."""
         return self.by_speed[wheel] * speed + self.by_yaw_rate[wheel] * yaw_rate
+
+    def body_speed(self, wheel: int, rim: float, yaw_rate: float) -> float:
+        """Return the body speed that comes nearest to a wheel's rolling [m/s]; nan as its rim.
+
+        Wheels resist being pushed sideways as they do slip along, so it is the v that makes
+        (v_i - rim)^2 + u_i^2 least; v itself where the wheel rolls without slip in any direction.
+        """
+        along, across = self.by_speed[wheel], self.side_by_speed[wheel]
+        rolled = rim - self.by_yaw_rate[wheel] * yaw_rate
+        pushed = self.side_by_yaw_rate[wheel] * yaw_rate
+        return (along * rolled - across * pushed) / (along * along + across * across)
 
     def yaw_rate(self, rims: Floats) -> float:
         """Return the yaw rate at which wheels would roll, by least squares [rad/s]; 0: not told."""

@@ -22,7 +22,7 @@ class TurningTuning:
     """Tuned on simulated drives, seeds 1000 to 1019, where no other source is given."""
 
     least_gain: float = 0.25
-    """Of the yaw rate per cycle while it is steady; what is more than noise is followed."""
+    """Of the gyro per cycle while it agrees with the wheels; more than noise is followed."""
     least_noise: float = 1e-6  # of the yaw rate [rad/s]
     side_time: float = 1.0
     """Time over which the lateral motion must change to count as new [s]."""
@@ -80,6 +80,8 @@ class TurningState(NamedTuple):
 
     yaw_rate: float = 0.0  # smoothed [rad/s]
     yaw_rate_std: float = 1.0  # nothing was heard yet
+    by_wheels: float = 0.0
+    """Yaw rate to expect of the rim speeds alone [rad/s]; a rover that skids turns less."""
     side_speed: float = 0.0  # greatest with which a wheel is pushed sideways [m/s]
     lateral_motion: float = 0.0
     """Lateral motion of the outer wheels over the fastest rim speed, 0 to 1 [-]."""
@@ -113,18 +115,23 @@ class Turning(Component[TurningState]):
         speed: float,
         fastest_rim: float,
         headings: Headings,
-        rims: Floats | None = None,
+        rims: Floats,
+        *,
+        gyro_silent: bool = False,
     ) -> TurningState:
-        """Take the IMU readings of a cycle of length `dt` [s]; speeds in [m/s].
+        """Take the IMU readings of a cycle of length `dt` [s] and the rim speeds at its end.
 
-        `rims` are the rim speeds of a rover without a gyro; None while there is one.
+        Speeds are in [m/s]; a rim speed that is unknown is nan.
         """
         state, tuning = self.state, self._tuning
+        by_wheels = state.by_wheels
+        if known(rims):
+            by_wheels = self._skid_share * headings.yaw_rate(rims)
         if window.rates:
-            yaw_rate, std = self._yaw_rate(window), self._gyro_std(window)
-        elif known(rims or ()):
-            # No gyro: the difference of the sides, which turns a rover that skids less.
-            yaw_rate = self._skid_share * headings.yaw_rate(rims or ())
+            yaw_rate = self._yaw_rate(window, by_wheels - state.by_wheels)
+            std = self._gyro_std(window)
+        elif gyro_silent and known(rims):
+            yaw_rate = by_wheels
             std = math.hypot(self._wheel_doubt * yaw_rate, tuning.least_wheel_yaw_std)
         else:
             self.state = state = state._replace(speed_change=0.0)
@@ -135,6 +142,7 @@ class Turning(Component[TurningState]):
         state = state._replace(
             yaw_rate=yaw_rate,
             yaw_rate_std=std,
+            by_wheels=by_wheels,
             side_speed=self._side_speed(speed, yaw_rate, headings),
             rotation=keep * state.rotation - window.pitch_rate / max(window.rates, 1) * dt,
             travel=keep * state.travel + travel,
@@ -185,13 +193,17 @@ class Turning(Component[TurningState]):
         left = self._tuning.least_yaw_noise_share * noise
         return math.hypot(left, self._sensors.angular_rate_bias_std)
 
-    def _yaw_rate(self, window: InertialWindow) -> float:
-        """Return the yaw rate: smoothed where its change may be noise, followed where not."""
-        tuning, old = self._tuning, self.state.yaw_rate
+    def _yaw_rate(self, window: InertialWindow, change: float) -> float:
+        """Return the yaw rate: carried on by its `change` by the wheels, set right by the gyro.
+
+        What may be noise of the gyro is smoothed, what is more is followed: the smoothing makes
+        the yaw rate late only by what the wheels do not tell of its change.
+        """
+        tuning, expected = self._tuning, self.state.yaw_rate + change
         now = window.yaw_rate / window.rates
         noise = max(self._noise(window) / math.sqrt(window.rates), tuning.least_noise)
-        gain = clipped(tuning.least_gain * abs(now - old) / noise, tuning.least_gain, 1.0)
-        return old + gain * (now - old)
+        gain = clipped(tuning.least_gain * abs(now - expected) / noise, tuning.least_gain, 1.0)
+        return expected + gain * (now - expected)
 
     def _with_lateral_motion(self, state: TurningState, dt: float, fastest: float) -> TurningState:
         """Return the state with the lateral motion, and where turning begins or ends."""

@@ -24,7 +24,7 @@ from typing import NamedTuple
 
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.component import Component
-from wheel_terra_estimator.estimation.contacts.steering import LEAST_ALONG, Headings
+from wheel_terra_estimator.estimation.contacts.steering import Headings
 from wheel_terra_estimator.estimation.contacts.usual_slip import UsualSlip
 from wheel_terra_estimator.estimation.filter.ekf import GatedFilter
 from wheel_terra_estimator.estimation.filter.prediction import Prediction
@@ -123,17 +123,15 @@ class RimSpeeds(NamedTuple):
 
     @classmethod
     def of(cls, rims: Floats, yaw_rate: float, headings: Headings) -> RimSpeeds:
-        """Take turning [rad/s] and steering off: as if all wheels rolled along with the body."""
-        each = tuple(
-            [
-                (rim - yaw_rate * by_yaw_rate) / by_speed if by_speed >= LEAST_ALONG else NAN
-                for rim, by_yaw_rate, by_speed in zip(
-                    rims, headings.by_yaw_rate, headings.by_speed, strict=True
-                )
-            ]
-        )
+        """Take turning [rad/s] and steering off: the body speed that each wheel asks for."""
+        each = tuple([headings.body_speed(i, rim, yaw_rate) for i, rim in enumerate(rims)])
         heard = known(each)
         return cls(each, median(heard) if heard else NAN)
+
+    def oppose(self, speed: float) -> bool:
+        """Tell whether all wheels turn against a speed of the body [m/s]; in a spin some do not."""
+        heard = known(self.each)
+        return bool(heard) and all(speed * rim < 0.0 for rim in heard)
 
 
 class PastDrive(NamedTuple):
