@@ -16,7 +16,6 @@ from ablations.switches import Switch, both, patched, tuned, without_sign
 from wheel_terra_estimator.estimation.contacts.turning import Turning
 from wheel_terra_estimator.estimation.filter.observability import considered_entries
 from wheel_terra_estimator.estimation.filter.soil_process import SoilProcess
-from wheel_terra_estimator.estimation.filter.speed_process import SpeedProcess
 from wheel_terra_estimator.estimation.filter.state import StateLayout
 from wheel_terra_estimator.estimation.judgement.stuck.monitor import StuckMonitor
 from wheel_terra_estimator.estimation.judgement.stuck.situation import SituationObserver
@@ -91,16 +90,9 @@ def _median_of(values: list[float]) -> float:
 
 _LEAST_ALONG = 0.2  # wheel speed for each body speed [-]
 _yaw_rate = Turning._yaw_rate
-_follow_traction_curve = SpeedProcess.follow_traction_curve
 _predict_soil = SoilProcess.predict
 _rolling_since = SituationObserver._rolling_since
 _update_monitor = StuckMonitor.update
-
-
-def _walk_most(self: Any, slope: float, travel: float, **more: Any) -> None:
-    _follow_traction_curve(self, slope, travel, **more)
-    walk = max(self.state.ratio_walk, self._most_walk)
-    self.state = self.state._replace(ratio_walk=walk)
 
 
 def _speed_learned_back(layout: StateLayout, *, opposes_rims: bool, **more: Any) -> list[int]:
@@ -201,11 +193,6 @@ _FILTER = (
         _OPENING,
         patched('contacts.demand:Demand.update', _none_of_it),
         'reference',
-    ),
-    Treatment(
-        'walk of the slip by the slope of the traction curve',
-        _OPENING,
-        patched('filter.speed_process:SpeedProcess.follow_traction_curve', _walk_most),
     ),
     Treatment('wider walk at a start', _OPENING, _speed(start_walk=0.0)),
     Treatment('wider walk while a wheel is dragged', _OPENING, _speed(drag_walk=0.0), 'faults'),

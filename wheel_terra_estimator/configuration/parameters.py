@@ -736,18 +736,9 @@ DECLARED: tuple[Parameter, ...] = (
     ),
     number(
         'filter.ratio_walk',
-        0.13,
+        0.1,
         '1/sqrt(m)',
-        'random walk of ground speed over rim speed per rim travel, at most',
-        above=0.0,
-    ),
-    number('filter.ratio_walk_least', 0.03, '1/sqrt(m)', 'the same, at least', above=0.0),
-    number(
-        'filter.demand_walk',
-        0.025,
-        '1/sqrt(m)',
-        'random walk of the pull that the ground asks for, as a share of the load; over the slope '
-        'of the traction curve it gives the walk of the speed ratio',
+        'random walk of ground speed over rim speed per rim travel',
         above=0.0,
     ),
     number(

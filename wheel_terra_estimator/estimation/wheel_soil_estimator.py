@@ -618,7 +618,7 @@ class WheelSoilEstimator:
             model_variance=model_variance,
             repeats=repeats,
         )
-        self._speed.follow_traction_curve(
+        self._speed.follow_contacts(
             traction_slope(forces, cycle.rims, loads),
             self._contact_age.state.travel,
             dragging=any(

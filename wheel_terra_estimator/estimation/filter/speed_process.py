@@ -182,10 +182,7 @@ class SpeedProcess(Component[SpeedState]):
         sensors: SensorFigures,
         tuning: SpeedTuning = SpeedTuning(),
     ) -> None:
-        figures = configuration.filter
-        self._least_walk = float(figures.ratio_walk_least)
-        self._most_walk = float(figures.ratio_walk)
-        self._demand_walk = float(figures.demand_walk)
+        self._walk = float(configuration.filter.ratio_walk)
         unknown = RimSpeeds((NAN,) * rover.wheel_count, NAN)
         super().__init__(
             SpeedState(
@@ -193,7 +190,7 @@ class SpeedProcess(Component[SpeedState]):
                 unknown,
                 tuning.first_ratio,
                 tuning.first_ratio_std,
-                self._most_walk,
+                self._walk,
                 slow_rims=unknown.each,
             )
         )
@@ -298,20 +295,19 @@ class SpeedProcess(Component[SpeedState]):
         if changed or state.inflation > tuning.restless_share * abs(rim):
             self.state = state._replace(change_time=time)
 
-    def follow_traction_curve(self, slope: float, travel: float, *, dragging: bool) -> None:
-        """Let the slip walk as what the ground asks does, over the slope of the traction curve.
+    def follow_contacts(self, slope: float, travel: float, *, dragging: bool) -> None:
+        """Note the slope of the traction curve, and how far the slip may walk.
 
-        Where the curve is steep, a change of demand changes the slip little; on the plateau the
-        same change makes the rover dig in. After a start it walks farther, over some `travel` [m],
-        and so it does while a wheel is dragged, which digs in and asks more of the others.
+        After a start it walks farther, over some `travel` [m], and so it does while a wheel is
+        dragged, which digs in and asks more of the others.
         """
         tuning = self._tuning
-        slope = max(slope, tuning.least_slope)
-        walk = self._demand_walk / slope
         start = tuning.start_walk * math.exp(-travel / tuning.start_walk_travel)
-        least = max(start, tuning.drag_walk if dragging else 0.0)
-        walk = max(clipped(walk, self._least_walk, self._most_walk), least)
-        self.state = self.state._replace(traction_slope=slope, ratio_walk=walk)
+        drag = tuning.drag_walk if dragging else 0.0
+        self.state = self.state._replace(
+            traction_slope=max(slope, tuning.least_slope),
+            ratio_walk=max(self._walk, start, drag),
+        )
 
     @property
     def on_plateau(self) -> bool:
