@@ -111,10 +111,6 @@ def _as_if_straight(self: Any, time: float, motion: Any) -> Any:
     return _update_monitor(self, time, motion._replace(turning=False))
 
 
-def _undoubted(self: Any, reference_known: bool, model_doubt: float) -> float:
-    return 1.0 if reference_known else float(self._tuning.law_share)
-
-
 def _by_gyro_alone(self: Any, window: Any, change: float) -> float:
     return float(_yaw_rate(self, window, 0.0))
 
@@ -234,12 +230,6 @@ _FILTER = (
         _OPENING,
         _reference(lasting_count=NEVER),
         'reference',
-    ),
-    Treatment(
-        'sinkage doubted with the models',
-        _OPENING,
-        patched('filter.sinkage_process:SinkageProcess._told_of_slip', _undoubted),
-        'reference sinkage',
     ),
     Treatment(
         'a soil that nobody states is wide',

@@ -509,7 +509,6 @@ class WheelSoilEstimator:
                 headings=self._steering.state.headings,
                 leaving_angles=cycle.leaving_angles,
                 reference_known=cycle.reference_known,
-                model_doubt=self._reference.model_doubt,
             )
             self._contact_age.advance(travel, self._wheels.fastest() * cycle.dt)
             if travel > 0.0:

@@ -20,6 +20,11 @@ from wheel_terra_estimator.estimation.measurements import ReferenceVelocity
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
 from wheel_terra_estimator.estimation.scalars import clipped
 
+_LEAST_GAP = 0.01  # between references [s]
+_RISE = 1.76
+"""By which a limit of chi square (one degree of freedom) rises for each e-th part of what exceeds
+it by chance, from 5 to 0.05 % [-]."""
+
 
 @dataclass(frozen=True)
 class ReferenceTuning:
@@ -134,10 +139,20 @@ class ReferenceUpdate(Component[ReferenceState]):
         """
         tuning, state = self._tuning, self.state
         excess = max(
-            _excess(state.mean_innovation, tuning.mean_count),
-            _excess(state.lasting_innovation, tuning.lasting_count),
+            self._excess(state.mean_innovation, tuning.mean_count),
+            self._excess(state.lasting_innovation, tuning.lasting_count),
         )
         return clipped(excess**2, 1.0, tuning.most_doubt)
+
+    def _excess(self, mean: float, count: float) -> float:
+        """Return the square of a mean of `count` innovations over the variance of white ones [-].
+
+        Where references come faster than one a second it counts less, so that white ones pass the
+        limit of a run as seldom a second as slow ones do.
+        """
+        gap = clipped(self.state.gap, _LEAST_GAP, 1.0)
+        limit = self._tuning.run_excess
+        return mean * mean * (2.0 * count - 1.0) * limit / (limit - _RISE * math.log(gap))
 
     def believes(self, agreeing: int, *, beyond: bool, witnessed: bool) -> bool:
         """Say whether so many references in a row that disagree by the same amount are right."""
@@ -193,11 +208,13 @@ class ReferenceUpdate(Component[ReferenceState]):
         most = tuning.most_deviations
         score = clipped(residual / math.sqrt(total), -most, most)
         state = self.state
-        mean, lasting = state.mean_innovation, state.lasting_innovation
-        mean += (score - mean) / tuning.mean_count
-        lasting += (score - lasting) / tuning.lasting_count
-        smoothed = smoothed_nis(state.nis, nis)
-        state = state._replace(nis=smoothed, mean_innovation=mean, lasting_innovation=lasting)
+        state = state._replace(nis=smoothed_nis(state.nis, nis))
+        if nis <= self._gate or state.rejected_in_a_row:  # a single wild one is no lean
+            mean, lasting = state.mean_innovation, state.lasting_innovation
+            state = state._replace(
+                mean_innovation=mean + (score - mean) / tuning.mean_count,
+                lasting_innovation=lasting + (score - lasting) / tuning.lasting_count,
+            )
         opened = False
         if nis > self._gate:
             beyond = abs(reference.forward) > (
@@ -219,7 +236,8 @@ class ReferenceUpdate(Component[ReferenceState]):
             )
         else:
             state = state._replace(rejected_in_a_row=0)
-            if _excess(mean, tuning.mean_count) > tuning.run_excess and nis > CONSISTENT:
+            excess = self._excess(state.mean_innovation, tuning.mean_count)
+            if excess > tuning.run_excess and nis > CONSISTENT:
                 # One more of a run to one side: the prediction is too sure of itself.
                 ekf.widen(SPEED, residual * residual / CONSISTENT - total)
         ekf.fuse([Row(self.innovation(ekf, reference)[0], self._reading, variance)])
@@ -249,8 +267,3 @@ class ReferenceUpdate(Component[ReferenceState]):
             until += max(tuning.slide_gaps * self.state.gap, tuning.shortest_slide)
             ekf.widen(SPEED, forward**2)
         self.state = self.state._replace(sliding_until=until)
-
-
-def _excess(mean: float, count: float) -> float:
-    """Return the square of a mean of `count` innovations over the variance of white ones [-]."""
-    return mean * mean * (2.0 * count - 1.0)

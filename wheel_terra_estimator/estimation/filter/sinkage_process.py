@@ -123,7 +123,6 @@ class SinkageProcess(Component[SinkageState]):
         headings: Headings,
         leaving_angles: Floats,
         reference_known: bool,
-        model_doubt: float,
     ) -> float:
         """Add the sinkages to a prediction from a state `x` over `dt` [s]; return the travel [m].
 
@@ -143,11 +142,9 @@ class SinkageProcess(Component[SinkageState]):
             Of the wheels.
         reference_known : bool
             Whether a reference velocity tells the slip.
-        model_doubt : float
-            Factor on the variance of the wheel-soil models [-], 1 or more.
         """
         tuning, layout = self._tuning, self._layout
-        share = self._told_of_slip(reference_known, model_doubt)
+        share = 1.0 if reference_known else tuning.law_share
         travels = []
         slopes = list(self.state.slopes)
         entries = x.tolist()
@@ -198,14 +195,6 @@ class SinkageProcess(Component[SinkageState]):
             rate=tuple([r + gain * (c - r) for r, c in zip(self.state.rate, change, strict=True)]),
             rate_std=tuple([math.sqrt(2.0 * v) for v in variance]),
         )
-
-    def _told_of_slip(self, reference_known: bool, model_doubt: float) -> float:
-        """Return how much of the slip that the bearing law sees in the sinkage counts [-].
-
-        Ground harder than the law carries the wheels where the law finds no slip small enough:
-        where the references gainsay it, the sinkage must not hold the speed against them.
-        """
-        return (1.0 if reference_known else self._tuning.law_share) / model_doubt
 
     def _relaxed(
         self, i: int, wheel: WheelState, speed: float, rim: float, dt: float
