@@ -97,7 +97,8 @@ def test_wheels_that_disagree_leave_the_speed_to_the_accelerometer():
     together = made.step(0.1, speeds([0.30] * 4), window, inflated=True)
     apart = made.step(0.1, speeds([0.25, 0.25, 0.35, 0.35]), window, inflated=True)
     assert together.speed_gain * 0.1 + together.constant > 0.103
-    assert apart.speed_gain * 0.1 + apart.constant == pytest.approx(0.1, abs=0.001)
+    # The wheels alone would make 0.12 of it: less than a tenth of that change is theirs.
+    assert apart.speed_gain * 0.1 + apart.constant == pytest.approx(0.1, abs=0.1 * 0.02)
     assert apart.variance <= made.acceleration_noise(StatedNoise()).density ** 2 * 0.1
 
 
@@ -208,7 +209,7 @@ def test_the_slip_of_a_start_walks_farther():
     for travel in (0.0, 0.1, 10.0):
         made.follow_contacts(1.0, travel, dragging=False)
         walks.append(made.state.ratio_walk)
-    assert walks == pytest.approx([0.6, 0.6 * np.exp(-0.5), 0.1])
+    assert walks == pytest.approx([0.6, 0.6 * np.exp(-0.5), 0.07])
     made.follow_contacts(1.0, 10.0, dragging=True)
     assert made.state.ratio_walk == 0.6  # a locked wheel digs in
 

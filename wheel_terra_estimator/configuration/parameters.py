@@ -736,7 +736,7 @@ DECLARED: tuple[Parameter, ...] = (
     ),
     number(
         'filter.ratio_walk',
-        0.1,
+        0.07,
         '1/sqrt(m)',
         'random walk of ground speed over rim speed per rim travel',
         above=0.0,
