@@ -526,7 +526,8 @@ DECLARED: tuple[Parameter, ...] = (
         'sensors.torque_std',
         0.2,
         'N m',
-        'noise of a drive torque, one standard deviation',
+        'noise of a drive torque, one standard deviation; where it is not stated the estimator '
+        'takes 0.015 of mean load times radius, then what the first seconds show',
         at_least=0.0,
     ),
     number(
@@ -541,7 +542,8 @@ DECLARED: tuple[Parameter, ...] = (
         'sensors.torque_zero_std',
         0.1,
         'N m',
-        'what is not known of the zero of a drive torque, one standard deviation for all wheels',
+        'what is not known of the zero of a drive torque, one standard deviation for all wheels; '
+        'where it is not stated the estimator takes 0.02 of mean load times radius',
         at_least=0.0,
     ),
     number(

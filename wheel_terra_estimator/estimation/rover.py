@@ -86,6 +86,11 @@ class Rover:
         )
 
 
+_UNSTATED_TORQUE = {'torque_std': 0.015, 'torque_zero_std': 0.02}
+"""Deviations of a torque by the motor's current, of the mean load times radius, where nobody states
+them: 2 kg and 900 kg have no newton metres in common."""
+
+
 @dataclass(frozen=True)
 class SensorFigures:
     """Standard deviations and rates of the sensors, as in the keys ``sensors.*``."""
@@ -110,9 +115,16 @@ class SensorFigures:
 
     @classmethod
     def from_configuration(cls, configuration: Configuration) -> SensorFigures:
-        """Take the figures of a configuration."""
+        """Take the figures of a configuration; those of torques by the rover where not stated."""
         sensors = configuration.sensors
-        return cls(**{name: float(getattr(sensors, name)) for name in cls.__annotations__})
+        figures = {name: float(getattr(sensors, name)) for name in cls.__annotations__}
+        wheels, rover = configuration.wheels, configuration.rover
+        load = float(rover.mass) * float(rover.gravity) / wheels.count
+        moment = load * float(np.mean(wheels.slip_radius))
+        for name, share in _UNSTATED_TORQUE.items():
+            if f'sensors.{name}' not in configuration.stated:
+                figures[name] = share * moment
+        return cls(**figures)
 
 
 def _floats(values: np.ndarray) -> tuple[float, ...]:

@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""A rover file that states no soil: the prior spans soils, and firm ground is no entrapment."""
+"""A rover file that states little: the prior spans soils, torques scale, hard ground is no trap."""
 
 import numpy as np
 import pytest
@@ -14,6 +14,7 @@ from wheel_terra_estimator.estimation.measurements import (
     SinkageReading,
     WheelOdometry,
 )
+from wheel_terra_estimator.estimation.rover import SensorFigures
 
 RADIUS, MASS, GRAVITY = 0.12, 40.0, 9.81
 TEN_LINES = {
@@ -65,6 +66,25 @@ def test_a_soil_that_somebody_states_is_known_as_well_as_he_says():
     )
     named = reader.from_parameters({**TEN_LINES, 'soil.name': 'beach'})
     assert not named.soil_stated
+
+
+@pytest.mark.parametrize('scale', [0.3, 3.0])
+def test_torques_that_nobody_describes_scale_with_the_rover(scale):
+    """A rover `scale` times as long of the same material: torques go with its fourth power."""
+    bare = {key: value for key, value in TEN_LINES.items() if key != 'sensors.torque_std'}
+    scaled = {
+        **bare,
+        'rover.mass': MASS * scale**3,
+        'wheels.radius': [RADIUS * scale] * 6,
+    }
+    one, other = (
+        SensorFigures.from_configuration(reader.from_parameters(values))
+        for values in (bare, scaled)
+    )
+    for name in ('torque_std', 'torque_zero_std'):
+        assert getattr(other, name) == pytest.approx(getattr(one, name) * scale**4)
+    said = SensorFigures.from_configuration(reader.from_parameters(TEN_LINES))
+    assert said.torque_std == TEN_LINES['sensors.torque_std']
 
 
 def rolling(rng, seconds):
