@@ -738,7 +738,7 @@ DECLARED: tuple[Parameter, ...] = (
     ),
     number(
         'filter.ratio_walk',
-        0.07,
+        0.1,
         '1/sqrt(m)',
         'random walk of ground speed over rim speed per rim travel',
         above=0.0,
