@@ -211,6 +211,8 @@ def bounds(
         upper[layout.reference_error] = tuning.most_speed
     lower = -upper
     lower[SLIP_PER_DEMAND] = 0.0
+    # Ground may be harder than any soil. K of decimetres is none: it makes every slope a trap.
+    upper[SHEAR_MODULUS] = tuning.most_shear_modulus
     upper[layout.sinkage] = rover.rim_radius
     lower[layout.sinkage] = [-tuning.highest * r for r in rover.rim_radius]
     return lower, upper
