@@ -61,19 +61,17 @@ class Headings(NamedTuple):
 
     def yaw_rate(self, rims: Floats) -> float:
         """Return the yaw rate at which wheels would roll, by least squares [rad/s]; 0: not told."""
-        rows = [
-            (a, b, rim)
-            for a, b, rim in zip(self.by_speed, self.by_yaw_rate, rims, strict=True)
-            if not isnan(rim)
-        ]
-        aa = sum(a * a for a, _, _ in rows)
-        ab = sum(a * b for a, b, _ in rows)
-        bb = sum(b * b for _, b, _ in rows)
+        aa = ab = bb = along = across = 0.0
+        for a, b, rim in zip(self.by_speed, self.by_yaw_rate, rims, strict=True):
+            if not isnan(rim):
+                aa += a * a
+                ab += a * b
+                bb += b * b
+                along += a * rim
+                across += b * rim
         determinant = aa * bb - ab * ab
         if determinant <= _LEAST_SQUARE * max(aa * bb, _LEAST_SQUARE):
             return 0.0
-        along = sum(a * rim for a, _, rim in rows)
-        across = sum(b * rim for _, b, rim in rows)
         return (aa * across - ab * along) / determinant
 
     def side_speeds(self, speed: float, yaw_rate: float) -> list[float]:

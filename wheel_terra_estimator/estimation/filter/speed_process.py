@@ -124,7 +124,15 @@ class RimSpeeds(NamedTuple):
     @classmethod
     def of(cls, rims: Floats, yaw_rate: float, headings: Headings) -> RimSpeeds:
         """Take turning [rad/s] and steering off: the body speed that each wheel asks for."""
-        each = tuple([headings.body_speed(i, rim, yaw_rate) for i, rim in enumerate(rims)])
+        if headings.steered:
+            each = tuple([headings.body_speed(i, rim, yaw_rate) for i, rim in enumerate(rims)])
+        else:  # each rolls along with the body
+            each = tuple(
+                [
+                    rim - by_yaw_rate * yaw_rate
+                    for rim, by_yaw_rate in zip(rims, headings.by_yaw_rate, strict=True)
+                ]
+            )
         heard = known(each)
         return cls(each, median(heard) if heard else NAN)
 
