@@ -140,13 +140,16 @@ def rigid_body(rover, angles, speed, side, yaw_rate):
     return (velocity[:, :2] * ahead).sum(axis=1), (velocity[:, :2] * left).sum(axis=1)
 
 
-def test_wheels_that_follow_ackermann_are_not_pushed_sideways(parts):
+def about_a_point_to_the_left(rover, yaw_rate):
     """All axles steer about a point 2 m to the left: rim speeds are the distances from it."""
-    rover, yaw_rate = parts.rover, 0.03
     distance = 2.0 - np.array(rover.lateral)
     angles = np.arctan2(rover.longitudinal, distance)
-    found = headings(rover, angles.tolist())
-    expected = yaw_rate * np.hypot(rover.longitudinal, distance)
+    return headings(rover, angles.tolist()), yaw_rate * np.hypot(rover.longitudinal, distance)
+
+
+def test_wheels_that_follow_ackermann_are_not_pushed_sideways(parts):
+    yaw_rate = 0.03
+    found, expected = about_a_point_to_the_left(parts.rover, yaw_rate)
     speeds = [found.speed(i, 2.0 * yaw_rate, yaw_rate) for i in range(6)]
     assert speeds == pytest.approx(expected)
     assert found.side_speeds(2.0 * yaw_rate, yaw_rate) == pytest.approx([0.0] * 6, abs=1e-12)
@@ -182,11 +185,8 @@ def test_angles_of_nought_are_those_of_a_rover_that_does_not_steer(parts):
 
 
 def test_wheels_that_roll_ask_for_the_speed_of_the_body(parts):
-    rover, yaw_rate = parts.rover, 0.03
-    distance = 2.0 - np.array(rover.lateral)
-    angles = np.arctan2(rover.longitudinal, distance)
-    found = headings(rover, angles.tolist())
-    rims = yaw_rate * np.hypot(rover.longitudinal, distance)
+    yaw_rate = 0.03
+    found, rims = about_a_point_to_the_left(parts.rover, yaw_rate)
     asked = [found.body_speed(i, rim, yaw_rate) for i, rim in enumerate(rims)]
     assert asked == pytest.approx([2.0 * yaw_rate] * 6)
     assert math.isnan(found.body_speed(0, NAN, yaw_rate))
@@ -200,14 +200,9 @@ def test_wheels_that_push_against_one_another_ask_for_little_way(parts, degrees)
     angles = math.radians(degrees) * -np.sign(x * y)
     assert np.abs(angles).max() > 0.0
     found = headings(rover, angles.tolist())
-    ahead = np.column_stack(
-        [np.cos(angles), np.sin(angles), x * np.sin(angles) - y * np.cos(angles)]
-    )
-    aside = np.column_stack(
-        [-np.sin(angles), np.cos(angles), x * np.cos(angles) + y * np.sin(angles)]
-    )
+    motions = [np.concatenate(rigid_body(rover, angles, *motion)) for motion in np.eye(3)]
     wanted = np.concatenate([np.full(6, rim), np.zeros(6)])
-    (speed, drift, yaw_rate), *_ = np.linalg.lstsq(np.vstack([ahead, aside]), wanted, rcond=None)
+    (speed, drift, yaw_rate), *_ = np.linalg.lstsq(np.column_stack(motions), wanted, rcond=None)
     assert (drift, yaw_rate) == pytest.approx((0.0, 0.0), abs=1e-12)
     asked = [found.body_speed(i, rim, 0.0) for i in range(6)]
     assert np.mean(asked) == pytest.approx(speed)

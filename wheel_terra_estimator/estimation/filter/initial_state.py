@@ -89,38 +89,46 @@ class SoilPriors:
     def from_configuration(
         cls, configuration: Configuration, tuning: PriorTuning = PriorTuning()
     ) -> SoilPriors:
-        """Derive them from the deviations of the configured soil."""
+        """Derive them from the deviations of the configured soil, if anybody stated one."""
         figures = configuration.filter
-        errors = math.hypot(
-            float(figures.shear_error_std), float(configuration.sensors.torque_gain_std)
-        )
-        common = float(figures.shear_error_common_std)
-        if not configuration.soil_stated:
-            return cls(
-                tuning.unstated_strength_std,
-                tuning.unstated_shear_modulus_std,
-                tuning.unstated_stiffness_std,
-                errors,
-                common,
-            )
-        soil, std = configuration.soil, configuration.soil_std
-        phi = float(soil.friction_angle)
-        # d ln tan(phi) = d phi / (sin phi cos phi)
-        strength = std['friction_angle'] / max(math.sin(phi) * math.cos(phi), _LEAST_SINE)
-        stiffness = std['frictional_modulus'] / max(float(soil.frictional_modulus), 1.0)
-        modulus = std['shear_modulus'] / float(soil.shear_modulus)
+        strength, modulus, stiffness = _soil_deviations(configuration, tuning)
         return cls(
-            max(strength, tuning.least_strength_std),
-            max(modulus, tuning.least_shear_modulus_std),
-            max(stiffness, tuning.least_stiffness_std),
-            errors,
-            common,
+            strength_std=strength,
+            shear_modulus_std=modulus,
+            stiffness_std=stiffness,
+            shear_error_std=math.hypot(
+                float(figures.shear_error_std), float(configuration.sensors.torque_gain_std)
+            ),
+            shear_error_common_std=float(figures.shear_error_common_std),
         )
 
     def shear_error_covariance(self, wheel_count: int) -> FloatArray:
         """Return the (n, n) covariance of what the shear model gets wrong at each wheel."""
         own = np.eye(wheel_count) * self.shear_error_std**2
         return own + self.shear_error_common_std**2
+
+
+def _soil_deviations(
+    configuration: Configuration, tuning: PriorTuning
+) -> tuple[float, float, float]:
+    """Return the deviations of strength, shear modulus and stiffness [ln]."""
+    if not configuration.soil_stated:
+        return (
+            tuning.unstated_strength_std,
+            tuning.unstated_shear_modulus_std,
+            tuning.unstated_stiffness_std,
+        )
+    soil, std = configuration.soil, configuration.soil_std
+    phi = float(soil.friction_angle)
+    # d ln tan(phi) = d phi / (sin phi cos phi)
+    strength = std['friction_angle'] / max(math.sin(phi) * math.cos(phi), _LEAST_SINE)
+    stiffness = std['frictional_modulus'] / max(float(soil.frictional_modulus), 1.0)
+    modulus = std['shear_modulus'] / float(soil.shear_modulus)
+    return (
+        max(strength, tuning.least_strength_std),
+        max(modulus, tuning.least_shear_modulus_std),
+        max(stiffness, tuning.least_stiffness_std),
+    )
 
 
 def gravity_bias_std(rover: Rover, sensors: SensorFigures, orientation_std: float) -> float:
@@ -200,7 +208,7 @@ def bounds(
     most = tuning.most_deviations
     upper[[SPEED, GRAVITY_BIAS]] = tuning.most_speed, tuning.most_gravity_bias
     upper[SHEAR_STRENGTH] = max(tuning.most_strength, most * priors.strength_std)
-    upper[SHEAR_MODULUS] = max(tuning.most_shear_modulus, most * priors.shear_modulus_std)
+    upper[SHEAR_MODULUS] = tuning.most_shear_modulus
     upper[SLIP_SINKAGE] = tuning.most_slip_sinkage
     upper[[CENTROID, MOUND]] = tuning.most_centroid, tuning.most_mound
     upper[SLIP_PER_DEMAND] = tuning.most_slip_per_demand
@@ -212,7 +220,7 @@ def bounds(
     lower = -upper
     lower[SLIP_PER_DEMAND] = 0.0
     # Ground may be harder than any soil. K of decimetres is none: it makes every slope a trap.
-    upper[SHEAR_MODULUS] = tuning.most_shear_modulus
+    lower[SHEAR_MODULUS] = -max(tuning.most_shear_modulus, most * priors.shear_modulus_std)
     upper[layout.sinkage] = rover.rim_radius
     lower[layout.sinkage] = [-tuning.highest * r for r in rover.rim_radius]
     return lower, upper
