@@ -19,11 +19,11 @@ import pytest
 from campaigns import Plan, make_campaign, scoring
 
 from wheel_terra_estimator.configuration import reader
-from wheel_terra_estimator.discrepancy import workflow
+from wheel_terra_estimator.discrepancy import decision
+from wheel_terra_estimator.discrepancy.assessment.gaps import _cell_noise, _shrink
 from wheel_terra_estimator.discrepancy.report import page as page_module
 from wheel_terra_estimator.discrepancy.report.model_file import write_model
 from wheel_terra_estimator.discrepancy.report.page import SOIL_WORDS, _cards, number, write_report
-from wheel_terra_estimator.discrepancy.report.words import _cell_noise, _shrink
 from wheel_terra_estimator.discrepancy.result import QuantityGap
 from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES
 
@@ -380,15 +380,15 @@ def test_two_shares_of_the_gap_that_closed_are_shown_as_percentages(named):
 
 def test_how_far_a_name_worsens_a_quantity_is_in_squares_of_its_noise(monkeypatch):
     """Errors of 3 where there were 2, at a noise of 5: (9 - 4) / 25."""
-    monkeypatch.setattr(workflow.significance, 'chi_square_p_value', lambda *_: 1.0)
-    monkeypatch.setattr(workflow.significance, 'soil_p_value', lambda *_: 1.0)
+    monkeypatch.setattr(decision.significance, 'chi_square_p_value', lambda *_: 1.0)
+    monkeypatch.setattr(decision.significance, 'soil_p_value', lambda *_: 1.0)
     findings = SimpleNamespace(
         nothing=SimpleNamespace(outputs=np.zeros((4, 3))),
         noise=SimpleNamespace(std=np.ones((4, 3))),
     )
     fitted = SimpleNamespace(outputs=np.ones((4, 3)), variance=None)
     gap = {'torque': QuantityGap(4.0, 2.0, 3.0, 5.0)}
-    found = workflow._what_rows_show(findings, fitted, gap)
+    found = decision._what_rows_show(findings, fitted, gap)
     assert found['worse'] == pytest.approx(np.tanh(0.2))
 
 

@@ -11,8 +11,9 @@ from campaigns.scoring import diagnose as diagnose_campaign
 from test_workflow import make, run
 
 from wheel_terra_estimator.configuration import reader
-from wheel_terra_estimator.discrepancy import workflow
-from wheel_terra_estimator.discrepancy.report.words import channels_off, sentence
+from wheel_terra_estimator.discrepancy import decision
+from wheel_terra_estimator.discrepancy.assessment.gaps import channels_off
+from wheel_terra_estimator.discrepancy.report.words import sentence
 from wheel_terra_estimator.discrepancy.result import QuantityGap
 from wheel_terra_estimator.discrepancy.tables.checks import check_table
 from wheel_terra_estimator.discrepancy.tables.together import together
@@ -186,7 +187,7 @@ def test_a_patchwork_of_doubtful_names_is_not_given(monkeypatch):
     assert found.verdict == 'unexplained'
     assert not found.effects
     assert found.nearest
-    monkeypatch.setattr(workflow, '_PATCHWORK', 0.0)
+    monkeypatch.setattr(decision, '_PATCHWORK', 0.0)
     patched = diagnose_campaign(campaign, campaign.hidden)
     assert len(patched.effects) > 1
     assert max(effect.confidence for effect in patched.effects) < 1.0 / 3.0

@@ -7,9 +7,9 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, is_dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 FloatArray = NDArray[np.float64]
 VERDICTS = ('agrees', 'named', 'unexplained', 'undecided')
+_ASIDE: Mapping[str, Any] = {'json': False}  # metadata of a field that is no part of report.json
 OPEN = ('unexplained', 'undecided')  # verdicts for which a law may be proposed
 
 
@@ -35,13 +36,9 @@ class FittedParameter:
     value: float
     std: float
     unit: str
-    lower: float = -math.inf
-    upper: float = math.inf
-    meaning: str = ''
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the keys of ``report.json``."""
-        return {'value': self.value, 'std': self.std, 'unit': self.unit}
+    lower: float = field(default=-math.inf, metadata=_ASIDE)
+    upper: float = field(default=math.inf, metadata=_ASIDE)
+    meaning: str = field(default='', metadata=_ASIDE)
 
 
 @dataclass(frozen=True)
@@ -78,25 +75,12 @@ class NamedEffect:
     confidence_of_set: float
     confounded_with: tuple[str, ...] = ()
     remainder: bool = False
-    claim: str = ''
-    source: str = ''
-    separates: Mapping[str, str] = field(default_factory=dict)
-    features: Mapping[str, float] = field(default_factory=dict)
+    claim: str = field(default='', metadata=_ASIDE)
+    source: str = field(default='', metadata=_ASIDE)
+    separates: Mapping[str, str] = field(default_factory=dict, metadata=_ASIDE)
+    features: Mapping[str, float] = field(default_factory=dict, metadata=_ASIDE)
     form: str = ''
     other_forms: Mapping[str, float] = field(default_factory=dict)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the keys of ``report.json``."""
-        return {
-            'name': self.name,
-            'parameters': {key: value.to_dict() for key, value in self.parameters.items()},
-            'confidence': self.confidence,
-            'confidence_of_set': self.confidence_of_set,
-            'confounded_with': list(self.confounded_with),
-            'remainder': self.remainder,
-            **({'form': self.form} if self.form else {}),
-            'other_forms': dict(self.other_forms),
-        }
 
 
 @dataclass(frozen=True)
@@ -123,14 +107,16 @@ class Candidate:
         Why it was not added; empty for the chosen one.
     """
 
-    names: tuple[str, ...]
+    json_also: ClassVar[Mapping[str, str]] = {'name': 'label', 'form': 'form'}
+
+    names: tuple[str, ...] = field(metadata=_ASIDE)
     log_evidence: float
     probability: float
     held_out_gain: float
     chi2: float
-    degrees_of_freedom: float
+    degrees_of_freedom: float = field(metadata=_ASIDE)
     parameters: Mapping[str, FittedParameter]
-    size: float
+    size: float = field(metadata=_ASIDE)
     why_not: str = ''
 
     @property
@@ -148,19 +134,6 @@ class Candidate:
     def form(self) -> str:
         """Forms of the effects, where they are not the first ones."""
         return ', '.join(key for key in self.names if effect_of(key) != key)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the keys of ``report.json``."""
-        return {
-            'name': self.label,
-            'form': self.form,
-            'log_evidence': self.log_evidence,
-            'why_not': self.why_not,
-            'probability': self.probability,
-            'held_out_gain': self.held_out_gain,
-            'chi2': self.chi2,
-            'parameters': {key: value.to_dict() for key, value in self.parameters.items()},
-        }
 
 
 @dataclass(frozen=True)
@@ -185,22 +158,6 @@ class QuantityGap:
     shrink: float | None = None
     shrink_low: float | None = None
     shrink_high: float | None = None
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the keys of ``report.json``."""
-        result: dict[str, Any] = {
-            'before': self.before,
-            'refit': self.refit,
-            'after': self.after,
-            'fitted': self.fitted,
-            'rows': self.rows,
-            'floor': self.floor,
-            'limit': self.limit,
-        }
-        for key in ('noise', 'shrink', 'shrink_low', 'shrink_high'):
-            if getattr(self, key) is not None:
-                result[key] = getattr(self, key)
-        return result
 
 
 @dataclass(frozen=True)
@@ -248,28 +205,10 @@ class Proposal:
     resembles: tuple[str, ...]
     not_trusted: tuple[str, ...]
     left_out: Mapping[str, Mapping[str, LeftOut]]
-    soil: tuple[SoilShift, ...] = ()
-    refitted: Mapping[str, FittedParameter] = field(default_factory=dict)
-    fit: Fit | None = None
+    soil: tuple[SoilShift, ...] = field(default=(), metadata=_ASIDE)
+    refitted: Mapping[str, FittedParameter] = field(default_factory=dict, metadata=_ASIDE)
+    fit: Fit | None = field(default=None, metadata=_ASIDE)
     soil_held: bool = False
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the keys of ``report.json``."""
-        return {
-            'words': self.words,
-            'soil_held': self.soil_held,
-            'targets': list(self.targets),
-            'features': list(self.features),
-            'coefficients': list(self.coefficients),
-            'coefficients_std': list(self.coefficients_std),
-            'gap': {key: value.to_dict() for key, value in self.gap.items()},
-            'resembles': list(self.resembles),
-            'not_trusted': list(self.not_trusted),
-            'left_out': {
-                name: {quantity: vars(item) for quantity, item in quantities.items()}
-                for name, quantities in self.left_out.items()
-            },
-        }
 
 
 @dataclass(frozen=True)
@@ -310,6 +249,8 @@ class Where:
         Input with the largest rank correlation with the residual.
     """
 
+    json_also: ClassVar[Mapping[str, str]] = {'unit': 'unit'}
+
     sentence: str
     quantity: str
     shares: Mapping[str, float]
@@ -323,23 +264,10 @@ class Where:
     trend_input: str
     trend_correlation: float
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return the keys of ``report.json``."""
-        return {
-            'sentence': self.sentence,
-            'quantity': self.quantity,
-            'shares': dict(self.shares),
-            'box': [vars(side) for side in self.box],
-            'rows': [int(row) for row in self.rows],
-            'share_of_gap': self.share_of_gap,
-            'share_of_rows': self.share_of_rows,
-            'mean': self.mean,
-            'unit': UNITS[self.quantity],
-            'mean_in_noise_std': self.mean_in_noise_std,
-            'p_value': self.p_value,
-            'trend_input': self.trend_input,
-            'trend_correlation': self.trend_correlation,
-        }
+    @property
+    def unit(self) -> str:
+        """Unit of ``quantity``."""
+        return UNITS[self.quantity]
 
 
 @dataclass(frozen=True)
@@ -365,19 +293,7 @@ class NextMeasurement:
     distance_now: float
     distance_then: float
     rows: Mapping[str, FloatArray] | None = None
-    predictions: Mapping[str, FloatArray] = field(default_factory=dict)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the keys of ``report.json``."""
-        return {
-            'what': self.what,
-            'separates': list(self.separates),
-            'distance_now': self.distance_now,
-            'distance_then': self.distance_then,
-            'rows': None
-            if self.rows is None
-            else {key: [float(x) for x in value] for key, value in self.rows.items()},
-        }
+    predictions: Mapping[str, FloatArray] = field(default_factory=dict, metadata=_ASIDE)
 
 
 @dataclass(frozen=True)
@@ -484,22 +400,22 @@ class Diagnosis:
 
     verdict: str
     sentence: str
-    table: SteadyTable
-    configuration: Configuration
+    table: SteadyTable = field(metadata=_ASIDE)
+    configuration: Configuration = field(metadata=_ASIDE)
     effects: tuple[NamedEffect, ...]
     candidates: tuple[Candidate, ...]
     gap: Mapping[str, QuantityGap]
-    not_visible: Mapping[str, str]
-    smallest_visible: Mapping[str, tuple[str, float, str]]
+    not_visible: Mapping[str, str] = field(metadata=_ASIDE)
+    smallest_visible: Mapping[str, tuple[str, float, str]] = field(metadata=_ASIDE)
     where: Where
     next_measurement: tuple[NextMeasurement, ...]
-    curves: Curves
-    noise: Noise
+    curves: Curves = field(metadata=_ASIDE)
+    noise: Noise = field(metadata=_ASIDE)
     soil: tuple[SoilShift, ...]
-    outliers: tuple[tuple[int, str, float], ...]
+    outliers: tuple[tuple[int, str, float], ...] = field(metadata=_ASIDE)
     gap_p_value: float
-    remainder_p_value: float
-    remainder_amplitude: float
+    remainder_p_value: float = field(metadata=_ASIDE)
+    remainder_amplitude: float = field(metadata=_ASIDE)
     floor: float
     notes: tuple[str, ...] = ()
     base_effects: tuple[str, ...] = ()
@@ -508,57 +424,38 @@ class Diagnosis:
     proposal: Proposal | None = None
     structural_error: StructuralError | None = None
     not_tried: Mapping[str, str] = field(default_factory=dict)
-    seconds: float = 0.0
+    seconds: float = field(default=0.0, metadata=_ASIDE)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the content of ``report.json``: finite numbers, text and lists only."""
-        return _finite(
-            {
-                'verdict': self.verdict,
-                'sentence': self.sentence,
-                'effects': [effect.to_dict() for effect in self.effects],
-                'candidates': [candidate.to_dict() for candidate in self.candidates],
-                'gap': {key: value.to_dict() for key, value in self.gap.items()},
-                'not_tried': dict(self.not_tried),
-                'not_visible': sorted(self.not_visible),
-                'why_not_visible': dict(self.not_visible),
-                'smallest_visible': {
-                    key: {'parameter': parameter, 'value': value, 'unit': unit}
-                    for key, (parameter, value, unit) in self.smallest_visible.items()
-                },
-                'where': self.where.to_dict(),
-                'next_measurement': [item.to_dict() for item in self.next_measurement],
-                'soil': [vars(shift) for shift in self.soil],
-                'noise': {
-                    quantity: {
-                        'std': float(np.nanmedian(self.noise.std[:, column])),
-                        'origin': self.noise.origin[quantity],
-                    }
-                    for column, quantity in enumerate(QUANTITIES)
-                    if quantity in self.noise.origin
-                },
-                'outliers': [
-                    {'line': int(self.table.lines[row]), 'quantity': quantity, 'deviation': size}
-                    for row, quantity, size in self.outliers
-                ],
-                'gap_p_value': self.gap_p_value,
-                'remainder': {
-                    'p_value': self.remainder_p_value,
-                    'amplitude': self.remainder_amplitude,
-                },
-                'floor': self.floor,
-                'base_effects': list(self.base_effects),
-                'refitted': {key: value.to_dict() for key, value in self.refitted.items()},
-                'nearest': list(self.nearest),
-                'proposal': None if self.proposal is None else self.proposal.to_dict(),
-                'structural_error': (
-                    None if self.structural_error is None else self.structural_error.to_dict()
-                ),
-                'notes': list(self.notes),
-                'rows': len(self.table.lines),
-                'table': self.table.name,
-            }
-        )
+        freely = {
+            'not_visible': sorted(self.not_visible),
+            'why_not_visible': self.not_visible,
+            'smallest_visible': {
+                key: {'parameter': parameter, 'value': value, 'unit': unit}
+                for key, (parameter, value, unit) in self.smallest_visible.items()
+            },
+            'noise': {
+                quantity: {
+                    'std': float(np.nanmedian(self.noise.std[:, column])),
+                    'origin': self.noise.origin[quantity],
+                }
+                for column, quantity in enumerate(QUANTITIES)
+                if quantity in self.noise.origin
+            },
+            'outliers': [
+                {'line': int(self.table.lines[row]), 'quantity': quantity, 'deviation': size}
+                for row, quantity, size in self.outliers
+            ],
+            'remainder': {
+                'p_value': self.remainder_p_value,
+                'amplitude': self.remainder_amplitude,
+            },
+            'rows': len(self.table.lines),
+            'table': self.table.name,
+        }
+        plain: dict[str, Any] = as_json({**as_json(self), **freely})
+        return plain
 
     def write_json(self, path: str | Path) -> None:
         """Write ``report.json``."""
@@ -566,14 +463,24 @@ class Diagnosis:
         Path(path).write_text(text + '\n', encoding='utf-8')
 
 
-def _finite(value: Any) -> Any:
-    """Turn numpy scalars into numbers and what is not finite into null: JSON has no NaN."""
+def as_json(value: Any) -> Any:
+    """Turn results into dicts, lists, text and finite numbers: JSON has no NaN.
+
+    A dataclass gives its fields but those marked as no part of the report, and the properties that
+    its ``json_also`` lists (key -> property); one with ``to_json`` is asked itself.
+    """
+    if hasattr(value, 'to_json'):
+        return as_json(value.to_json())
+    if is_dataclass(value):
+        own = {f.name: f.name for f in fields(value) if f.metadata.get('json', True)}
+        own |= getattr(value, 'json_also', {})
+        return {key: as_json(getattr(value, name)) for key, name in own.items()}
     if isinstance(value, Mapping):
-        return {key: _finite(item) for key, item in value.items()}
+        return {key: as_json(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [_finite(item) for item in value]
-    if isinstance(value, np.generic):
-        value = value.item()
+        return [as_json(item) for item in value]
+    if isinstance(value, np.ndarray | np.generic):
+        return as_json(value.tolist())
     if isinstance(value, float) and not math.isfinite(value):
         return None
     return value

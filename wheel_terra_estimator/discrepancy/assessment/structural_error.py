@@ -47,7 +47,7 @@ class StructuralError:
     std: FloatArray
     beyond_law: bool = False
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_json(self) -> dict[str, Any]:
         """Return the keys of ``report.json``; mean and deviation row by row."""
         measured = [q for q in range(len(QUANTITIES)) if np.isfinite(self.mean[:, q]).any()]
         return {

@@ -19,7 +19,6 @@ from scipy.special import expit
 
 from wheel_terra_estimator.discrepancy.effect_keys import effect_of
 from wheel_terra_estimator.discrepancy.fitting.evidence import log_sum
-from wheel_terra_estimator.discrepancy.selection.remainder import Remainder
 from wheel_terra_estimator.discrepancy.selection.verdict import Verdict
 from wheel_terra_estimator.discrepancy.selection.weights import Selection
 
@@ -55,9 +54,7 @@ class Confidence:
     of_set: float
 
 
-def features(
-    selection: Selection, verdict: Verdict, place: int, left: Remainder
-) -> dict[str, float]:
+def features(selection: Selection, verdict: Verdict, place: int) -> dict[str, float]:
     """Return the features of the name at ``place`` in the named set."""
     total = np.array([log_sum(row) for row in selection.log_joint])
     name = selection.explanations[verdict.index].names[place]
@@ -81,10 +78,10 @@ def features(
         'margin': alone,
         'margin_of_set': _squash(margin(covered)),
         'gain': gain,
-        'remainder': float(left.significant),
-        'floor': left.probability_of_any,
+        'remainder': float(verdict.left.significant),
+        'floor': verdict.left.probability_of_any,
         'two': two,
-        'margin_floor': alone * left.probability_of_any,
+        'margin_floor': alone * verdict.left.probability_of_any,
         'margin_two': alone * two,
         'gain_squared': gain**2,
     }

@@ -67,7 +67,7 @@ class Verdict:
     left: Remainder
 
 
-def decide(
+def choose(
     selection: Selection,
     variance_of: Variance,
     *,

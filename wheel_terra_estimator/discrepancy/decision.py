@@ -1,0 +1,282 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""The decision: which explanation is reported, from the findings of the search alone.
+
+One loop. Each round takes the best explanation that is still allowed, refits it under its own
+floor, predicts rows that the fit did not see, and either stands or bars itself from the next round.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wheel_terra_estimator.discrepancy.assessment.gaps import (
+    channels_off,
+    channels_worsened,
+    gaps,
+)
+from wheel_terra_estimator.discrepancy.assessment.held_out import hold_out, slip_groups
+from wheel_terra_estimator.discrepancy.effect_keys import effect_of
+from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
+from wheel_terra_estimator.discrepancy.fitting.reference import shared_error
+from wheel_terra_estimator.discrepancy.proposal.find import promise_on_top
+from wheel_terra_estimator.discrepancy.result import Curves, QuantityGap
+from wheel_terra_estimator.discrepancy.selection import confidence as confidences
+from wheel_terra_estimator.discrepancy.selection import significance
+from wheel_terra_estimator.discrepancy.selection.confidence import Confidence
+from wheel_terra_estimator.discrepancy.selection.remainder import Remainder
+from wheel_terra_estimator.discrepancy.selection.search import Findings
+from wheel_terra_estimator.discrepancy.selection.verdict import Verdict, choose
+from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES, SteadyTable
+from wheel_terra_estimator.terramechanics.effects import catalogue
+from wheel_terra_estimator.terramechanics.effects.base import Effect
+
+FloatArray = NDArray[np.float64]
+IndexArray = NDArray[np.intp]
+
+_AT_NOISE = 1.2  # times the noise: a quantity that was never off
+_MOST_EXCLUDED = 3  # names that worsen a quantity, after which the last one stands
+# Confidence that at least one name of several must reach; below, they patch what no listed effect
+# explains (one of ten names in five such sets of tuning campaigns was right).
+_PATCHWORK = 1.0 / 3.0
+
+
+@dataclass(frozen=True)
+class Naming:
+    """One named effect: its key, its rivals, how sure it is and what that was computed from."""
+
+    key: str
+    rivals: tuple[str, ...]
+    confidence: Confidence
+    features: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Decision:
+    """What was decided, and the fits and predictions that speak for it.
+
+    Attributes
+    ----------
+    findings : Findings
+        Those of the search, with ``nothing`` refitted under the floor of the decision.
+    verdict : Verdict
+    floor_index : int
+        Of ``findings.selection.floors``: the model-error floor in use.
+    after : Fit
+        The chosen explanation, refitted under that floor.
+    groups : numpy.ndarray
+        (N,) groups of slip that were left out in turn; -1 for rows of a reference.
+    curves : Curves
+    gap : mapping
+        Quantity -> QuantityGap.
+    names : tuple of Naming
+        Strongest first; empty unless ``named``.
+    """
+
+    findings: Findings
+    verdict: Verdict
+    floor_index: int
+    after: Fit
+    variance: FloatArray
+    groups: IndexArray
+    curves: Curves
+    gap: Mapping[str, QuantityGap]
+    names: tuple[Naming, ...] = ()
+
+    @property
+    def left(self) -> Remainder:
+        """What the chosen explanation leaves."""
+        return self.verdict.left
+
+    @property
+    def floor(self) -> float:
+        """Model-error floor in use, share of each quantity's range."""
+        return self.findings.selection.floors[self.floor_index].largest
+
+    @property
+    def nothing(self) -> Fit:
+        """The soil refitted alone, under the floor."""
+        return self.findings.nothing
+
+
+def decide(
+    table: SteadyTable, both: SteadyTable, findings: Findings, allowed_error: float
+) -> Decision:
+    """Decide what is reported.
+
+    Parameters
+    ----------
+    table, both : SteadyTable
+        The rows under diagnosis, and with those of a reference behind them.
+    allowed_error : float
+        Model error that is no reason for doubt [share of the range].
+    """
+    selection = findings.selection
+    off, barred = False, frozenset[int]()
+    while True:
+        verdict = choose(selection, findings.setting.problem.variance, off=off, excluded=barred)
+        decision = _judged(table, both, findings, verdict, allowed_error)
+        if verdict.word == 'agrees' and not off and channels_off(decision.gap):
+            off = True
+        elif verdict.word != 'named':
+            return decision
+        elif channels_worsened(decision.gap, verdict.left) and len(barred) < _MOST_EXCLUDED:
+            barred |= {verdict.index}
+        else:
+            names = _names(table, decision)
+            if len(names) == 1 or max(n.confidence.of_name for n in names) >= _PATCHWORK:
+                return replace(decision, names=names)
+            barred = frozenset(range(len(selection.explanations)))
+
+
+def _judged(
+    table: SteadyTable,
+    both: SteadyTable,
+    findings: Findings,
+    verdict: Verdict,
+    allowed_error: float,
+) -> Decision:
+    """Refit nothing and the chosen explanation under its own floor, and predict unseen rows."""
+    setting, selection = findings.setting, findings.selection
+    quiet = [k for k, floor in enumerate(selection.floors) if not floor.unexplained]
+    place = quiet[int(np.argmax(selection.log_joint[verdict.index][quiet]))]
+    floor, chosen = selection.floors[place], selection.explanations[verdict.index]
+    own = setting.problem.variance(floor.amplitude, chosen.posterior.noise_factor[place])
+    fits = [findings.nothing, chosen.fitted] if chosen.names else [findings.nothing]
+    fits = [setting.fit([f.names], [f.u], f.angle, own)[0] for f in fits]
+    findings = replace(findings, nothing=fits[0])
+    variance = setting.problem.variance(floor.largest)
+    groups = np.where(np.arange(len(both)) < len(table), slip_groups(both), -1)
+    outs = hold_out(setting, fits, variance, groups)
+    curves = _curves(len(table), findings, fits[-1], outs[0], outs[-1], floor.largest)
+    gap = gaps(table, findings, curves, floor.largest, allowed_error)
+    return Decision(findings, verdict, place, fits[-1], variance, groups, curves, gap)
+
+
+def _names(table: SteadyTable, decision: Decision) -> tuple[Naming, ...]:
+    """Return the named effects with their confidence; first the one that alone explains more."""
+    findings, fitted, known = decision.findings, decision.after, catalogue()
+    shown = _what_rows_show(findings, fitted, decision.gap)
+    promise = promise_on_top(table, findings.setting, fitted)
+    shown['law'] = float(np.log1p(max(promise, 0.0)))
+    found = []
+    for place, key in enumerate(fitted.names):
+        values = confidences.features(findings.selection, decision.verdict, place) | shown
+        values['strength'] = _strength(fitted, key)
+        alike = known_alike(key, findings, known)
+        values['alike'] = float(len(alike))
+        alone = float(np.logaddexp.reduce(findings.selection.joint_of((key,))))
+        rivals = decision.verdict.open_sets[place]
+        sure = confidences.confidence(values, len(alike))
+        found.append((alone, Naming(key, rivals, sure, values)))
+    return tuple(naming for _, naming in sorted(found, key=lambda item: -item[0]))
+
+
+def known_alike(name: str, findings: Findings, known: Mapping[str, Effect]) -> tuple[str, ...]:
+    """Return effects that are known to look like a name, might be named, and were not tried."""
+    on = set(findings.setting.forward.base_effects)
+    own = known[effect_of(name)].confounded_with
+    others = (
+        other.base_name for other in known.values() if effect_of(name) in other.confounded_with
+    )
+
+    def might_be(other: str) -> bool:
+        return other not in known or (
+            known[other].candidate and not known[other].incompatible_with & on
+        )
+
+    names = dict.fromkeys((*own, *others))
+    return tuple(other for other in names if other not in findings.tried and might_be(other))
+
+
+def _what_rows_show(
+    findings: Findings, fitted: Fit, gap: Mapping[str, QuantityGap]
+) -> dict[str, float]:
+    """Return features of the confidence that follow from unseen rows and from the fit.
+
+    ``worse``: how far an effect worsens a quantity; ``idle``: share of its signature in quantities
+    that were never off; ``misfit``, ``soil``: how improbable the residual and the soil are.
+    """
+    change = (fitted.outputs - findings.nothing.outputs)[: len(findings.noise.std)]
+    worse, idle, total = 0.0, 0.0, 1e-12
+    for q, item in enumerate(gap.get(name) for name in QUANTITIES):
+        if item is None or not item.noise:
+            continue
+        worse = max(worse, (item.after**2 - item.refit**2) / item.noise**2)
+        square = float(np.nanmean(change[:, q] ** 2)) / item.noise**2
+        total += square
+        idle += square if item.refit < _AT_NOISE * item.noise else 0.0
+    misfit = significance.chi_square_p_value(fitted, fitted.variance)
+    return {
+        'worse': float(np.tanh(worse)),
+        'idle': idle / total,
+        'misfit': -float(np.log10(max(misfit, 1e-6))),
+        'soil': -float(np.log10(max(significance.soil_p_value(fitted), 1e-6))),
+    }
+
+
+def _strength(fitted: Fit, name: str) -> float:
+    """Size of an effect in deviations of its prior, compressed."""
+    sizes = [
+        abs(u - c.coordinate(c.neutral))
+        for c, u in zip(fitted.coordinates, fitted.u, strict=True)
+        if c.owner == name and c.role == 'strength'
+    ]
+    return float(np.log1p(max(sizes, default=0.0)))
+
+
+def _curves(
+    rows: int,
+    findings: Findings,
+    after: Fit,
+    held_refit: FloatArray,
+    held_after: FloatArray,
+    floor: float,
+) -> Curves:
+    setting = findings.setting
+    nuisance = setting.nuisance
+    refit_error, after_error = (
+        _shared_error(findings, fitted, floor) for fitted in (findings.nothing, after)
+    )
+    configured = setting.forward.solve([nuisance], [np.zeros(len(nuisance))], jacobian=False)
+    # Where slips are latent the model stands at the most probable slip; a curve is compared with
+    # what was read, so that it goes back along the tangent (cells that were not measured stay).
+    problem = setting.problem
+    moved = np.zeros_like(after.outputs)
+    moved[problem.row, problem.quantity] = setting.observed - problem.observed
+    refit_error, after_error = refit_error - moved, after_error - moved
+    band = np.sqrt(findings.noise.std**2 + (floor * problem.scale) ** 2)
+    singles = [e.fitted for e in findings.selection.explanations if len(e.names) == 1]
+    ordered = ([after] if after.names else []) + [f for f in singles if f.names != after.names]
+    shapes = [_signature_shape(findings, f) for f in ordered[:2]]
+    labels = [' + '.join(effect_of(key) for key in f.names) for f in ordered[:2]]
+    return Curves(
+        (configured.outputs[0] - moved)[:rows],
+        (findings.nothing.outputs + refit_error)[:rows],
+        (after.outputs + after_error)[:rows],
+        (held_refit + refit_error)[:rows],
+        (held_after + after_error)[:rows],
+        band[:rows],
+        shapes[0][:rows] if shapes else None,
+        labels[0] if labels else '',
+        shapes[1][:rows] if len(shapes) > 1 else None,
+        labels[1] if len(labels) > 1 else '',
+    )
+
+
+def _shared_error(findings: Findings, fitted: Fit, floor: float) -> FloatArray:
+    """(N, 3) structural error known from a reference; zero without one."""
+    setting = findings.setting
+    active = setting.forward.active
+    if active is None or floor == 0.0:
+        return np.zeros_like(fitted.outputs)
+    return shared_error(setting.problem, fitted, setting.observed, floor, active)
+
+
+def _signature_shape(findings: Findings, fitted: Fit) -> FloatArray:
+    """(N, 3) change of the model from soil refit to fitted effect: comparable with the residual."""
+    return fitted.outputs - findings.nothing.outputs

@@ -1,0 +1,330 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""From a decision to the diagnosis that is reported; nothing is decided here."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.discrepancy.assessment import next_measurement
+from wheel_terra_estimator.discrepancy.assessment.along import changed_stretch
+from wheel_terra_estimator.discrepancy.assessment.held_out import log_scores
+from wheel_terra_estimator.discrepancy.assessment.structural_error import structural_error
+from wheel_terra_estimator.discrepancy.assessment.where import locate
+from wheel_terra_estimator.discrepancy.decision import Decision, known_alike
+from wheel_terra_estimator.discrepancy.effect_keys import effect_of
+from wheel_terra_estimator.discrepancy.fitting.coordinates import WIDENING
+from wheel_terra_estimator.discrepancy.fitting.evidence import log_sum
+from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
+from wheel_terra_estimator.discrepancy.proposal.find import propose
+from wheel_terra_estimator.discrepancy.report import words
+from wheel_terra_estimator.discrepancy.result import (
+    OPEN,
+    Candidate,
+    Diagnosis,
+    FittedParameter,
+    NamedEffect,
+    NextMeasurement,
+    Proposal,
+    SoilShift,
+)
+from wheel_terra_estimator.discrepancy.selection import significance
+from wheel_terra_estimator.discrepancy.selection.search import Findings
+from wheel_terra_estimator.discrepancy.selection.signatures import CLEAR
+from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES, SteadyTable
+from wheel_terra_estimator.terramechanics.effects import catalogue
+from wheel_terra_estimator.terramechanics.effects.base import Effect
+from wheel_terra_estimator.terramechanics.effects.learned_closure import NAME
+
+FloatArray = NDArray[np.float64]
+
+_CANDIDATES_SHOWN = 12
+_NEAREST = 3  # effects named as nearest where nothing is named
+
+
+def render(
+    table: SteadyTable, both: SteadyTable, configuration: Configuration, decision: Decision
+) -> Diagnosis:
+    """Return what is reported of a decision.
+
+    Parameters
+    ----------
+    table, both : SteadyTable
+        The rows under diagnosis, and with those of a reference behind them.
+    """
+    findings, after, variance = decision.findings, decision.after, decision.variance
+    setting, known, left = findings.setting, catalogue(), decision.left
+    effects = _effects(decision, known)
+    nearest = () if after.names else _nearest(findings)
+    stretch = changed_stretch(both, setting, after, variance)
+    proposal = _proposal(table, decision)
+    gap_p_value = _gap_p_value(decision, known)
+    law = None if proposal is None else proposal.fit
+    covariance = np.asarray(np.linalg.inv(after.precision()), dtype=float)
+    return Diagnosis(
+        verdict=decision.verdict.word,
+        sentence=words.sentence(
+            decision.verdict,
+            effects,
+            gap_p_value,
+            left,
+            decision.floor,
+            stretch,
+            decision.gap,
+            nearest,
+        ),
+        table=table,
+        configuration=configuration,
+        effects=effects,
+        candidates=_candidates(decision),
+        gap=decision.gap,
+        not_visible=dict(findings.not_visible),
+        smallest_visible=_smallest_visible(findings, known),
+        where=locate(both, setting.problem, decision.nothing, setting.observed, len(table)),
+        next_measurement=_next(decision),
+        curves=decision.curves,
+        noise=replace(findings.noise, std=findings.noise.std[: len(table)]),
+        soil=_soil_shifts(findings, after, variance),
+        outliers=tuple(
+            (r, QUANTITIES[q], size) for r, q, size in findings.outliers if r < len(table)
+        ),
+        gap_p_value=gap_p_value,
+        remainder_p_value=left.p_value,
+        remainder_amplitude=left.amplitude,
+        floor=decision.floor,
+        notes=(
+            *words.notes(both, findings, after, stretch),
+            *words.untried({e.name: known_alike(e.name, findings, known) for e in effects}),
+        ),
+        base_effects=tuple(configuration.effects),
+        refitted=_parameters(after, covariance, base=True),
+        nearest=nearest,
+        proposal=proposal,
+        structural_error=structural_error(
+            setting.problem,
+            both.scaled_inputs(),
+            law or after,
+            findings.selection.floors,
+            len(table),
+            beyond_law=law is not None,
+        ),
+    )
+
+
+def _gap_p_value(decision: Decision, known: Mapping[str, Effect]) -> float:
+    """P-value of "the soil alone explains these rows": two tests, the smaller one twice."""
+    findings = decision.findings
+    tried = findings.setting.effects
+    names = {name: s for name, s in findings.signatures.items() if name in tried}
+    one_sided = {
+        name for name in names if all(p.prior == 'half_normal' for p in known[name].parameters[:1])
+    }
+    scan = significance.scan_p_value(decision.nothing, decision.variance, names, one_sided)
+    square = significance.chi_square_p_value(decision.nothing, decision.variance)
+    return min(1.0, 2.0 * min(scan, square))
+
+
+def _effects(decision: Decision, known: Mapping[str, Effect]) -> tuple[NamedEffect, ...]:
+    """Return the named effects as they are reported."""
+    fitted, selection = decision.after, decision.findings.selection
+    covariance = np.asarray(np.linalg.inv(fitted.precision()), dtype=float)
+    parameters = _parameters(fitted, covariance)
+    found = []
+    for naming in decision.names:
+        key, name = naming.key, effect_of(naming.key)
+        forms = {
+            e.names[0]: float(log_sum(selection.joint_of(e.names)))
+            for e in selection.explanations
+            if len(e.names) == 1 and effect_of(e.names[0]) == name
+        }
+        rivals = tuple(map(effect_of, naming.rivals))
+        found.append(
+            NamedEffect(
+                name,
+                {
+                    owned.split('.', 1)[1]: value
+                    for owned, value in parameters.items()
+                    if owned.split('.', 1)[0] == key
+                },
+                naming.confidence.of_name,
+                naming.confidence.of_set,
+                rivals,
+                decision.left.noticeable,
+                known[key].claim,
+                known[key].source,
+                {
+                    rival: known[key].confounded_with.get(rival)
+                    or known[rival].confounded_with.get(name, '')
+                    for rival in rivals
+                },
+                naming.features,
+                known[key].form if len(known[name].forms) > 1 else '',
+                {
+                    known[form].form: forms[key] - weight
+                    for form, weight in forms.items()
+                    if form != key
+                },
+            )
+        )
+    return tuple(found)
+
+
+def _shown(findings: Findings, chosen: int) -> list[int]:
+    """Return the explanations that are listed: the best, and the chosen one among them."""
+    with_names = [h for h, e in enumerate(findings.selection.explanations) if e.names]
+    shown = with_names[:_CANDIDATES_SHOWN]
+    if findings.selection.explanations[chosen].names and chosen not in shown:
+        shown.append(chosen)
+    return shown
+
+
+def _parameters(
+    fitted: Fit, covariance: FloatArray, *, base: bool = False
+) -> dict[str, FittedParameter]:
+    """Return the parameters of the effects of a fit, or of those that were on before."""
+    found = {}
+    for index, c in enumerate(fitted.coordinates):
+        if c.owner != 'soil' and (c.owner in fitted.names) != base:
+            u, std = float(fitted.u[index]), float(np.sqrt(covariance[index, index]))
+            found[c.key] = FittedParameter(
+                float(c.value(u)),
+                c.deviation(u, std),
+                c.unit,
+                float(c.value(c.lower)),
+                float(c.value(c.upper)),
+                c.meaning,
+            )
+    return found
+
+
+def _proposal(table: SteadyTable, decision: Decision) -> Proposal | None:
+    """Return a law where something is missing and no name is given; not on top of another."""
+    findings = decision.findings
+    if decision.verdict.word not in OPEN or NAME in findings.setting.forward.base_effects:
+        return None
+    hold = decision.left.only_soil
+    found = propose(table, findings, decision.gap, decision.variance, hold_soil=hold)
+    if found is None or found.fit is None:
+        return None
+    covariance = np.asarray(np.linalg.inv(found.fit.precision()), dtype=float)
+    base = _parameters(found.fit, covariance, base=True)
+    return replace(
+        found,
+        soil=_soil_shifts(findings, found.fit, decision.variance),
+        refitted={key: value for key, value in base.items() if not key.startswith(f'{NAME}.')},
+    )
+
+
+def _nearest(findings: Findings) -> tuple[str, ...]:
+    """Return up to three single effects that the rows favour most."""
+    weights = findings.selection.single_weights()
+    order = sorted(weights, key=lambda name: -weights[name])
+    return tuple(dict.fromkeys(effect_of(key) for key in order))[:_NEAREST]
+
+
+def _distance_to_nothing(findings: Findings, fitted: Fit) -> float:
+    change = findings.setting.problem.rotate(
+        findings.setting.problem.flat(fitted.outputs - findings.nothing.outputs)
+    )
+    return float(np.sqrt((change**2 / fitted.variance).sum()))
+
+
+def _candidates(decision: Decision) -> tuple[Candidate, ...]:
+    """Return the best explanations, nothing among them, each with why it was not the one."""
+    findings, verdict = decision.findings, decision.verdict
+    selection, setting = findings.selection, findings.setting
+    shown = _shown(findings, verdict.index)
+    nothing = next(h for h, e in enumerate(selection.explanations) if not e.names)
+    totals = np.logaddexp.reduce(selection.log_joint, axis=1)
+    kept = [decision.nothing, *(selection.explanations[h].fitted for h in shown)]
+    scores = log_scores(setting, kept, decision.variance, decision.groups)
+    gains = dict(zip((nothing, *shown), (s - scores[0] for s in scores), strict=True))
+    evidence = {h: selection.explanations[h].log_evidence for h in gains}
+    chosen = set(selection.explanations[verdict.index].names)
+    found = []
+    for h in sorted(gains, key=lambda h: -totals[h]):
+        explanation = selection.explanations[h]
+        fitted = explanation.fitted
+        found.append(
+            Candidate(
+                explanation.names,
+                evidence[h] - evidence[nothing],
+                float(selection.probability[h].sum()),
+                gains[h],
+                float((fitted.residual**2).sum()),
+                float(setting.problem.size - len(fitted.u)),
+                _parameters(fitted, explanation.posterior.covariance[decision.floor_index]),
+                _distance_to_nothing(findings, fitted) if explanation.names else 0.0,
+                '' if h == verdict.index else words.why_not(findings, verdict, h, totals, chosen),
+            )
+        )
+    return tuple(found)
+
+
+def _smallest_visible(
+    findings: Findings, known: Mapping[str, Effect]
+) -> dict[str, tuple[str, float, str]]:
+    """Size of each effect that these rows would have shown clearly (signature scaled linearly)."""
+    found: dict[str, tuple[str, float, str]] = {}
+    for name, s in findings.signatures.items():
+        if name in findings.setting.effects and s.distance > 0.0:
+            parameter = known[name].parameters[0]
+            size = (parameter.name, abs(s.size) * CLEAR / s.distance, parameter.unit)
+            found.setdefault(effect_of(name), size)  # of the first form that is visible
+    return found
+
+
+def _next(decision: Decision) -> tuple[NextMeasurement, ...]:
+    findings, verdict, after = decision.findings, decision.verdict, decision.after
+    selection = findings.selection
+    rivals: list[Fit] = []
+    if verdict.word == 'named':
+        for place, names in enumerate(verdict.open_sets):
+            others = set(after.names) - {after.names[place]}
+            for rival in names:
+                try:
+                    rivals.append(selection.find((*others, rival)).fitted)
+                except KeyError:
+                    continue
+    if not rivals:
+        wanted = [e.fitted for e in selection.explanations if e.names != after.names]
+        wanted = [f for f in wanted if f.names or verdict.word == 'named']
+        rivals = [f for f in wanted if not set(after.names) < set(f.names)][:1]
+    noise = np.array(
+        [
+            float(np.nanmedian(findings.noise.std[:, q]))
+            if np.isfinite(findings.noise.std[:, q]).any()
+            else np.inf
+            for q in range(3)
+        ]
+    )
+    return next_measurement.propose(findings.setting, after, rivals, noise)
+
+
+def _soil_shifts(findings: Findings, after: Fit, variance: FloatArray) -> tuple[SoilShift, ...]:
+    weighted = after.jacobian / variance[:, None]
+    covariance = np.linalg.inv(weighted.T @ after.jacobian + np.diag(after.prior))
+    refit = findings.nothing.values()
+    found = []
+    for index, c in enumerate(after.coordinates):
+        if c.owner != 'soil':
+            continue
+        u = float(after.u[index])
+        found.append(
+            SoilShift(
+                c.name,
+                float(c.value(0.0)),
+                c.deviation(0.0, 1.0 / WIDENING),
+                refit[c.key],
+                float(c.value(u)),
+                c.deviation(u, float(np.sqrt(covariance[index, index]))),
+                WIDENING * u,
+                c.unit,
+            )
+        )
+    return tuple(found)
