@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import csv
 import zlib
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -17,6 +18,8 @@ from wheel_terra_estimator.trials.designs import random_rows, random_soil
 from wheel_terra_estimator.trials.detectability import Ruler, listed_kinds, size_for
 from wheel_terra_estimator.trials.forms import FORMS
 from wheel_terra_estimator.trials.hidden import LISTED, OTHER, OUTSIDE, SmoothError
+from wheel_terra_estimator.trials.other_worlds import WORLDS
+from wheel_terra_estimator.trials.strangers import SCORED
 from wheel_terra_estimator.trials.truth import (
     OUTPUTS,
     SOIL_SD,
@@ -65,6 +68,9 @@ class Plan:
         Least d' that is asked for; 0: 2.5 for one effect, 4 for each of two.
     forms : bool
         Draw from all forms of all effects, not from the first form of some.
+    world : str
+        One of ``other_worlds.WORLDS``: a truth that shares no closure with the package; empty =
+        the independent quadrature.
     """
 
     hide: str = 'one'
@@ -80,6 +86,7 @@ class Plan:
     names: tuple[str, ...] = ()
     least: float = field(default=0.0, repr=False)  # no part of the seed
     forms: bool = field(default=False, repr=False)
+    world: str = field(default='', repr=False)
 
 
 @dataclass(frozen=True)
@@ -90,7 +97,8 @@ class Campaign:
     ``noise_free`` the noise and the true outputs of the same rows, ``believed`` the
     soil in the configuration, ``soil`` the true one, ``hidden`` what was hidden, ``distances`` its
     d' (each beyond the other when two), ``distance_left`` what the best listed effect leaves
-    (strangers only), ``distance_beside`` d' where the structural error counts as noise too.
+    (strangers only), ``distance_beside`` d' where the structural error counts as noise too,
+    ``true_outputs`` the noise-free truth of any rows.
     """
 
     seed: int
@@ -110,6 +118,7 @@ class Campaign:
     noise_free: Rows = field(default_factory=dict)
     soil_deviations_stated: bool = True
     distance_beside: float = float('nan')
+    true_outputs: Callable[[Rows], Rows] | None = None
 
     def settings(self) -> dict[str, object]:
         """Return the engineer's configuration of a one-wheel rig, key by key."""
@@ -170,6 +179,8 @@ class _UnusableError(Exception):
 
 
 def _attempt(seed: int, design: str, plan: Plan, rng: np.random.Generator) -> Campaign:
+    if plan.world:
+        return _of_world(seed, design, plan, rng)
     believed = random_soil(rng)
     soil, stated = _true_soil(believed, plan.soil_error, rng)
     rows = random_rows('basic16' if plan.drive else design, rng, believed)
@@ -226,6 +237,38 @@ def _attempt(seed: int, design: str, plan: Plan, rng: np.random.Generator) -> Ca
         {key: truth[key][kept] for key in OUTPUTS},
         stated,
         beside,
+        lambda rows: solve(rows, soil, effects),
+    )
+
+
+def _of_world(seed: int, design: str, plan: Plan, rng: np.random.Generator) -> Campaign:
+    """Return a campaign whose truth is another model; its soil tests state no deviations."""
+    world = WORLDS[plan.world]
+    believed, true_soil = world.soil(rng)
+    rows = random_rows(design, rng, believed)
+    truth = world.solve(rows, true_soil)
+    sunk = truth['sinkage'] / rows['wheel_radius']
+    if not np.all(np.isfinite(sunk)) or np.max(sunk) > 0.6:
+        raise _UnusableError
+    std = _noise_level(rows, rng)
+    table, kept = _measure(plan, rows, truth, {key: std[key].copy() for key in OUTPUTS}, rng)
+    return Campaign(
+        seed,
+        design,
+        plan,
+        {key: table[key] for key in INPUTS},
+        table,
+        {key: std[key][kept] for key in OUTPUTS},
+        believed,
+        believed,
+        (plan.world,),
+        (1.0,),
+        (),
+        (Ruler(rows, believed, std).distance_of(truth),),
+        float('nan'),
+        noise_free={key: truth[key][kept] for key in OUTPUTS},
+        soil_deviations_stated=False,
+        true_outputs=lambda rows: world.solve(rows, true_soil),
     )
 
 
@@ -282,7 +325,8 @@ def _hide(
     if plan.hide == 'none':
         return (), (), (), ()
     if plan.hide == 'outside':
-        catalogue, names = OUTSIDE, [*plan.names] or [str(rng.choice(sorted(OUTSIDE)))]
+        catalogue = {**OUTSIDE, **SCORED}
+        names = [*plan.names] or [str(rng.choice(sorted(OUTSIDE)))]
     else:
         catalogue = OTHER if plan.other_formula else {**LISTED, **FORMS}
         drawn_from = {**LISTED, **FORMS} if plan.forms else LISTED

@@ -64,6 +64,11 @@ class Ruler:
             )
         )
 
+    def distance_of(self, outputs: Rows) -> float:
+        """Distance of given outputs beyond the best refit of the soil."""
+        y = np.stack([outputs[key] for key in OUTPUTS], 1) / self._std
+        return float(np.linalg.norm(self._refit(y[np.isfinite(self._std)], None, 0.5)))
+
     def distance_beside(self, hidden: tuple[Hidden, ...], structure: SmoothError) -> float:
         """Distance of ``hidden`` where the structural error counts as noise (soil linear)."""
         change = self.whitened(np.zeros(len(SOIL_SD)), hidden) - self.base
