@@ -28,6 +28,7 @@ def sets(count: int = 25) -> list[Any]:
         some_estimates(
             stamp=STAMP + i * SECOND // 10,
             stuck=8 <= i < 15,
+            stuck_direction=-1 if 8 <= i < 15 else 0,
             slip=np.array([0.01 * i, -0.02 * i]),
             slip_class=np.array([i % 4, 255], dtype=np.uint8),
             reasons=('slip; rover: digging in', 'at rest; rover: digging in'),
@@ -72,6 +73,7 @@ def test_topics_have_full_names_and_their_types(bag: Path) -> None:
         f'{own}/slip_class': ('std_msgs/msg/UInt8MultiArray', 25),
         f'{own}/twist': ('geometry_msgs/msg/TwistWithCovarianceStamped', 25),
         f'{own}/stuck': ('std_msgs/msg/Bool', 3),
+        f'{own}/stuck_direction': ('std_msgs/msg/Int8', 3),
         # By the second (0, 1, 2), and whenever a class changed its level.
         '/diagnostics': ('diagnostic_msgs/msg/DiagnosticArray', found['/diagnostics'][1]),
     }
@@ -91,7 +93,8 @@ def test_messages_of_a_set_share_stamp_and_log_time(bag: Path) -> None:
                 stamp = message.header.stamp
                 assert stamp.sec * SECOND + stamp.nanosec == STAMP + i * SECOND // 10
                 assert message.header.frame_id == 'base_link'
-    assert [topic for topic, _ in by_time.pop(STAMP)] == ['/wheel_terra_estimator/stuck']
+    at_start = [topic.rpartition('/')[2] for topic, _ in by_time.pop(STAMP)]
+    assert at_start == ['stuck_direction', 'stuck']
     assert not by_time
 
 
@@ -103,12 +106,15 @@ def test_slip_class_layout(bag: Path) -> None:
     assert found[2].data.tolist() == [2, 255]
 
 
-def test_stuck_is_sent_at_start_and_on_change(bag: Path) -> None:
-    found = [(t, m.data) for t, topic, m in messages(bag) if topic.endswith('/stuck')]
+@pytest.mark.parametrize(('topic', 'led'), [('stuck', True), ('stuck_direction', -1)])
+def test_stuck_and_its_direction_are_sent_at_start_and_on_change(
+    bag: Path, topic: str, led: int
+) -> None:
+    found = [(t, m.data) for t, name, m in messages(bag) if name.endswith(f'/{topic}')]
     assert found == [
-        (STAMP, False),
-        (STAMP + 8 * SECOND // 10 + 7, True),
-        (STAMP + 15 * SECOND // 10 + 7, False),
+        (STAMP, 0),
+        (STAMP + 8 * SECOND // 10 + 7, led),
+        (STAMP + 15 * SECOND // 10 + 7, 0),
     ]
 
 
@@ -117,7 +123,7 @@ def test_quality_of_service_in_the_metadata(bag: Path) -> None:
     assert metadata['storage_identifier'] == 'mcap'
     for topic in metadata['topics_with_message_count']:
         (profile,) = topic['topic_metadata']['offered_qos_profiles']
-        latched = topic['topic_metadata']['name'].endswith('/stuck')
+        latched = topic['topic_metadata']['name'].endswith(('/stuck', '/stuck_direction'))
         assert profile['reliability'] == 'reliable'
         assert profile['durability'] == ('transient_local' if latched else 'volatile')
         assert (profile['history'], profile['depth']) == ('keep_last', 1 if latched else 10)
@@ -156,7 +162,7 @@ def test_existing_path_is_refused_unless_overwrite(bag: Path, tmp_path: Path) ->
     assert len(messages(bag)) > 100
     with EstimateBagWriter(bag, NAMES, overwrite=True) as writer:
         writer.clear_stuck(STAMP)
-    assert len(messages(bag)) == 1
+    assert len(messages(bag)) == 2
 
 
 def test_overwrite_never_deletes_what_is_no_bag(tmp_path: Path) -> None:

@@ -20,6 +20,7 @@ from fake_estimator import (
     stamp_at,
 )
 
+from wheel_terra_estimator.configuration.soil_file import StuckState
 from wheel_terra_estimator.estimation.core import EstimatorCore
 from wheel_terra_estimator.estimation.estimates import SlipClass
 from wheel_terra_estimator.estimation.measurements import WheelOdometry
@@ -95,6 +96,70 @@ def test_a_failing_filter_is_held_said_and_started_anew(how):
     fresh = play(make_core()[0], [odometry(0.3), odometry(0.4)])
     assert essence(again) == essence(fresh)
     assert core.health()['filter_restarts'] == 1
+
+
+class Digging(Failing):
+    """Stuck from a wheel rate of 5 on, forward, as long as its run lasts."""
+
+    def begin_run(self, stamp, keep_soil):
+        super().begin_run(stamp, keep_soil)
+        self.rate, self.digs = 0.0, False
+
+    def step(self, stamp, inputs):
+        super().step(stamp, inputs)
+        self.rate = float(inputs.wheel_odometry.rate[0])
+        self.digs |= self.rate == 5.0
+
+    def estimates(self):
+        slip = np.full(2, 0.1 if self.rate > 0.0 else 0.97)
+        reasons = ('digs; rover: digs in',) * 2 if self.digs else ('slip',) * 2
+        direction = int(self.digs)
+        return replace(
+            super().estimates(),
+            slip=slip,
+            stuck=self.digs,
+            stuck_direction=direction,
+            reasons=reasons,
+        )
+
+
+@pytest.mark.parametrize(
+    'how',
+    ['clock steps back', pytest.param('filter fails', marks=pytest.mark.filter_fails)],
+)
+def test_a_warning_and_its_direction_stand_over_a_new_beginning(how):
+    config = configuration(output_rate=0.0, max_lag=0.0)
+    core = EstimatorCore(config, Digging(config, 'raise'))
+    play(core, [odometry(10.0 + 0.1 * i, rate=5.0) for i in range(5)], flush=False)
+    start = 0.0
+    if how == 'filter fails':
+        core.add(odometry(10.5, rate=9.0))
+        start = 10.6
+    standing = play(core, [odometry(start + 0.1 * i, rate=-1.0) for i in range(60)], flush=False)
+    assert len(standing) > 50
+    assert all(s.stuck and s.stuck_direction == 1 for s in standing)
+    assert 'digs in' in standing[-1].reasons[0]
+    free = play(core, [odometry(start + 6.0 + 0.1 * i) for i in range(40)], flush=False)
+    cleared = next(i for i, s in enumerate(free) if not s.stuck)
+    assert cleared == 30 and free[-1].stuck_direction == 0
+    assert core.health()['filter_restarts'] + core.health()['clock_steps_back'] == 1
+
+
+def test_a_reset_clears_the_warning():
+    config = configuration(output_rate=0.0, max_lag=0.0)
+    core = EstimatorCore(config, Digging(config, 'raise'))
+    assert play(core, [odometry(0.1 * i, rate=5.0) for i in range(5)])[-1].stuck
+    core.reset()
+    assert not play(core, [odometry(1.0 + 0.1 * i) for i in range(5)])[-1].stuck
+
+
+def test_a_gap_between_two_sets_is_no_time_driven_free():
+    config = configuration(output_rate=0.0, max_lag=0.0)
+    core = EstimatorCore(config, Digging(config, 'raise'))
+    core.warning.restore(StuckState(True, 'digs in', stamp_at(-10.0), -1))
+    apart = play(core, [odometry(2.0 * i) for i in range(10)])
+    assert all(s.stuck and s.stuck_direction == -1 for s in apart)
+    assert 'warned 10 s ago' in apart[0].reasons[0]
 
 
 @pytest.mark.filter_fails

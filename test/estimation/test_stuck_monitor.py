@@ -143,6 +143,42 @@ def test_travel_left_shrinks_to_nothing():
     assert left[-1] == 0.0
 
 
+@pytest.mark.parametrize('ahead', [1, -1])
+def test_the_direction_is_that_of_the_rims_that_led_in_and_stays_until_it_clears(ahead):
+    monitor = StuckMonitor()
+
+    def drive(slip, rim, seconds, start):
+        rows = [[wheel(slip, rim=ahead * rim, known=rim != 0.0)] * 6] * round(10 * seconds)
+        return course(rows, monitor=monitor, start=start)[-1]
+
+    assert drive(0.2, -0.05, 20.0, 0.0).direction == 0, 'none while it is not stuck'
+    assert drive(0.97, 0.05, 20.0, 20.0).direction == ahead
+    assert drive(0.97, 0.0, 600.0, 40.0).direction == ahead, 'rest changes nothing'
+    backing = drive(0.97, -0.05, 20.0, 640.0)
+    assert backing.stuck and backing.direction == ahead, 'nor does digging on the way out'
+    assert drive(0.1, -0.05, 20.0, 660.0).direction == 0
+    assert drive(0.97, -0.05, 20.0, 680.0).direction == -ahead, 'a new one is its own'
+
+
+def stalling(before, seconds):
+    """Wheels turn so, [m/s], for some seconds, the last of them on the spot; then two stall."""
+    monitor = StuckMonitor()
+    stalled = [wheel(0.0, rim=0.0, known=False, torque=0.95)] * 2 + [wheel(0.2, torque=0.1)] * 2
+    for i in range(round(10 * seconds)):
+        rims = before(0.1 * i)
+        wheels = [wheel(0.2, rim=rim, torque=0.4) for rim in rims] * 2
+        judge(monitor, 0.1 * i, sum(rims) / 2, True, wheels)
+    found = [judge(monitor, seconds + 0.1 * i, 0.0, True, stalled) for i in range(5)]
+    assert found[-1].stuck
+    return found[-1].direction
+
+
+def test_the_direction_is_unknown_where_the_rims_went_both_ways():
+    assert stalling(lambda t: (0.05, 0.05), 20.0) == 1
+    rocking = stalling(lambda t: (0.05, 0.05) if t % 1.0 < 0.5 else (-0.05, -0.05), 20.0)
+    assert rocking == stalling(lambda t: (0.05, -0.05), 20.0) == 0
+
+
 def test_memory_comes_back():
     monitor = StuckMonitor()
     course([[wheel(0.97)] * 6] * 10, monitor=monitor)

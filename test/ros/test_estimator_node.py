@@ -61,7 +61,7 @@ class TestOneNode:
         assert any('never heard' in s.message for s in statuses)
 
     def test_topics_types_and_stuck_for_those_who_come_late(self, listener):
-        from std_msgs.msg import Bool
+        from std_msgs.msg import Bool, Int8
 
         node, until = listener
         expected = {
@@ -74,6 +74,7 @@ class TestOneNode:
             'slip_class': 'std_msgs/msg/UInt8MultiArray',
             'twist': 'geometry_msgs/msg/TwistWithCovarianceStamped',
             'stuck': 'std_msgs/msg/Bool',
+            'stuck_direction': 'std_msgs/msg/Int8',
         }
 
         def offered():
@@ -97,6 +98,9 @@ class TestOneNode:
         stuck = hear(node, Bool, f'{NODE}/stuck', latched())
         until(lambda: stuck)
         assert [m.data for m in stuck] == [False]
+        direction = hear(node, Int8, f'{NODE}/stuck_direction', latched())
+        until(lambda: direction)
+        assert [m.data for m in direction] == [0]
 
     def test_parameters_are_described_and_read_only(self, listener):
         from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue

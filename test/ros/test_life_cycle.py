@@ -4,6 +4,7 @@
 
 import itertools
 import json
+import math
 import os
 import signal
 import threading
@@ -140,7 +141,7 @@ def test_life_cycle_services_and_live_parameters(start, parameters, listener, tm
 def test_a_warning_and_the_soil_stand_over_a_restart(start, parameters, listener, tmp_path):
     from diagnostic_msgs.msg import DiagnosticArray
     from sensor_msgs.msg import JointState
-    from std_msgs.msg import Bool
+    from std_msgs.msg import Bool, Int8
     from std_srvs.srv import Trigger
 
     from wheel_terra_estimator.configuration import reader
@@ -149,14 +150,15 @@ def test_a_warning_and_the_soil_stand_over_a_restart(start, parameters, listener
     soil = tmp_path / 'soil.yaml'
     soil.write_text('/**:\n  ros__parameters:\n    soil.cohesion: 432.1\n')
     state = tmp_path / 'soil.yaml.state.json'
-    kept = {'stuck': True, 'reason': 'wheels dig in', 'stamp': 90_000_000_000}
+    kept = {'stuck': True, 'reason': 'wheels dig in', 'stamp': math.inf, 'direction': -1}
     state.write_text(json.dumps(kept))
     stuck = hear(node, Bool, f'{NODE}/stuck', latched())
+    direction = hear(node, Int8, f'{NODE}/stuck_direction', latched())
     said = hear(node, DiagnosticArray, '/diagnostics')
     wheels = node.create_publisher(JointState, 'joint_states', 10)
     process = start('estimator_node', *ROVER, parameters, '-p', f'soil_file:={soil}')
-    until(lambda: stuck and wheels.get_subscription_count())
-    assert stuck[-1].data
+    until(lambda: stuck and direction and wheels.get_subscription_count())
+    assert stuck[-1].data and direction[-1].data == -1
     names = reader.load(['pathfinder']).wheels.names
     sent = 0
 
@@ -175,7 +177,7 @@ def test_a_warning_and_the_soil_stand_over_a_restart(start, parameters, listener
     until(told)
     assert len(stuck) == 1, 'rest does not clear it'
     assert call(node, until, Trigger, 'reset', Trigger.Request()).success
-    until(lambda: not stuck[-1].data)
+    until(lambda: not stuck[-1].data and direction[-1].data == 0)
     assert not state.exists()
     until(lambda: told() and sent % 20 == 0)
     assert not call(node, until, Trigger, 'save_soil', Trigger.Request()).message.endswith('empty')

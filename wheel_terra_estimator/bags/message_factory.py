@@ -62,6 +62,10 @@ class MessageFactory:
         """Return a Bool."""
         return self.make('std_msgs/msg/Bool', data=value)
 
+    def int8(self, value: int) -> Any:
+        """Return an Int8."""
+        return self.make('std_msgs/msg/Int8', data=value)
+
     def vector(self, x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Any:
         """Return a Vector3."""
         return self.make('geometry_msgs/msg/Vector3', x=float(x), y=float(y), z=float(z))

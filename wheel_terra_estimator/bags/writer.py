@@ -26,6 +26,8 @@ from wheel_terra_estimator.messages.convert import (
 
 NAMESPACE = f'/{diagnostics.NODE}'
 STUCK = f'{NAMESPACE}/stuck'
+STUCK_DIRECTION = f'{NAMESPACE}/stuck_direction'
+LATCHED = (STUCK, STUCK_DIRECTION)
 DIAGNOSTICS = '/diagnostics'
 TOPICS = {
     **{f'{NAMESPACE}/{topic}': kind for topic, kind in OUTPUT_TYPES.items()},
@@ -105,10 +107,10 @@ class EstimateBagWriter(BagFile):
         statuses: diagnostics.Diagnostics | None = None,
         inputs: Iterable[Path] = (),
     ) -> None:
-        super().__init__(path, TOPICS, latched=(STUCK,), overwrite=overwrite, inputs=inputs)
+        super().__init__(path, TOPICS, latched=LATCHED, overwrite=overwrite, inputs=inputs)
         self.names = names
         self._diagnostics = statuses or diagnostics.Diagnostics(names)
-        self._stuck: bool | None = None
+        self._stuck: tuple[bool, int] | None = None
         self._joint_states = JointStatePacker(BASE_FRAME)
         self._twists = TwistPacker(BASE_FRAME)
 
@@ -120,7 +122,7 @@ class EstimateBagWriter(BagFile):
 
     def clear_stuck(self, log_time: int) -> None:
         """Write what the node sends at its start and after a reset: no stuck warning."""
-        self._write_stuck(False, log_time)
+        self._write_stuck(False, 0, log_time)
 
     def add(
         self,
@@ -143,14 +145,15 @@ class EstimateBagWriter(BagFile):
             stamp, estimates.forward_velocity, estimates.yaw_rate, twist_covariance(estimates)
         )
         self.write_raw(f'{NAMESPACE}/twist', twist, log_time)
-        self._write_stuck(estimates.stuck, log_time)
+        self._write_stuck(estimates.stuck, estimates.stuck_direction, log_time)
         found = self._diagnostics.due(estimates) if statuses is None else statuses
         if found:
             header = self.messages.header(stamp)
             array = self.messages.diagnostic_array(header, list(found))
             self.write(DIAGNOSTICS, array, log_time)
 
-    def _write_stuck(self, stuck: bool, log_time: int) -> None:
-        if stuck != self._stuck:
-            self._stuck = stuck
+    def _write_stuck(self, stuck: bool, direction: int, log_time: int) -> None:
+        if (stuck, direction) != self._stuck:
+            self._stuck = stuck, direction
+            self.write(STUCK_DIRECTION, self.messages.int8(direction), log_time)
             self.write(STUCK, self.messages.bool(stuck), log_time)

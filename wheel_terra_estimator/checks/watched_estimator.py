@@ -86,7 +86,8 @@ class WatchedEstimator:
             return without_judgement(estimates, findings)
         if self._warning.waits:
             reason = f'stuck warning waits: {self._checks.undecided}'
-            return replace(estimates, stuck=False, reasons=(reason,) * len(estimates.reasons))
+            reasons = (reason,) * len(estimates.reasons)
+            return replace(estimates, stuck=False, stuck_direction=0, reasons=reasons)
         return estimates
 
     def _with_misfits(self, estimates: EstimateSet) -> EstimateSet:
@@ -134,6 +135,7 @@ def without_judgement(estimates: EstimateSet, findings: tuple[Finding, ...]) -> 
         estimates,
         slip_class=np.full(wheels, SlipClass.UNKNOWN, dtype=np.uint8),
         stuck=False,
+        stuck_direction=0,
         stuck_probability=np.zeros(wheels),
         rim_travel_left=np.full(wheels, NO_ENTRAPMENT_IN_SIGHT),
         reasons=(f'not judged: {findings[0].words}',) * wheels,

@@ -15,6 +15,7 @@ from wheel_terra_estimator.configuration import ros_yaml
 from wheel_terra_estimator.configuration.parameters import declared
 from wheel_terra_estimator.errors import UserError
 
+_LATEST_STAMP = 2**63 - 1  # [ns]
 _COMMENT = 'Learned by the estimator on the drive; read at its next start.'
 
 
@@ -29,12 +30,16 @@ class StuckState:
     reason : str
         In words.
     stamp : int
-        Stamp of the set that raised or lowered it [ns].
+        Stamp of the set that raised or lowered it [ns]; 0 = unknown.
+    direction : int
+        ``~/stuck_direction``: of the rims that led to it, 1 forward, -1 backward, 0 none, both or
+        unknown.
     """
 
     stuck: bool = False
     reason: str = ''
     stamp: int = 0
+    direction: int = 0
 
 
 def state_path(soil_file: Path) -> Path:
@@ -80,6 +85,8 @@ def write_values(soil_file: Path, learned: Mapping[str, Any]) -> None:
 def read_state(soil_file: Path) -> StuckState:
     """Return the warning as it was last written; none where there is no such file.
 
+    A warning stands also where its stamp or its direction cannot be used: these are unknown then.
+
     Raises
     ------
     UserError
@@ -90,9 +97,16 @@ def read_state(soil_file: Path) -> StuckState:
         return StuckState()
     try:
         found = json.loads(path.read_text(encoding='utf-8'))
-        return StuckState(bool(found['stuck']), str(found['reason']), int(found['stamp']))
-    except (OSError, ValueError, TypeError, KeyError):
+        stuck, reason, stamp = found['stuck'], str(found['reason']), found['stamp']
+    except (OSError, ValueError, TypeError, KeyError, RecursionError):
         raise UserError(f'{path}: is no state of the estimator; remove it') from None
+    if not isinstance(stuck, bool):
+        raise UserError(f'{path}: stuck is neither true nor false; remove the file')
+    usable = isinstance(stamp, int) and 0 <= stamp <= _LATEST_STAMP
+    direction = found.get('direction', 0)
+    return StuckState(
+        stuck, reason, stamp if usable else 0, int(direction) if direction in (-1, 0, 1) else 0
+    )
 
 
 def write_state(soil_file: Path, state: StuckState) -> None:

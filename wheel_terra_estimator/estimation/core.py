@@ -18,6 +18,7 @@ import numpy as np
 
 from wheel_terra_estimator.configuration import Configuration
 from wheel_terra_estimator.estimation.estimates import EstimateSet, SlipClass
+from wheel_terra_estimator.estimation.judgement.stuck.memory import StuckMemory
 from wheel_terra_estimator.estimation.measurements import Measurement
 from wheel_terra_estimator.estimation.output_guard import OutputGuard
 from wheel_terra_estimator.estimation.sensor_errors import SensorErrors
@@ -49,6 +50,11 @@ class EstimatorCore:
         What runs through the inputs; default: ``WheelSoilEstimator``.
     watched_by : callable, optional
         Puts a watch over the inputs around an estimator.
+
+    Attributes
+    ----------
+    warning : StuckMemory
+        The stuck warning, which stands over a new beginning of the estimator but not over `reset`.
     """
 
     def __init__(
@@ -65,6 +71,7 @@ class EstimatorCore:
         self._errors = SensorErrors(configuration)
         self._checks = InputChecks(configuration)
         self._guard = OutputGuard(configuration)
+        self.warning = StuckMemory(configuration)
         self._timeline = Timeline(self._estimator, self._settings, self._finish)
         self._contradicted = self._timeline.contradicted  # counts as it goes on
         self._watch = self._new_watch()
@@ -104,6 +111,7 @@ ReferenceVelocity
     def reset(self) -> None:
         """Forget the state, keep the parameters; the next measurement begins a new run."""
         self._resets += 1
+        self.warning.clear()
         self._watch = self._new_watch()
         self._end_run(keep_soil=False)
 
@@ -116,6 +124,7 @@ ReferenceVelocity
         self._settings = _time_settings(configuration)
         self._lags.fixed = _max_lag(configuration)
         self._clock_step = _nanoseconds(configuration.filter.clock_step)
+        self.warning.retune(configuration)
         self._timeline.retune(self._estimator, self._settings)
 
     def learned(self) -> dict[str, Any]:
@@ -173,6 +182,7 @@ ReferenceVelocity
         if judgement.stepped_back:
             self._clock_steps += 1
             sets += self._timeline.flush()
+            self.warning.begin_anew()
             self._end_run(keep_soil=True)
         for arrival in judgement.accepted:
             self._lags.note(arrival.channel, arrival.measurement.stamp)
@@ -215,6 +225,9 @@ ReferenceVelocity
         if silent:
             unknown = np.full(len(estimates.slip_class), SlipClass.UNKNOWN, dtype=np.uint8)
             estimates = replace(estimates, slip_class=unknown)
+        estimates = self.warning.follow(estimates)
+        if failed:
+            self.warning.begin_anew()
         self._latest = estimates
         return estimates, failed
 

@@ -62,3 +62,4 @@ class EstimateSet:
     time_to_stuck: FloatArray  # (n,) [s]
     reasons: tuple[str, ...]  # (n,) why the wheel is called what it is called, in words
     faults: dict[str, str] = field(default_factory=dict)  # input or state -> words, for diagnostics
+    stuck_direction: int = 0  # of the rims that led to `stuck`: 1, -1; 0 none, both or unknown

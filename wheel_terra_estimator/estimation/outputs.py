@@ -157,6 +157,7 @@ class Outputs:
             yaw_rate=given.yaw_rate,
             yaw_rate_variance=given.yaw_rate_std**2,
             stuck=given.assessment.stuck,
+            stuck_direction=given.assessment.direction,
             reasons=reasons_in_words(given),
             faults=faults_in_words(missing),
             **dict(zip(per_wheel, rows, strict=True)),

@@ -49,6 +49,7 @@ OUTPUT_TYPES = {
     **dict.fromkeys(JOINT_OUTPUTS, JOINT_STATE),
     'slip_class': 'std_msgs/msg/UInt8MultiArray',
     'twist': 'geometry_msgs/msg/TwistWithCovarianceStamped',
+    'stuck_direction': 'std_msgs/msg/Int8',
     'stuck': 'std_msgs/msg/Bool',
 }
 """Private output topics of the estimator and their message types."""

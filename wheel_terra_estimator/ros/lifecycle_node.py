@@ -50,7 +50,6 @@ from wheel_terra_estimator.ros import parameters
 from wheel_terra_estimator.ros.input_watch import InputWatch
 from wheel_terra_estimator.ros.outputs import EstimatePublisher, time_message
 from wheel_terra_estimator.ros.qos import OVERRIDABLE, input_profile
-from wheel_terra_estimator.ros.stuck_memory import StuckMemory
 
 if TYPE_CHECKING:
     from wheel_terra_estimator.ros.live_views import LiveViews
@@ -194,7 +193,8 @@ class EstimatorNode(LifecycleNode):
         self._pipeline = Pipeline(configuration, self._full_name)
         self._soil_path = Path(configuration.soil_file).expanduser()
         self._keeps_soil = bool(configuration.soil_file)
-        self._stuck = self._stuck_memory(configuration)
+        self._pipeline.core.warning.restore(self._kept_warning())
+        self._warned = self._pipeline.core.warning.state
         self._watch_inputs = InputWatch()
         self._latest: EstimateSet | None = None
         self._started = self._seconds()
@@ -204,7 +204,7 @@ class EstimatorNode(LifecycleNode):
         self._same_name = self._said_ready = False
         self._pipeline.transport_values = self._transport_values
         self._publisher = EstimatePublisher(self, self._pipeline.names)
-        self._publisher.publish_stuck(self._stuck.state.stuck)
+        self._publisher.publish_stuck(self._warned.stuck, self._warned.direction)
         self._views = self._live_views(configuration)
         self._listen()
         self._timers_made = [
@@ -291,11 +291,10 @@ class EstimatorNode(LifecycleNode):
 
     def _take(self, estimates: EstimateSet, now: float) -> None:
         assert self._pipeline is not None and self._publisher is not None
-        before = self._stuck.state
-        estimates = self._stuck.follow(estimates)
         self._latest = estimates
         self._set_at = now
-        if self._stuck.state is not before:
+        if self._pipeline.core.warning.state is not self._warned:
+            self._warned = self._pipeline.core.warning.state
             self._log_stuck()
             self._save_state()
         if not (self._active and self._enabled):
@@ -331,10 +330,10 @@ class EstimatorNode(LifecycleNode):
             self._arrival.write('reset\n')
         self._pipeline.reset()
         self._latest = None
-        self._stuck.clear()
+        self._warned = self._pipeline.core.warning.state
         if self._keeps_soil:
             soil_file.clear_state(self._soil_path)
-        self._publisher.publish_stuck(False)
+        self._publisher.publish_stuck(False, 0, again=True)  # so that listeners hear of the reset
         response.success = True
         response.message = 'state forgotten, parameters kept'
         self.get_logger().info('reset')
@@ -385,7 +384,7 @@ class EstimatorNode(LifecycleNode):
             self.get_logger().info(f'{path}: {len(kept)} parameters learned before')
         return kept
 
-    def _stuck_memory(self, configuration: Configuration) -> StuckMemory:
+    def _kept_warning(self) -> soil_file.StuckState:
         state = soil_file.StuckState()
         if self._keeps_soil:
             try:
@@ -394,8 +393,7 @@ class EstimatorNode(LifecycleNode):
                 self.get_logger().error(str(error))
         if state.stuck:
             self.get_logger().error(f'stuck before the restart: {state.reason}')
-        tuning = configuration.filter
-        return StuckMemory(state, float(tuning.stuck_clear_slip), float(tuning.stuck_clear_time))
+        return state
 
     def _save(self) -> bool:
         """Write what was learned; return whether there was anything."""
@@ -403,7 +401,7 @@ class EstimatorNode(LifecycleNode):
         learned = self._pipeline.core.learned()
         if learned:
             soil_file.write_values(self._soil_path, learned)
-        soil_file.write_state(self._soil_path, self._stuck.state)
+        soil_file.write_state(self._soil_path, self._warned)
         return bool(learned)
 
     def _save_quietly(self) -> None:
@@ -420,7 +418,7 @@ class EstimatorNode(LifecycleNode):
     def _save_state(self) -> None:
         if self._keeps_soil:
             try:
-                soil_file.write_state(self._soil_path, self._stuck.state)
+                soil_file.write_state(self._soil_path, self._warned)
             except UserError as error:
                 self.get_logger().error(str(error))
 
@@ -428,14 +426,13 @@ class EstimatorNode(LifecycleNode):
 
     def _say_stuck(self) -> None:
         if self._publisher is not None and self._active and self._enabled:
-            self._publisher.publish_stuck(self._stuck.state.stuck)
+            self._publisher.publish_stuck(self._warned.stuck, self._warned.direction)
 
     def _log_stuck(self) -> None:
-        state = self._stuck.state
-        if state.stuck:
-            self.get_logger().error(f'stuck: {state.reason}')
+        if self._warned.stuck:
+            self.get_logger().error(f'stuck: {self._warned.reason}')
         else:
-            self.get_logger().info(f'no longer stuck: {state.reason}')
+            self.get_logger().info(f'no longer stuck: {self._warned.reason}')
 
     def _say(self, stamp: Any, statuses: list[Status], now: float) -> None:
         """Publish diagnostics; log a change of the node's level."""

@@ -34,7 +34,7 @@ from rclpy.qos import QoSProfile
 from rclpy.serialization import deserialize_message
 from rclpy.utilities import try_shutdown
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Bool, UInt8MultiArray
+from std_msgs.msg import Bool, Int8, UInt8MultiArray
 
 from wheel_terra_estimator.bags.bag_file import BagFile
 from wheel_terra_estimator.bags.history import read_estimates
@@ -42,7 +42,14 @@ from wheel_terra_estimator.bags.raw_messages import RawMessage
 from wheel_terra_estimator.bags.reader import MeasurementReader, parse_remaps
 from wheel_terra_estimator.bags.storage import Bag, open_bag
 from wheel_terra_estimator.bags.truth import read_truth
-from wheel_terra_estimator.bags.writer import DIAGNOSTICS, NAMESPACE, STUCK, TOPICS
+from wheel_terra_estimator.bags.writer import (
+    DIAGNOSTICS,
+    LATCHED,
+    NAMESPACE,
+    STUCK,
+    STUCK_DIRECTION,
+    TOPICS,
+)
 from wheel_terra_estimator.configuration import reader as configuration_reader
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.errors import UserError
@@ -63,6 +70,7 @@ OUTPUT_MESSAGES = {
     f'{NAMESPACE}/slip_class': UInt8MultiArray,
     f'{NAMESPACE}/twist': TwistWithCovarianceStamped,
     STUCK: Bool,
+    STUCK_DIRECTION: Int8,
     DIAGNOSTICS: DiagnosticArray,  # the last: `_Player.wait_for_partners` relies on it
 }
 
@@ -134,7 +142,7 @@ def _node_arguments(parameters: Path, topics: Mapping[str, str], arrival: Path) 
     settings.update(
         (f'qos_overrides.{topic}.publisher.depth', QUEUE)
         for topic in OUTPUT_MESSAGES
-        if topic != STUCK
+        if topic not in LATCHED
     )
     arguments = ['--ros-args', '--params-file', str(parameters)]
     for name, value in settings.items():
@@ -188,7 +196,7 @@ class _Player(Node):
         }
         for topic, kind in OUTPUT_MESSAGES.items():
             profile = QoSProfile(depth=QUEUE)
-            if topic == STUCK:
+            if topic in LATCHED:
                 profile.durability = profile.durability.TRANSIENT_LOCAL
             self.create_subscription(kind, topic, self._keeper(topic), profile, raw=True)
 
@@ -305,7 +313,7 @@ def record(heard: Sequence[Heard], path: Path, start: int, overwrite: bool = Fal
         Whether an earlier bag is replaced.
     """
     log_time = start
-    with BagFile(path, TOPICS, latched=(STUCK,), overwrite=overwrite) as file:
+    with BagFile(path, TOPICS, latched=LATCHED, overwrite=overwrite) as file:
         for _, topic, data in heard:
             if topic == f'{NAMESPACE}/slip':
                 log_time = max(log_time, stamp_of(deserialize_message(data, JointState)))

@@ -13,7 +13,7 @@ from geometry_msgs.msg import TwistWithCovarianceStamped
 from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Bool, MultiArrayDimension, UInt8MultiArray
+from std_msgs.msg import Bool, Int8, MultiArrayDimension, UInt8MultiArray
 
 from wheel_terra_estimator.estimation.estimates import EstimateSet
 from wheel_terra_estimator.messages.cdr import JointStatePacker, TwistPacker
@@ -45,7 +45,7 @@ class EstimatePublisher:
     def __init__(self, node: Node, names: tuple[str, ...]) -> None:
         self._node = node
         self._names = names
-        self._stuck: bool | None = None
+        self._stuck: tuple[bool, int] | None = None
 
         def publisher(kind: type, topic: str, latched: bool = False):  # type: ignore[no-untyped-def]
             return node.create_publisher(
@@ -60,6 +60,7 @@ class EstimatePublisher:
         self._class_publisher = publisher(UInt8MultiArray, '~/slip_class')
         self._twist_publisher = publisher(TwistWithCovarianceStamped, '~/twist')
         self._stuck_publisher = publisher(Bool, '~/stuck', latched=True)
+        self._direction_publisher = publisher(Int8, '~/stuck_direction', latched=True)
         self._diagnostics_publisher = publisher(DiagnosticArray, '/diagnostics')
         # Bytes, as a recording has them: rclpy would check and convert every field.
         self._joint_states = JointStatePacker(BASE_FRAME)
@@ -75,6 +76,7 @@ class EstimatePublisher:
             self._class_publisher,
             self._twist_publisher,
             self._stuck_publisher,
+            self._direction_publisher,
             self._diagnostics_publisher,
         ):
             self._node.destroy_publisher(publisher)
@@ -99,16 +101,17 @@ class EstimatePublisher:
                 stamp, estimates.forward_velocity, estimates.yaw_rate, twist_covariance(estimates)
             )
             self._twist_publisher.publish(data)
-        self.publish_stuck(estimates.stuck)
+        self.publish_stuck(estimates.stuck, estimates.stuck_direction)
 
     def _publish_classes(self, estimates: EstimateSet) -> None:
         self._classes.data = array('B', estimates.slip_class.tolist())
         self._class_publisher.publish(self._classes)
 
-    def publish_stuck(self, stuck: bool) -> None:
-        """Publish the stuck warning if it is new."""
-        if stuck != self._stuck:
-            self._stuck = stuck
+    def publish_stuck(self, stuck: bool, direction: int, *, again: bool = False) -> None:
+        """Publish the stuck warning and the direction that led to it, if new or `again`."""
+        if again or (stuck, direction) != self._stuck:
+            self._stuck = stuck, direction
+            self._direction_publisher.publish(Int8(data=direction))
             self._stuck_publisher.publish(Bool(data=stuck))
 
     def publish_diagnostics(self, stamp: Time, statuses: Sequence[Status]) -> None:

@@ -47,6 +47,7 @@ FloatArray = NDArray[np.float64]
 
 _OF_THE_FILTER = (
     'stuck',
+    'stuck_direction',
     'stuck_probability',
     'time_to_stuck',
     'rim_travel_left',

@@ -37,6 +37,7 @@ class StuckAssessment(NamedTuple):
     reason: str = ''
     wheels: tuple[WheelForecast, ...] = ()
     stalled: tuple[bool, ...] = ()
+    direction: int = 0  # of the rims that led to it: 1, -1; 0 none, both or unknown
 
 
 class StuckState(NamedTuple):
@@ -47,6 +48,7 @@ class StuckState(NamedTuple):
     stuck: bool = False
     reason: str = ''
     clear_since: float = NAN  # [s]
+    direction: int = 0
 
 
 class StuckMonitor(Component[StuckState]):
@@ -82,16 +84,19 @@ class StuckMonitor(Component[StuckState]):
         self._observer.restore(self.state.observed)
         situation = self._observer.update(time, motion)
         since, raised = self._signs_at(time, situation)
-        stuck, reason, clear_since = self.state.stuck, self.state.reason, NAN
+        old = self.state
+        stuck, reason, direction, clear_since = old.stuck, old.reason, old.direction, NAN
         if raised:
-            reason = reason if stuck else in_words(raised[0], situation, self._tuning)
-            stuck = True
+            if not stuck:
+                reason = in_words(raised[0], situation, self._tuning)
+                stuck, direction = True, situation.led_by
         elif stuck:
             clear_since = self._clear_since(time, situation, since)
             if time - clear_since >= self._settings.clear_time:
-                stuck, reason, clear_since = False, '', NAN
-        self.state = StuckState(situation.observed, since, stuck, reason, clear_since)
-        return StuckAssessment(stuck, reason, situation.outlook.wheels, situation.stalled)
+                stuck, reason, direction, clear_since = False, '', 0, NAN
+        self.state = StuckState(situation.observed, since, stuck, reason, clear_since, direction)
+        wheels = situation.outlook.wheels
+        return StuckAssessment(stuck, reason, wheels, situation.stalled, direction)
 
     def _signs_at(self, time: float, situation: Situation) -> tuple[tuple[float, ...], list[Sign]]:
         """Return since when each sign is there, and the signs that have been for long enough."""

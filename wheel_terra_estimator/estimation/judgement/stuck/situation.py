@@ -54,6 +54,8 @@ class SituationTuning:
     stopping_share: float = 0.8  # of the fastest rim speed in it
     strained_torque: float = 0.5  # of the limit: two such wheels are held by the soil
     cruise_window: float = 5.0  # [s]
+    direction_memory: float = 0.5  # of the rims' direction [s] of turning: half a sign's hold time
+    direction_share: float = 0.75  # of the rim travel that must be one way
     least_deepening: float = 0.02  # sinkage per rim travel that counts as digging
     deepening_slip: float = 0.2
     deep: float = 0.5
@@ -123,6 +125,8 @@ class Observed(NamedTuple):
     typical: Window = ()  # typical rim speed over time
     deepening: tuple[Deepening, ...] = ()
     standing: tuple[bool, ...] = ()  # wheels that stand while others turn
+    travels: tuple[float, float] = (0.0, 0.0)
+    """Rim travel forward and backward of late [m]; kept while the rims stand."""
 
 
 @dataclass(frozen=True)
@@ -169,6 +173,13 @@ class Situation:
     def outlook(self) -> Outlook:
         """What lies ahead: probability, time and travel to an entrapment."""
         return outlook(self)
+
+    @property
+    def led_by(self) -> int:
+        """Direction in which the rims turned last: 1 forward, -1 backward, 0 both or none."""
+        forward, backward = self.observed.travels
+        least = self.tuning.direction_share * (forward + backward)
+        return (forward > least) - (backward > least)
 
     @property
     def speed_known(self) -> bool:
@@ -265,6 +276,7 @@ class SituationObserver(Component[Observed]):
             fastest=rims,
             standing=standing,
             typical=self._typical_rims(time, motion, moving),
+            travels=self._travels(dt, moving),
             deepening=self._deepened(
                 motion.wheels,
                 dt,
@@ -359,6 +371,17 @@ class SituationObserver(Component[Observed]):
             return self.state.typical
         typical = median([abs(w.rim_speed) for w in moving]) if moving else 0.0
         return appended(self.state.typical, time, typical, self._tuning.cruise_window)
+
+    def _travels(self, dt: float, moving: Sequence[WheelMotion]) -> tuple[float, float]:
+        if not moving:
+            return self.state.travels
+        forward, backward = self.state.travels
+        kept = math.exp(-dt / self._tuning.direction_memory)
+        share = dt / len(moving)
+        return (
+            kept * forward + share * sum([max(w.rim_speed, 0.0) for w in moving]),
+            kept * backward + share * sum([max(-w.rim_speed, 0.0) for w in moving]),
+        )
 
     def _deepened(
         self, wheels: Sequence[WheelMotion], dt: float, *, fresh: bool

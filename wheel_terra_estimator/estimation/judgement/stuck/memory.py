@@ -1,0 +1,108 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""The stuck warning over a new beginning: it stands until the rover has driven free of it.
+
+A new beginning is a restart of the node, a clock that stepped back, or a filter that failed: the
+rover stands where it stood, and the estimator knows nothing of it any more.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.configuration.soil_file import StuckState
+from wheel_terra_estimator.estimation.estimates import EstimateSet, SlipClass
+
+_SECOND = 1e-9
+_LONGEST_GAP = 1.0  # [s] between two sets of one drive
+
+
+class StuckMemory:
+    """Keeps a warning over a new beginning of the estimator.
+
+    Parameters
+    ----------
+    configuration : Configuration
+        Says when the rover is free: ``filter.stuck_clear_slip`` and ``filter.stuck_clear_time``.
+
+    Attributes
+    ----------
+    state : StuckState
+        The warning that stands.
+    """
+
+    def __init__(self, configuration: Configuration) -> None:
+        self.state = StuckState()
+        self._restored = False
+        self._free: tuple[int, int] | None = None  # stamps: since when, last seen
+        self.retune(configuration)
+
+    def retune(self, configuration: Configuration) -> None:
+        """Take over other tuning."""
+        self._clear_slip = float(configuration.filter.stuck_clear_slip)
+        self._clear_time = float(configuration.filter.stuck_clear_time)
+
+    def restore(self, state: StuckState) -> None:
+        """Take over a warning as it was written before."""
+        self.state = state
+        self.begin_anew()
+
+    def begin_anew(self) -> None:
+        """Hold the warning: the estimator starts without it."""
+        self._restored = self.state.stuck
+        self._free = None
+
+    def clear(self) -> None:
+        """Forget the warning."""
+        self.restore(StuckState())
+
+    def follow(self, estimates: EstimateSet) -> EstimateSet:
+        """Return the set with the warning that stands; take it over."""
+        if self._restored and self._is_clear(estimates):
+            self._restored = False
+        if self._restored:
+            words = f'rover: warned{self._age(estimates.stamp)} before a restart: '
+            held = f'; {words}{self.state.reason}'
+            reasons = tuple(
+                reason if estimates.stuck else reason + held for reason in estimates.reasons
+            )
+            direction = self.state.direction
+            return replace(estimates, stuck=True, stuck_direction=direction, reasons=reasons)
+        if estimates.stuck != self.state.stuck:
+            self.state = StuckState(
+                estimates.stuck, _reason(estimates), estimates.stamp, estimates.stuck_direction
+            )
+        return estimates
+
+    def _age(self, stamp: int) -> str:
+        age = (stamp - self.state.stamp) * _SECOND
+        return f' {age:.0f} s ago,' if self.state.stamp > 0 and age >= 0.0 else ''
+
+    def _is_clear(self, estimates: EstimateSet) -> bool:
+        """Whether the rover has moved with little slip for long enough; rest proves nothing."""
+        known = estimates.slip_class != SlipClass.UNKNOWN
+        free = (
+            not estimates.stuck
+            and bool(known.any())
+            and float(np.median(np.abs(estimates.slip[known]))) < self._clear_slip
+        )
+        if not free:
+            self._free = None
+            return False
+        stamp = estimates.stamp
+        if self._free is None or not 0 <= (stamp - self._free[1]) * _SECOND <= _LONGEST_GAP:
+            self._free = stamp, stamp
+        self._free = self._free[0], stamp
+        return (stamp - self._free[0]) * _SECOND >= self._clear_time
+
+
+def _reason(estimates: EstimateSet) -> str:
+    """Return why the warning stands, in words."""
+    for reason in estimates.reasons:
+        _, mark, words = reason.partition('rover: ')
+        if mark:
+            return words
+    return 'entrapment under way or close ahead' if estimates.stuck else 'moving freely'
