@@ -9,6 +9,8 @@ import setuptools
 from setuptools import find_packages, setup
 
 PACKAGE = 'wheel_terra_estimator'
+LABORATORY = 'wheel_terra_lab'
+"""What proves the estimator; it imports the package, never the reverse."""
 HERE = Path(__file__).resolve().parent
 SHARED = ('config', 'data', 'launch', 'layouts')
 """Folders of files that are installed as they are; one that is absent is passed over."""
@@ -66,9 +68,10 @@ def shared_files() -> list[tuple[str, list[str]]]:
 setup(
     name=PACKAGE,
     version=version(),
-    packages=find_packages(include=[PACKAGE, f'{PACKAGE}.*']),
+    packages=find_packages(include=[PACKAGE, f'{PACKAGE}.*', LABORATORY, f'{LABORATORY}.*']),
     package_data={
-        PACKAGE: ['py.typed', '**/*.html', '**/*.json', '**/*.csv', '**/*.npz', '**/*.js']
+        PACKAGE: ['py.typed', '**/*.html', '**/*.json', '**/*.csv', '**/*.npz', '**/*.js'],
+        LABORATORY: ['py.typed', '**/*.html', '**/*.csv'],
     },
     data_files=shared_files(),
     zip_safe=False,
@@ -131,6 +134,10 @@ setup(
             'wheel-terra = wheel_terra_estimator.cli.main:main',
             'estimator_node = wheel_terra_estimator.ros.estimator_node:main',
             'traction_limiter_node = wheel_terra_estimator.ros.traction_limiter_node:main',
+        ],
+        'wheel_terra_estimator.commands': [
+            f'{name} = {LABORATORY}.cli.{name}'
+            for name in ('trial', 'soilbin', 'evaluate', 'bench')
         ],
     },
 )

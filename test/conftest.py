@@ -29,8 +29,8 @@ LONGEST = (
     'ros',
     'discrepancy',
     'estimation/test_wheel_soil_estimator.py',
-    'soilbin/test_engine.py',
-    'evaluation/test_closed_loop.py',
+    'lab/soilbin/test_engine.py',
+    'lab/evaluation/test_closed_loop.py',
 )
 """Files and folders that begin first, so that no worker ends long after the others."""
 

@@ -5,13 +5,9 @@
 from __future__ import annotations
 
 import struct
-import sys
 from collections.abc import Iterator
-from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / 'tools'))
-
-from fuzzing import mcap_maker as maker
+from wheel_terra_lab.studies.fuzzing import mcap_maker as maker
 
 TYPES = {'/joint_states': 'sensor_msgs/msg/JointState'}
 

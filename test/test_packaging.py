@@ -19,7 +19,9 @@ from wheel_terra_estimator.configuration import reader, shipped
 ROOT = Path(__file__).resolve().parents[1]
 NAME = 'wheel_terra_estimator'
 SOURCES = sorted(
-    path for top in (NAME, 'test', 'tools', 'launch') for path in (ROOT / top).rglob('*.py')
+    path
+    for top in (NAME, 'wheel_terra_lab', 'test', 'tools', 'launch')
+    for path in (ROOT / top).rglob('*.py')
 )
 
 

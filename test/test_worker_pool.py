@@ -16,7 +16,7 @@ from typing import Any
 import pytest
 
 from wheel_terra_estimator.cli.main import main
-from wheel_terra_estimator.evaluation import bench, tables
+from wheel_terra_lab.evaluation import bench, tables
 
 PROGRAM = """
 import os, sys, time

@@ -16,7 +16,7 @@ import numpy as np
 from wheel_terra_estimator.api import plot_diagnosis
 from wheel_terra_estimator.cli.demo import TRIAL_SEED
 from wheel_terra_estimator.reporting.style import LINE_COLOURS, picture_style
-from wheel_terra_estimator.trials import trial
+from wheel_terra_lab.trials import trial
 
 IMAGE = Path(__file__).resolve().parents[1] / 'docs' / 'images' / 'diagnosis.png'
 

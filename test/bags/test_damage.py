@@ -13,15 +13,14 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
-import fuzzing_tools  # noqa: F401
 import pytest
-from fuzzing.mcap_maker import Layout, Sample, make
 
 from wheel_terra_estimator.bags.limits import Limits
 from wheel_terra_estimator.bags.raw_messages import RawMessage
 from wheel_terra_estimator.bags.storage import open_bag
 from wheel_terra_estimator.cli.main import main
 from wheel_terra_estimator.errors import UserError
+from wheel_terra_lab.studies.fuzzing.mcap_maker import Layout, Sample, make
 
 DEMO = next(Path(__file__).resolve().parents[2].glob('**/demo/entrapment'), Path('absent'))
 TYPES = {'/joint_states': 'sensor_msgs/msg/JointState', '/imu/data': 'sensor_msgs/msg/Imu'}

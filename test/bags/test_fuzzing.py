@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Some hundred damaged inputs; any number of them by hand with ``tools/fuzz_files.py``."""
+"""Some hundred damaged inputs; any number: ``python -m wheel_terra_lab.studies.fuzz_files``."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ import random
 from pathlib import Path
 from typing import Any
 
-import fuzzing_tools  # noqa: F401
 import pytest
-from fuzz_files import fuzz
-from fuzzing import cases
-from fuzzing.mcap_maker import Layout, make
+
+from wheel_terra_lab.studies.fuzz_files import fuzz
+from wheel_terra_lab.studies.fuzzing import cases
+from wheel_terra_lab.studies.fuzzing.mcap_maker import Layout, make
 
 
 def test_damaged_inputs_of_all_kinds() -> None:

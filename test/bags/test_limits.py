@@ -8,14 +8,13 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-import fuzzing_tools  # noqa: F401
 import pytest
-from fuzzing.cases import _real_messages
-from fuzzing.mcap_maker import Layout, Sample, make
 
 from wheel_terra_estimator.bags import limits, storage
 from wheel_terra_estimator.cli.main import main
 from wheel_terra_estimator.errors import UserError
+from wheel_terra_lab.studies.fuzzing.cases import _real_messages
+from wheel_terra_lab.studies.fuzzing.mcap_maker import Layout, Sample, make
 
 TYPES = {'/joint_states': 'sensor_msgs/msg/JointState', '/imu/data': 'sensor_msgs/msg/Imu'}
 

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import importlib
 import shlex
 import types
 
@@ -108,7 +107,7 @@ def test_red_on_a_terminal_only(broken, monkeypatch, capsys):
 
 def examples():
     for name in main.COMMANDS:
-        module = importlib.import_module(f'wheel_terra_estimator.cli.{name}')
+        module = main.command_module(name)
         for line in getattr(module, 'EXAMPLES', ()):
             yield pytest.param(line, id=line[:40])
 

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import campaign_tools  # noqa: F401
 import numpy as np
 import pytest
 
@@ -14,10 +13,10 @@ from wheel_terra_estimator.discrepancy.tables.checks import check_table
 from wheel_terra_estimator.discrepancy.workflow import diagnose
 from wheel_terra_estimator.estimation.core import EstimatorCore
 from wheel_terra_estimator.estimation.measurements import SinkageReading
-from wheel_terra_estimator.evaluation.runner import inputs_of_mode
 from wheel_terra_estimator.simulation import drive, scenario
-from wheel_terra_estimator.trials.hidden import LISTED
-from wheel_terra_estimator.trials.truth import OUTPUTS, TrueSoil, solve
+from wheel_terra_lab.evaluation.runner import inputs_of_mode
+from wheel_terra_lab.trials.hidden import LISTED
+from wheel_terra_lab.trials.truth import OUTPUTS, TrueSoil, solve
 
 FILES = ['generic_six_wheel', 'hit_lss1']
 LUGS = 'wheels.lug_height:=[0.015, 0.015, 0.015, 0.015, 0.015, 0.015]'

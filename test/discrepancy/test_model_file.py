@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import csv
 
-import campaign_tools  # noqa: F401
 import numpy as np
 import pytest
 from test_workflow import make

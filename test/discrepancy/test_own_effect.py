@@ -7,14 +7,13 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-import campaign_tools  # noqa: F401
 import numpy as np
 import pytest
-from campaigns import Plan, make_campaign
 
 from wheel_terra_estimator.cli.main import main
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.terramechanics import effects
+from wheel_terra_lab.studies.campaigns import Plan, make_campaign
 
 EXAMPLE = Path(__file__).parents[2] / 'docs' / 'discrepancy' / 'examples' / 'side_drag.py'
 

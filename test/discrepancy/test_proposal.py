@@ -4,10 +4,8 @@
 
 from __future__ import annotations
 
-import campaign_tools  # noqa: F401
 import numpy as np
 import pytest
-from campaigns.scoring import diagnose as diagnose_campaign
 from test_model_file import predicted
 from test_workflow import make, run
 
@@ -25,7 +23,8 @@ from wheel_terra_estimator.terramechanics.model import WheelSoilModel
 from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
 from wheel_terra_estimator.terramechanics.soil import Soil
 from wheel_terra_estimator.terramechanics.wheel import Wheel
-from wheel_terra_estimator.trials.campaign import Plan, make_campaign
+from wheel_terra_lab.studies.campaigns.scoring import diagnose as diagnose_campaign
+from wheel_terra_lab.trials.campaign import Plan, make_campaign
 
 QUANTITIES = ('sinkage', 'drawbar_pull', 'torque')
 SHARE = 0.06  # of load times radius per decade of rim speed

@@ -12,11 +12,9 @@ from dataclasses import replace
 from html.parser import HTMLParser
 from types import SimpleNamespace
 
-import campaign_tools  # noqa: F401
 import matplotlib as mpl
 import numpy as np
 import pytest
-from campaigns import Plan, make_campaign, scoring
 
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.discrepancy import decision
@@ -26,6 +24,7 @@ from wheel_terra_estimator.discrepancy.report.model_file import write_model
 from wheel_terra_estimator.discrepancy.report.page import SOIL_WORDS, _cards, number, write_report
 from wheel_terra_estimator.discrepancy.result import QuantityGap
 from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES
+from wheel_terra_lab.studies.campaigns import Plan, make_campaign, scoring
 
 
 class Page(HTMLParser):

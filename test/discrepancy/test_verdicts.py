@@ -4,10 +4,8 @@
 
 from __future__ import annotations
 
-import campaign_tools  # noqa: F401
 import numpy as np
 import pytest
-from campaigns.scoring import diagnose as diagnose_campaign
 from test_workflow import make, run
 
 from wheel_terra_estimator.configuration import reader
@@ -21,7 +19,8 @@ from wheel_terra_estimator.discrepancy.workflow import Options, diagnose, operat
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.terramechanics.effects import catalogue
 from wheel_terra_estimator.terramechanics.model import WheelSoilModel
-from wheel_terra_estimator.trials.campaign import Plan, make_campaign
+from wheel_terra_lab.studies.campaigns.scoring import diagnose as diagnose_campaign
+from wheel_terra_lab.trials.campaign import Plan, make_campaign
 
 
 def with_effect(design, seed, name, **parameters):

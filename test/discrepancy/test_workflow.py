@@ -9,11 +9,8 @@ import functools
 import json
 import re
 
-import campaign_tools  # noqa: F401
 import numpy as np
 import pytest
-from campaigns.groups import GROUPS
-from campaigns.scoring import diagnose as diagnose_campaign
 
 from wheel_terra_estimator.cli.main import main
 from wheel_terra_estimator.configuration import reader
@@ -24,10 +21,12 @@ from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES
 from wheel_terra_estimator.discrepancy.workflow import Options, diagnose, operating_points
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.terramechanics.model import WheelSoilModel
-from wheel_terra_estimator.trials.campaign import make_campaign
-from wheel_terra_estimator.trials.designs import random_rows, random_soil
-from wheel_terra_estimator.trials.hidden import LISTED, OUTSIDE, SmoothError
-from wheel_terra_estimator.trials.truth import OUTPUTS, TrueSoil, solve
+from wheel_terra_lab.studies.campaigns.groups import GROUPS
+from wheel_terra_lab.studies.campaigns.scoring import diagnose as diagnose_campaign
+from wheel_terra_lab.trials.campaign import make_campaign
+from wheel_terra_lab.trials.designs import random_rows, random_soil
+from wheel_terra_lab.trials.hidden import LISTED, OUTSIDE, SmoothError
+from wheel_terra_lab.trials.truth import OUTPUTS, TrueSoil, solve
 
 SHARE = {'sinkage': 0.02, 'drawbar_pull': 0.015, 'torque': 0.015}  # noise over the range
 

@@ -66,7 +66,7 @@ CLOSED = (
     r'INTERFACE\.md',
 )
 """Sources that a reader cannot open."""
-SOURCES = ('wheel_terra_estimator', 'config', 'launch', 'tools')
+SOURCES = ('wheel_terra_estimator', 'wheel_terra_lab', 'config', 'launch', 'tools')
 
 
 @pytest.mark.parametrize('name', NAMES)

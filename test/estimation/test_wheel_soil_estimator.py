@@ -20,10 +20,10 @@ from wheel_terra_estimator.estimation.measurements import (
     WheelOdometry,
 )
 from wheel_terra_estimator.estimation.wheel_soil_estimator import WheelSoilEstimator
-from wheel_terra_estimator.evaluation import kinds
-from wheel_terra_estimator.evaluation.runner import inputs_of_mode
 from wheel_terra_estimator.simulation.drive import simulate
 from wheel_terra_estimator.simulation.scenario import load
+from wheel_terra_lab.evaluation import kinds
+from wheel_terra_lab.evaluation.runner import inputs_of_mode
 
 NAMES = {
     WheelOdometry: 'wheel_odometry',

@@ -178,9 +178,9 @@ def test_two_runs_over_an_hour_on_one_time_axis(comparison_report: Path) -> None
 
 @pytest.fixture(scope='module')
 def soilbin_report(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    from wheel_terra_estimator.soilbin import report
-    from wheel_terra_estimator.soilbin.bookkeeping import SERIES
-    from wheel_terra_estimator.soilbin.case import Case
+    from wheel_terra_lab.soilbin import report
+    from wheel_terra_lab.soilbin.bookkeeping import SERIES
+    from wheel_terra_lab.soilbin.case import Case
 
     series = np.random.default_rng(1).random((200, len(SERIES)))
     series[:, 0] = np.linspace(0.0, 40.0, 200)
@@ -191,8 +191,8 @@ def soilbin_report(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope='module')
 def limiter_report(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    from wheel_terra_estimator.evaluation import page
-    from wheel_terra_estimator.evaluation.closed_loop import ClosedLoopDrive, Comparison, report
+    from wheel_terra_lab.evaluation import page
+    from wheel_terra_lab.evaluation.closed_loop import ClosedLoopDrive, Comparison, report
 
     time = np.linspace(0.0, 90.0, 900)
     wheels = np.outer(time / 90.0, np.ones(6))

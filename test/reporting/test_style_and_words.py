@@ -155,7 +155,7 @@ def test_every_figure_is_drawn_in_the_one_style() -> None:
 
     root = Path(__file__).resolve().parents[2]
     makers = []
-    for folder in ('wheel_terra_estimator', 'tools'):
+    for folder in ('wheel_terra_estimator', 'wheel_terra_lab', 'tools'):
         for path in sorted((root / folder).rglob('*.py')):
             text = path.read_text(encoding='utf-8')
             if 'figsize=' in text:

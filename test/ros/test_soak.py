@@ -5,11 +5,9 @@
 import random
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
-TOOLS = Path(__file__).resolve().parents[2] / 'tools'
 ONE_FAULT = 0.1  # [s]: no second one begins
 
 
@@ -18,9 +16,8 @@ def soak(node_server, monkeypatch):
     """The program's module, with nodes from the server."""
     import rclpy
 
-    monkeypatch.syspath_prepend(str(TOOLS))
-    import soak
-    from live_rover import Process
+    from wheel_terra_lab.studies import soak
+    from wheel_terra_lab.studies.live_rover import Process
 
     class Forked(Process):
         def __init__(self, arguments):
@@ -45,7 +42,15 @@ def test_numbers_that_are_none_are_told_and_recovered_from(soak, tmp_path, monke
 
 @pytest.mark.slow
 def test_no_fault_ends_the_node_and_all_are_recovered_from():
-    command = [sys.executable, str(TOOLS / 'soak.py'), '--minutes', '2', '--seed', '3']
+    command = [
+        sys.executable,
+        '-m',
+        'wheel_terra_lab.studies.soak',
+        '--minutes',
+        '2',
+        '--seed',
+        '3',
+    ]
     done = subprocess.run(command, capture_output=True, text=True, timeout=280, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
     assert 'Traceback' not in done.stderr

@@ -4,23 +4,25 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 import yaml
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / 'tools'))
-
-from discrepancy_demonstrations import cmu_fitted
-from model_validation import cmu_wheel, ding_statements, grc3_wheel, hit_wheels, shipped_soils
-from model_validation.fitting import Misfit, deviations, fit
-
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.configuration.shipped import configuration_folder
 from wheel_terra_estimator.discrepancy.report.files import write_files
 from wheel_terra_estimator.discrepancy.workflow import diagnose
+from wheel_terra_lab.studies.discrepancy_demonstrations import cmu_fitted
+from wheel_terra_lab.studies.model_validation import (
+    cmu_wheel,
+    ding_statements,
+    grc3_wheel,
+    hit_wheels,
+    shipped_soils,
+)
+from wheel_terra_lab.studies.model_validation.fitting import Misfit, deviations, fit
 
 pytestmark = pytest.mark.shared
 

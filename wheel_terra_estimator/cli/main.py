@@ -40,10 +40,14 @@ COMMANDS = {
 }
 """Sub-commands in the order of the help, and what each is for.
 
-The module of that name has add_arguments(parser) and run(arguments) -> exit status, and may have
-EXAMPLES (command lines for its help). Only that of the command that is asked for is imported, and
-it imports heavy libraries inside run.
+The module of that name, here or in the laboratory, has add_arguments(parser) and run(arguments) ->
+exit status, and may have EXAMPLES (command lines for its help). Only that of the command that is
+asked for is imported, and it imports heavy libraries inside run.
 """
+LABORATORY = frozenset({'trial', 'soilbin', 'evaluate', 'bench'})
+"""Sub-commands of the package wheel_terra_lab, which a robot does without."""
+ENTRY_POINTS = 'wheel_terra_estimator.commands'
+"""Group of entry points that names the modules of these."""
 
 UNUSABLE_INPUT = 2
 PROGRAM_ERROR = 3
@@ -74,12 +78,12 @@ class Parser(argparse.ArgumentParser):
 
 def build_parser() -> argparse.ArgumentParser:
     """Return the parser of all sub-commands."""
-    return _parsers(COMMANDS)[0]
+    return _parsers(_commands_here())[0]
 
 
 def sub_parsers() -> dict[str, argparse.ArgumentParser]:
     """Return sub-command -> its parser."""
-    return _parsers(COMMANDS)[1]
+    return _parsers(_commands_here())[1]
 
 
 def _parsers(needed: Container[str]) -> tuple[Parser, dict[str, argparse.ArgumentParser]]:
@@ -108,8 +112,43 @@ def _parsers(needed: Container[str]) -> tuple[Parser, dict[str, argparse.Argumen
             formatter_class=argparse.RawDescriptionHelpFormatter,
         )
         if name in needed:
-            _add_arguments(sub, importlib.import_module(f'wheel_terra_estimator.cli.{name}'))
+            _add_arguments(sub, command_module(name))
     return parser, dict(commands.choices)
+
+
+def command_module(name: str) -> Any:
+    """Return the module of a sub-command.
+
+    Raises
+    ------
+    UserError
+        If it belongs to the laboratory, and that is not installed.
+    """
+    if name not in LABORATORY:
+        return importlib.import_module(f'wheel_terra_estimator.cli.{name}')
+    from importlib.metadata import entry_points  # 30 ms that most commands do without
+
+    try:
+        (entry,) = entry_points(group=ENTRY_POINTS, name=name)
+        return entry.load()
+    except (ValueError, ModuleNotFoundError) as error:
+        if not (getattr(error, 'name', None) or 'wheel_terra_lab').startswith('wheel_terra_lab'):
+            raise
+        raise UserError(
+            'the laboratory (package wheel_terra_lab) is not installed here; it comes with '
+            'wheel_terra_estimator from pip or colcon, unless it was left out'
+        ) from None
+
+
+def _commands_here() -> Container[str]:
+    """Return the sub-commands whose modules are installed."""
+    here = set(COMMANDS)
+    for name in LABORATORY:
+        try:
+            command_module(name)
+        except UserError:
+            here.discard(name)
+    return here
 
 
 def _add_arguments(parser: argparse.ArgumentParser, module: Any) -> None:
@@ -126,7 +165,7 @@ def _needed(words: Sequence[str]) -> Container[str]:
     """Return the sub-commands whose arguments a command line needs."""
     named = [word for word in words if word in COMMANDS][:1]
     if not named and any(word.startswith('--p') for word in words):
-        return COMMANDS
+        return _commands_here()
     return named
 
 
@@ -163,6 +202,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         _complain('wheel-terra: interrupted')
         return INTERRUPTED
+    except UserError as error:
+        _complain(f'wheel-terra {next(word for word in words if word in COMMANDS)}: {error}')
+        return UNUSABLE_INPUT
     if unknown:
         _refuse(unknown[0], subs[arguments.command])
     try:

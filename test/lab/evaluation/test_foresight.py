@@ -1,0 +1,90 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Reliability and Brier score against hand-made outcomes."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from wheel_terra_estimator.estimation.judgement.stuck.settings import StuckSettings
+from wheel_terra_lab.evaluation.foresight import (
+    Foresight,
+    brier,
+    brier_interval,
+    entrapments,
+    foresight,
+    reliability,
+    reliability_error,
+)
+
+STEP = 0.1
+
+
+def drive(slips, rim=0.1, probability=0.0):
+    """A drive of two wheels with the same slip, one row in a tenth of a second."""
+    slips = np.asarray(slips, dtype=float)
+    stamp = 10**9 + np.arange(slips.size) * round(STEP * 1e9)
+    truth = SimpleNamespace(
+        stamp=stamp,
+        slip=np.column_stack([slips, slips]),
+        wheel_rate=np.full((slips.size, 2), rim / 0.1),
+    )
+    record = SimpleNamespace(
+        stamp=stamp,
+        stuck=np.zeros(slips.size, dtype=bool),
+        stuck_probability=np.full((slips.size, 2), probability),
+    )
+    return foresight(truth, record, np.full(2, 0.1), StuckSettings(horizon=15.0, travel=0.3))
+
+
+def test_only_what_lasts_a_second_is_an_entrapment():
+    slip = np.full((100, 3), 0.2)
+    slip[20:25] = 0.95  # half a second
+    slip[40:60] = 0.95
+    slip[70:90, :1] = 1.0  # one wheel of three
+    slip[95:] = np.nan
+    begins, under_way = entrapments(np.arange(100) * STEP, slip)
+    assert begins.tolist() == [40]
+    assert np.flatnonzero(under_way).tolist() == list(range(40, 60))
+
+
+def test_braking_is_no_entrapment():
+    begins, _ = entrapments(np.arange(100) * STEP, np.full((100, 2), -1.0))
+    assert not begins.size
+
+
+def test_the_event_lies_within_the_horizon():
+    slips = np.full(600, 0.2)
+    slips[500:] = 0.95
+    found = drive(slips)
+    # From 10 s to the entrapment at 50 s, twice a second; the last 15 s of it see it come.
+    assert found.came.size == pytest.approx(80, abs=1)
+    assert found.came.sum() == pytest.approx(30, abs=1)
+    # A crawling rover: 0.3 m of rim travel last 30 s.
+    assert drive(slips, rim=0.01).came.sum() == pytest.approx(60, abs=1)
+
+
+def test_rows_whose_outcome_nobody_saw_are_not_scored():
+    found = drive(np.full(600, 0.2))
+    assert found.came.size == pytest.approx(70, abs=1)  # 10 s to 45 s of 60 s
+    assert not found.came.any()
+
+
+def test_a_calibrated_probability_is_reliable_and_beats_a_warning():
+    rng = np.random.default_rng(3)
+    said = rng.uniform(size=20_000)
+    came = (rng.uniform(size=said.size) < said).astype(float)
+    data = Foresight(said, (said > 0.5).astype(float), came)
+    assert reliability_error(data) < 0.015
+    assert len(reliability(data)) == 10
+    # E[p (1 - p)] of a uniform p is 1/6; of the warning E[min(p, 1 - p)] = 1/4.
+    assert brier(data.probability, came) == pytest.approx(1.0 / 6.0, abs=5e-3)
+    parts = [
+        Foresight(*(a[i::10] for a in (data.probability, data.warned, came))) for i in range(10)
+    ]
+    found = brier_interval(parts)
+    assert found['warning'][0] == pytest.approx(0.25, abs=0.01)
+    assert found['difference'][2] < 0.0
+    low = Foresight(np.full(100, 0.1), np.zeros(100), np.ones(100))
+    assert reliability_error(low) == pytest.approx(0.9)

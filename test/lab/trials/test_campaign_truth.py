@@ -1,0 +1,260 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Two implementations of the same physics: the campaigns' quadrature and the package's."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from scipy.optimize import brentq
+
+from wheel_terra_estimator.terramechanics.model import WheelSoilModel
+from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
+from wheel_terra_estimator.terramechanics.soil import Soil
+from wheel_terra_estimator.terramechanics.wheel import Wheel
+from wheel_terra_lab.studies.campaigns import DESIGNS, Plan, make_campaign
+from wheel_terra_lab.trials.designs import random_rows, random_soil
+from wheel_terra_lab.trials.detectability import Ruler
+from wheel_terra_lab.trials.forms import FORMS
+from wheel_terra_lab.trials.hidden import LISTED, OTHER, OUTSIDE, SmoothError
+from wheel_terra_lab.trials.truth import OUTPUTS, TrueSoil, solve
+
+# Main parameter of each effect in the package's catalogue, and its second one where it has any.
+PARAMETERS = {
+    'pull_zero': 'offset',
+    'pull_gain': 'gain',
+    'torque_gain': 'gain',
+    'sinkage_gain': 'gain',
+    'slip_sinkage_exponent': 'n1',
+    'lug_digging': 'kd',
+    'lug_support': 'dz4',
+    'lug_shear_radius': 'lam',
+    'soil_mound': 'kappa',
+    'stress_peak_shift': 'c2',
+    'slope_gravity': 'share',
+    'bulldozing': 'kb',
+    'cohesion': 'delta',
+    'multipass': 'stiffening',
+    'rate_dependence': 'bearing',
+    'hard_layer': 'stiffness',
+    'drivetrain_friction': 'torque',
+    'wheel_radius_bias': 'bias',
+    'sinkage_offset': 'offset',
+    'pitch_bias': 'bias',
+}
+FORM_PARAMETERS = {
+    'slip_sinkage_exponent:lyasko': 'gain',
+    'slip_sinkage_exponent:load': 'nw',
+    'lug_digging:saturating': 'kd',
+    'lug_support:by_height': 'share',
+    'bulldozing:terzaghi': 'kb',
+    'multipass:rut': 'rut',
+    'hard_layer:bearing': 'stiffness',
+    'stress_peak_shift:backward': 'retreat',
+    'drivetrain_friction:proportional': 'share',
+    'drivetrain_friction:viscous': 'damping',
+    'grouser_thrust': 'share',
+    'grouser_thrust:textbook': 'share',
+    'rim_friction': 'loss',
+    'wheel_flexibility': 'compliance',
+    'soil_adhesion': 'thickness',
+    'soil_adhesion:tension': 'tension',
+    'soil_transport': 'fill',
+    'shear_deformation:pressure': 'growth',
+}
+
+
+def package(rows, soil: TrueSoil, effects) -> dict[str, np.ndarray]:
+    fields = (
+        'cohesive_modulus',
+        'frictional_modulus',
+        'sinkage_exponent',
+        'cohesion',
+        'friction_angle',
+        'shear_modulus',
+        'peak_stress_ratio',
+        'leaving_angle_ratio',
+        'density',
+    )
+    wheel = Wheel(
+        radius=rows['wheel_radius'],
+        width=rows['wheel_width'],
+        lug_height=rows['lug_height'],
+        lug_count=rows['lug_count'],
+    )
+    points = OperatingPoints(
+        slip=rows['slip'],
+        normal_load=rows['normal_load'],
+        wheel=wheel,
+        slope=rows['slope'],
+        gravity=rows['gravity'],
+        angular_velocity=rows['angular_velocity'],
+        pass_number=rows['pass_number'],
+    )
+    model = WheelSoilModel(Soil(**{name: getattr(soil, name) for name in fields}), effects)
+    state = model.steady_state(points)
+    return {key: getattr(state, key) for key in OUTPUTS}
+
+
+def assert_close(ours, theirs, rows, share):
+    """Agreement as a share of radius, load and load times radius."""
+    scale = {
+        'sinkage': rows['wheel_radius'],
+        'drawbar_pull': rows['normal_load'],
+        'torque': rows['normal_load'] * rows['wheel_radius'],
+    }
+    for key in OUTPUTS:
+        np.testing.assert_array_less(np.abs(ours[key] - theirs[key]) / scale[key], share, key)
+
+
+@pytest.mark.parametrize('row', [0, 5, 40])
+def test_truth_is_the_integral_of_the_printed_stresses(row):
+    """Third derivation: scipy's adaptive quadrature and Brent's root, one scalar at a time."""
+    rng = np.random.default_rng(3)
+    soil = random_soil(rng)
+    rows = random_rows('full56', rng, soil)
+    one = {key: value[row : row + 1] for key, value in rows.items()}
+    got = solve(one, soil)
+    r, b, h, s = (float(one[k][0]) for k in ('wheel_radius', 'wheel_width', 'lug_height', 'slip'))
+    k = soil.cohesive_modulus / b + soil.frictional_modulus
+    advance = (1 - s) * (r + h)
+
+    def normal(t, t1):
+        tm, t2 = soil.peak_stress_ratio * t1, soil.leaving_angle_ratio * t1
+        te = t if t >= tm else t1 - (t - t2) * (t1 - tm) / (tm - t2)
+        return k * (r * max(np.cos(te) - np.cos(t1), 0.0)) ** soil.sinkage_exponent
+
+    def shear(t, t1):
+        j = r * (t1 - t) - advance * (np.sin(t1) - np.sin(t))
+        limit = soil.cohesion + normal(t, t1) * np.tan(soil.friction_angle)
+        return limit * np.sign(j) * (1 - np.exp(-abs(j) / soil.shear_modulus))
+
+    def integral(f, t1):
+        tm, t2 = soil.peak_stress_ratio * t1, soil.leaving_angle_ratio * t1
+        return sum(quad(f, *ends, args=(t1,), limit=200)[0] for ends in ((t2, tm), (tm, t1)))
+
+    def missing_load(t1):
+        up = integral(lambda t, t1: normal(t, t1) * np.cos(t) + shear(t, t1) * np.sin(t), t1)
+        return b * r * up - one['normal_load'][0]
+
+    t1 = brentq(missing_load, 0.01, 1.3, xtol=1e-10)
+    pull = b * r * integral(lambda t, t1: shear(t, t1) * np.cos(t) - normal(t, t1) * np.sin(t), t1)
+    assert got['sinkage'][0] == pytest.approx(r * (1 - np.cos(t1)), rel=1e-6)
+    assert got['drawbar_pull'][0] == pytest.approx(pull, rel=1e-4, abs=1e-4)
+    assert got['torque'][0] == pytest.approx(b * r * r * integral(shear, t1), rel=1e-4, abs=1e-5)
+
+
+@pytest.mark.parametrize('design', DESIGNS)
+def test_package_agrees_without_effects(design):
+    rng = np.random.default_rng(11)
+    soil = random_soil(rng)
+    rows = random_rows(design, rng, soil)
+    assert_close(solve(rows, soil), package(rows, soil, {}), rows, 2e-4)
+
+
+@pytest.mark.parametrize('name', sorted(LISTED))
+def test_package_agrees_with_each_effect(name):
+    rng = np.random.default_rng(5)
+    soil = random_soil(rng)
+    rows = random_rows('full56', rng, soil)
+    kind = LISTED[name]
+    size = kind.typical(rows, soil)
+    hidden = kind.make(size, 0.4, rows, soil)
+    values = {PARAMETERS[name]: size, **hidden.second}
+    base, with_it = solve(rows, soil), solve(rows, soil, (hidden,))
+    change = max(np.max(np.abs(with_it[key] - base[key])) for key in OUTPUTS)
+    assert change > 1e-4, 'the effect does nothing'
+    # The package blends the top of the layer over a millimetre and saturates the mound below the
+    # hub; the campaigns do neither.
+    share = {'hard_layer': 1e-2, 'soil_mound': 2e-3}.get(name, 3e-4)
+    assert_close(with_it, package(rows, soil, {name: values}), rows, share)
+
+
+@pytest.mark.parametrize('key', sorted(FORMS))
+def test_package_agrees_with_each_form(key):
+    rng = np.random.default_rng(5)
+    soil = random_soil(rng)
+    rows = random_rows('full56', rng, soil)
+    kind = FORMS[key]
+    size = kind.typical(rows, soil)
+    hidden = kind.make(size, 0.4, rows, soil)
+    name, _, form = key.partition(':')
+    base, with_it = solve(rows, soil), solve(rows, soil, (hidden,))
+    change = max(np.max(np.abs(with_it[key] - base[key])) for key in OUTPUTS)
+    assert change > 1e-4, 'the form does nothing'
+    values = {FORM_PARAMETERS[key]: size, **hidden.second, **({'form': form} if form else {})}
+    # The top of a layer is blended over a millimetre in the package alone.
+    share = {'hard_layer:bearing': 1e-2}.get(key, 1e-3)
+    assert_close(with_it, package(rows, soil, {name: values}), rows, share)
+
+
+def test_strangers_and_other_formulas_change_the_outputs():
+    rng = np.random.default_rng(8)
+    soil = random_soil(rng)
+    rows = random_rows('full56', rng, soil)
+    base = solve(rows, soil)
+    for catalogue in (OTHER, OUTSIDE):
+        for name, kind in catalogue.items():
+            effect = kind.make(kind.typical(rows, soil), 0.6, rows, soil)
+            out = solve(rows, soil, (effect,))
+            changed = [np.max(np.abs(out[key] - base[key])) > 1e-6 for key in OUTPUTS]
+            assert any(changed), name
+            assert all(np.all(np.isfinite(out[key])) for key in OUTPUTS), name
+
+
+def test_other_formulas_are_other_formulas():
+    rng = np.random.default_rng(9)
+    soil = random_soil(rng)
+    rows = random_rows('full56', rng, soil)
+    for name, kind in OTHER.items():
+        size = kind.typical(rows, soil)
+        other = solve(rows, soil, (kind.make(size, 0.6, rows, soil),))
+        listed = solve(rows, soil, (LISTED[name].make(size, 0.6, rows, soil),))
+        assert any(np.max(np.abs(other[key] - listed[key])) > 1e-6 for key in OUTPUTS), name
+
+
+def test_same_seed_same_campaign_and_noise_as_asked():
+    plan = Plan(hide='one', noise='t', outliers=0.05, missing=0.1)
+    first, again = (make_campaign(7, 'sweep40', plan) for _ in range(2))
+    for key, values in first.table.items():
+        np.testing.assert_array_equal(values, again.table[key])
+    other = make_campaign(8, 'sweep40', plan)
+    assert not np.array_equal(first.rows['normal_load'], other.rows['normal_load'])
+    cells = np.concatenate([first.table[key] for key in OUTPUTS])
+    assert 0.02 < np.mean(np.isnan(cells)) < 0.25
+
+
+def test_noise_has_the_stated_size():
+    deviations = []
+    for seed in range(12):
+        campaign = make_campaign(seed, 'sweep40', Plan(hide='none', noise='mixed'))
+        for key in OUTPUTS:
+            error = campaign.table[key] - campaign.noise_free[key]
+            deviations.append(error / campaign.std[key])
+    assert np.std(np.concatenate(deviations)) == pytest.approx(1.0, abs=0.06)
+
+
+def test_distance_beside_a_structural_error_is_that_of_its_covariance():
+    """The drawn errors have the covariance that the distance takes for noise."""
+    campaign = make_campaign(7, 'basic16', Plan(other_formula=True, structure=0.02))
+    rng = np.random.default_rng(3)
+    rows, soil = campaign.rows, campaign.soil
+    clean = solve(rows, soil)
+    ruler = Ruler(rows, soil, campaign.std)
+    tiny = SmoothError(1e-9, rows, clean, rng)
+    alone = ruler.distance(campaign.effects)
+    assert ruler.distance_beside(campaign.effects, tiny) == pytest.approx(alone, rel=0.15)
+    draws = []
+    for _ in range(4000):
+        error = SmoothError(0.02, rows, clean, rng)
+        out = {key: np.zeros(len(rows['slip'])) for key in OUTPUTS}
+        error.finish(out, None, rows)
+        draws.append(np.stack([out[key] / campaign.std[key] for key in OUTPUTS], 1).ravel())
+    jacobian = ruler._jacobian
+    change = ruler.whitened(np.zeros(jacobian.shape[1]), campaign.effects) - ruler.base
+    covariance = np.cov(np.transpose(draws)) + np.eye(len(change)) + jacobian @ jacobian.T
+    expected = np.sqrt(change @ np.linalg.solve(covariance, change))
+    found = ruler.distance_beside(campaign.effects, error)
+    assert found == pytest.approx(expected, rel=0.05)
+    assert found == campaign.distance_beside < alone

@@ -1,0 +1,87 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""A trial that anyone can run: hidden by another quadrature, sealed, diagnosed blind, opened."""
+
+from __future__ import annotations
+
+import csv
+import json
+
+import numpy as np
+import pytest
+
+from wheel_terra_estimator.cli.main import main
+from wheel_terra_lab.trials import trial
+from wheel_terra_lab.trials.hidden import LISTED, OUTSIDE
+
+
+def run(folder, *arguments):
+    return main(['trial', *map(str, arguments), '-o', str(folder), '--no-pictures'])
+
+
+def test_one_trial_writes_table_seal_and_diagnosis(tmp_path, capsys):
+    assert run(tmp_path / 'a', '--seed', 3, '--effect', 'slip_sinkage_exponent') == 0
+    said = capsys.readouterr().out
+    assert 'truth sealed (SHA-256' in said
+    assert 'slip_sinkage_exponent was hidden; said: slip_sinkage_exponent' in said
+    assert ': right' in said
+    for word in ('as configured', 'refitted', 'after', 'noise'):
+        assert word in said
+    with (tmp_path / 'a' / trial.TABLE).open() as stream:
+        header = next(csv.reader(stream))
+    assert 'slip' in header and not {'hidden', 'effect'} & set(header)
+    truth = json.loads((tmp_path / 'a' / trial.SEAL).read_text())
+    assert truth['hidden'] == ['slip_sinkage_exponent']
+    assert truth['distances'][0] > trial.LEAST * 0.9
+    report = json.loads((tmp_path / 'a' / 'diagnosis' / 'report.json').read_text())
+    assert report['effects'][0]['name'] == 'slip_sinkage_exponent'
+    assert run(tmp_path / 'a', '--seed', 3) == 2, 'an output that exists is refused'
+
+
+def test_the_diagnosis_reads_nothing_but_table_and_rig(tmp_path):
+    campaign = trial.draw(5, 'none')
+    digest = trial.hide(campaign, tmp_path)
+    assert len(digest) == 64
+    seal = (tmp_path / trial.SEAL).read_text()
+    (tmp_path / trial.SEAL).unlink()
+    diagnosis = trial.solve_blind(tmp_path)
+    (tmp_path / trial.SEAL).write_text(seal)
+    outcome = trial.compare(tmp_path, diagnosis)
+    assert outcome.right == (diagnosis.verdict == 'agrees')
+    assert outcome.hidden == 'none'
+
+
+def test_the_same_seed_draws_the_same_and_lots_cover_all_kinds():
+    first, again = trial.draw(8, None), trial.draw(8, None)
+    assert first.hidden == again.hidden
+    np.testing.assert_array_equal(first.table['slip'], again.table['slip'])
+    hidden = {trial.draw(seed, None).hidden for seed in range(7)}
+    flat = {name for names in hidden for name in names}
+    assert () in hidden or flat & set(OUTSIDE)
+    assert flat & set(LISTED)
+
+
+def test_a_score_over_many_has_an_interval(tmp_path, capsys):
+    assert run(tmp_path / 'many', '--seed', 20, '--many', 2, '--effect', 'none') == 0
+    said = capsys.readouterr().out
+    assert 'nothing hidden:' in said and 'of 2 right' in said
+    with (tmp_path / 'many' / 'score.csv').open() as stream:
+        assert [row['seed'] for row in csv.DictReader(stream)] == ['20', '21']
+    # Wilson's interval, from the paper's formula at 8 of 10.
+    low, high = trial.interval(8, 10)
+    assert (low, high) == pytest.approx((0.4902, 0.9433), abs=5e-4)
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'part'),
+    [
+        (('--effect', 'lug_diging'), "nearest is 'lug_digging'"),
+        (('--many', 0), '--many 0: must be between'),
+        (('--seed', -1), '--seed -1: must be'),
+    ],
+)
+def test_what_cannot_be_tried_ends_with_one_line(tmp_path, capsys, arguments, part):
+    assert run(tmp_path / 'x', *arguments) == 2
+    error = capsys.readouterr().err
+    assert part in error and error.count('\n') == 1
+    assert not (tmp_path / 'x').exists()

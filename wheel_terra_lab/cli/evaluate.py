@@ -1,0 +1,335 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""``wheel-terra evaluate``."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.scheduler import add_jobs_argument
+
+if TYPE_CHECKING:
+    from wheel_terra_lab.evaluation.bench import Results
+    from wheel_terra_lab.evaluation.closed_loop import Comparison
+
+FILTER_FAILED = 1
+"""Exit status where the filter failed on a drive; none of them should make it."""
+INTERRUPTED = 130
+MOST_HOURS = 1000.0
+"""Longest drive: its ground is drawn before the start."""
+EXAMPLES = (
+    'wheel-terra evaluate --kinds climb turns --seeds 4',
+    'wheel-terra evaluate --rover my_rover.yaml --kinds climb scenarios/slow_entrapment --seeds 2',
+    'wheel-terra evaluate --limiter --seeds 10 -o limiter.md',
+    'wheel-terra evaluate --hours 24 -o day',
+    'wheel-terra evaluate --hours 24 -o day --resume',
+    'wheel-terra evaluate --hours 10 --world both --kinds firm --modes reference -o firm',
+)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of the command."""
+    from wheel_terra_lab.evaluation.runner import MODES
+    from wheel_terra_lab.evaluation.worlds import WORLDS
+
+    own, rival = WORLDS['own'], WORLDS['rival']
+    parser.add_argument(
+        '--world',
+        choices=[*WORLDS, 'both'],
+        default='own',
+        help='simulator of the drives: that of the package (own), a second one that was written '
+        'apart from it (rival), or both side by side',
+    )
+    parser.add_argument(
+        '--kinds',
+        nargs='+',
+        metavar='KIND',
+        help=f'kinds of simulated drives (default: all but firm of the own world). own: '
+        f'{", ".join((*own.kinds, *own.more_kinds))}, or scenarios/NAME, a shipped scenario; '
+        f'rival: {", ".join(rival.kinds)}',
+    )
+    parser.add_argument(
+        '--rover',
+        metavar='F',
+        help="rover file, or the bare name of a shipped one, in place of the kinds' own rover "
+        '(own world)',
+    )
+    parser.add_argument(
+        '--seeds', type=int, default=20, metavar='N', help='drives of each kind (default 20)'
+    )
+    seeds = parser.add_mutually_exclusive_group()
+    seeds.add_argument(
+        '--tuning', action='store_true', help='tuning seeds; the default are the test seeds'
+    )
+    seeds.add_argument(
+        '--first-seed',
+        type=int,
+        metavar='N',
+        help='the first of the seeds, for drives that nothing was chosen on',
+    )
+    parser.add_argument(
+        '--modes',
+        nargs='+',
+        metavar='MODE',
+        default=['reference', 'no_reference'],
+        help=f'what the estimator gets: {", ".join(MODES)}',
+    )
+    parser.add_argument(
+        '--pooled', action='store_true', help='one row per mode in place of one per kind'
+    )
+    add_jobs_argument(parser, '--processes', words='drives at a time')
+    parser.add_argument(
+        '--measured',
+        type=Path,
+        metavar='DIR',
+        help='folder of the measured data: score the real drives in place of simulated ones',
+    )
+    parser.add_argument(
+        '--limiter',
+        action='store_true',
+        help='drive the same soft patch with and without the traction limiter (and a picture '
+        'beside the output)',
+    )
+    parser.add_argument(
+        '-o',
+        dest='output',
+        type=Path,
+        metavar='F.md|F.html|DIR',
+        help='write the tables; as a page with a picture where the name ends in .html; with '
+        '--hours a folder',
+    )
+    parser.add_argument(
+        '--hours',
+        type=float,
+        metavar='N',
+        help='one drive of so many hours with slopes, turns, stops and sensor faults; -o DIR keeps '
+        'a line of JSON per hour (an hour takes about three minutes). With --kinds drives of these '
+        'kinds, seed after seed, until so many hours are driven in each mode, a line per drive',
+    )
+    parser.add_argument(
+        '--resume',
+        action='store_true',
+        help='go on with an interrupted --hours behind its last line',
+    )
+    parser.add_argument(
+        '--json', action='store_true', help='print the figures of simulated kinds as JSON'
+    )
+    parser.add_argument('--overwrite', action='store_true', help='replace an earlier output')
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Run the command."""
+    from wheel_terra_estimator.output_folder import check_file, new_file
+    from wheel_terra_lab.evaluation import page, tables
+
+    if arguments.hours is not None:
+        return _drive_for_hours(arguments)
+    if arguments.resume:
+        raise UserError('--resume goes with --hours')
+    for option in ('json', 'rover'):
+        if getattr(arguments, option) and (arguments.measured or arguments.limiter):
+            raise UserError(
+                f'--{option} goes with simulated kinds, not with --measured or --limiter'
+            )
+    if arguments.output:
+        check_file(arguments.output, arguments.overwrite)
+    if arguments.measured:
+        told = _measured(arguments)
+    elif arguments.limiter:
+        told = _limiter(arguments)
+    else:
+        told = _simulated(arguments)
+    restarts = sum(health.get('filter_restarts', 0) for health in told.healths)
+    text = (
+        f'{told.text}\n\nThe filter was started anew {restarts} times in {len(told.healths)} runs.'
+    )
+    if arguments.json and told.results is not None:
+        print(json.dumps(tables.as_dict(told.results, arguments.modes), indent=2))
+    else:
+        print(text)
+    if arguments.output:
+        with new_file(arguments.output, arguments.overwrite) as fresh:
+            if page.is_page(arguments.output):
+                page.write(fresh, told.title, text, told.results, told.limited)
+            else:
+                fresh.write_text(text + '\n', encoding='utf-8')
+    return told.status or (FILTER_FAILED if restarts else 0)
+
+
+class _Told(NamedTuple):
+    """What one kind of evaluation found."""
+
+    text: str
+    healths: Sequence[Mapping[str, Any]]
+    title: str = 'The estimator against truth and baselines'
+    results: Results | None = None
+    limited: Comparison | None = None
+    status: int = 0
+
+
+def _measured(arguments: argparse.Namespace) -> _Told:
+    from wheel_terra_lab.evaluation import real_drives
+
+    return _Told(*real_drives.report(arguments.measured))
+
+
+def _seeds(arguments: argparse.Namespace) -> range:
+    from wheel_terra_lab.evaluation import kinds
+
+    first = arguments.first_seed
+    if first is None:
+        first = (kinds.TUNING_SEEDS if arguments.tuning else kinds.TEST_SEEDS).start
+    elif first < 0:
+        raise UserError(f'--first-seed {first}: must be 0 or more')
+    return range(first, first + arguments.seeds)
+
+
+def _limiter(arguments: argparse.Namespace) -> _Told:
+    from wheel_terra_estimator.output_folder import check_file, new_file
+    from wheel_terra_lab.evaluation import closed_loop, page
+
+    picture: Path | None = None
+    if arguments.output and not page.is_page(arguments.output):
+        picture = arguments.output.with_suffix('.png')
+        check_file(picture, arguments.overwrite)
+    drives = closed_loop.compare(_seeds(arguments))
+    if picture:
+        with new_file(picture, arguments.overwrite) as fresh:
+            page.draw_limiter(drives[0], fresh)
+    return _Told(
+        closed_loop.report(drives),
+        [run.health for pair in drives for run in (pair.free, pair.limited)],
+        'The traction limiter in a closed loop',
+        limited=drives[0],
+    )
+
+
+def _simulated(arguments: argparse.Namespace) -> _Told:
+    from wheel_terra_lab.evaluation import bench, runner, tables
+
+    chosen = _chosen(arguments.world, arguments.kinds)
+    if arguments.rover:
+        _check_rover(arguments.rover, arguments.world)
+    _check_names(arguments.modes, runner.MODES, 'mode')
+    from tqdm import tqdm
+
+    with tqdm(total=len(chosen) * arguments.seeds, unit='drive') as bar:
+        results = bench.run(
+            chosen,
+            _seeds(arguments),
+            arguments.modes,
+            arguments.jobs,
+            lambda _: bar.update(),
+            arguments.rover,
+        )
+    write = tables.pooled_report if arguments.pooled else tables.report
+    parts = [write(results, arguments.modes)]
+    if arguments.rover:
+        parts.append(f'Rover in place of that of the kinds: {arguments.rover}.')
+    if results.interrupted:
+        parts.append(results.interrupted)
+    return _Told(
+        '\n\n'.join(parts),
+        [score.health for score in results.drives],
+        results=results,
+        status=INTERRUPTED if results.interrupted else 0,
+    )
+
+
+def _drive_for_hours(arguments: argparse.Namespace) -> int:
+    """Run one long drive or many of some kinds, or go on with them."""
+    from wheel_terra_lab.evaluation import long_drive, many_drives
+
+    if any((arguments.measured, arguments.limiter, arguments.rover)):
+        raise UserError('--hours goes with neither --measured nor --limiter nor --rover')
+    if arguments.world != 'own' and not arguments.kinds:
+        raise UserError(f'--hours --world {arguments.world} needs --kinds')
+    if arguments.output is None:
+        raise UserError('--hours needs -o DIR, where its figures are kept')
+    if not 0.0 < arguments.hours <= MOST_HOURS:
+        raise UserError(f'--hours {arguments.hours:g}: must be above 0, at most {MOST_HOURS:g}')
+    report = many_drives.report if arguments.kinds else long_drive.report
+    try:
+        rows = _hours_of_kinds(arguments) if arguments.kinds else _one_long_drive(arguments)
+    except KeyboardInterrupt:
+        which = ''
+        if arguments.tuning:
+            which = '--tuning '
+        elif arguments.first_seed is not None:
+            which = f'--first-seed {arguments.first_seed} '
+        if arguments.kinds:
+            kinds, modes = ' '.join(arguments.kinds), ' '.join(arguments.modes)
+            which += f'--world {arguments.world} --kinds {kinds} --modes {modes} '
+        print(
+            f'interrupted; go on with: --hours {arguments.hours:g} {which}-o {arguments.output} '
+            '--resume'
+        )
+        return INTERRUPTED
+    print(report(rows))
+    return FILTER_FAILED if any(row['filter_restarts'] for row in rows) else 0
+
+
+def _one_long_drive(arguments: argparse.Namespace) -> list[dict[str, Any]]:
+    from wheel_terra_lab.evaluation import long_drive
+
+    return long_drive.drive_for_hours(
+        arguments.output,
+        arguments.hours,
+        _seeds(arguments).start,
+        resume=arguments.resume,
+        overwrite=arguments.overwrite,
+    )
+
+
+def _hours_of_kinds(arguments: argparse.Namespace) -> list[dict[str, Any]]:
+    from wheel_terra_lab.evaluation import many_drives, runner
+
+    chosen = _chosen(arguments.world, arguments.kinds)
+    _check_names(arguments.modes, runner.MODES, 'mode')
+    smoothed = [mode for mode in arguments.modes if mode.startswith(runner.SMOOTHED)]
+    if smoothed:
+        raise UserError(f'--hours does not go with the mode {smoothed[0]}')
+    return many_drives.drive_kinds_for_hours(
+        arguments.output,
+        arguments.hours,
+        chosen,
+        arguments.modes,
+        _seeds(arguments).start,
+        resume=arguments.resume,
+        overwrite=arguments.overwrite,
+    )
+
+
+def _chosen(world: str, kinds: list[str] | None) -> list[tuple[str, str]]:
+    """Return the pairs of world and kind to be run."""
+    from wheel_terra_lab.evaluation.worlds import WORLDS
+
+    worlds = list(WORLDS.values()) if world == 'both' else [WORLDS[world]]
+    if kinds is None:
+        return [(w.name, kind) for w in worlds for kind in w.kinds]
+    known = {kind: None for w in worlds for kind in (*w.kinds, *w.more_kinds)}
+    strange = [kind for kind in kinds if not any(w.has(kind) for w in worlds)]
+    _check_names(strange, tuple(known), 'kind')
+    return [(w.name, kind) for w in worlds for kind in kinds if w.has(kind)]
+
+
+def _check_rover(rover: str, world: str) -> None:
+    """Refuse what is no rover file before the first drive."""
+    from wheel_terra_estimator.configuration import reader, ros_yaml, shipped
+
+    if world != 'own':
+        raise UserError(f'--rover needs --world own: the rovers of {world!r} are not files')
+    if 'wheels.names' not in ros_yaml.read(shipped.find(rover)):
+        raise UserError(f'--rover {rover}: wheels.names is missing: not a rover file')
+    reader.load([rover])
+
+
+def _check_names(given: Sequence[str], known: Sequence[str], what: str) -> None:
+    unknown = [name for name in given if name not in known]
+    if unknown:
+        raise UserError(f'no {what} {unknown[0]!r}; there are {", ".join(known)}')

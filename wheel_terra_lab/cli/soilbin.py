@@ -1,0 +1,169 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""``wheel-terra soilbin``: the virtual soil bin and its studies."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.scheduler import add_jobs_argument
+
+if TYPE_CHECKING:
+    from wheel_terra_lab.soilbin.case import Case
+
+EXAMPLES = (
+    'wheel-terra soilbin run quick -o run',
+    'wheel-terra soilbin rows --help',
+)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the sub-commands."""
+    actions = parser.add_subparsers(dest='action', required=True, metavar='ACTION')
+
+    one = actions.add_parser('run', help='run one wheel over one bed')
+    one.add_argument(
+        'files', nargs='*', metavar='FILE', help='case, wheel or grain files (path or shipped name)'
+    )
+    one.add_argument('-o', '--output', type=Path, required=True, metavar='DIR')
+    one.add_argument('--overwrite', action='store_true', help='replace an output folder')
+    one.add_argument('--resume', action='store_true', help='go on with an interrupted run')
+    one.add_argument('--wheel', metavar='N', help="one of the paper's wheels, 1 to 9, or a file")
+    one.add_argument('--load', type=float, metavar='N', help='vertical load W [N]')
+    one.add_argument('--slope', type=float, metavar='DEG', help='slope [deg]')
+    one.add_argument('--gravity', type=float, metavar='G', help='gravity [m/s^2]')
+    one.add_argument('--rate', type=float, metavar='W', help='wheel rate [rad/s]')
+    one.add_argument('--friction', type=float, metavar='MU', help='friction between grains [-]')
+    one.add_argument('--pull', type=float, metavar='P', help='pull at the hitch [N]')
+    one.add_argument('--slip', type=float, metavar='S', help='impose the travel speed [-]')
+    one.add_argument('--seed', type=int, metavar='N', help='seed of grain sizes and lug phase')
+    one.add_argument('--duration', type=float, metavar='S', help='travel [s] at speed factor 1')
+    one.add_argument('--grain-scale', type=float, metavar='K', help='grains larger by K')
+    one.add_argument('-p', dest='overrides', action='append', default=[], metavar='NAME:=VALUE')
+    one.add_argument('--film', action='store_true', help='also write film.gif')
+    _common(one, studies=False)
+
+    for name, text in (
+        ('calibrate', 'fit what the paper does not state on wheel 2 alone'),
+        ('reproduce', "the paper's tables 6 and 7, its figures' trends and its section 6"),
+        ('sensitivity', 'which assumption decides: the calibrated case, one thing changed'),
+        ('convergence', 'grain size, time step, speed factor and bin: what they change'),
+        ('rows', 'virtual measurements for diagnose: pull sweep or slip sweep'),
+    ):
+        study = actions.add_parser(name, help=text, description=text)
+        study.add_argument('-o', '--output', type=Path, required=True, metavar='DIR')
+        study.add_argument('--resume', action='store_true', help='go on with the study in DIR')
+        study.add_argument('--overwrite', action='store_true', help='start the study in DIR anew')
+        study.add_argument('--seeds', type=int, default=0, metavar='N', help='beds per case')
+        study.add_argument(
+            '--grain-scale', type=float, default=0.0, metavar='K', help='grains larger by K'
+        )
+        study.add_argument('--report-only', action='store_true', help='write the page, run nothing')
+        if name == 'rows':
+            study.add_argument('--sweep', choices=('pull', 'slip'), required=True)
+        if name == 'reproduce':
+            study.add_argument(
+                '--part', action='append',
+                choices=('table7', 'table6', 'loads', 'moon', 'high_lugs', 'paper_speed'),
+                help='only this part (may be given several times); paper_speed, half an hour per '
+                'case and core, runs only where it is asked for',
+            )  # fmt: skip
+        if name == 'sensitivity':
+            study.add_argument(
+                '--part', action='append', choices=('slopes', 'moon'),
+                help='only this part (may be given twice)',
+            )  # fmt: skip
+        if name == 'calibrate':
+            study.add_argument(
+                '--stage', choices=('screen', 'seeds', 'all'), default='all',
+                help='screen: one bed per setting; seeds: the final one on several beds',
+            )  # fmt: skip
+        _common(study, studies=True)
+
+
+def _common(parser: argparse.ArgumentParser, studies: bool) -> None:
+    parser.add_argument('--cache', type=Path, metavar='DIR', help='where settled beds are kept')
+    parser.add_argument('--no-cache', action='store_true', help='settle every bed anew')
+    if studies:
+        add_jobs_argument(
+            parser,
+            '--workers',
+            default=0,
+            words='engine processes at a time (default: one per core)',
+        )
+        parser.add_argument(
+            '--scheduler',
+            default='',
+            metavar='ADDRESS',
+            help='Dask scheduler whose workers take the cases, over files that all of them see',
+        )
+        parser.add_argument('--dask', dest='scheduler', help=argparse.SUPPRESS)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Run the chosen action."""
+    from wheel_terra_lab.soilbin import snapshots
+
+    cache = None if arguments.no_cache else arguments.cache or snapshots.default_cache()
+    if arguments.action == 'run':
+        return _run_one(arguments, cache)
+    from wheel_terra_lab.soilbin import studies
+
+    return studies.run(arguments, cache)
+
+
+def _run_one(arguments: argparse.Namespace, cache: Path | None) -> int:
+    from wheel_terra_estimator.output_folder import working_folder
+    from wheel_terra_lab.soilbin import output, progress
+    from wheel_terra_lab.soilbin.case import check
+    from wheel_terra_lab.soilbin.launch import StoppedByUserError, run_case
+
+    case = case_of(arguments)
+    check(case)
+    folder: Path = arguments.output
+    work = folder / '.work'
+    working_folder(folder, arguments.overwrite, arguments.resume, output.FILES)
+    try:
+        with progress.bar() as report:
+            summary = run_case(case, work, cache, report)
+        output.write_folder(folder, work, case, summary, arguments.film)
+    except StoppedByUserError as stopped:
+        raise UserError(f'{stopped}; go on with --resume') from stopped
+    except OSError as error:
+        raise UserError(f'{folder}: cannot be written: {error}; free some space') from error
+    output.clean(work)
+    print(output.as_text(summary, case))
+    if summary['stopped']:
+        print(f'stopped early: {summary["stopped"]}')
+    return 0
+
+
+def case_of(arguments: argparse.Namespace) -> Case:
+    """Return the case of files and options; options win."""
+    from wheel_terra_lab.soilbin import files
+
+    names = list(arguments.files)
+    if arguments.wheel:
+        names.append(f'wheel_{arguments.wheel}' if arguments.wheel.isdigit() else arguments.wheel)
+    if not any(name == 'published' for name in names):
+        names.insert(0, 'calibrated')
+    options = {
+        'operation.vertical_load': arguments.load,
+        'operation.slope_deg': arguments.slope,
+        'operation.gravity': arguments.gravity,
+        'grains.soil_friction': arguments.friction,
+        'operation.hitch_pull': arguments.pull,
+        'operation.imposed_slip': arguments.slip,
+        'bed.seed': arguments.seed,
+        'operation.duration': arguments.duration,
+        'bed.grain_scale': arguments.grain_scale,
+    }
+    given = [f'{name}:={value!r}' for name, value in options.items() if value is not None]
+    case = files.load(names, [*given, *arguments.overrides])
+    if arguments.rate is not None:
+        speed = arguments.rate * case.wheel.tip_radius / case.operation.speed_factor
+        case = case.replace(operation__tip_speed=speed)
+    return case

@@ -1,0 +1,162 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Run kinds of drives times seeds times modes, in processes, and keep the scores."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any
+
+from wheel_terra_estimator.estimation.judgement.stuck.settings import StuckSettings
+from wheel_terra_estimator.estimation.measurements import Measurement
+from wheel_terra_estimator.scheduler import finished
+from wheel_terra_lab.evaluation import baselines, scores
+from wheel_terra_lab.evaluation.foresight import Foresight, foresight
+from wheel_terra_lab.evaluation.runner import (
+    SMOOTHED,
+    inputs_of_mode,
+    record,
+    run_estimator,
+    run_smoother,
+)
+from wheel_terra_lab.evaluation.two_state_filters import slip_course
+from wheel_terra_lab.evaluation.worlds import WORLDS, BenchDrive
+
+
+@dataclass(frozen=True)
+class DriveScore:
+    """Scores of one drive in one mode."""
+
+    kind: str
+    seed: int
+    mode: str
+    samples: scores.Samples
+    warnings: scores.Warnings
+    health: dict[str, Any]
+    world: str = 'own'
+    foresight: Foresight | None = None
+
+
+@dataclass
+class Results:
+    """All scores of a run of the bench."""
+
+    drives: list[DriveScore] = field(default_factory=list)
+    interrupted: str = ''  # in words, if not all drives were run
+
+    @property
+    def worlds(self) -> list[str]:
+        """Worlds of which there are drives."""
+        return [name for name in WORLDS if any(d.world == name for d in self.drives)]
+
+    def of_mode(self, mode: str, world: str | None = None) -> dict[str, list[DriveScore]]:
+        """Return kind -> drives of a mode, of one world or of all."""
+        found: dict[str, list[DriveScore]] = defaultdict(list)
+        for drive in self.drives:
+            if drive.mode == mode and world in (None, drive.world):
+                found[drive.kind].append(drive)
+        return dict(found)
+
+
+def score_drive(
+    world: str, kind: str, seed: int, modes: Sequence[str], rover: str | None = None
+) -> list[DriveScore]:
+    """Simulate one drive and score the estimator on it in each mode."""
+    drive = WORLDS[world].simulate(kind, seed, None, rover)
+    return [score_mode(world, kind, seed, mode, drive) for mode in modes]
+
+
+def score_mode(world: str, kind: str, seed: int, mode: str, drive: BenchDrive) -> DriveScore:
+    """Score the estimator in one mode on a drive."""
+    configuration, truth = drive.configuration, drive.truth
+    measurements = list(inputs_of_mode(drive.arrivals, mode))
+    run = run_smoother if mode.startswith(SMOOTHED) else run_estimator
+    sets, health = run(configuration, measurements)
+    kept = record(sets, health)
+    radius = configuration.wheels.slip_radius
+    return DriveScore(
+        kind=kind,
+        seed=seed,
+        mode=mode,
+        samples=scores.samples(truth, kept, _baselines(drive, measurements), radius),
+        warnings=scores.warnings(truth, kept, radius),
+        health=health,
+        world=world,
+        foresight=foresight(truth, kept, radius, StuckSettings.from_configuration(configuration)),
+    )
+
+
+def _baselines(drive: BenchDrive, measurements: Sequence[Measurement]) -> scores.BaselineSlips:
+    """Run the baselines over the measurements that the estimator got."""
+    configuration, truth = drive.configuration, drive.truth
+    wheels = configuration.wheels
+    rim = truth.wheel_rate * wheels.slip_radius
+    held, reckoned = (
+        baselines.slip_of(
+            speed(configuration, measurements, truth.stamp), truth.yaw_rate, rim, wheels.y
+        )
+        for speed in (baselines.held_speed, baselines.dead_reckoned_speed)
+    )
+    return scores.BaselineSlips(
+        held,
+        reckoned,
+        slip_course(configuration, measurements, truth.stamp, 'torque'),
+        slip_course(configuration, measurements, truth.stamp, 'pitch'),
+    )
+
+
+def run(
+    chosen: Sequence[tuple[str, str]],
+    seeds: Sequence[int],
+    modes: Sequence[str],
+    processes: int = 1,
+    progress: Callable[[str], object] | None = None,
+    rover: str | None = None,
+) -> Results:
+    """Run the bench over pairs of world and kind, with a rover file in place of the kinds' own.
+
+    Drives come in the order in which they finish, results do not depend on it. Interrupted, it
+    returns the drives that are done.
+    """
+    results = Results()
+    tasks = [(world, kind, seed) for seed in seeds for world, kind in chosen]
+    done = 0
+    try:
+        for scores_of_drive, words in _scored(tasks, modes, processes, rover):
+            results.drives += scores_of_drive
+            done += 1
+            if progress:
+                progress(words)
+    except KeyboardInterrupt:
+        if not done:
+            raise
+        results.interrupted = f'interrupted: {done} of {len(tasks)} drives'
+    results.drives.sort(key=lambda d: (d.world, d.kind, d.seed, d.mode))
+    return results
+
+
+def _scored(
+    tasks: Sequence[tuple[str, str, int]],
+    modes: Sequence[str],
+    processes: int,
+    rover: str | None,
+) -> Iterator[tuple[list[DriveScore], str]]:
+    """Yield the scores of each drive and its name."""
+    if processes == 1:
+        for task in tasks:
+            yield score_drive(*task, modes, rover), ' '.join(map(str, task))
+        return
+    score = partial(_score, modes=modes, rover=rover)
+    with closing(finished(score, tasks, processes)) as outcomes:
+        for index, outcome in outcomes:
+            if isinstance(outcome, Exception):
+                raise outcome
+            yield outcome, ' '.join(map(str, tasks[index]))
+
+
+def _score(task: tuple[str, str, int], modes: Sequence[str], rover: str | None) -> list[DriveScore]:
+    return score_drive(*task, modes, rover)

@@ -1,0 +1,425 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Tables of the bench as Markdown."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+
+from wheel_terra_lab.evaluation import scores
+from wheel_terra_lab.evaluation.bench import DriveScore, Results
+from wheel_terra_lab.evaluation.foresight import (
+    Foresight,
+    brier_interval,
+    reliability,
+    reliability_error,
+)
+from wheel_terra_lab.evaluation.runner import SMOOTHED
+from wheel_terra_lab.evaluation.scores import Samples
+from wheel_terra_lab.evaluation.worlds import WORLDS
+
+_CLASSES = ('low', 'moderate', 'high', 'stuck')
+_MODES = {
+    'reference': 'With reference at 1 Hz',
+    'no_reference': 'Without reference',
+    'no_torque': 'Without torque',
+    'no_sinkage': 'Without sinkage',
+    'no_orientation': 'Without orientation',
+    'reference_at_once': 'Reference at once',
+    'reference_2s_late': 'Reference 2 s late',
+    'smoothed': 'Smoother with reference at 1 Hz',
+    'smoothed_no_reference': 'Smoother without reference',
+}
+
+
+_WORLDS = {'own': 'simulator of the package', 'rival': 'rival simulator'}
+
+
+def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """Return a Markdown table."""
+    lines = ['| ' + ' | '.join(head) + ' |', '|' + '---|' * len(head)]
+    lines += ['| ' + ' | '.join(row) + ' |' for row in rows]
+    return '\n'.join(lines)
+
+
+def report(results: Results, modes: Sequence[str]) -> str:
+    """Return all tables of a run: the worlds side by side, then each by itself."""
+    parts = []
+    if len(results.worlds) > 1:
+        parts += [_side_by_side(results, mode) for mode in modes]
+    parts += _smoother_over_filter(results, modes)
+    for mode, world in ((mode, world) for mode in modes for world in results.worlds):
+        by_kind = results.of_mode(mode, world)
+        if not by_kind:
+            continue
+        joined = {k: Samples.joined(d.samples for d in drives) for k, drives in by_kind.items()}
+        pooled = Samples.joined(joined.values())
+        high = float((np.abs(pooled.true_slip) > 0.6).mean())
+        count = sum(len(d) for d in by_kind.values())
+        parts.append(f'## {_MODES[mode]}, {_WORLDS[world]}\n')
+        parts.append(
+            f'{count} drives, {len(pooled)} scored wheel samples, {high:.0%} of them above '
+            '|s| = 0.6.\n'
+        )
+        parts.append(_errors({**joined, '**pooled**': pooled}))
+        parts.append('\nSlip against the two-state filters, and how honest its deviation is:\n')
+        parts.append(_two_states(by_kind))
+        parts.append('\nBy true slip:\n')
+        parts.append(_errors(_by_slip(pooled)))
+        parts.append('\nClasses (rows: truth, columns: estimate; share of the row):\n')
+        parts.append(_confusion(pooled))
+        parts.append('\nStuck warnings:\n')
+        parts.append(_warnings(by_kind))
+        parts += _foresight([d for drives in by_kind.values() for d in drives])
+        parts.append('\nFilter, mean over the drives (NIS of a consistent filter: 1):\n')
+        parts.append(_health(by_kind))
+        parts.append('')
+    return '\n'.join(parts)
+
+
+def pooled_report(results: Results, modes: Sequence[str]) -> str:
+    """Return one table with a row per mode, pooled over all drives."""
+    rows, warnings = {}, {}
+    for mode in modes:
+        drives = [d for found in results.of_mode(mode).values() for d in found]
+        if drives:
+            rows[f'{_MODES[mode]} ({len(drives)} drives)'] = Samples.joined(
+                d.samples for d in drives
+            )
+            warnings[_MODES[mode]] = drives
+    return f'{_errors(rows)}\n\nStuck warnings:\n\n{_warnings(warnings)}\n'
+
+
+def _two_states(by_kind: dict[str, list[DriveScore]]) -> str:
+    """Return the table of the rule of the bench, and a line that says whether it is kept."""
+    rows, broken = [], []
+    pooled = [d for drives in by_kind.values() for d in drives]
+    for kind, drives in (*by_kind.items(), ('**pooled**', pooled)):
+        parts = [d.samples for d in drives]
+        data = Samples.joined(parts)
+        ratio = scores.ratio_to_better_baseline(parts)
+        better, _ = scores.better_baseline(data)
+        if ratio.keeps_the_rule is False and kind in by_kind:
+            broken.append(kind)
+        mean, median = scores.squared_over_variance(data.slip_error, data.slip_std)
+        rows.append(
+            (
+                kind,
+                f'{scores.rms(data.slip_error):.4f}',
+                f'{scores.rms(data.torque_filter_error):.4f}',
+                f'{scores.rms(data.pitch_filter_error):.4f}',
+                better,
+                _interval(ratio),
+                _RULE[ratio.keeps_the_rule],
+                f'{scores.rms(data.slow_slip_error):.4f}',
+                f'{scores.coverage(data.slip_error, data.slip_std):.1%}',
+                _coverage_after_start(data),
+                f'{scores.coverage(data.torque_filter_error, data.torque_filter_std):.1%}',
+                f'{mean:.2f}, {median:.2f}',
+            )
+        )
+    head = (
+        *('drives', 'slip RMSE', 'two states, torque', 'two states, pitch', 'better'),
+        *(
+            'ratio (95 % interval)',
+            'rule kept',
+            'slow part (20 s means)',
+            'coverage',
+            '30 s after a start',
+        ),
+        *('coverage of two states, torque', 'squared error over variance: mean, median'),
+    )
+    judged = any(len(drives) >= scores.FEWEST_DRIVES for drives in by_kind.values())
+    verdict = f'broken in {", ".join(broken)}' if broken else 'kept in every kind'
+    if not judged:
+        verdict = f'not judged with fewer than {scores.FEWEST_DRIVES} drives of a kind'
+    return (
+        f'{table(head, rows)}\n\nThe rule of the bench (slip RMSE not above the better two-state '
+        f'filter by more than 5 % plus two standard errors of the paired drives): {verdict}.'
+    )
+
+
+_RULE = {True: 'yes', False: '**no**', None: 'too few drives'}
+
+
+def _coverage_after_start(data: scores.Samples) -> str:
+    part = scores.after_start(data)
+    return f'{scores.coverage(part.slip_error, part.slip_std):.1%}' if len(part) else '-'
+
+
+def _interval(ratio: scores.Ratio) -> str:
+    if np.isnan(ratio.error):
+        return f'{ratio.value:.2f}'
+    return f'{ratio.value:.2f} ({ratio.low:.2f} to {ratio.high:.2f})'
+
+
+def _side_by_side(results: Results, mode: str) -> str:
+    """Return the pooled figures of a mode, one column per world."""
+    columns = {}
+    for world in results.worlds:
+        drives = [d for found in results.of_mode(mode, world).values() for d in found]
+        columns[world] = _figures(drives)
+    names = next(iter(columns.values()))
+    rows = [(name, *(column[name] for column in columns.values())) for name in names]
+    head = ('pooled', *(_WORLDS[world] for world in columns))
+    return f'## {_MODES[mode]}: the worlds side by side\n\n{table(head, rows)}\n'
+
+
+def _figures(drives: Sequence[DriveScore]) -> dict[str, str]:
+    parts = [d.samples for d in drives]
+    data = Samples.joined(parts)
+    ratio = scores.ratio_to_better_baseline(parts)
+    better, error = scores.better_baseline(data)
+    mean, median = scores.squared_over_variance(data.slip_error, data.slip_std)
+    by_kind = {d.kind: [e.samples for e in drives if e.kind == d.kind] for d in drives}
+    worst = {kind: scores.rms(Samples.joined(p).slip_error) for kind, p in by_kind.items()}
+    hardest = max(worst, key=lambda kind: worst[kind])
+    found = [d.warnings for d in drives]
+    trapped = [w for w in found if w.entrapped is not None]
+    warned = sum(w.lead_time is not None for w in trapped)
+    hours = sum(w.duration for w in found) / 3600.0
+    return {
+        'drives': str(len(drives)),
+        'slip RMSE': f'{scores.rms(data.slip_error):.4f}',
+        'worst kind': f'{worst[hardest]:.4f} ({hardest})',
+        'better two-state filter': f'{scores.rms(error):.4f} ({better})',
+        'ratio (95 % interval)': _interval(ratio),
+        'last reference held': f'{scores.rms(data.held_error):.4f}',
+        'dead reckoning': f'{scores.rms(data.dead_reckoned_error):.4f}',
+        'slow part of the slip error': f'{scores.rms(data.slow_slip_error):.4f}',
+        'coverage of slip': f'{scores.coverage(data.slip_error, data.slip_std):.1%}',
+        'coverage of slip, first 30 s after a start': _coverage_after_start(data),
+        'squared slip error over variance: mean, median': f'{mean:.2f}, {median:.2f}',
+        'sinkage RMSE [mm]': f'{1e3 * scores.rms(data.sinkage_error):.2f}',
+        'coverage of sinkage': f'{scores.coverage(data.sinkage_error, data.sinkage_std):.1%}',
+        'pull RMSE [% load]': f'{100 * scores.rms(data.pull_error):.2f}',
+        'coverage of pull': f'{scores.coverage(data.pull_error, data.pull_std):.1%}',
+        'entrapments warned of before': f'{warned} of {len(trapped)}',
+        'false warnings': f'{sum(w.false_alarms for w in found)} in {hours:.1f} h',
+    }
+
+
+def _by_slip(pooled: Samples) -> dict[str, Samples]:
+    edges = ((-1.01, -0.02), (-0.02, 0.3), (0.3, 0.6), (0.6, 0.9), (0.9, 1.01))
+    names = ('braking', 'low', 'moderate', 'high', 'stuck')
+    parts = {
+        name: pooled.where((pooled.true_slip > low) & (pooled.true_slip <= high))
+        for name, (low, high) in zip(names, edges, strict=True)
+    }
+    return {name: part for name, part in parts.items() if len(part)}
+
+
+def _errors(rows: dict[str, Samples]) -> str:
+    head = (
+        'drives',
+        'slip RMSE',
+        'bias',
+        'coverage',
+        'held reference',
+        'dead reckoning',
+        'sinkage RMSE [mm]',
+        'coverage',
+        'pull RMSE [% load]',
+        'coverage',
+        'shared by load [%]',
+        '3 classes',
+        '2 classes',
+        '3 near border',
+    )
+    return table(head, (_error_row(name, data) for name, data in rows.items()))
+
+
+def _error_row(name: str, data: Samples) -> tuple[str, ...]:
+    return (
+        name,
+        f'{scores.rms(data.slip_error):.3f}',
+        f'{np.nanmean(data.slip_error):+.3f}',
+        f'{scores.coverage(data.slip_error, data.slip_std):.1%}',
+        f'{scores.rms(data.held_error):.3f}',
+        f'{scores.rms(data.dead_reckoned_error):.3f}',
+        f'{1e3 * scores.rms(data.sinkage_error):.2f}',
+        f'{scores.coverage(data.sinkage_error, data.sinkage_std):.1%}',
+        f'{100 * scores.rms(data.pull_error):.2f}',
+        f'{scores.coverage(data.pull_error, data.pull_std):.1%}',
+        f'{100 * scores.rms(data.shared_pull_error):.2f}',
+        _share(scores.three_class_accuracy(data)),
+        _share(scores.two_class_accuracy(data)),
+        _share(scores.three_class_accuracy(data, near_border=True)),
+    )
+
+
+def _share(value: float) -> str:
+    return '-' if np.isnan(value) else f'{value:.2%}'
+
+
+def _confusion(pooled: Samples) -> str:
+    counts = scores.confusion(pooled)
+    rows = []
+    for name, row in zip(_CLASSES, counts, strict=True):
+        total = row.sum()
+        rows.append((name, *(f'{v / total:.3f}' if total else '-' for v in row), str(total)))
+    return table(('truth', *_CLASSES, 'unknown', 'samples'), rows)
+
+
+def _warnings(by_kind: dict[str, list[DriveScore]]) -> str:
+    rows = []
+    for kind, drives in by_kind.items():
+        found = [d.warnings for d in drives]
+        trapped = [w for w in found if w.entrapped is not None]
+        warned = [w for w in trapped if w.lead_time is not None]
+        times = [w.lead_time for w in warned if w.lead_time is not None]
+        travels = [w.lead_travel for w in warned if w.lead_travel is not None]
+        hours = sum(w.duration for w in found) / 3600.0
+        kilometres = sum(w.distance for w in found) / 1000.0
+        false = sum(w.false_alarms for w in found)
+        made_to = any(kind in WORLDS[d.world].entrapments for d in drives)
+        rows.append(
+            (
+                f'{kind}{" (made to entrap)" if made_to else ""}',
+                f'{len(trapped)} of {len(found)}',
+                f'{len(warned)} of {len(trapped)}' if trapped else '-',
+                f'{np.median(times):.1f} ({min(times):.1f})' if times else '-',
+                f'{np.median(travels):.2f} ({min(travels):.2f})' if travels else '-',
+                str(false),
+                f'{false / hours:.2f}',
+                f'{false / max(kilometres, 1e-9):.1f}',
+            )
+        )
+    return table(
+        (
+            'drives',
+            'entrapped',
+            'warned before',
+            'lead [s], median (least)',
+            'lead [m of rim travel]',
+            'false alarms',
+            'per hour',
+            'per km',
+        ),
+        rows,
+    )
+
+
+def _foresight(drives: Sequence[DriveScore]) -> list[str]:
+    """Return the reliability diagram of the stuck probability, and its Brier score."""
+    parts = [d.foresight for d in drives if d.foresight is not None]
+    data = Foresight.joined(parts) if parts else None
+    if data is None or not data.came.size:
+        return []
+    found = brier_interval(parts)
+    share = data.came.mean()
+    rows = [
+        (name, f'{value:.4f}', f'{low:.4f} to {high:.4f}')
+        for name, (value, low, high) in found.items()
+    ]
+    rows.append(('the share of events, always', f'{share * (1.0 - share):.4f}', '-'))
+    bins = [(f'{said:.2f}', f'{came:.2f}', str(count)) for count, said, came in reliability(data)]
+    return [
+        '\nProbability of an entrapment (median slip above 0.9 for a second, within horizon or '
+        f'travel): {share:.1%} of {data.came.size} rows; reliability error '
+        f'{reliability_error(data):.3f}.\n',
+        table(('Brier score of', 'value', '95 % interval'), rows),
+        '',
+        table(('said', 'came', 'rows'), bins),
+    ]
+
+
+def _smoother_over_filter(results: Results, modes: Sequence[str]) -> list[str]:
+    """Return the table of smoother over filter, for modes of which both were run."""
+    rows = []
+    for mode in (m for m in modes if m.startswith(SMOOTHED)):
+        live = mode.removeprefix(SMOOTHED).removeprefix('_') or 'reference'
+        for world in results.worlds:
+            sides = [
+                [d.samples for drives in results.of_mode(m, world).values() for d in drives]
+                for m in (live, mode)
+            ]
+            if all(sides):
+                before, after = (Samples.joined(side) for side in sides)
+                rows.append((f'{_MODES[live]}, {_WORLDS[world]}', *_ratios(before, after)))
+    if not rows:
+        return []
+    head = ('drives', 'slip', 'coverage', 'sinkage', 'coverage', 'pull', 'coverage')
+    return ['## Smoother over filter (RMSE)\n', table(head, rows), '']
+
+
+def _ratios(live: Samples, smoothed: Samples) -> Iterable[str]:
+    for name in ('slip', 'sinkage', 'pull'):
+        error, std = getattr(smoothed, f'{name}_error'), getattr(smoothed, f'{name}_std')
+        before = scores.rms(getattr(live, f'{name}_error'))
+        yield f'{scores.rms(error) / before:.3f}'
+        yield f'{scores.coverage(error, std):.1%}'
+
+
+def _health(by_kind: dict[str, list[DriveScore]]) -> str:
+    keys = ('nis_reference', 'nis_sinkage', 'nis_torque', 'nis_balance', 'filter_restarts')
+    rows = []
+    for kind, drives in by_kind.items():
+        values = []
+        for key in keys:
+            known = [float(d.health[key]) for d in drives if key in d.health]
+            values.append(f'{np.mean(known):.2f}' if known else '-')
+        rows.append((kind, *values))
+    return table(('drives', 'NIS reference', 'sinkage', 'torque', 'balance', 'restarts'), rows)
+
+
+def as_dict(results: Results, modes: Sequence[str]) -> dict[str, Any]:
+    """Return the main figures for JSON: world -> mode -> kind and ``pooled`` -> figures.
+
+    Errors in slip [-], sinkage [m] and pull [share of the load]; ``coverage`` of 95 % intervals.
+    """
+    found: dict[str, Any] = {}
+    for world in results.worlds:
+        for mode in modes:
+            by_kind = results.of_mode(mode, world)
+            if by_kind:
+                pooled = [drive for drives in by_kind.values() for drive in drives]
+                rows = {**by_kind, 'pooled': pooled}
+                found.setdefault(world, {})[mode] = {k: _numbers(d) for k, d in rows.items()}
+    return found
+
+
+def _numbers(drives: Sequence[DriveScore]) -> dict[str, Any]:
+    data = Samples.joined(d.samples for d in drives)
+    warnings = [d.warnings for d in drives]
+    trapped = [w for w in warnings if w.entrapped is not None]
+    better, baseline = scores.better_baseline(data)
+    errors = {
+        'slip': (data.slip_error, data.slip_std),
+        'sinkage': (data.sinkage_error, data.sinkage_std),
+        'drawbar_pull': (data.pull_error, data.pull_std),
+    }
+    return {
+        'drives': len(drives),
+        'rms': {name: _or_none(scores.rms(error)) for name, (error, _) in errors.items()},
+        'coverage': {
+            name: _or_none(scores.coverage(error, std)) for name, (error, std) in errors.items()
+        },
+        'better_two_state_filter': {'name': better, 'slip_rms': _or_none(scores.rms(baseline))},
+        'entrapped': len(trapped),
+        'warned_before': sum(w.lead_time is not None for w in trapped),
+        'false_alarms': sum(w.false_alarms for w in warnings),
+        'hours': sum(w.duration for w in warnings) / 3600.0,
+        **_foresight_numbers([d.foresight for d in drives if d.foresight is not None]),
+    }
+
+
+def _foresight_numbers(parts: Sequence[Foresight]) -> dict[str, Any]:
+    data = Foresight.joined(parts) if parts else None
+    if data is None or not data.came.size:
+        return {}
+    return {
+        'stuck_probability': {
+            'rows': int(data.came.size),
+            'events': float(data.came.mean()),
+            'reliability_error': reliability_error(data),
+            'brier': {name: list(found) for name, found in brier_interval(parts).items()},
+        }
+    }
+
+
+def _or_none(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None

@@ -1,0 +1,115 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Worlds of the bench: simulators of different hands, with one face."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wheel_terra_estimator.configuration import shipped
+from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.estimation.measurements import Measurement
+from wheel_terra_lab.evaluation import kinds as own_kinds
+from wheel_terra_lab.evaluation.simulator_b import kinds as rival_kinds
+
+FloatArray = NDArray[np.float64]
+SCENARIO = 'scenarios/'
+"""Begins the name of a kind that is a shipped scenario."""
+
+
+class TimedMeasurement(Protocol):
+    """A measurement and when it arrives [ns]."""
+
+    @property
+    def arrival(self) -> int: ...  # noqa: D102
+
+    @property
+    def measurement(self) -> Measurement: ...  # noqa: D102
+
+
+class Truth(Protocol):
+    """Ground truth of a drive, k stamps and n wheels; slip is nan at rest."""
+
+    @property
+    def stamp(self) -> NDArray[np.int64]: ...  # noqa: D102
+    @property
+    def slip(self) -> FloatArray: ...  # noqa: D102
+    @property
+    def slip_velocity(self) -> FloatArray: ...  # noqa: D102
+    @property
+    def drawbar_pull(self) -> FloatArray: ...  # noqa: D102
+    @property
+    def normal_load(self) -> FloatArray: ...  # noqa: D102
+    @property
+    def sinkage(self) -> FloatArray: ...  # noqa: D102
+    @property
+    def wheel_rate(self) -> FloatArray: ...  # noqa: D102
+    @property
+    def slip_class(self) -> NDArray[np.uint8]: ...  # noqa: D102
+    @property
+    def yaw_rate(self) -> FloatArray: ...  # noqa: D102
+    def first_stuck(self) -> float | None: ...  # noqa: D102
+
+
+@dataclass(frozen=True)
+class BenchDrive:
+    """A drive as the bench needs it."""
+
+    configuration: Configuration
+    arrivals: Sequence[TimedMeasurement]
+    truth: Truth
+
+
+@dataclass(frozen=True)
+class World:
+    """A simulator: its kinds of drives, those made to entrap, and how to make one.
+
+    ``simulate`` takes kind, seed, greatest duration [s] and a rover file in place of the kind's
+    own rover (None: that of the kind).
+    """
+
+    name: str
+    kinds: tuple[str, ...]
+    more_kinds: tuple[str, ...]  # run only when named
+    entrapments: tuple[str, ...]
+    simulate: Callable[[str, int, float | None, str | None], BenchDrive]
+    takes_scenarios: bool = False  # a kind may be `scenarios/NAME`, a shipped scenario
+
+    def has(self, kind: str) -> bool:
+        """Return whether the world makes drives of a kind."""
+        if self.takes_scenarios and kind.startswith(SCENARIO):
+            return shipped.find(kind).is_file()
+        return kind in self.kinds or kind in self.more_kinds
+
+
+def _own(kind: str, seed: int, duration: float | None, rover: str | None) -> BenchDrive:
+    from wheel_terra_estimator.simulation.drive import simulate
+    from wheel_terra_estimator.simulation.scenario import load
+
+    kinds = {**own_kinds.KINDS, 'firm': own_kinds.FIRM}
+    scenario = load(kinds.get(kind, kind), rover=rover)
+    longest = scenario.duration if duration is None else min(duration, scenario.duration)
+    drive = simulate(scenario, seed, longest)
+    return BenchDrive(drive.configuration, drive.arrivals, drive.truth)
+
+
+def _rival(kind: str, seed: int, duration: float | None, rover: str | None) -> BenchDrive:
+    if rover is not None:
+        raise UserError('the rival world has rovers of its own: another rover needs the own world')
+    from wheel_terra_lab.evaluation.simulator_b.drive import simulate
+
+    drive = simulate(kind, seed, duration)
+    return BenchDrive(drive.configuration, drive.arrivals, drive.truth)
+
+
+WORLDS = {
+    'own': World('own', tuple(own_kinds.KINDS), ('firm',), own_kinds.ENTRAPMENTS, _own, True),
+    'rival': World('rival', tuple(rival_kinds.KINDS), (), rival_kinds.ENTRAPMENTS, _rival),
+}
+"""The simulator of the package, and a second one that was written apart from it."""
