@@ -356,3 +356,18 @@ def test_a_finding_comes_and_goes_with_hysteresis():
     for _ in range(100):
         tally = rule.after(tally, False)
     assert tally.score == -5
+
+
+def test_checks_that_fail_leave_the_estimates_alone(drives, monkeypatch):
+    calls = []
+
+    def fail(self, window):
+        calls.append(window)
+        raise ZeroDivisionError('on purpose')
+
+    monkeypatch.setattr(OnlineChecks, '_judge', fail)
+    sets = sets_of(drives[SIX], lambda m: m, seconds=20.0)
+    assert len(calls) == 1, 'not asked again before the next run'
+    assert all(s.stuck for s in sets if s.faults), 'a warning does not wait for them'
+    assert any('internal error, see --debug' in ' '.join(s.faults.values()) for s in sets)
+    assert not any('filter' in s.faults for s in sets)

@@ -5,6 +5,8 @@
 from __future__ import annotations
 
 import math
+import warnings
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -142,6 +144,22 @@ def test_mound_raises_the_pull_at_high_slip_only() -> None:
     # Higher than the free surface behind the wheel: leaving angle beyond the entrance angle.
     high = state([0.9], effects={'soil_mound': {'kappa': 3.0, 'onset': 0.3}})
     assert -high.leaving_angle > high.entrance_angle
+
+
+@pytest.mark.parametrize('name', LISTED)
+def test_a_soil_that_cannot_carry_the_wheel_gives_no_warning_of_numpy(name: str) -> None:
+    for ratio, exponent, modulus, load in ((-1.0, 1.1, 1e4, 1e3), (-1.5, 0.3, 1e3, 1e4)):
+        soil = replace(
+            SAND,
+            leaving_angle_ratio=ratio,
+            sinkage_exponent=exponent,
+            frictional_modulus=modulus,
+            cohesive_modulus=0.0,
+        )
+        with warnings.catch_warnings():
+            warnings.simplefilter('error')
+            model = WheelSoilModel(soil, {name: {}}, strict=False)
+            model.steady_state(points(**{**ROW, 'load': load}))
 
 
 def test_effects_without_their_column_do_nothing() -> None:

@@ -131,7 +131,7 @@ LARGEST = 1e9
 """A number beyond this is damage in any unit."""
 
 
-def _credible(values: Any) -> Any:
+def credible(values: Any) -> Any:
     """Return values with nan in place of infinity and absurd numbers."""
     with np.errstate(invalid='ignore'):
         return np.where(np.abs(values) < LARGEST, values, math.nan)
@@ -188,7 +188,7 @@ class _Joints(_Collector):
                 place = self.names.get(name)
                 if place is not None:
                     values[index, place] = number
-        return _credible(values)
+        return credible(values)
 
     def series(self) -> Any:
         return JointSeries(self.topic, *self.times, tuple(self.names), self.table(1), self.table(2))
@@ -210,7 +210,7 @@ class _Imu(_Collector):
         return (f.x, f.y, f.z, w.x, w.y, w.z, *orientation)
 
     def series(self) -> Any:
-        table = _credible(np.array(self.rows, dtype=float))
+        table = credible(np.array(self.rows, dtype=float))
         return ImuSeries(self.topic, *self.times, table[:, :3], table[:, 3:6], table[:, 6:])
 
 
@@ -221,7 +221,7 @@ class _Velocity(_Collector):
         return (linear.x, linear.y, linear.z, angular.z, variance)
 
     def series(self) -> Any:
-        table = _credible(np.array(self.rows, dtype=float))
+        table = credible(np.array(self.rows, dtype=float))
         return VelocitySeries(self.topic, *self.times, table[:, :3], table[:, 3], table[:, 4])
 
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from wheel_terra_estimator.bags.message_types import topic_messages
 from wheel_terra_estimator.bags.reader import MeasurementReader
+from wheel_terra_estimator.bags.series_reader import credible
 from wheel_terra_estimator.bags.storage import Bag
 from wheel_terra_estimator.bags.thinning import ThinnedRows
 from wheel_terra_estimator.configuration.configuration import Configuration
@@ -186,7 +187,7 @@ def _thinned(bag: Bag, wanted: Mapping[str, _Values]) -> dict[str, WheelTruth]:
 def _sorted(rows: ThinnedRows, width: int) -> WheelTruth:
     stamps, values = rows.stamps(), rows.values(width)
     order = np.argsort(stamps, kind='stable')
-    return WheelTruth(stamps[order], values[order])
+    return WheelTruth(stamps[order], credible(values[order]))
 
 
 def _forward(message: Any) -> list[float]:

@@ -31,6 +31,8 @@ KINDS = (
     'jumps',
 )
 """All kinds of findings."""
+INTERNAL_ERROR = 'internal error, see --debug'
+"""Why a check that failed has nothing to say."""
 
 
 @dataclass(frozen=True, kw_only=True)

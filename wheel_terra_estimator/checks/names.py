@@ -13,6 +13,7 @@ import numpy as np
 from wheel_terra_estimator.checks.finding import Finding, NotChecked, Outcome
 from wheel_terra_estimator.checks.rover_facts import RoverFacts, side_of, wheel_names
 from wheel_terra_estimator.checks.series import Recording
+from wheel_terra_estimator.configuration.configuration import Configuration
 
 DEFAULT_TOPICS = {
     'joint_states': '/joint_states',
@@ -20,6 +21,33 @@ DEFAULT_TOPICS = {
     'sinkage': '/sinkage',
     'reference': '/reference_odom',
 }
+
+
+def check_required(recording: Recording, configuration: Configuration | None) -> list[Outcome]:
+    """Return the inputs that the estimator cannot do without and the recording does not have."""
+    found: list[Outcome] = []
+    own = configuration.wheel_odometry if configuration is not None else 'joint_states'
+    if (recording.joints if own == 'joint_states' else recording.wheel_odometry) is None:
+        other = recording.wheel_odometry
+        cure = f'record the wheel rates, or name their topic: --remap {own}:=/TOPIC'
+        if own == 'joint_states' and other is not None:
+            cure = f'-p wheel_odometry:=odom --remap odom:={other.topic}'
+        found.append(_required(own, 'wheel rates', 'there is nothing to estimate', cure))
+    if recording.imu is None:
+        effect = 'a reference velocity alone then tells slip, and nothing the slope'
+        cure = 'record the IMU, or name its topic: --remap imu/data:=/TOPIC'
+        found.append(_required('imu/data', 'IMU', effect, cure))
+    return found
+
+
+def _required(own: str, what: str, effect: str, cure: str) -> Finding:
+    return Finding(
+        kind='drop_outs',
+        topic=f'/{own}',
+        confidence=0.999,
+        words=f'no {what} in the recording, which the estimator needs: {effect}',
+        cure=cure,
+    )
 
 
 def check_topics(recording: Recording, remapped: Sequence[str]) -> list[Outcome]:

@@ -35,6 +35,8 @@ LAG_GAIN = 1.15
 """By how much the unlike part has to shrink for a lag to count; a slow reference is ragged."""
 LEAST_DELAY = 0.25
 """Delays below this [s] are left to jitter and filters of encoders."""
+SLOWEST_FOR_DELAY = 1.5
+"""Period of a reference [s] above which nothing is said of its delay."""
 LEAST_DELAY_PERIODS = 0.5
 """The same in periods of the reference: between its stamps nothing is known."""
 COVARIANCE_FACTOR = 6.0
@@ -228,8 +230,8 @@ def _delay(evidence: Evidence, reference: VelocitySeries, figures: dict[str, Any
     speed = np.interp(time, at[order], reference.velocity[order, 0])
     # Between its stamps the reference is a straight line: the rims are smoothed as much.
     for _ in range(2):
-        rim = moving_mean(rim, round(period / step))
-    if period > 1.5 or float(np.std(rim)) < 0.1 * float(np.abs(rim).mean() + 1e-9):
+        rim = moving_mean(rim, round(min(period, SLOWEST_FOR_DELAY) / step))
+    if period > SLOWEST_FOR_DELAY or float(np.std(rim)) < 0.1 * float(np.abs(rim).mean() + 1e-9):
         return [NotChecked('delay', 'reference: hardly a change of speed in it; stop and go')]
     found = lag(time, rim, speed, 3.0)
     if found is None or found.fit < 0.9:

@@ -3,16 +3,20 @@
 """All checks of a recording, in the order in which one rests on the other.
 
 What an earlier check found is mended before the later ones look, so that one fault gives one
-finding.
+finding. Each check runs apart: one that fails leaves what it was given as it was.
 """
 
 from __future__ import annotations
 
+import logging
 import math
-from collections.abc import Sequence
-from dataclasses import replace
+import warnings
+from collections.abc import Callable, Sequence
+from dataclasses import fields, replace
+from typing import Any, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from wheel_terra_estimator.checks import (
     alignment,
@@ -29,10 +33,20 @@ from wheel_terra_estimator.checks import (
     wheel_rates,
 )
 from wheel_terra_estimator.checks.evidence import LEAST_MOVING_ROWS, Evidence, gather
-from wheel_terra_estimator.checks.finding import CheckReport, Finding, NotChecked, Outcome
+from wheel_terra_estimator.checks.finding import (
+    INTERNAL_ERROR,
+    CheckReport,
+    Finding,
+    NotChecked,
+    Outcome,
+)
 from wheel_terra_estimator.checks.rover_facts import RoverFacts
-from wheel_terra_estimator.checks.series import Recording
+from wheel_terra_estimator.checks.series import ImuSeries, Recording, VelocitySeries
 from wheel_terra_estimator.configuration.configuration import Configuration
+
+_LOGGER = logging.getLogger(__name__)
+Result = TypeVar('Result')
+Series = TypeVar('Series', ImuSeries, VelocitySeries)
 
 
 def check_recording(
@@ -51,9 +65,7 @@ def check_recording(
     remapped : sequence of str
         Topics of the estimator that the user has named himself.
     """
-    with np.errstate(all='ignore'):  # damaged recordings hold anything
-        report, _ = examine(recording, configuration, remapped)
-    return report
+    return examine(recording, configuration, remapped)[0]
 
 
 def examine(
@@ -63,6 +75,32 @@ def examine(
 ) -> tuple[CheckReport, Evidence | None]:
     """Run all checks and return the evidence with everything mended that was found."""
     report = CheckReport()
+    with np.errstate(all='ignore'), warnings.catch_warnings():  # damaged recordings hold anything
+        warnings.simplefilter('ignore', RuntimeWarning)
+        evidence = run_apart(
+            report, 'sign', None, lambda: _examined(recording, configuration, remapped, report)
+        )
+    return report, evidence
+
+
+def run_apart(
+    report: CheckReport, kind: str, otherwise: Result, check: Callable[[], Result]
+) -> Result:
+    """Return what a check returns; if it fails, say that it did and return what was given."""
+    try:
+        return check()
+    except Exception:
+        _LOGGER.debug('check for %s', kind, exc_info=True)
+        report.not_checked.append(NotChecked(kind, INTERNAL_ERROR))
+        return otherwise
+
+
+def _examined(
+    recording: Recording,
+    configuration: Configuration | None,
+    remapped: Sequence[str],
+    report: CheckReport,
+) -> Evidence | None:
     figures = report.figures
     joints = recording.joints.names if recording.joints is not None else ()
     facts = (
@@ -70,51 +108,82 @@ def examine(
         if configuration is not None
         else rover_facts.from_names(joints)
     )
-    report.take(names.check_topics(recording, remapped))
-    report.take(names.check_wheel_names(recording, facts))
+
+    def take(kind: str, check: Callable[[], list[Outcome]]) -> None:
+        report.take(run_apart(report, kind, [], check))
+
+    take('drop_outs', lambda: names.check_required(recording, configuration))
+    take('unknown_name', lambda: names.check_topics(recording, remapped))
+    take('missing_wheel', lambda: names.check_wheel_names(recording, facts))
     facts = _with_names_in(facts, report)
-    report.take(transport.check_transport(recording, figures))
+    take('order', lambda: transport.check_transport(recording, figures))
     recording = _whole_rows(recording)
     rotation = configured_mounting(configuration)
-    outcomes, state = imu.check_imu(recording, facts, rotation, figures)
+    unjudged: tuple[list[Outcome], imu.ImuState] = [], imu.ImuState(recording, rotation)
+    outcomes, state = run_apart(
+        report,
+        'gravity',
+        unjudged,
+        lambda: imu.check_imu(recording, facts, rotation, figures),
+    )
     report.take(outcomes)
     evidence = gather(state.recording, facts, state.rotation)
     if evidence is None or evidence.time.size < LEAST_MOVING_ROWS:
         report.not_checked.append(NotChecked('sign', 'no wheel rates to compare with'))
-        return report, None
+        return None
     if not state.usable_force:
         evidence = replace(evidence, force=None)
     if not state.usable_gyro:
         evidence = replace(evidence, gyro=None)
-    evidence = _tilt(evidence, report)
-    evidence = _wheels(evidence, report)
-    return report, _rest(evidence, report)
+    return _against_each_other(evidence, report)
+
+
+def _against_each_other(evidence: Evidence, report: CheckReport) -> Evidence:
+    """Run the checks that hold one channel against another; return the evidence mended."""
+    figures = report.figures
+
+    def mend(kind: str, check: Callable[[Evidence], tuple[list[Outcome], Evidence]]) -> None:
+        nonlocal evidence
+        unchanged: tuple[list[Outcome], Evidence] = [], evidence
+        outcomes, evidence = run_apart(report, kind, unchanged, lambda: check(evidence))
+        report.take(outcomes)
+
+    def look(kind: str, check: Callable[..., list[Outcome]]) -> None:
+        report.take(run_apart(report, kind, [], lambda: check(evidence, figures)))
+
+    mend('mounting', lambda e: _tilt(e, figures))
+    mend('missing_wheel', wheel_rates.check_dead_wheels)
+    mend('unit', _gyro_unit)
+    mend('sign', lambda e: _signs_and_unit(e, figures))
+    look('noise', rate_noise.check_noise)
+    mend('covariance', lambda e: reference.check_reference(e, figures))
+    mend('gain', lambda e: torque.check_torque(e, figures))
+    mend('mounting', lambda e: _yaw(e, figures))
+    look('delay', alignment.check_clock)
+    look('zero', imu.check_noise_and_zero)
+    look('zero', sinkage.check_sinkage)
+    look('exchanged_wheels', sinkage_order.check_order)
+    look('radius', geometry.check_radius)
+    look('track', geometry.check_track)
+    return evidence
 
 
 def _whole_rows(recording: Recording) -> Recording:
     """Leave out IMU and reference messages with values that are no numbers."""
-    measured, velocity = recording.imu, recording.reference
-    if measured is not None:
-        keep = np.isfinite(measured.force).all(axis=1) & np.isfinite(measured.rate).all(axis=1)
-        measured = replace(
-            measured,
-            stamp=measured.stamp[keep],
-            log_time=measured.log_time[keep],
-            force=measured.force[keep],
-            rate=measured.rate[keep],
-            orientation=measured.orientation[keep],
-        )
+    imu, velocity = recording.imu, recording.reference
+    if imu is not None:
+        imu = _rows(imu, np.isfinite(np.hstack([imu.force, imu.rate])))
     if velocity is not None:
-        keep = np.isfinite(velocity.velocity).all(axis=1)
-        velocity = replace(
-            velocity,
-            stamp=velocity.stamp[keep],
-            log_time=velocity.log_time[keep],
-            velocity=velocity.velocity[keep],
-            yaw_rate=velocity.yaw_rate[keep],
-            variance=velocity.variance[keep],
-        )
-    return replace(recording, imu=measured, reference=velocity)
+        velocity = _rows(velocity, np.isfinite(velocity.velocity))
+    return replace(recording, imu=imu, reference=velocity)
+
+
+def _rows(series: Series, known: NDArray[np.bool_]) -> Series | None:
+    """Return the rows of a channel in which all is known; None for none."""
+    kept = known.all(axis=1)
+    arrays = {f.name: getattr(series, f.name) for f in fields(series) if f.name != 'topic'}
+    rows = {name: values[kept] for name, values in arrays.items()}
+    return replace(series, **rows) if kept.any() else None
 
 
 def configured_mounting(configuration: Configuration | None) -> np.ndarray:
@@ -139,10 +208,14 @@ def _with_names_in(facts: RoverFacts, report: CheckReport) -> RoverFacts:
     return replace(facts, names=tuple(name.strip() for name in listed.split(',')))
 
 
-def _tilt(evidence: Evidence, report: CheckReport) -> Evidence:
-    outcomes, rotation = imu.check_mounting(evidence, report.figures)
-    report.take(outcomes)
-    return turned(evidence, rotation)
+def _tilt(evidence: Evidence, figures: dict[str, Any]) -> tuple[list[Outcome], Evidence]:
+    outcomes, rotation = imu.check_mounting(evidence, figures)
+    return outcomes, turned(evidence, rotation)
+
+
+def _yaw(evidence: Evidence, figures: dict[str, Any]) -> tuple[list[Outcome], Evidence]:
+    outcomes, rotation = alignment.check_yaw(evidence, figures)
+    return outcomes, turned(evidence, rotation)
 
 
 def turned(evidence: Evidence, rotation: np.ndarray) -> Evidence:
@@ -156,21 +229,13 @@ def turned(evidence: Evidence, rotation: np.ndarray) -> Evidence:
     )
 
 
-def _wheels(evidence: Evidence, report: CheckReport) -> Evidence:
-    figures = report.figures
-    outcomes, evidence = wheel_rates.check_dead_wheels(evidence)
-    report.take(outcomes)
-    outcomes, evidence = _gyro_unit(evidence)
-    report.take(outcomes)
+def _signs_and_unit(evidence: Evidence, figures: dict[str, Any]) -> tuple[list[Outcome], Evidence]:
     unit, evidence = wheel_rates.check_unit(evidence, figures)
-    outcomes, evidence = wheel_rates.check_signs(evidence)
-    report.take(outcomes)
+    signs, evidence = wheel_rates.check_signs(evidence)
     if any(isinstance(outcome, NotChecked) for outcome in unit):
         # Wheels that count against each other hide the speed as well.
         unit, evidence = wheel_rates.check_unit(evidence, figures)
-    report.take(unit)
-    report.take(rate_noise.check_noise(evidence, figures))
-    return evidence
+    return [*signs, *unit], evidence
 
 
 def _gyro_unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
@@ -184,21 +249,3 @@ def _gyro_unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         return outcomes, evidence
     recording = replace(evidence.recording, imu=judged.recording.imu)
     return again, replace(evidence, recording=recording, gyro=judged.gyro)
-
-
-def _rest(evidence: Evidence, report: CheckReport) -> Evidence:
-    figures = report.figures
-    outcomes, evidence = reference.check_reference(evidence, figures)
-    report.take(outcomes)
-    outcomes, evidence = torque.check_torque(evidence, figures)
-    report.take(outcomes)
-    outcomes, rotation = alignment.check_yaw(evidence, figures)
-    report.take(outcomes)
-    evidence = turned(evidence, rotation)
-    report.take(alignment.check_clock(evidence, figures))
-    report.take(imu.check_noise_and_zero(evidence, figures))
-    report.take(sinkage.check_sinkage(evidence, figures))
-    report.take(sinkage_order.check_order(evidence, figures))
-    report.take(geometry.check_radius(evidence, figures))
-    report.take(geometry.check_track(evidence, figures))
-    return evidence

@@ -41,7 +41,7 @@ class Estimate(NamedTuple):
 
 
 def even_times(time: FloatArray, step: float) -> FloatArray:
-    """Return times [s] at even steps over a drive, given its increasing stamps [s].
+    """Return times [s] at even steps over a drive, given its increasing stamps [s]; one at least.
 
     Where the stamps jump by years (a clock that was set late, a damaged stamp) it is the stretch
     with the most of them.
@@ -50,7 +50,7 @@ def even_times(time: FloatArray, step: float) -> FloatArray:
         stretches = np.split(time, np.flatnonzero(np.diff(time) > LONGEST_PAUSE) + 1)
         time = max(stretches, key=len)
     end = min(float(time[-1]), float(time[0]) + MOST_TIMES * step)
-    return np.asarray(np.arange(time[0], end, step), dtype=np.float64)
+    return np.asarray(time[0] + step * np.arange(max(math.ceil((end - time[0]) / step), 1)))
 
 
 def robust_std(values: FloatArray) -> float:
@@ -162,6 +162,8 @@ def lag(time: FloatArray, first: FloatArray, second: FloatArray, limit: float) -
 
     The deviation is that of the lags of thirds of the record. None: nothing to correlate.
     """
+    if time.size < 2:
+        return None
     step = float(np.median(np.diff(time)))
     reach = max(round(limit / step), 1)
     if time.size < 6 * reach or not first.std() or not second.std():

@@ -4,13 +4,14 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from wheel_terra_estimator.checks.finding import Finding
+from wheel_terra_estimator.checks.finding import INTERNAL_ERROR, Finding
 from wheel_terra_estimator.checks.online import OnlineChecks
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.estimates import (
@@ -21,8 +22,10 @@ from wheel_terra_estimator.estimation.estimates import (
 from wheel_terra_estimator.estimation.measurements import StepInputs
 from wheel_terra_estimator.estimation.timing.input_log import Estimator
 
+_LOGGER = logging.getLogger(__name__)
 SUBJECT = 'check of '
 """Begins the subject of a finding among the faults of a set."""
+_NOT_CHECKED = {SUBJECT + 'the inputs': f'not checked: {INTERNAL_ERROR}'}
 LONGEST_WAIT = 4_000_000_000
 """A stuck warning waits no longer [ns of stamps] for the verdict on its inputs."""
 FAR_NIS = 10.0
@@ -59,10 +62,17 @@ class WatchedEstimator:
         self._estimator = estimator
         self._checks = OnlineChecks(configuration)
         self._warning = _Warning()
+        self._failed = False  # the checks of this run
 
     def step(self, stamp: int, inputs: StepInputs) -> None:
         """Bring both to `stamp` [ns], later than the one before."""
-        self._checks.step(stamp, inputs)
+        if not self._failed:
+            try:
+                self._checks.step(stamp, inputs)
+            except Exception:  # an onlooker: the estimate goes on without it
+                _LOGGER.debug('checks while driving', exc_info=True)
+                self._checks.reset()
+                self._failed = True
         self._estimator.step(stamp, inputs)
         self._warning = self._followed(stamp)
 
@@ -73,7 +83,9 @@ class WatchedEstimator:
         since, waited = self._warning
         rises = since is None
         begun = stamp if since is None else since
-        undecided = bool(self._checks.undecided) and stamp - begun < LONGEST_WAIT
+        undecided = (
+            bool(self._checks.undecided) and not self._failed and stamp - begun < LONGEST_WAIT
+        )
         return _Warning(begun, (rises or waited) and undecided)
 
     def estimates(self) -> EstimateSet:
@@ -81,6 +93,8 @@ class WatchedEstimator:
         estimates = self._with_misfits(self._estimator.estimates())
         if self._checks.remarks:
             estimates = replace(estimates, faults=_told(estimates.faults, self._checks.remarks))
+        if self._failed:
+            estimates = replace(estimates, faults={**estimates.faults, **_NOT_CHECKED})
         findings = self._checks.findings
         if findings:
             return without_judgement(estimates, findings)
@@ -105,11 +119,11 @@ class WatchedEstimator:
 
     def snapshot(self) -> Any:
         """Return all states."""
-        return self._estimator.snapshot(), self._checks.snapshot(), self._warning
+        return self._estimator.snapshot(), self._checks.snapshot(), self._warning, self._failed
 
     def restore(self, snapshot: Any) -> None:
         """Return to a kept state."""
-        estimator, checks, self._warning = snapshot
+        estimator, checks, self._warning, self._failed = snapshot
         self._estimator.restore(estimator)
         self._checks.restore(checks)
 
@@ -117,6 +131,7 @@ class WatchedEstimator:
         """Start anew."""
         self._checks.reset()
         self._warning = _Warning()
+        self._failed = False
         self._estimator.begin_run(stamp, keep_soil)
 
     def health(self) -> dict[str, Any]:

@@ -11,6 +11,7 @@ from __future__ import annotations
 import argparse
 import difflib
 import importlib
+import logging
 import os
 import sys
 from collections.abc import Container, Sequence
@@ -208,6 +209,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     if unknown:
         _refuse(unknown[0], subs[arguments.command])
     try:
+        if arguments.debug:  # what is mended in silence is told, too
+            logging.basicConfig()
+            logging.getLogger('wheel_terra_estimator').setLevel(logging.DEBUG)
         with harmless_output(), termination_as_interrupt():
             return int(arguments.run(arguments) or 0)
     except UserError as error:

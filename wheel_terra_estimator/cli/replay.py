@@ -124,7 +124,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _run_one(arguments: argparse.Namespace) -> int:
     from wheel_terra_estimator.bags.reader import parse_remaps
-    from wheel_terra_estimator.checks.finding import CheckReport
+    from wheel_terra_estimator.checks.finding import INTERNAL_ERROR, CheckReport
     from wheel_terra_estimator.fleet.drive import replay_drive
     from wheel_terra_estimator.reporting import track_table
 
@@ -132,6 +132,9 @@ def _run_one(arguments: argparse.Namespace) -> int:
         if not arguments.json:
             for finding in checked.findings:
                 print(f'finding: {finding}')
+            for entry in checked.not_checked:
+                if entry.reason == INTERNAL_ERROR:
+                    print(f'not checked: {entry.kind}: {entry.reason}')
 
     (bag,) = arguments.bags
     configuration = configuration_reader.from_arguments(arguments)

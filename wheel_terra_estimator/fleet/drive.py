@@ -11,10 +11,10 @@ from pathlib import Path
 from wheel_terra_estimator.bags.limits import LIMITS, Limits
 from wheel_terra_estimator.bags.replay import Replay, replay
 from wheel_terra_estimator.bags.series_reader import read_series
-from wheel_terra_estimator.bags.storage import open_bag
+from wheel_terra_estimator.bags.storage import Bag, open_bag
 from wheel_terra_estimator.bags.truth import Truth, read_truth
 from wheel_terra_estimator.checks.finding import CheckReport
-from wheel_terra_estimator.checks.run import check_recording
+from wheel_terra_estimator.checks.run import check_recording, run_apart
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.output_folder import new_file
 from wheel_terra_estimator.reporting import estimates_table, track_table, truth_scores
@@ -99,8 +99,7 @@ def replay_drive(
         Input that cannot be used, an output path that is taken.
     """
     with open_bag(path, limits) as bag:
-        recording = read_series(bag, remaps, path.name, QUICK_MESSAGES)
-        checked = check_recording(recording, configuration, tuple(remaps))
+        checked = _checked(bag, configuration, remaps)
         on_checked(checked)
         result = replay(
             bag,
@@ -129,3 +128,15 @@ def replay_drive(
         notes.append(NO_SOIL)
     summary = summarise(title, result.history, result.topics, result.heard, result.rejected, notes)
     return Drive(configuration, checked, result, truth, errors, summary, filter_errors)
+
+
+def _checked(bag: Bag, configuration: Configuration, remaps: Mapping[str, str]) -> CheckReport:
+    """Return what the checks found; nothing that fails there keeps the replay from its work."""
+    report = CheckReport()
+    recording = run_apart(
+        report,
+        'order',
+        None,
+        lambda: read_series(bag, remaps, bag.path.resolve().name, QUICK_MESSAGES),
+    )
+    return report if recording is None else check_recording(recording, configuration, tuple(remaps))

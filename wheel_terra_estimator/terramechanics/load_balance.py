@@ -138,7 +138,7 @@ def solve_entrance_angle(
             return angle, done
         low = np.where(force < load, angle, low)
         high = np.where(force >= load, angle, high)
-        with np.errstate(divide='ignore', invalid='ignore'):
+        with np.errstate(divide='ignore', over='ignore', invalid='ignore'):
             exponent = (next_force / force - 1.0) / _STEP
             proposal = angle * (load / force) ** (1.0 / exponent)
         good = np.isfinite(proposal) & (proposal > low) & (proposal < high) & (exponent > 0.2)

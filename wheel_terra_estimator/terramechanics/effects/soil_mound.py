@@ -10,6 +10,9 @@ from typing import Any
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter
 
+SMALLEST_ROOM = 1e-12
+"""Height left below the hub over r [-]; contact that leaves above the hub has none."""
+
 
 def _mound(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
     """Raise the rear contact height by kappa z ((s - onset)+/(1 - onset))^2, below the hub."""
@@ -18,7 +21,8 @@ def _mound(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
     # 1 - cos is the contact height over r. The slope of a circle is steeper the higher one gets, so
     # the height saturates below the hub (1 - exp keeps it smooth).
     base = 1.0 - maths.cos(contact.leaving_angle)
-    height = base + (1.0 - base) * (1.0 - maths.exp(-rise / (1.0 - base)))
+    room = maths.maximum(1.0 - base, SMALLEST_ROOM)
+    height = base + room * (1.0 - maths.exp(-rise / room))
     raised = -maths.arccos(maths.maximum(1.0 - height, 0.0))
     contact.leaving_angle = maths.where(rise > 0.0, raised, contact.leaving_angle)
 
