@@ -25,7 +25,7 @@ import sys
 class Block:
     def find_spec(self, name, path=None, target=None):
         if name.partition('.')[0] in {blocked!r}:
-            raise ImportError(name + ' is blocked by this test')
+            raise ModuleNotFoundError(name + ' is blocked by this test', name=name)
 sys.meta_path.insert(0, Block())
 """
 
@@ -67,6 +67,18 @@ def test_the_node_does_not_need_rosbags():
         'import wheel_terra_estimator.ros.estimator_node', blocked=('rosbags', 'matplotlib')
     )
     assert result.returncode == 0, result.stderr
+
+
+@pytest.mark.parametrize('command', ['trial', 'soilbin', 'evaluate', 'bench'])
+def test_a_command_of_the_laboratory_says_that_this_is_missing(command):
+    result = run(
+        'from wheel_terra_estimator.cli.main import main\n'
+        f'sys.exit(main([{command!r}, "-o", "folder"]))',
+        blocked=('wheel_terra_lab',),
+    )
+    assert result.returncode == 2
+    assert result.stderr.startswith(f'wheel-terra {command}: the laboratory')
+    assert result.stderr.count('\n') == 1
 
 
 def test_help_is_light():

@@ -37,11 +37,15 @@ def run(*command: str | Path, cwd: Path) -> str:
 @pytest.fixture(scope='module')
 def built_wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The wheel, built from the source distribution (as a package index would hold both)."""
-    work = tmp_path_factory.mktemp('packages')
+    return build(tmp_path_factory.mktemp('packages'))
+
+
+def build(work: Path, without: str = 'nothing') -> Path:
+    """Return the wheel of the committed files, without those below a folder."""
     source = work / 'source'
     listed = run('git', 'ls-files', cwd=ROOT).splitlines()
     for name in listed:
-        if (ROOT / name).is_file():
+        if (ROOT / name).is_file() and not name.startswith(f'{without}/'):
             target = source / name
             target.parent.mkdir(parents=True, exist_ok=True)
             target.write_bytes((ROOT / name).read_bytes())
@@ -68,13 +72,33 @@ def test_metadata(built_wheel: Path) -> None:
     assert not any(n.startswith(('test/', 'tools/')) for n in files)
 
 
-def test_demo_after_pip_install_alone(built_wheel: Path, tmp_path: Path) -> None:
-    environment = tmp_path / 'environment'
+def installed(wheel: Path, folder: Path) -> Path:
+    """Install a wheel in an environment of its own; return the command."""
+    environment = folder / 'environment'
     venv.create(environment, with_pip=True)
     pins = ROOT / 'requirements' / 'runtime.txt'
-    run(environment / 'bin' / 'pip', 'install', '--quiet', '-r', pins, cwd=tmp_path)
-    run(environment / 'bin' / 'pip', 'install', '--quiet', '--no-deps', built_wheel, cwd=tmp_path)
-    command = environment / 'bin' / 'wheel-terra'
+    run(environment / 'bin' / 'pip', 'install', '--quiet', '-r', pins, cwd=folder)
+    run(environment / 'bin' / 'pip', 'install', '--quiet', '--no-deps', wheel, cwd=folder)
+    return environment / 'bin' / 'wheel-terra'
+
+
+def test_demo_after_pip_install_alone(built_wheel: Path, tmp_path: Path) -> None:
+    command = installed(built_wheel, tmp_path)
+    check_demo(command, tmp_path)
+    assert 'usage: wheel-terra trial' in run(command, 'trial', '--help', cwd=tmp_path)
+
+
+def test_the_product_without_the_laboratory(tmp_path: Path) -> None:
+    command = installed(build(tmp_path, without='wheel_terra_lab'), tmp_path)
+    assert not list((tmp_path / 'environment').rglob('wheel_terra_lab'))
+    check_demo(command, tmp_path)
+    for name in ('trial', 'soilbin', 'evaluate', 'bench'):
+        said = subprocess.run([command, name], cwd=tmp_path, capture_output=True, text=True)
+        assert said.returncode == 2
+        assert 'wheel_terra_lab) is not installed' in said.stderr
+
+
+def check_demo(command: Path, tmp_path: Path) -> None:
     assert run(command, '--version', cwd=tmp_path).split()[-1] == __version__
     said = run(command, 'demo', '--no-node', cwd=tmp_path)
     assert 'entrapped at' in said

@@ -1,10 +1,11 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Makes the recordings of ``make demo``: the entrapment drive, and a piece of the Pathfinder drive.
+"""Makes what ``wheel-terra demo`` shows: two recordings and the table of a blind trial.
 
     python tools/make_demo_bags.py ../shared/measured/bags/wvu_pathfinder_test17_mcap
 
-writes ``data/demo/entrapment`` and ``data/demo/pathfinder`` (compressed MCAP).
+writes ``data/demo/entrapment`` and ``data/demo/pathfinder`` (compressed MCAP), and the table in
+``data/demo/trial``, whose hash it prints for ``wheel_terra_estimator/cli/demo.py``.
 """
 
 from __future__ import annotations
@@ -20,11 +21,14 @@ from rosbags.typesys import Stores, get_typestore
 from wheel_terra_estimator.bags.simulated_drive import write_simulated_drive
 from wheel_terra_estimator.simulation.drive import simulate
 from wheel_terra_estimator.simulation.scenario import load
+from wheel_terra_lab.trials import trial
 
 DATA = Path(__file__).resolve().parents[1] / 'data' / 'demo'
 SCENARIO, SEED, DURATION = 'climb_soft_patch', 5, 112.0
 PIECE = (6.0, 36.0)
 """Part of the Pathfinder drive [s after its start]: standing, starting and driving."""
+
+TRIAL_SEED = 55
 
 
 def repack(source: Path, target: Path, part: tuple[float, float] | None = None) -> None:
@@ -63,6 +67,8 @@ def main() -> None:
         write_simulated_drive(simulate(scenario, SEED, DURATION), plain)
         repack(plain, DATA / 'entrapment')
     repack(arguments.pathfinder, DATA / 'pathfinder', PIECE)
+    (DATA / 'trial').mkdir(exist_ok=True)
+    print(trial.hide(trial.draw(TRIAL_SEED, None), DATA / 'trial'))
 
 
 if __name__ == '__main__':

@@ -8,13 +8,12 @@ and after the diagnosis, and the gap on rows that the fit did not see.
 
 from __future__ import annotations
 
-import tempfile
 from pathlib import Path
 
 import numpy as np
 
 from wheel_terra_estimator.api import plot_diagnosis
-from wheel_terra_estimator.cli.demo import TRIAL_SEED
+from wheel_terra_estimator.configuration.shipped import demo_recording
 from wheel_terra_estimator.reporting.style import LINE_COLOURS, picture_style
 from wheel_terra_lab.trials import trial
 
@@ -25,11 +24,9 @@ def main() -> None:
     """Hide, diagnose blind, open the seal, draw."""
     from matplotlib import pyplot
 
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        trial.hide(trial.draw(TRIAL_SEED, None), folder)
-        diagnosis = trial.solve_blind(folder)
-        outcome = trial.compare(folder, diagnosis)
+    folder = demo_recording('trial')
+    diagnosis = trial.solve_blind(folder)
+    outcome = trial.compare(folder, diagnosis)
     columns, curves = diagnosis.table.columns, diagnosis.curves
     with picture_style():
         figure, (left, right) = pyplot.subplots(1, 2, figsize=(10.5, 3.6))

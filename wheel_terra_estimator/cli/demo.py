@@ -4,14 +4,16 @@
 
 The entrapment of a simulated six-wheel rover, whose ground truth is known, and a piece of a real
 drive of the Pathfinder rover. The node hears them over DDS; where there is no rclpy the same drives
-go through ``wheel-terra replay``, which gives the same numbers. The trial hides an effect in a
-table, diagnoses it blind and opens the seal (``wheel-terra trial``).
+go through ``wheel-terra replay``, which gives the same numbers. The trial is a table made
+by ``wheel-terra trial``, in which an effect is hidden: it is diagnosed blind, then the seal opened.
 """
 
 from __future__ import annotations
 
 import argparse
+import hashlib
 import importlib.util
+import json
 import os
 import subprocess
 import sys
@@ -25,7 +27,8 @@ from wheel_terra_estimator.errors import UserError
 if TYPE_CHECKING:
     from wheel_terra_estimator.bags.truth import Truth
 
-TRIAL_SEED = 55  # what it hides is told when the seal is opened
+SEAL_SHA256 = '78c7f9baa4662e0969d5b5dff2c94fbd5cbd89ae14923cf0fcc754b1af82c5c7'
+"""Of the shipped ``sealed.json``, which says what was hidden in the table beside it."""
 EXAMPLES = ('wheel-terra demo', 'wheel-terra demo --no-node -o /tmp/demo --overwrite')
 
 
@@ -91,10 +94,8 @@ def run(arguments: argparse.Namespace) -> int:
             return status
         _key_numbers(drive, output)
         reports.append(output / f'{drive.name}.html')
-    print(f'\n=== trial {TRIAL_SEED}: what is missing in the model of a wheel?\n', flush=True)
-    trial = [sys.executable, '-m', 'wheel_terra_estimator.cli.main', 'trial', '--overwrite']
-    trial += ['--seed', str(TRIAL_SEED), '-o', str(output / 'trial')]
-    status = subprocess.run(trial, env=_environment(), check=False).returncode
+    print('\n=== trial: what is missing in the model of a wheel?\n', flush=True)
+    status = _trial(output / 'trial')
     if status:
         return status
     reports.append(output / 'trial' / 'diagnosis' / 'report.html')
@@ -102,6 +103,28 @@ def run(arguments: argparse.Namespace) -> int:
     for report in reports:
         print(f'  {report.resolve()}')
     return 0
+
+
+def _trial(folder: Path) -> int:
+    """Diagnose the shipped table blind, then open its seal."""
+    from wheel_terra_estimator.configuration.shipped import demo_recording
+
+    shipped = demo_recording('trial')
+    sealed = (shipped / 'sealed.json').read_bytes()
+    if hashlib.sha256(sealed).hexdigest() != SEAL_SHA256:
+        raise UserError(f'{shipped / "sealed.json"}: the seal is broken; install the package anew')
+    print(f'blind table, truth sealed (SHA-256 {SEAL_SHA256[:16]}...)', flush=True)
+    command = [sys.executable, '-m', 'wheel_terra_estimator.cli.main', 'diagnose', '--overwrite']
+    command += [str(shipped / 'blind.csv'), '--config', str(shipped / 'rig.yaml')]
+    command += ['-o', str(folder / 'diagnosis')]
+    status = subprocess.run(command, env=_environment(), check=False).returncode
+    if status == 0:
+        report = json.loads((folder / 'diagnosis' / 'report.json').read_text(encoding='utf-8'))
+        hidden = ' + '.join(json.loads(sealed)['hidden'])
+        said = ' + '.join(effect['name'] for effect in report['effects']) or report['verdict']
+        judged = 'right' if said == hidden else 'wrong'
+        print(f'seal opened: {hidden} was hidden; said: {said}: {judged}')
+    return status
 
 
 def _make_room(output: Path, overwrite: bool) -> None:

@@ -28,7 +28,7 @@ def configuration_folder() -> Path:
 
 
 def demo_recording(name: str) -> Path:
-    """Return the folder of a recording that is shipped for ``wheel-terra demo``."""
+    """Return the folder of a drive, or of the trial, that is shipped for ``wheel-terra demo``."""
     return _shipped_folder('data') / 'demo' / name
 
 

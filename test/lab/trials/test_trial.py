@@ -5,12 +5,15 @@
 from __future__ import annotations
 
 import csv
+import hashlib
 import json
 
 import numpy as np
 import pytest
 
+from wheel_terra_estimator.cli.demo import SEAL_SHA256
 from wheel_terra_estimator.cli.main import main
+from wheel_terra_estimator.configuration.shipped import demo_recording
 from wheel_terra_lab.trials import trial
 from wheel_terra_lab.trials.hidden import LISTED, OUTSIDE
 
@@ -59,6 +62,17 @@ def test_the_same_seed_draws_the_same_and_lots_cover_all_kinds():
     flat = {name for names in hidden for name in names}
     assert () in hidden or flat & set(OUTSIDE)
     assert flat & set(LISTED)
+
+
+def test_the_shipped_trial_is_sealed_and_a_draw_of_its_seed(tmp_path):
+    shipped = demo_recording('trial')
+    seal = (shipped / trial.SEAL).read_bytes()
+    assert hashlib.sha256(seal).hexdigest() == SEAL_SHA256, 'python tools/make_demo_bags.py'
+    campaign = trial.draw(json.loads(seal)['seed'], None)
+    trial.hide(campaign, tmp_path)
+    assert list(campaign.hidden) == json.loads(seal)['hidden']
+    tables = [np.genfromtxt(f / trial.TABLE, delimiter=',')[1:] for f in (shipped, tmp_path)]
+    np.testing.assert_allclose(*tables, rtol=1e-6)
 
 
 def test_a_score_over_many_has_an_interval(tmp_path, capsys):
