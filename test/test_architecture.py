@@ -212,7 +212,7 @@ def test_folders_use_what_is_below_them(folder):
 @pytest.mark.parametrize('folder', LABORATORY_MAY_USE)
 def test_folders_of_the_laboratory_too(folder):
     folders, libraries = LABORATORY_MAY_USE[folder]
-    allowed = {PACKAGE.name: folders | COMMON, LABORATORY.name: {folder}}
+    allowed = {PACKAGE.name: folders | COMMON, LABORATORY.name: {'jobs', folder}}
     assert not list(beyond(LABORATORY / folder, allowed, libraries))
 
 

@@ -23,6 +23,7 @@ from wheel_terra_estimator.output_folder import working_folder
 from wheel_terra_lab.evaluation import scores
 from wheel_terra_lab.evaluation.runner import Record, inputs_of_mode, record, run_estimator
 from wheel_terra_lab.evaluation.worlds import WORLDS, FloatArray, Truth
+from wheel_terra_lab.jobs import ResultFile
 
 HOUR = 3600.0
 FIGURES = 'drives.jsonl'
@@ -87,11 +88,10 @@ def drive_kinds_for_hours(
         The folder cannot be written, or it holds other drives.
     """
     working_folder(folder, overwrite, resume, (FIGURES,))
-    path = folder / FIGURES
-    rows = _kept(path, chosen, modes, first_seed) if resume and path.is_file() else []
-    path.write_text(''.join(f'{json.dumps(row)}\n' for row in rows), encoding='utf-8')
-    done = {tuple(row[key] for key in ('world', 'kind', 'seed', 'mode')) for row in rows}
-    driven = sum(row['hours'] for row in rows if row['mode'] == modes[-1])
+    results = ResultFile(folder / FIGURES)
+    _check_same(results, chosen, modes, first_seed)
+    done = {tuple(row[key] for key in ('world', 'kind', 'seed', 'mode')) for row in results.rows}
+    driven = sum(row['hours'] for row in results.rows if row['mode'] == modes[-1])
     for world, kind, seed in _drives(chosen, first_seed):
         if driven >= hours:
             break
@@ -99,13 +99,10 @@ def drive_kinds_for_hours(
         if not missing:
             continue
         for figures in _figures(world, kind, seed, missing):
-            rows.append(asdict(figures))
-            line = json.dumps(rows[-1])
-            with path.open('a', encoding='utf-8') as stream:
-                stream.write(line + '\n')
-            progress(line)
+            results.add(asdict(figures))
+            progress(json.dumps(results.rows[-1]))
             driven += figures.hours if figures.mode == modes[-1] else 0.0
-    return rows
+    return results.rows
 
 
 def _drives(chosen: Sequence[tuple[str, str]], first_seed: int) -> Iterator[tuple[str, str, int]]:
@@ -114,24 +111,21 @@ def _drives(chosen: Sequence[tuple[str, str]], first_seed: int) -> Iterator[tupl
             yield world, kind, seed
 
 
-def _kept(
-    path: Path, chosen: Sequence[tuple[str, str]], modes: Sequence[str], first_seed: int
-) -> list[dict[str, Any]]:
-    """Return the whole lines of an earlier run of the same drives."""
-    text = path.read_text(encoding='utf-8')
-    whole = text[: text.rfind('\n') + 1]  # a run that was killed may have left half a line
+def _check_same(
+    results: ResultFile, chosen: Sequence[tuple[str, str]], modes: Sequence[str], first_seed: int
+) -> None:
+    """Refuse rows of an earlier run of other drives."""
+    path, rows = results.path, results.rows
     try:
-        rows = [json.loads(line) for line in whole.splitlines()]
         same = all(
             (row['world'], row['kind']) in chosen and row['mode'] in modes for row in rows
         ) and (not rows or rows[0]['seed'] == first_seed)
-    except (json.JSONDecodeError, KeyError, TypeError) as error:
+    except KeyError as error:
         raise UserError(f'{path}: cannot be gone on with ({error}); give --overwrite') from None
     if not same:
         raise UserError(
             f'{path}: of other kinds, modes or seeds; give those it was begun with, or --overwrite'
         )
-    return rows
 
 
 def _figures(world: str, kind: str, seed: int, modes: Sequence[str]) -> Iterator[DriveFigures]:

@@ -4,17 +4,16 @@
 
 from __future__ import annotations
 
-import csv
 import hashlib
 import json
 import shutil
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import Any
 
-from wheel_terra_estimator.scheduler import finished
+from wheel_terra_lab.jobs import ResultFile, run_jobs
 from wheel_terra_lab.soilbin.case import Case, to_dict
 from wheel_terra_lab.soilbin.launch import CaseFailedError, run_case
 
@@ -51,7 +50,8 @@ def run_job(job: Job, work: str, cache: str) -> dict[str, object]:
     except CaseFailedError as error:
         row = {'stopped': str(error)}
     shutil.rmtree(folder, ignore_errors=True)
-    return dict(job.labels) | {'key': job.key} | row
+    row = dict(job.labels) | {'key': job.key} | row
+    return {name: _text(value) for name, value in row.items()}
 
 
 def _keep_series(series: Path, kept: Path) -> None:
@@ -59,14 +59,6 @@ def _keep_series(series: Path, kept: Path) -> None:
     if series.exists():
         kept.parent.mkdir(exist_ok=True)
         shutil.move(series, kept)
-
-
-def read_rows(table: Path) -> list[dict[str, str]]:
-    """Return the finished rows of a study's table."""
-    if not table.exists():
-        return []
-    with table.open(newline='') as file:
-        return list(csv.DictReader(file))
 
 
 def run_study(
@@ -78,41 +70,28 @@ def run_study(
     scheduler: str = '',
     tell: Callable[[str], None] = print,
 ) -> list[dict[str, str]]:
-    """Run the jobs that the table does not hold yet; return the rows of all jobs.
+    """Run the jobs that the table does not hold yet; return the rows of all jobs, as text.
 
     ``workers``: engine processes at a time; 0 runs nothing and returns the finished rows.
     ``scheduler``: address of a Dask scheduler whose workers take the cases. Interrupted, or after
     an error, the running cases keep their state, the others do not start.
     """
-    done = {row['key'] for row in read_rows(table)}
     unique = {job.key: job for job in jobs}
-    waiting = [job for key, job in unique.items() if key not in done]
-    if waiting and workers:
-        tell(f'{len(waiting)} of {len(unique)} cases to run, {workers} at a time')
-        table.parent.mkdir(parents=True, exist_ok=True)
+
+    def said(number: int, count: int, row: Mapping[str, Any]) -> None:
+        slip = row.get('slip')
+        told = f'slip {float(slip):.3f}' if slip is not None else str(row['stopped'])
+        tell(f'{number}/{count} {row.get("name", row["key"])}: {told}')
+
+    if workers:
         task = partial(run_job, work=str(work.absolute()), cache=str(cache or ''))
-        with closing(finished(task, waiting, workers, scheduler)) as outcomes:
-            for number, (_, row) in enumerate(outcomes, start=1):
-                if isinstance(row, Exception):
-                    raise row
-                _append(table, row)
-                slip = row.get('slip')
-                told = f'slip {float(str(slip)):.3f}' if slip is not None else str(row['stopped'])
-                tell(f'{number}/{len(waiting)} {row.get("name", row["key"])}: {told}')
-    wanted = set(unique)
-    return [row for row in read_rows(table) if row['key'] in wanted]
+        results = ResultFile(table)
+        run_jobs(task, unique, results, _key, jobs=workers, scheduler=scheduler, tell=said)
+    return [row for row in ResultFile(table).rows if row['key'] in unique]
 
 
-def _append(table: Path, row: Mapping[str, object]) -> None:
-    """Add one row; a new column makes the table be written anew, whole or not at all."""
-    rows = read_rows(table)
-    names = list(dict.fromkeys([*(rows[0] if rows else ()), *row]))
-    part = table.with_suffix('.part')
-    with part.open('w', newline='') as file:
-        writer = csv.DictWriter(file, names, restval='')
-        writer.writeheader()
-        writer.writerows([*rows, {k: _text(v) for k, v in row.items()}])
-    part.replace(table)
+def _key(row: Mapping[str, Any]) -> str:
+    return str(row['key'])
 
 
 def _text(value: object) -> object:

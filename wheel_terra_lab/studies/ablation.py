@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import argparse
 import itertools
-import json
 import subprocess
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
@@ -29,6 +28,7 @@ from wheel_terra_lab.evaluation.kinds import TEST_SEEDS
 from wheel_terra_lab.evaluation.runner import Record, record, run_estimator
 from wheel_terra_lab.evaluation.scores import FEWEST_DRIVES
 from wheel_terra_lab.evaluation.tables import table
+from wheel_terra_lab.jobs import ResultFile
 from wheel_terra_lab.studies.ablations.drives import (
     PLANS,
     WHOLE_PLANS,
@@ -82,19 +82,18 @@ def run(arguments: argparse.Namespace) -> None:
     if arguments.undecided:
         chosen = [t for t in chosen if _verdict_of(t, rows) != 'yes']
     commit = _commit()
-    with arguments.file.open('a', encoding='utf-8') as stream:
-        for drive in _drives(arguments):
-            if not drive.tags.issuperset(arguments.tags):
-                continue
-            missing = [t for t in chosen if t.acts_in(drive) and drive.name not in rows[t.name]]
-            if not missing:
-                continue
-            for name, figures in _tried(drive, missing, known=drive.name in rows[AS_IT_IS]):
-                row = {'treatment': name, 'drive': drive.name, 'world': drive.world, **figures}
-                if name == AS_IT_IS:
-                    row |= {'seed': drive.seed, 'whole': drive.warning_only, 'commit': commit}
-                stream.write(json.dumps(row) + '\n')
-                stream.flush()
+    results = ResultFile(arguments.file)
+    for drive in _drives(arguments):
+        if not drive.tags.issuperset(arguments.tags):
+            continue
+        missing = [t for t in chosen if t.acts_in(drive) and drive.name not in rows[t.name]]
+        if not missing:
+            continue
+        for name, figures in _tried(drive, missing, known=drive.name in rows[AS_IT_IS]):
+            row = {'treatment': name, 'drive': drive.name, 'world': drive.world, **figures}
+            if name == AS_IT_IS:
+                row |= {'seed': drive.seed, 'whole': drive.warning_only, 'commit': commit}
+            results.add(row)
 
 
 def _drives(arguments: argparse.Namespace) -> Iterator[Drive]:
@@ -371,8 +370,7 @@ def _worst(base: Figures, found: Figures, names: Sequence[str]) -> tuple[float, 
 
 def _rows(path: Path) -> Rows:
     rows: Rows = defaultdict(dict)
-    for line in path.read_text(encoding='utf-8').splitlines() if path.is_file() else ():
-        row = json.loads(line)
+    for row in ResultFile(path).rows:
         rows[row['treatment']][row['drive']] = row
     return rows
 

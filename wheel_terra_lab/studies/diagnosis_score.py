@@ -14,7 +14,6 @@ wrong. The run can be ended at any time: rounds go through all groups.
 from __future__ import annotations
 
 import argparse
-import json
 import math
 import time
 from dataclasses import replace
@@ -25,6 +24,7 @@ import numpy as np
 from scipy.special import ndtr
 
 from wheel_terra_estimator.discrepancy.effect_keys import effect_of
+from wheel_terra_lab.jobs import ResultFile
 from wheel_terra_lab.studies.campaigns import make_campaign, scoring
 from wheel_terra_lab.studies.campaigns.groups import GROUPS
 from wheel_terra_lab.trials.campaign import Campaign
@@ -105,15 +105,12 @@ def _closed(found: Any) -> float:
 
 def run(file: Path, first: int, rounds: int) -> None:
     """Append campaigns to the file, those that are in it aside."""
-    done = set()
-    if file.exists():
-        done = {tuple(json.loads(line)['key']) for line in file.read_text().splitlines()}
-    with file.open('a', encoding='utf-8') as stream:
-        for seed in range(first, first + rounds):
-            for key in ((g, d, seed) for g in PLANS for d in DESIGNS):
-                if key not in done:
-                    stream.write(json.dumps({'key': key, **record(*key)}) + '\n')
-                    stream.flush()
+    results = ResultFile(file)
+    done = {tuple(row['key']) for row in results.rows}
+    for seed in range(first, first + rounds):
+        for key in ((g, d, seed) for g in PLANS for d in DESIGNS):
+            if key not in done:
+                results.add({'key': key, **record(*key)})
 
 
 def nearest_rival(campaign: Campaign) -> tuple[float, str]:
@@ -161,7 +158,7 @@ def judge(file: Path) -> None:
     probability Phi(d'/2). Several: an effect that stands less than `_TELLABLE` beyond soil and the
     others does not pay the price of a further effect.
     """
-    everything = [json.loads(line) for line in file.read_text().splitlines()]
+    everything = ResultFile(file).rows
     shares, misses, distances = [], [], []
     for r in everything:
         if r['group'] == 'one' and r['distances'][0] > 5.0:
@@ -227,7 +224,7 @@ def _calibration_error(sure: np.ndarray, right: np.ndarray) -> float:
 
 def show(file: Path) -> None:
     """Print the figures, each with its 95 % interval."""
-    everything = [json.loads(line) for line in file.read_text().splitlines()]
+    everything = ResultFile(file).rows
 
     def of(*groups: str) -> list[Record]:
         return [r for r in everything if r['group'] in groups]

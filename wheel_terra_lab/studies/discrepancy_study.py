@@ -18,13 +18,12 @@ Groups and counts: ``campaigns/groups.py``; scores: ``campaigns/scoring.py``.
 from __future__ import annotations
 
 import argparse
-import csv
 import time
-from collections.abc import Iterator
-from contextlib import closing
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-from wheel_terra_estimator.scheduler import add_jobs_argument, finished
+from wheel_terra_estimator.scheduler import add_jobs_argument
+from wheel_terra_lab.jobs import ResultFile, run_jobs
 from wheel_terra_lab.studies.campaigns import make_campaign, scoring, summary
 from wheel_terra_lab.studies.campaigns.groups import GROUPS
 
@@ -40,9 +39,10 @@ def one(task: Task) -> dict[str, object]:
         started = time.process_time()
         diagnosis = scoring.diagnose(campaign)
         seconds = time.process_time() - started
-        return {**scoring.score(group, campaign, diagnosis), 'processor_seconds': seconds}
+        record = {**scoring.score(group, campaign, diagnosis), 'processor_seconds': seconds}
     except Exception as error:
-        return scoring.failure(group, design, seed, error)
+        record = scoring.failure(group, design, seed, error)
+    return {name: record.get(name, '') for name in scoring.FIELDS}
 
 
 def tasks(arguments: argparse.Namespace) -> Iterator[Task]:
@@ -61,32 +61,19 @@ def tasks(arguments: argparse.Namespace) -> Iterator[Task]:
 
 def run(arguments: argparse.Namespace) -> None:
     """Score the campaigns that the file does not hold yet."""
-    path: Path = arguments.file
-    done = set()
-    if path.exists():
-        done = {(r['group'], r['design'], int(r['seed'])) for r in summary.read(path)}
-    todo = [task for task in tasks(arguments) if task not in done]
-    print(f'{len(done)} campaigns in {path}, {len(todo)} to go', flush=True)
-    with path.open('a', newline='', encoding='utf-8') as stream:
-        writer = csv.DictWriter(stream, scoring.FIELDS)
-        if not done:
-            writer.writeheader()
-        for count, record in enumerate(_results(todo, arguments.jobs), 1):
-            writer.writerow(record)
-            stream.flush()
-            if count % 100 == 0:
-                print(f'{count} of {len(todo)}', flush=True)
+    results = ResultFile(arguments.file)
+    wanted = {tuple(map(str, task)): task for task in tasks(arguments)}
+    print(f'{len(results.rows)} campaigns in {arguments.file}', flush=True)
+
+    def tell(number: int, count: int, row: object) -> None:
+        if number % 100 == 0:
+            print(f'{number} of {count}', flush=True)
+
+    run_jobs(one, wanted, results, _key, jobs=arguments.jobs, tell=tell)
 
 
-def _results(todo: list[Task], jobs: int) -> Iterator[dict[str, object]]:
-    if jobs == 1:
-        yield from map(one, todo)
-        return
-    with closing(finished(one, todo, jobs)) as outcomes:
-        for _, record in outcomes:
-            if isinstance(record, Exception):
-                raise record
-            yield record
+def _key(row: Mapping[str, object]) -> tuple[str, ...]:
+    return tuple(str(row[name]) for name in ('group', 'design', 'seed'))
 
 
 def show(arguments: argparse.Namespace) -> None:

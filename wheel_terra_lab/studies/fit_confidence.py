@@ -13,14 +13,14 @@ from __future__ import annotations
 
 import argparse
 import json
-from contextlib import closing
 from pathlib import Path
 
 import numpy as np
 from scipy.special import expit
 
 from wheel_terra_estimator.discrepancy.selection import confidence
-from wheel_terra_estimator.scheduler import add_jobs_argument, finished
+from wheel_terra_estimator.scheduler import add_jobs_argument
+from wheel_terra_lab.jobs import ResultFile, run_jobs
 from wheel_terra_lab.studies.campaigns import make_campaign, scoring
 from wheel_terra_lab.studies.campaigns.groups import GROUPS
 
@@ -59,22 +59,13 @@ def names_of(task: tuple[str, str, int]) -> list[dict[str, object]]:
 
 def run(file: Path, per_group: int, jobs: int) -> None:
     """Diagnose campaigns and append their names to the file."""
-    done = set()
-    if file.exists():
-        done = {json.loads(line)['key'] for line in file.read_text().splitlines()}
-    todo = [
-        (group, design, FIRST_SEED + i)
+    tasks = {
+        f'{group} {design} {FIRST_SEED + i}': (group, design, FIRST_SEED + i)
         for i in range(per_group)
         for group in (*GROUPS, *(f'{name}{LEFT_OUT}' for name in KINDS_LEFT_OUT))
         for design in GROUPS[group.partition(LEFT_OUT)[0]].designs
-        if f'{group} {design} {FIRST_SEED + i}' not in done
-    ]
-    with closing(finished(names_of, todo, jobs)) as outcomes, file.open('a') as stream:
-        for _, records in outcomes:
-            if isinstance(records, Exception):
-                raise records
-            stream.writelines(json.dumps(record) + '\n' for record in records)
-            stream.flush()
+    }
+    run_jobs(names_of, tasks, ResultFile(file), lambda row: row['key'], jobs=jobs)
 
 
 def logistic(features: np.ndarray, right: np.ndarray, centre: np.ndarray) -> np.ndarray:
@@ -120,7 +111,7 @@ def fit(file: Path, around: Path | None) -> None:
         None: around zero.
     """
     known = json.loads(around.read_text()) if around else {'features': []}
-    records = [json.loads(line) for line in file.read_text().splitlines()]
+    records = ResultFile(file).rows
     # Where an effect that looks like the name was left out, its share is taken off by rule.
     records = [r for r in records if 'features' in r and not r['features'].get('alike', 0.0)]
     x = np.array([[record['features'][name] for name in confidence.FEATURES] for record in records])

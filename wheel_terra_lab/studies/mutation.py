@@ -19,7 +19,6 @@ import argparse
 import ast
 import compileall
 import importlib
-import json
 import os
 import py_compile
 import random
@@ -35,6 +34,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+
+from wheel_terra_lab.jobs import ResultFile
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = 'wheel_terra_estimator'
@@ -308,7 +309,8 @@ def judge(mutants: list[Mutant], arguments: argparse.Namespace) -> None:
     for library in LIBRARIES:
         importlib.import_module(library)
     call_map = CallMap(arguments.map)
-    with tempfile.TemporaryDirectory() as folder, arguments.file.open('a') as stream:
+    results = ResultFile(arguments.file)
+    with tempfile.TemporaryDirectory() as folder:
         copy = Path(folder) / ROOT.name
         os.environ['PYTHONPATH'] = str(copy)  # for processes that tests start
         shutil.copytree(ROOT, copy, ignore=shutil.ignore_patterns('.git', '__pycache__', 'site'))
@@ -318,8 +320,7 @@ def judge(mutants: list[Mutant], arguments: argparse.Namespace) -> None:
         compileall.compile_dir(copy / PACKAGE, quiet=1, invalidation_mode=mode)
         for number, mutant in enumerate(mutants, 1):
             row = {**asdict(mutant), 'verdict': verdict(mutant, copy, call_map.tests(mutant))}
-            stream.write(json.dumps(row) + '\n')
-            stream.flush()
+            results.add(row)
             print(f'{number}/{len(mutants)} {row["verdict"]}: {_words(row)}', flush=True)
 
 
@@ -354,8 +355,7 @@ def _words(row: dict[str, Any]) -> str:
 
 def _read(path: Path) -> Iterator[dict[str, Any]]:
     """Yield the rows of a file; of several about one mutant the last."""
-    lines = path.read_text(encoding='utf-8').splitlines() if path.is_file() else []
-    rows = [json.loads(line) for line in lines]
+    rows = ResultFile(path).rows
     yield from {tuple(row.get(key) for key in _KEY): row for row in rows}.values()
 
 

@@ -15,6 +15,8 @@ import pytest
 
 from wheel_terra_estimator.cli.main import main
 from wheel_terra_estimator.errors import UserError
+from wheel_terra_lab import jobs as jobs_module
+from wheel_terra_lab.jobs import ResultFile
 from wheel_terra_lab.soilbin import (
     calibration,
     files,
@@ -119,11 +121,11 @@ def test_study_goes_on_where_it_was_cut(tmp_path, monkeypatch):
         return {'slip': 0.1 * case.bed.seed, 'stopped': ''}
 
     monkeypatch.setattr(study, 'run_case', fake)
-    monkeypatch.setattr(study, 'finished', in_this_process)
+    monkeypatch.setattr(jobs_module, 'finished', in_this_process)
     table = tmp_path / 'out' / 'study.csv'
     with pytest.raises(StoppedByUserError):
         study.run_study(jobs(5), table, tmp_path, None, 1, tell=lambda _: None)
-    assert [row['name'] for row in study.read_rows(table)] == ['bed 0', 'bed 1']
+    assert [row['name'] for row in ResultFile(table).rows] == ['bed 0', 'bed 1']
     rows = study.run_study(jobs(5), table, tmp_path, None, 2, tell=lambda _: None)
     assert ran.count(0) == ran.count(1) == 1
     by_name = {row['name']: row for row in rows}
