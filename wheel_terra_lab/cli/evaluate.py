@@ -37,13 +37,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     from wheel_terra_lab.evaluation.runner import MODES
     from wheel_terra_lab.evaluation.worlds import WORLDS
 
-    own, rival = WORLDS['own'], WORLDS['rival']
+    own, rival, third = (WORLDS[name] for name in ('own', 'rival', 'c'))
     parser.add_argument(
         '--world',
         choices=[*WORLDS, 'both'],
         default='own',
         help='simulator of the drives: that of the package (own), a second one that was written '
-        'apart from it (rival), or both side by side',
+        'apart from it (rival), both of them side by side, or the third, simulator C (c)',
     )
     parser.add_argument(
         '--kinds',
@@ -51,7 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='KIND',
         help=f'kinds of simulated drives (default: all but firm of the own world). own: '
         f'{", ".join((*own.kinds, *own.more_kinds))}, or scenarios/NAME, a shipped scenario; '
-        f'rival: {", ".join(rival.kinds)}',
+        f'rival: {", ".join(rival.kinds)}; c: {", ".join(third.kinds)}',
     )
     parser.add_argument(
         '--rover',
@@ -309,7 +309,7 @@ def _chosen(world: str, kinds: list[str] | None) -> list[tuple[str, str]]:
     """Return the pairs of world and kind to be run."""
     from wheel_terra_lab.evaluation.worlds import WORLDS
 
-    worlds = list(WORLDS.values()) if world == 'both' else [WORLDS[world]]
+    worlds = [WORLDS[name] for name in (('own', 'rival') if world == 'both' else (world,))]
     if kinds is None:
         return [(w.name, kind) for w in worlds for kind in w.kinds]
     known = {kind: None for w in worlds for kind in (*w.kinds, *w.more_kinds)}

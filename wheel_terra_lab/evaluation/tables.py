@@ -35,7 +35,7 @@ _MODES = {
 }
 
 
-_WORLDS = {'own': 'simulator of the package', 'rival': 'rival simulator'}
+_WORLDS = {'own': 'simulator of the package', 'rival': 'rival simulator', 'c': 'simulator C'}
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:

@@ -17,6 +17,7 @@ from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.estimation.measurements import Measurement
 from wheel_terra_lab.evaluation import kinds as own_kinds
 from wheel_terra_lab.evaluation.simulator_b import kinds as rival_kinds
+from wheel_terra_lab.evaluation.simulator_c import plans as plans_of_c
 
 FloatArray = NDArray[np.float64]
 SCENARIO = 'scenarios/'
@@ -108,8 +109,18 @@ def _rival(kind: str, seed: int, duration: float | None, rover: str | None) -> B
     return BenchDrive(drive.configuration, drive.arrivals, drive.truth)
 
 
+def _c(kind: str, seed: int, duration: float | None, rover: str | None) -> BenchDrive:
+    if rover is not None:
+        raise UserError('simulator C draws its rovers itself: another rover needs the own world')
+    from wheel_terra_lab.evaluation.simulator_c.drive import simulate
+
+    drive = simulate(kind, seed, duration)
+    return BenchDrive(drive.configuration, drive.arrivals, drive.truth)
+
+
 WORLDS = {
     'own': World('own', tuple(own_kinds.KINDS), ('firm',), own_kinds.ENTRAPMENTS, _own, True),
     'rival': World('rival', tuple(rival_kinds.KINDS), (), rival_kinds.ENTRAPMENTS, _rival),
+    'c': World('c', tuple(plans_of_c.KINDS), (), plans_of_c.ENTRAPMENTS, _c),
 }
-"""The simulator of the package, and a second one that was written apart from it."""
+"""The simulator of the package, and two more that were written apart from it."""

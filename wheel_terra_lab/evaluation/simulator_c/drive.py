@@ -1,0 +1,193 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Drives of simulator C: configuration, measurements in the order of arrival, and the truth."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.errors import UserError
+from wheel_terra_lab.evaluation.simulator_c.dynamics import STEP, Course, Motion, drive
+from wheel_terra_lab.evaluation.simulator_c.plans import (
+    ENTRAPMENTS,
+    KINDS,
+    TRAPPED_SLIP,
+    TRAPPED_TIME,
+    Driver,
+    Kind,
+    slip_ratio,
+)
+from wheel_terra_lab.evaluation.simulator_c.rover import FAMILIES, Rover, draw_rover
+from wheel_terra_lab.evaluation.simulator_c.rover_file import configuration_of
+from wheel_terra_lab.evaluation.simulator_c.sensors import (
+    START,
+    Arrival,
+    Sensing,
+    draw_instruments,
+    sampled,
+)
+from wheel_terra_lab.evaluation.simulator_c.site import Site, draw_site
+
+FloatArray = NDArray[np.float64]
+
+_TRIES = 6
+"""How often the land is changed until a drive becomes what its kind promises."""
+_NEAR_MISS = (0.6, 0.82)  # greatest median slip
+_EARLIEST_TRAP = 12.0  # [s]
+_OFTEN = 0.05  # share of the time with high slip of a rover that is about to be trapped [-]
+_UNKNOWN = 255
+
+
+@dataclass(frozen=True)
+class Truth:
+    """Ground truth at the stamps of the wheel odometry, k stamps and n wheels; nan: at rest."""
+
+    stamp: NDArray[np.int64]
+    slip: FloatArray
+    slip_velocity: FloatArray
+    drawbar_pull: FloatArray
+    normal_load: FloatArray
+    sinkage: FloatArray
+    wheel_rate: FloatArray
+    slip_class: NDArray[np.uint8]
+    yaw_rate: FloatArray
+    stuck_since: float | None
+
+    def first_stuck(self) -> float | None:
+        """Return when the first entrapment begins, from the first stamp on [s]."""
+        return self.stuck_since
+
+
+@dataclass(frozen=True)
+class SimulatedDrive:
+    """A drive as the bench needs it, with the course and the rover for tests."""
+
+    configuration: Configuration
+    arrivals: Sequence[Arrival]
+    truth: Truth
+    course: Course
+    rover: Rover
+
+
+def simulate(kind: str, seed: int, duration: float | None = None) -> SimulatedDrive:
+    """Simulate a drive.
+
+    Parameters
+    ----------
+    kind : str
+        One of `plans.KINDS`.
+    seed : int
+        Draws rover, soil, land, sensors and rover file.
+    duration : float, optional
+        Greatest duration [s]; default: that of the kind.
+    """
+    if kind not in KINDS:
+        raise UserError(f'simulator C has no kind of drive {kind!r}; it has {", ".join(KINDS)}')
+    plan = KINDS[kind]
+    rover, site, course = _driven(kind, plan, seed)
+    if duration is not None:
+        rows = min(len(course.time), max(round(duration / STEP), 2))
+        course = Course(**{name: values[:rows] for name, values in vars(course).items()})
+    rng = _generator(kind, seed, 'sensors')
+    instruments = draw_instruments(rng, plan, rover)
+    sensing = Sensing(rng, rover, instruments, course)
+    configuration = configuration_of(
+        _generator(kind, seed, 'file'), plan, rover, instruments, site.base
+    )
+    truth = truth_of(course, configuration, sensing.odometry_stamps)
+    return SimulatedDrive(configuration, sensing.arrivals(), truth, course, rover)
+
+
+def _generator(kind: str, seed: int, what: str, again: int = 0) -> np.random.Generator:
+    return np.random.default_rng([seed, zlib.crc32(f'{kind} {what}'.encode()), again])
+
+
+def _driven(name: str, kind: Kind, seed: int) -> tuple[Rover, Site, Course]:
+    """Drive; change the land until the drive is what its kind promises."""
+    for again in range(_TRIES):
+        rng = _generator(name, seed, 'land', again)
+        family = FAMILIES[str(rng.choice(kind.families))]
+        rover = draw_rover(rng, family, float(rng.choice(kind.gravity)))
+        site = draw_site(rng, kind, rover)
+        locked = int(rng.integers(rover.count)) if kind.dragged else None
+        for _ in range(_TRIES):
+            patience = float(rng.uniform(2.0, 8.0))
+            course = drive(
+                Motion(rover, site.land()),
+                Driver(rover, kind.phases, patience, locked, name not in ENTRAPMENTS),
+                kind.duration,
+            )
+            change = _wanted_change(name, kind, rover, course)
+            if change == 1.0:
+                return rover, site, course
+            site.change(change)
+    return rover, site, course
+
+
+def _wanted_change(name: str, kind: Kind, rover: Rover, course: Course) -> float:
+    """Return by how much harder the land must be (a factor, 1: as it is)."""
+    median = _driving_median(course, rover.rims.radius + rover.rims.lug_height)
+    began = _beginning(median)
+    if name in ENTRAPMENTS:
+        if began is not None and course.time[began] < _EARLIEST_TRAP:
+            return 0.9
+        return 1.0 if began is not None else 1.25
+    trapped = began is not None or np.mean(median[course.time > 4.0] > 0.85) > _OFTEN
+    if kind.patch == 'near_miss':
+        moving = np.abs(course.velocity[:, 0]) > 0.05 * rover.speed
+        worst = median[moving & (course.time > 4.0)].max(initial=0.0)
+        if trapped or worst > _NEAR_MISS[1]:
+            return 0.93
+        return 1.0 if worst > _NEAR_MISS[0] else 1.05
+    return 0.8 if trapped else 1.0
+
+
+def _driving_median(course: Course, radius: FloatArray) -> FloatArray:
+    """Return (k,) the median slip of the wheels, 0 at rest; braking counts as negative."""
+    rim = course.rate * radius
+    median = np.median(slip_ratio(rim, course.speed), axis=1)
+    return np.where(np.abs(rim).max(axis=1) > 0.004, median, 0.0)
+
+
+def _beginning(median: FloatArray) -> int | None:
+    """Return the step at which an entrapment begins."""
+    above = np.concatenate([[0], median > TRAPPED_SLIP, [0]]).astype(int)
+    edges = np.flatnonzero(np.diff(above))
+    long = edges[1::2] - edges[::2] >= round(TRAPPED_TIME / STEP)
+    return int(edges[::2][long][0]) if long.any() else None
+
+
+def truth_of(course: Course, configuration: Configuration, stamps: NDArray[np.int64]) -> Truth:
+    """Return the truth at stamps, with the slip radius that the configuration states."""
+    radius = configuration.wheels.slip_radius
+    rate, speed = (sampled(course.time, a, stamps) for a in (course.rate, course.speed))
+    rest_speed = configuration.rest_speed
+    slip = slip_ratio(rate * radius, speed, rest_speed)
+    slow = (np.abs(course.rate * radius) < rest_speed) & (np.abs(course.speed) < rest_speed)
+    needed = round(configuration.filter.rest_time / STEP)
+    step = np.arange(len(slow))[:, None]
+    moved = np.maximum.accumulate(np.where(slow, -needed, step), axis=0)
+    at_rest = step - moved >= needed  # the rover also stood before the drive
+    resting = sampled(course.time, at_rest.astype(float), stamps) > 0.5
+    bounds = configuration.filter.class_thresholds
+    classes = np.searchsorted(bounds, np.abs(slip), side='left').astype(np.uint8)
+    began = _beginning(_driving_median(course, radius))
+    first = (int(stamps[0]) - START) * 1e-9
+    return Truth(
+        stamp=stamps,
+        slip=np.where(resting, np.nan, slip),
+        slip_velocity=rate * radius - speed,
+        drawbar_pull=sampled(course.time, course.pull, stamps),
+        normal_load=sampled(course.time, course.normal, stamps),
+        sinkage=sampled(course.time, course.sinkage, stamps),
+        wheel_rate=rate,
+        slip_class=np.where(resting, _UNKNOWN, classes).astype(np.uint8),
+        yaw_rate=sampled(course.time, course.velocity[:, 2], stamps),
+        stuck_since=None if began is None else max(course.time[began] - first, 0.0),
+    )
