@@ -74,7 +74,7 @@ def test_an_interrupted_bench_keeps_and_says_what_it_has(
         if len(done) == 2:
             raise KeyboardInterrupt
         done.append(seed)
-        return [SimpleNamespace(world=world, kind=kind, seed=seed, mode='reference', health={})]
+        return [SimpleNamespace(simulator=world, kind=kind, seed=seed, mode='reference', health={})]
 
     monkeypatch.setattr(bench, 'score_drive', score)
     monkeypatch.setattr(tables, 'report', lambda results, modes: f'{len(results.drives)} rows')

@@ -28,36 +28,39 @@ EXAMPLES = (
     'wheel-terra evaluate --limiter --seeds 10 -o limiter.md',
     'wheel-terra evaluate --hours 24 -o day',
     'wheel-terra evaluate --hours 24 -o day --resume',
-    'wheel-terra evaluate --hours 10 --world both --kinds firm --modes reference -o firm',
+    'wheel-terra evaluate --hours 10 --simulator A B --kinds firm --modes reference -o firm',
 )
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
     from wheel_terra_lab.evaluation.runner import MODES
-    from wheel_terra_lab.evaluation.worlds import WORLDS
+    from wheel_terra_lab.evaluation.simulators import SIMULATORS
 
-    own, rival, third = (WORLDS[name] for name in ('own', 'rival', 'c'))
+    kinds = '; '.join(
+        f'{name}: {", ".join((*simulator.kinds, *simulator.more_kinds))}'
+        + (', or scenarios/NAME, a shipped scenario' if simulator.takes_scenarios else '')
+        for name, simulator in SIMULATORS.items()
+    )
     parser.add_argument(
-        '--world',
-        choices=[*WORLDS, 'both'],
-        default='own',
-        help='simulator of the drives: that of the package (own), a second one that was written '
-        'apart from it (rival), both of them side by side, or the third, simulator C (c)',
+        '--simulator',
+        nargs='+',
+        choices=list(SIMULATORS),
+        default=['A'],
+        help="simulators of the drives: A (default), the package's own; the others were written "
+        'apart from it, by other hands',
     )
     parser.add_argument(
         '--kinds',
         nargs='+',
         metavar='KIND',
-        help=f'kinds of simulated drives (default: all but firm of the own world). own: '
-        f'{", ".join((*own.kinds, *own.more_kinds))}, or scenarios/NAME, a shipped scenario; '
-        f'rival: {", ".join(rival.kinds)}; c: {", ".join(third.kinds)}',
+        help=f'kinds of simulated drives (default: all but firm of simulator A). {kinds}',
     )
     parser.add_argument(
         '--rover',
         metavar='F',
         help="rover file, or the bare name of a shipped one, in place of the kinds' own rover "
-        '(own world)',
+        '(simulator A)',
     )
     parser.add_argument(
         '--seeds', type=int, default=20, metavar='N', help='drives of each kind (default 20)'
@@ -212,9 +215,9 @@ def _limiter(arguments: argparse.Namespace) -> _Told:
 def _simulated(arguments: argparse.Namespace) -> _Told:
     from wheel_terra_lab.evaluation import bench, runner, tables
 
-    chosen = _chosen(arguments.world, arguments.kinds)
+    chosen = _chosen(arguments.simulator, arguments.kinds)
     if arguments.rover:
-        _check_rover(arguments.rover, arguments.world)
+        _check_rover(arguments.rover, arguments.simulator)
     _check_names(arguments.modes, runner.MODES, 'mode')
     from tqdm import tqdm
 
@@ -247,8 +250,8 @@ def _drive_for_hours(arguments: argparse.Namespace) -> int:
 
     if any((arguments.measured, arguments.limiter, arguments.rover)):
         raise UserError('--hours goes with neither --measured nor --limiter nor --rover')
-    if arguments.world != 'own' and not arguments.kinds:
-        raise UserError(f'--hours --world {arguments.world} needs --kinds')
+    if arguments.simulator != ['A'] and not arguments.kinds:
+        raise UserError(f'--hours --simulator {" ".join(arguments.simulator)} needs --kinds')
     if arguments.output is None:
         raise UserError('--hours needs -o DIR, where its figures are kept')
     if not 0.0 < arguments.hours <= MOST_HOURS:
@@ -264,7 +267,7 @@ def _drive_for_hours(arguments: argparse.Namespace) -> int:
             which = f'--first-seed {arguments.first_seed} '
         if arguments.kinds:
             kinds, modes = ' '.join(arguments.kinds), ' '.join(arguments.modes)
-            which += f'--world {arguments.world} --kinds {kinds} --modes {modes} '
+            which += f'--simulator {" ".join(arguments.simulator)} --kinds {kinds} --modes {modes} '
         print(
             f'interrupted; go on with: --hours {arguments.hours:g} {which}-o {arguments.output} '
             '--resume'
@@ -289,7 +292,7 @@ def _one_long_drive(arguments: argparse.Namespace) -> list[dict[str, Any]]:
 def _hours_of_kinds(arguments: argparse.Namespace) -> list[dict[str, Any]]:
     from wheel_terra_lab.evaluation import many_drives, runner
 
-    chosen = _chosen(arguments.world, arguments.kinds)
+    chosen = _chosen(arguments.simulator, arguments.kinds)
     _check_names(arguments.modes, runner.MODES, 'mode')
     smoothed = [mode for mode in arguments.modes if mode.startswith(runner.SMOOTHED)]
     if smoothed:
@@ -305,25 +308,25 @@ def _hours_of_kinds(arguments: argparse.Namespace) -> list[dict[str, Any]]:
     )
 
 
-def _chosen(world: str, kinds: list[str] | None) -> list[tuple[str, str]]:
-    """Return the pairs of world and kind to be run."""
-    from wheel_terra_lab.evaluation.worlds import WORLDS
+def _chosen(names: Sequence[str], kinds: list[str] | None) -> list[tuple[str, str]]:
+    """Return the pairs of simulator and kind to be run."""
+    from wheel_terra_lab.evaluation.simulators import SIMULATORS
 
-    worlds = [WORLDS[name] for name in (('own', 'rival') if world == 'both' else (world,))]
+    simulators = [SIMULATORS[name] for name in names]
     if kinds is None:
-        return [(w.name, kind) for w in worlds for kind in w.kinds]
-    known = {kind: None for w in worlds for kind in (*w.kinds, *w.more_kinds)}
-    strange = [kind for kind in kinds if not any(w.has(kind) for w in worlds)]
+        return [(s.name, kind) for s in simulators for kind in s.kinds]
+    known = {kind: None for s in simulators for kind in (*s.kinds, *s.more_kinds)}
+    strange = [kind for kind in kinds if not any(s.has(kind) for s in simulators)]
     _check_names(strange, tuple(known), 'kind')
-    return [(w.name, kind) for w in worlds for kind in kinds if w.has(kind)]
+    return [(s.name, kind) for s in simulators for kind in kinds if s.has(kind)]
 
 
-def _check_rover(rover: str, world: str) -> None:
+def _check_rover(rover: str, simulators: Sequence[str]) -> None:
     """Refuse what is no rover file before the first drive."""
     from wheel_terra_estimator.configuration import reader, ros_yaml, shipped
 
-    if world != 'own':
-        raise UserError(f'--rover needs --world own: the rovers of {world!r} are not files')
+    if list(simulators) != ['A']:
+        raise UserError('--rover needs --simulator A: the rovers of the others are not files')
     if 'wheels.names' not in ros_yaml.read(shipped.find(rover)):
         raise UserError(f'--rover {rover}: wheels.names is missing: not a rover file')
     reader.load([rover])

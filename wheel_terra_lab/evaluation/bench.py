@@ -23,8 +23,8 @@ from wheel_terra_lab.evaluation.runner import (
     run_estimator,
     run_smoother,
 )
+from wheel_terra_lab.evaluation.simulators import SIMULATORS, BenchDrive
 from wheel_terra_lab.evaluation.two_state_filters import slip_course
-from wheel_terra_lab.evaluation.worlds import WORLDS, BenchDrive
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class DriveScore:
     samples: scores.Samples
     warnings: scores.Warnings
     health: dict[str, Any]
-    world: str = 'own'
+    simulator: str = 'A'
     foresight: Foresight | None = None
 
 
@@ -49,28 +49,28 @@ class Results:
     interrupted: str = ''  # in words, if not all drives were run
 
     @property
-    def worlds(self) -> list[str]:
-        """Worlds of which there are drives."""
-        return [name for name in WORLDS if any(d.world == name for d in self.drives)]
+    def simulators(self) -> list[str]:
+        """Simulators of which there are drives."""
+        return [name for name in SIMULATORS if any(d.simulator == name for d in self.drives)]
 
-    def of_mode(self, mode: str, world: str | None = None) -> dict[str, list[DriveScore]]:
-        """Return kind -> drives of a mode, of one world or of all."""
+    def of_mode(self, mode: str, simulator: str | None = None) -> dict[str, list[DriveScore]]:
+        """Return kind -> drives of a mode, of one simulator or of all."""
         found: dict[str, list[DriveScore]] = defaultdict(list)
         for drive in self.drives:
-            if drive.mode == mode and world in (None, drive.world):
+            if drive.mode == mode and simulator in (None, drive.simulator):
                 found[drive.kind].append(drive)
         return dict(found)
 
 
 def score_drive(
-    world: str, kind: str, seed: int, modes: Sequence[str], rover: str | None = None
+    simulator: str, kind: str, seed: int, modes: Sequence[str], rover: str | None = None
 ) -> list[DriveScore]:
     """Simulate one drive and score the estimator on it in each mode."""
-    drive = WORLDS[world].simulate(kind, seed, None, rover)
-    return [score_mode(world, kind, seed, mode, drive) for mode in modes]
+    drive = SIMULATORS[simulator].simulate(kind, seed, None, rover)
+    return [score_mode(simulator, kind, seed, mode, drive) for mode in modes]
 
 
-def score_mode(world: str, kind: str, seed: int, mode: str, drive: BenchDrive) -> DriveScore:
+def score_mode(simulator: str, kind: str, seed: int, mode: str, drive: BenchDrive) -> DriveScore:
     """Score the estimator in one mode on a drive."""
     configuration, truth = drive.configuration, drive.truth
     measurements = list(inputs_of_mode(drive.arrivals, mode))
@@ -85,7 +85,7 @@ def score_mode(world: str, kind: str, seed: int, mode: str, drive: BenchDrive) -
         samples=scores.samples(truth, kept, _baselines(drive, measurements), radius),
         warnings=scores.warnings(truth, kept, radius),
         health=health,
-        world=world,
+        simulator=simulator,
         foresight=foresight(truth, kept, radius, StuckSettings.from_configuration(configuration)),
     )
 
@@ -117,13 +117,13 @@ def run(
     progress: Callable[[str], object] | None = None,
     rover: str | None = None,
 ) -> Results:
-    """Run the bench over pairs of world and kind, with a rover file in place of the kinds' own.
+    """Run the bench over pairs of simulator and kind, with a rover file in place of the kinds' own.
 
     Drives come in the order in which they finish, results do not depend on it. Interrupted, it
     returns the drives that are done.
     """
     results = Results()
-    tasks = [(world, kind, seed) for seed in seeds for world, kind in chosen]
+    tasks = [(simulator, kind, seed) for seed in seeds for simulator, kind in chosen]
     done = 0
     try:
         for scores_of_drive, words in _scored(tasks, modes, processes, rover):
@@ -135,7 +135,7 @@ def run(
         if not done:
             raise
         results.interrupted = f'interrupted: {done} of {len(tasks)} drives'
-    results.drives.sort(key=lambda d: (d.world, d.kind, d.seed, d.mode))
+    results.drives.sort(key=lambda d: (d.simulator, d.kind, d.seed, d.mode))
     return results
 
 

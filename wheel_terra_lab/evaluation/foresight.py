@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from wheel_terra_estimator.estimation.judgement.stuck.settings import StuckSettings
 from wheel_terra_lab.evaluation.runner import Record
-from wheel_terra_lab.evaluation.worlds import Truth
+from wheel_terra_lab.evaluation.simulators import Truth
 
 FloatArray = NDArray[np.float64]
 

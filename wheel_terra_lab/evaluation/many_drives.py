@@ -22,7 +22,7 @@ from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.output_folder import working_folder
 from wheel_terra_lab.evaluation import scores
 from wheel_terra_lab.evaluation.runner import Record, inputs_of_mode, record, run_estimator
-from wheel_terra_lab.evaluation.worlds import WORLDS, FloatArray, Truth
+from wheel_terra_lab.evaluation.simulators import SIMULATORS, FloatArray, Truth
 from wheel_terra_lab.jobs import ResultFile
 
 HOUR = 3600.0
@@ -35,7 +35,7 @@ CONFIDENCE = 0.95
 class DriveFigures:
     """One drive in one mode."""
 
-    world: str
+    simulator: str
     kind: str
     seed: int
     mode: str
@@ -72,7 +72,7 @@ def drive_kinds_for_hours(
     hours : float
         Length of the drives together, each mode by itself; the last drive is run whole.
     chosen : sequence of (str, str)
-        Worlds and kinds, all with one seed before any with the next.
+        Simulators and kinds, all with one seed before any with the next.
     modes : sequence of str
         What the estimator gets, see `runner.MODES`.
     first_seed : int
@@ -90,15 +90,17 @@ def drive_kinds_for_hours(
     working_folder(folder, overwrite, resume, (FIGURES,))
     results = ResultFile(folder / FIGURES)
     _check_same(results, chosen, modes, first_seed)
-    done = {tuple(row[key] for key in ('world', 'kind', 'seed', 'mode')) for row in results.rows}
+    done = {
+        tuple(row[key] for key in ('simulator', 'kind', 'seed', 'mode')) for row in results.rows
+    }
     driven = sum(row['hours'] for row in results.rows if row['mode'] == modes[-1])
-    for world, kind, seed in _drives(chosen, first_seed):
+    for simulator, kind, seed in _drives(chosen, first_seed):
         if driven >= hours:
             break
-        missing = [mode for mode in modes if (world, kind, seed, mode) not in done]
+        missing = [mode for mode in modes if (simulator, kind, seed, mode) not in done]
         if not missing:
             continue
-        for figures in _figures(world, kind, seed, missing):
+        for figures in _figures(simulator, kind, seed, missing):
             results.add(asdict(figures))
             progress(json.dumps(results.rows[-1]))
             driven += figures.hours if figures.mode == modes[-1] else 0.0
@@ -107,8 +109,8 @@ def drive_kinds_for_hours(
 
 def _drives(chosen: Sequence[tuple[str, str]], first_seed: int) -> Iterator[tuple[str, str, int]]:
     for seed in itertools.count(first_seed):
-        for world, kind in chosen:
-            yield world, kind, seed
+        for simulator, kind in chosen:
+            yield simulator, kind, seed
 
 
 def _check_same(
@@ -118,7 +120,7 @@ def _check_same(
     path, rows = results.path, results.rows
     try:
         same = all(
-            (row['world'], row['kind']) in chosen and row['mode'] in modes for row in rows
+            (row['simulator'], row['kind']) in chosen and row['mode'] in modes for row in rows
         ) and (not rows or rows[0]['seed'] == first_seed)
     except KeyError as error:
         raise UserError(f'{path}: cannot be gone on with ({error}); give --overwrite') from None
@@ -128,9 +130,9 @@ def _check_same(
         )
 
 
-def _figures(world: str, kind: str, seed: int, modes: Sequence[str]) -> Iterator[DriveFigures]:
+def _figures(simulator: str, kind: str, seed: int, modes: Sequence[str]) -> Iterator[DriveFigures]:
     """Simulate one drive and yield the figures of each mode."""
-    drive = WORLDS[world].simulate(kind, seed, None, None)
+    drive = SIMULATORS[simulator].simulate(kind, seed, None, None)
     radius = drive.configuration.wheels.slip_radius
     for mode in modes:
         begun = time.process_time()
@@ -140,7 +142,7 @@ def _figures(world: str, kind: str, seed: int, modes: Sequence[str]) -> Iterator
         found = scores.warnings(drive.truth, kept, radius)
         error, std = _slip_errors(drive.truth, kept, radius)
         yield DriveFigures(
-            world=world,
+            simulator=simulator,
             kind=kind,
             seed=seed,
             mode=mode,
@@ -166,7 +168,7 @@ def _slip_errors(truth: Truth, kept: Record, radius: FloatArray) -> tuple[FloatA
 
 
 def report(rows: Sequence[dict[str, Any]]) -> str:
-    """Return the figures of each world, kind and mode as a table, and what they come to."""
+    """Return the figures of each simulator, kind and mode as a table, and what they come to."""
     from wheel_terra_lab.evaluation.tables import table
 
     head = (
@@ -185,15 +187,15 @@ def report(rows: Sequence[dict[str, Any]]) -> str:
     )
     groups: dict[tuple[str, str, str], list[dict[str, Any]]] = {}
     for row in rows:
-        for key in ((row['world'], row['kind'], row['mode']), ('all', '', row['mode'])):
+        for key in ((row['simulator'], row['kind'], row['mode']), ('all', '', row['mode'])):
             groups.setdefault(key, []).append(row)
     single = len(groups) == 2 * len({mode for _, _, mode in groups})
     cells = [
-        (f'{world} {kind}'.strip(), mode, *_cells(group))
-        for (world, kind, mode), group in sorted(
+        (f'{simulator} {kind}'.strip(), mode, *_cells(group))
+        for (simulator, kind, mode), group in sorted(
             groups.items(), key=lambda item: (item[0][2], item[0][0] == 'all', item[0])
         )
-        if not (single and world == 'all')
+        if not (single and simulator == 'all')
     ]
     restarts = sum(row['filter_restarts'] for row in rows)
     return (

@@ -108,28 +108,28 @@ def slip_errors(results: Results, width: float) -> Figure:
     from matplotlib.figure import Figure
 
     modes = list(dict.fromkeys(drive.mode for drive in results.drives))
-    kinds = list(dict.fromkeys((drive.world, drive.kind) for drive in results.drives))[::-1]
-    several = len(results.worlds) > 1
+    kinds = list(dict.fromkeys((drive.simulator, drive.kind) for drive in results.drives))[::-1]
+    several = len(results.simulators) > 1
     with picture_style():
         figure = Figure(figsize=(width, ROOM + ROW * len(kinds)))
         axis = figure.subplots()
         for m, mode in enumerate(modes):
-            for y, (world, kind) in enumerate(kinds):
-                drives = results.of_mode(mode, world).get(kind, [])
+            for y, (simulator, kind) in enumerate(kinds):
+                drives = results.of_mode(mode, simulator).get(kind, [])
                 if not drives:
                     continue
                 data = Samples.joined(d.samples for d in drives)
                 ours = scores.rms(data.slip_error)
                 other = scores.rms(scores.better_baseline(data)[1])
                 colour, height = LINE_COLOURS[m], y + 0.12 * (m - 0.5 * (len(modes) - 1))
-                first = kind == kinds[-1][1] and world == kinds[-1][0]
+                first = kind == kinds[-1][1] and simulator == kinds[-1][0]
                 axis.plot([ours, other], [height, height], color=EDGE, lw=0.7, zorder=1)
                 axis.plot(other, height, 'o', ms=5, mfc='none', mec=colour)
                 axis.plot(
                     ours, height, 'o', ms=5, color=colour, label=mode.replace('_', ' ') * first
                 )
         axis.plot(np.nan, np.nan, 'o', ms=5, mfc='none', mec=INK, label='two-state filter')
-        names = [f'{kind} ({world})' if several else kind for world, kind in kinds]
+        names = [f'{kind} ({simulator})' if several else kind for simulator, kind in kinds]
         axis.set_yticks(range(len(kinds)), [name.replace('_', ' ') for name in names])
         axis.set_xlim(left=0.0)
         axis.set_xlabel('root-mean-square error of slip [-]')

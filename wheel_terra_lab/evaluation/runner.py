@@ -21,7 +21,7 @@ from wheel_terra_estimator.estimation.measurements import (
     SinkageReading,
     WheelOdometry,
 )
-from wheel_terra_lab.evaluation.worlds import TimedMeasurement
+from wheel_terra_lab.evaluation.simulators import TimedMeasurement
 
 FloatArray = NDArray[np.float64]
 

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wheel_terra_lab.evaluation.runner import Record
+from wheel_terra_lab.evaluation.simulators import Truth
 from wheel_terra_lab.evaluation.two_state_filters import SlipCourse
-from wheel_terra_lab.evaluation.worlds import Truth
 
 FloatArray = NDArray[np.float64]
 

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable, Sequence
 from typing import Any
 
@@ -19,7 +20,7 @@ from wheel_terra_lab.evaluation.foresight import (
 )
 from wheel_terra_lab.evaluation.runner import SMOOTHED
 from wheel_terra_lab.evaluation.scores import Samples
-from wheel_terra_lab.evaluation.worlds import WORLDS
+from wheel_terra_lab.evaluation.simulators import SIMULATORS
 
 _CLASSES = ('low', 'moderate', 'high', 'stuck')
 _MODES = {
@@ -35,9 +36,6 @@ _MODES = {
 }
 
 
-_WORLDS = {'own': 'simulator of the package', 'rival': 'rival simulator', 'c': 'simulator C'}
-
-
 def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     """Return a Markdown table."""
     lines = ['| ' + ' | '.join(head) + ' |', '|' + '---|' * len(head)]
@@ -46,20 +44,20 @@ def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 
 
 def report(results: Results, modes: Sequence[str]) -> str:
-    """Return all tables of a run: the worlds side by side, then each by itself."""
+    """Return all tables of a run: the simulators side by side, then each by itself."""
     parts = []
-    if len(results.worlds) > 1:
+    if len(results.simulators) > 1:
         parts += [_side_by_side(results, mode) for mode in modes]
     parts += _smoother_over_filter(results, modes)
-    for mode, world in ((mode, world) for mode in modes for world in results.worlds):
-        by_kind = results.of_mode(mode, world)
+    for mode, simulator in itertools.product(modes, results.simulators):
+        by_kind = results.of_mode(mode, simulator)
         if not by_kind:
             continue
         joined = {k: Samples.joined(d.samples for d in drives) for k, drives in by_kind.items()}
         pooled = Samples.joined(joined.values())
         high = float((np.abs(pooled.true_slip) > 0.6).mean())
         count = sum(len(d) for d in by_kind.values())
-        parts.append(f'## {_MODES[mode]}, {_WORLDS[world]}\n')
+        parts.append(f'## {_MODES[mode]}, simulator {simulator}\n')
         parts.append(
             f'{count} drives, {len(pooled)} scored wheel samples, {high:.0%} of them above '
             '|s| = 0.6.\n'
@@ -157,15 +155,15 @@ def _interval(ratio: scores.Ratio) -> str:
 
 
 def _side_by_side(results: Results, mode: str) -> str:
-    """Return the pooled figures of a mode, one column per world."""
+    """Return the pooled figures of a mode, one column per simulator."""
     columns = {}
-    for world in results.worlds:
-        drives = [d for found in results.of_mode(mode, world).values() for d in found]
-        columns[world] = _figures(drives)
+    for simulator in results.simulators:
+        drives = [d for found in results.of_mode(mode, simulator).values() for d in found]
+        columns[simulator] = _figures(drives)
     names = next(iter(columns.values()))
     rows = [(name, *(column[name] for column in columns.values())) for name in names]
-    head = ('pooled', *(_WORLDS[world] for world in columns))
-    return f'## {_MODES[mode]}: the worlds side by side\n\n{table(head, rows)}\n'
+    head = ('pooled', *(f'simulator {simulator}' for simulator in columns))
+    return f'## {_MODES[mode]}: the simulators side by side\n\n{table(head, rows)}\n'
 
 
 def _figures(drives: Sequence[DriveScore]) -> dict[str, str]:
@@ -275,7 +273,7 @@ def _warnings(by_kind: dict[str, list[DriveScore]]) -> str:
         hours = sum(w.duration for w in found) / 3600.0
         kilometres = sum(w.distance for w in found) / 1000.0
         false = sum(w.false_alarms for w in found)
-        made_to = any(kind in WORLDS[d.world].entrapments for d in drives)
+        made_to = any(kind in SIMULATORS[d.simulator].entrapments for d in drives)
         rows.append(
             (
                 f'{kind}{" (made to entrap)" if made_to else ""}',
@@ -332,14 +330,14 @@ def _smoother_over_filter(results: Results, modes: Sequence[str]) -> list[str]:
     rows = []
     for mode in (m for m in modes if m.startswith(SMOOTHED)):
         live = mode.removeprefix(SMOOTHED).removeprefix('_') or 'reference'
-        for world in results.worlds:
+        for simulator in results.simulators:
             sides = [
-                [d.samples for drives in results.of_mode(m, world).values() for d in drives]
+                [d.samples for drives in results.of_mode(m, simulator).values() for d in drives]
                 for m in (live, mode)
             ]
             if all(sides):
                 before, after = (Samples.joined(side) for side in sides)
-                rows.append((f'{_MODES[live]}, {_WORLDS[world]}', *_ratios(before, after)))
+                rows.append((f'{_MODES[live]}, simulator {simulator}', *_ratios(before, after)))
     if not rows:
         return []
     head = ('drives', 'slip', 'coverage', 'sinkage', 'coverage', 'pull', 'coverage')
@@ -367,18 +365,18 @@ def _health(by_kind: dict[str, list[DriveScore]]) -> str:
 
 
 def as_dict(results: Results, modes: Sequence[str]) -> dict[str, Any]:
-    """Return the main figures for JSON: world -> mode -> kind and ``pooled`` -> figures.
+    """Return the main figures for JSON: simulator -> mode -> kind and ``pooled`` -> figures.
 
     Errors in slip [-], sinkage [m] and pull [share of the load]; ``coverage`` of 95 % intervals.
     """
     found: dict[str, Any] = {}
-    for world in results.worlds:
+    for simulator in results.simulators:
         for mode in modes:
-            by_kind = results.of_mode(mode, world)
+            by_kind = results.of_mode(mode, simulator)
             if by_kind:
                 pooled = [drive for drives in by_kind.values() for drive in drives]
                 rows = {**by_kind, 'pooled': pooled}
-                found.setdefault(world, {})[mode] = {k: _numbers(d) for k, d in rows.items()}
+                found.setdefault(simulator, {})[mode] = {k: _numbers(d) for k, d in rows.items()}
     return found
 
 

@@ -33,7 +33,7 @@ Demand = Literal['torque', 'pitch']
 
 @dataclass(frozen=True)
 class TwoStateTuning:
-    """Numbers of a filter; found on tuning seeds of both worlds (docs/development/worlds.md)."""
+    """Numbers of a filter; found on tuning seeds of simulators A and B."""
 
     offset: float = 0.05  # of the slip at demand 0, at the start
     offset_std: float = 0.15

@@ -5,7 +5,7 @@
     python -m wheel_terra_lab.studies.ablation run ablation.jsonl --measured ../shared/measured
     python -m wheel_terra_lab.studies.ablation show ablation.jsonl -o docs/development/ablation.md
 
-``run`` goes through simulated drives of both worlds (``ablations/drives.py``) and the
+``run`` goes through simulated drives of simulators A and B (``ablations/drives.py``) and the
 recorded ones; on each it runs the estimator as it is and with each treatment of
 ``ablations/treatments.py`` off that can act there. It adds to the file line by line and skips
 what is there: stop it at any time, start it again. ``show`` makes the table of what is there.
@@ -53,7 +53,7 @@ LATER = 0.05
 FIRST_SEED = TEST_SEEDS.start + 500  # seeds of no other study
 _SEEDS_OF_A_ROUND = len(PLANS) + len(WHOLE_PLANS)
 _RESAMPLES = 1000
-_WORLDS = ('own', 'rival', 'recorded')
+_SIMULATORS = ('A', 'B', 'recorded')
 _ESTIMATOR = 'wheel_terra_estimator/estimation'
 
 _HEAD = """# What each special treatment of the estimator is worth
@@ -63,8 +63,8 @@ _HEAD = """# What each special treatment of the estimator is worth
 
 Each treatment is switched off by itself (`ablations/treatments.py` says how) and the
 estimator run again over those of the drives on which it can act: drives of
-[both worlds](worlds.md), with and without a reference, torque or sinkage, each with a seed of its
-own, and recorded ones (`ablations/drives.py`). A loss is the price of doing without; a
+[simulators A and B](simulators.md), with and without a reference, torque or sinkage, each with a
+seed of its own, and recorded ones (`ablations/drives.py`). A loss is the price of doing without; a
 negative one says that the treatment did harm. Guards and signs of the stuck warning are also tried
 on drives at full length.
 """
@@ -90,7 +90,7 @@ def run(arguments: argparse.Namespace) -> None:
         if not missing:
             continue
         for name, figures in _tried(drive, missing, known=drive.name in rows[AS_IT_IS]):
-            row = {'treatment': name, 'drive': drive.name, 'world': drive.world, **figures}
+            row = {'treatment': name, 'drive': drive.name, 'simulator': drive.simulator, **figures}
             if name == AS_IT_IS:
                 row |= {'seed': drive.seed, 'whole': drive.warning_only, 'commit': commit}
             results.add(row)
@@ -159,8 +159,8 @@ def _of_this_run(base: Figures) -> str:
     commits = ', '.join(sorted({str(row['commit']) for row in base.values()}))
     seeds = sorted({row['seed'] for row in base.values() if row['seed']})
     whole = sum(row.get('whole', False) for row in base.values())
-    count = Counter(row['world'] for row in base.values() if not row.get('whole'))
-    drives = ', '.join(f'{count[w]} {w}' for w in _WORLDS)
+    count = Counter(row['simulator'] for row in base.values() if not row.get('whole'))
+    drives = ', '.join(f'{count[w]} {w}' for w in _SIMULATORS)
     return (
         f'Filter of commit {commits}; {len(seeds)} seeds, {seeds[0]} to {seeds[-1]}; drives: '
         f'{drives}, and {whole} at full length for the warning alone.\n'
@@ -194,7 +194,7 @@ def report(rows: Rows) -> str:
         lines.append((worst, (treatment.group, treatment.name, *cells, verdict)))
     lines.sort(key=lambda pair: -pair[0])
     head = (
-        *('kind', 'treatment', 'acted on', 'slip [%]', *(f'{w} [%]' for w in _WORLDS)),
+        *('kind', 'treatment', 'acted on', 'slip [%]', *(f'{w} [%]' for w in _SIMULATORS)),
         *('pull [%]', 'sinkage [%]'),
         *('coverage of slip [points]', 'of pull', 'classes wrong [points]', 'too high'),
         *('false warnings', 'missed', 'lead [s]', 'slip of the drive hit most', 'earns its place'),
@@ -220,7 +220,7 @@ _SHARES = (
 """Counts, and what they are shares of."""
 _VERDICTS = {
     'yes': f'Earns its place (a loss above {ALLOWED:.0%} plus two standard errors in slip, pull or '
-    f'sinkage, over all drives or those of a world; {ALLOWED:.0%} of the classes, '
+    f'sinkage, over all drives or those of a simulator; {ALLOWED:.0%} of the classes, '
     f'{UNCOVERED:.0%} more errors outside their interval; a warning that gets worse)',
     'open': f'Open (within that, but some drive loses more than {ALLOWED:.0%}, has '
     f'{UNCOVERED_DRIVE:.0%} more errors outside, or is warned later: more drives needed)',
@@ -273,11 +273,11 @@ def _loses(base: Figures, found: Figures, name: str) -> bool:
 
 
 def _losses(base: Figures, found: Figures, names: Sequence[str]) -> dict[str, tuple[float, float]]:
-    """Return the change and its standard error of slip, slip by world, pull and sinkage."""
+    """Return the change and its standard error of slip, slip by simulator, pull and sinkage."""
     losses = {'slip': _change(base, found, names, 'slip')}
-    for world in _WORLDS:
-        here = [n for n in names if base[n]['world'] == world]
-        losses[world] = _change(base, found, here, 'slip')
+    for simulator in _SIMULATORS:
+        here = [n for n in names if base[n]['simulator'] == simulator]
+        losses[simulator] = _change(base, found, here, 'slip')
     for what in ('pull', 'sinkage'):
         losses[what] = _change(base, found, names, what)
     return losses

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """How well the slip of a drive can be known from its reference velocities alone.
 
-    python -m wheel_terra_lab.studies.information_limit rival:climb --seeds 1000 1001
+    python -m wheel_terra_lab.studies.information_limit B:climb --seeds 1000 1001
 
 The slip of the rover is taken as a random walk over rim travel, seen by each reference velocity
 v = (1 - s) r w. Three estimators know what no estimator knows: the error of each sensor drawn in
@@ -31,8 +31,8 @@ from numpy.typing import NDArray
 from wheel_terra_estimator.estimation.measurements import ReferenceVelocity
 from wheel_terra_lab.evaluation.runner import inputs_of_mode, record, run_estimator
 from wheel_terra_lab.evaluation.scores import FIRST_SECONDS, LEAST_SPEED
+from wheel_terra_lab.evaluation.simulators import SIMULATORS, BenchDrive
 from wheel_terra_lab.evaluation.tables import table
-from wheel_terra_lab.evaluation.worlds import WORLDS, BenchDrive
 
 FloatArray = NDArray[np.float64]
 WALKS = np.geomspace(0.005, 0.6, 13)
@@ -143,18 +143,18 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawTextHelpFormatter
     )
-    parser.add_argument('kinds', nargs='+', metavar='WORLD:KIND')
+    parser.add_argument('kinds', nargs='+', metavar='SIMULATOR:KIND')
     parser.add_argument('--seeds', nargs='+', type=int, default=[1000])
     arguments = parser.parse_args()
     rows = []
     for name in arguments.kinds:
-        world, kind = name.split(':')
+        simulator, kind = name.split(':')
         for seed in arguments.seeds:
-            drive = WORLDS[world].simulate(kind, seed, None, None)
+            drive = SIMULATORS[simulator].simulate(kind, seed, None, None)
             tried = [tuple(map(rms, errors(drive, walk))) for walk in WALKS]
             causal, smoother = (min(column) for column in zip(*tried, strict=True))
             figures = estimator_error(drive), causal, smoother, bound(drive)
-            rows.append((f'{world} {kind} {seed}', *(f'{value:.4f}' for value in figures)))
+            rows.append((f'{simulator} {kind} {seed}', *(f'{value:.4f}' for value in figures)))
             print(*rows[-1], flush=True)
     head = 'drive', 'estimator', 'causal, hindsight', 'smoother, hindsight', 'bound, constant slip'
     print(table(head, rows))

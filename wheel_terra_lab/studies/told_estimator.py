@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the estimator still gets wrong when it is told what it has to learn otherwise.
 
-    python -m wheel_terra_lab.studies.told_estimator own:stop_and_go rival:entrapment --seeds 1000
+    python -m wheel_terra_lab.studies.told_estimator A:stop_and_go B:entrapment --seeds 1000
 
 Each drive is run by the estimator as it is and by the same one that is told, with hindsight:
 
@@ -42,9 +42,9 @@ from wheel_terra_estimator.estimation.measurements import (
 from wheel_terra_estimator.estimation.wheel_soil_estimator import WheelSoilEstimator
 from wheel_terra_lab.evaluation import scores
 from wheel_terra_lab.evaluation.runner import inputs_of_mode, record, run_estimator
+from wheel_terra_lab.evaluation.simulators import SIMULATORS, BenchDrive
 from wheel_terra_lab.evaluation.tables import table
 from wheel_terra_lab.evaluation.two_state_filters import SlipCourse
-from wheel_terra_lab.evaluation.worlds import WORLDS, BenchDrive
 
 FloatArray = NDArray[np.float64]
 TEACHING_PERIOD = 0.2  # of the true speed as a reference [s]
@@ -205,19 +205,21 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawTextHelpFormatter
     )
-    parser.add_argument('kinds', nargs='+', metavar='WORLD:KIND')
+    parser.add_argument('kinds', nargs='+', metavar='SIMULATOR:KIND')
     parser.add_argument('--seeds', nargs='+', type=int, default=[1000])
     parser.add_argument('--modes', nargs='+', default=['reference', 'no_torque'])
     arguments = parser.parse_args()
     rows: list[tuple[str, ...]] = []
     head: tuple[str, ...] = ('drive',)
     for name in arguments.kinds:
-        world, kind = name.split(':')
+        simulator, kind = name.split(':')
         for seed in arguments.seeds:
-            found = compared(WORLDS[world].simulate(kind, seed, None, None), arguments.modes)
+            found = compared(
+                SIMULATORS[simulator].simulate(kind, seed, None, None), arguments.modes
+            )
             head = ('drive', *(f'{n}: as it is, told' for n in found))
             shown = (f'{plain:.4g}, {told:.4g}' for plain, told in found.values())
-            rows.append((f'{world} {kind} {seed}', *shown))
+            rows.append((f'{simulator} {kind} {seed}', *shown))
             print(*rows[-1], sep=' | ', flush=True)
     print(table(head, rows))
 

@@ -58,9 +58,9 @@ def test_patch_wants_what_is_there():
         pass
 
 
-def short(world, kind, seconds, **more):
+def short(simulator, kind, seconds, **more):
     """Return a short drive of a tuning seed."""
-    return next(simulated([Plan(world, kind, seconds=seconds, **more)], 1000))
+    return next(simulated([Plan(simulator, kind, seconds=seconds, **more)], 1000))
 
 
 def differ(one, other):
@@ -71,7 +71,7 @@ def differ(one, other):
 
 
 def test_estimator_runs_with_everything_switched_off():
-    case = short('own', 'climb', 8.0).make()
+    case = short('A', 'climb', 8.0).make()
     kept = ablation._run(case)
     with both(*(t.off for t in TREATMENTS))():
         bare = ablation._run(case)
@@ -82,7 +82,7 @@ def test_estimator_runs_with_everything_switched_off():
 
 def test_warning_told_again_is_the_same_and_feels_its_own_switches():
     # Late references: steps are made again, from kept states.
-    case = short('rival', 'climb', 10.0).make()
+    case = short('B', 'climb', 10.0).make()
     always = both(
         tuned('judgement.stuck.signs:SignTuning', likely=-1.0),
         tuned('judgement.stuck.situation:SituationTuning', settling_travel=0.0),
@@ -97,20 +97,20 @@ def test_warning_told_again_is_the_same_and_feels_its_own_switches():
     assert not told.played(case.configuration).any()
 
 
-def row(treatment, drive, world, slip, **more):
+def row(treatment, drive, simulator, slip, **more):
     figures = {'slip_square': 100.0 * slip**2, 'slip_count': 100.0, 'slip_covered': 95.0, **more}
-    return {'treatment': treatment, 'drive': drive, 'world': world, **figures}
+    return {'treatment': treatment, 'drive': drive, 'simulator': simulator, **figures}
 
 
 def test_table_says_what_earns_its_place():
     useful, idle = TREATMENTS[0].name, TREATMENTS[1].name
     rows = {ablation.AS_IT_IS: {}, useful: {}, idle: {}}
     for i, base in enumerate((0.02, 0.03, 0.05, 0.04)):
-        for world in ('own', 'rival'):
-            name = f'{world} {i}'
-            rows[ablation.AS_IT_IS][name] = row('', name, world, base)
-            rows[useful][name] = row('', name, world, base * (1.5 if world == 'rival' else 1.0))
-            rows[idle][name] = row('', name, world, base * 1.001)
+        for simulator in ('A', 'B'):
+            name = f'{simulator} {i}'
+            rows[ablation.AS_IT_IS][name] = row('', name, simulator, base)
+            rows[useful][name] = row('', name, simulator, base * (1.5 if simulator == 'B' else 1.0))
+            rows[idle][name] = row('', name, simulator, base * 1.001)
     text = ablation.report(rows)
     lines = {line.split('|')[2].strip(): line for line in text.splitlines() if line.count('|') > 5}
     assert '+50.0 ± 0.0' in lines[useful]
@@ -121,7 +121,7 @@ def test_table_says_what_earns_its_place():
     base = rows[ablation.AS_IT_IS]
     silent, doubtful = TREATMENTS[2].name, TREATMENTS[3].name
     rows[silent] = dict(base)
-    rows[doubtful] = {**base, 'own 2': row('', 'own 2', 'own', 0.055)}
+    rows[doubtful] = {**base, 'A 2': row('', 'A 2', 'A', 0.055)}
     text = ablation.report(rows)
     lines = {line.split('|')[2].strip(): line for line in text.splitlines() if line.count('|') > 5}
     assert lines[silent].endswith('| did not act |')
@@ -133,13 +133,13 @@ def test_table_says_what_earns_its_place():
     assert '+3.0' in text
     assert f'{silent}.' not in text.splitlines()[-1]
     rows[silent] = dict(base)
-    rows[silent]['own 1'] = {**base['own 1'], 'missed': 1.0}
+    rows[silent]['A 1'] = {**base['A 1'], 'missed': 1.0}
     assert f'{silent}.' not in ablation.report(rows).splitlines()[-1]
 
 
 def test_deviation_that_is_too_small_without_a_treatment_earns_its_place():
     wide, narrow = TREATMENTS[0].name, TREATMENTS[1].name
-    base = {f'own {i}': row('', f'own {i}', 'own', 0.03) for i in range(4)}
+    base = {f'A {i}': row('', f'A {i}', 'A', 0.03) for i in range(4)}
     rows = {
         ablation.AS_IT_IS: base,
         wide: {name: {**figures, 'slip_covered': 92.0} for name, figures in base.items()},
@@ -151,10 +151,10 @@ def test_deviation_that_is_too_small_without_a_treatment_earns_its_place():
 
 
 def test_warning_that_comes_later_earns_its_place():
-    base = {f'own {i}': {**row('', f'own {i}', 'own', 0.03), 'lead': 10.0 + i} for i in range(4)}
+    base = {f'A {i}': {**row('', f'A {i}', 'A', 0.03), 'lead': 10.0 + i} for i in range(4)}
     later = {name: {**figures, 'lead': figures['lead'] - 2.0} for name, figures in base.items()}
-    once = {**base, 'own 1': {**base['own 1'], 'lead': 10.8}}
-    seldom = {**base, 'own 1': {**base['own 1'], 'lead': 11.01}}
+    once = {**base, 'A 1': {**base['A 1'], 'lead': 10.8}}
+    seldom = {**base, 'A 1': {**base['A 1'], 'lead': 11.01}}
     assert ablation._verdict(base, later, list(base)) == 'yes'
     assert ablation._verdict(base, once, list(base)) == 'open'
     assert ablation._verdict(base, seldom, list(base)) == 'seldom'
@@ -163,8 +163,8 @@ def test_warning_that_comes_later_earns_its_place():
 
 def test_treatment_is_tried_where_it_can_act():
     by_name = {t.name: t for t in TREATMENTS}
-    blind = next(simulated([Plan('own', 'climb', mode='no_reference')], 1000))
-    seeing = next(simulated([Plan('own', 'climb')], 1000))
+    blind = next(simulated([Plan('A', 'climb', mode='no_reference')], 1000))
+    seeing = next(simulated([Plan('A', 'climb')], 1000))
     usual = by_name['return to the usual slip']
     assert usual.acts_in(blind)
     assert not usual.acts_in(seeing)
@@ -180,14 +180,14 @@ def test_treatment_is_tried_where_it_can_act():
 @pytest.mark.parametrize(
     'plan',
     [
-        Plan('rival', 'spin', mode='no_torque_no_reference'),
-        Plan('own', 'wild_stops'),
+        Plan('B', 'spin', mode='no_torque_no_reference'),
+        Plan('A', 'wild_stops'),
     ],
     ids=lambda p: p.kind,
 )
-def test_drives_of_both_worlds_are_made(plan):
-    drive = short(plan.world, plan.kind, 1.0, mode=plan.mode)
-    assert drive.name.startswith(f'{plan.world} {plan.kind} 1000')
+def test_drives_of_both_simulators_are_made(plan):
+    drive = short(plan.simulator, plan.kind, 1.0, mode=plan.mode)
+    assert drive.name.startswith(f'{plan.simulator} {plan.kind} 1000')
     case = drive.make()
     references = [m for m in case.measurements if hasattr(m, 'forward')]
     assert bool(references) == ('no_reference' not in plan.mode)
@@ -195,7 +195,7 @@ def test_drives_of_both_worlds_are_made(plan):
 
 
 def test_towed_rover_moves_on_standing_wheels():
-    drive = short('own', 'towed', 22.0)
+    drive = short('A', 'towed', 22.0)
     case = drive.make()
     kept = ablation._run(case)
     late = kept.stamp[0] + 20_000_000_000

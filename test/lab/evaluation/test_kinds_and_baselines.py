@@ -18,7 +18,7 @@ from wheel_terra_estimator.estimation.measurements import (
 from wheel_terra_estimator.simulation.scenario import load
 from wheel_terra_estimator.simulation.sensors import Arrival
 from wheel_terra_lab.cli import evaluate
-from wheel_terra_lab.evaluation import baselines, kinds, worlds
+from wheel_terra_lab.evaluation import baselines, kinds, simulators
 from wheel_terra_lab.evaluation.runner import inputs_of_mode
 from wheel_terra_lab.evaluation.two_state_filters import slip_course
 
@@ -38,11 +38,11 @@ def test_tuning_and_test_seeds_are_apart():
 
 @pytest.mark.parametrize('kind', ['wheel_faults', 'scenarios/stalled_wheel'])
 def test_another_rover_drives_any_kind_and_any_scenario_of_the_own_world(kind):
-    drive = worlds.WORLDS['own'].simulate(kind, 1000, 1.0, 'frostyboy')
+    drive = simulators.SIMULATORS['A'].simulate(kind, 1000, 1.0, 'frostyboy')
     assert drive.configuration.wheels.count == 4
     assert drive.configuration.rover.mass == reader.load(['frostyboy']).rover.mass
     assert drive.truth.slip.shape[1] == 4
-    own = worlds.WORLDS['own'].simulate(kind, 1000, 1.0, None)
+    own = simulators.SIMULATORS['A'].simulate(kind, 1000, 1.0, None)
     assert drive.configuration.soil == own.configuration.soil
 
 
@@ -51,7 +51,7 @@ def test_another_rover_drives_any_kind_and_any_scenario_of_the_own_world(kind):
     [
         (['--rover', 'hit_lss1'], 'not a rover file'),
         (['--rover', 'frosty'], 'frostyboy'),
-        (['--rover', 'frostyboy', '--world', 'rival', '--kinds', 'climb'], '--world own'),
+        (['--rover', 'frostyboy', '--simulator', 'B', '--kinds', 'climb'], '--simulator A'),
         (['--rover', 'frostyboy', '--limiter'], '--limiter'),
         (['--kinds', 'scenarios/stalled'], 'stalled_wheel'),
     ],
@@ -171,14 +171,14 @@ def test_pitch_filter_sees_the_slope_by_orientation_or_by_specific_force():
     assert slips[0] == pytest.approx(0.05 + 1.0 * np.sin(up), abs=0.01)
 
 
-def test_worlds_and_kinds_of_the_command():
-    assert {w for w, _ in evaluate._chosen('both', None)} == {'own', 'rival'}
-    assert evaluate._chosen('both', ['spin', 'climb']) == [
-        ('own', 'climb'),
-        ('rival', 'spin'),
-        ('rival', 'climb'),
+def test_simulators_and_kinds_of_the_command():
+    assert {s for s, _ in evaluate._chosen('ABC', None)} == set('ABC')
+    assert evaluate._chosen('AB', ['spin', 'climb']) == [
+        ('A', 'climb'),
+        ('B', 'spin'),
+        ('B', 'climb'),
     ]
-    assert ('own', 'firm') not in evaluate._chosen('own', None)
+    assert ('A', 'firm') not in evaluate._chosen(['A'], None)
 
 
 def test_a_filter_that_failed_on_a_drive_ends_evaluate_with_status_1(monkeypatch, capsys):

@@ -11,17 +11,17 @@ import pytest
 
 from wheel_terra_estimator.cli.main import INTERRUPTED, main
 from wheel_terra_estimator.errors import UserError
-from wheel_terra_lab.evaluation import many_drives, worlds
+from wheel_terra_lab.evaluation import many_drives, simulators
 from wheel_terra_lab.evaluation.many_drives import drive_kinds_for_hours, most_per_hour
 from wheel_terra_lab.evaluation.scores import coverage, rms
 
 SEED = 1090
 LENGTH = 12.0  # of a drive [s]; the first ten are not scored
 HOURS = 3.5 * LENGTH / 3600.0
-CHOSEN = [('own', 'cruise'), ('own', 'climb')]
+CHOSEN = [('A', 'cruise'), ('A', 'climb')]
 
 
-OWN = worlds.WORLDS['own']
+OWN = simulators.SIMULATORS['A']
 
 
 @functools.cache
@@ -36,7 +36,7 @@ def short(monkeypatch):
     def simulate(kind, seed, duration, rover):
         return drive_of(kind, seed, rover)
 
-    monkeypatch.setitem(worlds.WORLDS, 'own', replace(OWN, simulate=simulate))
+    monkeypatch.setitem(simulators.SIMULATORS, 'A', replace(OWN, simulate=simulate))
 
 
 def without_process(rows):
@@ -79,8 +79,8 @@ def test_seed_after_seed_until_the_hours_are_driven_and_gone_on_with(short, tmp_
 def test_the_sums_of_a_drive_are_those_of_the_bench(short):
     from wheel_terra_lab.evaluation.bench import score_drive
 
-    (figures,) = many_drives._figures('own', 'climb', SEED, ['reference'])
-    (score,) = score_drive('own', 'climb', SEED, ['reference'])
+    (figures,) = many_drives._figures('A', 'climb', SEED, ['reference'])
+    (score,) = score_drive('A', 'climb', SEED, ['reference'])
     assert figures.slip_samples == len(score.samples)
     assert math.sqrt(figures.slip_squared_error / figures.slip_samples) == pytest.approx(
         rms(score.samples.slip_error)
@@ -94,7 +94,7 @@ def test_the_table_sums_drives_and_gives_the_limit_of_the_rate():
     table = many_drives.report(
         [
             {
-                'world': 'own',
+                'simulator': 'A',
                 'kind': 'firm',
                 'seed': seed,
                 'mode': 'reference',
@@ -114,7 +114,7 @@ def test_the_table_sums_drives_and_gives_the_limit_of_the_rate():
         ]
     )
     row = [cell.strip() for cell in table.splitlines()[2].strip('|').split('|')]
-    assert row[:5] == ['own firm', 'reference', '2', '1.00', '180']
+    assert row[:5] == ['A firm', 'reference', '2', '1.00', '180']
     assert row[5:] == ['0.0200', '95.0%', '1', '1', '3', '1', '4.74']
 
 
@@ -137,11 +137,11 @@ def test_the_command_takes_kinds_and_hours_and_refuses_what_does_not_go(
 
         during.setattr(many_drives, '_figures', interrupt)
         assert main(command) == INTERRUPTED
-    assert '--tuning --world own --kinds cruise --modes reference -o' in capsys.readouterr().out
+    assert '--tuning --simulator A --kinds cruise --modes reference -o' in capsys.readouterr().out
     assert main([*command, '--resume']) == 0
-    assert '| own cruise | reference | 1 |' in capsys.readouterr().out
+    assert '| A cruise | reference | 1 |' in capsys.readouterr().out
     for wrong, words in (
-        (['--world', 'rival'], 'needs --kinds'),
+        (['--simulator', 'B'], 'needs --kinds'),
         (['--kinds', 'cruise', '--modes', 'smoothed'], 'mode smoothed'),
         (['--kinds', 'firm', '--limiter'], '--limiter'),
     ):

@@ -179,9 +179,9 @@ def test_tables_hold_every_kind():
     better = replace(drive, mode='smoothed', samples=take(true, said(true, error=0.02)))
     worse = replace(drive, samples=take(true, said(true, error=0.04)))
     text = tables.report(Results([worse, better]), ['reference', 'smoothed'])
-    assert '| With reference at 1 Hz, simulator of the package | 0.500 | 100.0% |' in text
+    assert '| With reference at 1 Hz, simulator A | 0.500 | 100.0% |' in text
     assert '## Smoother with reference at 1 Hz' in text
-    both = Results([drive, replace(drive, world='rival', kind='spin')])
+    both = Results([drive, replace(drive, simulator='B', kind='spin')])
     text = tables.report(both, ['reference'])
     assert 'side by side' in text
     assert '| climb |' in text and '| spin |' in text
@@ -227,14 +227,14 @@ def test_figures_for_programs_are_those_of_the_tables():
     drive = DriveScore(
         'climb', 1, 'reference', take(true, record), scores.warnings(true, record, RADIUS), {}
     )
-    results = Results([drive, replace(drive, kind='cruise', world='rival')])
+    results = Results([drive, replace(drive, kind='cruise', simulator='B')])
     found = tables.as_dict(results, ['reference', 'no_torque'])
-    assert set(found) == {'own', 'rival'}
-    assert set(found['own']) == {'reference'}
-    assert set(found['own']['reference']) == {'climb', 'pooled'}
-    figures = found['own']['reference']['climb']
+    assert set(found) == {'A', 'B'}
+    assert set(found['A']) == {'reference'}
+    assert set(found['A']['reference']) == {'climb', 'pooled'}
+    figures = found['A']['reference']['climb']
     assert figures['rms']['slip'] == pytest.approx(scores.rms(drive.samples.slip_error))
-    assert figures == found['own']['reference']['pooled']
+    assert figures == found['A']['reference']['pooled']
     json.dumps(found, allow_nan=False)
 
 

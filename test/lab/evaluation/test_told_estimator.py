@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from wheel_terra_estimator.estimation.measurements import ReferenceVelocity
-from wheel_terra_lab.evaluation.worlds import WORLDS
+from wheel_terra_lab.evaluation.simulators import SIMULATORS
 from wheel_terra_lab.studies import told_estimator
 
 
@@ -32,7 +32,7 @@ def test_a_gain_that_no_torque_tells_stays_one() -> None:
 
 
 def test_what_is_told_of_a_drive_and_what_its_teacher_says() -> None:
-    drive = WORLDS['rival'].simulate('climb', 1000, 6.0, None)
+    drive = SIMULATORS['B'].simulate('climb', 1000, 6.0, None)
     told = told_estimator.told_sensors(drive)
     # The file's radius is off by about 1 %; rim speed over wheel rate is that of the rover.
     truth = drive.truth

@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""One drive of the rival world, from its kind and seed."""
+"""One drive of simulator B, from its kind and seed."""
 
 from __future__ import annotations
 

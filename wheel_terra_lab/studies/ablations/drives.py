@@ -18,13 +18,13 @@ from wheel_terra_estimator.estimation.estimates import SlipClass
 from wheel_terra_estimator.estimation.measurements import Measurement, ReferenceVelocity
 from wheel_terra_lab.evaluation import real_drives, scores
 from wheel_terra_lab.evaluation.runner import Record, inputs_of_mode
+from wheel_terra_lab.evaluation.simulators import SIMULATORS, BenchDrive
 from wheel_terra_lab.evaluation.two_state_filters import SlipCourse
-from wheel_terra_lab.evaluation.worlds import WORLDS, BenchDrive
 from wheel_terra_lab.studies.ablations import odd_drives
 
 Figures = dict[str, float]
 SHORT, LONG = 25.0, 42.0
-"""Of a drive of the rival world, which is compressed into it, and of the own, which is cut [s]."""
+"""Of a drive of simulator B, which is compressed into it, and of A, which is cut [s]."""
 
 NEITHER = 'no_torque_no_reference'
 """Mode without torque and reference, beside those of the bench."""
@@ -32,83 +32,83 @@ WANDER_TOLD = 'reference_wander_told'
 """Mode whose file says that the error of the reference lasts."""
 NO_SOIL = 'reference_no_soil'
 """Mode whose file states no soil."""
-_WANDER_STD = 0.02  # [m/s], of the satellite velocities of the rival world
+_WANDER_STD = 0.02  # [m/s], of the satellite velocities of simulator B
 
 
 @dataclass(frozen=True)
 class Plan:
     """A simulated drive: `tags` say what there is to treat, beside what its mode says."""
 
-    world: str
+    simulator: str
     kind: str
     tags: frozenset[str] = frozenset()
-    mode: str = 'reference'  # with reference the rival world's come at once: half the time
+    mode: str = 'reference'  # with reference simulator B's come at once: half the time
     seconds: float | None = None  # None: `SHORT` or `LONG`
 
 
-def _plan(world: str, kind: str, tags: str = '', **more: Any) -> Plan:
-    return Plan(world, kind, frozenset(tags.split()), **more)
+def _plan(simulator: str, kind: str, tags: str = '', **more: Any) -> Plan:
+    return Plan(simulator, kind, frozenset(tags.split()), **more)
 
 
 PLANS = (
-    _plan('rival', 'climb', 'slope'),
-    _plan('own', 'turns', 'turning spin', seconds=52.0),
-    _plan('rival', 'stop_and_go', 'slope stops', mode='no_reference'),
-    _plan('own', 'wheel_faults', 'slope faults', seconds=66.0),
-    _plan('rival', 'spin', 'turning spin stops'),
-    _plan('own', 'soft_patch', mode='no_reference'),
-    _plan('rival', 'creeping_entrapment', 'slope entraps'),
-    _plan('own', 'wild_stops', 'slope stops wild'),
-    _plan('rival', 'light', 'slope'),
-    _plan('own', 'entrapment_patch', 'slope entraps', seconds=60.0),
-    _plan('rival', 'turns', 'turning', mode='no_reference'),
-    _plan('own', 'low_gravity', 'slope', mode='no_torque'),
-    _plan('rival', 'field', 'slope fast'),
-    _plan('own', 'stop_and_go', 'slope stops reversal', seconds=62.0),
-    _plan('rival', 'wheel_faults', 'slope faults'),
-    _plan('own', 'climb', 'slope', mode='no_reference'),
-    _plan('rival', 'reversal', 'slope stops reversal'),
-    _plan('own', 'sensor_faults', 'slope wild'),
-    _plan('rival', 'steered', 'turning spin stops steered'),
-    _plan('own', 'soft_patch', mode='no_sinkage'),
-    _plan('rival', 'recovery', 'slope entraps'),
-    _plan('own', 'stop_and_go', 'slope stops', mode='no_reference'),
-    _plan('rival', 'climb', 'slope', mode=NEITHER),
-    _plan('own', 'towed', 'slope stops slides'),
-    _plan('rival', 'field', 'slope fast wander', mode=WANDER_TOLD),
-    _plan('own', 'jolts', 'slope stops', mode='no_reference'),
-    _plan('rival', 'entrapment', 'slope entraps', seconds=45.0),
-    _plan('own', 'climb', 'slope', mode='no_torque'),
-    _plan('rival', 'turns', 'turning'),
-    _plan('own', 'jumps', 'slope wild'),
-    _plan('rival', 'soft_patch', 'slope', mode='no_torque'),
-    _plan('own', 'fast_stops', 'stops fast'),
-    _plan('own', 'mixed_soil', 'slope', mode='no_torque'),
-    _plan('own', 'scenarios/stalled_wheel', 'slope faults', seconds=62.0),
-    _plan('own', 'scenarios/free_spinning_wheel', 'slope faults', seconds=62.0),
-    _plan('own', 'scenarios/steered_turns', 'slope turning steered', seconds=52.0),
-    _plan('own', 'firm', 'slope', mode=NO_SOIL, seconds=60.0),
-    _plan('rival', 'firm', 'slope', mode=NO_SOIL),
-    _plan('own', 'soft_patch', 'slope', mode=NO_SOIL),
-    _plan('rival', 'soft_patch', 'slope', mode=NO_SOIL),
+    _plan('B', 'climb', 'slope'),
+    _plan('A', 'turns', 'turning spin', seconds=52.0),
+    _plan('B', 'stop_and_go', 'slope stops', mode='no_reference'),
+    _plan('A', 'wheel_faults', 'slope faults', seconds=66.0),
+    _plan('B', 'spin', 'turning spin stops'),
+    _plan('A', 'soft_patch', mode='no_reference'),
+    _plan('B', 'creeping_entrapment', 'slope entraps'),
+    _plan('A', 'wild_stops', 'slope stops wild'),
+    _plan('B', 'light', 'slope'),
+    _plan('A', 'entrapment_patch', 'slope entraps', seconds=60.0),
+    _plan('B', 'turns', 'turning', mode='no_reference'),
+    _plan('A', 'low_gravity', 'slope', mode='no_torque'),
+    _plan('B', 'field', 'slope fast'),
+    _plan('A', 'stop_and_go', 'slope stops reversal', seconds=62.0),
+    _plan('B', 'wheel_faults', 'slope faults'),
+    _plan('A', 'climb', 'slope', mode='no_reference'),
+    _plan('B', 'reversal', 'slope stops reversal'),
+    _plan('A', 'sensor_faults', 'slope wild'),
+    _plan('B', 'steered', 'turning spin stops steered'),
+    _plan('A', 'soft_patch', mode='no_sinkage'),
+    _plan('B', 'recovery', 'slope entraps'),
+    _plan('A', 'stop_and_go', 'slope stops', mode='no_reference'),
+    _plan('B', 'climb', 'slope', mode=NEITHER),
+    _plan('A', 'towed', 'slope stops slides'),
+    _plan('B', 'field', 'slope fast wander', mode=WANDER_TOLD),
+    _plan('A', 'jolts', 'slope stops', mode='no_reference'),
+    _plan('B', 'entrapment', 'slope entraps', seconds=45.0),
+    _plan('A', 'climb', 'slope', mode='no_torque'),
+    _plan('B', 'turns', 'turning'),
+    _plan('A', 'jumps', 'slope wild'),
+    _plan('B', 'soft_patch', 'slope', mode='no_torque'),
+    _plan('A', 'fast_stops', 'stops fast'),
+    _plan('A', 'mixed_soil', 'slope', mode='no_torque'),
+    _plan('A', 'scenarios/stalled_wheel', 'slope faults', seconds=62.0),
+    _plan('A', 'scenarios/free_spinning_wheel', 'slope faults', seconds=62.0),
+    _plan('A', 'scenarios/steered_turns', 'slope turning steered', seconds=52.0),
+    _plan('A', 'firm', 'slope', mode=NO_SOIL, seconds=60.0),
+    _plan('B', 'firm', 'slope', mode=NO_SOIL),
+    _plan('A', 'soft_patch', 'slope', mode=NO_SOIL),
+    _plan('B', 'soft_patch', 'slope', mode=NO_SOIL),
 )
-"""Any head of the list is a fair sample of both worlds."""
+"""Any head of the list is a fair sample of simulators A and B."""
 
 WHOLE_PLANS = (
-    _plan('rival', 'entrapment', 'entraps'),
-    _plan('own', 'entrapment_patch', 'entraps'),
-    _plan('rival', 'creeping_entrapment', 'entraps'),
-    _plan('own', 'entrapment_slope', 'entraps'),
-    _plan('rival', 'spin', 'spin'),
-    _plan('own', 'near_stuck'),
-    _plan('rival', 'entrapment', 'entraps', mode='no_reference'),
-    _plan('own', 'wheel_faults'),
-    _plan('rival', 'wheel_faults'),
-    _plan('own', 'turns', 'spin'),
-    _plan('rival', 'recovery'),
-    _plan('own', 'entrapment_slope', 'entraps', mode='no_reference'),
-    _plan('rival', 'stop_and_go'),
-    _plan('own', 'sensor_faults'),
+    _plan('B', 'entrapment', 'entraps'),
+    _plan('A', 'entrapment_patch', 'entraps'),
+    _plan('B', 'creeping_entrapment', 'entraps'),
+    _plan('A', 'entrapment_slope', 'entraps'),
+    _plan('B', 'spin', 'spin'),
+    _plan('A', 'near_stuck'),
+    _plan('B', 'entrapment', 'entraps', mode='no_reference'),
+    _plan('A', 'wheel_faults'),
+    _plan('B', 'wheel_faults'),
+    _plan('A', 'turns', 'spin'),
+    _plan('B', 'recovery'),
+    _plan('A', 'entrapment_slope', 'entraps', mode='no_reference'),
+    _plan('B', 'stop_and_go'),
+    _plan('A', 'sensor_faults'),
 )
 """Drives at full length, on which only treatments of the warning are tried."""
 
@@ -143,7 +143,7 @@ class Case:
 class Drive:
     """A drive of the study; `make` simulates or reads it."""
 
-    world: str
+    simulator: str
     name: str
     tags: frozenset[str]
     make: Callable[[], Case]
@@ -157,8 +157,8 @@ def simulated(plans: Sequence[Plan], first: int, *, whole: bool = False) -> Iter
     for seed, plan in enumerate(plans, first):
         mode = '' if plan.mode == 'reference' else f' {plan.mode}'.replace('_', ' ')
         yield Drive(
-            plan.world,
-            f'{plan.world} {plan.kind} {seed}{mode}' + (' whole' if whole else ''),
+            plan.simulator,
+            f'{plan.simulator} {plan.kind} {seed}{mode}' + (' whole' if whole else ''),
             plan.tags | _inputs(plan.mode),
             partial(_simulated, plan, seed, whole),
             seed,
@@ -173,7 +173,7 @@ def _inputs(mode: str) -> frozenset[str]:
 
 
 def _simulated(plan: Plan, seed: int, whole: bool) -> Case:
-    short = SHORT if plan.world == 'rival' else LONG
+    short = SHORT if plan.simulator == 'B' else LONG
     drive = _bench_drive(plan, seed, None if whole else plan.seconds or short)
     configuration = drive.configuration
     if plan.mode == WANDER_TOLD:
@@ -182,7 +182,7 @@ def _simulated(plan: Plan, seed: int, whole: bool) -> Case:
         stated = frozenset(key for key in configuration.stated if not key.startswith('soil.'))
         configuration = replace(configuration, stated=stated).replace({})
     mode = 'reference' if plan.mode == NO_SOIL else plan.mode
-    if plan.world == 'rival' and mode == 'reference':
+    if plan.simulator == 'B' and mode == 'reference':
         mode = 'reference_at_once'
     return Case(configuration, list(_measurements(drive, mode)), partial(_figures, drive))
 
@@ -190,7 +190,7 @@ def _simulated(plan: Plan, seed: int, whole: bool) -> Case:
 def _bench_drive(plan: Plan, seed: int, seconds: float | None) -> BenchDrive:
     if plan.kind in odd_drives.KINDS:
         return odd_drives.simulated(plan.kind, seed, seconds)
-    return WORLDS[plan.world].simulate(plan.kind, seed, seconds, None)
+    return SIMULATORS[plan.simulator].simulate(plan.kind, seed, seconds, None)
 
 
 def _measurements(drive: BenchDrive, mode: str) -> Iterator[Measurement]:

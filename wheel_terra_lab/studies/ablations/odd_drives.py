@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Drives of the own world for the ablation alone, for what happens in no kind of the bench."""
+"""Drives of simulator A for the ablation alone, for what happens in no kind of the bench."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from wheel_terra_estimator.estimation.measurements import (
 from wheel_terra_estimator.simulation import drive as own_world
 from wheel_terra_estimator.simulation.scenario import load
 from wheel_terra_lab.evaluation import kinds, scores
-from wheel_terra_lab.evaluation.worlds import BenchDrive, Truth
+from wheel_terra_lab.evaluation.simulators import BenchDrive, Truth
 
 _TWO_STOPS = {
     **kinds.KINDS['stop_and_go'],

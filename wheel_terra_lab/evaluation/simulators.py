@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Worlds of the bench: simulators of different hands, with one face."""
+"""Simulators of different hands, with one face for the bench."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from wheel_terra_estimator.configuration import shipped
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.estimation.measurements import Measurement
-from wheel_terra_lab.evaluation import kinds as own_kinds
-from wheel_terra_lab.evaluation.simulator_b import kinds as rival_kinds
-from wheel_terra_lab.evaluation.simulator_c import plans as plans_of_c
+from wheel_terra_lab.evaluation import kinds as kinds_a
+from wheel_terra_lab.evaluation.simulator_b import kinds as kinds_b
+from wheel_terra_lab.evaluation.simulator_c import plans as plans_c
 
 FloatArray = NDArray[np.float64]
 SCENARIO = 'scenarios/'
@@ -68,7 +68,7 @@ class BenchDrive:
 
 
 @dataclass(frozen=True)
-class World:
+class Simulator:
     """A simulator: its kinds of drives, those made to entrap, and how to make one.
 
     ``simulate`` takes kind, seed, greatest duration [s] and a rover file in place of the kind's
@@ -83,44 +83,44 @@ class World:
     takes_scenarios: bool = False  # a kind may be `scenarios/NAME`, a shipped scenario
 
     def has(self, kind: str) -> bool:
-        """Return whether the world makes drives of a kind."""
+        """Return whether the simulator makes drives of a kind."""
         if self.takes_scenarios and kind.startswith(SCENARIO):
             return shipped.find(kind).is_file()
         return kind in self.kinds or kind in self.more_kinds
 
 
-def _own(kind: str, seed: int, duration: float | None, rover: str | None) -> BenchDrive:
+def _simulate_a(kind: str, seed: int, duration: float | None, rover: str | None) -> BenchDrive:
     from wheel_terra_estimator.simulation.drive import simulate
     from wheel_terra_estimator.simulation.scenario import load
 
-    kinds = {**own_kinds.KINDS, 'firm': own_kinds.FIRM}
+    kinds = {**kinds_a.KINDS, 'firm': kinds_a.FIRM}
     scenario = load(kinds.get(kind, kind), rover=rover)
     longest = scenario.duration if duration is None else min(duration, scenario.duration)
     drive = simulate(scenario, seed, longest)
     return BenchDrive(drive.configuration, drive.arrivals, drive.truth)
 
 
-def _rival(kind: str, seed: int, duration: float | None, rover: str | None) -> BenchDrive:
+def _simulate_b(kind: str, seed: int, duration: float | None, rover: str | None) -> BenchDrive:
     if rover is not None:
-        raise UserError('the rival world has rovers of its own: another rover needs the own world')
+        raise UserError('simulator B has rovers of its own: another rover needs simulator A')
     from wheel_terra_lab.evaluation.simulator_b.drive import simulate
 
     drive = simulate(kind, seed, duration)
     return BenchDrive(drive.configuration, drive.arrivals, drive.truth)
 
 
-def _c(kind: str, seed: int, duration: float | None, rover: str | None) -> BenchDrive:
+def _simulate_c(kind: str, seed: int, duration: float | None, rover: str | None) -> BenchDrive:
     if rover is not None:
-        raise UserError('simulator C draws its rovers itself: another rover needs the own world')
+        raise UserError('simulator C draws its rovers itself: another rover needs simulator A')
     from wheel_terra_lab.evaluation.simulator_c.drive import simulate
 
     drive = simulate(kind, seed, duration)
     return BenchDrive(drive.configuration, drive.arrivals, drive.truth)
 
 
-WORLDS = {
-    'own': World('own', tuple(own_kinds.KINDS), ('firm',), own_kinds.ENTRAPMENTS, _own, True),
-    'rival': World('rival', tuple(rival_kinds.KINDS), (), rival_kinds.ENTRAPMENTS, _rival),
-    'c': World('c', tuple(plans_of_c.KINDS), (), plans_of_c.ENTRAPMENTS, _c),
+SIMULATORS = {
+    'A': Simulator('A', tuple(kinds_a.KINDS), ('firm',), kinds_a.ENTRAPMENTS, _simulate_a, True),
+    'B': Simulator('B', tuple(kinds_b.KINDS), (), kinds_b.ENTRAPMENTS, _simulate_b),
+    'C': Simulator('C', tuple(plans_c.KINDS), (), plans_c.ENTRAPMENTS, _simulate_c),
 }
-"""The simulator of the package, and two more that were written apart from it."""
+"""A: that of the package; B, C: written apart from it and from one another by other hands."""

@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""The rival simulator obeys its own mechanics; common laws agree with the package."""
+"""Simulator B obeys its own mechanics; common laws agree with the package."""
 
 import ast
 from dataclasses import replace
@@ -19,8 +19,8 @@ from wheel_terra_estimator.terramechanics.model import WheelSoilModel
 from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
 from wheel_terra_estimator.terramechanics.soil import Soil
 from wheel_terra_estimator.terramechanics.wheel import Wheel
-from wheel_terra_lab.evaluation import simulator_b as rival
-from wheel_terra_lab.evaluation.simulator_b import drive as rival_drive
+from wheel_terra_lab.evaluation import simulator_b
+from wheel_terra_lab.evaluation.simulator_b import drive as drive_b
 from wheel_terra_lab.evaluation.simulator_b import rovers, sensing, truth, vehicle, wheel_soil
 from wheel_terra_lab.evaluation.simulator_b.kinds import KINDS
 
@@ -102,7 +102,7 @@ def test_loads_balance_weight_and_moments_whatever_carries_them():
 
 @pytest.fixture(scope='module')
 def climb():
-    return rival_drive.simulate('climb', 1001, 15.0)
+    return drive_b.simulate('climb', 1001, 15.0)
 
 
 def test_forces_close_and_no_wheel_gives_energy(climb):
@@ -123,7 +123,7 @@ def test_forces_close_and_no_wheel_gives_energy(climb):
 
 
 def test_steady_slip_grows_with_the_slope():
-    draw = rival_drive.simulate('cruise', 1003, 1.0).draw
+    draw = drive_b.simulate('cruise', 1003, 1.0).draw
     slopes = [
         rovers.slope_for_slip(draw.vehicle, draw.soil, s) for s in (-0.3, -0.15, 0.2, 0.35, 0.5)
     ]
@@ -131,7 +131,7 @@ def test_steady_slip_grows_with_the_slope():
 
 
 def test_drive_is_the_same_for_the_same_seed_and_measurements_are_of_the_rover(climb):
-    again = rival_drive.simulate('climb', 1001, 15.0)
+    again = drive_b.simulate('climb', 1001, 15.0)
     assert [a.arrival for a in again.arrivals] == [a.arrival for a in climb.arrivals]
     np.testing.assert_array_equal(again.truth.slip, climb.truth.slip)
     by_type = {}
@@ -170,7 +170,7 @@ def test_truth_knows_rest_classes_and_entrapment():
 
 
 def test_steered_wheels_roll_round_where_they_are_told():
-    drive = rival_drive.simulate('steered', 1002, 30.0)
+    drive = drive_b.simulate('steered', 1002, 30.0)
     rover, t, c = drive.draw.vehicle, drive.truth, drive.course
     front = np.abs(rover.x) == np.abs(rover.x).max()
     time = (t.stamp - sensing.START) * 1e-9
@@ -195,15 +195,15 @@ def test_steered_wheels_roll_round_where_they_are_told():
 
 @pytest.mark.parametrize('kind', KINDS)
 def test_every_kind_starts(kind):
-    drive = rival_drive.simulate(kind, 1002, 2.0)
+    drive = drive_b.simulate(kind, 1002, 2.0)
     assert len(drive.truth.stamp) > 10
     assert drive.configuration.wheels.count == drive.draw.vehicle.count
 
 
 def test_nothing_is_shared_with_the_first_simulator_or_the_estimator():
     """Measurement types and the reader of configuration files are all that may be imported."""
-    allowed = ('estimation.measurements', 'configuration', 'evaluation.rival')
-    for file in Path(rival.__file__).parent.glob('*.py'):
+    allowed = ('estimation.measurements', 'configuration', 'evaluation.simulator_b')
+    for file in Path(simulator_b.__file__).parent.glob('*.py'):
         for node in ast.walk(ast.parse(file.read_text())):
             if isinstance(node, ast.ImportFrom) and node.module:
                 package, _, module = node.module.partition('wheel_terra_estimator.')
