@@ -219,7 +219,7 @@ def _spot_angles(rover: Rover) -> FloatArray:
 
 
 def slip_ratio(rim: FloatArray, speed: FloatArray, rest: float = 0.002) -> FloatArray:
-    """Return slip ratios as INTERFACE.md defines them, rest aside.
+    """Return slip ratios as the estimator defines them, rest aside.
 
     Parameters
     ----------
