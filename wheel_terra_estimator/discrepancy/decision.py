@@ -23,8 +23,8 @@ from wheel_terra_estimator.discrepancy.assessment.held_out import hold_out, slip
 from wheel_terra_estimator.discrepancy.effect_keys import effect_of
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
 from wheel_terra_estimator.discrepancy.fitting.reference import shared_error
-from wheel_terra_estimator.discrepancy.proposal.find import promise_on_top
-from wheel_terra_estimator.discrepancy.result import Curves, QuantityGap
+from wheel_terra_estimator.discrepancy.proposal.find import closed_by, promise_on_top, propose
+from wheel_terra_estimator.discrepancy.result import OPEN, Curves, Proposal, QuantityGap
 from wheel_terra_estimator.discrepancy.selection import confidence as confidences
 from wheel_terra_estimator.discrepancy.selection import significance
 from wheel_terra_estimator.discrepancy.selection.confidence import Confidence
@@ -34,15 +34,19 @@ from wheel_terra_estimator.discrepancy.selection.verdict import Verdict, choose
 from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES, SteadyTable
 from wheel_terra_estimator.terramechanics.effects import catalogue
 from wheel_terra_estimator.terramechanics.effects.base import Effect
+from wheel_terra_estimator.terramechanics.effects.learned_closure import NAME as LAW
 
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.intp]
 
+_USUAL_PULL = 2.5  # stated deviations: a right name leaves no soil number pulled farther
 _AT_NOISE = 1.2  # times the noise: a quantity that was never off
-_MOST_EXCLUDED = 3  # names that worsen a quantity, after which the last one stands
-# Confidence that at least one name of several must reach; below, they patch what no listed effect
-# explains (one of ten names in five such sets of tuning campaigns was right).
-_PATCHWORK = 1.0 / 3.0
+_MOST_BARRED = 3  # names that worsen a quantity, or are doubtful, after which none is given
+# A name is given where it, or one of those that the rows cannot tell from it, is more likely right
+# than not; below the second figure a law has to do worse than the name.
+_LIKELY = 0.5
+_BEYOND_DOUBT = 0.85
+_CLEARLY = 0.05  # of the gap: so much more a law must close than a doubtful name
 
 
 @dataclass(frozen=True)
@@ -75,6 +79,10 @@ class Decision:
         Quantity -> QuantityGap.
     names : tuple of Naming
         Strongest first; empty unless ``named``.
+    doubtful : tuple of Naming
+        Names that would have been given, were they likely enough.
+    proposal : Proposal or None
+        A law, where something is missing and no name is given.
     """
 
     findings: Findings
@@ -86,6 +94,8 @@ class Decision:
     curves: Curves
     gap: Mapping[str, QuantityGap]
     names: tuple[Naming, ...] = ()
+    doubtful: tuple[Naming, ...] = ()
+    proposal: Proposal | None = None
 
     @property
     def left(self) -> Remainder:
@@ -115,22 +125,45 @@ def decide(
     allowed_error : float
         Model error that is no reason for doubt [share of the range].
     """
-    selection = findings.selection
-    off, barred = False, frozenset[int]()
+    off, barred, doubtful = False, frozenset[int](), tuple[Naming, ...]()
+    everything = frozenset(range(len(findings.selection.explanations)))
+    variance_of = findings.setting.problem.variance
     while True:
-        verdict = choose(selection, findings.setting.problem.variance, off=off, excluded=barred)
+        verdict = choose(findings.selection, variance_of, off=off, excluded=barred)
         decision = _judged(table, both, findings, verdict, allowed_error)
         if verdict.word == 'agrees' and not off and channels_off(decision.gap):
             off = True
         elif verdict.word != 'named':
-            return decision
-        elif channels_worsened(decision.gap, verdict.left) and len(barred) < _MOST_EXCLUDED:
-            barred |= {verdict.index}
+            return _left_open(table, replace(decision, doubtful=doubtful))
         else:
             names = _names(table, decision)
-            if len(names) == 1 or max(n.confidence.of_name for n in names) >= _PATCHWORK:
+            least = min(name.confidence.of_set for name in names)
+            worsens = bool(channels_worsened(decision.gap, verdict.left))
+            if not worsens and least >= _LIKELY and not _law_is_better(table, decision, least):
                 return replace(decision, names=names)
-            barred = frozenset(range(len(selection.explanations)))
+            doubtful = doubtful or (() if worsens else names)
+            barred |= {verdict.index}
+            if len(barred) >= _MOST_BARRED:
+                barred = everything
+
+
+def _law_is_better(table: SteadyTable, decision: Decision, confidence: float) -> bool:
+    """Return whether a law closes more of the gap on left-out levels than doubtful names do."""
+    if confidence >= _BEYOND_DOUBT:
+        return False
+    where = (table, decision.findings, decision.gap, decision.variance)
+    law = propose(*where)
+    return law is not None and law.closed > closed_by(*where, decision.after) + _CLEARLY
+
+
+def _left_open(table: SteadyTable, decision: Decision) -> Decision:
+    """Return the decision with a law, where something is missing and no name is given."""
+    on = decision.findings.setting.forward.base_effects
+    if decision.verdict.word not in OPEN or LAW in on:  # not on top of another law
+        return decision
+    hold = decision.left.only_soil
+    law = propose(table, decision.findings, decision.gap, decision.variance, hold_soil=hold)
+    return replace(decision, proposal=law)
 
 
 def _judged(
@@ -199,7 +232,8 @@ def _what_rows_show(
     """Return features of the confidence that follow from unseen rows and from the fit.
 
     ``worse``: how far an effect worsens a quantity; ``idle``: share of its signature in quantities
-    that were never off; ``misfit``, ``soil``: how improbable the residual and the soil are.
+    that were never off; ``misfit``: how improbable the residual is; ``pull``: the
+    largest pull of a soil number beyond ``_USUAL_PULL`` of its stated deviations.
     """
     change = (fitted.outputs - findings.nothing.outputs)[: len(findings.noise.std)]
     worse, idle, total = 0.0, 0.0, 1e-12
@@ -211,11 +245,12 @@ def _what_rows_show(
         total += square
         idle += square if item.refit < _AT_NOISE * item.noise else 0.0
     misfit = significance.chi_square_p_value(fitted, fitted.variance)
+    largest = max(map(abs, significance.soil_pulls(fitted).values()), default=0.0)
     return {
         'worse': float(np.tanh(worse)),
         'idle': idle / total,
         'misfit': -float(np.log10(max(misfit, 1e-6))),
-        'soil': -float(np.log10(max(significance.soil_p_value(fitted), 1e-6))),
+        'pull': max(largest - _USUAL_PULL, 0.0),
     }
 
 

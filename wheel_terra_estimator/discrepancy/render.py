@@ -21,10 +21,8 @@ from wheel_terra_estimator.discrepancy.effect_keys import effect_of
 from wheel_terra_estimator.discrepancy.fitting.coordinates import WIDENING
 from wheel_terra_estimator.discrepancy.fitting.evidence import log_sum
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
-from wheel_terra_estimator.discrepancy.proposal.find import propose
 from wheel_terra_estimator.discrepancy.report import words
 from wheel_terra_estimator.discrepancy.result import (
-    OPEN,
     Candidate,
     Diagnosis,
     FittedParameter,
@@ -62,7 +60,7 @@ def render(
     effects = _effects(decision, known)
     nearest = () if after.names else _nearest(findings)
     stretch = changed_stretch(both, setting, after, variance)
-    proposal = _proposal(table, decision)
+    proposal = _proposal(decision)
     gap_p_value = _gap_p_value(decision, known)
     law = None if proposal is None else proposal.fit
     covariance = np.asarray(np.linalg.inv(after.precision()), dtype=float)
@@ -202,13 +200,9 @@ def _parameters(
     return found
 
 
-def _proposal(table: SteadyTable, decision: Decision) -> Proposal | None:
-    """Return a law where something is missing and no name is given; not on top of another."""
-    findings = decision.findings
-    if decision.verdict.word not in OPEN or NAME in findings.setting.forward.base_effects:
-        return None
-    hold = decision.left.only_soil
-    found = propose(table, findings, decision.gap, decision.variance, hold_soil=hold)
+def _proposal(decision: Decision) -> Proposal | None:
+    """Return the law of the decision with the soil and effects refitted beside it."""
+    findings, found = decision.findings, decision.proposal
     if found is None or found.fit is None:
         return None
     covariance = np.asarray(np.linalg.inv(found.fit.precision()), dtype=float)

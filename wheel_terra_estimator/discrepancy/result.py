@@ -194,6 +194,8 @@ class Proposal:
     soil_held : bool
         Refit and law hold the soil where it can be believed: another soil alone would leave no
         gap, but is too far from the configured one.
+    closed : float
+        Share of the refit's gap on left-out levels that the law closes.
     """
 
     words: str
@@ -209,6 +211,7 @@ class Proposal:
     refitted: Mapping[str, FittedParameter] = field(default_factory=dict, metadata=_ASIDE)
     fit: Fit | None = field(default=None, metadata=_ASIDE)
     soil_held: bool = False
+    closed: float = field(default=0.0, metadata=_ASIDE)
 
 
 @dataclass(frozen=True)

@@ -140,10 +140,28 @@ def propose(
                 best, most = (fits, judged), closed
     if best is None:
         return None
-    found = _proposal(table, findings, setting, *best, gap)
+    found = replace(_proposal(table, findings, setting, *best, gap), closed=most)
     if not hold_soil:
         return found
     return replace(found, soil_held=True, fit=_widened(best[0][1], findings))
+
+
+def closed_by(
+    table: SteadyTable,
+    findings: Findings,
+    gap: Mapping[str, QuantityGap],
+    variance: FloatArray,
+    fitted: Fit,
+) -> float:
+    """Return the share of the refit's gap on left-out levels that a set of effects closes."""
+    setting, nothing = findings.setting, findings.nothing
+    fits = [setting.fit([f.names], [f.u], f.angle, variance)[0] for f in (nothing, fitted)]
+    groupings = _groupings(table, len(setting.forward.points))
+    judged = {
+        name: _left_out(setting, fits, variance, groups, findings, table)
+        for name, groups in groupings.items()
+    }
+    return _closed(judged, gap)
 
 
 def _soil_is_believed(fitted: Fit, findings: Findings) -> bool:

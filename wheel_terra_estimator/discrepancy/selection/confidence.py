@@ -36,7 +36,7 @@ FEATURES = (
     'worse',  # a quantity is predicted worse on unseen rows than by the soil alone
     'idle',  # share of the signature in quantities that were never off
     'misfit',  # improbability of the residual,
-    'soil',  # and of the soil
+    'pull',  # largest pull of a soil number beyond what soils usually need
     'strength',  # in deviations of the prior
     'law',  # what the best term of an unlisted law promises on top, compressed
 )

@@ -22,8 +22,8 @@ Variance: TypeAlias = Callable[[ArrayLike, ArrayLike], NDArray[np.float64]]
 
 # Misfit that even the best floor leaves improbable.
 IMPROBABLE = 1e-3
-# The same for the distance of the soil: its prior is wide already.
-IMPROBABLE_SOIL = 1e-2
+# The same for the soil number that is pulled farthest: about five stated deviations.
+IMPROBABLE_SOIL = 0.05
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class Remainder:
     p_value : float
         Of the whole misfit under the best floor (chi-square).
     soil_p_value : float
-        Of a soil as far from the configured one as the fit needs it (chi-square, widened prior).
+        Of the soil number that the fit pulls farthest, the choice among them paid for.
     """
 
     probability: float
