@@ -11,6 +11,7 @@ from test_workflow import make, run
 
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.discrepancy.report.model_file import write_proposal
+from wheel_terra_estimator.discrepancy.result import as_json
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.terramechanics.conditioned import ConditionedForces
 from wheel_terra_estimator.terramechanics.effects.learned_closure import (
@@ -128,14 +129,14 @@ def test_where_only_an_unbelievable_soil_fits_the_law_leaves_one_that_can_be_bel
     assert 'too far from the configured one' in found.sentence
     law = found.proposal
     assert law.soil_held
-    assert law.to_dict()['soil_held']
+    assert as_json(law)['soil_held']
     far, near = (sum(shift.pull**2 for shift in soil) for soil in (found.soil, law.soil))
     assert near < 0.2 * far
     for quantity in ('drawbar_pull', 'torque'):
         gap = law.gap[quantity]
         assert gap.noise < gap.refit
         assert gap.after < 0.9 * gap.refit
-        assert gap.after < 1.2 * gap.noise
+        assert gap.after < 1.6 * gap.noise
     configuration = reader.from_parameters(campaign.settings(), complete=False)
     write_proposal(found, law, tmp_path / 'proposal.yaml')
     rows = predicted(found.table.columns, configuration, tmp_path, 'proposal.yaml')

@@ -380,15 +380,17 @@ def test_two_shares_of_the_gap_that_closed_are_shown_as_percentages(named):
 def test_how_far_a_name_worsens_a_quantity_is_in_squares_of_its_noise(monkeypatch):
     """Errors of 3 where there were 2, at a noise of 5: (9 - 4) / 25."""
     monkeypatch.setattr(decision.significance, 'chi_square_p_value', lambda *_: 1.0)
-    monkeypatch.setattr(decision.significance, 'soil_p_value', lambda *_: 1.0)
+    monkeypatch.setattr(decision.significance, 'soil_pulls', lambda *_: {'cohesion': -3.5})
     findings = SimpleNamespace(
         nothing=SimpleNamespace(outputs=np.zeros((4, 3))),
         noise=SimpleNamespace(std=np.ones((4, 3))),
+        setting=SimpleNamespace(forward=SimpleNamespace(active=None)),
     )
     fitted = SimpleNamespace(outputs=np.ones((4, 3)), variance=None)
     gap = {'torque': QuantityGap(4.0, 2.0, 3.0, 5.0)}
     found = decision._what_rows_show(findings, fitted, gap)
     assert found['worse'] == pytest.approx(np.tanh(0.2))
+    assert found['pull'] == pytest.approx(1.0)
 
 
 def test_noise_of_a_cell_is_its_own_part_of_the_covariance():

@@ -179,14 +179,15 @@ def test_a_name_leaves_room_for_an_effect_that_looks_like_it_and_was_not_tried()
 
 
 def test_a_patchwork_of_doubtful_names_is_not_given(monkeypatch):
-    """Digging that may not be named: of the pair that patches it no name reaches one third."""
+    """Digging that may not be named: the pair that patches it is less likely right than not."""
     campaign = make_campaign(1070, 'basic16', Plan(noise='mixed', missing=0.03, forms=True))
     assert campaign.hidden == ('lug_digging',)
     found = diagnose_campaign(campaign, campaign.hidden)
     assert found.verdict == 'unexplained'
     assert not found.effects
     assert found.nearest
-    monkeypatch.setattr(decision, '_PATCHWORK', 0.0)
+    monkeypatch.setattr(decision, '_LIKELY', 0.0)
+    monkeypatch.setattr(decision, '_BEYOND_DOUBT', 0.0)
     patched = diagnose_campaign(campaign, campaign.hidden)
     assert len(patched.effects) > 1
-    assert max(effect.confidence for effect in patched.effects) < 1.0 / 3.0
+    assert min(effect.confidence_of_set for effect in patched.effects) < 0.5

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -134,10 +135,11 @@ def decide(
         if verdict.word == 'agrees' and not off and channels_off(decision.gap):
             off = True
         elif verdict.word != 'named':
-            return _left_open(table, replace(decision, doubtful=doubtful))
+            return _left_open(table, both, replace(decision, doubtful=doubtful), allowed_error)
         else:
             names = _names(table, decision)
-            least = min(name.confidence.of_set for name in names)
+            # What was not tried on purpose makes a name less sure, and is no reason to give none.
+            least = min(confidences.confidence(name.features).of_set for name in names)
             worsens = bool(channels_worsened(decision.gap, verdict.left))
             if not worsens and least >= _LIKELY and not _law_is_better(table, decision, least):
                 return replace(decision, names=names)
@@ -156,14 +158,23 @@ def _law_is_better(table: SteadyTable, decision: Decision, confidence: float) ->
     return law is not None and law.closed > closed_by(*where, decision.after) + _CLEARLY
 
 
-def _left_open(table: SteadyTable, decision: Decision) -> Decision:
-    """Return the decision with a law, where something is missing and no name is given."""
-    on = decision.findings.setting.forward.base_effects
-    if decision.verdict.word not in OPEN or LAW in on:  # not on top of another law
+def _left_open(
+    table: SteadyTable, both: SteadyTable, decision: Decision, allowed_error: float
+) -> Decision:
+    """Return an open decision with a law, where one helps, and the soil plainly refitted.
+
+    A floor that stands for what is missing keeps the soil from following the rows: at operating
+    points that they do not have, the refit without one is nearer to the truth (docs/discrepancy).
+    """
+    findings, gap, variance = decision.findings, decision.gap, decision.variance
+    if decision.verdict.word not in OPEN:
         return decision
-    hold = decision.left.only_soil
-    law = propose(table, decision.findings, decision.gap, decision.variance, hold_soil=hold)
-    return replace(decision, proposal=law)
+    law = None
+    if LAW not in findings.setting.forward.base_effects:  # not on top of another law
+        law = propose(table, findings, gap, variance, hold_soil=decision.left.only_soil)
+    exact = findings.setting.problem.variance(0.0)
+    plain = _predicted(table, both, findings, [findings.nothing], exact, 0.0, allowed_error)
+    return replace(decision, proposal=law, **plain)
 
 
 def _judged(
@@ -180,14 +191,35 @@ def _judged(
     floor, chosen = selection.floors[place], selection.explanations[verdict.index]
     own = setting.problem.variance(floor.amplitude, chosen.posterior.noise_factor[place])
     fits = [findings.nothing, chosen.fitted] if chosen.names else [findings.nothing]
-    fits = [setting.fit([f.names], [f.u], f.angle, own)[0] for f in fits]
+    found = _predicted(table, both, findings, fits, own, floor.largest, allowed_error)
+    return Decision(verdict=verdict, floor_index=place, **found)
+
+
+def _predicted(
+    table: SteadyTable,
+    both: SteadyTable,
+    findings: Findings,
+    fits: list[Fit],
+    variance: FloatArray,
+    floor: float,
+    allowed_error: float,
+) -> dict[str, Any]:
+    """Refit nothing and what was chosen (the last), and predict rows that the fits did not see."""
+    setting = findings.setting
+    fits = [setting.fit([f.names], [f.u], f.angle, variance)[0] for f in fits]
     findings = replace(findings, nothing=fits[0])
-    variance = setting.problem.variance(floor.largest)
+    beside = setting.problem.variance(floor)
     groups = np.where(np.arange(len(both)) < len(table), slip_groups(both), -1)
-    outs = hold_out(setting, fits, variance, groups)
-    curves = _curves(len(table), findings, fits[-1], outs[0], outs[-1], floor.largest)
-    gap = gaps(table, findings, curves, floor.largest, allowed_error)
-    return Decision(findings, verdict, place, fits[-1], variance, groups, curves, gap)
+    outs = hold_out(setting, fits, beside, groups)
+    curves = _curves(len(table), findings, fits[-1], outs[0], outs[-1], floor)
+    return {
+        'findings': findings,
+        'after': fits[-1],
+        'variance': beside,
+        'groups': groups,
+        'curves': curves,
+        'gap': gaps(table, findings, curves, floor, allowed_error),
+    }
 
 
 def _names(table: SteadyTable, decision: Decision) -> tuple[Naming, ...]:
@@ -245,7 +277,8 @@ def _what_rows_show(
         total += square
         idle += square if item.refit < _AT_NOISE * item.noise else 0.0
     misfit = significance.chi_square_p_value(fitted, fitted.variance)
-    largest = max(map(abs, significance.soil_pulls(fitted).values()), default=0.0)
+    pulls = significance.soil_pulls(fitted) if findings.setting.forward.active is None else {}
+    largest = max(map(abs, pulls.values()), default=0.0)
     return {
         'worse': float(np.tanh(worse)),
         'idle': idle / total,

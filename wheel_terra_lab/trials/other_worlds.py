@@ -74,11 +74,11 @@ def resistive_stress(beta: FloatArray, gamma: FloatArray) -> tuple[FloatArray, F
     def phase(m: int, n: int) -> FloatArray:
         return 2.0 * np.pi * (m * beta / np.pi + n * gamma / (2.0 * np.pi))
 
-    up = sum(a * np.cos(phase(*k)) for k, a in _A.items())
-    up = up + sum(b * np.sin(phase(*k)) for k, b in _B.items())
-    back = sum(c * np.cos(phase(*k)) for k, c in _C.items())
-    back = back + sum(d * np.sin(phase(*k)) for k, d in _D.items())
-    return np.asarray(back), np.asarray(up)
+    up = sum((a * np.cos(phase(*k)) for k, a in _A.items()), np.zeros_like(beta))
+    up = sum((b * np.sin(phase(*k)) for k, b in _B.items()), up)
+    back = sum((c * np.cos(phase(*k)) for k, c in _C.items()), np.zeros_like(beta))
+    back = sum((d * np.sin(phase(*k)) for k, d in _D.items()), back)
+    return back, up
 
 
 def _resistive_forces(

@@ -10,6 +10,7 @@ unknown noise and strangers, brings it to the frequency with which such names ar
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib.resources import files
@@ -97,7 +98,7 @@ def _loosened(squashed: float) -> float:
     return 8.0 * float(np.arctanh(np.clip(squashed / 4.0, -0.999, 0.999)))
 
 
-def confidence(values: dict[str, float], alike: int = 0) -> Confidence:
+def confidence(values: Mapping[str, float], alike: int = 0) -> Confidence:
     """Map features to probabilities.
 
     Parameters

@@ -89,10 +89,12 @@ def remainder(selection: Selection, index: int, variance_of: Variance) -> Remain
     best = quiet[int(np.argmax(joint[quiet]))]
     floor = selection.floors[best]
     variance = variance_of(floor.amplitude, explanation.posterior.noise_factor[best])
+    # A reference has no misfit that asks for a name: its structural error moves the soil as well.
+    soil = soil_p_value(explanation.fitted) if selection.unexplained.any() else 1.0
     return Remainder(
         share,
         any_share,
         selection.floors[top].largest,
         chi_square_p_value(explanation.fitted, variance),
-        soil_p_value(explanation.fitted),
+        soil,
     )
