@@ -19,9 +19,10 @@ import pytest
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.discrepancy import decision
 from wheel_terra_estimator.discrepancy.assessment.gaps import _cell_noise, _shrink
+from wheel_terra_estimator.discrepancy.numbers import number
 from wheel_terra_estimator.discrepancy.report import page as page_module
 from wheel_terra_estimator.discrepancy.report.model_file import write_model
-from wheel_terra_estimator.discrepancy.report.page import SOIL_WORDS, _cards, number, write_report
+from wheel_terra_estimator.discrepancy.report.page import SOIL_WORDS, _cards, write_report
 from wheel_terra_estimator.discrepancy.result import QuantityGap
 from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES
 from wheel_terra_lab.studies.campaigns import Plan, make_campaign, scoring
@@ -250,7 +251,7 @@ def test_global_picture_settings_stay(written):
 
 @pytest.mark.parametrize(
     ('value', 'text'),
-    [(0.0, '0'), (1234.5, '1234'), (0.00176, '0.00176'), (3.2e7, '3.2e+07'), (np.nan, '-')],
+    [(0.0, '0'), (1234.5, '1234'), (0.00176, '0.00176'), (3.2e7, '32000000'), (np.nan, '-')],
 )
 def test_numbers_for_people(value, text):
     assert number(value, 4 if value == 1234.5 else 3) == text

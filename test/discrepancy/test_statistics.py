@@ -35,6 +35,7 @@ from wheel_terra_estimator.discrepancy.fitting.problem import (
     kernel,
     slip_features,
 )
+from wheel_terra_estimator.discrepancy.fitting.soil_deviations import deviations
 from wheel_terra_estimator.discrepancy.result import Noise
 from wheel_terra_estimator.discrepancy.selection import confidence
 from wheel_terra_estimator.discrepancy.selection import significance as gap_test
@@ -66,7 +67,7 @@ def forward():
 @pytest.fixture(scope='module')
 def setting(forward):
     """Truth, inputs and noise of a table on these points."""
-    soil = soil_coordinates(SOIL, {})
+    soil = soil_coordinates(SOIL, deviations(SOIL, {}))
     truth = forward.solve([soil], [np.zeros(len(soil))], jacobian=False).outputs[0]
     std = np.broadcast_to([4e-4, 1.0, 0.1], truth.shape)
     points = forward.points
@@ -76,7 +77,7 @@ def setting(forward):
 
 def test_batched_model_is_the_package_model(forward):
     """Outputs and Jacobians against terramechanics, one hypothesis at a time, other steps."""
-    soil = soil_coordinates(SOIL, {})
+    soil = soil_coordinates(SOIL, deviations(SOIL, {}))
     names = [name for name, effect in catalogue().items() if effect.candidate]
     hypotheses = [(*soil, *effect_coordinates(catalogue()[name])) for name in names]
     u = [

@@ -82,6 +82,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="model error that is no reason for doubt, share of each quantity's range (default "
         '0.02): a channel off by more than twice its sum with the noise does not agree',
     )
+    parser.add_argument(
+        '--soil-known-to',
+        type=float,
+        metavar='SHARE',
+        help='share of its value to which every soil number is known (default: as the '
+        'configuration states, else by the class of its source)',
+    )
     bag_arguments.add_arguments(parser, 'for a bag: ')
     parser.add_argument(
         '--smooth',
@@ -109,6 +116,10 @@ def run(arguments: argparse.Namespace) -> int:
     if not 0.0 <= arguments.allowed_error <= 0.5:
         raise UserError(
             f'--allowed-error {arguments.allowed_error:g}: must be a share between 0 and 0.5'
+        )
+    if arguments.soil_known_to is not None and not 0.0 < arguments.soil_known_to <= 2.0:
+        raise UserError(
+            f'--soil-known-to {arguments.soil_known_to:g}: must be a share above 0, at most 2'
         )
     given = [*arguments.data, *([arguments.reference] if arguments.reference else [])]
     if not any(_is_bag(Path(path)) for path in given):
@@ -143,7 +154,12 @@ def _diagnosed(arguments: argparse.Namespace) -> Diagnosis:
     reference = None
     if arguments.reference:
         reference = _read(arguments.reference, arguments, configuration)
-    options = Options(tuple(arguments.only) or None, arguments.floor, arguments.allowed_error)
+    options = Options(
+        tuple(arguments.only) or None,
+        arguments.floor,
+        arguments.allowed_error,
+        arguments.soil_known_to,
+    )
     diagnosis = diagnose(table, configuration, reference, options)
     diagnosis = _with_effect_file(diagnosis, own)
     if not any(key.startswith('soil.') for key in configuration.stated):
@@ -198,20 +214,27 @@ def _folder_names(data: list[str]) -> list[str]:
 
 def _tell(diagnosis: Diagnosis, output: Path) -> None:
     """Print the verdict, the gaps, what to do next and what was written."""
+    from wheel_terra_estimator.discrepancy.numbers import number
+    from wheel_terra_estimator.discrepancy.report.words import soil_line, worth
+    from wheel_terra_estimator.discrepancy.result import OPEN
     from wheel_terra_estimator.discrepancy.tables.steady_table import UNITS
 
     print(diagnosis.sentence)
+    print(f'  {soil_line(diagnosis)}')
     for quantity, gap in diagnosis.gap.items():
         scale, unit = (1e3, 'mm') if quantity == 'sinkage' else (1.0, UNITS[quantity])
-        noise = '' if gap.noise is None else f', noise {scale * gap.noise:.3g}'
+        noise = '' if gap.noise is None else f', noise {number(scale * gap.noise)}'
         print(
-            f'  {quantity} [{unit}]: held-out error {scale * gap.before:.3g} as configured, '
-            f'{scale * gap.refit:.3g} soil refitted, {scale * gap.after:.3g} in the end{noise}'
+            f'  {quantity} [{unit}]: held-out error {number(scale * gap.before)} as configured, '
+            f'{number(scale * gap.refit)} soil refitted, {number(scale * gap.after)} in the end'
+            f'{noise}'
         )
     if diagnosis.proposal:
         print(f'  proposed law (proposal.yaml): {diagnosis.proposal.words}')
     if diagnosis.next_measurement:
-        print(f'  next measurement: {diagnosis.next_measurement[0].what}')
+        print(f'  next measurement: {worth(diagnosis.next_measurement[0])}')
+    elif diagnosis.verdict in OPEN:
+        print('  next measurement: none of the usual ones would settle it')
     for note in diagnosis.notes:
         print(f'  note: {note}')
     print(f'  written: {output}')

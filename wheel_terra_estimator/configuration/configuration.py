@@ -22,6 +22,7 @@ from wheel_terra_estimator.terramechanics.wheel import Wheel
 FloatArray: TypeAlias = NDArray[np.float64]
 EffectSettings: TypeAlias = dict[str, dict[str, Any]]
 
+_SOIL_LABELS = ('soil.name', 'soil.source')
 SOIL_FIELDS = (
     'cohesive_modulus',
     'frictional_modulus',
@@ -167,9 +168,14 @@ class Configuration:
     _values: Mapping[str, Value]
 
     @property
+    def soil_source(self) -> str:
+        """Class of the source of soil numbers whose deviation is not stated."""
+        return str(self._values['soil.source'])
+
+    @property
     def soil_stated(self) -> bool:
         """Whether anybody stated a soil, or how well it is known; else the default is a guess."""
-        return any(key.startswith('soil.') and key != 'soil.name' for key in self.stated)
+        return any(key.startswith('soil.') and key not in _SOIL_LABELS for key in self.stated)
 
     @classmethod
     def from_values(cls, values: Mapping[str, Value], stated: Iterable[str]) -> Configuration:

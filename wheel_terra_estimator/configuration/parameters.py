@@ -441,6 +441,13 @@ DECLARED: tuple[Parameter, ...] = (
     # Soil
     text('soil.name', '', 'name of the soil, for reports'),
     text(
+        'soil.source',
+        '',
+        'class of the source of soil numbers whose deviation is not stated, for diagnose: tests '
+        'of this soil (empty), numbers published elsewhere, or proxies from another soil',
+        choices=('', 'published', 'proxy'),
+    ),
+    text(
         'soil.pressure_law',
         'bekker',
         'how the two moduli are read: (kc/b + kphi) z^n, or with reece, where both are pure '

@@ -28,6 +28,7 @@ from wheel_terra_estimator.discrepancy.proposal.find import closed_by, promise_o
 from wheel_terra_estimator.discrepancy.result import OPEN, Curves, Proposal, QuantityGap
 from wheel_terra_estimator.discrepancy.selection import confidence as confidences
 from wheel_terra_estimator.discrepancy.selection import significance
+from wheel_terra_estimator.discrepancy.selection.candidates import FIT_FLOOR
 from wheel_terra_estimator.discrepancy.selection.confidence import Confidence
 from wheel_terra_estimator.discrepancy.selection.remainder import Remainder
 from wheel_terra_estimator.discrepancy.selection.search import Findings
@@ -172,8 +173,10 @@ def _left_open(
     law = None
     if LAW not in findings.setting.forward.base_effects:  # not on top of another law
         law = propose(table, findings, gap, variance, hold_soil=decision.left.only_soil)
-    exact = findings.setting.problem.variance(0.0)
-    plain = _predicted(table, both, findings, [findings.nothing], exact, 0.0, allowed_error)
+    # Estimated noise may be next to nothing beside a few smooth rows.
+    exact = 'estimated' not in findings.noise.origin.values()
+    variance = findings.setting.problem.variance(0.0 if exact else FIT_FLOOR)
+    plain = _predicted(table, both, findings, [findings.nothing], variance, 0.0, allowed_error)
     return replace(decision, proposal=law, **plain)
 
 

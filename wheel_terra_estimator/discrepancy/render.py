@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -23,6 +24,7 @@ from wheel_terra_estimator.discrepancy.fitting.evidence import log_sum
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
 from wheel_terra_estimator.discrepancy.report import words
 from wheel_terra_estimator.discrepancy.result import (
+    OPEN,
     Candidate,
     Diagnosis,
     FittedParameter,
@@ -277,18 +279,24 @@ def _next(decision: Decision) -> tuple[NextMeasurement, ...]:
     findings, verdict, after = decision.findings, decision.verdict, decision.after
     selection = findings.selection
     rivals: list[Fit] = []
-    if verdict.word == 'named':
-        for place, names in enumerate(verdict.open_sets):
-            others = set(after.names) - {after.names[place]}
-            for rival in names:
-                try:
-                    rivals.append(selection.find((*others, rival)).fitted)
-                except KeyError:
-                    continue
+    for place, names in enumerate(verdict.open_sets):
+        others = set(after.names) - {after.names[place]}
+        for rival in names:
+            with suppress(KeyError):
+                rivals.append(selection.find((*others, rival)).fitted)
     if not rivals:
-        wanted = [e.fitted for e in selection.explanations if e.names != after.names]
-        wanted = [f for f in wanted if f.names or verdict.word == 'named']
-        rivals = [f for f in wanted if not set(after.names) < set(f.names)][:1]
+        by_effects: dict[frozenset[str], Fit] = {}
+        for explanation in selection.explanations:  # each set of effects in its best forms
+            effects = frozenset(map(effect_of, explanation.names))
+            by_effects.setdefault(effects, explanation.fitted)
+        best = list(by_effects.values())
+        if verdict.word in OPEN:  # the two names that come nearest, and nothing
+            after, *rivals = [f for f in best if f.names][:2] or [after]
+            rivals.append(decision.nothing)
+        else:
+            named = verdict.word == 'named'
+            wanted = [f for f in best if f.names != after.names and (f.names or named)]
+            rivals = [f for f in wanted if not set(after.names) < set(f.names)][:1]
     noise = np.array(
         [
             float(np.nanmedian(findings.noise.std[:, q]))
@@ -319,6 +327,7 @@ def _soil_shifts(findings: Findings, after: Fit, variance: FloatArray) -> tuple[
                 c.deviation(u, float(np.sqrt(covariance[index, index]))),
                 WIDENING * u,
                 c.unit,
+                c.source,
             )
         )
     return tuple(found)

@@ -301,7 +301,10 @@ class NextMeasurement:
 
 @dataclass(frozen=True)
 class SoilShift:
-    """A soil parameter before and after the fit; ``pull`` = shift in stated deviations."""
+    """A soil parameter before and after the fit.
+
+    ``pull`` is the shift in deviations of ``prior_std``, ``source`` says where these come from.
+    """
 
     name: str
     before: float
@@ -311,6 +314,7 @@ class SoilShift:
     after_std: float
     pull: float
     unit: str
+    source: str = ''
 
 
 @dataclass(frozen=True)
@@ -432,6 +436,11 @@ class Diagnosis:
     def to_dict(self) -> dict[str, Any]:
         """Return the content of ``report.json``: finite numbers, text and lists only."""
         freely = {
+            'soil_pulls': {
+                key: {'pull': shift.pull, 'std': std, 'source': shift.source}
+                for shift in self.soil
+                for key, std in (self._stated_std(shift),)
+            },
             'not_visible': sorted(self.not_visible),
             'why_not_visible': self.not_visible,
             'smallest_visible': {
@@ -459,6 +468,15 @@ class Diagnosis:
         }
         plain: dict[str, Any] = as_json({**as_json(self), **freely})
         return plain
+
+    def _stated_std(self, shift: SoilShift) -> tuple[str, float]:
+        """Return the key of a soil number below ``soil.`` and its deviation in that key's unit."""
+        if shift.name == 'stiffness':
+            modulus = float(self.configuration.soil.frictional_modulus)
+            return 'frictional_modulus', shift.prior_std * modulus
+        if shift.name == 'tan_friction':
+            return 'friction_angle_deg', math.degrees(shift.prior_std / (1.0 + shift.before**2))
+        return shift.name, shift.prior_std
 
     def write_json(self, path: str | Path) -> None:
         """Write ``report.json``."""

@@ -21,6 +21,7 @@ from wheel_terra_estimator.discrepancy.fitting.coordinates import (
 )
 from wheel_terra_estimator.discrepancy.fitting.forward import Forward
 from wheel_terra_estimator.discrepancy.fitting.reference import join
+from wheel_terra_estimator.discrepancy.fitting.soil_deviations import deviations
 from wheel_terra_estimator.discrepancy.render import render
 from wheel_terra_estimator.discrepancy.result import (
     Diagnosis,
@@ -55,11 +56,15 @@ class Options:
     allowed_error : float
         Model error that is no reason for doubt, share of each quantity's range: a channel that is
         off by more than twice its root sum of squares with the noise does not agree.
+    soil_known_to : float or None
+        Share of its value to which each soil number is known; None = as stated, else by the class
+        of its source.
     """
 
     effects: tuple[str, ...] | None = None
     floor: float | None = None
     allowed_error: float = 0.02
+    soil_known_to: float | None = None
 
 
 def diagnose(
@@ -109,7 +114,7 @@ def diagnose(
     )
     configured = _check_soil_carries(both, forward, configuration)
     check_pull_against_model(both, configured[:, 1])
-    nuisance = nuisance_coordinates(configuration, known)
+    nuisance = nuisance_coordinates(configuration, known, chosen.soil_known_to)
     floors = default_floors(chosen.floor) if reference is None else shared_floors()
     findings = search(both, forward, nuisance, effects, floors)
     decision = decide(table, both, findings, chosen.allowed_error)
@@ -171,7 +176,7 @@ def operating_points(table: SteadyTable, configuration: Configuration) -> Operat
 
 
 def nuisance_coordinates(
-    configuration: Configuration, known: Mapping[str, Effect]
+    configuration: Configuration, known: Mapping[str, Effect], known_to: float | None = None
 ) -> tuple[Coordinate, ...]:
     """Return the soil parameters and the stated uncertain parameters of effects that are on."""
     # soil.relative_std is the estimator's doubt of a soil on its way, not that of a measured soil.
@@ -180,8 +185,9 @@ def nuisance_coordinates(
         for field, value in configuration.soil_std.items()
         if configuration.stated & {f'soil.{field}_std', f'soil.{field}_std_deg'}
     }
+    soil = deviations(configuration.soil, stated, configuration.soil_source, known_to)
     return (
-        *soil_coordinates(configuration.soil, stated),
+        *soil_coordinates(configuration.soil, soil),
         *base_coordinates(configuration.effects, configuration.effects_std, known),
     )
 
@@ -222,7 +228,7 @@ def _check_soil_carries(
     table: SteadyTable, forward: Forward, configuration: Configuration
 ) -> FloatArray:
     """Return (N, 3) values as configured; raise where the soil lets the wheel sink to its hub."""
-    nothing = soil_coordinates(configuration.soil, {})
+    nothing = soil_coordinates(configuration.soil, deviations(configuration.soil, {}))
     state = forward.solve([nothing], [np.zeros(len(nothing))], jacobian=False)
     sunk = state.angle[0] > 1.45
     if sunk.any():

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
 from wheel_terra_estimator.discrepancy.fitting.outliers import inverse_covariance
+from wheel_terra_estimator.discrepancy.numbers import number
 from wheel_terra_estimator.discrepancy.selection.candidates import Setting
 from wheel_terra_estimator.discrepancy.tables.steady_table import SteadyTable
 
@@ -38,10 +39,10 @@ class Stretch:
         """In words."""
         grip = ''
         if abs(self.friction - 1.0) > 0.05:
-            grip = f' and has {self.friction:.2g} times the friction coefficient'
+            grip = f' and has {number(self.friction, 2)} times the friction coefficient'
         return (
             f'the soil changes along the way: from {self.start:.0f} to {self.end:.0f} s it is '
-            f'about {self.stiffness:.2g} times as stiff{grip} as on the rest of the drive'
+            f'about {number(self.stiffness, 2)} times as stiff{grip} as on the rest of the drive'
         )
 
 

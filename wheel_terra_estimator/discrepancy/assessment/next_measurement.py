@@ -23,6 +23,8 @@ FloatArray = NDArray[np.float64]
 
 _SLIPS = np.array([0.05, 0.1, 0.2, 0.3, 0.45, 0.6, 0.7, 0.8])
 _KEPT = 3
+_WORTH = 2.0  # d' that a measurement must promise, and ...
+_MORE = 1.5  # ... times the distance at hand: else it is not worth the trouble
 _DEEPEST = 0.6  # of the radius: blocks in which a rival sinks deeper are not proposed
 # A zero check costs minutes and settles an instrument's error for good.
 ZERO_CHECKS = {
@@ -63,7 +65,8 @@ def propose(
             outputs = values[[0, place]]
             then = _with_rows(setting, chosen, rival, outputs, sensitivity[place], std)
             depth = outputs[..., 0].max()
-            if np.isfinite(then) and depth < _DEEPEST * np.min(points.wheel.radius):
+            worth = np.isfinite(then) and then > max(_WORTH, _MORE * now)
+            if worth and depth < _DEEPEST * np.min(points.wheel.radius):
                 blocks.append(
                     NextMeasurement(
                         what,

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
 from wheel_terra_estimator.discrepancy.fitting.problem import Problem
+from wheel_terra_estimator.discrepancy.numbers import number
 from wheel_terra_estimator.discrepancy.result import InputRange, Where
 from wheel_terra_estimator.discrepancy.tables.steady_table import (
     INPUT_UNITS,
@@ -194,8 +195,8 @@ def _ranks(values: FloatArray) -> FloatArray:
 def _text(side: InputRange) -> str:
     unit = '' if side.unit == '-' else f' {side.unit}'
     if side.low == side.high:
-        return f'at {side.input} {side.low:.3g}{unit}'
-    return f'at {side.input} {side.low:.3g} to {side.high:.3g}{unit}'
+        return f'at {side.input} {number(side.low)}{unit}'
+    return f'at {side.input} {number(side.low)} to {number(side.high)}{unit}'
 
 
 def _amount(value: float, quantity: str) -> str:

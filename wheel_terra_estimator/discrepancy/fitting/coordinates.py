@@ -15,21 +15,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from wheel_terra_estimator.discrepancy.fitting.soil_deviations import Deviation
 from wheel_terra_estimator.terramechanics.effects import by_variant
 from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter
 from wheel_terra_estimator.terramechanics.soil import Soil
 
 FloatArray = NDArray[np.float64]
 
-# Standard deviations of the soil parameters where the configuration states none.
-STIFFNESS_STD = 0.10  # of ln k
-EXPONENT_STD = 0.05
-FRICTION_STD = 0.05  # of ln tan(phi)
-SHEAR_MODULUS_STD = 0.10  # of ln K
-COHESION_STD = 0.20  # of c, plus COHESION_FLOOR
-COHESION_FLOOR = 10.0  # [Pa]
-PEAK_RATIO_STD = 0.03
-LEAVING_RATIO_STD = 0.03
 # Stated uncertainties are often optimistic: the coordinates are this many times wider, and the
 # evidence weighs both widths.
 WIDENING = 2.5
@@ -41,6 +33,9 @@ AS_THEY_ARE = ((1.0, 1.0),)  # of coordinates that are held on purpose
 # know the size of the machine) are weighed against each other, with these shares.
 EFFECT_SCALES = (0.3, 2.0, 10.0)
 EFFECT_SHARES = (0.45, 0.45, 0.10)
+# Bounds of the fits: factor on the bearing moduli, and shear deformation modulus [m].
+_STIFFNESS = (0.05, 20.0)
+_SHEAR_MODULUS = (1e-4, 0.5)
 # During fits the strength is held loosely, so that a strong effect is not pulled back.
 LOOSE = 6.0
 
@@ -67,6 +62,8 @@ class Coordinate:
         Value of an effect's parameter at which the term vanishes.
     unit, meaning : str
         For people.
+    source : str
+        Where the deviation of a soil number comes from.
     """
 
     owner: str
@@ -80,6 +77,7 @@ class Coordinate:
     neutral: float = 0.0
     unit: str = '-'
     meaning: str = ''
+    source: str = ''
 
     @property
     def key(self) -> str:
@@ -101,85 +99,41 @@ class Coordinate:
         return ((math.log(value) if self.logarithmic else value) - self.centre) / self.scale
 
 
-def soil_coordinates(soil: Soil, stated: Mapping[str, float]) -> tuple[Coordinate, ...]:
+def soil_coordinates(soil: Soil, known: Mapping[str, Deviation]) -> tuple[Coordinate, ...]:
     """Return the free soil parameters, centred on the configured soil.
 
     Parameters
     ----------
-    stated : mapping
-        Field of ``Soil`` -> standard deviation that the configuration states explicitly [SI].
+    known : mapping
+        Name of the coordinate -> its deviation (``soil_deviations.deviations``).
     """
 
-    def width(field: str, usual: float, relative_to: float = 1.0) -> float:
-        return WIDENING * (stated[field] / relative_to if field in stated else usual)
-
-    def logarithm(field: str, value: float, usual: float) -> Coordinate:
-        unit = {'shear_modulus': 'm'}.get(field, '-')
-        scale = width(field, usual, value)
-        return Coordinate('soil', field, math.log(value), scale, -6.0, 6.0, True, unit=unit)
-
-    def shifted(
-        field: str, value: float, scale: float, low: float, high: float, unit: str = '-'
+    def make(
+        name: str, centre: float, lower: float, upper: float, logarithmic: bool, unit: str = '-'
     ) -> Coordinate:
-        low, high = min(low, value), max(high, value)
+        scale = WIDENING * known[name].value
         return Coordinate(
-            'soil', field, value, scale, (low - value) / scale, (high - value) / scale, unit=unit
-        )
+            'soil', name, centre, scale, (lower - centre) / scale, (upper - centre) / scale,
+            logarithmic, unit=unit, source=known[name].source,
+        )  # fmt: skip
 
-    tan_friction = math.tan(float(soil.friction_angle))
-    slope = 1.0 / math.cos(float(soil.friction_angle)) ** 2
-    friction = width('friction_angle', FRICTION_STD, tan_friction / slope)
-    cohesion = float(soil.cohesion)
+    def logarithm(name: str, value: float, lower: float, upper: float, unit: str) -> Coordinate:
+        ends = math.log(min(lower, value)), math.log(max(upper, value))
+        return make(name, math.log(value), *ends, True, unit)
+
+    def shifted(name: str, lower: float, upper: float, unit: str = '-') -> Coordinate:
+        value = float(getattr(soil, name))
+        return make(name, value, min(lower, value), max(upper, value), False, unit)
+
+    stiffness = logarithm('stiffness', 1.0, *_STIFFNESS, '-')
     return (
-        Coordinate(
-            'soil',
-            'stiffness',
-            0.0,
-            width('frictional_modulus', STIFFNESS_STD, max(float(soil.frictional_modulus), 1e-9)),
-            -8.0,
-            8.0,
-            True,
-            meaning='factor on both bearing moduli',
-        ),
-        shifted(
-            'sinkage_exponent',
-            float(soil.sinkage_exponent),
-            width('sinkage_exponent', EXPONENT_STD),
-            0.15,
-            3.0,
-        ),
-        Coordinate(
-            'soil',
-            'tan_friction',
-            math.log(tan_friction),
-            friction,
-            math.log(0.05 / tan_friction) / friction,
-            math.log(1.7 / tan_friction) / friction,
-            True,
-        ),
-        logarithm('shear_modulus', float(soil.shear_modulus), SHEAR_MODULUS_STD),
-        shifted(
-            'cohesion',
-            cohesion,
-            width('cohesion', COHESION_STD * cohesion + COHESION_FLOOR),
-            0.0,
-            math.inf,
-            'Pa',
-        ),
-        shifted(
-            'peak_stress_ratio',
-            float(soil.peak_stress_ratio),
-            width('peak_stress_ratio', PEAK_RATIO_STD),
-            0.02,
-            0.95,
-        ),
-        shifted(
-            'leaving_angle_ratio',
-            float(soil.leaving_angle_ratio),
-            width('leaving_angle_ratio', LEAVING_RATIO_STD),
-            -1.2,
-            0.0,
-        ),
+        replace(stiffness, meaning='factor on both bearing moduli'),
+        shifted('sinkage_exponent', 0.15, 3.0),
+        logarithm('tan_friction', math.tan(float(soil.friction_angle)), 0.05, 1.7, '-'),
+        logarithm('shear_modulus', float(soil.shear_modulus), *_SHEAR_MODULUS, 'm'),
+        shifted('cohesion', 0.0, math.inf, 'Pa'),
+        shifted('peak_stress_ratio', 0.02, 0.95),
+        shifted('leaving_angle_ratio', -1.2, 0.0),
     )
 
 

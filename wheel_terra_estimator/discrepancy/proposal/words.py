@@ -9,6 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from wheel_terra_estimator.discrepancy.numbers import number
 from wheel_terra_estimator.discrepancy.tables.steady_table import (
     INPUT_UNITS,
     QUANTITIES,
@@ -59,12 +60,14 @@ def law_in_words(
         change = value * step
         change *= law.bound / (law.bound + abs(change))
         if law.factor and change > _TWICE:
-            parts.append(f'{law.meaning} grows to {math.exp(change):.2g} times as much {per}')
+            parts.append(
+                f'{law.meaning} grows to {number(math.exp(change), 2)} times as much {per}'
+            )
             continue
         if law.factor:
-            size = f'{100 * abs(math.expm1(change)):.2g} %'
+            size = f'{number(100 * abs(math.expm1(change)), 2)} %'
         elif law.unit == '-':
-            size = f'{abs(change):.2g}'
+            size = f'{number(abs(change), 2)}'
         else:
             size = _size(target, abs(change), table, points)
         parts.append(f'{law.meaning} {"grows" if change > 0.0 else "falls"} by {size} {per}')
@@ -75,7 +78,7 @@ def law_in_words(
 def _size(target: str, change: float, table: SteadyTable, points: OperatingPoints) -> str:
     """Return a change of an angle or an output in the units of the rows."""
     if target not in QUANTITIES:
-        return f'{100 * change:.2g} % of the entrance angle'
+        return f'{number(100 * change, 2)} % of the entrance angle'
     rows = slice(len(table))
     load = np.asarray(points.normal_load)[rows]
     radius = np.broadcast_to(points.wheel.radius, (len(points),))[rows]
@@ -83,7 +86,7 @@ def _size(target: str, change: float, table: SteadyTable, points: OperatingPoint
     size = change * float(np.mean(scale))
     mean = float(np.nanmean(np.abs(table.measured[:, QUANTITIES.index(target)])))
     shown, unit = (1e3 * size, 'mm') if target == 'sinkage' else (size, UNITS[target])
-    return f'{shown:.2g} {unit} ({100 * size / mean:.2g} % of its mean)'
+    return f'{number(shown, 2)} {unit} ({number(100 * size / mean, 2)} % of its mean)'
 
 
 def limits_of_trust(table: SteadyTable) -> tuple[str, ...]:
@@ -95,7 +98,7 @@ def limits_of_trust(table: SteadyTable) -> tuple[str, ...]:
             continue
         values = table.columns[name][np.isfinite(table.columns[name])]
         unit = '' if INPUT_UNITS[name] == '-' else f' {INPUT_UNITS[name]}'
-        found.append(f'{name} outside {values.min():.3g} to {values.max():.3g}{unit}')
+        found.append(f'{name} outside {number(values.min())} to {number(values.max())}{unit}')
     still = [name for name in INPUT_UNITS if name in table.columns and name not in varying]
     if still:
         found.append(f'other values of what did not vary: {", ".join(still)}')

@@ -11,9 +11,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from wheel_terra_estimator.discrepancy.numbers import number
 from wheel_terra_estimator.discrepancy.report import pictures as pictures
 from wheel_terra_estimator.discrepancy.report.model_file import corrected
-from wheel_terra_estimator.discrepancy.report.words import STRONG_PULL, far_soil, in_words
+from wheel_terra_estimator.discrepancy.report.words import (
+    STRONG_PULL,
+    far_soil,
+    in_words,
+    soil_line,
+)
 from wheel_terra_estimator.discrepancy.result import Diagnosis, FittedParameter, NextMeasurement
 from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES
 from wheel_terra_estimator.reporting.html import picture, render, write_page
@@ -81,6 +87,7 @@ def write_report(diagnosis: Diagnosis, folder: str | Path) -> Path:
         ],
         sources=_sources(diagnosis),
         sentence=diagnosis.sentence.replace('+-', '±'),
+        soil_line=soil_line(diagnosis),
         where=_where(diagnosis),
     )
     path = folder / 'report.html'
@@ -98,19 +105,6 @@ def _left_out(diagnosis: Diagnosis) -> list[tuple[str, str, str, str]]:
             shown_name = f'{pictures.words(quantity)} [{unit}]'
             rows.append((pictures.words(name), shown_name, texts[0], texts[1]))
     return rows
-
-
-def number(value: float, digits: int = 3) -> str:
-    """Return a number for people: significant digits, no exponent where it is readable without."""
-    if not np.isfinite(value):
-        return '-'
-    if value == 0.0:
-        return '0'
-    text = f'{value:.{digits}g}'
-    if 'e' in text and 1e-4 <= abs(value) < 1e5:
-        decimals = max(digits - 1 - int(np.floor(np.log10(abs(value)))), 0)
-        text = f'{value:.{decimals}f}'
-    return text
 
 
 def shown(value: Any) -> str:
@@ -320,6 +314,7 @@ def _soil_row(shift: Any) -> dict[str, Any]:
         'refit': number(shift.refit),
         'after': f'{number(shift.after)} ± {number(shift.after_std, 2)}',
         'pull': f'{shift.pull:+.1f}',
+        'source': shift.source,
         'far': abs(shift.pull) > STRONG_PULL,
         'left': f'{50 + 25 * float(np.clip(shift.pull / STRONG_PULL, -2, 2)):.1f}',
     }

@@ -14,10 +14,12 @@ from wheel_terra_estimator.discrepancy.assessment.gaps import channels_off
 from wheel_terra_estimator.discrepancy.effect_keys import effect_of
 from wheel_terra_estimator.discrepancy.fitting.coordinates import WIDENING
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
+from wheel_terra_estimator.discrepancy.numbers import number
 from wheel_terra_estimator.discrepancy.result import (
     OPEN,
     Diagnosis,
     NamedEffect,
+    NextMeasurement,
     QuantityGap,
 )
 from wheel_terra_estimator.discrepancy.selection.remainder import Remainder
@@ -44,13 +46,16 @@ def in_words(diagnosis: Diagnosis) -> dict[str, list[str]]:
     shrank, still_off = [], channels_off(diagnosis.gap)
     for name, item in diagnosis.gap.items():
         scale, unit = (1e3, 'mm') if name == 'sinkage' else (1.0, UNITS[name])
-        stages = [f'{scale * item.before:.3g} as configured', f'{scale * item.refit:.3g} refitted']
+        stages = [
+            f'{number(scale * item.before)} as configured',
+            f'{number(scale * item.refit)} refitted',
+        ]
         if diagnosis.effects:
-            stages.append(f'{scale * item.after:.3g} with the effect')
+            stages.append(f'{number(scale * item.after)} with the effect')
         if diagnosis.proposal and name in diagnosis.proposal.gap:
             law = diagnosis.proposal.gap[name].after
-            stages.append(f'{scale * law:.3g} with the proposed law')
-        noise = f'; its noise is {scale * item.noise:.3g}' if item.noise else ''
+            stages.append(f'{number(scale * law)} with the proposed law')
+        noise = f'; its noise is {number(scale * item.noise)}' if item.noise else ''
         shrank.append(f'{_plain(name)} [{unit}]: off by {", ".join(stages)}{noise}.')
     left = [
         f'{_plain(name)} is still off by more than noise and the allowed model error.'
@@ -66,7 +71,7 @@ def in_words(diagnosis: Diagnosis) -> dict[str, list[str]]:
         left.append('Why these rows need another soil, or more scatter, than was stated.')
     if not left:
         left.append('Nothing beyond noise and the allowed model error.')
-    following = [f'Measure next: {item.what}.' for item in diagnosis.next_measurement[:1]]
+    following = [f'Measure next: {worth(item)}.' for item in diagnosis.next_measurement[:1]]
     if diagnosis.verdict in OPEN and diagnosis.where.box:
         following.append(f'Look first where the gap is largest: {diagnosis.where.sentence}.')
     if diagnosis.verdict in OPEN:
@@ -106,11 +111,33 @@ def _to_settle(diagnosis: Diagnosis) -> list[str]:
     return found
 
 
+def worth(item: NextMeasurement) -> str:
+    """Return a measurement with what it is worth."""
+    rivals = ' from '.join(name.replace('_', ' ') for name in item.separates)
+    if not np.isfinite(item.distance_then):
+        return f'{item.what} (settles {rivals})'
+    distances = (
+        f'{number(item.distance_now, 2)} noise deviations now, {number(item.distance_then, 2)}'
+    )
+    return f'{item.what} (parts {rivals}: {distances} with it)'
+
+
+def soil_line(diagnosis: Diagnosis) -> str:
+    """Return which soil number the fit pulls farthest, and how well the numbers were known."""
+    shift = max(diagnosis.soil, key=lambda shift: abs(shift.pull))
+    name = _SOIL_KEYS.get(shift.name, f'soil.{shift.name}')
+    sources = ', '.join(dict.fromkeys(s.source for s in diagnosis.soil))
+    return (
+        f'Soil, farthest: {name} from {number(shift.before)} to {number(shift.after)}, '
+        f'{shift.pull:+.1f} of its deviations ({shift.source}); deviations of all: {sources}.'
+    )
+
+
 def far_soil(diagnosis: Diagnosis) -> list[str]:
     """Return the soil numbers that had to move far, in words."""
     return [
-        f'{_SOIL_KEYS.get(shift.name, "soil." + shift.name)}: {shift.before:.3g} stated, '
-        f'{shift.after:.3g} here ({abs(shift.pull):.1f} stated deviations)'
+        f'{_SOIL_KEYS.get(shift.name, "soil." + shift.name)}: {number(shift.before)} stated, '
+        f'{number(shift.after)} here ({abs(shift.pull):.1f} stated deviations)'
         for shift in diagnosis.soil
         if abs(shift.pull) > STRONG_PULL
     ]
@@ -153,8 +180,8 @@ def _undecided(gap: Mapping[str, QuantityGap], nearest: tuple[str, ...]) -> str:
         scale, unit = (1e3, 'mm') if name == 'sinkage' else (1.0, UNITS[name])
         item = gap[name]
         parts.append(
-            f'{name.replace("_", " ")} is off by {scale * item.after:.3g} {unit} on unseen rows '
-            f'(noise and allowed model error permit {scale * item.limit:.3g})'
+            f'{_plain(name)} is off by {number(scale * item.after)} {unit} on unseen rows '
+            f'(noise and allowed model error permit {number(scale * item.limit)})'
         )
     text = f'Not decided: {" and ".join(parts)}, but these rows favour neither nothing nor a name'
     return f'{text}; nearest: {", ".join(nearest)}.' if nearest else f'{text}.'
@@ -186,10 +213,10 @@ def notes(
             unit = '' if c.unit == '-' else f' {c.unit}'
             found.append(
                 f'{_SOIL_KEYS.get(c.name, f"soil.{c.name}")} was pulled {pull:+.1f} of its stated '
-                f'deviations to {float(c.value(u)):.3g}{unit}: look at it before any effect'
+                f'deviations to {number(float(c.value(u)))}{unit}: look at it before any effect'
             )
         if c.owner != 'soil' and (u - c.lower < 1e-3 or c.upper - u < 1e-3):
-            found.append(f'{c.key} stands at the end of its range ({float(c.value(u)):.3g})')
+            found.append(f'{c.key} stands at the end of its range ({number(float(c.value(u)))})')
     return tuple(found)
 
 
@@ -216,13 +243,13 @@ def sentence(
     """Return the verdict in words."""
     if verdict.word == 'undecided':
         return _undecided(gap or {}, nearest)
-    within = f', with a model-error floor of {100 * floor:.2g} % of the range'
+    within = f', with a model-error floor of {number(100 * floor, 2)} % of the range'
     if not floor:
         within = ' (model-error floor needed: none)'
     if verdict.word == 'agrees' and floor > _COARSE:
         return (
             'These rows are too scattered to judge the model: it agrees with them, but only within '
-            f'{100 * floor:.0f} % of the range (p = {gap_p_value:.2g}).'
+            f'{100 * floor:.0f} % of the range (p = {number(gap_p_value, 2)}).'
         )
     if verdict.word == 'agrees':
         agreed = 'Model and measurement agree once the soil is refitted'
@@ -242,22 +269,25 @@ def sentence(
         size = f'a misfit of about {100 * left.amplitude:.0f} % of the range'
         if left.amplitude < 0.005:
             size = 'nothing smooth, but more scatter than the noise allows,'
+        near = f'; nearest: {", ".join(nearest)}' if nearest else ''
         return (
-            'Model and measurement disagree, and none of the known effects explains it '
-            f'({size} is left).'
+            'Model and measurement disagree, and none of the known effects explains it well enough '
+            f'to be named ({size} is left{near}).'
         )
     parts = []
     for effect in effects:
         values = ', '.join(
-            f'{name} = {p.value:.3g} +- {p.std:.2g}{"" if p.unit == "-" else " " + p.unit}'
+            f'{name} = {number(p.value)} +- {number(p.std, 2)}'
+            f'{"" if p.unit == "-" else " " + p.unit}'
             for name, p in effect.parameters.items()
         )
         form = f' in the form {effect.form}' if effect.form else ''
-        text = f'{effect.name}{form} ({values}; confidence {effect.confidence:.2f}'
+        text = f'{effect.name}{form} ({values}; confidence {effect.confidence:.2f})'
         if effect.confounded_with:
-            text += f'; these rows cannot tell it from {", ".join(effect.confounded_with)}'
-        parts.append(text + ')')
-    result = 'Missing in the model: ' + ' and '.join(parts)
+            rivals = ' or '.join(effect.confounded_with)
+            text += f' or {rivals} (one of them: {effect.confidence_of_set:.2f})'
+        parts.append(text)
+    result = 'Missing in the model: ' + ', and '.join(parts)
     if any(effect.remainder for effect in effects):
         result += '; something is left that this does not explain'
     return result + '.'

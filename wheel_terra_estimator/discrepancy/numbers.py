@@ -1,0 +1,20 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Numbers for people."""
+
+from __future__ import annotations
+
+import math
+
+
+def number(value: float, digits: int = 3) -> str:
+    """Return significant digits, without an exponent but for what is tiny."""
+    if not math.isfinite(value):
+        return '-'
+    if value == 0.0:
+        return '0'
+    text = f'{value:.{digits}g}'
+    if 'e' in text and abs(value) >= 1e-4:
+        decimals = max(digits - 1 - math.floor(math.log10(abs(value))), 0)
+        text = f'{float(text):.{decimals}f}'
+    return text
