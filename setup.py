@@ -71,7 +71,7 @@ setup(
     packages=find_packages(include=[PACKAGE, f'{PACKAGE}.*', LABORATORY, f'{LABORATORY}.*']),
     package_data={
         PACKAGE: ['py.typed', '**/*.html', '**/*.json', '**/*.csv', '**/*.npz', '**/*.js'],
-        LABORATORY: ['py.typed', '**/*.html', '**/*.csv'],
+        LABORATORY: ['py.typed', '**/*.html', '**/*.csv', '**/*.yaml'],
     },
     data_files=shared_files(),
     zip_safe=False,

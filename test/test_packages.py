@@ -69,6 +69,7 @@ def test_metadata(built_wheel: Path) -> None:
     assert metadata.get_all('Classifier')
     assert any(n.endswith('data/demo/entrapment/entrapment.mcap') for n in files)
     assert any(n.endswith('config/soils/dlr_mss.yaml') for n in files)
+    assert 'wheel_terra_lab/soilbin/config/cases/quick.yaml' in files
     assert not any(n.startswith(('test/', 'tools/')) for n in files)
 
 

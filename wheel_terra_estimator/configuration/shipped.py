@@ -75,7 +75,7 @@ def _files_below(folder: Path) -> dict[str, Path]:
     return {p.relative_to(folder).with_suffix('').as_posix(): p for p in found}
 
 
-def find(name: str | Path, kind: str = '') -> Path:
+def find(name: str | Path, kind: str = '', folder: Path | None = None) -> Path:
     """Return the file that ``name`` means: a path, or the bare name of a shipped file.
 
     Parameters
@@ -84,6 +84,8 @@ def find(name: str | Path, kind: str = '') -> Path:
         A path, a bare name (``frostyboy``) or one with its folder (``soils/hit_lss1``).
     kind : str
         Folder to search (``scenarios``); empty: all.
+    folder : pathlib.Path or None
+        Where the shipped files lie; None: those of the package.
 
     Raises
     ------
@@ -94,7 +96,7 @@ def find(name: str | Path, kind: str = '') -> Path:
     if path.is_file():
         return path
     text = str(name)
-    shipped = files()
+    shipped = files(folder)
     if kind:
         shipped = {key: p for key, p in shipped.items() if key.startswith(f'{kind}/')}
     wanted = text.removesuffix('.yaml').removesuffix('.yml')
@@ -113,7 +115,7 @@ def find(name: str | Path, kind: str = '') -> Path:
     hint = f"did you mean '{first}'? " if alike else ''
     raise UserError(
         f'{text}: no such file, and no shipped file of this name; {hint}the nearest are '
-        f'{", ".join(near)} (all: wheel-terra config list)'
+        f'{", ".join(near)}' + ('' if folder else ' (all: wheel-terra config list)')
     )
 
 

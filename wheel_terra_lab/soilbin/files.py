@@ -7,12 +7,15 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_lab.soilbin.case import Case
 
 ROOT = 'soilbin.'
+CONFIG = Path(__file__).with_name('config')
+"""Shipped cases, wheels and grains."""
 GROUPS = ('wheel', 'grains', 'bed', 'operation', 'numerics')
 IN_DEGREES = {'operation.slope': 'operation.slope_deg'}
 
@@ -33,7 +36,7 @@ def load(names: Sequence[str], overrides: Sequence[str] = ()) -> Case:
     Parameters
     ----------
     names : sequence of str
-        Paths, or bare names of files shipped in ``config/soilbin`` (``wheel_2``, ``quick``).
+        Paths, or bare names of files shipped in `CONFIG` (``wheel_2``, ``quick``).
     overrides : sequence of str
         NAME:=VALUE; the leading ``soilbin.`` may be left out.
 
@@ -46,7 +49,7 @@ def load(names: Sequence[str], overrides: Sequence[str] = ()) -> Case:
 
     case = Case()
     for name in names:
-        path = shipped.find(name, 'soilbin')
+        path = shipped.find(name, folder=CONFIG)
         case = apply(case, ros_yaml.read(path), str(path))
         if path.parent.name not in ('wheels', 'grains'):
             case = dataclasses.replace(case, name=path.stem)

@@ -63,8 +63,9 @@ _HEAD = """# What each special treatment of the estimator is worth
 
 Each treatment is switched off by itself (`ablations/treatments.py` says how) and the
 estimator run again over those of the drives on which it can act: drives of
-[simulators A and B](simulators.md), with and without a reference, torque or sinkage, each with a
-seed of its own, and recorded ones (`ablations/drives.py`). A loss is the price of doing without; a
+[simulators A and B](../laboratory/simulators.md), with and without a reference, torque or sinkage,
+each with a seed of its own, and recorded ones (`ablations/drives.py`).
+A loss is the price of doing without; a
 negative one says that the treatment did harm. Guards and signs of the stuck warning are also tried
 on drives at full length.
 """

@@ -297,7 +297,7 @@ def grc3(shared: Path) -> Case:
 
 def _soilbin(title: str, *tables: str) -> Case:
     """Return the rows of sweeps of the discrete elements against the model of their wheel."""
-    folder = Path(__file__).resolve().parents[2] / 'docs' / 'soilbin'
+    folder = Path(__file__).resolve().parents[2] / 'docs' / 'laboratory' / 'soilbin'
     rows: Rows = {}
     for table in tables:
         with (folder / table).open(encoding='utf-8') as stream:
