@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from wheel_terra_estimator.configuration import reader
-from wheel_terra_estimator.discrepancy.result import Diagnosis
+from wheel_terra_estimator.discrepancy.result import OPEN, Diagnosis
 from wheel_terra_estimator.discrepancy.tables.parsing import read_table
 from wheel_terra_estimator.discrepancy.workflow import diagnose
 from wheel_terra_estimator.errors import UserError
@@ -27,7 +27,6 @@ NONE, STRANGER = 'none', 'stranger'
 TABLE, RIG, SEAL = 'blind.csv', 'rig.yaml', 'sealed.json'
 DESIGNS = ('sweep40', 'lugs48', 'full56')
 LEAST = 8.0  # d' of what is hidden, at least: smaller effects nobody can see
-SURE = 0.8  # confidence from which a name for a stranger counts as wrong
 # Lots: nothing hidden, a stranger, else one effect of the catalogue.
 _SHARE_NONE, _SHARE_STRANGER = 0.15, 0.15
 
@@ -136,7 +135,8 @@ def compare(folder: Path, diagnosis: Diagnosis) -> Outcome:
         right = bool(said) and said[0] in hidden
         wanted = f'{" + ".join(hidden)} was hidden'
     else:
-        right = not said or sure <= SURE
+        # Owned up to: neither a name, however doubtful, nor an agreement.
+        right = diagnosis.verdict in OPEN
         wanted = f'a stranger was hidden ({hidden[0]})'
     answer = f'{" + ".join(said)} ({sure:.2f})' if said else diagnosis.verdict
     return Outcome(
