@@ -15,6 +15,7 @@ from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.discrepancy.assessment import next_measurement
 from wheel_terra_estimator.discrepancy.assessment.along import changed_stretch
 from wheel_terra_estimator.discrepancy.assessment.held_out import log_scores
+from wheel_terra_estimator.discrepancy.assessment.order import changes_along_rows
 from wheel_terra_estimator.discrepancy.assessment.structural_error import structural_error
 from wheel_terra_estimator.discrepancy.assessment.where import locate
 from wheel_terra_estimator.discrepancy.decision import Decision, known_alike
@@ -66,6 +67,8 @@ def render(
     gap_p_value = _gap_p_value(decision, known)
     law = None if proposal is None else proposal.fit
     covariance = np.asarray(np.linalg.inv(after.precision()), dtype=float)
+    curves = decision.curves
+    along = changes_along_rows(table, curves.after, curves.band)
     return Diagnosis(
         verdict=decision.verdict.word,
         sentence=words.sentence(
@@ -99,10 +102,12 @@ def render(
         floor=decision.floor,
         notes=(
             *words.notes(both, findings, after, stretch),
+            *(f'{change.text}; look for what changed there' for change in along),
             *words.untried({e.name: known_alike(e.name, findings, known) for e in effects}),
         ),
         base_effects=tuple(configuration.effects),
         refitted=_parameters(after, covariance, base=True),
+        along_rows=tuple(along),
         nearest=nearest,
         proposal=proposal,
         structural_error=structural_error(

@@ -20,6 +20,7 @@ from wheel_terra_estimator.terramechanics.effects.base import FORM_MARK
 
 if TYPE_CHECKING:
     from wheel_terra_estimator.configuration.reader import Configuration
+    from wheel_terra_estimator.discrepancy.assessment.order import Change
     from wheel_terra_estimator.discrepancy.assessment.structural_error import StructuralError
     from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
 
@@ -395,6 +396,8 @@ class Diagnosis:
         Effects that the configuration had switched on already.
     refitted : mapping
         ``effect.parameter`` -> fitted value, of parameters that were on already.
+    along_rows : tuple of Change
+        Quantities whose residuals change along the order of the rows.
     nearest : tuple of str
         Where nothing was named: the effects that come nearest.
     proposal : Proposal or None
@@ -428,6 +431,7 @@ class Diagnosis:
     base_effects: tuple[str, ...] = ()
     refitted: Mapping[str, FittedParameter] = field(default_factory=dict)
     nearest: tuple[str, ...] = ()
+    along_rows: tuple[Change, ...] = ()
     proposal: Proposal | None = None
     structural_error: StructuralError | None = None
     not_tried: Mapping[str, str] = field(default_factory=dict)

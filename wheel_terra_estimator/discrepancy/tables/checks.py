@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from wheel_terra_estimator.discrepancy.tables.averaging import MOST_ROWS, averaged
 from wheel_terra_estimator.discrepancy.tables.steady_table import (
     INPUT_UNITS,
+    ORDER_COLUMNS,
     QUANTITIES,
     STD_COLUMNS,
     UNITS,
@@ -80,7 +81,8 @@ def check_table(
     slip_std = np.nan_to_num(arrays.get('slip_std', np.zeros(count)), nan=0.0)
     inputs = {key: arrays[key] for key in INPUT_UNITS if key in arrays}
     # No inputs of the model: a measured angle, and when the rows of a drive were.
-    inputs.update({key: arrays[key] for key in ('leaving_angle', 'time') if key in arrays})
+    beside = ('leaving_angle', 'time', *ORDER_COLUMNS)
+    inputs.update({key: arrays[key] for key in beside if key in arrays})
     angle_std = arrays.get('leaving_angle_std')
     if angle_std is not None:
         angle_std = np.nan_to_num(angle_std, nan=0.0)

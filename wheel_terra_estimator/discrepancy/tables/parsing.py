@@ -11,6 +11,7 @@ import math
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from datetime import datetime, timezone
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +21,7 @@ from wheel_terra_estimator.discrepancy.tables.checks import check_table
 from wheel_terra_estimator.discrepancy.tables.steady_table import (
     COLUMNS,
     INPUT_UNITS,
+    ORDER_COLUMNS,
     QUANTITIES,
     STD_COLUMNS,
     UNITS,
@@ -218,6 +220,8 @@ def _unit_of(name: str) -> str:
     quantity = name.removesuffix('_std')
     if quantity == 'leaving_angle':
         return 'rad'
+    if quantity in ORDER_COLUMNS:
+        return '-'
     return INPUT_UNITS.get(quantity) or UNITS[quantity]
 
 
@@ -296,10 +300,31 @@ def _read_cells(
             )
         for column in columns:
             cell = cells[column.place] if column.place < len(cells) else ''
+            if column.name in ORDER_COLUMNS:
+                continue
             if cell and cell.lower() not in _NOT_MEASURED:
                 number = _number(cell, f'{path}, line {line}, column {column.name}')
                 values[column.name][index] = column.factor * number
+    for column in columns:
+        if column.name in ORDER_COLUMNS:
+            cells = [row[column.place] if column.place < len(row) else '' for _, row in rows]
+            values[column.name] = _ordered(cells)
     return values
+
+
+def _ordered(cells: Sequence[str]) -> FloatArray:
+    """Return numbers and ISO dates as they are [-, days], other texts as counts of appearance."""
+    for read in (float, _days):
+        try:
+            return np.array([read(cell) if cell else math.nan for cell in cells])
+        except ValueError:
+            continue
+    known = {cell: place for place, cell in enumerate(dict.fromkeys(filter(None, cells)))}
+    return np.array([known.get(cell, math.nan) for cell in cells], dtype=float)
+
+
+def _days(text: str) -> float:
+    return datetime.fromisoformat(text).replace(tzinfo=timezone.utc).timestamp() / 86400.0
 
 
 def _check_first_row(

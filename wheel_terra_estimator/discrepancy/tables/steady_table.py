@@ -35,7 +35,11 @@ INPUT_UNITS = {
 STD_COLUMNS = ('slip_std', *(f'{quantity}_std' for quantity in QUANTITIES), 'leaving_angle_std')
 
 
-COLUMNS = (*INPUT_UNITS, *QUANTITIES, 'leaving_angle', *STD_COLUMNS)
+# When and how the rows were taken: no inputs of the model, but residuals may change along them.
+ORDER_COLUMNS = ('row_order', 'trial', 'date', 'direction')
+
+
+COLUMNS = (*INPUT_UNITS, *QUANTITIES, 'leaving_angle', *STD_COLUMNS, *ORDER_COLUMNS)
 
 
 @dataclass(frozen=True)
