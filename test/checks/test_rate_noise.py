@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 import rolling_rover as rolling
 
-from wheel_terra_estimator.checks.rate_noise import rate_step
 from wheel_terra_estimator.checks.run import check_recording
+from wheel_terra_estimator.checks.wheel_rates import rate_step
 
 WHOLE = rolling.recording()
 COUNTS = 180  # per turn of the wheel

@@ -24,6 +24,8 @@ WORTH_CHANGING = 0.2
 """Relative change of a noise or a rate below which the rover file keeps its number [-]."""
 NOISE_STD = 0.1
 """Relative deviation of a noise that a drive tells [-]."""
+LEAST_SURE = 0.8
+"""Confidence from which a cure is written [-]."""
 BLUNT_REFERENCE = 0.005
 """Deviation of the radius by the noise of the reference alone, as a share, that is told [-]."""
 
@@ -70,6 +72,7 @@ def calibrate(
         raise UserError(f'{recording.name}: no wheel rates in it to calibrate with')
     changes = [
         *_directions(report, configuration),
+        *_offsets(report, configuration),
         *_mounting(evidence, report),
         *_biases(evidence),
         *_noises(report, configuration),
@@ -87,17 +90,31 @@ def calibrate(
 
 
 def _directions(report: CheckReport, configuration: Configuration) -> list[Change]:
-    wrong = {f.wheel for f in report.findings if f.parameter == 'wheels.direction' and f.wheel}
-    if not wrong:
+    told = next((f for f in _sure(report) if f.fault == 'backwards' and f.wheel), None)
+    if told is None:
         return []
+    wrong = str(told.wheel).split(', ')
     wheels = configuration.wheels
     after = [
         int(-d) if name in wrong else int(d)
         for name, d in zip(wheels.names, wheels.direction, strict=True)
     ]
-    source = 'signs against the other wheels, the gyro and the reference'
+    source = f'{told.wheel}: {told.words}'
     return [
         Change('wheels.direction', _before(configuration, 'wheels.direction'), after, None, source)
+    ]
+
+
+def _sure(report: CheckReport) -> list[Finding]:
+    """Return the findings whose cure stood its trial and has no rival."""
+    return [finding for finding in report.findings if finding.confidence > LEAST_SURE]
+
+
+def _offsets(report: CheckReport, configuration: Configuration) -> list[Change]:
+    return [
+        Change(f.parameter, _before(configuration, f.parameter), f.value, f.std, f.words)
+        for f in _sure(report)
+        if f.parameter is not None and f.value is not None and f.parameter.endswith('_stamp_offset')
     ]
 
 
@@ -195,15 +212,20 @@ def _radius(evidence: Evidence, report: CheckReport) -> tuple[list[Change], Evid
     configuration = evidence.facts.configuration
     assert configuration is not None
     ratio = geometry.radius_ratio(evidence, report.figures)
-    if isinstance(ratio, NotChecked) or ratio.sigmas_from(1.0) < 1.0:
+    told = {finding.fault for finding in report.findings}
+    rival = 'reference_scale' in told and 'radius' not in told
+    found = not np.allclose(evidence.facts.radius, configuration.wheels.slip_radius)
+    if isinstance(ratio, NotChecked) or rival or (ratio.sigmas_from(1.0) < 1.0 and not found):
         return [], evidence
     rolling = evidence.facts.radius * ratio.value
-    lugs = evidence.facts.radius - configuration.wheels.radius
+    lugs = configuration.wheels.slip_radius - configuration.wheels.radius
     after = [round(float(value), 5) for value in rolling - lugs]
     std = float(np.mean(evidence.facts.radius)) * ratio.std
     reference = evidence.reference()
     assert reference is not None
     source = f'straight, steady, firm stretches against {reference.topic}'
+    if 'reference_scale' in told:
+        source += ' (or its scale is off: slip is the same)'
     bound = report.figures['rover.radius_bound_by_reference_m']
     if bound > BLUNT_REFERENCE * float(np.mean(evidence.facts.radius)):
         source += f' (its noise alone allows no better than +- {bound:.2g}: drive faster or longer)'

@@ -57,6 +57,8 @@ class Finding:
         What was seen, with figures.
     cure : str
         What to do, ready to copy where a parameter or a remap does it.
+    fault : str
+        Its name in ``faults.FAULTS``.
     """
 
     kind: str
@@ -68,6 +70,7 @@ class Finding:
     confidence: float
     words: str
     cure: str
+    fault: str = ''
 
     def __str__(self) -> str:
         wheel = f' {self.wheel}:' if self.wheel else ''
@@ -106,7 +109,10 @@ class CheckReport:
     def as_dict(self) -> dict[str, Any]:
         """Return what ``check --json`` prints."""
         return {
-            'findings': [asdict(finding) for finding in self.findings],
+            'findings': [
+                {key: value for key, value in asdict(finding).items() if key != 'fault'}
+                for finding in self.findings
+            ],
             'not_checked': [asdict(entry) for entry in self.not_checked],
             'figures': self.figures,
         }

@@ -5,13 +5,16 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wheel_terra_estimator.checks.evidence import Evidence
-from wheel_terra_estimator.checks.finding import Finding, NotChecked, Outcome
+from wheel_terra_estimator.checks.faults import FAULTS, LEAST_TURN_RATE, found, listed
+from wheel_terra_estimator.checks.finding import NotChecked, Outcome
+from wheel_terra_estimator.checks.imu import speed_scale
 from wheel_terra_estimator.checks.sinkage import without_stated_errors
 from wheel_terra_estimator.checks.statistics import (
     Estimate,
@@ -21,12 +24,26 @@ from wheel_terra_estimator.checks.statistics import (
     robust_std,
 )
 from wheel_terra_estimator.checks.torque import MOST_TRACTION, thrust
+from wheel_terra_estimator.checks.trial import Trial, tried
 
 FloatArray = NDArray[np.float64]
 
 LEAST_RADIUS_ERROR = 0.025
 """Share by which a radius is wrong before it is a finding [-]."""
 RADIUS_SIGMAS = 4.0
+LEAST_RATIO = 0.3
+"""Speed over rim speed below which a rover is stuck, or its reference dead [-]."""
+SURE = 0.97
+"""Probability beside its rival from which a fault is named alone [-]."""
+INERTIAL_STD = 0.08
+TRACK_STD = 0.02
+"""Deviation that slip leaves in a scale of speed by accelerations, and by turns, at least [-]."""
+RESISTANCE = Estimate(0.08, 0.05)
+"""Rolling resistance of firm ground over the weight: mean, deviation [-]."""
+UNKNOWN_RESISTANCE = Estimate(0.1, 0.08)
+"""The same where no torque tells how firm the ground is [-]."""
+SOFT_DEPTH = 0.06
+"""Sinkage over radius above which ground without torques is not taken for firm [-]."""
 UNIFORM_STD = 1.0 / math.sqrt(12.0)
 """Standard deviation of what lies anywhere in an interval, as a share of its length [-]."""
 CREDIBLE_STD = 0.05
@@ -44,7 +61,6 @@ LEAST_REFERENCES = 12
 LEAST_TRACK_ERROR = 0.08
 CLEAR_TURN = 0.95
 """Correlation of gyro and difference of the sides that a turn has [-]."""
-LEAST_YAW_RATE = 0.02  # [rad/s]
 SKID_TRACK = 0.9
 """Effective over geometric track below which the rover file's track is too large [-]: skidding
 makes it larger, never smaller."""
@@ -78,17 +94,59 @@ def radius_ratio(evidence: Evidence, figures: dict[str, Any]) -> Estimate | NotC
     bound = noise / math.sqrt(max(float(rim @ rim), 1e-12))
     figures['rover.radius_bound_by_reference_m'] = round(bound * float(np.mean(facts.radius)), 5)
     figures['rover.speed_over_rim_speed'] = round(plain.value, 4)
-    if not np.isfinite(evidence.torque).any() or not np.any(np.nan_to_num(evidence.torque)):
-        return _without_torque(evidence, plain)
-    traction = evidence.rim_at(reference.stamp, np.nan_to_num(thrust(evidence)), half)[rows]
+    if plain.value < LEAST_RATIO:
+        return NotChecked('radius', 'the rover hardly moves beside its wheels')
     sense, weight = np.sign(rim), facts.mass * facts.gravity
     demand = np.zeros(rim.size)
     if evidence.force is not None:
         along = evidence.rim_at(reference.stamp, evidence.force[:, 0], half)[rows]
         demand = along * sense / facts.gravity
-    speeds = _Speeds(rim, forward, traction * sense / weight, demand)
-    ratio = _with_torque(speeds, plain, figures)
-    return ratio if isinstance(ratio, NotChecked) else _referred_to_slip_radius(evidence, ratio)
+    resistance = UNKNOWN_RESISTANCE
+    traction = demand + resistance.value
+    if np.isfinite(evidence.torque).any(axis=0).all():
+        traction = evidence.rim_at(reference.stamp, np.nan_to_num(thrust(evidence)), half)[rows]
+        traction = traction * sense / weight
+        told = _resistance(evidence, float(np.median(traction - demand)))
+        if isinstance(told, NotChecked):
+            return told
+        resistance = told
+    elif _depth(evidence).value > SOFT_DEPTH:
+        return NotChecked('radius', 'no torque, and soft ground: a ratio of speeds may be slip')
+    ratio = _without_slip(_Speeds(rim, forward, traction, demand), plain, resistance, figures)
+    if isinstance(ratio, NotChecked):
+        return ratio
+    trial = _ratio_trial(evidence)
+    large = abs(ratio.value - 1.0) > LEAST_RADIUS_ERROR
+    if large and not trial.falls and trial.after > 4.0 * ratio.std:
+        return NotChecked(
+            'radius',
+            'speed over rim speed is another in each half of the drive: slip; drive ten metres '
+            'over firm ground',
+        )
+    return _referred_to_slip_radius(evidence, ratio)
+
+
+def _resistance(evidence: Evidence, seen: float) -> Estimate | NotChecked:
+    """Return the rolling resistance over the weight by the torques, beside that of firm ground.
+
+    Zeros of the torques look like it; what no firm ground costs is not taken off as slip.
+    """
+    facts = evidence.facts
+    assert facts.configuration is not None
+    if seen > MOST_TRACTION:
+        return NotChecked('radius', 'torques have no credible scale')
+    sensors = facts.configuration.sensors
+    arm = len(facts.names) / float(np.mean(facts.radius)) / (facts.mass * facts.gravity)
+    std = math.hypot(float(sensors.torque_zero_std) * arm, float(sensors.torque_gain_std) * seen)
+    if abs(seen - RESISTANCE.value) > 3.0 * math.hypot(std, RESISTANCE.std):
+        return NotChecked(
+            'radius',
+            f'the torques ask for {seen:.2f} of the weight on the level: soft ground, or their '
+            'zero or scale is off; drive ten metres over firm ground',
+        )
+    share = RESISTANCE.std**2 / (RESISTANCE.std**2 + std**2)
+    value = share * seen + (1.0 - share) * RESISTANCE.value
+    return Estimate(max(value, 0.0), math.sqrt(share) * std)
 
 
 def _referred_to_slip_radius(evidence: Evidence, ratio: Estimate) -> Estimate:
@@ -140,8 +198,8 @@ class _Speeds(NamedTuple):
     demand: FloatArray
 
 
-def _with_torque(
-    speeds: _Speeds, plain: Estimate, figures: dict[str, Any]
+def _without_slip(
+    speeds: _Speeds, plain: Estimate, resistance: Estimate, figures: dict[str, Any]
 ) -> Estimate | NotChecked:
     """Take the slip off the ratio of the speeds.
 
@@ -150,68 +208,115 @@ def _with_torque(
     is taken in the middle, half of the way between both is its uncertainty.
     """
     rim, forward, traction = speeds.rim, speeds.forward, speeds.traction
-    if float(np.median(np.abs(traction))) > MOST_TRACTION:
-        return NotChecked('radius', 'torques have no credible scale')
     both = block_fit(np.column_stack([rim, rim * traction]), forward)
     # What firm ground does elsewhere is one more observation of the slope.
     told = Estimate(-both[1].value / both[0].value, both[1].std)
     weight = SLOPE_OF_SLIP.std**2 / (SLOPE_OF_SLIP.std**2 + told.std**2)
-    slope = weight * told.value + (1.0 - weight) * SLOPE_OF_SLIP.value
-    middle = float(np.median(traction))
+    slope = max(weight * told.value + (1.0 - weight) * SLOPE_OF_SLIP.value, 0.0)
+    middle = float(np.median(speeds.demand)) + resistance.value
     slip = slope * middle
     figures['rover.slip_of_ground'] = round(slip, 4)
     if slip > FIRM_SLIP:
-        return NotChecked('radius', f'soft ground (slip about {slip:.2f}); drive on firm ground')
-    no_torque = plain.value / (1.0 - slip)
-    resistance = slope * max(float(np.median(traction - speeds.demand)), 0.0)
-    value = no_torque * (1.0 - 0.5 * resistance)
+        return NotChecked(
+            'radius', f'soft ground (slip about {slip:.2f}); drive ten metres over firm ground'
+        )
+    skid = slope * resistance.value
+    value = plain.value / (1.0 - slip) * (1.0 - 0.5 * skid)
     slope_std = math.sqrt(weight) * told.std
-    std = math.hypot(plain.std, slope_std * middle, UNIFORM_STD * resistance)
+    std = math.hypot(plain.std, slope_std * middle, slope * resistance.std, UNIFORM_STD * skid)
     if std > CREDIBLE_STD:
         return NotChecked('radius', 'slip not told from radius; drive up and down a firm slope')
     return Estimate(value, std)
 
 
-def _without_torque(evidence: Evidence, plain: Estimate) -> Estimate | NotChecked:
-    if plain.value > 1.0:
-        return plain  # nothing but a larger radius makes a rover outrun its rolling wheels
-    if plain.value > 1.0 - LEAST_RADIUS_ERROR:
-        return Estimate(plain.value, math.hypot(plain.std, 0.5 * LEAST_RADIUS_ERROR))
-    return NotChecked(
-        'radius', f'no torque: a speed of {plain.value:.3f} of the rims may be slip; drive on firm'
-    )
-
-
-def check_radius(evidence: Evidence, figures: dict[str, Any]) -> list[Outcome]:
-    """Return a rolling radius that is not the one of the rover file."""
+def check_radius(evidence: Evidence, figures: dict[str, Any]) -> tuple[list[Outcome], Evidence]:
+    """Return a radius or a reference of another scale, and the evidence with that mended."""
     ratio = radius_ratio(evidence, figures)
     if isinstance(ratio, NotChecked):
-        return [ratio]
-    facts, joints = evidence.facts, evidence.recording.joints
-    assert joints is not None and facts.configuration is not None
+        return [ratio], evidence
+    facts, joints, reference = evidence.facts, evidence.recording.joints, evidence.reference()
+    assert joints is not None and facts.configuration is not None and reference is not None
     rolling = float(np.mean(facts.radius)) * ratio.value
     figures['rover.rolling_radius_m'] = round(rolling, 5)
     figures['rover.rolling_radius_std_m'] = round(float(np.mean(facts.radius)) * ratio.std, 5)
     sigmas = ratio.sigmas_from(1.0)
     if abs(ratio.value - 1.0) < LEAST_RADIUS_ERROR or sigmas < RADIUS_SIGMAS:
-        return []
+        return [], evidence
+    trial = _ratio_trial(evidence)
+    if not trial.falls:
+        reason = 'its halves of the drive say another: drive longer, over firm ground'
+        return [NotChecked('radius', reason)], evidence
     rims = facts.radius * ratio.value - (facts.radius - facts.configuration.wheels.radius)
-    listed = ', '.join(f'{radius:.4f}' for radius in rims)
-    return [
-        Finding(
-            kind='radius',
-            topic=joints.topic,
-            parameter='wheels.radius',
-            value=round(float(np.mean(rims)), 5),
-            std=round(float(np.mean(facts.radius)) * ratio.std, 5),
-            confidence=confidence(sigmas),
-            words=(
-                f'the rover runs {ratio.value:.3f} +- {ratio.std:.3f} of what its rims say on the '
-                'straight'
-            ),
-            cure=f'wheels.radius: [{listed}]',
-        )
-    ]
+    share = _share_of_radius(evidence, ratio, figures)
+    alone = max(share, 1.0 - share) > SURE
+    told: dict[str, Any] = {
+        'ratio': ratio.value,
+        'off': ratio.std,
+        'trial': trial.words('off by', 'of the speed'),
+        'separate': ''
+        if alone
+        else '; measure ten metres with a tape: the rims or the reference must say ten',
+    }
+    radius = found(
+        'radius',
+        joints.topic,
+        share * confidence(sigmas),
+        value=round(float(np.mean(rims)), 5),
+        std=round(float(np.mean(facts.radius)) * ratio.std, 5),
+        radii=listed(rims),
+        rival='' if alone else ': the radius, or the scale of the reference',
+        **told,
+    )
+    scale = found(
+        'reference_scale',
+        reference.topic,
+        (1.0 - share) * confidence(sigmas),
+        value=1.0 / ratio.value,
+        std=ratio.std,
+        rival='' if alone else ': the scale of the reference, or the radius',
+        **told,
+    )
+    if not alone:
+        return [radius, scale], evidence
+    if share < 0.5:
+        return [scale], evidence
+    return [radius], replace(evidence, facts=replace(facts, radius=facts.radius * ratio.value))
+
+
+def _ratio_trial(evidence: Evidence) -> Trial:
+    """Try the ratio of the speeds by one half of the straight stretches on the other."""
+    reference = evidence.reference()
+    assert reference is not None
+    rim = evidence.rim_at(reference.stamp, evidence.rim, 0.25)
+    straight = evidence.rim_at(reference.stamp, evidence.straight.astype(float), 0.25)
+    forward = reference.velocity[:, 0]
+    rows = np.isfinite(rim) & (straight > 0.99) & np.isfinite(forward)
+    rim, forward = rim[rows], forward[rows]
+    return tried(lambda part: block_fit(rim[part, None], forward[part])[0].value, 1.0, rim**2)
+
+
+def _share_of_radius(evidence: Evidence, ratio: Estimate, figures: dict[str, Any]) -> float:
+    """Return the probability that a ratio of speeds is the radius, not the scale of the reference.
+
+    The accelerometer knows the scale of speed, and where the rover need not skid the gyro as well.
+    """
+    radius, scale = FAULTS['radius'].prior, FAULTS['reference_scale'].prior
+    odds = math.log(radius / scale)
+    felt = speed_scale(evidence)
+    if felt is not None:
+        std = math.hypot(felt.std, INERTIAL_STD, ratio.std)
+        figures['rover.speed_scale_by_imu'] = round(felt.value, 3)
+        figures['rover.speed_scale_by_imu_std'] = round(std, 3)
+        odds += 0.5 * ((felt.value - 1.0) ** 2 - (felt.value - ratio.value) ** 2) / std**2
+    turns = NotChecked('track', 'skids') if skids(evidence) else track_ratio(evidence)
+    if not isinstance(turns, NotChecked):
+        std = math.hypot(turns.std, TRACK_STD, ratio.std)
+        rolling = 1.0 / figures['rover.speed_over_rim_speed']
+        of_scale = abs(turns.value - 1.0) / std
+        of_radius = abs(turns.value - rolling) / std
+        if min(of_scale, of_radius) < 1.0:  # else the track is another as well
+            odds += 0.5 * (of_scale**2 - of_radius**2)
+    return 1.0 / (1.0 + math.exp(-min(max(odds, -50.0), 50.0)))
 
 
 def skids(evidence: Evidence) -> bool:
@@ -231,8 +336,31 @@ def stated_track(evidence: Evidence) -> float:
     return float(lateral[side > 0].mean() - lateral[side < 0].mean())
 
 
+def _track_trial(evidence: Evidence) -> Trial:
+    turns = _turns(evidence)
+    assert not isinstance(turns, NotChecked)
+    yaw, difference = turns
+    track = stated_track(evidence)
+    return tried(
+        lambda rows: block_fit(yaw[rows, None], difference[rows])[0].value / track, 1.0, yaw**2
+    )
+
+
 def track_ratio(evidence: Evidence) -> Estimate | NotChecked:
     """Return effective over configured track from the gyro and the difference of the sides."""
+    turns = _turns(evidence)
+    if isinstance(turns, NotChecked):
+        return turns
+    track = stated_track(evidence)
+    slope = block_fit(turns[0][:, None], turns[1])[0]
+    ratio = Estimate(float(slope.value / track), float(slope.std / abs(track)))
+    if abs(ratio.value - 1.0) > LEAST_TRACK_ERROR and not _track_trial(evidence).falls:
+        return NotChecked('track', 'the turns of both halves of the drive need different tracks')
+    return ratio
+
+
+def _turns(evidence: Evidence) -> tuple[FloatArray, FloatArray] | NotChecked:
+    """Return yaw rate [rad/s] and difference of the sides [m/s] in turns."""
     facts, difference = evidence.facts, evidence.side_difference
     if evidence.gyro is None or not facts.known or not facts.has_sides():
         return NotChecked('track', 'no IMU, or sides not known')
@@ -240,11 +368,9 @@ def track_ratio(evidence: Evidence) -> Estimate | NotChecked:
     rows = evidence.turning & np.isfinite(difference)
     bias = np.median(yaw[evidence.at_rest]) if evidence.at_rest.sum() > 20 else 0.0
     clear = rows.sum() > 60 and correlation((yaw - bias)[rows], difference[rows]) > CLEAR_TURN
-    if not clear or float(np.quantile(np.abs(yaw), 0.95)) < LEAST_YAW_RATE:
+    if not clear or float(np.quantile(np.abs(yaw), 0.95)) < LEAST_TURN_RATE:
         return NotChecked('track', 'no clear turn in it; drive a circle both ways')
-    track = stated_track(evidence)
-    slope = block_fit((yaw[rows] - bias)[:, None], difference[rows])[0]
-    return Estimate(float(slope.value / track), float(slope.std / abs(track)))
+    return (yaw - bias)[rows], difference[rows]
 
 
 def check_track(evidence: Evidence, figures: dict[str, Any]) -> list[Outcome]:
@@ -272,24 +398,22 @@ def check_track(evidence: Evidence, figures: dict[str, Any]) -> list[Outcome]:
         ]
     if ratio.sigmas_from(1.0) < 4.0 or abs(ratio.value - 1.0) < LEAST_TRACK_ERROR:
         return []
+    trial = _track_trial(evidence)
     if not slip_free and not skidding:
         ratio = Estimate(ratio.value, math.hypot(ratio.std, 0.03))
     joints = evidence.recording.joints
     assert joints is not None
-    facts, track = evidence.facts, stated
-    listed = ', '.join(f'{y * ratio.value:.3f}' for y in facts.lateral)
     return [
-        Finding(
-            kind='track',
-            topic=joints.topic,
-            parameter='wheels.y',
-            value=round(track * ratio.value, 4),
-            std=round(track * ratio.std, 4),
-            confidence=confidence(ratio.sigmas_from(1.0)),
-            words=(
-                f'turns need a track of {ratio.value:.3f} +- {ratio.std:.3f} of the stated '
-                f'{track:.3f} m'
-            ),
-            cure=f'wheels.y: [{listed}]',
+        found(
+            'track',
+            joints.topic,
+            confidence(ratio.sigmas_from(1.0)),
+            value=round(stated * ratio.value, 4),
+            std=round(stated * ratio.std, 4),
+            ratio=ratio.value,
+            off=ratio.std,
+            stated=stated,
+            trial=trial.words('off by', 'of the track'),
+            lateral=listed(evidence.facts.lateral * ratio.value, '.3f'),
         )
     ]

@@ -14,8 +14,10 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from wheel_terra_estimator.checks.evidence import Evidence
+from wheel_terra_estimator.checks.faults import STANDARD_GRAVITY, found, listed
 from wheel_terra_estimator.checks.finding import Finding, NotChecked, Outcome
 from wheel_terra_estimator.checks.rover_facts import RoverFacts
 from wheel_terra_estimator.checks.series import ImuSeries, Recording
@@ -27,10 +29,11 @@ from wheel_terra_estimator.checks.statistics import (
     moving_mean,
     robust_std,
 )
+from wheel_terra_estimator.checks.torque import heading_of_torque
+from wheel_terra_estimator.checks.trial import Trial, halves
 
 FloatArray = NDArray[np.float64]
 
-STANDARD_GRAVITY = 9.80665  # [m/s^2]
 GRAVITY_TOLERANCE = 0.1
 """Share by which the mean specific force may differ from gravity (slopes, bias, vibration)."""
 GRAVITIES = {'the Moon': 1.62, 'Mars': 3.71, 'the Earth': 9.81}  # [m/s^2]
@@ -50,11 +53,21 @@ EVEN_GROUND_STD = math.radians(0.8)
 """Deviation of a tilt [rad] above which the ground was no plane."""
 NOISE_FACTOR = 4.0
 """Noise above so many times the stated one is a finding."""
+DEGREES = (0.4, 4.0)
+"""Noise of a gyro over the one stated, if it were in degrees per second, that tells it is [-]."""
 BIAS_FACTOR = 6.0
 """A bias above so many stated deviations is a finding."""
 LEAST_GYRO_BIAS = 0.004  # [rad/s]
+LEAST_YAW = math.radians(25.0)
+"""Yaw of the mounting below which starts, stops and slopes do not tell it [rad]."""
+YAW_SIGMAS = 4.0
+FELT_BLOCKS = 10
+"""Parts of a drive that a deviation comes from."""
 FROZEN_SHARE = 0.3
 """Share of messages that repeat the one before."""
+IMU_ARRAYS = ('stamp', 'log_time', 'force', 'rate', 'orientation')
+FROZEN_TIME = 1.0
+"""Time that no number of a running IMU stays the same [s]."""
 
 
 @dataclass(frozen=True)
@@ -77,36 +90,29 @@ def check_imu(
         return [
             NotChecked(kind, 'no IMU in the recording') for kind in ('mounting', 'gravity')
         ], replace(state, usable_force=False, usable_gyro=False)
-    found: list[Outcome] = []
+    outcomes: list[Outcome] = []
     placeholders, state = _placeholders(imu, state)
-    found += placeholders
-    found += _frozen(imu, state)
+    outcomes += placeholders
+    frozen, state = _frozen(imu, state)
+    outcomes += frozen
     if state.usable_force:
-        outcomes, state = _gravity(facts, state, figures)
-        found += outcomes
+        told, state = _gravity(facts, state, figures)
+        outcomes += told
     imu = state.recording.imu
     assert imu is not None
     if state.usable_gyro:
-        outcomes, state = _against_orientation(imu, state, figures)
-        found += outcomes
-    return found, state
+        told, state = _against_orientation(imu, state, figures)
+        outcomes += told
+    return outcomes, state
 
 
 def _placeholders(imu: ImuSeries, state: ImuState) -> tuple[list[Outcome], ImuState]:
-    found: list[Outcome] = []
+    outcomes: list[Outcome] = []
     words = {'force': 'linear_acceleration', 'rate': 'angular_velocity'}
     for name, field in words.items():
         values = getattr(imu, name)
         if not np.any(np.nan_to_num(values)):
-            found.append(
-                Finding(
-                    kind='placeholder',
-                    topic=imu.topic,
-                    confidence=0.999,
-                    words=f'{field} is 0 in every message',
-                    cure=f'fill {field}, or say that there is none: {field}_covariance[0] = -1',
-                )
-            )
+            outcomes.append(found('force_zero', imu.topic, 0.999, field=field))
             blind = 'usable_force' if name == 'force' else 'usable_gyro'
             state = replace(state, **{blind: False})  # type: ignore[arg-type]
     orientation = imu.orientation[np.isfinite(imu.orientation).all(axis=1)]
@@ -115,36 +121,32 @@ def _placeholders(imu: ImuSeries, state: ImuState) -> tuple[list[Outcome], ImuSt
         norm = np.linalg.norm(orientation, axis=1)
         if np.median(norm) < 0.5 or (moved == 0.0 and np.ptp(imu.rate, axis=0).max() > 0.0):
             shown = ', '.join(f'{value:g}' for value in orientation[0])
-            found.append(
-                Finding(
-                    kind='placeholder',
-                    topic=imu.topic,
-                    confidence=0.999,
-                    words=f'orientation is ({shown}) in every message',
-                    cure='say that there is none: orientation_covariance[0] = -1 (REP 145)',
-                )
-            )
+            outcomes.append(found('orientation_placeholder', imu.topic, 0.999, shown=shown))
             blank = np.full_like(imu.orientation, np.nan)
             state = replace(
                 state, recording=replace(state.recording, imu=replace(imu, orientation=blank))
             )
-    return found, state
+    return outcomes, state
 
 
-def _frozen(imu: ImuSeries, state: ImuState) -> list[Outcome]:
+def _frozen(imu: ImuSeries, state: ImuState) -> tuple[list[Outcome], ImuState]:
     rows = np.hstack([imu.force, imu.rate])
     same = (np.diff(rows, axis=0) == 0.0).all(axis=1)
-    if not state.usable_force or not state.usable_gyro or np.mean(same) < FROZEN_SHARE:
-        return []
-    return [
-        Finding(
-            kind='frozen',
-            topic=imu.topic,
-            confidence=0.99,
-            words=f'{100 * np.mean(same):.0f} % of the messages repeat the one before',
-            cure='publish a message when the IMU has measured, not on a timer',
-        )
-    ]
+    if not state.usable_force or not state.usable_gyro:
+        return [], state
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], same, [False]]).astype(int)))
+    longest = max((imu.seconds[b] - imu.seconds[a] for a, b in edges.reshape(-1, 2)), default=0.0)
+    if np.mean(same) > FROZEN_SHARE:
+        how = f'{100 * np.mean(same):.0f} % of the messages repeat the one before'
+    elif longest > FROZEN_TIME:
+        how = f'all six numbers stay the same for up to {longest:.1f} s'
+        alive = ~np.concatenate([[False], same])
+        measured = [getattr(imu, name)[alive] for name in IMU_ARRAYS]
+        imu = replace(imu, **dict(zip(IMU_ARRAYS, measured, strict=True)))
+        state = replace(state, recording=replace(state.recording, imu=imu))
+    else:
+        return [], state
+    return [found('sensor_frozen', imu.topic, 0.99, how=how)], state
 
 
 def _gravity(
@@ -155,59 +157,29 @@ def _gravity(
     middle = np.median(imu.force, axis=0)
     size = float(np.linalg.norm(middle))
     upright = abs(float((state.rotation @ middle)[2])) > UPRIGHT_SHARE * size
-    typical = float(np.median(np.linalg.norm(imu.force, axis=1)))
     figures['imu.mean_specific_force_m_s2'] = round(size, 4)
     gravity = facts.gravity
     if abs(size / gravity - 1.0) <= GRAVITY_TOLERANCE:
         return [], state
 
-    def found(kind: str, parameter: str | None, value: float, words: str, cure: str) -> Outcome:
-        return Finding(
-            kind=kind,
-            topic=imu.topic,
-            parameter=parameter,
-            value=value,
-            confidence=0.98,
-            words=f'mean specific force {size:.3g} m/s^2 where gravity is {gravity:.4g}: {words}',
-            cure=cure,
-        )
+    def told(key: str, value: float, **figures: Any) -> Outcome:
+        return found(key, imu.topic, 0.98, value=value, size=size, gravity=gravity, **figures)
 
     in_g = abs(size - 1.0) <= 0.12 and upright  # what a slope leaves may have the same size
     if size < 0.3 * min(gravity, STANDARD_GRAVITY) and not in_g:
-        outcome = found(
-            'gravity',
-            None,
-            gravity,
-            f'gravity was taken off (what is left: {typical:.2g})',
-            'publish the specific force with gravity (+g on z at rest, REP 145), '
-            'such as imu/data_raw in place of a linear acceleration',
-        )
+        outcome = told('gravity_off', gravity)
         return [outcome], replace(state, usable_force=False)
     for unit, factor in (('g', STANDARD_GRAVITY), ('mg', STANDARD_GRAVITY / 1000.0)):
         if abs(size * factor / gravity - 1.0) <= 0.12:
-            outcome = found(
-                'unit',
-                None,
-                factor,
-                f'linear_acceleration is in {unit}',
-                f'multiply linear_acceleration by {factor:.5g} in the driver (m/s^2, REP 103)',
-            )
+            outcome = told('force_unit', factor, unit=unit)
             mended = replace(imu, force=imu.force * factor)
             return [outcome], replace(state, recording=replace(state.recording, imu=mended))
     for place, there in GRAVITIES.items():
         if abs(size / there - 1.0) <= GRAVITY_TOLERANCE:
-            outcome = found(
-                'gravity', 'rover.gravity', there, f'this is {place}', f'rover.gravity: {there:g}'
-            )
+            outcome = told('planet', there, place=place)
             return [outcome], state
     gain = gravity / size
-    outcome = found(
-        'gain',
-        None,
-        gain,
-        'the accelerometer has another scale',
-        f'multiply linear_acceleration by {gain:.4g} in the driver, or state rover.gravity',
-    )
+    outcome = told('force_scale', gain)
     mended = replace(imu, force=imu.force * gain)
     return [outcome], replace(state, recording=replace(state.recording, imu=mended))
 
@@ -223,10 +195,11 @@ def _against_orientation(
     before, after = q[:-step], q[step:]
     dt = time[step:] - time[:-step]
     good = np.isfinite(before).all(axis=1) & np.isfinite(after).all(axis=1) & (dt > 0.0)
+    good &= (np.abs(before).max(axis=1) > 0.0) & (np.abs(after).max(axis=1) > 0.0)
     turned = _rotation_between(before[good], after[good]) / dt[good, None]
     total = np.vstack([np.zeros(3), np.cumsum(imu.rate, axis=0)])
     mean = ((total[step:] - total[:-step]) / step)[: good.size][good]
-    found: list[Outcome] = []
+    outcomes: list[Outcome] = []
     rate = imu.rate.copy()
     for axis, name in enumerate('xyz'):
         seen, told = turned[:, axis], mean[:, axis] - np.median(mean[:, axis])
@@ -238,60 +211,42 @@ def _against_orientation(
         figures[f'imu.gyro_over_orientation_{name}'] = round(gain, 3)
         if fit < 0.0:
             rate[:, axis] *= -1.0
-            found.append(
-                Finding(
-                    kind='sign',
-                    topic=imu.topic,
+            outcomes.append(
+                found(
+                    'gyro_reversed',
+                    imu.topic,
+                    confidence(6.0 * abs(fit)),
                     value=-1.0,
-                    confidence=confidence(6.0 * abs(fit)),
-                    words=f'angular_velocity.{name} turns against the orientation',
-                    cure=(
-                        f'negate angular_velocity.{name} in the driver (no mounting angle '
-                        'does that)'
-                    ),
+                    axis=name,
+                    against='the orientation',
                 )
             )
         if 30.0 < abs(gain) < 110.0:
             rate[:, axis] *= math.pi / 180.0
-            if not any(o.kind == 'unit' for o in found):
-                found.append(_degrees(imu.topic, f'{abs(gain):.0f} times as fast as orientation'))
-    if not found:
+            if not any(o.kind == 'unit' for o in outcomes):
+                outcomes.append(
+                    found(
+                        'gyro_degrees',
+                        imu.topic,
+                        0.99,
+                        value=math.pi / 180.0,
+                        times=abs(gain),
+                        how='turning of the orientation',
+                    )
+                )
+    if not outcomes:
         return [], state
-    mended = replace(imu, rate=np.radians(imu.rate) if _all_degrees(found) else rate)
-    if _all_degrees(found) and any(o.kind == 'sign' for o in found):
-        mended = replace(imu, rate=rate)
-    return found, replace(state, recording=replace(state.recording, imu=mended))
-
-
-def _all_degrees(found: list[Outcome]) -> bool:
-    return any(o.kind == 'unit' for o in found)
-
-
-def _degrees(topic: str, words: str) -> Finding:
-    return Finding(
-        kind='unit',
-        topic=topic,
-        value=math.pi / 180.0,
-        confidence=0.99,
-        words=f'angular_velocity is in degrees per second ({words})',
-        cure='multiply angular_velocity by 0.0174533 in the driver (rad/s, REP 103)',
-    )
+    in_degrees = any(o.kind == 'unit' for o in outcomes)
+    if in_degrees and not any(o.kind == 'sign' for o in outcomes):
+        rate = np.radians(imu.rate)
+    mended = replace(imu, rate=rate)
+    return outcomes, replace(state, recording=replace(state.recording, imu=mended))
 
 
 def _rotation_between(before: FloatArray, after: FloatArray) -> FloatArray:
     """Return the rotation vectors (k, 3) from one attitude to the next, in the body's frame."""
-    bx, by, bz, bw = before.T
-    ax, ay, az, aw = after.T
-    vector = np.column_stack(
-        [
-            bw * ax - bx * aw - by * az + bz * ay,
-            bw * ay + bx * az - by * aw - bz * ax,
-            bw * az - bx * ay + by * ax - bz * aw,
-        ]
-    )
-    scalar = bw * aw + bx * ax + by * ay + bz * az
-    sign = np.where(scalar < 0.0, -1.0, 1.0)
-    return 2.0 * vector * sign[:, None]
+    turn = Rotation.from_quat(before).inv() * Rotation.from_quat(after)
+    return np.asarray(turn.as_rotvec())
 
 
 # With the wheels ---------------------------------------------------------------------------------
@@ -323,10 +278,8 @@ def _upright(up: FloatArray) -> FloatArray:
     sine = float(np.linalg.norm(axis))
     if sine < 0.15 and up[2] < 0.0:
         return np.diag([1.0, -1.0, -1.0])
-    axis = axis / max(sine, 1e-9)
     angle = math.atan2(sine, float(up[2]))
-    cross = np.array([[0.0, -axis[2], axis[1]], [axis[2], 0.0, -axis[0]], [-axis[1], axis[0], 0.0]])
-    return np.asarray(np.eye(3) + math.sin(angle) * cross + (1.0 - math.cos(angle)) * cross @ cross)
+    return np.asarray(Rotation.from_rotvec(angle * axis / max(sine, 1e-9)).as_matrix())
 
 
 def gyro_bias(evidence: Evidence) -> tuple[FloatArray, FloatArray, str]:
@@ -386,8 +339,11 @@ def _evenness(heading: FloatArray) -> float:
     return float(np.hypot(np.cos(heading).mean(), np.sin(heading).mean()))
 
 
-def yaw_mounting(evidence: Evidence) -> Estimate | None:
-    """Return the yaw of the IMU against the chassis from starts and stops and from curves [rad]."""
+def felt_motion(evidence: Evidence) -> tuple[NDArray[np.complex128], float] | None:
+    """Return sums over blocks of acceleration felt times that of the wheels, and their energy.
+
+    Along x the acceleration of starts and stops, along y that of curves, as complex numbers.
+    """
     if evidence.force is None or evidence.gyro is None or evidence.time.size < 100:
         return None
     period = evidence.period
@@ -398,14 +354,98 @@ def yaw_mounting(evidence: Evidence) -> Estimate | None:
     motion = _without_drift(change + 1j * curve, period)
     horizontal = [moving_mean(evidence.force[:, axis], width) for axis in (0, 1)]
     seen = _without_drift(horizontal[0] + 1j * horizontal[1], period)
-    blocks = np.array_split(np.arange(seen.size), 10)
-    parts = np.array([np.vdot(motion[b], seen[b]) for b in blocks])
-    energy = float(np.sum(np.abs(motion) ** 2))
+    return felt_blocks(motion, seen)
+
+
+def felt_blocks(
+    motion: NDArray[np.complex128], seen: NDArray[np.complex128]
+) -> tuple[NDArray[np.complex128], float]:
+    """Return what blocks of equal energy of a motion say of how it is felt, and the energy."""
+    energy = np.cumsum(np.abs(motion) ** 2)
+    edges = np.searchsorted(energy, np.linspace(0.0, energy[-1], FELT_BLOCKS + 1)[1:-1])
+    parts = np.array(
+        [np.vdot(m, s) for m, s in zip(np.split(motion, edges), np.split(seen, edges), strict=True)]
+    )
+    return parts, float(energy[-1])
+
+
+def yaw_of_motion(parts: NDArray[np.complex128], energy: float) -> Estimate | None:
+    """Return the angle by which a motion is felt turned [rad]; None where it is not clear."""
     total = parts.sum()
-    spread = np.sqrt(np.sum(np.abs(parts - total / parts.size) ** 2))
+    spread = float(np.sqrt(np.sum(np.abs(parts - total / parts.size) ** 2)))
     if energy <= 0.0 or not 0.5 < abs(total) / energy < 2.0 or abs(total) < 3.0 * spread:
         return None
-    return Estimate(float(np.angle(total)), float(spread / abs(total)))
+    return Estimate(float(np.angle(total)), spread / abs(total))
+
+
+def speed_scale(evidence: Evidence) -> Estimate | None:
+    """Return true speed over that of the rims by the accelerometer: starts, stops, curves."""
+    felt = felt_motion(evidence)
+    if felt is None or felt[1] <= 0.0:
+        return None
+    parts, energy = felt
+    total = float(parts.real.sum())
+    spread = float(np.sqrt(np.sum((parts.real - total / parts.size) ** 2)))
+    return Estimate(total / energy, spread / energy)
+
+
+def yaw_of_imu(evidence: Evidence) -> tuple[Estimate, Trial] | None:
+    """Return the yaw of the IMU in ``base_link`` [rad] and its trial, angles off by half."""
+    felt = felt_motion(evidence)
+    by_motion = yaw_of_motion(*felt) if felt is not None else None
+    by_torque = heading_of_torque(evidence)
+    told = [e for e in (by_motion, by_torque) if e is not None]
+    if not told:
+        return None
+    best = min(told, key=lambda estimate: estimate.std)
+    other = next((e for e in told if e is not best), None)
+    if best is by_motion and felt is not None:
+        first, second = (complex(felt[0][half].sum()) for half in halves(np.ones(felt[0].size)))
+        a, b = float(np.angle(first)), float(np.angle(second))
+    else:
+        a = b = best.value
+    if other is not None:
+        b = other.value  # slopes and starts are each other's trial
+        a = best.value
+    apart = abs(math.remainder(a - b, 2.0 * math.pi))
+    return best, Trial(abs(math.remainder(b, 2.0 * math.pi)), apart)
+
+
+def check_yaw(evidence: Evidence, figures: dict[str, Any]) -> tuple[list[Outcome], FloatArray]:
+    """Return an IMU whose x axis does not point forward, and the rotation that puts it right."""
+    told = yaw_of_imu(evidence)
+    if told is None:
+        reason = 'yaw of the IMU: neither lively starts and stops nor slopes in it'
+        return [NotChecked('mounting', reason)], evidence.rotation
+    seen, trial = told
+    figures['imu.yaw_deg'] = round(math.degrees(seen.value), 2)
+    figures['imu.yaw_std_deg'] = round(math.degrees(seen.std), 2)
+    if abs(seen.value) < LEAST_YAW or seen.sigmas_from(0.0) < YAW_SIGMAS:
+        return [], evidence.rotation
+    if not trial.falls:
+        reason = 'yaw of the IMU: both halves of the drive say another'
+        return [NotChecked('mounting', reason)], evidence.rotation
+    rotation = without_yaw(seen) @ evidence.rotation
+    std = math.degrees(seen.std)
+    finding = mounting_finding(
+        'imu_yaw',
+        evidence,
+        rotation,
+        std,
+        0.97,
+        angle=math.degrees(seen.value),
+        trial=Trial(*(math.degrees(angle) for angle in trial[:2])).words('off by', 'degrees'),
+    )
+    return [finding], rotation
+
+
+def without_yaw(seen: Estimate) -> FloatArray:
+    """Return the rotation that takes a yaw off; right angles are meant where they fit."""
+    angle = -seen.value
+    quarter = round(angle / (math.pi / 2.0)) * math.pi / 2.0
+    if abs(angle - quarter) < 2.5 * max(seen.std, math.radians(4.0)):
+        angle = quarter
+    return np.asarray(Rotation.from_rotvec([0.0, 0.0, angle]).as_matrix())
 
 
 def _without_drift(values: NDArray[np.complex128], period: float) -> NDArray[np.complex128]:
@@ -423,8 +463,8 @@ def check_mounting(evidence: Evidence, figures: dict[str, Any]) -> tuple[list[Ou
     fix = gross_tilt(evidence)
     if fix is not None:
         rotation = fix @ rotation
-        words = f'{_tilt_in_words(evidence)}: the IMU is mounted upside down or on its side'
-        return [mounting_finding(evidence, rotation, 0.3, 0.999, words)], rotation
+        told = {'force': _tilt_in_words(evidence)}
+        return [mounting_finding('imu_upside', evidence, rotation, 0.3, 0.999, **told)], rotation
     tilt = small_tilt(evidence)
     if tilt is None:
         reason = 'no full circle in it: mounting not told from slope; drive a circle both ways'
@@ -440,17 +480,16 @@ def check_mounting(evidence: Evidence, figures: dict[str, Any]) -> tuple[list[Ou
     if size < LEAST_MOUNTING or sigmas < 4.0:
         return [], rotation
     rotation = tilt_rotation(tilt.roll.value, tilt.pitch.value) @ rotation
-    words = f'its axes lie {math.degrees(size):.2f} degrees off the chassis, seen in full turns'
     std = math.degrees(max(tilt.roll.std, tilt.pitch.std))
-    return [mounting_finding(evidence, rotation, std, confidence(sigmas), words)], rotation
+    finding = mounting_finding(
+        'imu_tilt', evidence, rotation, std, confidence(sigmas), size=math.degrees(size)
+    )
+    return [finding], rotation
 
 
 def tilt_rotation(roll: float, pitch: float) -> FloatArray:
     """Return the small rotation about x, then y, that takes a tilt off."""
-    cr, sr, cp, sp = math.cos(roll), math.sin(roll), math.cos(pitch), math.sin(pitch)
-    about_x = np.array([[1.0, 0.0, 0.0], [0.0, cr, -sr], [0.0, sr, cr]])
-    about_y = np.array([[cp, 0.0, sp], [0.0, 1.0, 0.0], [-sp, 0.0, cp]])
-    return about_y @ about_x
+    return np.asarray(Rotation.from_euler('xy', [roll, pitch]).as_matrix())
 
 
 def _tilt_in_words(evidence: Evidence) -> str:
@@ -461,14 +500,12 @@ def _tilt_in_words(evidence: Evidence) -> str:
 
 def mounting_angles(rotation: FloatArray) -> tuple[float, float, float]:
     """Return roll, pitch, yaw [deg] of a rotation (fixed axes x, then y, then z, as in URDF)."""
-    pitch = math.asin(float(np.clip(-rotation[2, 0], -1.0, 1.0)))
-    roll = math.atan2(rotation[2, 1], rotation[2, 2])
-    yaw = math.atan2(rotation[1, 0], rotation[0, 0])
-    return math.degrees(roll), math.degrees(pitch), math.degrees(yaw)
+    roll, pitch, yaw = Rotation.from_matrix(rotation).as_euler('xyz', degrees=True)
+    return float(roll), float(pitch), float(yaw)
 
 
 def mounting_finding(
-    evidence: Evidence, rotation: FloatArray, std: float, sure: float, words: str
+    key: str, evidence: Evidence, rotation: FloatArray, std: float, sure: float, **figures: Any
 ) -> Finding:
     """Return the finding that asks for a rotation; its parameter is the angle that changes most."""
     new, old = mounting_angles(rotation), mounting_angles(evidence.rotation)
@@ -477,20 +514,20 @@ def mounting_finding(
     names = [f'sensors.imu_mounting_{axis}_deg' for axis in ('roll', 'pitch', 'yaw')]
     imu = evidence.recording.imu
     assert imu is not None
-    cure = '  '.join(
+    angles = '  '.join(
         f'{name}: {angle:.2f}'
         for name, angle, apart in zip(names, new, change, strict=True)
         if apart >= LEAST_SHOWN
     )
-    return Finding(
-        kind='mounting',
-        topic=imu.topic,
-        parameter=names[most],
+    return found(
+        key,
+        imu.topic,
+        sure,
         value=round(new[most], 3),
         std=std,
-        confidence=sure,
-        words=words,
-        cure=cure,
+        parameter=names[most],
+        angles=angles,
+        **figures,
     )
 
 
@@ -499,7 +536,7 @@ def check_noise_and_zero(evidence: Evidence, figures: dict[str, Any]) -> list[Ou
     imu, configuration = evidence.recording.imu, evidence.facts.configuration
     if imu is None or configuration is None or evidence.gyro is None or evidence.force is None:
         return []
-    found: list[Outcome] = []
+    outcomes: list[Outcome] = []
     sensors = configuration.sensors
     for name, key, unit, stated in (
         ('force', 'specific_force_std', 'm/s^2', sensors.specific_force_std),
@@ -509,41 +546,47 @@ def check_noise_and_zero(evidence: Evidence, figures: dict[str, Any]) -> list[Ou
         # Vibration comes and goes with driving: the root mean square of the livelier half counts.
         noise = float(np.median([_upper_rms(column) for column in change.T]))
         figures[f'imu.{key}_{unit}'] = float(f'{noise:.3g}')
+        if key == 'angular_rate_std' and DEGREES[0] < math.radians(noise) / stated < DEGREES[1]:
+            told = {'times': noise / stated, 'how': 'noise of a gyro'}
+            value = math.pi / 180.0
+            outcomes.append(found('gyro_degrees', imu.topic, 0.8, value=value, **told))
+            return outcomes
         if noise > NOISE_FACTOR * stated:
-            found.append(
-                Finding(
-                    kind='noise',
-                    topic=imu.topic,
-                    parameter=f'sensors.{key}',
+            outcomes.append(
+                found(
+                    'imu_noise',
+                    imu.topic,
+                    confidence(noise / stated),
                     value=float(f'{noise:.2g}'),
-                    confidence=confidence(noise / stated),
-                    words=f'noise {noise:.2g} {unit} where the rover file has {stated:g} {unit}',
-                    cure=f'sensors.{key}: {noise:.2g}',
+                    parameter=f'sensors.{key}',
+                    noise=noise,
+                    stated=stated,
+                    unit=unit,
                 )
             )
     bias, std, where = gyro_bias(evidence)
     if not np.isfinite(std).all():
-        found.append(NotChecked('zero', 'IMU: no standstill of 3 s in it; stand still for 10 s'))
-        return found
+        outcomes.append(NotChecked('zero', 'IMU: no standstill of 3 s in it; stand still for 10 s'))
+        return outcomes
     figures['imu.gyro_bias_rad_s'] = [float(f'{b:.3g}') for b in bias]
     limit = max(BIAS_FACTOR * sensors.angular_rate_bias_std, LEAST_GYRO_BIAS)
     worst = int(np.argmax(np.abs(bias)))
     if abs(bias[worst]) > limit:
         whole = bias + sensors.angular_rate_bias
-        listed = ', '.join(f'{value:.5f}' for value in whole)
-        found.append(
-            Finding(
-                kind='zero',
-                topic=imu.topic,
-                parameter='sensors.angular_rate_bias',
+        outcomes.append(
+            found(
+                'gyro_bias',
+                imu.topic,
+                0.99,
                 value=float(f'{whole[worst]:.4g}'),
                 std=float(std[worst]),
-                confidence=0.99,
-                words=f'angular_velocity.{"xyz"[worst]} reads {bias[worst]:.3g} rad/s {where}',
-                cure=f'sensors.angular_rate_bias: [{listed}]',
+                axis='xyz'[worst],
+                bias=float(bias[worst]),
+                where=where,
+                biases=listed(whole, '.5f'),
             )
         )
-    return found
+    return outcomes
 
 
 def _upper_rms(values: FloatArray) -> float:

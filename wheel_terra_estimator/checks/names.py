@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from wheel_terra_estimator.checks.faults import found
 from wheel_terra_estimator.checks.finding import Finding, NotChecked, Outcome
 from wheel_terra_estimator.checks.rover_facts import RoverFacts, side_of, wheel_names
 from wheel_terra_estimator.checks.series import Recording
@@ -25,50 +26,37 @@ DEFAULT_TOPICS = {
 
 def check_required(recording: Recording, configuration: Configuration | None) -> list[Outcome]:
     """Return the inputs that the estimator cannot do without and the recording does not have."""
-    found: list[Outcome] = []
+    outcomes: list[Outcome] = []
     own = configuration.wheel_odometry if configuration is not None else 'joint_states'
     if (recording.joints if own == 'joint_states' else recording.wheel_odometry) is None:
         other = recording.wheel_odometry
         cure = f'record the wheel rates, or name their topic: --remap {own}:=/TOPIC'
         if own == 'joint_states' and other is not None:
             cure = f'-p wheel_odometry:=odom --remap odom:={other.topic}'
-        found.append(_required(own, 'wheel rates', 'there is nothing to estimate', cure))
+        outcomes.append(_required(own, 'wheel rates', 'there is nothing to estimate', cure))
     if recording.imu is None:
         effect = 'a reference velocity alone then tells slip, and nothing the slope'
         cure = 'record the IMU, or name its topic: --remap imu/data:=/TOPIC'
-        found.append(_required('imu/data', 'IMU', effect, cure))
-    return found
+        outcomes.append(_required('imu/data', 'IMU', effect, cure))
+    return outcomes
 
 
 def _required(own: str, what: str, effect: str, cure: str) -> Finding:
-    return Finding(
-        kind='drop_outs',
-        topic=f'/{own}',
-        confidence=0.999,
-        words=f'no {what} in the recording, which the estimator needs: {effect}',
-        cure=cure,
-    )
+    return found('missing_input', f'/{own}', 0.999, what=what, effect=effect, how=cure)
 
 
 def check_topics(recording: Recording, remapped: Sequence[str]) -> list[Outcome]:
     """Return topics that are there under another name than the estimator listens to."""
-    found: list[Outcome] = []
+    outcomes: list[Outcome] = []
     for name, default in DEFAULT_TOPICS.items():
         series = getattr(recording, 'joints' if name == 'joint_states' else name)
         own = default.lstrip('/')
         if series is None or series.topic == default or own in remapped:
             continue
         if 'truth' not in series.topic:  # kept apart on purpose, to compare with
-            found.append(
-                Finding(
-                    kind='unknown_name',
-                    topic=series.topic,
-                    confidence=0.9,
-                    words=f'the estimator listens to {default}, the recording has {series.topic}',
-                    cure=f'--remap {own}:={series.topic}',
-                )
-            )
-    return found
+            remap = f'--remap {own}:={series.topic}'
+            outcomes.append(found('topic_name', series.topic, 0.9, own=default, remap=remap))
+    return outcomes
 
 
 def check_wheel_names(recording: Recording, facts: RoverFacts) -> list[Outcome]:
@@ -86,42 +74,24 @@ def check_wheel_names(recording: Recording, facts: RoverFacts) -> list[Outcome]:
     absent = [name for name in facts.names if name not in joints.names]
     spare = [name for name in wheel_names(joints.names) if name not in facts.names]
     renamed = _pairs(absent, spare)
-    found: list[Outcome] = []
+    outcomes: list[Outcome] = []
     if renamed:
         names = [renamed.get(name, name) for name in facts.names]
         listed = ', '.join(names)
         for own, other in renamed.items():
-            found.append(
-                Finding(
-                    kind='unknown_name',
-                    topic=joints.topic,
-                    wheel=own,
-                    parameter='wheels.names',
-                    confidence=0.95,
-                    words=f'no joint {own} in the recording, but {other}',
-                    cure=f'wheels.names: [{listed}]',
-                )
+            outcomes.append(
+                found('joint_name', joints.topic, 0.95, wheel=own, other=other, names=listed)
             )
-    for name in absent:
-        if name not in renamed:
-            found.append(_missing(joints.topic, name, 'is in no message'))
-    for name in facts.names:
-        if name in silent:
-            found.append(_missing(joints.topic, name, 'has no rate in any message'))
+    gone = [name for name in absent if name not in renamed]
+    if gone:
+        outcomes.append(_missing(joints.topic, gone, 'in no message'))
+    mute = [name for name in facts.names if name in silent]
+    if mute:
+        outcomes.append(_missing(joints.topic, mute, 'without a rate in every message'))
     for name in spare:
         if name not in renamed.values() and 'wheel' in name.lower() and name not in silent:
-            found.append(
-                Finding(
-                    kind='unknown_name',
-                    topic=joints.topic,
-                    wheel=name,
-                    parameter='wheels.names',
-                    confidence=0.7,
-                    words='turns like a wheel and is not in wheels.names',
-                    cure=f'add {name} to wheels.names, with its radius, width, x and y',
-                )
-            )
-    return found
+            outcomes.append(found('spare_joint', joints.topic, 0.7, wheel=name))
+    return outcomes
 
 
 def proposal(recording: Recording) -> dict[str, Any]:
@@ -134,18 +104,9 @@ def proposal(recording: Recording) -> dict[str, Any]:
     return {'remaps': remaps, 'wheels.names': list(names)}
 
 
-def _missing(topic: str, name: str, words: str) -> Finding:
-    return Finding(
-        kind='missing_wheel',
-        topic=topic,
-        wheel=name,
-        parameter='wheels.names',
-        confidence=0.99,
-        words=words,
-        cure=(
-            f'publish the joint {name}, or take it out of wheels.names and of every per-wheel list'
-        ),
-    )
+def _missing(topic: str, names: Sequence[str], how: str) -> Finding:
+    them = 'it' if len(names) == 1 else 'them'
+    return found('missing_wheel', topic, 0.99, wheel=', '.join(names), how=how, it=them)
 
 
 def _pairs(absent: Sequence[str], spare: Sequence[str]) -> dict[str, str]:

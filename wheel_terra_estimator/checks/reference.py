@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""The reference velocity: frame, unit, delay, jumps, noise and covariance."""
+"""The reference velocity: frame, unit, jumps, noise and covariance."""
 
 from __future__ import annotations
 
@@ -12,33 +12,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wheel_terra_estimator.checks.evidence import Evidence
+from wheel_terra_estimator.checks.faults import found
 from wheel_terra_estimator.checks.finding import Finding, NotChecked, Outcome
 from wheel_terra_estimator.checks.series import VelocitySeries
-from wheel_terra_estimator.checks.statistics import (
-    averaged,
-    correlation,
-    even_times,
-    lag,
-    moving_mean,
-    robust_std,
-)
+from wheel_terra_estimator.checks.statistics import correlation, robust_std
 
 FloatArray = NDArray[np.float64]
 
+LEAST_REFERENCES = 10
 JUMP_FACTOR = 8.0
 """A velocity that leaves its neighbours by so many times the usual scatter is a jump."""
 JUMP_SHARE = 0.005
 """Share of jumps that is a fault of the source, not a single wild reading."""
 LEAST_JUMP = 0.3
 """A jump is also larger than this share of the speed."""
-LAG_GAIN = 1.15
-"""By how much the unlike part has to shrink for a lag to count; a slow reference is ragged."""
-LEAST_DELAY = 0.25
-"""Delays below this [s] are left to jitter and filters of encoders."""
-SLOWEST_FOR_DELAY = 1.5
-"""Period of a reference [s] above which nothing is said of its delay."""
-LEAST_DELAY_PERIODS = 0.5
-"""The same in periods of the reference: between its stamps nothing is known."""
 COVARIANCE_FACTOR = 6.0
 """Ratio of stated to seen standard deviation that makes a covariance a placeholder."""
 TOO_SMALL_STD = 4.0
@@ -50,26 +37,26 @@ LEAST_UNIT_RATIO = 1.3
 KNOWN_UNITS = {'kilometres per hour': 3.6, 'millimetres per second': 1000.0, 'knots': 1.9438}
 
 
-def check_reference(evidence: Evidence, figures: dict[str, Any]) -> tuple[list[Outcome], Evidence]:
-    """Return what is wrong with the reference, and the evidence with its frame and unit mended."""
+def check_frame(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
+    """Return a reference in another frame or unit, and the evidence with that mended."""
+    reference = evidence.reference()
+    if reference is None or reference.stamp.size < LEAST_REFERENCES:
+        return [], evidence
+    frame, evidence = _frame(evidence, reference)
+    unit, evidence = _unit(evidence)
+    return [*frame, *unit], evidence
+
+
+def check_quality(evidence: Evidence, figures: dict[str, Any]) -> list[Outcome]:
+    """Return jumps of the reference, and what is wrong with its variance."""
     reference = evidence.reference()
     if reference is None:
         reason = 'no reference velocity in it (visual odometry, GNSS)'
-        return [NotChecked(kind, reason) for kind in ('delay', 'jumps', 'covariance')], evidence
-    if reference.stamp.size < 10:
-        return [NotChecked('jumps', 'hardly any reference velocity in it')], evidence
-    found: list[Outcome] = []
-    frame, evidence = _frame(evidence, reference)
-    found += frame
-    unit, evidence = _unit(evidence)
-    found += unit
-    reference = evidence.reference()
-    assert reference is not None
+        return [NotChecked(kind, reason) for kind in ('jumps', 'covariance')]
+    if reference.stamp.size < LEAST_REFERENCES:
+        return [NotChecked('jumps', 'hardly any reference velocity in it')]
     jumps, calm = _jumps(evidence, reference, figures)
-    found += jumps
-    found += _delay(evidence, replace(reference, velocity=calm), figures)
-    found += _covariance(evidence, calm[:, 0], reference, figures)
-    return found, evidence
+    return [*jumps, *_covariance(evidence, calm[:, 0], reference, figures)]
 
 
 def _frame(evidence: Evidence, reference: VelocitySeries) -> tuple[list[Outcome], Evidence]:
@@ -82,23 +69,7 @@ def _frame(evidence: Evidence, reference: VelocitySeries) -> tuple[list[Outcome]
         return [], evidence
     rotated = _turning_with_heading(evidence, reference)
     if rotated is not None:
-        return [
-            Finding(
-                kind='mounting',
-                topic=reference.topic,
-                confidence=0.95,
-                words=(
-                    'the direction of its velocity turns with the heading: it is given in '
-                    'the world '
-                    'frame'
-                ),
-                cure=(
-                    'publish twist in child_frame_id base_link (nav_msgs/Odometry), or turn '
-                    'it by the '
-                    'heading first'
-                ),
-            )
-        ], replace(
+        return [found('reference_world', reference.topic, 0.95)], replace(
             evidence,
             recording=replace(
                 evidence.recording,
@@ -111,19 +82,10 @@ def _frame(evidence: Evidence, reference: VelocitySeries) -> tuple[list[Outcome]
         angle = math.degrees(math.atan2(across, along))
         turned = np.column_stack([np.sign(across) * side, 0 * side, 0 * side])
         mended = replace(evidence.recording, reference=replace(reference, velocity=turned))
-        return [
-            Finding(
-                kind='mounting',
-                topic=reference.topic,
-                value=round(angle, 1),
-                std=5.0,
-                confidence=0.95,
-                words='the rover moves along y of its frame, not along x',
-                cure=(
-                    f'turn twist.linear by {-angle:.0f} degrees about z into base_link (x forward)'
-                ),
-            )
-        ], replace(evidence, recording=mended)
+        finding = found(
+            'reference_axis', reference.topic, 0.95, value=round(angle, 1), std=5.0, turn=-angle
+        )
+        return [finding], replace(evidence, recording=mended)
     return [], evidence
 
 
@@ -160,13 +122,13 @@ def _unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     for unit, factor in KNOWN_UNITS.items():
         if max(0.55 * factor, LEAST_UNIT_RATIO) < ratio < 1.25 * factor:
             mended = replace(reference, velocity=reference.velocity / factor)
-            outcome = Finding(
-                kind='unit',
-                topic=reference.topic,
+            outcome = found(
+                'reference_unit',
+                reference.topic,
+                0.9,
                 value=1.0 / factor,
-                confidence=0.9,
-                words=f'linear.x is {ratio:.3g} times the rim speed: it is in {unit}',
-                cure=f'multiply twist.linear by {1.0 / factor:.5g} in its driver (m/s, REP 103)',
+                ratio=ratio,
+                unit=unit,
             )
             return [outcome], replace(
                 evidence, recording=replace(evidence.recording, reference=mended)
@@ -198,67 +160,19 @@ def _jumps(
     velocity[2:-2, 0] = np.where(wild, beside, forward[2:-2])
     if share < JUMP_SHARE or wild.sum() < 3:
         return [], velocity
-    return [
-        Finding(
-            kind='jumps',
-            topic=reference.topic,
-            confidence=0.97,
-            words=(
-                f'{wild.sum()} velocities ({100 * share:.1f} %) leave their neighbours by up to '
-                f'{np.abs(off).max():.2g} m/s'
-            ),
-            cure=(
-                'use the filtered velocity of the receiver in place of differences of raw '
-                'positions, '
-                'and leave out what has no solution'
-            ),
-        )
-    ], velocity
+    finding = found(
+        'jumps',
+        reference.topic,
+        0.97,
+        count=int(wild.sum()),
+        share=100.0 * share,
+        most=float(np.abs(off).max()),
+    )
+    return [finding], velocity
 
 
 def _period(reference: VelocitySeries) -> float:
     return float(np.median(np.abs(np.diff(reference.stamp)))) * 1e-9
-
-
-def _delay(evidence: Evidence, reference: VelocitySeries, figures: dict[str, Any]) -> list[Outcome]:
-    step = 0.05
-    time = even_times(evidence.time, step)
-    at = (reference.stamp - evidence.origin) * 1e-9
-    order = np.argsort(at, kind='stable')
-    period = float(np.median(np.diff(at[order])))
-    rim = averaged(evidence.time, np.nan_to_num(evidence.rim)[:, None], time, 2 * step)[:, 0]
-    speed = np.interp(time, at[order], reference.velocity[order, 0])
-    # Between its stamps the reference is a straight line: the rims are smoothed as much.
-    for _ in range(2):
-        rim = moving_mean(rim, round(min(period, SLOWEST_FOR_DELAY) / step))
-    if period > SLOWEST_FOR_DELAY or float(np.std(rim)) < 0.1 * float(np.abs(rim).mean() + 1e-9):
-        return [NotChecked('delay', 'reference: hardly a change of speed in it; stop and go')]
-    found = lag(time, rim, speed, 3.0)
-    if found is None or found.fit < 0.9:
-        return [NotChecked('delay', 'reference: does not follow the wheels closely enough')]
-    figures['reference.delay_s'] = round(float(found.value), 3)
-    figures['reference.delay_std_s'] = round(found.std, 3)
-    if abs(found.value) < max(
-        LEAST_DELAY, LEAST_DELAY_PERIODS * period, 3.0 * found.std
-    ) or not found.clear(LAG_GAIN):
-        return []
-    return [
-        Finding(
-            kind='delay',
-            topic=reference.topic,
-            value=round(found.value, 3),
-            std=round(found.std, 3),
-            confidence=0.97,
-            words=(
-                f'its velocity comes {found.value:+.2f} s after that of the wheels, by the stamps'
-            ),
-            cure=(
-                f'take {found.value:.2f} s off the stamps of the reference: stamp the moment '
-                'of the '
-                'picture or measurement, not of the result (or the wheels late, if it is negative)'
-            ),
-        )
-    ]
 
 
 def _covariance(
@@ -272,20 +186,6 @@ def _covariance(
     figures['reference.stated_std_m_s'] = float(f'{usual:.3g}')
     constant = bool(np.ptp(stated) == 0.0) if stated.size else True
     parameter = 'sensors.reference_std'
-
-    def finding(kind: str, std: float, words: str, cure: str) -> list[Outcome]:
-        return [
-            Finding(
-                kind=kind,
-                topic=reference.topic,
-                parameter=parameter,
-                value=float(f'{std:.2g}'),
-                confidence=0.9,
-                words=words,
-                cure=cure,
-            )
-        ]
-
     if usual == 0.0:
         configuration = evidence.facts.configuration
         if configuration is not None and evidence.facts.stated(parameter):
@@ -299,23 +199,15 @@ def _covariance(
     elif constant and (usual > COVARIANCE_FACTOR * noise or usual * COVARIANCE_FACTOR < noise):
         words = f'states {usual:.2g} m/s, always the same, and scatters by {noise:.2g} m/s'
     elif noise > TOO_SMALL_STD * usual:
-        return finding(
-            'noise',
-            noise,
-            f'velocity scatters by {noise:.2g} m/s and states {usual:.2g} m/s',
-            f'state the variance {noise**2:.2g} in twist.covariance[0] '
-            f'({parameter}: {noise:.2g} where it states none)',
-        )
+        return [_noise_of('reference_noise', reference, noise, stated=usual)]
     else:
         return []
-    std = max(noise, LEAST_STD)
-    return finding(
-        'covariance',
-        std,
-        f'covariance is a placeholder: it {words}',
-        f'{parameter}: {std:.2g} and twist.covariance[0] = 0, or the true '
-        f'variance ({std**2:.2g}) there',
-    )
+    return [_noise_of('covariance', reference, max(noise, LEAST_STD), how=words)]
+
+
+def _noise_of(key: str, reference: VelocitySeries, noise: float, **figures: Any) -> Finding:
+    value = float(f'{noise:.2g}')
+    return found(key, reference.topic, 0.9, value=value, noise=noise, variance=noise**2, **figures)
 
 
 def _scatter(forward: FloatArray) -> float:

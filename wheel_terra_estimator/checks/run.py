@@ -9,7 +9,6 @@ finding. Each check runs apart: one that fails leaves what it was given as it wa
 from __future__ import annotations
 
 import logging
-import math
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import fields, replace
@@ -17,26 +16,27 @@ from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from wheel_terra_estimator.checks import (
-    alignment,
+    clocks,
     geometry,
     imu,
     names,
-    rate_noise,
     reference,
     rover_facts,
     sinkage,
     sinkage_order,
     torque,
     transport,
+    turning,
     wheel_rates,
 )
 from wheel_terra_estimator.checks.evidence import LEAST_MOVING_ROWS, Evidence, gather
+from wheel_terra_estimator.checks.faults import RANK
 from wheel_terra_estimator.checks.finding import (
     INTERNAL_ERROR,
     CheckReport,
-    Finding,
     NotChecked,
     Outcome,
 )
@@ -80,6 +80,7 @@ def examine(
         evidence = run_apart(
             report, 'sign', None, lambda: _examined(recording, configuration, remapped, report)
         )
+    report.findings.sort(key=lambda finding: RANK[finding.fault])
     return report, evidence
 
 
@@ -101,6 +102,7 @@ def _examined(
     remapped: Sequence[str],
     report: CheckReport,
 ) -> Evidence | None:
+    recording = clocks.corrected(recording, configuration)
     figures = report.figures
     joints = recording.joints.names if recording.joints is not None else ()
     facts = (
@@ -116,8 +118,16 @@ def _examined(
     take('unknown_name', lambda: names.check_topics(recording, remapped))
     take('missing_wheel', lambda: names.check_wheel_names(recording, facts))
     facts = _with_names_in(facts, report)
-    take('order', lambda: transport.check_transport(recording, figures))
+    told, offset = run_apart(
+        report,
+        'order',
+        ([], 0.0),
+        lambda: transport.check_transport(recording, configuration, figures),
+    )
+    report.take(told)
     recording = _whole_rows(recording)
+    if offset and recording.imu is not None:
+        recording = replace(recording, imu=clocks.shifted(recording.imu, round(offset * 1e9)))
     rotation = configured_mounting(configuration)
     unjudged: tuple[list[Outcome], imu.ImuState] = [], imu.ImuState(recording, rotation)
     outcomes, state = run_apart(
@@ -153,17 +163,19 @@ def _against_each_other(evidence: Evidence, report: CheckReport) -> Evidence:
 
     mend('mounting', lambda e: _tilt(e, figures))
     mend('missing_wheel', wheel_rates.check_dead_wheels)
-    mend('unit', _gyro_unit)
-    mend('sign', lambda e: _signs_and_unit(e, figures))
-    look('noise', rate_noise.check_noise)
-    mend('covariance', lambda e: reference.check_reference(e, figures))
+    mend('sign', turning.check_signs)
+    mend('unit', turning.check_gyro_unit)
+    mend('unit', lambda e: wheel_rates.check_unit(e, figures))
+    look('noise', wheel_rates.check_noise)
+    mend('mounting', reference.check_frame)
     mend('gain', lambda e: torque.check_torque(e, figures))
     mend('mounting', lambda e: _yaw(e, figures))
-    look('delay', alignment.check_clock)
+    mend('delay', lambda e: clocks.check_clocks(e, figures))
+    look('covariance', reference.check_quality)
     look('zero', imu.check_noise_and_zero)
     look('zero', sinkage.check_sinkage)
     look('exchanged_wheels', sinkage_order.check_order)
-    look('radius', geometry.check_radius)
+    mend('radius', lambda e: geometry.check_radius(e, figures))
     look('track', geometry.check_track)
     return evidence
 
@@ -194,9 +206,7 @@ def configured_mounting(configuration: Configuration | None) -> np.ndarray:
     roll, pitch, yaw = (
         getattr(sensors, f'imu_mounting_{axis}') for axis in ('roll', 'pitch', 'yaw')
     )
-    cosine, sine = math.cos(yaw), math.sin(yaw)
-    about_z = np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
-    return np.asarray(about_z @ imu.tilt_rotation(roll, pitch))
+    return np.asarray(Rotation.from_euler('xyz', [roll, pitch, yaw]).as_matrix())
 
 
 def _with_names_in(facts: RoverFacts, report: CheckReport) -> RoverFacts:
@@ -214,7 +224,7 @@ def _tilt(evidence: Evidence, figures: dict[str, Any]) -> tuple[list[Outcome], E
 
 
 def _yaw(evidence: Evidence, figures: dict[str, Any]) -> tuple[list[Outcome], Evidence]:
-    outcomes, rotation = alignment.check_yaw(evidence, figures)
+    outcomes, rotation = imu.check_yaw(evidence, figures)
     return outcomes, turned(evidence, rotation)
 
 
@@ -227,25 +237,3 @@ def turned(evidence: Evidence, rotation: np.ndarray) -> Evidence:
         force=None if evidence.force is None else evidence.force @ change.T,
         gyro=None if evidence.gyro is None else evidence.gyro @ change.T,
     )
-
-
-def _signs_and_unit(evidence: Evidence, figures: dict[str, Any]) -> tuple[list[Outcome], Evidence]:
-    unit, evidence = wheel_rates.check_unit(evidence, figures)
-    signs, evidence = wheel_rates.check_signs(evidence)
-    if any(isinstance(outcome, NotChecked) for outcome in unit):
-        # Wheels that count against each other hide the speed as well.
-        unit, evidence = wheel_rates.check_unit(evidence, figures)
-    return [*signs, *unit], evidence
-
-
-def _gyro_unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
-    """Judge the unit of the gyro; wheels that count backwards hide the turns from it."""
-    outcomes, judged = alignment.check_gyro_unit(evidence)
-    if not any(isinstance(outcome, NotChecked) for outcome in outcomes):
-        return outcomes, judged
-    _, mended = wheel_rates.check_signs(evidence)
-    again, judged = alignment.check_gyro_unit(mended)
-    if not any(isinstance(outcome, Finding) for outcome in again):
-        return outcomes, evidence
-    recording = replace(evidence.recording, imu=judged.recording.imu)
-    return again, replace(evidence, recording=recording, gyro=judged.gyro)

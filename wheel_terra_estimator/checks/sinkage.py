@@ -11,8 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wheel_terra_estimator.checks.evidence import Evidence
+from wheel_terra_estimator.checks.faults import found, listed
 from wheel_terra_estimator.checks.finding import Finding, NotChecked, Outcome
 from wheel_terra_estimator.checks.statistics import robust_std
+from wheel_terra_estimator.checks.trial import halves
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.sensor_errors import LinearErrors, SensorErrors
 
@@ -24,6 +26,8 @@ LEAST_READINGS = 50
 NOISE_FACTOR = 4.0
 BELOW_ZERO = 0.006
 """A median sinkage further above the ground than this [m] is no sinkage (lugs carry less)."""
+ALIKE_SHARE = 0.4
+"""Share by which the offset of a wheel may change over a drive to count as its zero [-]."""
 ODD_ZERO = 0.015
 """A wheel that reads this much less or more than every other of its side [m] is odd."""
 
@@ -33,34 +37,26 @@ def check_sinkage(evidence: Evidence, figures: dict[str, Any]) -> list[Outcome]:
     sinkage, facts = evidence.recording.sinkage, evidence.facts
     if sinkage is None:
         return [NotChecked('zero', 'no sinkage in the recording')]
-    found: list[Outcome] = []
-    for name in facts.configuration.wheels.names if facts.configuration else ():
-        if name not in sinkage.names:
-            found.append(
-                Finding(
-                    kind='missing_wheel',
-                    topic=sinkage.topic,
-                    wheel=name,
-                    confidence=0.9,
-                    words='has no sinkage',
-                    cure=f'publish the sinkage of {name}, nan while there is none',
-                )
-            )
+    outcomes: list[Outcome] = []
+    stated = facts.configuration.wheels.names if facts.configuration else ()
+    mute = [name for name in stated if name not in sinkage.names]
+    if mute:
+        outcomes.append(found('sinkage_missing', sinkage.topic, 0.9, wheel=', '.join(mute)))
     wheels = facts.configuration.wheels.names if facts.configuration else sinkage.names
     columns = [i for i, name in enumerate(sinkage.names) if name in wheels]
     table = sinkage.sinkage[:, columns]
     names = [sinkage.names[i] for i in columns]
     if not columns or np.isfinite(table).sum(axis=0).max() < LEAST_READINGS:
-        return [*found, NotChecked('zero', 'hardly any sinkage readings')]
+        return [*outcomes, NotChecked('zero', 'hardly any sinkage readings')]
     unit, table = _unit(evidence, table)
-    found += unit
+    outcomes += unit
     if facts.configuration is not None:
         table = without_stated_errors(facts.configuration, names, table)
     middle = np.array([_median(column) for column in table.T])
     figures['sinkage.median_m'] = [round(float(m), 4) for m in middle]
-    found += _sign_and_zero(evidence, names, table, middle)
-    found += _noise(evidence, table, figures)
-    return found
+    outcomes += _sign_and_zero(evidence, names, table, middle)
+    outcomes += _noise(evidence, table, figures)
+    return outcomes
 
 
 def without_stated_errors(
@@ -97,16 +93,15 @@ def _unit(evidence: Evidence, table: FloatArray) -> tuple[list[Outcome], FloatAr
         # Both the depth and the noise have to fit the unit.
         fits = 0.1 < noise * factor / max(stated, 1e-4) < 10.0 and level * factor < 0.8 * radius
         if (level > DEEPEST * radius or noise > 0.2 * radius) and fits:
-            outcome = Finding(
-                kind='unit',
-                topic=sinkage.topic,
+            outcome = found(
+                'sinkage_unit',
+                sinkage.topic,
+                0.97,
                 value=factor,
-                confidence=0.97,
-                words=(
-                    f'median sinkage {level:.3g} with noise {noise:.2g} at a wheel radius of '
-                    f'{radius:.3g} m: it is in {unit}'
-                ),
-                cure=f'multiply position by {factor:g} in the driver (m, REP 103)',
+                level=level,
+                noise=noise,
+                radius=radius,
+                unit=unit,
             )
             return [outcome], table * factor
     return [], table
@@ -125,10 +120,10 @@ def _sign_and_zero(
     lugs = float(np.max(configuration.wheels.lug_height)) if configuration else 0.0
     limit = BELOW_ZERO + lugs
     if np.nanmedian(middle) < -limit:
-        return _reversed_or_zero(evidence, names, table, float(np.nanmedian(middle)))
-    found: list[Outcome] = []
+        return [_reversed_or_zero(evidence, names, table, float(np.nanmedian(middle)))]
+    outcomes: list[Outcome] = []
     if np.nanmedian(np.abs(middle)) < limit:
-        found.append(NotChecked('sign', 'sinkage: hardly any in it; drive where it is soft'))
+        outcomes.append(NotChecked('sign', 'sinkage: hardly any in it; drive where it is soft'))
     for index, name in enumerate(names):
         others = np.delete(middle, index)
         if others.size < 2 or not np.isfinite(middle[index]):
@@ -140,73 +135,80 @@ def _sign_and_zero(
             typical = float(np.nanmedian(others))
             mirrored = abs(-middle[index] - typical) < 0.6 * typical
             kind = 'sign' if mirrored and _skew(reading) <= 0.0 else 'zero'
-            found.append(_one_wheel(evidence, name, kind, middle[index], typical))
-        elif abs(far) > max(ODD_ZERO, 3.0 * spread):
-            found.append(
+            outcomes.append(_one_wheel(evidence, name, kind, middle[index], typical))
+        elif abs(far) > max(ODD_ZERO, 3.0 * spread) and _lasting(table, index, far):
+            outcomes.append(
                 _one_wheel(evidence, name, 'zero', middle[index], float(np.nanmedian(others)))
             )
-    return found
+    return outcomes
+
+
+def _lasting(table: FloatArray, index: int, far: float) -> bool:
+    """Return whether a wheel reads so much more than the others in both halves, shallow and deep.
+
+    A zero shifts all readings; a wheel that digs itself in is deeper now and then.
+    """
+    apart = []
+    for part in halves(np.ones(table.shape[0])):
+        low, high = np.nanquantile(table[part], [0.1, 0.9], axis=0)
+        apart += [float(q[index] - np.nanmedian(np.delete(q, index))) for q in (low, high)]
+    return all(abs(one - far) < ALIKE_SHARE * abs(far) for one in apart)
 
 
 def _one_wheel(evidence: Evidence, name: str, kind: str, reading: float, typical: float) -> Finding:
     assert evidence.recording.sinkage is not None
     topic = evidence.recording.sinkage.topic
     off = reading - typical
-    zero = _whole_zero(evidence, name, off)
     if kind == 'sign':
-        return Finding(
-            kind='sign',
-            topic=topic,
-            wheel=name,
-            value=-1.0,
-            confidence=0.9,
-            words=f'median sinkage {1000 * reading:.0f} mm, the others {1000 * typical:.0f} mm',
-            cure=f'negate position of {name} in the driver (positive down)',
-        )
-    return Finding(
-        kind='zero',
-        topic=topic,
-        wheel=name,
-        parameter='sensors.sinkage_zero',
-        value=round(zero, 4),
-        confidence=0.9,
-        words=f'reads {1000 * off:+.0f} mm off the other wheels all the time',
-        cure=f'sensors.sinkage_zero: {zero:.4f} in the place of {name}',
+        others = f', the others {1000 * typical:.0f} mm'
+        told: dict[str, Any] = {'reading': 1000 * reading, 'others': others, 'of': f' of {name}'}
+        return found('sinkage_sign', topic, 0.9, wheel=name, value=-1.0, **told)
+    how = f'reads {1000 * off:+.0f} mm off the other wheels all the time'
+    return _zero(evidence, [name], off, 0.9, how, wheel=name)
+
+
+def _zero(
+    evidence: Evidence,
+    names: list[str],
+    left: float,
+    sure: float,
+    how: str,
+    wheel: str | None = None,
+) -> Finding:
+    """Return the finding of a zero [m] that is left in the readings of some wheels."""
+    sinkage, facts = evidence.recording.sinkage, evidence.facts
+    assert sinkage is not None
+    zeros = np.zeros(len(facts.names))
+    if facts.configuration is not None:
+        zeros = SensorErrors(facts.configuration).sinkage.zero.copy()
+    for name in names:
+        if name in facts.names:
+            zeros[facts.names.index(name)] = _whole_zero(evidence, name, left)
+    value = float(np.mean([_whole_zero(evidence, name, left) for name in names]))
+    return found(
+        'sinkage_zero',
+        sinkage.topic,
+        sure,
+        wheel=wheel,
+        value=round(value, 4),
+        how=how,
+        zeros=listed(zeros),
     )
 
 
 def _reversed_or_zero(
     evidence: Evidence, names: list[str], table: FloatArray, middle: float
-) -> list[Outcome]:
+) -> Finding:
     """Tell a reversed sign (deep spells go down) from a zero error (deep spells go up)."""
     sinkage = evidence.recording.sinkage
     assert sinkage is not None
     skew = float(np.median([_skew(column) for column in table.T]))
     top = float(np.nanmedian(np.nanquantile(table, 0.98, axis=0)))
     if top < 0.004 and skew < 0.3:
-        return [
-            Finding(
-                kind='sign',
-                topic=sinkage.topic,
-                value=-1.0,
-                confidence=0.9,
-                words=f'median sinkage {1000 * middle:.0f} mm: the wheels would float',
-                cure='negate position in the driver (sinkage is positive down)',
-            )
-        ]
-    zeros = [_whole_zero(evidence, name, middle) for name in names]
-    listed = ', '.join(f'{zero:.4f}' for zero in zeros)
-    return [
-        Finding(
-            kind='zero',
-            topic=sinkage.topic,
-            parameter='sensors.sinkage_zero',
-            value=round(float(np.mean(zeros)), 4),
-            confidence=0.8,
-            words=f'median sinkage {1000 * middle:.0f} mm: the wheels would float',
-            cure=f'sensors.sinkage_zero: [{listed}]',
-        )
-    ]
+        told: dict[str, Any] = {'reading': 1000 * middle, 'others': '', 'of': ''}
+        return found('sinkage_sign', sinkage.topic, 0.9, value=-1.0, **told)
+    how = f'median sinkage {1000 * middle:.0f} mm: the wheels would float'
+    return _zero(evidence, names, middle, 0.8, how)
 
 
 def _skew(column: FloatArray) -> float:
@@ -228,16 +230,13 @@ def _noise(evidence: Evidence, table: FloatArray, figures: dict[str, Any]) -> li
     if noise < NOISE_FACTOR * stated:
         return []
     return [
-        Finding(
-            kind='noise',
-            topic=sinkage.topic,
-            parameter='sensors.sinkage_std',
+        found(
+            'sinkage_noise',
+            sinkage.topic,
+            0.95,
             value=float(f'{noise:.2g}'),
-            confidence=0.95,
-            words=(
-                f'readings scatter by {1000 * noise:.2g} mm where the rover file has '
-                f'{1000 * stated:.2g} mm'
-            ),
-            cure=f'sensors.sinkage_std: {noise:.2g}',
+            noise=noise,
+            noise_mm=1000.0 * noise,
+            stated=1000.0 * stated,
         )
     ]

@@ -20,7 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wheel_terra_estimator.checks.evidence import Evidence
-from wheel_terra_estimator.checks.finding import Finding, NotChecked, Outcome
+from wheel_terra_estimator.checks.faults import found
+from wheel_terra_estimator.checks.finding import NotChecked, Outcome
 from wheel_terra_estimator.checks.series import SinkageSeries
 from wheel_terra_estimator.checks.statistics import (
     averaged,
@@ -68,44 +69,38 @@ def check_order(evidence: Evidence, figures: dict[str, Any]) -> list[Outcome]:
     compared = pairs(evidence, sinkage)
     wrong = [p for p in compared if p.sigmas < -CLEAR and p.correlation < -ALIKE]
     right = [p for p in compared if p.sigmas > CLEAR and p.correlation > ALIKE]
-    found: list[Outcome] = []
+    outcomes: list[Outcome] = []
     exchanged: set[str] = set()
     for pair in sorted(wrong, key=lambda p: p.correlation):
         if exchanged & {pair.first, pair.second}:
             continue
         exchanged |= {pair.first, pair.second}
-        found += [_finding(sinkage, pair, wheel) for wheel in (pair.first, pair.second)]
+        outcomes.append(
+            found(
+                'sinkage_order',
+                sinkage.topic,
+                confidence(abs(pair.sigmas)),
+                wheel=f'{pair.first}, {pair.second}',
+                fit=pair.correlation,
+                both=f'{pair.first} and {pair.second}',
+            )
+        )
     figures['sinkage.pairs_in_order'] = f'{len(right)} of {len(compared)}'
     open_pairs = [p for p in compared if p not in right and p not in wrong]
     if open_pairs or not compared:
         shown = ', '.join(f'{p.first} / {p.second}' for p in open_pairs[:SHOWN])
         listed = f' ({shown}{", ..." if len(open_pairs) > SHOWN else ""})' if shown else ''
-        found.append(
+        outcomes.append(
             _not_told(
                 f'{len(open_pairs) or "all"} pairs of wheels do not show theirs{listed}; drive '
                 'straight over soft, patchy ground, up and down, or along a side slope'
             )
         )
-    return found
+    return outcomes
 
 
 def _not_told(reason: str) -> NotChecked:
     return NotChecked('exchanged_wheels', f'order of the sinkage sensors: {reason}')
-
-
-def _finding(sinkage: SinkageSeries, pair: Pair, wheel: str) -> Finding:
-    other = pair.second if wheel == pair.first else pair.first
-    return Finding(
-        kind='exchanged_wheels',
-        topic=sinkage.topic,
-        wheel=wheel,
-        confidence=confidence(abs(pair.sigmas)),
-        words=(
-            f'its sinkage goes with the torque of {other}, and the other way round (correlation of '
-            f'the differences {pair.correlation:.2f})'
-        ),
-        cure=f'exchange {pair.first} and {pair.second} in the names of the sinkage message',
-    )
 
 
 def pairs(evidence: Evidence, sinkage: SinkageSeries) -> list[Pair]:
@@ -130,15 +125,15 @@ def pairs(evidence: Evidence, sinkage: SinkageSeries) -> list[Pair]:
             continue
         depth[name] = averaged(at[known], column[known, None], time, WINDOW)[rows, 0]
         thrust[name] = averaged(evidence.time, torque[:, None], time, WINDOW)[rows, 0]
-    found = []
+    compared = []
     for first, second in itertools.combinations(depth, 2):
         deeper = depth[first] - depth[second]
         harder = thrust[first] - thrust[second]
         deeper, harder = deeper - deeper.mean(), harder - harder.mean()
         slope = block_fit(deeper[:, None], harder)[0]
         sigmas = math.copysign(slope.sigmas_from(0.0), slope.value)
-        found.append(Pair(first, second, correlation(deeper, harder), sigmas))
-    return found
+        compared.append(Pair(first, second, correlation(deeper, harder), sigmas))
+    return compared
 
 
 def _slip(evidence: Evidence, time: FloatArray) -> FloatArray:

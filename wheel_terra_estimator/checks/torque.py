@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wheel_terra_estimator.checks.evidence import LEAST_MOVING_ROWS, Evidence
+from wheel_terra_estimator.checks.evidence import LEAST_MOVING_ROWS, Evidence, row_medians
+from wheel_terra_estimator.checks.faults import found, listed
 from wheel_terra_estimator.checks.finding import Finding, NotChecked, Outcome
 from wheel_terra_estimator.checks.statistics import (
     Estimate,
@@ -19,12 +20,15 @@ from wheel_terra_estimator.checks.statistics import (
     correlation,
     moving_mean,
 )
+from wheel_terra_estimator.checks.trial import Trial, tried
 from wheel_terra_estimator.estimation.sensor_errors import SensorErrors
 
 FloatArray = NDArray[np.float64]
 
 UPHILL_ENOUGH = -0.02
 """Specific force along the drive, in g, above which a driven wheel takes power."""
+ALIKE = 0.3
+"""Correlation of the changes of two torques that have the same sign [-]."""
 WRONG_SIGN = -0.4
 """Correlation of torque and rate below which the sign is wrong."""
 MOST_TRACTION = 0.85
@@ -57,17 +61,28 @@ def check_torque(evidence: Evidence, figures: dict[str, Any]) -> tuple[list[Outc
         return [NotChecked(kind, 'no torque in it (effort is empty or nan)') for kind in kinds], (
             evidence
         )
-    found, evidence = _signs(evidence)
+    if not np.nan_to_num(evidence.torque).any():
+        blank = evidence.with_rate(evidence.rate, np.full_like(evidence.torque, np.nan))
+        return [found('torque_placeholder', joints.topic, 0.99)], blank
+    outcomes, evidence = _signs(evidence)
     if not facts.known or evidence.force is None:
-        return found, evidence
+        return outcomes, evidence
     if not np.isfinite(evidence.torque).any(axis=0).all():
         reason = 'a wheel without torque: the sum is not known'
-        return [*found, *(NotChecked(kind, reason) for kind in kinds)], evidence
-    scale, evidence = _scale(evidence, figures)
-    found += scale
-    if not any(isinstance(o, Finding) for o in scale):
-        found += _gain(evidence, figures)
-    return found + _zeros(evidence, figures), evidence
+        return [*outcomes, *(NotChecked(kind, reason) for kind in kinds)], evidence
+    zeros = torque_zeros(evidence)
+    without = evidence
+    if zeros is not None:  # a zero looks like a resistance that no soil has, not the other way
+        table = evidence.torque - np.array([zero.value for zero in zeros])
+        without = evidence.with_rate(evidence.rate, table)
+    scale, without = _scale(without, figures)
+    if any(isinstance(o, Finding) for o in scale):
+        return [*outcomes, *scale], without
+    outcomes += scale
+    wrong = _zeros(evidence, zeros, figures)
+    if any(isinstance(o, Finding) for o in wrong) and zeros is not None:
+        evidence = without
+    return [*outcomes, *_gain(evidence, figures), *wrong], evidence
 
 
 def _signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
@@ -79,30 +94,31 @@ def _signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         rows &= along > UPHILL_ENOUGH
     if rows.sum() < LEAST_MOVING_ROWS:
         return [NotChecked('sign', 'torque: no stretch on the level or uphill')], evidence
-    found: list[Outcome] = []
+    fits = [
+        _sign_fit(evidence.torque[rows], evidence.rate[rows, i], i) for i in range(len(facts.names))
+    ]
+    wrong = [(i, fit) for i, (fit, _) in enumerate(fits) if fit < WRONG_SIGN]
+    if len(wrong) < len(fits):  # one way only: what goes with the other wheels is a zero
+        wrong = [(i, fit) for i, fit in wrong if not fits[i][1] > ALIKE]
     torque = evidence.torque.copy()
-    for index, name in enumerate(facts.names):
-        fit = correlation(evidence.torque[rows, index], evidence.rate[rows, index])
-        if fit < WRONG_SIGN:
-            found.append(
-                Finding(
-                    kind='sign',
-                    topic=joints.topic,
-                    wheel=name,
-                    value=-1.0,
-                    confidence=confidence(4.0 * abs(fit)),
-                    words=(
-                        'torque brakes where the wheel drives (correlation with its rate '
-                        f'{fit:.2f})'
-                    ),
-                    cure=(
-                        f'negate effort of {name} in the driver (wheels.direction flips rate and '
-                        'torque together)'
-                    ),
-                )
-            )
-            torque[:, index] *= -1.0
-    return found, evidence.with_rate(evidence.rate, torque)
+    torque[:, [i for i, _ in wrong]] *= -1.0
+    if not wrong:
+        return [], evidence
+    sure = confidence(4.0 * min(abs(fit) for _, fit in wrong))
+    names = ', '.join(facts.names[i] for i, _ in wrong)
+    finding = found('torque_sign', joints.topic, sure, wheel=names, value=-1.0)
+    return [finding], evidence.with_rate(evidence.rate, torque)
+
+
+def _sign_fit(torque: FloatArray, rate: FloatArray, index: int) -> tuple[float, float]:
+    """Return the correlation of a wheel's torque with its rate, a zero taken off where both ways
+    tell it, and that of its changes with those of the other wheels (nan where both ways do).
+    """
+    own, others = torque[:, index], row_medians(np.delete(torque, index, axis=1))
+    if min(int((rate > 0.0).sum()), int((rate < 0.0).sum())) > LEAST_MOVING_ROWS:
+        middle = 0.5 * (np.nanmean(own[rate > 0.0]) + np.nanmean(own[rate < 0.0]))
+        return correlation(own - middle, rate), math.nan
+    return correlation(own, rate), correlation(own - np.nanmean(own), others - others.mean())
 
 
 def thrust(evidence: Evidence) -> FloatArray:
@@ -116,21 +132,17 @@ def _scale(evidence: Evidence, figures: dict[str, Any]) -> tuple[list[Outcome], 
     assert joints is not None and evidence.force is not None
     rows = evidence.straight
     if rows.sum() < LEAST_MOVING_ROWS:
-        rows = evidence.moving
+        reason = (
+            'torque: no straight, steady stretch in it: wheels push against each other in turns'
+        )
+        return [NotChecked('gain', reason)], evidence
     weight = facts.mass * facts.gravity
     forward = np.sign(evidence.rim[rows])
     level = (thrust(evidence)[rows] - facts.mass * evidence.force[rows, 0]) * forward
     traction = float(np.median(level)) / weight
     figures['torque.level_traction'] = round(traction, 4)
     if traction > UNIT_TRACTION:
-        outcome = Finding(
-            kind='unit',
-            topic=joints.topic,
-            value=1e-3,
-            confidence=0.97,
-            words=f'sum of T/r is {traction:.0f} times the weight on the level: effort is in N mm',
-            cure='multiply effort by 0.001 in the driver (N m, REP 103)',
-        )
+        outcome = found('torque_unit', joints.topic, 0.97, value=1e-3, traction=traction)
         return [outcome], evidence.with_rate(evidence.rate, evidence.torque * 1e-3)
     if traction > MOST_TRACTION or traction < LEAST_TRACTION:
         return [
@@ -149,26 +161,18 @@ def _off_scale(evidence: Evidence, traction: float) -> Finding:
         whole = whole_gain(evidence, fit.value)
         gain = ', '.join(f'{one:.3g}' for one in whole)
         value, std = float(np.mean(whole)), float(np.mean(whole)) * fit.std / fit.value
-    return Finding(
-        kind='gain',
-        topic=joints.topic,
-        parameter='sensors.torque_gain',
-        value=value,
-        std=std,
-        confidence=0.8,
-        words=(
-            f'sum of T/r is {traction:.3g} of the weight on the level, what no soil asks for: '
-            'a motor current, or a torque before the gear?'
-        ),
-        cure=(
-            f'sensors.torque_gain: [{gain}], or turn current into torque at the wheel '
-            '(motor constant times gear ratio times efficiency)'
-        ),
-    )
+    figures: dict[str, Any] = {'value': value, 'std': std, 'traction': traction, 'gains': gain}
+    return found('torque_scale', joints.topic, 0.8, **figures)
 
 
 def _slope_fit(evidence: Evidence) -> Estimate | None:
     """Return thrust over mass times specific force: torque gain times true over stated mass."""
+    fitted = _slope_rows(evidence)
+    return None if fitted is None else block_fit(*fitted)[0]
+
+
+def _slope_rows(evidence: Evidence) -> tuple[FloatArray, FloatArray] | None:
+    """Return columns of a fit of the thrust [N], and the thrust; None without slopes."""
     assert evidence.force is not None
     rows = evidence.straight
     if rows.sum() < 3 * LEAST_MOVING_ROWS:
@@ -182,7 +186,20 @@ def _slope_fit(evidence: Evidence) -> Estimate | None:
     columns = [evidence.facts.mass * along, sense]
     if (sense > 0).any() and (sense < 0).any():
         columns.append(np.ones(along.size))
-    return block_fit(np.column_stack(columns), pushed)[0]
+    return np.column_stack(columns), pushed
+
+
+def _gain_trial(evidence: Evidence) -> Trial | None:
+    """Try a scale of the torques, found on one half of the slopes, on the other."""
+    fitted = _slope_rows(evidence)
+    if fitted is None:
+        return None
+    design, pushed = fitted
+    return tried(
+        lambda rows: block_fit(design[rows], pushed[rows])[0].value,
+        1.0,
+        (design[:, 0] - design[:, 0].mean()) ** 2,
+    )
 
 
 def _smooth(values: FloatArray) -> FloatArray:
@@ -219,6 +236,12 @@ def torque_gain(evidence: Evidence, figures: dict[str, Any]) -> Estimate | NotCh
         return NotChecked(
             'gain', f'torque: soft ground (it costs {traction:.2f} of the weight); drive on firm'
         )
+    trial = _gain_trial(evidence)
+    if abs(fit.value - 1.0) > LEAST_GAIN_ERROR and not (trial and trial.falls):
+        return NotChecked(
+            'gain',
+            'torque: its scale by one half of the drive does not fit the slopes of the other',
+        )
     return Estimate(fit.value, math.hypot(fit.std, GAIN_MODEL_STD))
 
 
@@ -232,33 +255,41 @@ def _gain(evidence: Evidence, figures: dict[str, Any]) -> list[Outcome]:
     figures['torque.gain_std'] = round(gain.std, 4)
     stated = facts.configuration.sensors.torque_gain_std
     sigmas = abs(gain.value - 1.0) / math.hypot(gain.std, stated)
-    if sigmas < 3.0 or abs(gain.value - 1.0) < LEAST_GAIN_ERROR or gain.value <= 0.0:
+    if abs(gain.value - 1.0) < LEAST_GAIN_ERROR or gain.value <= 0.0:
         return []
+    if sigmas < 3.0:
+        reason = f'torque: {gain.value:.2f} is within what the rover file leaves open ({stated:g})'
+        return [NotChecked('gain', reason), NotChecked('mass', reason)]
+    trial = _gain_trial(evidence)
+    assert trial is not None
     whole = whole_gain(evidence, gain.value)
-    listed = ', '.join(f'{one:.3f}' for one in whole)
     middle = float(np.mean(whole))
     mass = facts.mass * gain.value
-    words = f'slopes cost {gain.value:.2f} +- {gain.std:.2f} of what weight and torque say'
+    sure = 0.5 * confidence(sigmas)
+    told: dict[str, Any] = {
+        'gain': gain.value,
+        'off': gain.std,
+        'mass': mass,
+        'gains': listed(whole, '.3f'),
+        'trial': trial.words('gain left', ''),
+    }
+    told_std = round(middle * gain.std / gain.value, 4)
     return [
-        Finding(
-            kind='gain',
-            topic=joints.topic,
-            parameter='sensors.torque_gain',
+        found(
+            'torque_gain',
+            joints.topic,
+            sure,
             value=round(middle, 4),
-            std=round(middle * gain.std / gain.value, 4),
-            confidence=0.5 * confidence(sigmas),
-            words=f'{words}: the torque has another scale, or the mass is another',
-            cure=f'sensors.torque_gain: [{listed}]',
+            std=told_std,
+            **told,
         ),
-        Finding(
-            kind='mass',
-            topic=joints.topic,
-            parameter='rover.mass',
+        found(
+            'mass',
+            joints.topic,
+            sure,
             value=round(mass, 2),
             std=round(facts.mass * gain.std, 2),
-            confidence=0.5 * confidence(sigmas),
-            words=f'{words}: the mass is another, or the torque has another scale',
-            cure=f'rover.mass: {mass:.1f}',
+            **told,
         ),
     ]
 
@@ -304,14 +335,14 @@ def drive_friction(evidence: Evidence) -> Estimate | NotChecked:
     return Estimate(mean, math.hypot(scatter, zero / math.sqrt(len(wheels)), noise))
 
 
-def _zeros(evidence: Evidence, figures: dict[str, Any]) -> list[Outcome]:
+def _zeros(
+    evidence: Evidence, zeros: list[Estimate] | None, figures: dict[str, Any]
+) -> list[Outcome]:
     joints, facts = evidence.recording.joints, evidence.facts
     assert joints is not None and facts.configuration is not None
     stated = max(float(facts.configuration.sensors.torque_zero_std), 1e-3)
     driving = float(np.nanmedian(np.abs(evidence.torque[evidence.moving])))
     rest = evidence.at_rest
-    found: list[Outcome] = []
-    zeros = torque_zeros(evidence)
     where = 'driving both ways'
     if zeros is None:
         if rest.sum() < LEAST_MOVING_ROWS:
@@ -330,22 +361,22 @@ def _zeros(evidence: Evidence, figures: dict[str, Any]) -> list[Outcome]:
         if abs(zero.value) > limit:
             wrong.append((name, zero))
     whole = dict(zip(facts.names, whole_zeros(evidence, zeros), strict=True))
-    listed = ', '.join(f'{zero.value:.2f}' for zero in whole.values())
-    for name, zero in wrong:
-        found.append(
-            Finding(
-                kind='zero',
-                topic=joints.topic,
-                wheel=name,
-                parameter='sensors.torque_zero',
-                value=round(whole[name].value, 3),
-                std=round(whole[name].std, 3),
-                confidence=confidence(zero.sigmas_from(0.0)),
-                words=f'torque reads {zero.value:.2f} N m off zero, {where}',
-                cure=f'sensors.torque_zero: [{listed}]',
-            )
+    if not wrong:
+        return []
+    first = whole[wrong[0][0]]
+    return [
+        found(
+            'torque_zero',
+            joints.topic,
+            confidence(min(zero.sigmas_from(0.0) for _, zero in wrong)),
+            wheel=', '.join(name for name, _ in wrong),
+            value=round(first.value, 3),
+            std=round(first.std, 3),
+            left=', '.join(f'{zero.value:.2f}' for _, zero in wrong),
+            where=where,
+            zeros=listed((zero.value for zero in whole.values()), '.2f'),
         )
-    return found
+    ]
 
 
 def heading_of_torque(evidence: Evidence) -> Estimate | None:

@@ -8,8 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from wheel_terra_estimator.checks.finding import Finding, Outcome
+from wheel_terra_estimator.checks.faults import found
+from wheel_terra_estimator.checks.finding import Outcome
 from wheel_terra_estimator.checks.series import Channel, Recording
+from wheel_terra_estimator.checks.statistics import robust_std
+from wheel_terra_estimator.configuration.configuration import Configuration
 
 LONGEST_GAP = 0.5
 """A gap of the wheel odometry or the IMU longer than this [s] leaves the estimator blind."""
@@ -25,9 +28,12 @@ CLOCK_DIFFERENCE = 1.0
 """Greatest difference between the clocks (log time minus stamp) of two topics [s]."""
 
 
-def check_transport(recording: Recording, figures: dict[str, Any]) -> list[Outcome]:
-    """Return what is wrong with the stamps of the input topics."""
-    found: list[Outcome] = []
+def check_transport(
+    recording: Recording, configuration: Configuration | None, figures: dict[str, Any]
+) -> tuple[list[Outcome], float]:
+    """Return what is wrong with the stamps, and how late those of the IMU are by log time [s]."""
+    outcomes: list[Outcome] = []
+    offset_left = 0.0
     delays = {}
     channels = (recording.joints, recording.imu, recording.sinkage, recording.reference)
     for name, channel in zip(
@@ -37,31 +43,41 @@ def check_transport(recording: Recording, figures: dict[str, Any]) -> list[Outco
             continue
         disorder = _order(channel)
         gaps = _drop_outs(name, channel, figures)
-        found += disorder or gaps
+        outcomes += disorder or gaps
         delays[name] = float(np.median(channel.log_time - channel.stamp)) * 1e-9
         figures[f'{name}.log_minus_stamp_s'] = round(delays[name], 4)
     if 'joint_states' in delays and 'imu' in delays and recording.imu is not None:
         difference = delays['imu'] - delays['joint_states']
         if abs(difference) > CLOCK_DIFFERENCE:
-            found.append(
-                Finding(
-                    kind='delay',
-                    topic=recording.imu.topic,
-                    value=round(difference, 3),
-                    std=0.0,
-                    confidence=0.999,
-                    words=(
-                        f'its stamps lie {difference:+.3g} s off those of the wheels by log time: '
-                        'two clocks'
-                    ),
-                    cure=(
-                        'synchronise the clocks (chrony, PTP) or let the driver stamp with '
-                        'the clock '
-                        'of the computer that records'
-                    ),
+            stated = 0.0
+            if configuration is not None:
+                stated = float(configuration.sensors.imu_stamp_offset)
+            offset = stated - difference
+            outcomes.append(
+                found(
+                    'imu_offset',
+                    recording.imu.topic,
+                    0.999,
+                    value=round(offset, 3),
+                    std=_jitter(recording.imu, recording.joints),
+                    channel='imu',
+                    offset=offset,
+                    offset_left=-difference,
+                    against='by log time, two clocks',
                 )
             )
-    return found
+            offset_left = -difference
+    return outcomes, offset_left
+
+
+def _jitter(*channels: Channel | None) -> float:
+    """Return the deviation of the usual time from stamp to log time of some channels [s]."""
+    parts = [
+        robust_std(np.asarray((c.log_time - c.stamp) * 1e-9, dtype=np.float64))
+        for c in channels
+        if c is not None
+    ]
+    return round(float(np.hypot.reduce(parts)), 4)
 
 
 def _order(channel: Channel) -> list[Outcome]:
@@ -84,17 +100,7 @@ def _order(channel: Channel) -> list[Outcome]:
         words.append(f'{100 * repeated:.0f} % of the stamps repeat the one before')
     if not words:
         return []
-    return [
-        Finding(
-            kind='order',
-            topic=channel.topic,
-            confidence=0.99,
-            words='; '.join(words),
-            cure=(
-                'stamp each message in the driver, once, when it is measured, and publish in order'
-            ),
-        )
-    ]
+    return [found('order', channel.topic, 0.99, how='; '.join(words))]
 
 
 def _drop_outs(name: str, channel: Channel, figures: dict[str, Any]) -> list[Outcome]:
@@ -113,17 +119,13 @@ def _drop_outs(name: str, channel: Channel, figures: dict[str, Any]) -> list[Out
     if not gaps.size and not (needed and missing > GAP_SHARE):
         return []
     return [
-        Finding(
-            kind='drop_outs',
-            topic=channel.topic,
-            confidence=0.99,
-            words=(
-                f'{gaps.size} gaps, the longest {step.max():.2g} s at a period of {period:.3g} s; '
-                f'{100 * missing:.1f} % of the messages are missing'
-            ),
-            cure=(
-                'look at the load of bus and network, and record with a larger cache '
-                '(ros2 bag record --max-cache-size)'
-            ),
+        found(
+            'drop_outs',
+            channel.topic,
+            0.99,
+            gaps=gaps.size,
+            longest=float(step.max()),
+            period=period,
+            missing=100.0 * missing,
         )
     ]

@@ -709,6 +709,23 @@ DECLARED: tuple[Parameter, ...] = (
         'typical age of a reference velocity when it arrives',
         at_least=0.0,
     ),
+    *(
+        number(
+            f'sensors.{name}_stamp_offset',
+            0.0,
+            's',
+            f'what the stamps of {topic} lie too late (negative: too early); taken off them before '
+            'anything else',
+            at_least=-1.0e4,
+            at_most=1.0e4,
+        )
+        for name, topic in (
+            ('imu', 'imu/data'),
+            ('wheel_odometry', 'joint_states or odom'),
+            ('reference', 'reference_odom'),
+            ('sinkage', 'sinkage'),
+        )
+    ),
     # Filter: time
     number(
         'filter.silence',

@@ -1,8 +1,9 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Known errors of the sensors: the zeros, gains and biases that the configuration states.
+"""Known errors of the sensors: the zeros, gains, biases and stamp offsets of the configuration.
 
-A sensor reads ``gain * true + zero``; an IMU reads its bias on top, in ``base_link``. Readings are
+A sensor reads ``gain * true + zero``; an IMU reads its bias on top, in ``base_link``; stamps are
+late by their offset. Readings are
 corrected once, where they enter the estimator core or the rows of a drive; the simulator makes
 readings the other way round. An instrument effect in a model (``torque_gain``, ``sinkage_offset``)
 is what is left after this correction.
@@ -20,6 +21,7 @@ from wheel_terra_estimator.estimation.measurements import (
     FloatArray,
     InertialReading,
     Measurement,
+    ReferenceVelocity,
     SinkageReading,
     WheelOdometry,
 )
@@ -53,7 +55,8 @@ class SensorErrors:
     ----------
     configuration : Configuration
         ``sensors.torque_zero`` [N m], ``torque_gain`` [-], ``sinkage_zero`` [m], ``sinkage_gain``
-        [-], ``specific_force_bias`` [m/s^2] and ``angular_rate_bias`` [rad/s].
+        [-], ``specific_force_bias`` [m/s^2], ``angular_rate_bias`` [rad/s] and the
+        ``*_stamp_offset`` [s].
     """
 
     def __init__(self, configuration: Configuration) -> None:
@@ -64,6 +67,12 @@ class SensorErrors:
         self.specific_force_bias: FloatArray = sensors.specific_force_bias
         self.angular_rate_bias: FloatArray = sensors.angular_rate_bias
         self._biased = bool(self.specific_force_bias.any() or self.angular_rate_bias.any())
+        self._late: dict[type, int] = {
+            WheelOdometry: round(sensors.wheel_odometry_stamp_offset * 1e9),
+            InertialReading: round(sensors.imu_stamp_offset * 1e9),
+            SinkageReading: round(sensors.sinkage_stamp_offset * 1e9),
+            ReferenceVelocity: round(sensors.reference_stamp_offset * 1e9),
+        }
 
     def corrected(self, measurement: Measurement) -> Measurement:
         """Return a measurement without the stated errors; itself where none is stated.
@@ -71,6 +80,7 @@ class SensorErrors:
         A message with the wrong number of wheels, and an accelerometer that is not running, are
         returned as they are, for the checks of the inputs to refuse.
         """
+        measurement = self._stamped(measurement, -1)
         if isinstance(measurement, WheelOdometry):
             if self.torque.none or len(measurement.torque) != self._count:
                 return measurement
@@ -85,6 +95,7 @@ class SensorErrors:
 
     def as_read(self, measurement: Measurement) -> Measurement:
         """Return a true measurement as these sensors would read it."""
+        measurement = self._stamped(measurement, 1)
         if isinstance(measurement, WheelOdometry) and not self.torque.none:
             return replace(measurement, torque=self.torque.reading(measurement.torque))
         if isinstance(measurement, SinkageReading) and not self.sinkage.none:
@@ -92,6 +103,12 @@ class SensorErrors:
         if isinstance(measurement, InertialReading):
             return self._with_bias(measurement, 1.0)
         return measurement
+
+    def _stamped(self, measurement: Measurement, sign: int) -> Measurement:
+        late = self._late.get(type(measurement), 0)
+        if not late or measurement.stamp <= 0:  # 0 stays no stamp
+            return measurement
+        return replace(measurement, stamp=measurement.stamp + sign * late)
 
     def _with_bias(self, reading: InertialReading, sign: float) -> InertialReading:
         if not self._biased or not np.any(reading.specific_force):

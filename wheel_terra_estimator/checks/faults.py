@@ -1,0 +1,515 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""All faults that the checks know, worst first: one entry each, for recordings and while driving.
+
+``prior`` is how likely a fault is beside its rivals, those that the same evidence could come from;
+``trial`` says whether its cure can be tried on the other half of a recording.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from wheel_terra_estimator.checks.finding import Finding
+
+RATE_UNITS = {
+    'revolutions per minute': 2.0 * math.pi / 60.0,
+    'degrees per second': math.pi / 180.0,
+    'revolutions per second': 2.0 * math.pi,
+    'thousandths of rad/s': 1e-3,
+}
+"""Units that wheel rates come in by mistake: factor to rad/s."""
+SKID_TRACKS = (0.7, 6.0)
+"""Effective over geometric track of rovers, skidding or not [-]."""
+LEAST_TURN_RATE = 0.02
+"""Yaw rate [rad/s] below which sides are not compared."""
+STANDARD_GRAVITY = 9.80665  # [m/s^2]
+
+
+@dataclass(frozen=True)
+class Fault:
+    """A kind of fault.
+
+    Attributes
+    ----------
+    kind : str
+        One of ``finding.KINDS``.
+    words, cure : str
+        Format strings of what was seen and what mends it.
+    parameter : str or None
+        Key of the rover file that mends it.
+    evidence : str
+        What it touches: faults that touch the same compete.
+    prior : float
+        Relative probability among these.
+    trial : bool
+        Whether its cure is tried on the other half of the recording before it is named.
+    """
+
+    kind: str
+    words: str
+    cure: str
+    parameter: str | None = None
+    evidence: str = 'itself'
+    prior: float = 1.0
+    trial: bool = False
+
+
+_DIRECTIONS = 'wheels.direction: [{directions}]'
+_OFFSET = 'sensors.{channel}_stamp_offset: {offset:.3f}, or synchronise the clocks'
+_LATE = 'its stamps lie {offset_left:+.2f} +- {std:.2f} s off the others: {against}'
+
+FAULTS: dict[str, Fault] = {
+    # Names and missing inputs
+    'missing_input': Fault(
+        'drop_outs',
+        'no {what} in the recording, which the estimator needs: {effect}',
+        '{how}',
+    ),
+    'topic_name': Fault(
+        'unknown_name',
+        'the estimator listens to {own}, the recording has {topic}',
+        '{remap}',
+    ),
+    'missing_wheel': Fault(
+        'missing_wheel',
+        '{how}',
+        'publish {wheels}, or take {it} out of wheels.names and of every per-wheel list',
+        'wheels.names',
+    ),
+    'joint_name': Fault(
+        'unknown_name',
+        'no joint of this name in the recording, but {other}',
+        'wheels.names: [{names}]',
+        'wheels.names',
+    ),
+    'spare_joint': Fault(
+        'unknown_name',
+        'turns like a wheel and is not in wheels.names',
+        'add {wheels} to wheels.names, with radius, width, x and y',
+        'wheels.names',
+    ),
+    # Units and gravity
+    'rate_unit': Fault(
+        'unit',
+        'velocity is in {unit} ({how})',
+        'multiply velocity by {value:.6g} in the driver (rad/s, REP 103)',
+    ),
+    'rate_counts': Fault(
+        'unit',
+        'velocity is {times:.0f} times what the {how} allows: counts of an encoder per second, '
+        'about {counts:.0f} in a turn of the wheel?',
+        'multiply velocity by 2 pi / counts per turn (about {value:.3g}) in the driver '
+        '(rad/s, REP 103)',
+    ),
+    'absurd_rate': Fault(
+        'unit',
+        'rim speed {figure:.3g} m/s: velocity is not in rad/s',
+        'publish rad/s (REP 103): revolutions per minute times 0.10472, degrees per second '
+        'times 0.0174533',
+    ),
+    'gravity_off': Fault(
+        'gravity',
+        'mean specific force {size:.3g} m/s^2 where gravity is {gravity:.4g}: gravity was taken '
+        'off',
+        'publish the specific force with gravity (+g on z at rest, REP 145), such as '
+        'imu/data_raw in place of a linear acceleration',
+    ),
+    'force_unit': Fault(
+        'unit',
+        'mean specific force {size:.3g} where gravity is {gravity:.4g}: linear_acceleration is '
+        'in {unit}',
+        'multiply linear_acceleration by {value:.5g} in the driver (m/s^2, REP 103)',
+    ),
+    'planet': Fault(
+        'gravity',
+        'mean specific force {size:.3g} m/s^2 where gravity is {gravity:.4g}: this is {place}',
+        'rover.gravity: {value:.4g}',
+        'rover.gravity',
+    ),
+    'force_scale': Fault(
+        'gain',
+        'mean specific force {size:.3g} m/s^2 where gravity is {gravity:.4g}: the accelerometer '
+        'has another scale',
+        'multiply linear_acceleration by {value:.4g} in the driver, or state rover.gravity',
+    ),
+    'gyro_degrees': Fault(
+        'unit',
+        'angular_velocity is {times:.0f} times what the {how} allows: degrees per second',
+        'multiply angular_velocity by 0.0174533 in the driver (rad/s, REP 103)',
+        evidence='turns',
+    ),
+    'force_zero': Fault(
+        'placeholder',
+        '{field} is 0 in every message',
+        'fill {field}, or say that there is none: {field}_covariance[0] = -1',
+    ),
+    'orientation_placeholder': Fault(
+        'placeholder',
+        'orientation is ({shown}) in every message',
+        'say that there is none: orientation_covariance[0] = -1 (REP 145)',
+    ),
+    'torque_placeholder': Fault(
+        'placeholder',
+        'effort is 0 in every message',
+        'publish the torque at the wheel, or leave effort empty where there is none',
+    ),
+    # Signs and places of the wheels
+    'imu_upside': Fault(
+        'mounting',
+        '{force}: the IMU is mounted upside down or on its side',
+        '{angles}',
+        evidence='gravity',
+    ),
+    'backwards': Fault(
+        'sign',
+        'counts backwards when the rover drives forward{trial}',
+        _DIRECTIONS + '{torque}',
+        'wheels.direction',
+        evidence='turns',
+        trial=True,
+    ),
+    'one_side_backwards': Fault(
+        'sign',
+        'left and right wheels turn against each other while the gyro sees no turn: one side '
+        'counts backwards',
+        'wheels.direction: [{left}] if the left side is the one, [{right}] if the right',
+        'wheels.direction',
+        evidence='turns',
+    ),
+    'all_backwards': Fault(
+        'sign',
+        'all wheels may count backwards: they run against the reference',
+        _DIRECTIONS,
+        'wheels.direction',
+        evidence='direction',
+        prior=0.4,
+    ),
+    'reference_reversed': Fault(
+        'sign',
+        'linear.x runs against the wheels',
+        'negate twist.linear.x in its driver, or turn its frame into base_link{or_wheels}',
+        evidence='direction',
+        prior=0.6,
+    ),
+    'swapped_sides': Fault(
+        'swapped_sides',
+        'left and right wheels turn against the gyro: the sides are swapped{rival}{trial}',
+        'exchange left and right in wheels.names: [{names}]{mirrored}',
+        'wheels.names',
+        evidence='turns',
+        prior=0.5,
+        trial=True,
+    ),
+    'gyro_reversed': Fault(
+        'sign',
+        'angular_velocity.{axis} turns against {against}',
+        'negate angular_velocity.{axis} in the driver (REP 103: positive to the left; no '
+        'mounting angle does that)',
+        evidence='turns',
+        prior=0.5,
+    ),
+    'exchanged': Fault(
+        'exchanged_wheels',
+        'each turns like a wheel of the other side{trial}',
+        'wheels.names: [{names}]',
+        'wheels.names',
+        evidence='turns',
+        trial=True,
+    ),
+    'rate_frozen': Fault(
+        'frozen',
+        '{how} while the other wheels change',
+        'look at encoder and cable of {wheels}; publish nan, or leave it out of the message, '
+        'while it is dead',
+        'wheels.names',
+        evidence='turns',
+    ),
+    'sensor_frozen': Fault(
+        'frozen',
+        '{how}',
+        'publish a message when the sensor has measured, not on a timer; nothing while it is dead',
+    ),
+    # Stamps
+    'order': Fault(
+        'order',
+        '{how}',
+        'stamp each message in the driver, once, when it is measured, and publish in order',
+    ),
+    'drop_outs': Fault(
+        'drop_outs',
+        '{gaps} gaps, the longest {longest:.2g} s at a period of {period:.3g} s; '
+        '{missing:.1f} % of the messages are missing',
+        'look at the load of bus and network, and record with a larger cache '
+        '(ros2 bag record --max-cache-size)',
+    ),
+    'imu_offset': Fault(
+        'delay', _LATE, _OFFSET, 'sensors.imu_stamp_offset', 'lags', 0.35, trial=True
+    ),
+    'reference_offset': Fault(
+        'delay', _LATE, _OFFSET, 'sensors.reference_stamp_offset', 'lags', 0.45, trial=True
+    ),
+    'wheel_odometry_offset': Fault(
+        'delay', _LATE, _OFFSET, 'sensors.wheel_odometry_stamp_offset', 'lags', 0.2, trial=True
+    ),
+    'sinkage_offset': Fault('delay', _LATE, _OFFSET, 'sensors.sinkage_stamp_offset', 'lags', 0.2),
+    # IMU
+    'imu_yaw': Fault(
+        'mounting',
+        'forward acceleration, curves and slopes show {angle:.0f} +- {std:.0f} degrees off its x '
+        'axis{trial}',
+        '{angles}',
+        evidence='acceleration',
+        trial=True,
+    ),
+    'imu_tilt': Fault(
+        'mounting',
+        'its axes lie {size:.2f} degrees off the chassis, seen in full turns',
+        '{angles}',
+        evidence='gravity',
+        trial=True,
+    ),
+    'gyro_bias': Fault(
+        'zero',
+        'angular_velocity.{axis} reads {bias:.3g} rad/s {where}',
+        'sensors.angular_rate_bias: [{biases}]',
+        'sensors.angular_rate_bias',
+    ),
+    'imu_noise': Fault(
+        'noise',
+        'noise {noise:.2g} {unit} where the rover file has {stated:g} {unit}',
+        '{parameter}: {noise:.2g}',
+    ),
+    # Reference
+    'reference_world': Fault(
+        'mounting',
+        'the direction of its velocity turns with the heading: it is given in the world frame',
+        'publish twist in child_frame_id base_link (nav_msgs/Odometry), or turn it by the heading '
+        'first',
+    ),
+    'reference_axis': Fault(
+        'mounting',
+        'the rover moves along y of its frame, not along x',
+        'turn twist.linear by {turn:.0f} degrees about z into base_link (x forward)',
+    ),
+    'reference_unit': Fault(
+        'unit',
+        'linear.x is {ratio:.3g} times the rim speed: it is in {unit}',
+        'multiply twist.linear by {value:.5g} in its driver (m/s, REP 103)',
+        evidence='speed',
+    ),
+    'radius': Fault(
+        'radius',
+        'the rover runs {ratio:.3f} +- {off:.3f} of what its rims say on the straight{rival}'
+        '{trial}',
+        'wheels.radius: [{radii}]{separate}',
+        'wheels.radius',
+        'speed',
+        0.85,
+        trial=True,
+    ),
+    'reference_scale': Fault(
+        'gain',
+        'linear.x is {ratio:.3f} +- {off:.3f} of the speed of the rims on the straight{rival}'
+        '{trial}',
+        'multiply twist.linear by {value:.4f} in its driver{separate}',
+        None,
+        'speed',
+        0.15,
+        trial=True,
+    ),
+    'track': Fault(
+        'track',
+        'turns need a track of {ratio:.3f} +- {off:.3f} of the stated {stated:.3f} m{trial}',
+        'wheels.y: [{lateral}]',
+        'wheels.y',
+        'turns',
+        trial=True,
+    ),
+    # Torque
+    'torque_unit': Fault(
+        'unit',
+        'sum of T/r is {traction:.3g} times the weight: effort is in N mm',
+        'multiply effort by 0.001 in the driver (N m, REP 103)',
+    ),
+    'torque_absurd': Fault(
+        'unit',
+        'sum of T/r is {figure:.3g} times the weight: N mm, a current or a motor torque',
+        'publish the torque at the wheel in N m (N mm times 0.001), or state its scale in '
+        'sensors.torque_gain (wheel-terra calibrate)',
+        'sensors.torque_gain',
+    ),
+    'torque_sign': Fault(
+        'sign',
+        'torque brakes where the wheel drives on the level or uphill',
+        'negate effort of {wheels} in the driver (wheels.direction flips rate and torque together)',
+    ),
+    'torque_scale': Fault(
+        'gain',
+        'sum of T/r is {traction:.3g} of the weight on the level, what no soil asks for: a motor '
+        'current, or a torque before the gear?',
+        'sensors.torque_gain: [{gains}], or turn current into torque at the wheel (motor constant '
+        'times gear ratio times efficiency)',
+        'sensors.torque_gain',
+        'slopes',
+    ),
+    'torque_gain': Fault(
+        'gain',
+        'slopes cost {gain:.2f} +- {off:.2f} of what weight and torque say: the torque has '
+        'another scale, or the mass is another{trial}',
+        'sensors.torque_gain: [{gains}] (or rover.mass: {mass:.1f}: weigh the rover)',
+        'sensors.torque_gain',
+        'slopes',
+        0.5,
+        trial=True,
+    ),
+    'mass': Fault(
+        'mass',
+        'slopes cost {gain:.2f} +- {off:.2f} of what weight and torque say: the mass is another, '
+        'or the torque has another scale{trial}',
+        'rover.mass: {mass:.1f} (or sensors.torque_gain: [{gains}]: weigh the rover)',
+        'rover.mass',
+        'slopes',
+        0.5,
+        trial=True,
+    ),
+    'torque_zero': Fault(
+        'zero',
+        'torque reads {left} N m off zero, {where}',
+        'sensors.torque_zero: [{zeros}]',
+        'sensors.torque_zero',
+    ),
+    # Sinkage
+    'sinkage_missing': Fault(
+        'missing_wheel',
+        'has no sinkage',
+        'publish the sinkage of {wheels}, nan while there is none',
+    ),
+    'sinkage_unit': Fault(
+        'unit',
+        'median sinkage {level:.3g} with noise {noise:.2g} at a wheel radius of {radius:.3g} m: it '
+        'is in {unit}',
+        'multiply position by {value:g} in the driver (m, REP 103)',
+    ),
+    'sinkage_sign': Fault(
+        'sign',
+        'median sinkage {reading:.0f} mm{others}: counted upwards',
+        'negate position{of} in the driver (positive down)',
+    ),
+    'sinkage_above': Fault(
+        'sign',
+        'the wheels seem to run {height:.0f} mm above the surface: counted upwards, or the zero '
+        'is off',
+        'negate position in the driver (positive down), or state sensors.sinkage_zero [m]',
+        'sensors.sinkage_zero',
+    ),
+    'sinkage_zero': Fault(
+        'zero',
+        '{how}',
+        'sensors.sinkage_zero: [{zeros}]',
+        'sensors.sinkage_zero',
+    ),
+    'sinkage_order': Fault(
+        'exchanged_wheels',
+        'the sinkage of each goes with the torque of the other (correlation of the differences '
+        '{fit:.2f})',
+        'exchange {both} in the names of the sinkage message',
+    ),
+    # What the estimator lives with
+    'jumps': Fault(
+        'jumps',
+        '{count} velocities ({share:.1f} %) leave their neighbours by up to {most:.2g} m/s',
+        'use the filtered velocity of the receiver in place of differences of raw positions, and '
+        'leave out what has no solution',
+    ),
+    'rate_noise': Fault(
+        'noise',
+        'rate scatters by {noise:.2g} rad/s where the rover file has {stated:g}',
+        'sensors.wheel_rate_std: {noise:.2g}',
+        'sensors.wheel_rate_std',
+    ),
+    'rate_steps': Fault(
+        'noise',
+        'rate comes in steps of {step:.3g} rad/s ({share:.0f} % of the usual rate), as of an '
+        'encoder of {counts:.0f} counts per turn of the wheel read every {period:.3g} s; the '
+        'rover file has a noise of {stated:g}',
+        'sensors.wheel_rate_std: {noise:.2g}, or form the rate over more counts (a longer '
+        'interval) in the driver',
+        'sensors.wheel_rate_std',
+    ),
+    'sinkage_noise': Fault(
+        'noise',
+        'readings scatter by {noise_mm:.2g} mm where the rover file has {stated:.2g} mm',
+        'sensors.sinkage_std: {noise:.2g}',
+        'sensors.sinkage_std',
+    ),
+    'reference_noise': Fault(
+        'noise',
+        'velocity scatters by {noise:.2g} m/s and states {stated:.2g} m/s',
+        'state the variance {variance:.2g} in twist.covariance[0] (sensors.reference_std: '
+        '{noise:.2g} where it states none)',
+        'sensors.reference_std',
+    ),
+    'covariance': Fault(
+        'covariance',
+        'covariance is a placeholder: it {how}',
+        'sensors.reference_std: {noise:.2g} and twist.covariance[0] = 0, or the true variance '
+        '({variance:.2g}) there',
+        'sensors.reference_std',
+    ),
+}
+
+RANK = {key: rank for rank, key in enumerate(FAULTS)}
+"""Place of a fault, worst first."""
+
+
+def found(
+    key: str,
+    topic: str,
+    confidence: float,
+    *,
+    wheel: str | None = None,
+    value: float | None = None,
+    std: float | None = None,
+    **figures: Any,
+) -> Finding:
+    """Return a finding in the words of its fault.
+
+    Parameters
+    ----------
+    key : str
+        A name of ``FAULTS``.
+    topic : str
+        Topic in the recording.
+    confidence : float
+        Probability that it is so.
+    wheel : str, optional
+        The wheel concerned, or several with commas between.
+    value, std : float, optional
+        Of the parameter.
+    figures
+        What the words name.
+    """
+    fault = FAULTS[key]
+    figures = {'trial': '', 'rival': '', 'separate': '', 'wheels': wheel, 'topic': topic} | figures
+    figures.setdefault('value', value)
+    figures.setdefault('std', std)
+    return Finding(
+        kind=fault.kind,
+        topic=topic,
+        wheel=wheel,
+        parameter=figures.get('parameter', fault.parameter),
+        value=value,
+        std=std,
+        confidence=confidence,
+        words=fault.words.format(**figures),
+        cure=fault.cure.format(**figures),
+        fault=key,
+    )
+
+
+def listed(values: Any, form: str = '.4f') -> str:
+    """Return numbers with commas between, as a flat list of a rover file has them."""
+    return ', '.join(format(value, form) for value in values)

@@ -1,0 +1,486 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Signs and places of the wheels, by how they turn together with the gyro.
+
+A rolling rover has ``r w_i = v - w_z y_i`` with a track that skidding makes wider. A hypothesis
+says which wheels count backwards or go by each other's name; what it leaves unlike between the
+wheels, and the share of the gyro's turns that the wheels then do not make, is its residual. It is
+named if it is far better than nothing and than every other, on each half of the recording.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wheel_terra_estimator.checks.evidence import LEAST_MOVING_ROWS, Evidence, row_medians
+from wheel_terra_estimator.checks.faults import FAULTS, LEAST_TURN_RATE, SKID_TRACKS, found
+from wheel_terra_estimator.checks.finding import Finding, NotChecked, Outcome
+from wheel_terra_estimator.checks.imu import felt_motion, yaw_of_motion
+from wheel_terra_estimator.checks.statistics import (
+    confidence,
+    correlation,
+    moving_mean,
+    robust_std,
+)
+from wheel_terra_estimator.checks.trial import Trial, halves
+
+FloatArray = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+TRIAL_ROWS = 1000
+"""Rows, spread over the drive, that hypotheses are compared on."""
+MOST_WHEELS = 10
+"""Wheels for which all combinations of signs are tried."""
+LEAST_TURNING_ROWS = 40
+"""Rows with a turn by the gyro that the wheels must account for."""
+UNTURNED = 0.5
+"""What the residual of turns without an answer of the wheels weighs beside wheels unlike [-]."""
+CLEAR_DIRECTION = 0.8
+"""Cosine of the angle by which starts and curves are felt turned that tells the sense [-]."""
+LEAST_CORRELATION = 0.7
+"""Of gyro and wheels, for turns to tell the sides [-]."""
+TIE = 1e-3
+"""Residuals [-] that differ by less are the same."""
+NOISE_FLOOR = 0.02
+"""Residual [-] by which hypotheses must differ at least."""
+GYRO_DEGREES = (0.004, 0.07)
+"""Effective over stated track that a gyro in degrees per second gives [-]."""
+
+
+class Turning(NamedTuple):
+    """Rim speeds (k, m) [m/s] and yaw rate (k,) [rad/s] of a stretch, places of the wheels.
+
+    ``lateral`` (m,) [m] is +1 and -1 where the places are not known, zeros where the sides are not.
+    """
+
+    speed: FloatArray
+    yaw: FloatArray
+    lateral: FloatArray
+
+    def rows(self, part: slice | Mask) -> Turning:
+        """Return a part of the stretch."""
+        return Turning(self.speed[part], self.yaw[part], self.lateral)
+
+    def turns(self) -> Mask:
+        """Return the rows in which the gyro sees a turn."""
+        size = np.abs(self.yaw)
+        if size.size < 3 or not self.lateral.any():
+            return np.zeros(size.shape, dtype=bool)
+        noise = robust_std(np.diff(self.yaw)) / math.sqrt(2.0)
+        level = max(4.0 * noise, 0.3 * float(np.quantile(size, 0.98)), LEAST_TURN_RATE)
+        return np.asarray(size > level)
+
+
+class Fix(NamedTuple):
+    """A hypothesis: wheels that go by each other's name, then the sign of each."""
+
+    signs: tuple[int, ...]
+    exchanged: tuple[int, int] | None = None
+
+    def applied(self, values: FloatArray) -> FloatArray:
+        """Return columns (k, m) as they are under the hypothesis."""
+        if self.exchanged is not None:
+            order = list(range(values.shape[1]))
+            a, b = self.exchanged
+            order[a], order[b] = b, a
+            values = values[:, order]
+        return values * np.array(self.signs, dtype=float)
+
+    def mirrors(self, other: Fix) -> bool:
+        """Whether both differ by the sign of everything."""
+        return self.exchanged == other.exchanged and all(
+            a == -b for a, b in zip(self.signs, other.signs, strict=True)
+        )
+
+
+class Fit(NamedTuple):
+    """Residual of a hypothesis [-]; effective track over the stated one, and how well it fits."""
+
+    cost: float
+    track: float
+    correlation: float
+
+
+class Comparison(NamedTuple):
+    """The best hypothesis, its fit, its trial on the halves, and the best other one."""
+
+    fix: Fix
+    fit: Fit
+    trial: Trial
+    rival: Fix | None
+
+
+def fit_of(fix: Fix, stretch: Turning) -> Fit:
+    """Return how well a hypothesis accounts for wheels and gyro."""
+    speed, yaw, lateral = fix.applied(stretch.speed), stretch.yaw, stretch.lateral
+    size = np.maximum(np.abs(speed).mean(axis=1), 1e-9)
+    track = alike = 0.0
+    turns = stretch.turns()
+    rolling = speed
+    if turns.sum() >= LEAST_TURNING_ROWS:
+        left, right = lateral > 0.0, lateral < 0.0
+        stated = float(lateral[left].mean() - lateral[right].mean())
+        difference = speed[:, right].mean(axis=1) - speed[:, left].mean(axis=1)
+        alike = correlation(yaw, difference)
+        track = float(yaw @ difference) / max(float(yaw @ yaw), 1e-12) / stated
+        rolling = speed + track * yaw[:, None] * lateral
+    spread = np.abs(rolling - np.median(rolling, axis=1)[:, None]).mean(axis=1)
+    cost = float(np.mean(spread / size))
+    if turns.sum() >= LEAST_TURNING_ROWS:
+        cost += UNTURNED * (1.0 - alike**2)
+    return Fit(cost, track, alike)
+
+
+def compare(stretch: Turning, fixes: Sequence[Fix]) -> Comparison:
+    """Compare hypotheses, the first of which is that nothing is wrong."""
+    whole = [fit_of(fix, stretch) for fix in fixes]
+    parts = [
+        [fit_of(fix, stretch.rows(half)).cost for fix in fixes]
+        for half in halves(np.ones(stretch.yaw.size))
+    ]
+    least = min(fit.cost for fit in whole)
+    alike = [i for i, fit in enumerate(whole) if fit.cost < least + TIE]
+    # Of two that differ by swapped sides the one that agrees with the gyro is meant.
+    best = max(alike, key=lambda i: (whole[i].track > 0.0, -i))
+    others = [
+        i
+        for i in range(1, len(fixes))
+        if i != best
+        and not fixes[i].mirrors(fixes[best])
+        and whole[i].track * whole[best].track >= 0.0
+    ]
+    rival = min(others, key=lambda i: whole[i].cost, default=None)
+    trials = [
+        Trial(
+            part[0] - NOISE_FLOOR,
+            part[best],
+            np.inf if rival is None else part[rival] - NOISE_FLOOR,
+        )
+        for part in parts
+    ]
+    worst = max(trials, key=lambda t: t.after / max(min(t.before, t.rival), 1e-12))
+    return Comparison(fixes[best], whole[best], worst, None if rival is None else fixes[rival])
+
+
+def sign_fixes(count: int, lateral: FloatArray, *, exchanges: bool = True) -> list[Fix]:
+    """Return nothing, every combination of signs, and every left wheel exchanged with a right."""
+    plain = (1,) * count
+    fixes = [Fix((1, *signs)) for signs in itertools.product((1, -1), repeat=count - 1)]
+    if exchanges and count > 2:
+        fixes += [Fix(plain, pair) for pair in _pairs(lateral)]
+    return fixes
+
+
+def _pairs(lateral: FloatArray) -> list[tuple[int, int]]:
+    left, right = np.flatnonzero(lateral > 0.0), np.flatnonzero(lateral < 0.0)
+    return [(int(a), int(b)) for a in left for b in right]
+
+
+# In a recording ----------------------------------------------------------------------------------
+
+
+def stretch_of(evidence: Evidence, there: NDArray[np.intp], rows: Mask) -> Turning:
+    """Return the turning of some wheels in some rows."""
+    facts = evidence.facts
+    radius = np.where(np.isfinite(facts.radius), facts.radius, 1.0)[there]
+    speed = (evidence.rate[:, there] * radius)[rows]
+    lateral = (facts.lateral if facts.known else facts.side)[there]
+    sides = (lateral > 0.0).any() and (lateral < 0.0).any() and np.isfinite(lateral).all()
+    yaw = np.zeros(speed.shape[0])
+    if evidence.gyro is not None and sides:
+        rest = evidence.at_rest
+        bias = float(np.median(evidence.gyro[rest, 2])) if rest.sum() > 20 else 0.0
+        yaw = evidence.gyro[rows, 2] - bias
+    else:
+        lateral = np.zeros(there.size)
+    if speed.shape[0] > TRIAL_ROWS:
+        keep = np.linspace(0, speed.shape[0] - 1, TRIAL_ROWS).astype(int)
+        speed, yaw = speed[keep], yaw[keep]
+    return Turning(speed, yaw, lateral)
+
+
+class _Chosen(NamedTuple):
+    """What the wheels say: signs (n,), track (0: no turns), exchanged wheels, trial, certainty."""
+
+    signs: FloatArray
+    track: float = 0.0
+    exchanged: tuple[int, int] | None = None
+    trial: str = ''
+    sure: float = 0.99
+
+
+def check_signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
+    """Return wheels that count backwards or are exchanged, sides or a reference that are."""
+    facts, joints = evidence.facts, evidence.recording.joints
+    assert joints is not None
+    there = np.flatnonzero(np.isfinite(evidence.rate).any(axis=0))
+    rows = evidence.moving & np.isfinite(evidence.rate[:, there]).all(axis=1)
+    if rows.sum() < LEAST_MOVING_ROWS or not there.size:
+        return [NotChecked('sign', 'the rover hardly moves in it; drive straight')], evidence
+    outcomes: list[Outcome] = []
+    chosen = _chosen(evidence, there, rows)
+    signs, turn, mended = chosen.signs, chosen.track, evidence
+    if chosen.exchanged is not None:
+        finding, mended = _exchanged(evidence, chosen.exchanged, chosen.trial, chosen.sure)
+        outcomes.append(finding)
+    if not turn:
+        reason = 'no turn in it, or no IMU: left and right not checked; drive a circle both ways'
+        if not facts.known:
+            reason = 'left and right need the places of the wheels: a rover file (wheel-terra init)'
+        outcomes += [NotChecked(kind, reason) for kind in ('swapped_sides', 'exchanged_wheels')]
+    told = _told_direction(mended, signs)
+    blame = _blame(told, 2 * int(np.sum(signs[there] < 0.0)) >= there.size, turn)
+    if blame.unsure:
+        cure = _directions(evidence, -np.ones(signs.size))
+        outcomes.append(found('all_backwards', joints.topic, 0.4, value=-1.0, directions=cure))
+    if blame.wheels:
+        signs, turn = -signs, -turn
+    if (signs < 0.0).any():
+        outcomes.append(_backwards(evidence, signs, chosen.trial, chosen.sure))
+        mended = mended.with_rate(mended.rate * signs)
+    if turn < 0.0:
+        outcomes += _swapped(evidence)
+        mended = replace(mended, facts=replace(facts, side=-facts.side, lateral=-facts.lateral))
+    if blame.reference:
+        certain = confidence(3.0) if turn or told.force is not None else 0.5
+        finding, mended = _reversed_reference(mended, certain)
+        outcomes.append(finding)
+    return outcomes, mended
+
+
+def _chosen(evidence: Evidence, there: NDArray[np.intp], rows: Mask) -> _Chosen:
+    """Return the hypothesis that stood its trial, or that nothing is wrong."""
+    signs = np.ones(len(evidence.facts.names))
+    if not 2 <= there.size <= MOST_WHEELS:
+        return _Chosen(signs)
+    stretch = stretch_of(evidence, there, rows)
+    best = _best(stretch, there.size)
+    if not best.trial.falls:  # nothing is clearly better than what the rover file says
+        fit = fit_of(Fix((1,) * there.size), stretch)
+        return _Chosen(signs, fit.track if abs(fit.correlation) > LEAST_CORRELATION else 0.0)
+    turn = best.fit.track if abs(best.fit.correlation) > LEAST_CORRELATION else 0.0
+    signs[there] = best.fix.signs
+    doubled = 2 * int(np.sum(signs < 0.0))
+    if doubled > there.size or (doubled == there.size and turn < 0.0):
+        signs, turn = -signs, -turn  # the pair with fewer reversed wheels is meant
+    trial = best.trial.words('wheels apart', 'of their speed')
+    if not best.trial.passes and best.rival is not None:
+        names = [evidence.facts.names[i] for i in there]
+        trial += f', or {_told(best.rival, names)}: drive straight'
+    exchanged = None
+    if best.fix.exchanged is not None:
+        exchanged = int(there[best.fix.exchanged[0]]), int(there[best.fix.exchanged[1]])
+    return _Chosen(signs, turn, exchanged, trial, 0.99 if best.trial.passes else 0.5)
+
+
+def _best(stretch: Turning, count: int) -> Comparison:
+    """Compare all hypotheses; exchanged wheels show in the turns alone."""
+    best = compare(stretch, sign_fixes(count, stretch.lateral))
+    turns = stretch.turns()
+    if best.trial.falls or count < 3 or turns.sum() < 2 * LEAST_TURNING_ROWS:
+        return best
+    fixes = [Fix((1,) * count), *(Fix((1,) * count, pair) for pair in _pairs(stretch.lateral))]
+    again = compare(stretch.rows(turns), fixes)
+    return again if again.trial.falls else best
+
+
+def _told(fix: Fix, names: Sequence[str]) -> str:
+    if fix.exchanged is not None:
+        return f'{names[fix.exchanged[0]]} and {names[fix.exchanged[1]]} exchanged'
+    backwards = [name for name, sign in zip(names, fix.signs, strict=True) if sign < 0]
+    return f'{", ".join(backwards)} backwards'
+
+
+class _Told(NamedTuple):
+    """Agreement of the common speed with the reference and with the specific force; None: none."""
+
+    reference: float | None
+    force: float | None
+
+
+class _Blame(NamedTuple):
+    """What runs backwards, where wheels, turns, reference and specific force do not agree."""
+
+    wheels: bool = False  # all of them, beyond the signs that were found
+    reference: bool = False
+    unsure: bool = False
+
+
+def _blame(told: _Told, half_reversed: bool, turn: float) -> _Blame:
+    """Return what runs backwards.
+
+    Parameters
+    ----------
+    told : _Told
+        Agreement of the common speed with the others.
+    half_reversed : bool
+        Whether half of the wheels or more have a negative sign.
+    turn : float
+        Track that the turns tell, negative where they run against the gyro, 0 without turns.
+    """
+    if told.reference is None:
+        return _Blame(wheels=turn < 0.0 and told.force is not None and told.force < 0.0)
+    if told.reference >= 0.0:
+        return _Blame()
+    # Wheels or reference are backwards: with the turns on their side it is not the wheels.
+    if half_reversed and turn <= 0.0:
+        return _Blame(wheels=True)  # the other half counts backwards
+    if turn:
+        return _Blame(wheels=turn < 0.0, reference=turn > 0.0)
+    if told.force is not None:
+        return _Blame(wheels=told.force < 0.0, reference=told.force >= 0.0)
+    return _Blame(reference=True, unsure=True)
+
+
+def _told_direction(evidence: Evidence, signs: FloatArray) -> _Told:
+    speed = row_medians(np.nan_to_num(evidence.rate) * signs)
+    reference = evidence.reference()
+    by_reference = by_force = None
+    if reference is not None:
+        at = evidence.rim_at(reference.stamp, speed, 0.3)
+        fit = correlation(np.nan_to_num(at), reference.velocity[:, 0])
+        by_reference = fit if abs(fit) > 0.5 else None
+    if evidence.force is not None and evidence.time.size > 100:
+        width = max(round(0.4 / evidence.period), 1)
+        change = np.gradient(moving_mean(speed, width), evidence.period)
+        force = moving_mean(evidence.force[:, 0], width)
+        force = force - moving_mean(force, 10 * width)
+        parts = np.array(
+            [
+                float(a @ b)
+                for a, b in zip(np.array_split(change, 10), np.array_split(force, 10), strict=True)
+            ]
+        )
+        spread = float(np.sqrt(np.sum((parts - parts.mean()) ** 2)))
+        fit = correlation(change, force)
+        if abs(parts.sum()) > 3.0 * spread and abs(fit) > 0.15:
+            by_force = fit
+        elif (felt := felt_motion(evidence.with_rate(evidence.rate * signs))) is not None:
+            yaw = yaw_of_motion(*felt)
+            if yaw is not None and abs(math.cos(yaw.value)) > CLEAR_DIRECTION:
+                by_force = math.cos(yaw.value)
+    return _Told(by_reference, by_force)
+
+
+def _directions(evidence: Evidence, signs: FloatArray) -> str:
+    pairs = zip(evidence.facts.direction, signs, strict=True)
+    return ', '.join(f'{int(d * s)}' for d, s in pairs)
+
+
+def _backwards(evidence: Evidence, signs: FloatArray, trial: str, sure: float) -> Finding:
+    facts, joints, moving = evidence.facts, evidence.recording.joints, evidence.moving
+    assert joints is not None
+    wrong = [i for i in range(signs.size) if signs[i] < 0.0]
+    right = [
+        facts.names[i]
+        for i in wrong
+        if np.isfinite(evidence.torque[:, i]).any()
+        and correlation(evidence.torque[moving, i], evidence.rate[moving, i]) < -0.3
+    ]
+    negate = f' and negate effort of {", ".join(right)} in the driver (it is right as it is)'
+    return found(
+        'backwards',
+        joints.topic,
+        sure,
+        wheel=', '.join(facts.names[i] for i in wrong),
+        value=float(-facts.direction[wrong[0]]),
+        trial=trial,
+        directions=_directions(evidence, signs),
+        torque=negate if right else '',
+    )
+
+
+def _swapped(evidence: Evidence) -> list[Outcome]:
+    """Return what makes the wheels turn against the gyro: swapped sides or a reversed gyro."""
+    joints, imu, facts = evidence.recording.joints, evidence.recording.imu, evidence.facts
+    assert joints is not None and imu is not None
+    orientation_told = bool(np.isfinite(imu.orientation).all(axis=1).mean() > 0.9)
+    mirrored = ', '.join(f'{-y:g}' for y in facts.lateral)
+    sides = found(
+        'swapped_sides',
+        joints.topic,
+        0.97 if orientation_told else FAULTS['swapped_sides'].prior,
+        rival='' if orientation_told else ', or the gyro counts yaw to the right',
+        names=', '.join(facts.names),
+        mirrored=f', or wheels.y: [{mirrored}]' if facts.known else '',
+    )
+    if orientation_told:
+        return [sides]
+    against = 'the wheels, or left and right wheels are swapped'
+    return [
+        sides,
+        found('gyro_reversed', imu.topic, 0.5, value=-1.0, axis='z', against=against),
+    ]
+
+
+def _reversed_reference(evidence: Evidence, sure: float) -> tuple[Finding, Evidence]:
+    reference = evidence.reference()
+    assert reference is not None
+    finding = found('reference_reversed', reference.topic, sure, value=-1.0, or_wheels='')
+    turned = replace(reference, velocity=-reference.velocity)
+    return finding, replace(evidence, recording=replace(evidence.recording, reference=turned))
+
+
+def _exchanged(
+    evidence: Evidence, pair: tuple[int, int], trial: str, sure: float
+) -> tuple[Finding, Evidence]:
+    facts, joints = evidence.facts, evidence.recording.joints
+    assert joints is not None
+    (a, b), names = pair, list(facts.names)
+    names[a], names[b] = names[b], names[a]
+    rate, torque = evidence.rate.copy(), evidence.torque.copy()
+    rate[:, [a, b]], torque[:, [a, b]] = rate[:, [b, a]], torque[:, [b, a]]
+    finding = found(
+        'exchanged',
+        joints.topic,
+        min(sure, 0.95),
+        wheel=f'{facts.names[a]}, {facts.names[b]}',
+        trial=trial,
+        names=', '.join(names),
+    )
+    return finding, evidence.with_rate(rate, torque)
+
+
+def check_gyro_unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
+    """Return a gyro in degrees per second, told by the turns of the wheels."""
+    imu, facts = evidence.recording.imu, evidence.facts
+    if imu is None or evidence.gyro is None or not facts.known or not facts.has_sides():
+        return [], evidence
+    ratio = track_ratio(evidence)
+    if ratio is None:
+        return [NotChecked('unit', 'gyro: no clear turn in it; drive a circle')], evidence
+    if not GYRO_DEGREES[0] < abs(ratio) < GYRO_DEGREES[1]:
+        return [], evidence
+    finding = found(
+        'gyro_degrees',
+        imu.topic,
+        0.95,
+        value=math.pi / 180.0,
+        times=1.0 / abs(ratio),
+        how='turning of the wheels',
+    )
+    recording = replace(evidence.recording, imu=replace(imu, rate=np.radians(imu.rate)))
+    return [finding], replace(evidence, recording=recording, gyro=np.radians(evidence.gyro))
+
+
+def track_ratio(evidence: Evidence) -> float | None:
+    """Return effective over stated track from the turns; None without turns."""
+    facts = evidence.facts
+    there = np.flatnonzero(np.isfinite(evidence.rate).any(axis=0))
+    rows = evidence.moving & np.isfinite(evidence.rate[:, there]).all(axis=1)
+    if evidence.gyro is None or not facts.has_sides() or rows.sum() < LEAST_TURNING_ROWS:
+        return None
+    fit = fit_of(Fix((1,) * there.size), stretch_of(evidence, there, rows))
+    return fit.track if abs(fit.correlation) > LEAST_CORRELATION and fit.track else None
+
+
+def ordinary_track(ratio: float) -> bool:
+    """Return whether a rover may turn so, skidding or not."""
+    return SKID_TRACKS[0] < abs(ratio) < SKID_TRACKS[1]
