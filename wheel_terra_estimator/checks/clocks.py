@@ -49,6 +49,8 @@ accelerometer is noisy, a slow reference ragged."""
 APART = 0.2
 """Lags of two halves or of two kinds of motion that differ by less agree [s]; also 3 deviations."""
 SIGMAS = 4.0
+BETWEEN = 0.25
+"""Part of a period that a lag is not known to, one deviation [-]."""
 SLOWEST = 1.5
 """Period of a reference [s] above which nothing is said of its stamps."""
 FUTURE = -0.1
@@ -178,12 +180,14 @@ def _outcome(evidence: Evidence, name: str, told: Lag) -> Outcome:
     configuration = evidence.facts.configuration
     stated = getattr(configuration.sensors, f'{name}_stamp_offset') if configuration else 0.0
     value = told.value + float(stated)
+    # Between two messages nothing is known of a change.
+    std = math.hypot(told.std, BETWEEN * max(evidence.period, _period(channel)))
     return found(
         f'{name}_offset',
         channel.topic,
         0.97,
         value=round(value, 3),
-        std=round(told.std, 3),
+        std=round(std, 3),
         channel=name,
         offset=value,
         offset_left=told.value,
@@ -217,7 +221,7 @@ def _of_imu(evidence: Evidence, figures: dict[str, Any]) -> Lag | NotChecked:
         wheels = wheels * np.sign(correlation(wheels, yaw) or 1.0)
         turned = _lag_of(time, wheels, yaw, LONGEST['imu'], 'turns')
     started = None
-    if evidence.force is not None:
+    if evidence.force is not None and time.size > 2:
         width = round(SMOOTHING / STEP)
         speed = moving_mean(_even(evidence, evidence.rim, time), width)
         forward = averaged(at, (imu.force @ evidence.rotation.T)[:, :1], time, 2 * STEP)[:, 0]

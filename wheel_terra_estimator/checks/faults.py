@@ -377,7 +377,7 @@ FAULTS: dict[str, Fault] = {
     ),
     'torque_zero': Fault(
         'zero',
-        'torque reads {left} N m off zero, {where}',
+        'torque reads {left} N m off zero, {where}{rival}',
         'sensors.torque_zero: [{zeros}]',
         'sensors.torque_zero',
     ),

@@ -118,10 +118,11 @@ def _examined(
     take('unknown_name', lambda: names.check_topics(recording, remapped))
     take('missing_wheel', lambda: names.check_wheel_names(recording, facts))
     facts = _with_names_in(facts, report)
+    unread: tuple[list[Outcome], float] = [], 0.0
     told, offset = run_apart(
         report,
         'order',
-        ([], 0.0),
+        unread,
         lambda: transport.check_transport(recording, configuration, figures),
     )
     report.take(told)

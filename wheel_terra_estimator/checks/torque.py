@@ -94,9 +94,8 @@ def _signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         rows &= along > UPHILL_ENOUGH
     if rows.sum() < LEAST_MOVING_ROWS:
         return [NotChecked('sign', 'torque: no stretch on the level or uphill')], evidence
-    fits = [
-        _sign_fit(evidence.torque[rows], evidence.rate[rows, i], i) for i in range(len(facts.names))
-    ]
+    driven, rates = evidence.torque[rows], evidence.rate[rows]
+    fits = [_sign_fit(driven, rates[:, i], i) for i in range(len(facts.names))]
     wrong = [(i, fit) for i, (fit, _) in enumerate(fits) if fit < WRONG_SIGN]
     if len(wrong) < len(fits):  # one way only: what goes with the other wheels is a zero
         wrong = [(i, fit) for i, fit in wrong if not fits[i][1] > ALIKE]
@@ -111,8 +110,9 @@ def _signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
 
 
 def _sign_fit(torque: FloatArray, rate: FloatArray, index: int) -> tuple[float, float]:
-    """Return the correlation of a wheel's torque with its rate, a zero taken off where both ways
-    tell it, and that of its changes with those of the other wheels (nan where both ways do).
+    """Return the correlations of a torque with the rate, and with the torques of other wheels.
+
+    A zero is taken off where both ways tell it; the second, of changes alone, is nan then.
     """
     own, others = torque[:, index], row_medians(np.delete(torque, index, axis=1))
     if min(int((rate > 0.0).sum()), int((rate < 0.0).sum())) > LEAST_MOVING_ROWS:
@@ -364,16 +364,19 @@ def _zeros(
     if not wrong:
         return []
     first = whole[wrong[0][0]]
+    level = figures.get('torque.level_traction', 0.0)
+    doubt = level > SOFT_TRACTION  # with another scale every zero is another
     return [
         found(
             'torque_zero',
             joints.topic,
-            confidence(min(zero.sigmas_from(0.0) for _, zero in wrong)),
+            confidence(min(zero.sigmas_from(0.0) for _, zero in wrong)) * (0.5 if doubt else 1.0),
             wheel=', '.join(name for name, _ in wrong),
             value=round(first.value, 3),
             std=round(first.std, 3),
             left=', '.join(f'{zero.value:.2f}' for _, zero in wrong),
             where=where,
+            rival=', or the torques have another scale' if doubt else '',
             zeros=listed((zero.value for zero in whole.values()), '.2f'),
         )
     ]

@@ -100,13 +100,14 @@ def _longest_frozen(evidence: Evidence, index: int, change: float) -> float:
             continue
         stretch = slice(start, end + 1)
         if own[start] == 0.0:
-            beside = row_medians(np.abs(others[stretch])) > LIVELY * evidence.working_rate
-            lasts = float(beside.mean()) * lasts
-            lively = lasts > FROZEN_TIME and not _held(evidence, index, np.r_[stretch][beside])
+            busy = row_medians(np.abs(others[stretch])) > LIVELY * evidence.working_rate
+            lasts *= float(busy.mean())
+            lively = lasts > FROZEN_TIME and not _held(evidence, index, np.r_[stretch][busy])
         else:
             beside = np.nanmedian(others[stretch], axis=1)
             changes = np.mean(np.diff(others[stretch], axis=0) != 0.0)
-            lively = np.ptp(beside) > change or (lasts > LONG_FROZEN_TIME and changes > 0.5)
+            steady = lasts > LONG_FROZEN_TIME and changes > 0.5
+            lively = bool(np.ptp(beside) > change or steady)
         if lively:
             longest = max(longest, lasts)
     return longest
