@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from wheel_terra_estimator.checks.evidence import Evidence
 from wheel_terra_estimator.checks.faults import FAULTS, LEAST_TURN_RATE, found, listed
 from wheel_terra_estimator.checks.finding import NotChecked, Outcome
-from wheel_terra_estimator.checks.imu import speed_scale
 from wheel_terra_estimator.checks.sinkage import without_stated_errors
 from wheel_terra_estimator.checks.statistics import (
     Estimate,
@@ -33,11 +32,12 @@ LEAST_RADIUS_ERROR = 0.025
 RADIUS_SIGMAS = 4.0
 LEAST_RATIO = 0.3
 """Speed over rim speed below which a rover is stuck, or its reference dead [-]."""
+OUTRUN_STD = 0.01
+"""Slip that is left open where a rover outruns its wheels [-]."""
 SURE = 0.97
 """Probability beside its rival from which a fault is named alone [-]."""
-INERTIAL_STD = 0.08
 TRACK_STD = 0.02
-"""Deviation that slip leaves in a scale of speed by accelerations, and by turns, at least [-]."""
+"""Deviation that slip leaves in a scale of speed by turns, at least [-]."""
 RESISTANCE = Estimate(0.08, 0.05)
 """Rolling resistance of firm ground over the weight: mean, deviation [-]."""
 UNKNOWN_RESISTANCE = Estimate(0.1, 0.08)
@@ -110,11 +110,17 @@ def radius_ratio(evidence: Evidence, figures: dict[str, Any]) -> Estimate | NotC
         if isinstance(told, NotChecked):
             return told
         resistance = told
+    elif plain.value > 1.0:
+        # Nothing but a larger radius makes a rover outrun its rolling wheels.
+        return _tried(evidence, Estimate(plain.value, math.hypot(plain.std, OUTRUN_STD)))
     elif _depth(evidence).value > SOFT_DEPTH:
         return NotChecked('radius', 'no torque, and soft ground: a ratio of speeds may be slip')
     ratio = _without_slip(_Speeds(rim, forward, traction, demand), plain, resistance, figures)
-    if isinstance(ratio, NotChecked):
-        return ratio
+    return ratio if isinstance(ratio, NotChecked) else _tried(evidence, ratio)
+
+
+def _tried(evidence: Evidence, ratio: Estimate) -> Estimate | NotChecked:
+    """Return a ratio that both halves of the drive agree on, referred to the slip radius."""
     trial = _ratio_trial(evidence)
     large = abs(ratio.value - 1.0) > LEAST_RADIUS_ERROR
     if large and not trial.falls and trial.after > 4.0 * ratio.std:
@@ -298,16 +304,10 @@ def _ratio_trial(evidence: Evidence) -> Trial:
 def _share_of_radius(evidence: Evidence, ratio: Estimate, figures: dict[str, Any]) -> float:
     """Return the probability that a ratio of speeds is the radius, not the scale of the reference.
 
-    The accelerometer knows the scale of speed, and where the rover need not skid the gyro as well.
+    Where the rover need not skid to turn, the gyro knows the scale of the rims.
     """
     radius, scale = FAULTS['radius'].prior, FAULTS['reference_scale'].prior
     odds = math.log(radius / scale)
-    felt = speed_scale(evidence)
-    if felt is not None:
-        std = math.hypot(felt.std, INERTIAL_STD, ratio.std)
-        figures['rover.speed_scale_by_imu'] = round(felt.value, 3)
-        figures['rover.speed_scale_by_imu_std'] = round(std, 3)
-        odds += 0.5 * ((felt.value - 1.0) ** 2 - (felt.value - ratio.value) ** 2) / std**2
     turns = NotChecked('track', 'skids') if skids(evidence) else track_ratio(evidence)
     if not isinstance(turns, NotChecked):
         std = math.hypot(turns.std, TRACK_STD, ratio.std)

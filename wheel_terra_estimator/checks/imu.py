@@ -378,17 +378,6 @@ def yaw_of_motion(parts: NDArray[np.complex128], energy: float) -> Estimate | No
     return Estimate(float(np.angle(total)), spread / abs(total))
 
 
-def speed_scale(evidence: Evidence) -> Estimate | None:
-    """Return true speed over that of the rims by the accelerometer: starts, stops, curves."""
-    felt = felt_motion(evidence)
-    if felt is None or felt[1] <= 0.0:
-        return None
-    parts, energy = felt
-    total = float(parts.real.sum())
-    spread = float(np.sqrt(np.sum((parts.real - total / parts.size) ** 2)))
-    return Estimate(total / energy, spread / energy)
-
-
 def yaw_of_imu(evidence: Evidence) -> tuple[Estimate, Trial] | None:
     """Return the yaw of the IMU in ``base_link`` [rad] and its trial, angles off by half."""
     felt = felt_motion(evidence)

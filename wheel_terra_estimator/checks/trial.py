@@ -49,7 +49,7 @@ class Trial(NamedTuple):
 def halves(energy: FloatArray) -> tuple[slice, slice]:
     """Return two stretches of rows that hold as much of an energy (k,) each."""
     total = np.cumsum(energy)
-    middle = int(np.searchsorted(total, 0.5 * total[-1])) if total.size else 0
+    middle = int(np.searchsorted(total, 0.5 * total[-1])) + 1 if total.size else 0
     return slice(0, middle), slice(middle, total.size)
 
 

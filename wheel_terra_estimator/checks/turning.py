@@ -44,6 +44,8 @@ UNTURNED = 0.5
 """What the residual of turns without an answer of the wheels weighs beside wheels unlike [-]."""
 CLEAR_DIRECTION = 0.8
 """Cosine of the angle by which starts and curves are felt turned that tells the sense [-]."""
+OPPOSED = -0.3
+"""Correlation of torque and rate of a wheel that takes power, if one of them is reversed [-]."""
 LEAST_CORRELATION = 0.7
 """Of gyro and wheels, for turns to tell the sides [-]."""
 TIE = 1e-3
@@ -244,7 +246,8 @@ def check_signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         signs, turn = -signs, -turn
     if (signs < 0.0).any():
         outcomes.append(_backwards(evidence, signs, chosen.trial, chosen.sure))
-        mended = mended.with_rate(mended.rate * signs)
+        kept = _right_torques(evidence, signs)  # the cure flips the torques as well
+        mended = mended.with_rate(mended.rate * signs, mended.torque * np.where(kept, 1.0, signs))
     if turn < 0.0:
         outcomes += _swapped(evidence)
         mended = replace(mended, facts=replace(facts, side=-facts.side, lateral=-facts.lateral))
@@ -375,15 +378,10 @@ def _directions(evidence: Evidence, signs: FloatArray) -> str:
 
 
 def _backwards(evidence: Evidence, signs: FloatArray, trial: str, sure: float) -> Finding:
-    facts, joints, moving = evidence.facts, evidence.recording.joints, evidence.moving
+    facts, joints = evidence.facts, evidence.recording.joints
     assert joints is not None
     wrong = [i for i in range(signs.size) if signs[i] < 0.0]
-    right = [
-        facts.names[i]
-        for i in wrong
-        if np.isfinite(evidence.torque[:, i]).any()
-        and correlation(evidence.torque[moving, i], evidence.rate[moving, i]) < -0.3
-    ]
+    right = [facts.names[i] for i in np.flatnonzero(_right_torques(evidence, signs))]
     negate = f' and negate effort of {", ".join(right)} in the driver (it is right as it is)'
     return found(
         'backwards',
@@ -394,6 +392,17 @@ def _backwards(evidence: Evidence, signs: FloatArray, trial: str, sure: float) -
         trial=trial,
         directions=_directions(evidence, signs),
         torque=negate if right else '',
+    )
+
+
+def _right_torques(evidence: Evidence, signs: FloatArray) -> NDArray[np.bool_]:
+    """Return the wheels that count backwards and whose torque does not (n,)."""
+    moving = evidence.moving
+    return np.array(
+        [
+            sign < 0.0 and correlation(torque[moving], rate[moving]) < OPPOSED
+            for sign, torque, rate in zip(signs, evidence.torque.T, evidence.rate.T, strict=True)
+        ]
     )
 
 

@@ -40,7 +40,7 @@ LIVELY = 0.3
 LONG_FROZEN_TIME = 10.0
 """The same at a steady speed, where a coarse encoder may repeat itself [s]."""
 HELD_TORQUE = 1.5
-"""Torque of a standing wheel over that of the others while driving, above which it is held [-]."""
+"""Torque of a standing wheel over that of the others meanwhile, above which it is held [-]."""
 CLEAR_SPEED = 5.0
 """Speed over the noise of the reference that a ratio of speeds needs [-]."""
 NOISE_FACTOR = 5.0
@@ -115,11 +115,11 @@ def _longest_frozen(evidence: Evidence, index: int, change: float) -> float:
 
 def _held(evidence: Evidence, index: int, rows: Any) -> bool:
     """Return whether the torque says that a standing wheel is stalled, not its encoder dead."""
-    size = np.abs(evidence.torque)
-    own, usual = size[rows, index], size[evidence.moving]
-    if not np.isfinite(own).any() or not np.isfinite(usual).any():
+    size = np.abs(evidence.torque[rows])
+    own, others = size[:, index], np.delete(size, index, axis=1)
+    if not np.isfinite(own).any() or not np.isfinite(others).any():
         return False
-    return bool(np.nanmedian(own) > HELD_TORQUE * max(float(np.nanmedian(usual)), 1e-9))
+    return bool(np.nanmedian(own) > HELD_TORQUE * max(float(np.nanmedian(others)), 1e-9))
 
 
 def runs(values: FloatArray) -> list[tuple[int, int]]:

@@ -279,7 +279,9 @@ def outcome(fault: Fault, case: Case, before: CheckReport) -> str:
             'covariance',
             'radius',  # a rover file that is wrong as it is needs the same cure
         )
-        right = finding.kind in fault.kinds and (wheel is None or finding.wheel == wheel)
+        right = finding.kind in fault.kinds and (
+            wheel is None or wheel in (finding.wheel or '').split(', ')
+        )
         if right and fresh and finding.cure:
             return 'found'
     told = {entry.kind for entry in report.not_checked}

@@ -1,0 +1,130 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""No cure that a recording does not bear out: faults that imitate one another, from kinematics."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import rolling_rover as rolling
+
+from wheel_terra_estimator.checks.calibration import calibrate
+from wheel_terra_estimator.checks.run import check_recording
+from wheel_terra_estimator.checks.trial import Trial, halves, tried
+
+SKID = {'wheels.x': [0.3, 0.3, -0.3, -0.3]}  # wheels in two rows: its turns need skid
+
+
+def spot_turns():
+    """Four seconds ahead, then nothing but turns on the spot, to both sides."""
+    time = np.arange(0.0, 90.0, 1.0 / rolling.RATE)
+    speed = np.interp(time, [5, 6, 9, 10], [0, 0.2, 0.2, 0])
+    yaw = np.interp(time, [12, 13, 40, 41, 45, 46, 80, 81], [0, 0.4, 0.4, 0, 0, -0.4, -0.4, 0])
+    return rolling.Motion(time, speed, yaw, 0.0 * time)
+
+
+@pytest.mark.parametrize('seed', range(5))
+def test_turns_on_the_spot_reverse_no_side(seed):
+    report = check_recording(rolling.recording(spot_turns(), seed), rolling.rover())
+    assert not report.findings, [str(f) for f in report.findings]
+
+
+@pytest.mark.parametrize('wheels', [(1,), (1, 3), (0, 2)])
+def test_wheels_backwards_in_turns_on_the_spot_are_found_all_the_same(wheels):
+    sound = rolling.recording(spot_turns())
+    flip = np.where(np.isin(np.arange(4), wheels), -1.0, 1.0)
+    joints = replace(sound.joints, rate=sound.joints.rate * flip, torque=sound.joints.torque * flip)
+    (finding,) = check_recording(replace(sound, joints=joints), rolling.rover()).findings
+    assert finding.wheel == ', '.join(rolling.NAMES[i] for i in wheels)
+    assert finding.cure == f'wheels.direction: [{", ".join(f"{int(s)}" for s in flip)}]'
+    assert 'on the other half' in finding.words
+
+
+@pytest.mark.parametrize('factor', [0.9, 1.12])
+def test_a_scale_of_the_reference_is_no_radius(factor):
+    """Where the rover turns without skid the gyro tells them apart; else both are named."""
+    whole = rolling.recording()
+    scaled = replace(whole.reference, velocity=factor * whole.reference.velocity)
+    recording = replace(whole, reference=scaled)
+    (finding,) = check_recording(recording, rolling.rover()).findings
+    assert (finding.kind, finding.topic) == ('gain', '/reference_odom')
+    assert finding.value == pytest.approx(1.0 / factor, abs=3.0 * finding.std)
+    skidding = check_recording(recording, rolling.rover(**SKID)).findings
+    assert {f.kind for f in skidding} == {'radius', 'gain'}
+    assert all(f.confidence < 0.9 and 'ten metres' in f.cure for f in skidding)
+
+
+@pytest.mark.parametrize('zero', [8.0, -8.0])
+def test_a_zero_of_the_torques_is_no_radius(zero):
+    motion = rolling.ten_minute_drive()
+    forward = replace(motion, speed=np.maximum(motion.speed, 0.0))
+    for drive in (motion, forward):
+        whole = rolling.recording(drive)
+        joints = replace(whole.joints, torque=whole.joints.torque + zero)
+        found = check_recording(replace(whole, joints=joints), rolling.rover()).findings
+        assert 'radius' not in {f.kind for f in found}, [str(f) for f in found]
+
+
+def test_two_exchanged_wheels_are_no_track():
+    whole = rolling.recording()
+    order = [1, 0, 2, 3]
+    joints = replace(
+        whole.joints, rate=whole.joints.rate[:, order], torque=whole.joints.torque[:, order]
+    )
+    (finding,) = check_recording(replace(whole, joints=joints), rolling.rover()).findings
+    assert finding.kind == 'exchanged_wheels' and finding.wheel == 'front_left, front_right'
+
+
+def test_a_wheel_held_under_torque_is_not_frozen():
+    whole = rolling.recording()
+    rate, torque = whole.joints.rate.copy(), whole.joints.torque.copy()
+    held = (whole.joints.seconds > 20.0) & (whole.joints.seconds < 50.0)
+    rate[held, 1], torque[held, 1] = 0.0, 80.0
+    joints = replace(whole.joints, rate=rate, torque=torque)
+    found = check_recording(replace(whole, joints=joints), rolling.rover()).findings
+    assert 'frozen' not in {f.kind for f in found}
+    dead = replace(whole.joints, rate=rate)
+    found = check_recording(replace(whole, joints=dead), rolling.rover()).findings
+    assert ('frozen', 'front_right') in {(f.kind, f.wheel) for f in found}
+
+
+def test_effort_of_zero_is_a_placeholder():
+    whole = rolling.recording()
+    joints = replace(whole.joints, torque=0.0 * whole.joints.torque)
+    (finding,) = check_recording(replace(whole, joints=joints), rolling.rover()).findings
+    assert finding.kind == 'placeholder' and 'effort' in finding.words
+
+
+OFFSETS = {
+    'imu': ('imu', 0.7),
+    'reference': ('reference', -0.8),
+    'joints': ('wheel_odometry', 0.6),
+}
+
+
+@pytest.mark.parametrize('channel', OFFSETS)
+def test_stamps_that_are_off_are_mended_by_a_parameter(channel):
+    name, offset = OFFSETS[channel]
+    whole = rolling.recording()
+    series = getattr(whole, channel)
+    off = replace(whole, **{channel: replace(series, stamp=series.stamp + round(offset * 1e9))})
+    (finding,) = check_recording(off, rolling.rover()).findings
+    key = f'sensors.{name}_stamp_offset'
+    assert (finding.kind, finding.parameter) == ('delay', key)
+    assert finding.value == pytest.approx(offset, abs=max(2.0 * finding.std, 0.05))
+    change = {c.key: c for c in calibrate(off, rolling.rover()).changes}[key]
+    mended = check_recording(off, rolling.rover(**{key: change.after}))
+    assert not mended.findings, [str(f) for f in mended.findings]
+
+
+def test_halves_hold_as_much_of_what_tells():
+    energy = np.concatenate([np.zeros(50), np.ones(10), np.zeros(40)])
+    first, second = halves(energy)
+    assert energy[first].sum() == pytest.approx(energy[second].sum(), abs=1.0)
+
+
+def test_a_cure_that_one_half_contradicts_does_not_pass():
+    value = np.concatenate([np.full(50, 1.1), np.full(50, 0.95)])
+    assert not tried(lambda rows: float(value[rows].mean()), 1.0, np.ones(100)).falls
+    assert tried(lambda rows: 1.1, 1.0, np.ones(100)).falls
+    assert Trial(1.0, 0.1, 0.5).passes and not Trial(1.0, 0.1, 0.11).passes
