@@ -113,7 +113,7 @@ MAY_USE = {
     # filterpy brings scipy in any case; its Cholesky solver costs less than an inverse.
     'estimation': ({'configuration', 'terramechanics'}, {'numpy', 'filterpy', 'scipy'}),
     'messages': ({'configuration', 'estimation', 'checks'}, {'numpy'}),
-    'checks': ({'configuration', 'estimation'}, {'numpy'}),
+    'checks': ({'configuration', 'estimation'}, {'numpy', 'scipy'}),
     # Sensors of the simulated rover give the estimator's typed measurements.
     'simulation': ({'configuration', 'terramechanics', 'estimation'}, {'numpy'}),
     'bags': (

@@ -12,6 +12,7 @@ from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.estimation.core import EstimatorCore
 from wheel_terra_estimator.estimation.measurements import (
     InertialReading,
+    ReferenceVelocity,
     SinkageReading,
     WheelOdometry,
 )
@@ -125,3 +126,38 @@ def test_simulated_sensors_have_the_stated_errors():
         a.measurement for a in true.arrivals if isinstance(a.measurement, WheelOdometry)
     ]
     np.testing.assert_allclose(wheels[-1].torque, 1.2 * clean_wheels[-1].torque + 2.0)
+
+
+OFFSETS = {
+    InertialReading: ('imu', 0.3),
+    WheelOdometry: ('wheel_odometry', -0.2),
+    ReferenceVelocity: ('reference', 0.5),
+    SinkageReading: ('sinkage', -0.1),
+}
+
+
+def test_stamp_offsets_are_taken_off_before_anything_else(rover):
+    """Estimates of late stamps with the offset stated are those of honest ones, to the bit."""
+    honest = drive(3, duration=4.0)
+    late = {kind: round(offset * 1e9) for kind, (_, offset) in OFFSETS.items()}
+    off = [replace(m, stamp=m.stamp + late[type(m)]) if type(m) in late else m for m in honest]
+    stated = {f'sensors.{name}_stamp_offset': offset for name, offset in OFFSETS.values()}
+    expected, mended, left = [], [], []
+    for configuration, measurements, sets in (
+        (rover, honest, expected),
+        (rover.replace(stated), off, mended),
+        (rover, off, left),
+    ):
+        core = EstimatorCore(configuration)
+        for measurement in measurements:
+            sets += core.add(measurement)
+        sets += core.flush()
+    assert [s.stamp for s in mended] == [s.stamp for s in expected]
+    for a, b in zip(mended, expected, strict=True):
+        np.testing.assert_array_equal(a.slip, b.slip)
+    assert [s.stamp for s in left] != [s.stamp for s in expected]
+
+
+def test_no_stamp_stays_none(rover):
+    errors = SensorErrors(rover.replace({'sensors.imu_stamp_offset': -1.0}))
+    assert errors.corrected(InertialReading(0, np.ones(3), np.zeros(3), None)).stamp == 0

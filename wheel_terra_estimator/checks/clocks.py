@@ -15,7 +15,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import medfilt
 
 from wheel_terra_estimator.checks.evidence import Evidence
 from wheel_terra_estimator.checks.faults import found
@@ -256,7 +255,9 @@ def _of_reference(evidence: Evidence, figures: dict[str, Any]) -> Lag | NotCheck
     order = np.argsort(at, kind='stable')
     period = float(np.median(np.diff(at[order])))
     rim = _even(evidence, evidence.rim, time)
-    forward = medfilt(reference.velocity[order, 0], 3)  # a single wild reading is none
+    forward = reference.velocity[order, 0].copy()
+    beside = np.stack([forward[:-2], forward[1:-1], forward[2:]])
+    forward[1:-1] = np.median(beside, axis=0)  # a single wild reading is none
     speed = np.interp(time, at[order], forward)
     # Between its stamps the reference is a straight line: the rims are smoothed as much.
     for _ in range(2):
