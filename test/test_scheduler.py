@@ -7,11 +7,16 @@ from __future__ import annotations
 import argparse
 import os
 import signal
+import socket
+import time
 from pathlib import Path
+from threading import Thread
 from typing import Any
 
 import pytest
 
+from wheel_terra_estimator import scheduler
+from wheel_terra_estimator.cli.main import main
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.scheduler import add_jobs_argument, finished
 
@@ -48,19 +53,65 @@ def test_a_task_whose_worker_was_killed_is_run_again(tmp_path: Path) -> None:
     assert isinstance(process, int) and process not in (0, os.getpid())
 
 
-def test_a_scheduler_that_does_not_answer_is_said(monkeypatch: Any) -> None:
-    from wheel_terra_estimator import scheduler
-
+@pytest.mark.parametrize('greeting', [None, b'', b'SSH-2.0-OpenSSH_9.6\r\n', os.urandom(4096)])
+def test_an_address_that_does_not_answer_as_a_scheduler_does(
+    monkeypatch: Any, greeting: bytes | None
+) -> None:
+    """Refused, silent, another protocol."""
+    pytest.importorskip('dask.distributed')
     monkeypatch.setattr(scheduler, 'CONNECT_TIMEOUT', 1)
-    with pytest.raises(UserError, match='--scheduler'):
-        next(finished(root, [1.0], address='tcp://127.0.0.1:9'))
+    with socket.create_server(('127.0.0.1', 0)) as server:
+        address = f'tcp://127.0.0.1:{server.getsockname()[1]}'
+        if greeting is None:
+            server.close()
+        else:
+            Thread(target=lambda: server.accept()[0].sendall(greeting), daemon=True).start()
+        begin = time.monotonic()
+        with pytest.raises(UserError, match=f'--scheduler {address}: no Dask scheduler'):
+            next(finished(root, [1.0], address=address))
+        assert time.monotonic() - begin < 10.0
+
+
+def test_a_cluster_without_workers_is_said_and_given_up(
+    monkeypatch: Any, capsys: pytest.CaptureFixture[str]
+) -> None:
+    distributed = pytest.importorskip('dask.distributed')
+    monkeypatch.setattr(scheduler, 'CONNECT_TIMEOUT', 60)
+    monkeypatch.setattr(scheduler, 'LOOK', 1)
+    monkeypatch.setattr(scheduler, 'WORKER_TIMEOUT', 1)
+    with (
+        distributed.LocalCluster(n_workers=0, processes=False, dashboard_address=None) as cluster,
+        pytest.raises(UserError, match=r'has no workers; .* 0 of 2 tasks are done'),
+    ):
+        list(finished(root, [1.0, 4.0], address=cluster.scheduler_address))
+    said = capsys.readouterr().err
+    assert said.count(f'start one with: dask worker {cluster.scheduler_address}') == 1
+
+
+def test_a_scheduler_that_goes_away_is_said(monkeypatch: Any) -> None:
+    distributed = pytest.importorskip('dask.distributed')
+    monkeypatch.setattr(scheduler, 'CONNECT_TIMEOUT', 60)
+    monkeypatch.setattr(scheduler, 'LOOK', 1)
+    monkeypatch.setattr(scheduler, 'WORKER_TIMEOUT', 1)
+    with distributed.LocalCluster(
+        n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None
+    ) as cluster:
+        outcomes = finished(time.sleep, [0.0, 3.0], address=cluster.scheduler_address)
+        assert next(outcomes) == (0, None)
+        cluster.close()
+        with pytest.raises(UserError, match='1 of 2 tasks are done'):
+            next(outcomes)
+
+
+def test_an_empty_address_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main(['replay', 'a', 'b', '-o', 'c', '--scheduler', ''])
+    assert 'argument --scheduler: an empty address' in capsys.readouterr().err
 
 
 def test_a_cluster_that_loses_a_worker_ends_all_tasks(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from wheel_terra_estimator import scheduler
-
     distributed = pytest.importorskip('dask.distributed')
     monkeypatch.setattr(scheduler, 'CONNECT_TIMEOUT', 60)  # on a machine that is busy
     with distributed.LocalCluster(

@@ -1,6 +1,33 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""The one error that users are meant to see."""
+"""The one error that users are meant to see, and which others are not the program's own."""
+
+from __future__ import annotations
+
+import errno
+import traceback
+
+EFFECT_FILE_MODULE = 'wheel_terra_effects_'
+"""Begins the name of the module that a user's file of effects becomes."""
+_OF_THE_MACHINE = frozenset(
+    {
+        errno.ENOSPC,
+        errno.EDQUOT,
+        errno.EFBIG,
+        errno.EROFS,
+        errno.EIO,
+        errno.EMFILE,
+        errno.ENFILE,
+        errno.ENOMEM,
+        errno.EAGAIN,
+        errno.EACCES,
+        errno.EPERM,
+        errno.ENAMETOOLONG,
+        errno.ELOOP,
+        errno.ESTALE,
+    }
+)
+"""What a full disk, a missing permission or a limit of the machine says."""
 
 
 class UserError(Exception):
@@ -11,3 +38,21 @@ class UserError(Exception):
 
     def __init__(self, line: str) -> None:
         super().__init__(' '.join(line.splitlines()))  # cells and keys may hold line feeds
+
+
+def outside_cause(error: BaseException) -> str | None:
+    """Return in words what outside the program an error comes from; None: the program itself."""
+    if isinstance(error, UserError):
+        return str(error)
+    words = f'{type(error).__name__}: {error}'
+    for frame, line in reversed(list(traceback.walk_tb(error.__traceback__))):
+        if str(frame.f_globals.get('__name__')).startswith(EFFECT_FILE_MODULE):
+            return f'{frame.f_code.co_filename}, line {line}: {words}; mend that file of effects'
+    if isinstance(error, MemoryError):
+        return f'not enough memory ({error})'
+    if isinstance(error, OSError) and error.errno in _OF_THE_MACHINE:
+        place = error.filename or 'output or a temporary file'
+        return f'{place}: {error.strerror}; make room or use another place'
+    if isinstance(error, UnicodeEncodeError) and error.reason == 'surrogates not allowed':
+        return f'a name that is not UTF-8 ({error.object[:200]!a}): rename that file or folder'
+    return None

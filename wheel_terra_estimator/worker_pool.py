@@ -14,6 +14,8 @@ from contextlib import contextmanager
 from multiprocessing.connection import Connection, wait
 from typing import Any
 
+from wheel_terra_estimator.errors import UserError
+
 
 @contextmanager
 def worker_pool(processes: int) -> Iterator[ProcessPoolExecutor]:
@@ -23,9 +25,20 @@ def worker_pool(processes: int) -> Iterator[ProcessPoolExecutor]:
     ----------
     processes : int
         Number of workers.
+
+    Raises
+    ------
+    UserError
+        The machine has no shared memory left for them.
     """
     told, tell = multiprocessing.Pipe(duplex=False)
-    pool = ProcessPoolExecutor(processes, initializer=_watch, initargs=(told,))
+    try:
+        pool = ProcessPoolExecutor(processes, initializer=_watch, initargs=(told,))
+    except (OSError, ImportError) as error:  # its semaphores are files there
+        raise UserError(
+            f'processes side by side need shared memory: {error}; look at df -h /dev/shm and make '
+            'room (in a container: --shm-size)'
+        ) from None
     try:
         yield pool
     except BaseException:

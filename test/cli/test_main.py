@@ -4,14 +4,21 @@
 
 from __future__ import annotations
 
+import errno
+import io
 import shlex
+import subprocess
+import sys
 import types
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from wheel_terra_estimator import __version__
 from wheel_terra_estimator.cli import documentation, main
 from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.worker_pool import worker_pool
 
 
 def complaint(capsys, *arguments):
@@ -147,3 +154,122 @@ def test_ctrl_c_while_the_commands_are_loaded_is_an_interrupt(monkeypatch, capsy
     monkeypatch.setattr(main, '_parsers', interrupted)
     assert main.main(['effects']) == 130
     assert capsys.readouterr().err == 'wheel-terra: interrupted\n'
+
+
+class Failing(io.StringIO):
+    """A stream that fails after some characters, or only when it is flushed."""
+
+    encoding = 'ascii'
+
+    def __init__(self, error, room):
+        super().__init__()
+        self.error, self.room = error, room
+
+    def write(self, text):
+        text.encode(self.encoding)
+        if self.room is not None and self.tell() + len(text) > self.room:
+            raise self.error
+        return super().write(text)
+
+    def flush(self):
+        if self.room is None:
+            raise self.error
+
+
+@given(
+    st.sampled_from([errno.ENOSPC, errno.EIO, errno.EDQUOT, errno.EFBIG, errno.EPIPE]),
+    st.one_of(st.none(), st.integers(0, 3000)),
+    st.sampled_from(
+        [['effects'], ['effects', 'soil_mound'], ['effects', '--json'], ['config', 'list']]
+    ),
+)
+def test_output_that_fails_is_no_error_of_the_program(number, room, arguments):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sys, 'stdout', Failing(OSError(number, 'as told'), room))
+        patch.setattr(sys, 'stderr', heard := io.StringIO())
+        status = main.main(arguments)
+    failed = bool(heard.getvalue())
+    assert status == (2 if failed else 0)
+    assert 'error of the program' not in heard.getvalue()
+    assert heard.getvalue().count('\n') == int(failed)
+    if failed:
+        assert number != errno.EPIPE and 'as told' in heard.getvalue()
+    elif number != errno.EPIPE:
+        assert room is not None, 'all was written'
+
+
+CLOSED = """
+import os, sys
+for number in {closed}:
+    os.close(number)
+os.execv(sys.executable, [sys.executable, '-m', 'wheel_terra_estimator.cli.main', *{arguments}])
+"""
+
+
+@pytest.mark.parametrize('closed', [(1,), (2,), (0, 1), (0, 1, 2)])
+def test_closed_streams(tmp_path, closed):
+    path = tmp_path / 'rows.csv'
+    line = f'predict --config hit_wh3 --config hit_fit --slip 0:0.8:9 -o {path}'.split()
+    for arguments, status in ((line, 0), (['effects'], 0), (['check', str(path)], 2)):
+        code = CLOSED.format(closed=closed, arguments=arguments)
+        ended = subprocess.run([sys.executable, '-c', code], capture_output=True, check=False)
+        assert ended.returncode == status, ended.stderr
+        assert b'Traceback' not in ended.stderr + ended.stdout
+    assert path.read_text().count('\n') == 10
+
+
+def test_a_path_that_is_not_utf8_is_refused_before_anything_is_written(tmp_path, capsys):
+    assert main.main(['simulate', '-o', str(tmp_path / 'drive\udcff')]) == 2
+    assert 'not UTF-8' in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_terminal_that_knows_ascii_alone(capsys, monkeypatch):
+    plain = io.TextIOWrapper(io.BytesIO(), encoding='ascii')
+    monkeypatch.setattr(sys, 'stdout', plain)
+    assert main.main(['effects']) == 0
+    assert '+- 500' in plain.buffer.getvalue().decode('ascii')
+    assert not capsys.readouterr().err
+
+
+EFFECTS = """
+import sys
+from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter
+
+def term(contact, p, maths):
+    {body}
+
+{top}
+EFFECT = Effect(
+    name='own', claim='own', symbol='own', validity='-', source='-',
+    touches=frozenset({{'sinkage'}}),
+    parameters=(EffectParameter('a', '-', 1.0, 0.0, 2.0, 1.0, 'half_normal', 'own'),),
+    on_contact=term,
+)
+"""
+
+
+@pytest.mark.parametrize('words', ['sys.exit(0)', 'raise SystemExit', '1 / 0', '[][1]'])
+@pytest.mark.parametrize('where', ['top', 'body'])
+def test_a_file_of_effects_that_fails_or_ends_the_program(tmp_path, capsys, words, where):
+    file = tmp_path / 'own.py'
+    file.write_text(EFFECTS.format(**{'top': '', 'body': 'pass', where: words}))
+    rows = tmp_path / 'rows.csv'
+    model = ['--config', 'hit_wh3', '--config', 'hit_fit']
+    assert main.main(['predict', *model, '--slip', '0:0.8:9', '-o', str(rows)]) == 0
+    assert main.main(['effects', '--load', str(file)]) == (2 if where == 'top' else 0)
+    capsys.readouterr()
+    only = ['--effects', str(file), '--only', 'own']
+    status = main.main(['diagnose', str(rows), *model, *only, '-o', str(tmp_path / 'found')])
+    said = capsys.readouterr().err
+    assert status == 2 and said.count('\n') == 1
+    assert 'own.py' in said and 'error of the program' not in said
+
+
+def test_shared_memory_that_is_full_is_said(monkeypatch):
+    def full(*arguments, **others):
+        raise OSError(errno.ENOSPC, 'No space left on device')
+
+    monkeypatch.setattr('wheel_terra_estimator.worker_pool.ProcessPoolExecutor', full)
+    with pytest.raises(UserError, match='/dev/shm'), worker_pool(2):
+        pass

@@ -20,6 +20,13 @@ AS_ROS_READS = {
     '08': 8.0,
     '0x10': 16,
     '0x1p3': 8.0,
+    '0x1p99999': '0x1p99999',
+    '-0x1.8P99999': '-0x1.8P99999',
+    '0x1p-99999': '0x1p-99999',
+    '1e99999': '1e99999',
+    '-1e-999': '-1e-999',
+    '0x0.0p99999': 0.0,
+    '00e99999': 0.0,
     '1_000': '1_000',
     'yes': True,
     'Off': False,
@@ -49,6 +56,11 @@ def test_values(text, value):
     read = ros_yaml.parse_value(text, 'test')
     assert read == value
     assert type(read) is type(value)
+
+
+@given(st.from_regex(r'[+-]?(0[xX])?[0-9a-fA-F_.]{0,30}([eEpP][+-]?[0-9]{1,9})?', fullmatch=True))
+def test_whatever_looks_like_a_number_has_a_value(text):
+    ros_yaml.plain_scalar(text)
 
 
 def test_not_a_number():

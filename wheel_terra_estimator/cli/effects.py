@@ -105,7 +105,7 @@ def as_text(effects: Mapping[str, Effect]) -> str:
         lines += _wrapped('valid: ', effect.validity)
         lines += _wrapped('source: ', effect.source)
         blocks.append('\n'.join(lines) + '\n')
-    return '\n'.join(blocks)
+    return '\n'.join(blocks).replace('±', '+-')
 
 
 def _aside(effect: Effect) -> list[str]:

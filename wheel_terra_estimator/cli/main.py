@@ -15,11 +15,19 @@ import logging
 import os
 import sys
 from collections.abc import Container, Sequence
+from contextlib import suppress
 from typing import Any, NoReturn
 
 from wheel_terra_estimator import __version__
-from wheel_terra_estimator.cli.terminal import harmless_output, one_line, termination_as_interrupt
-from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.cli.terminal import (
+    discard_output,
+    harmless_output,
+    is_utf8,
+    one_line,
+    open_closed_streams,
+    termination_as_interrupt,
+)
+from wheel_terra_estimator.errors import UserError, outside_cause
 
 COMMANDS = {
     'simulate': 'drive a simulated rover and write a rosbag2 with ground truth',
@@ -196,8 +204,13 @@ def main(argv: Sequence[str] | None = None) -> int:
     # to be said before numpy is imported; what the user has set stays.
     for library in ('OMP', 'OPENBLAS'):
         os.environ.setdefault(f'{library}_NUM_THREADS', '1')
+    open_closed_streams()
+    words = sys.argv[1:] if argv is None else argv
+    for word in words:
+        if not is_utf8(word):
+            _complain(f'wheel-terra: {word}: not UTF-8, which reports and tables need; rename it')
+            return UNUSABLE_INPUT
     try:
-        words = sys.argv[1:] if argv is None else argv
         parser, subs = _parsers(_needed(words))
         arguments, unknown = parser.parse_known_args(words)
     except KeyboardInterrupt:
@@ -213,27 +226,34 @@ def main(argv: Sequence[str] | None = None) -> int:
             logging.basicConfig()
             logging.getLogger('wheel_terra_estimator').setLevel(logging.DEBUG)
         with harmless_output(), termination_as_interrupt():
-            return int(arguments.run(arguments) or 0)
-    except UserError as error:
-        if arguments.debug:
-            raise
-        _complain(f'wheel-terra {arguments.command}: {error}')
-        return UNUSABLE_INPUT
+            status = int(arguments.run(arguments) or 0)
+            sys.stdout.flush()
+            return status
     except KeyboardInterrupt:
         _complain(f'wheel-terra {arguments.command}: interrupted')
         return INTERRUPTED
     except BrokenPipeError:
         # The reader of our output (head, less) has gone: not an error of ours.
-        sys.stderr.close()
+        discard_output()
         return 0
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         if arguments.debug:
             raise
-        _complain(
-            f'wheel-terra {arguments.command}: error of the program '
-            f'({type(error).__name__}: {error}); add --debug for the traceback to report'
-        )
-        return PROGRAM_ERROR
+        discard_output()
+        return _ended_by(error, arguments.command)
+
+
+def _ended_by(error: BaseException, command: str) -> int:
+    """Say what ended a command; return the exit status."""
+    outside = outside_cause(error)
+    if outside is not None:
+        _complain(f'wheel-terra {command}: {outside}')
+        return UNUSABLE_INPUT
+    _complain(
+        f'wheel-terra {command}: error of the program '
+        f'({type(error).__name__}: {error}); add --debug for the traceback to report'
+    )
+    return PROGRAM_ERROR
 
 
 def _refuse(word: str, parser: argparse.ArgumentParser) -> NoReturn:
@@ -255,7 +275,8 @@ def _complain(line: str) -> None:
     line = one_line(line)
     if sys.stderr.isatty() and not os.environ.get('NO_COLOR'):
         line = f'\033[31m{line}\033[0m'
-    print(line, file=sys.stderr)
+    with suppress(OSError):  # nobody hears it
+        print(line, file=sys.stderr)
 
 
 if __name__ == '__main__':

@@ -15,7 +15,7 @@ from wheel_terra_estimator.cli import bag_arguments
 from wheel_terra_estimator.configuration import reader as configuration_reader
 from wheel_terra_estimator.configuration import soil_file
 from wheel_terra_estimator.errors import UserError
-from wheel_terra_estimator.scheduler import add_jobs_argument
+from wheel_terra_estimator.scheduler import add_jobs_argument, add_scheduler_argument
 
 if TYPE_CHECKING:
     from wheel_terra_estimator.fleet.drive import Drive
@@ -97,12 +97,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help='report with pictures; with several recordings a name, for one in the folder of each',
     )
     add_jobs_argument(parser, words='recordings at a time')
-    parser.add_argument(
-        '--scheduler',
-        default='',
-        metavar='ADDRESS',
-        help='Dask scheduler whose workers take the recordings, over files that all of them see',
-    )
+    add_scheduler_argument(parser, what='recordings')
     configuration_reader.add_arguments(parser)
     bag_arguments.add_arguments(parser)
     parser.add_argument(
@@ -281,7 +276,7 @@ def _run_several(arguments: argparse.Namespace) -> int:
         settings,
         overwrite=arguments.overwrite,
         jobs=arguments.jobs,
-        scheduler=arguments.scheduler,
+        scheduler=arguments.scheduler or '',
     )
     failed = [row for row in rows if row.error]
     if arguments.json:

@@ -4,12 +4,14 @@
 
 from __future__ import annotations
 
+import os
 import re
 import signal
 import sys
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager, redirect_stdout
+from contextlib import contextmanager, redirect_stdout, suppress
+from pathlib import Path
 from types import FrameType
 from typing import IO, Any
 
@@ -37,14 +39,42 @@ def one_line(text: str) -> str:
     return line
 
 
+def is_utf8(text: str) -> bool:
+    """Return whether an argument holds no bytes that are not UTF-8."""
+    return not any('\ud800' <= character <= '\udfff' for character in text)
+
+
+def open_closed_streams() -> None:
+    """Put what drops everything in the place of standard streams that the caller has closed.
+
+    Else the next file that is opened would take the number of one, and with it the output.
+    """
+    for name, mode in (('stdin', 'r'), ('stdout', 'w'), ('stderr', 'w')):
+        if getattr(sys, name) is None:
+            setattr(sys, name, Path(os.devnull).open(mode, encoding='utf-8'))  # noqa: SIM115
+
+
+def discard_output() -> None:
+    """Drop what is still to be written to standard output where it can no longer be."""
+    try:
+        sys.stdout.flush()
+    except (OSError, ValueError):
+        with suppress(OSError, ValueError):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
 class _Harmless:
-    """A text stream that writes control characters out."""
+    """A text stream that writes out control characters and what its encoding does not have."""
 
     def __init__(self, stream: IO[str]) -> None:
         self._stream = stream
 
     def write(self, text: str) -> int:
-        self._stream.write(harmless(text))
+        shown = harmless(text)
+        if not shown.isascii():
+            encoding = getattr(self._stream, 'encoding', None) or 'utf-8'
+            shown = shown.encode(encoding, 'backslashreplace').decode(encoding)
+        self._stream.write(shown)
         return len(text)
 
     def __getattr__(self, name: str) -> Any:

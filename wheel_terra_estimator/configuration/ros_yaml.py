@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -97,7 +97,7 @@ def plain_scalar(text: str) -> Scalar | _Null:
     if _INTEGER.fullmatch(text):
         digits = text.lstrip('+-')
         if len(digits) > LONGEST_INTEGER:
-            return float(text) if _DECIMAL.fullmatch(text) else text
+            return _in_range(float, text) if _DECIMAL.fullmatch(text) else text
         if digits[:2] in ('0x', '0X'):
             value = int(digits, 16)
         else:
@@ -106,13 +106,24 @@ def plain_scalar(text: str) -> Scalar | _Null:
         if -(2**63) <= value < 2**63:
             return value
     if _DECIMAL.fullmatch(text):
-        return float(text)
+        return _in_range(float, text)
     if _HEXADECIMAL.fullmatch(text):
-        return float.fromhex(text)
+        return _in_range(float.fromhex, text)
     special = _NOT_FINITE.fullmatch(text)
     if special:
         return float(special[1] + special[2])
     return text
+
+
+def _in_range(read: Callable[[str], float], text: str) -> float | str:
+    """Return a number; its text where it is too large or too small for one, as ROS does."""
+    try:
+        value = read(text)
+    except OverflowError:
+        return text
+    mantissa = re.split('[pP]' if 'x' in text.lower() else '[eE]', text)[0]
+    vanished = value == 0.0 and mantissa.strip('+-0xX.') != ''
+    return text if math.isinf(value) or vanished else value
 
 
 def parse_value(text: str, source: str) -> Value:

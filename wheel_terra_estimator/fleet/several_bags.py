@@ -22,7 +22,7 @@ from typing import Any
 from wheel_terra_estimator import __version__
 from wheel_terra_estimator.bags.limits import LIMITS, Limits
 from wheel_terra_estimator.configuration.configuration import Configuration
-from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.errors import UserError, outside_cause
 from wheel_terra_estimator.fleet.drive import replay_drive
 from wheel_terra_estimator.output_folder import (
     cannot_write,
@@ -262,10 +262,8 @@ def _replay(settings: Settings, task: _Task) -> DriveRow:
 
 
 def _words(error: Exception, path: Path) -> str:
-    words = ' '.join(str(error).split())
-    if isinstance(error, UserError):
-        return words.removeprefix(f'{path}: ')
-    return f'error of the program ({type(error).__name__}: {words})'
+    words = outside_cause(error) or f'error of the program ({type(error).__name__}: {error})'
+    return ' '.join(words.split()).removeprefix(f'{path}: ')
 
 
 def _shown(

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from wheel_terra_estimator.errors import UserError
-from wheel_terra_estimator.scheduler import add_jobs_argument
+from wheel_terra_estimator.scheduler import add_jobs_argument, add_scheduler_argument
 
 if TYPE_CHECKING:
     from wheel_terra_lab.soilbin.case import Case
@@ -94,13 +94,7 @@ def _common(parser: argparse.ArgumentParser, studies: bool) -> None:
             default=0,
             words='engine processes at a time (default: one per core)',
         )
-        parser.add_argument(
-            '--scheduler',
-            default='',
-            metavar='ADDRESS',
-            help='Dask scheduler whose workers take the cases, over files that all of them see',
-        )
-        parser.add_argument('--dask', dest='scheduler', help=argparse.SUPPRESS)
+        add_scheduler_argument(parser, '--dask', what='cases')
 
 
 def run(arguments: argparse.Namespace) -> int:

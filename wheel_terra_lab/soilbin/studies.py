@@ -41,6 +41,6 @@ def run(arguments: argparse.Namespace, cache: Path | None) -> int:
     )
     jobs: list[Job] = module.jobs(arguments)
     workers = 0 if arguments.report_only else arguments.jobs or os.cpu_count() or 1
-    rows = run_study(jobs, table, folder / '.work', cache, workers, arguments.scheduler)
+    rows = run_study(jobs, table, folder / '.work', cache, workers, arguments.scheduler or '')
     module.report(arguments, rows, folder)
     return 0

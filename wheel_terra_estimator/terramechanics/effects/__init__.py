@@ -18,6 +18,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+from wheel_terra_estimator.errors import EFFECT_FILE_MODULE
 from wheel_terra_estimator.terramechanics.effects.base import (
     FORM_MARK,
     OUTPUTS,
@@ -120,13 +121,13 @@ def load_file(path: str | Path) -> list[Effect]:
         If the file cannot be run, defines no effect, or uses a name that is taken.
     """
     path = Path(path)
-    spec = importlib.util.spec_from_file_location(f'wheel_terra_effects_{path.stem}', path)
+    spec = importlib.util.spec_from_file_location(f'{EFFECT_FILE_MODULE}{path.stem}', path)
     if spec is None or spec.loader is None or not path.is_file():
         raise ValueError(f'{path}: not a Python file')
     module = importlib.util.module_from_spec(spec)
     try:
         spec.loader.exec_module(module)
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise ValueError(f'{path}: {type(error).__name__}: {error}') from error
     effects = [value for value in vars(module).values() if isinstance(value, Effect)]
     if not effects:
