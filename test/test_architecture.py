@@ -154,6 +154,7 @@ MAY_USE = {
 }
 LABORATORY = PACKAGE.with_name('wheel_terra_lab')
 LABORATORY_MAY_USE = {
+    'terramechanics': ({'terramechanics'}, {'numpy'}),
     # The plain ways that the package is timed against need scipy's quadrature.
     'benchmarks': (
         {'configuration', 'terramechanics', 'estimation', 'simulation', 'bags'},
@@ -212,7 +213,7 @@ def test_folders_use_what_is_below_them(folder):
 @pytest.mark.parametrize('folder', LABORATORY_MAY_USE)
 def test_folders_of_the_laboratory_too(folder):
     folders, libraries = LABORATORY_MAY_USE[folder]
-    allowed = {PACKAGE.name: folders | COMMON, LABORATORY.name: {'jobs', folder}}
+    allowed = {PACKAGE.name: folders | COMMON, LABORATORY.name: {'jobs', 'terramechanics', folder}}
     assert not list(beyond(LABORATORY / folder, allowed, libraries))
 
 

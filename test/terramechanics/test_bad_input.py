@@ -13,16 +13,16 @@ from terra_tools import SAND, WHEEL, points
 
 from wheel_terra_estimator.terramechanics.conditioned import ConditionedForces
 from wheel_terra_estimator.terramechanics.entrapment import digging_per_turn, rim_travel_to_depth
-from wheel_terra_estimator.terramechanics.inverse import (
+from wheel_terra_estimator.terramechanics.model import WheelSoilModel
+from wheel_terra_estimator.terramechanics.slope_locomotion import SlopeLocomotion
+from wheel_terra_estimator.terramechanics.wheel import Wheel
+from wheel_terra_lab.terramechanics.inverse import (
     centroid_angle,
     entrance_angle,
     peak_stresses,
 )
-from wheel_terra_estimator.terramechanics.longitudinal_sinkage import longitudinal_slip_sinkage
-from wheel_terra_estimator.terramechanics.model import WheelSoilModel
-from wheel_terra_estimator.terramechanics.slope_locomotion import SlopeLocomotion
-from wheel_terra_estimator.terramechanics.steady_sinkage import SteadySinkage
-from wheel_terra_estimator.terramechanics.wheel import Wheel
+from wheel_terra_lab.terramechanics.longitudinal_sinkage import longitudinal_slip_sinkage
+from wheel_terra_lab.terramechanics.steady_sinkage import SteadySinkage
 
 
 @pytest.mark.parametrize(

@@ -19,10 +19,10 @@ from wheel_terra_estimator.terramechanics.maths import ScalarMaths
 from wheel_terra_estimator.terramechanics.model import WheelSoilModel
 from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
 from wheel_terra_estimator.terramechanics.soil import Soil
-from wheel_terra_estimator.terramechanics.steady_sinkage import INPUTS as SINKAGE_INPUTS
-from wheel_terra_estimator.terramechanics.steady_sinkage import SteadySinkage
 from wheel_terra_estimator.terramechanics.terms import Terms, build_contact, set_angles
 from wheel_terra_estimator.terramechanics.wheel import Wheel
+from wheel_terra_lab.terramechanics.steady_sinkage import INPUTS as SINKAGE_INPUTS
+from wheel_terra_lab.terramechanics.steady_sinkage import SteadySinkage
 
 MOUND = {**EFFECTS, 'soil_mound': {'kappa': 1.5, 'onset': 0.2}}
 

@@ -17,7 +17,7 @@ from wheel_terra_estimator.terramechanics import model as model_module
 from wheel_terra_estimator.terramechanics.load_balance import balance, solve_entrance_angle
 from wheel_terra_estimator.terramechanics.model import WheelSoilModel
 from wheel_terra_estimator.terramechanics.soil import PRESSURE_LAWS
-from wheel_terra_estimator.terramechanics.steady_sinkage import SteadySinkage
+from wheel_terra_lab.terramechanics.steady_sinkage import SteadySinkage
 
 
 @pytest.mark.parametrize('load', [1e-6, 1.0, 1e6])

@@ -23,8 +23,8 @@ from wheel_terra_estimator.terramechanics.effects import (
 )
 from wheel_terra_estimator.terramechanics.model import METHODS, WheelSoilModel
 from wheel_terra_estimator.terramechanics.soil import Soil
-from wheel_terra_estimator.terramechanics.steady_sinkage import SteadySinkage
 from wheel_terra_estimator.terramechanics.wheel import Wheel
+from wheel_terra_lab.terramechanics.steady_sinkage import SteadySinkage
 
 SKID = 'slip_sinkage_exponent'
 FRICTIONLESS = Soil(0.0, 1.2e6, 0.9, 0.0, 0.0, 0.01, 0.3, 0.0)

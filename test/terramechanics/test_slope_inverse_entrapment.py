@@ -17,16 +17,16 @@ from wheel_terra_estimator.terramechanics.entrapment import (
     digging_share,
     rim_travel_to_depth,
 )
-from wheel_terra_estimator.terramechanics.inverse import (
+from wheel_terra_estimator.terramechanics.model import WheelSoilModel
+from wheel_terra_estimator.terramechanics.slope_locomotion import SlopeLocomotion, rover_climb
+from wheel_terra_lab.terramechanics.inverse import (
     PeakStresses,
     centroid_angle,
     entrance_angle,
     equivalent_soil,
     peak_stresses,
 )
-from wheel_terra_estimator.terramechanics.longitudinal_sinkage import longitudinal_slip_sinkage
-from wheel_terra_estimator.terramechanics.model import WheelSoilModel
-from wheel_terra_estimator.terramechanics.slope_locomotion import SlopeLocomotion, rover_climb
+from wheel_terra_lab.terramechanics.longitudinal_sinkage import longitudinal_slip_sinkage
 
 SMOOTH = replace(WHEEL, lug_height=0.0)
 

@@ -27,7 +27,7 @@ def test_soil_file(path: Path) -> None:
     bare = [
         line.strip() for line in values
         if '#' not in line and not line.rstrip().endswith(':')
-        and 'name:' not in line and 'enabled:' not in line
+        and not any(key in line for key in ('name:', 'source:', 'enabled:'))
     ]  # fmt: skip
     assert not bare, 'values without a source: put "# <source>" or "# assumed" behind each'
     configuration = reader.load([path], complete=False)

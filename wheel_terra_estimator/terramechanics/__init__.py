@@ -7,9 +7,7 @@
   ``terms`` (one contact with its effects).
 - Forces at given angles: ``quadrature`` (reference), ``branch_moments`` (closed form),
   ``closed_form`` (its use with effects, the triangles A, B, C, pull from torque).
-- Load to sinkage, pull, torque: ``model`` (arrays, by ``load_balance``), ``steady_sinkage``
-  (floats); sinkage to torque and pull: ``conditioned`` by ``balanced_branches`` (floats, for the
-  filter). ``scalar_wheels`` is what both have in common.
-- Questions: ``inverse``, ``equivalent_contact``, ``slope_locomotion``, ``entrapment``,
-  ``longitudinal_sinkage``.
+- Load to sinkage, pull, torque: ``model`` (arrays, by ``load_balance``); sinkage to torque and
+  pull: ``conditioned`` by ``balanced_branches`` (floats, for the filter).
+- Questions: ``slope_locomotion``, ``entrapment``.
 """

@@ -20,10 +20,10 @@ from wheel_terra_estimator.estimation.filter.state import StateLayout
 from wheel_terra_estimator.terramechanics.model import WheelSoilModel
 from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
 from wheel_terra_estimator.terramechanics.soil import Soil
-from wheel_terra_estimator.terramechanics.steady_sinkage import SteadySinkage
 from wheel_terra_estimator.terramechanics.wheel import Wheel
 from wheel_terra_lab.benchmarks.pairs import Figure, timed_pairs
 from wheel_terra_lab.benchmarks.peers import PlainFilter, read_with_rosbags, smooth_wheel
+from wheel_terra_lab.terramechanics.steady_sinkage import SteadySinkage
 
 SCENARIO = 'firm_drive'
 FILES = ('generic_six_wheel', 'test_sand')

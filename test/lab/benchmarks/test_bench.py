@@ -11,11 +11,11 @@ from filterpy.kalman import KalmanFilter
 
 from wheel_terra_estimator.cli.main import main
 from wheel_terra_estimator.configuration import reader
-from wheel_terra_estimator.terramechanics.steady_sinkage import SteadySinkage
 from wheel_terra_estimator.terramechanics.wheel import Wheel
 from wheel_terra_lab.benchmarks.pairs import Figure
 from wheel_terra_lab.benchmarks.peers import PlainFilter, smooth_wheel
 from wheel_terra_lab.benchmarks.run import FILES, RADIUS, WIDTH, forces
+from wheel_terra_lab.terramechanics.steady_sinkage import SteadySinkage
 
 
 @pytest.mark.parametrize('slip', [0.05, 0.3, 0.7])

@@ -1,9 +1,9 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""The catalogue of effects: one module of this folder per effect, found by itself.
+"""The catalogue of effects: modules of this folder, one per effect, found by themselves.
 
-To add one, put a module with an ``EFFECT`` here, or keep it outside the package and call
-``register`` or ``load_file``.
+To add one, put a module with an ``EFFECT`` here (several: ``EFFECTS``), or keep it outside the
+package and call ``register`` or ``load_file``.
 """
 
 from __future__ import annotations
@@ -46,12 +46,12 @@ _registered: dict[str, Effect] = {}
 
 @lru_cache(maxsize=1)
 def _built_in() -> Mapping[str, Effect]:
-    found = {}
-    for module in pkgutil.iter_modules(__path__):
-        effect = getattr(importlib.import_module(f'{__name__}.{module.name}'), 'EFFECT', None)
-        if isinstance(effect, Effect):
-            found[effect.name] = effect
-    return MappingProxyType(found)
+    found: dict[str, Effect] = {}
+    for listed in pkgutil.iter_modules(__path__):
+        module = importlib.import_module(f'{__name__}.{listed.name}')
+        effects = (getattr(module, 'EFFECT', None), *getattr(module, 'EFFECTS', ()))
+        found |= {effect.name: effect for effect in effects if isinstance(effect, Effect)}
+    return MappingProxyType(dict(sorted(found.items())))
 
 
 class Catalogue(Mapping[str, Effect]):

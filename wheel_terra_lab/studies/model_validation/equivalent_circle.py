@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from wheel_terra_estimator.terramechanics.closed_form import decoupled_pull
-from wheel_terra_estimator.terramechanics.equivalent_contact import equivalent_contact
 from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
 from wheel_terra_lab.studies.model_validation.fitting import FloatArray, Model
 from wheel_terra_lab.studies.model_validation.hit_wheels import BASE, read
+from wheel_terra_lab.terramechanics.equivalent_contact import equivalent_contact
 
 SERIES = {
     'HIT_Wh34_smooth': 'HIT, smooth',

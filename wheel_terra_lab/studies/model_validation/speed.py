@@ -20,9 +20,9 @@ from wheel_terra_estimator.terramechanics.model import WheelSoilModel
 from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
 from wheel_terra_estimator.terramechanics.scalar_wheels import scalar_contacts
 from wheel_terra_estimator.terramechanics.soil import Soil
-from wheel_terra_estimator.terramechanics.steady_sinkage import SteadySinkage
 from wheel_terra_estimator.terramechanics.terms import Terms, build_contact, set_angles
 from wheel_terra_estimator.terramechanics.wheel import Wheel
+from wheel_terra_lab.terramechanics.steady_sinkage import SteadySinkage
 
 SOIL = Soil(15.6e3, 2407.4e3, 1.1, 250.0, math.radians(31.9), 0.0114, 0.5, -0.2, 1605.0)
 WHEEL = Wheel(0.15735, 0.165, 0.01, 30)
