@@ -166,10 +166,10 @@ def test_a_file_is_replaced_only_when_told_so(tmp_path: Path) -> None:
     link = tmp_path / 'link.html'
     link.symlink_to(report)
     for path, words in (
-        (link, 'a link or a device'),
-        (Path('/dev/full'), 'a link or a device'),
+        (link, 'is a link'),
+        (Path('/dev/full'), 'no regular file'),
         (tmp_path, 'is a folder'),
-        (report, 'what the command reads'),
+        (report, 'which the command reads'),
     ):
         with pytest.raises(UserError, match=words):
             check_file(path, True, [report])

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Where a command writes: folders and files that are whole or not there, and never anybody else's.
 
-Every command with ``-o`` or ``--report`` uses this module. A folder::
+Every command that writes, and the node, uses this module. A folder::
 
     check_folder(arguments.output, arguments.overwrite, inputs=[arguments.bag])  # before computing
     ...
@@ -18,8 +18,9 @@ as it was. A file::
     with new_file(arguments.report, arguments.overwrite) as path:
         path.write_text(...)
 
-A command that can go on with a folder (``--resume``) writes in place, see `working_folder`.
-Errors of the disk inside the blocks become a `UserError` of one line.
+`check_target` decides for both what may be written to. A command that can go on with a folder
+(``--resume``) writes in place, see `working_folder`. Errors of the disk inside the blocks become a
+`UserError` of one line.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ import json
 import os
 import shutil
 import tempfile
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path, PurePosixPath
 from types import MappingProxyType
@@ -49,56 +50,97 @@ LARGEST_MARKER = 16 * 2**20
 """A marker is a short list: a longer file [byte] is none of ours."""
 
 
-def check_folder(path: Path, overwrite: bool, inputs: Iterable[Path] = ()) -> None:
-    """Make sure, before anything is computed, that a folder can be written at ``path``.
+def check_target(
+    path: Path,
+    overwrite: bool,
+    inputs: Iterable[Path] = (),
+    *,
+    folder: bool = False,
+    foreign: Callable[[Path], str] = lambda path: '',
+) -> None:
+    """Decide whether a file (or a folder) may be written at ``path``; the only place that does.
 
     Parameters
     ----------
     path : Path
-        Folder that the command is to write.
+        What is to be written.
     overwrite : bool
-        Whether an earlier output of this program may be replaced.
+        Whether what is there may be replaced.
     inputs : iterable of Path
-        What the command reads; the output may neither hold it nor lie in it.
+        What the command reads; the output may neither be it, nor hold it, nor lie in it.
+    folder : bool
+        Whether a folder is to be written; of one that is there only what an earlier run listed is
+        ever replaced.
+    foreign : callable, optional
+        Takes a file that is there and returns why it is none of this program, empty where it is
+        one. Empty files are not asked about: they hold nothing.
 
     Raises
     ------
     UserError
-        The folder exists (and `overwrite` was not given, or it holds something that no earlier run
-        listed), is the working folder, a home, a link, holds an input, or cannot be written.
+        It may not: what stands there, and what to do.
     """
     try:
+        wrong_kind = not path.is_dir() if folder else not path.is_file()
+        if path.exists() and not path.is_symlink() and wrong_kind:
+            kind = 'a folder' if path.is_dir() else 'not a folder' if folder else 'no regular file'
+            raise UserError(f'{path}: is {kind}; choose another path')
         _refuse_place(path, inputs)
-        if path.exists():
-            if not overwrite:
-                raise UserError(f'{path}: exists already; choose another path or give --overwrite')
-            if not path.is_dir():
-                raise UserError(f'{path}: is not a folder; choose another path')
+        if not path.exists():
+            return
+        if not overwrite:
+            raise UserError(f'{path}: exists already; choose another path or give --overwrite')
+        if folder:
             _own_files(path)
-        _try_to_write(path)
+        elif path.stat().st_size and (reason := foreign(path)):
+            raise UserError(f'{path}: {reason}, so it is not overwritten; choose another path')
     except OSError as error:
         raise cannot_write(path, error) from None
 
 
-def check_file(path: Path, overwrite: bool, inputs: Iterable[Path] = ()) -> None:
-    """Make sure that a file can be written at ``path``; see `check_folder`.
+def check_folder(path: Path, overwrite: bool, inputs: Iterable[Path] = ()) -> None:
+    """Make sure, before anything is computed, that a folder can be written at ``path``.
 
     Raises
     ------
     UserError
-        The file exists (and `overwrite` was not given), is no regular file, is an input, or its
-        folder cannot be written.
+        It may not be written to, see `check_target`, or it cannot be written.
+    """
+    check_target(path, overwrite, inputs, folder=True)
+    try_to_write(path)
+
+
+def check_file(
+    path: Path,
+    overwrite: bool,
+    inputs: Iterable[Path] = (),
+    foreign: Callable[[Path], str] = lambda path: '',
+) -> None:
+    """Make sure, before anything is computed, that a file can be written at ``path``.
+
+    Raises
+    ------
+    UserError
+        It may not be written to, see `check_target`, or it cannot be written.
+    """
+    check_target(path, overwrite, inputs, foreign=foreign)
+    try_to_write(path)
+
+
+def try_to_write(path: Path) -> None:
+    """Find out whether the nearest folder that exists takes new entries of some size.
+
+    Raises
+    ------
+    UserError
+        It does not.
     """
     try:
-        if path.is_symlink() or (path.exists() and not path.is_file()):
-            kind = 'a folder' if path.is_dir() else 'a link or a device, no regular file'
-            raise UserError(f'{path}: is {kind}; choose another path')
-        if path.exists():
-            if any(given.exists() and path.samefile(given) for given in inputs):
-                raise UserError(f'{path}: is what the command reads; choose another path')
-            if not overwrite:
-                raise UserError(f'{path}: exists already; choose another path or give --overwrite')
-        _try_to_write(path)
+        place = _absolute(path).parent
+        while not place.exists() and place != place.parent:
+            place = place.parent
+        with tempfile.TemporaryDirectory(dir=place, prefix='.wheel-terra-') as probe:
+            (Path(probe) / 'probe').write_bytes(bytes(LEAST_ROOM))
     except OSError as error:
         raise cannot_write(path, error) from None
 
@@ -112,7 +154,7 @@ def new_folder(
     Parameters
     ----------
     path, overwrite, inputs
-        As in `check_folder`.
+        As in `check_target`.
     keep_partial : bool
         Whether what was written before an error is put in its place as well, unless an earlier
         output stands there.
@@ -120,9 +162,9 @@ def new_folder(
     Raises
     ------
     UserError
-        See `check_folder`; the disk is full or fails.
+        See `check_target`; the disk is full or fails.
     """
-    check_folder(path, overwrite, inputs)
+    check_target(path, overwrite, inputs, folder=True)
     path = _absolute(path)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -157,17 +199,23 @@ def new_folder(
 
 
 @contextmanager
-def new_file(path: Path, overwrite: bool = False, inputs: Iterable[Path] = ()) -> Iterator[Path]:
+def new_file(
+    path: Path,
+    overwrite: bool = False,
+    inputs: Iterable[Path] = (),
+    foreign: Callable[[Path], str] = lambda path: '',
+) -> Iterator[Path]:
     """Yield the path of a file to be written; at the end of the block it is at ``path``.
 
-    Its folder is made if it is missing; in a folder of ours the marker then lists the file.
+    Its folder is made if it is missing; in a folder of ours the marker then lists the file. A power
+    cut leaves the old file or the new one.
 
     Raises
     ------
     UserError
-        See `check_file`; the disk is full or fails.
+        See `check_target`; the disk is full or fails.
     """
-    check_file(path, overwrite, inputs)
+    check_target(path, overwrite, inputs, foreign=foreign)
     path = _absolute(path)
     beside: Path | None = None
     held: int | None = None
@@ -177,7 +225,9 @@ def new_file(path: Path, overwrite: bool = False, inputs: Iterable[Path] = ()) -
         beside = Path(tempfile.mkdtemp(dir=path.parent, prefix=f'.{path.name}.wheel-terra-'))
         held = _hold(beside)
         yield beside / path.name
+        _sync(beside / path.name)
         (beside / path.name).replace(path)
+        _sync(path.parent)
         if (path.parent / MARKER).is_file():
             listed = _listed(path.parent)
             _write_marker(path.parent, {*listed, path.name})
@@ -202,21 +252,23 @@ def working_folder(
     Parameters
     ----------
     path, overwrite
-        As in `check_folder`; what an earlier run listed is removed at once.
+        As in `check_target`; what an earlier run listed is removed at once.
     resume : bool
-        Whether to go on with a folder as it is.
+        Whether to go on with a folder as it is, where it is one of ours.
     entries : iterable of str
         All names that the command may write there, as in `mark`.
     inputs : iterable of Path
-        As in `check_folder`.
+        As in `check_target`.
 
     Raises
     ------
     UserError
         See `check_folder`.
     """
-    if resume and path.exists():
+    if resume and path.is_dir():
         _refuse_place(path, inputs)
+        if not is_ours(path):
+            _own_files(path)  # refuses all but an empty folder
     elif path.exists() and not overwrite:
         raise UserError(
             f'{path}: exists already; --resume goes on with it, --overwrite replaces it'
@@ -294,7 +346,7 @@ def cannot_write(path: Path, error: OSError) -> UserError:
 def _refuse_place(path: Path, inputs: Iterable[Path]) -> None:
     """Refuse places that no command may replace, whatever they hold."""
     if path.is_symlink():
-        raise UserError(f'{path}: is a link; name the folder itself, or choose another path')
+        raise UserError(f'{path}: is a link; name what it leads to, or choose another path')
     try:
         target = path.resolve()
     except (OSError, RuntimeError) as error:  # RuntimeError: a loop of links (Python < 3.13)
@@ -310,8 +362,8 @@ def _refuse_place(path: Path, inputs: Iterable[Path]) -> None:
             source = given.resolve()
         except (OSError, RuntimeError):  # whoever reads it will say so
             continue
-        inside = source in target.parents and given.is_dir()
-        if source == target or target in source.parents or inside:
+        same = target.exists() and source.exists() and target.samefile(source)
+        if same or source == target or target in source.parents or source in target.parents:
             raise UserError(
                 f'{path}: is, or lies in, or holds {given}, which the command reads; '
                 'choose another path'
@@ -348,6 +400,15 @@ def _hold(folder: Path) -> int | None:
     return descriptor
 
 
+def _sync(path: Path) -> None:
+    """Have a file, or the entries of a folder, on the disk."""
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
 def _home() -> Path | None:
     try:
         return Path.home().resolve()
@@ -358,15 +419,6 @@ def _home() -> Path | None:
 def _absolute(path: Path) -> Path:
     """Return the path with its folder resolved, so that a name such as ``a/..`` is plain."""
     return path.parent.resolve() / path.name if path.name not in ('', '..') else path.resolve()
-
-
-def _try_to_write(path: Path) -> None:
-    """Find out whether the nearest folder that exists takes new entries of some size."""
-    place = _absolute(path).parent
-    while not place.exists() and place != place.parent:
-        place = place.parent
-    with tempfile.TemporaryDirectory(dir=place, prefix='.wheel-terra-') as probe:
-        (Path(probe) / 'probe').write_bytes(bytes(LEAST_ROOM))
 
 
 def _listed(folder: Path) -> set[str]:
@@ -419,8 +471,11 @@ def _own_files(folder: Path) -> list[str]:
             'is not overwritten; choose another path, or remove it yourself'
         )
     listed = _listed(folder) if is_ours(folder) else set()
-    whole = tuple(name for name in listed if name.endswith('/'))
-    strangers = [name for name in there if name not in listed and not name.startswith(whole)]
+    whole = {name for name in listed if name.endswith('/')}
+    lists = {name for name in whole if is_ours(folder / name)}  # these say themselves what is ours
+    for name in lists:
+        _own_files(folder / name)
+    strangers = [n for n in there if n not in listed and not n.startswith(tuple(whole))]
     if strangers:
         raise UserError(
             f'{folder}: holds {strangers[0]}, which this program did not write, so it is not '

@@ -145,10 +145,11 @@ def test_a_warning_and_the_soil_stand_over_a_restart(start, parameters, listener
     from std_srvs.srv import Trigger
 
     from wheel_terra_estimator.configuration import reader
+    from wheel_terra_estimator.configuration.soil_file import write_values
 
     node, until = listener
     soil = tmp_path / 'soil.yaml'
-    soil.write_text('/**:\n  ros__parameters:\n    soil.cohesion: 432.1\n')
+    write_values(soil, {'soil.cohesion': 432.1})
     state = tmp_path / 'soil.yaml.state.json'
     kept = {'stuck': True, 'reason': 'wheels dig in', 'stamp': math.inf, 'direction': -1}
     state.write_text(json.dumps(kept))

@@ -215,8 +215,6 @@ def _write_outputs(
     drive: Drive, arguments: argparse.Namespace, origin: tuple[float, float]
 ) -> dict[str, Path]:
     """Write what was asked for beside the bag of estimates; return what there is now."""
-    from wheel_terra_estimator.output_folder import new_file
-
     if arguments.table:
         drive.write_table(arguments.table, arguments.overwrite)
     if arguments.track:
@@ -226,9 +224,7 @@ def _write_outputs(
             raise UserError(
                 f'{arguments.bags[0]}: no estimates, so nothing for {arguments.save_soil}'
             )
-        inputs = _inputs(arguments)
-        with new_file(arguments.save_soil, arguments.overwrite, inputs) as path:
-            soil_file.write_values(path, drive.result.learned)
+        soil_file.write_values(arguments.save_soil, drive.result.learned, arguments.overwrite)
     if arguments.report:
         drive.write_report(arguments.report, arguments.overwrite)
     outputs = {

@@ -280,7 +280,8 @@ DECLARED: tuple[Parameter, ...] = (
         'soil_file',
         '',
         'parameter file with the soil and the sensor zeros that were learned: read at start, '
-        'written at ~/save_soil, every 10 s and at the end; empty = none',
+        'written at ~/save_soil, every 10 s and at the end; a new file, or one written so; '
+        'empty = none',
     ),
     # Wheels
     text(

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -14,9 +13,15 @@ from typing import Any
 from wheel_terra_estimator.configuration import ros_yaml
 from wheel_terra_estimator.configuration.parameters import declared
 from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.input_file import read_text
+from wheel_terra_estimator.output_folder import new_file
 
 _LATEST_STAMP = 2**63 - 1  # [ns]
-_COMMENT = 'Learned by the estimator on the drive; read at its next start.'
+HEADER = 'Learned by the estimator on the drive; read at its next start.'
+"""First line, as a comment, of every soil file."""
+_COMMENT = f'{HEADER}\nWritten anew each time: keep nothing of your own in it.'
+_SECTIONS = ('soil.', 'sensors.')
+"""Of the keys that are written."""
 
 
 @dataclass(frozen=True)
@@ -48,17 +53,36 @@ def state_path(soil_file: Path) -> Path:
 
 
 def read_values(soil_file: Path) -> dict[str, Any]:
-    """Return the parameters in a soil file; none where it is not there yet.
+    """Return the parameters in a soil file; none where it is not there yet, or empty.
 
     Raises
     ------
     UserError
         If the file cannot be read.
     """
-    return dict(ros_yaml.read(soil_file)) if soil_file.exists() else {}
+    empty = not soil_file.exists() or (soil_file.is_file() and not soil_file.stat().st_size)
+    return {} if empty else dict(ros_yaml.read(soil_file))
 
 
-def write_values(soil_file: Path, learned: Mapping[str, Any]) -> None:
+def why_foreign(path: Path) -> str:
+    """Return why a file is no soil file of this program; empty where it is one.
+
+    What bears the header and cannot be read otherwise is one: told of by whoever reads it.
+    """
+    try:
+        first, _, _ = read_text(path).partition('\n')
+    except UserError as error:
+        return f'cannot be told to be a soil file ({error})'
+    if first.strip() != f'# {HEADER}':
+        return f"does not begin with '# {HEADER}', as the soil files of this program do"
+    try:
+        others = [key for key in ros_yaml.read(path) if not key.startswith(_SECTIONS)]
+    except UserError:
+        others = []
+    return f'holds {others[0]}, which no soil file does' if others else ''
+
+
+def write_values(soil_file: Path, learned: Mapping[str, Any], overwrite: bool = True) -> None:
     """Write what was learned, as far as it has declared keys and lies in their ranges.
 
     The file is replaced at once and whole: a power cut leaves the old one or the new one.
@@ -66,7 +90,7 @@ def write_values(soil_file: Path, learned: Mapping[str, Any]) -> None:
     Raises
     ------
     UserError
-        If the file cannot be written.
+        If there is a file that is none of this program, or it cannot be written.
     """
     table = declared()
     values = {
@@ -74,12 +98,8 @@ def write_values(soil_file: Path, learned: Mapping[str, Any]) -> None:
         for key, value in learned.items()
         if key in table and _in_range(value, table[key].lower, table[key].upper)
     }
-    partial = soil_file.with_name(f'.{soil_file.name}.{os.getpid()}')
-    try:
-        ros_yaml.write(partial, values, _COMMENT)
-        _replace(partial, soil_file)
-    except OSError as error:
-        raise UserError(f'{soil_file}: cannot be written ({error.strerror})') from None
+    with new_file(soil_file, overwrite, foreign=why_foreign) as path:
+        ros_yaml.write(path, values, _COMMENT)
 
 
 def read_state(soil_file: Path) -> StuckState:
@@ -93,12 +113,14 @@ def read_state(soil_file: Path) -> StuckState:
         If the file cannot be used.
     """
     path = state_path(soil_file)
-    if not path.exists():
-        return StuckState()
+    return _state_in(path) if path.exists() else StuckState()
+
+
+def _state_in(path: Path) -> StuckState:
     try:
-        found = json.loads(path.read_text(encoding='utf-8'))
+        found = json.loads(read_text(path))
         stuck, reason, stamp = found['stuck'], str(found['reason']), found['stamp']
-    except (OSError, ValueError, TypeError, KeyError, RecursionError):
+    except (ValueError, TypeError, KeyError, RecursionError):
         raise UserError(f'{path}: is no state of the estimator; remove it') from None
     if not isinstance(stuck, bool):
         raise UserError(f'{path}: stuck is neither true nor false; remove the file')
@@ -115,15 +137,10 @@ def write_state(soil_file: Path, state: StuckState) -> None:
     Raises
     ------
     UserError
-        If the file cannot be written.
+        If there is a file that is no state of the estimator, or it cannot be written.
     """
-    path = state_path(soil_file)
-    partial = path.with_name(f'.{path.name}.{os.getpid()}')
-    try:
-        partial.write_text(json.dumps(asdict(state)) + '\n', encoding='utf-8')
-        _replace(partial, path)
-    except OSError as error:
-        raise UserError(f'{path}: cannot be written ({error.strerror})') from None
+    with new_file(state_path(soil_file), overwrite=True, foreign=_why_no_state) as path:
+        path.write_text(json.dumps(asdict(state)) + '\n', encoding='utf-8')
 
 
 def clear_state(soil_file: Path) -> None:
@@ -131,10 +148,12 @@ def clear_state(soil_file: Path) -> None:
     state_path(soil_file).unlink(missing_ok=True)
 
 
-def _replace(partial: Path, path: Path) -> None:
-    with partial.open('rb') as file:
-        os.fsync(file.fileno())
-    partial.replace(path)
+def _why_no_state(path: Path) -> str:
+    try:
+        _state_in(path)
+    except UserError:
+        return 'is no state of the estimator'
+    return ''
 
 
 def _in_range(value: Any, lower: float, upper: float) -> bool:

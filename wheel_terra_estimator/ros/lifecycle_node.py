@@ -10,8 +10,10 @@ watch over silence.
 
 from __future__ import annotations
 
+import sys
 import time
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from functools import partial
 from inspect import signature
 from pathlib import Path
@@ -31,8 +33,8 @@ from rclpy.timer import Timer
 from sensor_msgs.msg import Imu, JointState
 from std_srvs.srv import SetBool, Trigger
 
-from wheel_terra_estimator.configuration import soil_file
 from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.configuration.soil_file import StuckState
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.estimation.estimates import EstimateSet
 from wheel_terra_estimator.messages.cdr import DamagedMessageError, TopicMessages
@@ -48,6 +50,7 @@ from wheel_terra_estimator.messages.diagnostics import (
 from wheel_terra_estimator.messages.pipeline import Pipeline
 from wheel_terra_estimator.ros import parameters
 from wheel_terra_estimator.ros.input_watch import InputWatch
+from wheel_terra_estimator.ros.kept_soil import KeptSoil
 from wheel_terra_estimator.ros.outputs import EstimatePublisher, time_message
 from wheel_terra_estimator.ros.qos import OVERRIDABLE, input_profile
 
@@ -112,6 +115,7 @@ class EstimatorNode(LifecycleNode):
     def __init__(self, **options: Any) -> None:
         super().__init__(NODE, automatically_declare_parameters_from_overrides=True, **options)
         self._given = parameters.overrides(self)
+        self._files = parameters.files([*sys.argv, *(options.get('cli_args') or ())])
         self._known = parameters.known()
         self._full_name = self.get_fully_qualified_name().lstrip('/')
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
@@ -121,6 +125,7 @@ class EstimatorNode(LifecycleNode):
         self._subscriptions_made: list[Subscription] = []
         self._unpack = {topic: _topic_messages(topic).unpack for topic in MESSAGE_TYPES}
         self._timers_made: list[Timer] = []
+        self._kept: KeptSoil | None = None
         self._active = False
         self._enabled = True
         self._arrival: TextIO | None = None
@@ -186,13 +191,12 @@ class EstimatorNode(LifecycleNode):
             If a parameter is unknown or its value cannot be used.
         """
         configuration = parameters.configuration(self._given)
-        kept = self._kept_over_restart(configuration)
+        self._kept = self._kept_over_restart(configuration)
+        kept = self._kept.values(configuration) if self._kept is not None else {}
         configuration = configuration.replace(kept) if kept else configuration
         parameters.declare(self, configuration)
         self._arrival = self._open_arrival_log(configuration)
         self._pipeline = Pipeline(configuration, self._full_name)
-        self._soil_path = Path(configuration.soil_file).expanduser()
-        self._keeps_soil = bool(configuration.soil_file)
         self._pipeline.core.warning.restore(self._kept_warning())
         self._warned = self._pipeline.core.warning.state
         self._watch_inputs = InputWatch()
@@ -231,6 +235,8 @@ class EstimatorNode(LifecycleNode):
             return
         self._active = False
         self._save_quietly()
+        if self._kept is not None:
+            self._kept.close()
         for timer in self._timers_made:
             self.destroy_timer(timer)
         for subscription in self._subscriptions_made:
@@ -296,7 +302,7 @@ class EstimatorNode(LifecycleNode):
         if self._pipeline.core.warning.state is not self._warned:
             self._warned = self._pipeline.core.warning.state
             self._log_stuck()
-            self._save_state()
+            self._save_warning()
         if not (self._active and self._enabled):
             return
         self._publisher.publish(estimates)
@@ -331,8 +337,8 @@ class EstimatorNode(LifecycleNode):
         self._pipeline.reset()
         self._latest = None
         self._warned = self._pipeline.core.warning.state
-        if self._keeps_soil:
-            soil_file.clear_state(self._soil_path)
+        if self._kept is not None:
+            self._kept.forget_warning()
         self._publisher.publish_stuck(False, 0, again=True)  # so that listeners hear of the reset
         response.success = True
         response.message = 'state forgotten, parameters kept'
@@ -340,7 +346,7 @@ class EstimatorNode(LifecycleNode):
         return response
 
     def _save_soil(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        if self._pipeline is None or not self._keeps_soil:
+        if self._pipeline is None or self._kept is None:
             response.success = False
             response.message = 'parameter soil_file is empty: there is no file to write'
             if self._pipeline is None:
@@ -352,7 +358,7 @@ class EstimatorNode(LifecycleNode):
             response.success, response.message = False, str(error)
             return response
         response.success = written
-        response.message = str(self._soil_path) if written else 'no estimates yet: nothing learned'
+        response.message = str(self._kept.path) if written else 'no estimates yet: nothing learned'
         return response
 
     def _set_enabled(
@@ -369,58 +375,48 @@ class EstimatorNode(LifecycleNode):
 
     # -- What is kept over a restart ------------------------------------------------------------
 
-    def _kept_over_restart(self, configuration: Configuration) -> dict[str, Any]:
-        """Return the parameters in the soil file; one that is broken is said and left."""
-        if not configuration.soil_file:
-            return {}
-        path = Path(configuration.soil_file).expanduser()
-        try:
-            kept = soil_file.read_values(path)
-            configuration.replace(kept)
-        except UserError as error:
-            self.get_logger().error(f'soil_file is not used: {error}')
-            return {}
-        if kept:
-            self.get_logger().info(f'{path}: {len(kept)} parameters learned before')
-        return kept
+    def _kept_over_restart(self, configuration: Configuration) -> KeptSoil | None:
+        """Return what is kept in the soil file, if there is to be one.
 
-    def _kept_warning(self) -> soil_file.StuckState:
-        state = soil_file.StuckState()
-        if self._keeps_soil:
-            try:
-                state = soil_file.read_state(self._soil_path)
-            except UserError as error:
-                self.get_logger().error(str(error))
+        Raises
+        ------
+        UserError
+            If that file may not be written to.
+        """
+        if self._kept is not None:
+            self._kept.close()  # of a configuration that was refused
+        if not configuration.soil_file:
+            return None
+        effects = str(configuration.flat()['effect_file'])
+        inputs = [*self._files, *([Path(effects)] if effects else [])]
+        return KeptSoil(Path(configuration.soil_file).expanduser(), inputs)
+
+    def _kept_warning(self) -> StuckState:
+        state = self._kept.warning() if self._kept is not None else StuckState()
         if state.stuck:
             self.get_logger().error(f'stuck before the restart: {state.reason}')
         return state
 
     def _save(self) -> bool:
         """Write what was learned; return whether there was anything."""
-        assert self._pipeline is not None
+        assert self._pipeline is not None and self._kept is not None
         learned = self._pipeline.core.learned()
-        if learned:
-            soil_file.write_values(self._soil_path, learned)
-        soil_file.write_state(self._soil_path, self._warned)
+        self._kept.save(learned, self._warned)
         return bool(learned)
 
     def _save_quietly(self) -> None:
-        if self._pipeline is not None and self._keeps_soil:
-            try:
+        if self._pipeline is not None and self._kept is not None:
+            with suppress(UserError):  # stands in the diagnostics
                 self._save()
-            except UserError as error:
-                self.get_logger().error(str(error))
 
     def _save_now_and_then(self) -> None:
         if self._latest is not None:
             self._save_quietly()
 
-    def _save_state(self) -> None:
-        if self._keeps_soil:
-            try:
-                soil_file.write_state(self._soil_path, self._warned)
-            except UserError as error:
-                self.get_logger().error(str(error))
+    def _save_warning(self) -> None:
+        if self._kept is not None:
+            with suppress(UserError):
+                self._kept.save({}, self._warned)
 
     # -- What the operator sees -----------------------------------------------------------------
 
@@ -486,6 +482,8 @@ class EstimatorNode(LifecycleNode):
         faults = self._watch_inputs.faults(now) | self._incompatible
         if self._same_name:
             faults['name'] = f'another node is called /{self._full_name}: both publish estimates'
+        if self._kept is not None and self._kept.fault:
+            faults['soil_file'] = self._kept.fault
         if self._has_no_clock():
             faults['clock'] = 'use_sim_time is true, but nothing comes on /clock'
         self._pipeline.transport_faults.clear()
@@ -525,7 +523,7 @@ class EstimatorNode(LifecycleNode):
             words.append(f'{self.resolve_topic_name(topic)}: rejected: {reason} ({count} messages)')
         words += [
             f'{subject}: {self._pipeline.transport_faults[subject]}'
-            for subject in ('clock', 'name')
+            for subject in ('clock', 'name', 'soil_file')
             if subject in self._pipeline.transport_faults
         ]
         seconds = now - max(self._set_at, self._started)

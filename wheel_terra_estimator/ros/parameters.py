@@ -4,7 +4,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
@@ -39,6 +40,13 @@ def overrides(node: Node) -> dict[str, Any]:
         for name in node.get_parameters_by_prefix('')
         if name not in reader.STANDARD_PARAMETERS and not name.startswith(reader.STANDARD_PREFIXES)
     }
+
+
+def files(arguments: Sequence[str]) -> list[Path]:
+    """Return the parameter files that a command line names."""
+    return [
+        Path(arguments[i + 1]) for i, word in enumerate(arguments[:-1]) if word == '--params-file'
+    ]
 
 
 def configuration(given: Mapping[str, Any]) -> Configuration:

@@ -1,0 +1,217 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""The soil file of a node: nobody else's file is written, one node writes, nothing fails unsaid."""
+
+import errno
+import json
+import os
+import signal
+from pathlib import Path
+
+import pytest
+from test_estimator_node import ROVER, hear, parameters
+
+from wheel_terra_estimator import output_folder
+from wheel_terra_estimator.configuration import reader
+from wheel_terra_estimator.configuration.soil_file import HEADER, StuckState, write_values
+from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.ros.kept_soil import KeptSoil
+
+__all__ = ['parameters']
+LEARNED = {'soil.cohesion': 400.0, 'soil.cohesion_std': 100.0}
+STUCK = StuckState(True, 'wheels dig in', 90, 1)
+OWN = f'# {HEADER}\n/**:\n  ros__parameters:\n'
+FOREIGN = {
+    'rover file': '/**:\n  ros__parameters:\n    rover.mass: 120.0\n',
+    'soil without our header': '# my sand\n/**:\n  ros__parameters:\n    soil.cohesion: 170.0\n',
+    'header further down': f'# mine\n{OWN}    soil.cohesion: 170.0\n',
+    'our header, own keys added': f'{OWN}    effects.lug_digging.enabled: true\n',
+    'notes': 'years of work\n',
+    'no text': b'\x00\xff' * 50,
+}
+
+
+@pytest.fixture
+def configuration():
+    return reader.load(['pathfinder'])
+
+
+def write(path, content):
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    return path
+
+
+def left_over(folder):
+    """Names in a folder that neither the node's files nor the lock account for."""
+    return {p.name for p in folder.iterdir()} - {'s.yaml', 's.yaml.state.json', '.s.yaml.lock'}
+
+
+@pytest.mark.parametrize('content', FOREIGN.values(), ids=FOREIGN)
+@pytest.mark.parametrize('linked', [False, True])
+def test_a_file_of_somebody_else_is_refused_and_stays_as_it_is(tmp_path, content, linked):
+    path = write(tmp_path / 'mine.yaml', content)
+    before = path.read_bytes()
+    if linked:
+        path = tmp_path / 'link.yaml'
+        path.symlink_to('mine.yaml')
+    with pytest.raises(UserError, match=r'soil_file: .* choose another path'):
+        KeptSoil(path)
+    assert (tmp_path / 'mine.yaml').read_bytes() == before
+    assert not list(tmp_path.glob('.*')), 'nothing is left beside it'
+
+
+def test_a_file_that_the_node_reads_is_refused_even_if_it_is_a_soil_file(tmp_path):
+    path = tmp_path / 's.yaml'
+    write_values(path, LEARNED)
+    with pytest.raises(UserError, match='which the command reads'):
+        KeptSoil(path, [path])
+    hard = tmp_path / 'hard.yaml'
+    hard.hardlink_to(path)
+    with pytest.raises(UserError, match='which the command reads'):
+        KeptSoil(hard, [path])
+
+
+@pytest.mark.parametrize('before', [None, '', f'{OWN}    soil.cohesion: 170.0\n'])
+def test_a_new_an_empty_and_an_own_file_are_written(tmp_path, configuration, before):
+    path = tmp_path / 's.yaml'
+    if before is not None:
+        write(path, before)
+    kept = KeptSoil(path)
+    kept.values(configuration)
+    kept.save(LEARNED, STUCK)
+    kept.close()
+    assert not kept.fault
+    again = KeptSoil(path)
+    assert again.values(configuration) == LEARNED
+    assert again.warning() == STUCK
+    assert not left_over(tmp_path)
+
+
+def test_what_is_put_in_its_place_later_is_not_overwritten(tmp_path):
+    path = tmp_path / 's.yaml'
+    kept = KeptSoil(path)
+    kept.save(LEARNED, STUCK)
+    mine = write(path, FOREIGN['rover file']).read_bytes()
+    with pytest.raises(UserError, match='not overwritten'):
+        kept.save(LEARNED, STUCK)
+    assert 'not overwritten' in kept.fault
+    assert path.read_bytes() == mine
+    state = write(tmp_path / 's.yaml.state.json', '{"my": "notes"}')
+    path.unlink()
+    with pytest.raises(UserError, match='no state of the estimator'):
+        kept.save(LEARNED, STUCK)
+    assert state.read_text() == '{"my": "notes"}'
+
+
+def test_an_own_file_that_does_not_suit_the_rover_is_told_and_left_alone(tmp_path, configuration):
+    other_rover = f'{OWN}    sensors.torque_zero: [0.0, 0.0, 0.0]\n'
+    path = write(tmp_path / 's.yaml', other_rover)
+    kept = KeptSoil(path)
+    assert kept.values(configuration) == {}
+    assert 'torque_zero' in kept.fault
+    with pytest.raises(UserError, match='before it is removed'):
+        kept.save(LEARNED, STUCK)
+    kept.save({}, STUCK)
+    assert kept.fault, 'a warning that can be kept takes nothing back'
+    assert path.read_text() == other_rover
+    assert kept.warning() == STUCK
+
+
+def test_one_node_writes_and_the_other_says_so_until_the_first_has_ended(tmp_path):
+    path = tmp_path / 's.yaml'
+    first, second = KeptSoil(path), KeptSoil(path)
+    assert not first.fault
+    assert f'another node (process {os.getpid()} on ' in second.fault
+    first.save(LEARNED, STUCK)
+    with pytest.raises(UserError, match='give each a soil_file of its own'):
+        second.save({'soil.cohesion': 1.0}, StuckState())
+    second.forget_warning()
+    assert KeptSoil(path).warning() == STUCK
+    first.close()
+    second.save({'soil.cohesion': 1.0}, StuckState())
+    assert not second.fault
+
+
+@pytest.mark.parametrize('number', [errno.ENOSPC, errno.EROFS, errno.EIO, errno.EDQUOT])
+@pytest.mark.parametrize('call', ['fsync', 'write'])
+def test_a_disk_that_takes_nothing_is_told_and_nothing_is_left(
+    tmp_path, configuration, monkeypatch, number, call
+):
+    path = tmp_path / 's.yaml'
+    kept = KeptSoil(path)
+    kept.save(LEARNED, STUCK)
+
+    def fails(*arguments, **options):
+        raise OSError(number, os.strerror(number))
+
+    with monkeypatch.context() as context:
+        if call == 'fsync':
+            context.setattr(output_folder.os, 'fsync', fails)
+        else:
+            context.setattr('pathlib.Path.write_text', fails)
+        with pytest.raises(UserError, match='cannot be written'):
+            kept.save({'soil.cohesion': 1.0}, StuckState())
+    assert os.strerror(number) in kept.fault
+    assert kept.values(configuration) == LEARNED
+    assert not left_over(tmp_path)
+    kept.save(LEARNED, STUCK)
+    assert not kept.fault
+
+
+def test_the_folder_is_on_the_disk_behind_each_rename(tmp_path, monkeypatch):
+    synced, fsync = [], os.fsync
+    monkeypatch.setattr(
+        output_folder.os, 'fsync', lambda fd: (synced.append(os.fstat(fd).st_ino), fsync(fd))
+    )
+    KeptSoil(tmp_path / 's.yaml').save(LEARNED, STUCK)
+    for name in ('s.yaml', 's.yaml.state.json'):
+        file = synced.index((tmp_path / name).stat().st_ino)
+        assert tmp_path.stat().st_ino in synced[file:]
+
+
+def test_names_of_temporary_files_do_not_follow_from_the_process(tmp_path, monkeypatch):
+    """Containers have each a process 1."""
+    seen = []
+    monkeypatch.setattr(output_folder, '_sync', lambda path: seen.append(path))
+    for _ in range(2):
+        kept = KeptSoil(tmp_path / 's.yaml')
+        kept.save(LEARNED, STUCK)
+        kept.close()
+    partial = [path for path in seen if path != tmp_path]
+    assert len(set(partial)) == len(partial) == 4
+
+
+@pytest.mark.parametrize('place', ['missing/s.yaml', '/proc/s.yaml'])
+def test_a_place_that_takes_no_file_is_told_at_the_start(
+    start, parameters, listener, place, tmp_path
+):
+    from diagnostic_msgs.msg import DiagnosticArray
+
+    node, until = listener
+    said = hear(node, DiagnosticArray, '/diagnostics')
+    path = tmp_path / place
+    process = start('estimator_node', *ROVER, parameters, '-p', f'soil_file:={path}')
+    until(lambda: any(f'soil_file: {path}: ' in m.status[0].message for m in said))
+    process.stop(signal.SIGINT)
+
+
+def test_a_node_whose_soil_file_is_its_rover_file_ends_at_the_start(start, parameters):
+    before = Path(parameters).read_text()
+    options = ['-p', f'soil_file:={parameters}']
+    status, words = start('estimator_node', *ROVER, parameters, *options).end()
+    assert status == 2
+    assert 'leave it out of the files that the node reads' in words
+    assert 'Traceback' not in words
+    assert Path(parameters).read_text() == before
+
+
+def test_a_damaged_state_is_told_and_the_soil_is_kept_all_the_same(tmp_path):
+    path = tmp_path / 's.yaml'
+    state = write(tmp_path / 's.yaml.state.json', json.dumps(['no state']))
+    kept = KeptSoil(path)
+    assert kept.warning() == StuckState()
+    assert 'no state' in kept.fault
+    with pytest.raises(UserError, match='no state'):
+        kept.save(LEARNED, STUCK)
+    assert path.exists()
+    assert json.loads(state.read_text()) == ['no state']

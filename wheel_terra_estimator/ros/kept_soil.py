@@ -1,0 +1,151 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""What a node keeps over a restart, and why it is not kept where it cannot be."""
+
+from __future__ import annotations
+
+import errno
+import os
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import IO, Any
+
+from wheel_terra_estimator.configuration import soil_file
+from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.configuration.soil_file import StuckState
+from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.output_folder import cannot_write, check_target, try_to_write
+
+_TAKEN = (errno.EWOULDBLOCK, errno.EACCES, errno.EAGAIN)  # by another process
+
+
+class KeptSoil:
+    """Soil, sensor biases and stuck warning of one node in the file of its ``soil_file``.
+
+    One node writes to a file: the lock beside it (``.NAME.lock``) says which. A file that may
+    never be written to is refused; what may change (a folder that is missing, a disk that is full,
+    another node) is told in `fault`, and nothing is written as long as it stands.
+
+    Parameters
+    ----------
+    path : Path
+        The file; a link is followed.
+    inputs : iterable of Path
+        Other files that the node reads.
+
+    Attributes
+    ----------
+    path : Path
+        The file.
+    fault : str
+        Why nothing is kept, in words; empty where it is.
+
+    Raises
+    ------
+    UserError
+        The file is none of this program, or one of `inputs`.
+    """
+
+    def __init__(self, path: Path, inputs: Iterable[Path] = ()) -> None:
+        self.path = path.resolve()
+        self.fault = ''
+        self._lock: IO[str] | None = None
+        self._unusable = ''
+        try:
+            check_target(self.path, True, inputs, foreign=soil_file.why_foreign)
+        except UserError as error:
+            raise UserError(
+                f'soil_file: {error}, or leave it out of the files that the node reads: it is '
+                'read at the start without that'
+            ) from None
+        try:
+            self._claim()
+            try_to_write(self.path)
+        except UserError as error:
+            self.fault = str(error)
+
+    def values(self, configuration: Configuration) -> dict[str, Any]:
+        """Return the parameters that were kept; those that do not suit the rover are left alone."""
+        try:
+            kept = soil_file.read_values(self.path)
+            configuration.replace(kept)
+        except UserError as error:
+            self._unusable = f'not used, and not written to before it is removed: {error}'
+            self.fault = self._unusable
+            return {}
+        return kept
+
+    def warning(self) -> StuckState:
+        """Return the stuck warning that was kept."""
+        try:
+            return soil_file.read_state(self.path)
+        except UserError as error:
+            self.fault = str(error)
+            return StuckState()
+
+    def save(self, learned: Mapping[str, Any], warning: StuckState) -> None:
+        """Write what was learned, if anything, and the warning.
+
+        Raises
+        ------
+        UserError
+            It cannot be written, or must not be; also in `fault`.
+        """
+        try:
+            self._claim()
+            try:
+                if learned and self._unusable:
+                    raise UserError(self._unusable)
+                if learned:
+                    soil_file.write_values(self.path, learned)
+            finally:
+                soil_file.write_state(self.path, warning)
+        except UserError as error:
+            self.fault = str(error)
+            raise
+        self.fault = self._unusable
+
+    def forget_warning(self) -> None:
+        """Remove the warning that was kept."""
+        try:
+            self._claim()
+            soil_file.clear_state(self.path)
+        except UserError as error:
+            self.fault = str(error)
+
+    def close(self) -> None:
+        """Let another node write to the file."""
+        if self._lock is not None:
+            self._lock.close()
+            self._lock = None
+
+    def _claim(self) -> None:
+        """Make sure that this node, and no other, writes to the file."""
+        if not self.path.parent.is_dir():
+            raise UserError(f'{self.path}: there is no folder {self.path.parent}; make it')
+        if self._lock is not None:
+            return
+        try:
+            import fcntl
+        except ImportError:  # not a POSIX system
+            return
+        try:
+            lock = self.path.with_name(f'.{self.path.name}.lock').open('a+', encoding='utf-8')
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError as error:
+                lock.seek(0)
+                holder = lock.read(100).strip()
+                lock.close()
+                if error.errno not in _TAKEN:
+                    return  # a file system without locks
+                raise UserError(
+                    f'{self.path}: another node ({holder}) writes to it, so this one does not; '
+                    'give each a soil_file of its own'
+                ) from None
+            self._lock = lock
+            lock.truncate(0)
+            lock.write(f'process {os.getpid()} on {os.uname().nodename}\n')
+            lock.flush()
+        except OSError as error:
+            raise cannot_write(self.path, error) from None
