@@ -165,7 +165,7 @@ def _left_open(
     """Return an open decision with a law, where one helps, and the soil plainly refitted.
 
     A floor that stands for what is missing keeps the soil from following the rows: at operating
-    points that they do not have, the refit without one is nearer to the truth (docs/discrepancy).
+    points that they do not have, the refit without one is nearer to the truth.
     """
     findings, gap, variance = decision.findings, decision.gap, decision.variance
     if decision.verdict.word not in OPEN:

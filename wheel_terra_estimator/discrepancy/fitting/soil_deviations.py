@@ -5,7 +5,7 @@
 A soil that somebody measured beside the wheel is known better than one out of a table of another
 laboratory, and that better than a proxy. The deviations of the classes of published numbers are the
 scatter between such numbers and the soils of ``config/soils/*_fit.yaml``, which were fitted to
-wheels (docs/discrepancy/soil_deviations.md); few fits, so that they are rounded and shared by
+wheels (docs/diagnose.md); few fits, so that they are rounded and shared by
 numbers of one kind of test.
 """
 

@@ -46,8 +46,6 @@ EFFECT = Effect(
     },
     validity='an even layer; the recorded slip keeps the configured radius',
     source='geometry of a coated wheel; sticking soil: Bekker 1969',
-    candidate=False,
-    why_aside='a layer imitates another radius or a zero of the sinkage (KLS-1: 21 mm of it)',
     on_inputs=_layer,
     on_outputs=_below_the_rim,
     other_forms=(
