@@ -64,7 +64,7 @@ def test_late_stamps_are_told_with_the_delay(late):
     (remark,) = checks.remarks
     assert (remark.kind, remark.topic) == ('delay', 'reference_odom')
     assert remark.value == pytest.approx(late, abs=0.15)
-    assert f'{remark.value:.1f} s off its stamps' in remark.cure
+    assert remark.cure.startswith(f'sensors.reference_stamp_offset: {remark.value:.2f}')
     assert not checks.findings and not checks.undecided
 
 

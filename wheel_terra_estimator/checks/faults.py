@@ -59,7 +59,7 @@ class Fault:
 
 _DIRECTIONS = 'wheels.direction: [{directions}]'
 _OFFSET = 'sensors.{channel}_stamp_offset: {offset:.3f}, or synchronise the clocks'
-_LATE = 'its stamps lie {offset_left:+.2f} +- {std:.2f} s off the others: {against}'
+_LATE = 'its stamps are {size:.2f} +- {std:.2f} s too {side}, by {against}'
 
 FAULTS: dict[str, Fault] = {
     # Names and missing inputs
@@ -258,7 +258,7 @@ FAULTS: dict[str, Fault] = {
     # IMU
     'imu_yaw': Fault(
         'mounting',
-        'forward acceleration, curves and slopes show {angle:.0f} +- {std:.0f} degrees off its x '
+        'forward acceleration, curves and slopes show {angle:.0f} +- {off:.0f} degrees off its x '
         'axis{trial}',
         '{angles}',
         evidence='acceleration',
@@ -495,6 +495,9 @@ def found(
     fault = FAULTS[key]
     figures = {'trial': '', 'rival': '', 'separate': '', 'wheels': wheel, 'topic': topic} | figures
     figures.setdefault('value', value)
+    if 'offset_left' in figures:
+        left = figures['offset_left']
+        figures |= {'size': abs(left), 'side': 'late' if left > 0.0 else 'early'}
     figures.setdefault('std', std)
     return Finding(
         kind=fault.kind,

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any, TypeAlias
 
@@ -89,6 +90,19 @@ class NotChecked:
 
 
 Outcome: TypeAlias = 'Finding | NotChecked'
+
+
+SHOWN = 5
+"""Findings that a terminal shows."""
+ALWAYS_SHOWN = ('sign', 'unit', 'swapped_sides', 'exchanged_wheels', 'missing_wheel', 'drop_outs')
+"""Kinds without whose cure nothing else counts: never cut."""
+
+
+def shown(findings: Sequence[Finding]) -> list[str]:
+    """Return the lines of a terminal: the worst findings, and how many more there are."""
+    lines = [str(f) for i, f in enumerate(findings) if i < SHOWN or f.kind in ALWAYS_SHOWN]
+    more = len(findings) - len(lines)
+    return [*lines, f'{more} more (wheel-terra check --json)'] if more else lines
 
 
 @dataclass

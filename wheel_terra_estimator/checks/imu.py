@@ -340,21 +340,25 @@ def _evenness(heading: FloatArray) -> float:
 
 
 def felt_motion(evidence: Evidence) -> tuple[NDArray[np.complex128], float] | None:
+    """Return how a recording's motion is felt; see `felt`."""
+    if evidence.force is None or evidence.gyro is None or evidence.time.size < 100:
+        return None
+    return felt(evidence.rim, evidence.gyro[:, 2], evidence.force[:, :2], evidence.period)
+
+
+def felt(
+    rim: FloatArray, yaw_rate: FloatArray, force: FloatArray, period: float
+) -> tuple[NDArray[np.complex128], float]:
     """Return sums over blocks of acceleration felt times that of the wheels, and their energy.
 
     Along x the acceleration of starts and stops, along y that of curves, as complex numbers.
     """
-    if evidence.force is None or evidence.gyro is None or evidence.time.size < 100:
-        return None
-    period = evidence.period
     width = max(round(0.4 / period), 1)
-    speed = moving_mean(evidence.rim, width)
-    change = np.gradient(speed, period)
-    curve = speed * moving_mean(evidence.gyro[:, 2], width)
-    motion = _without_drift(change + 1j * curve, period)
-    horizontal = [moving_mean(evidence.force[:, axis], width) for axis in (0, 1)]
-    seen = _without_drift(horizontal[0] + 1j * horizontal[1], period)
-    return felt_blocks(motion, seen)
+    speed = moving_mean(rim, width)
+    curve = speed * moving_mean(yaw_rate, width)
+    motion = _without_drift(np.gradient(speed, period) + 1j * curve, period)
+    along, across = (moving_mean(column, width) for column in force.T)
+    return felt_blocks(motion, _without_drift(along + 1j * across, period))
 
 
 def felt_blocks(
@@ -423,6 +427,7 @@ def check_yaw(evidence: Evidence, figures: dict[str, Any]) -> tuple[list[Outcome
         std,
         0.97,
         angle=math.degrees(seen.value),
+        off=std,
         trial=Trial(*(math.degrees(angle) for angle in trial[:2])).words('off by', 'degrees'),
     )
     return [finding], rotation

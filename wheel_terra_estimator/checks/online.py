@@ -14,17 +14,13 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from math import isnan
 from statistics import median
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+from wheel_terra_estimator.checks.faults import LEAST_TURN_RATE, RATE_UNITS, STANDARD_GRAVITY, found
 from wheel_terra_estimator.checks.finding import Finding
+from wheel_terra_estimator.checks.imu import LEAST_YAW, YAW_SIGMAS
 from wheel_terra_estimator.checks.online_delay import SpeedHistory
-from wheel_terra_estimator.checks.online_words import (
-    GRAVITY_OFF,
-    GRAVITY_SHARE,
-    Seen,
-    Wording,
-    rate_unit,
-)
+from wheel_terra_estimator.checks.online_motion import MotionHistory
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.measurements import (
     InertialReading,
@@ -50,14 +46,24 @@ UNSTEADY = 0.4
 """Change of the rim speed within a window, as a share of it, that is a start or a stop."""
 STRAIGHT = 0.15
 """Rim speed from yawing over rim speed below which a window is straight."""
+GRAVITY_SHARE = 0.2
+"""Share by which the mean specific force may differ from gravity."""
+GRAVITY_OFF = 0.3
+"""Specific force over gravity below which gravity was taken off."""
+UNIT_BAND = (0.85, 1.5)
+"""Rim speed over reference speed of a rolling wheel, slip included."""
+UPSIDE_DOWN = 150.0
+"""Angle [deg] between gravity and straight down above which an IMU lies on its back."""
+LEAST_READINGS = 5
+"""Readings of an IMU in a window that must not all be the same."""
+HELD_TORQUE = 1.5
+"""Torque of a standing wheel over that of the others from which it is held, not dead [-]."""
 UPRIGHT = math.cos(math.radians(50.0))
 """Upward share of the specific force that no rover drives below."""
 GREATEST_RIM_SPEED = 15.0
 """Rim speed [m/s] that no rover of this kind drives."""
 ORDINARY_RATIO = (0.3, 5.0)
 """Rim speed over reference speed of wheels in the right unit that still make way."""
-LEAST_YAW_RATE = 0.02
-"""Yaw rate [rad/s] below which a window says nothing of a turn."""
 CLEAR_TURN = 0.1
 """Rim speed from yawing over rim speed above which sides are compared."""
 ORDINARY_TRACKS = (0.3, 6.0)
@@ -121,10 +127,13 @@ RULES = {
     'torque_unit': Rule(4, 20),
     'sinkage': Rule(5, 20),
     'frozen': Rule(4, 2),
+    'imu_frozen': Rule(3, 2),
+    'imu_yaw': Rule(2, 3),
+    'exchanged': Rule(2, 3),
     'reference_delay': Rule(2, 4),
 }
 
-REMARKS = frozenset({'reference_delay'})
+REMARKS = frozenset({'reference_delay', 'imu_frozen', 'imu_yaw', 'exchanged'})
 """Faults that are told while slip is judged all the same."""
 
 Suspicion = tuple[str, int]
@@ -148,6 +157,7 @@ class _Sums:
     force_z: float = 0.0
     yaw_rate: float = 0.0
     inertial: int = 0
+    inertial_changes: int = 0
     reference: float = 0.0
     reference_variance: float = 0.0
     references: int = 0
@@ -184,6 +194,7 @@ class _Window:
     fastest: float  # greatest typical rim speed of one message [m/s]
     changes: tuple[int, ...]
     depth: float  # [m], nan: none
+    imu_dead: bool  # all its readings are the same
 
     @property
     def typical(self) -> float:
@@ -218,9 +229,12 @@ class OnlineChecks:
 
     def __init__(self, configuration: Configuration) -> None:
         wheels, rover = configuration.wheels, configuration.rover
-        self._wording = Wording(configuration)
+        self._names = wheels.names
+        self._odometry = configuration.wheel_odometry
+        self._direction: list[float] = wheels.direction.tolist()
         self._radius: list[float] = wheels.slip_radius.tolist()
-        lateral = wheels.y.tolist()
+        self._lateral = tuple(wheels.y.tolist())
+        lateral = self._lateral
         self._left = [i for i, y in enumerate(lateral) if y > 0.0]
         self._right = [i for i, y in enumerate(lateral) if y < 0.0]
         self._track = 0.0
@@ -231,12 +245,15 @@ class OnlineChecks:
         self._gravity = float(rover.gravity)
         self._weight = float(rover.mass) * self._gravity
         self._reference_std = float(configuration.sensors.reference_std)
+        self._reference_offset = float(configuration.sensors.reference_stamp_offset)
         sensors = configuration.sensors
         self._above_ground = max(
             ABOVE_GROUND, 2.0 * float(sensors.sinkage_zero_std), float(sensors.sinkage_std)
         )
         self._sums = self._empty()
         self._speeds = SpeedHistory()
+        self._motion = MotionHistory()
+        self._force = (math.nan,) * 3
         self._verdicts = _Verdicts({}, {}, ())
 
     @property
@@ -263,16 +280,19 @@ class OnlineChecks:
         """Forget everything."""
         self._sums = self._empty()
         self._speeds = SpeedHistory()
+        self._motion = MotionHistory()
+        self._force = (math.nan,) * 3
         self._verdicts = _Verdicts({}, {}, ())
 
-    def snapshot(self) -> tuple[_Sums, SpeedHistory, _Verdicts]:
+    def snapshot(self) -> tuple[Any, ...]:
         """Return the state in a form that later steps leave alone."""
-        return self._sums.copy(), self._speeds.copy(), self._verdicts
+        kept = self._sums.copy(), self._speeds.copy(), self._motion.copy()
+        return (*kept, self._force, self._verdicts)
 
-    def restore(self, snapshot: tuple[_Sums, SpeedHistory, _Verdicts]) -> None:
+    def restore(self, snapshot: tuple[Any, ...]) -> None:
         """Return to a kept state."""
-        sums, speeds, self._verdicts = snapshot
-        self._sums, self._speeds = sums.copy(), speeds.copy()
+        sums, speeds, motion, self._force, self._verdicts = snapshot
+        self._sums, self._speeds, self._motion = sums.copy(), speeds.copy(), motion.copy()
 
     def step(self, stamp: int, inputs: StepInputs) -> None:
         """Take all inputs of a stamp [ns], later than the one before."""
@@ -282,6 +302,8 @@ class OnlineChecks:
         delay = self._speeds.advance(stamp)
         if delay is not None:
             self._weigh([('reference_delay', -1, delay.late, delay.lag)])
+        if self._motion.advance(stamp):
+            self._weigh(self._of_motion())
         if inputs.wheel_odometry is not None:
             self._add_odometry(inputs.wheel_odometry)
         if inputs.inertial is not None:
@@ -318,6 +340,7 @@ class OnlineChecks:
             torques[i] += torque
         sums.odometry += 1
         sums.last = tuple(heard)
+        self._motion.add_rims(sums.last)
         if not sizes:
             return
         self._speeds.add_rim(sum(rim for rim in heard if not isnan(rim)) / len(sizes))
@@ -336,6 +359,9 @@ class OnlineChecks:
         sums.force_z += z
         sums.yaw_rate += float(reading.angular_rate[2])
         sums.inertial += 1
+        sums.inertial_changes += (x, y, z) != self._force
+        self._force = (x, y, z)
+        self._motion.add_inertial(x, y, float(reading.angular_rate[2]))
 
     def _add_reference(self, reference: ReferenceVelocity) -> None:
         sums = self._sums
@@ -358,7 +384,8 @@ class OnlineChecks:
             std = math.sqrt(sums.reference_variance) / sums.references
             if abs(reference) < max(3.0 * std, LEAST_RIM_SPEED):
                 reference = math.nan
-        inertial = sums.inertial
+        dead = sums.inertial >= LEAST_READINGS and not sums.inertial_changes
+        inertial = 0 if dead else sums.inertial  # what does not change says nothing
         force = (sums.force_x, sums.force_y, sums.force_z)
         return _Window(
             rims=tuple(rim / count if sums.odometry else math.nan for rim in sums.rims),
@@ -374,6 +401,7 @@ class OnlineChecks:
             fastest=sums.fastest,
             changes=tuple(sums.changes),
             depth=sums.depth / sums.depths if sums.depths else math.nan,
+            imu_dead=dead,
         )
 
     # -- Judgement ------------------------------------------------------------------------------
@@ -399,11 +427,21 @@ class OnlineChecks:
                 remarks=tuple(finding for name, finding in told if name in REMARKS),
             )
 
+    def _of_motion(self) -> Iterator[Evidence]:
+        """What the last half minute says, by the comparisons of a recording."""
+        yaw = self._motion.yaw_of_imu()
+        if yaw is not None:
+            yield 'imu_yaw', -1, yaw != 0.0, yaw
+        for (a, b), wrong in self._motion.exchanged(self._lateral):
+            yield 'exchanged', -1, wrong, float(a * len(self._names) + b)
+
     def _evidence(self, window: _Window) -> Iterator[Evidence]:
         if window.force is not None:
             yield from self._of_gravity(window.force)
         if window.moving:
             yield from self._of_frozen_rates(window)
+            if window.imu_dead or window.force is not None:
+                yield 'imu_frozen', -1, window.imu_dead, 0.0
             if abs(window.depth) > self._above_ground:
                 yield 'sinkage', -1, window.depth < 0.0, window.depth
         yield from self._of_torque_unit(window)
@@ -441,7 +479,7 @@ class OnlineChecks:
                 yield 'one_side_backwards', -1, False, 0.0
         elif left * right > 0.0 and self._straight(window):
             yield 'one_side_backwards', -1, False, 0.0
-        if abs(yaw_rate) < LEAST_YAW_RATE or 0.5 * abs(turn) < CLEAR_TURN * window.size:
+        if abs(yaw_rate) < LEAST_TURN_RATE or 0.5 * abs(turn) < CLEAR_TURN * window.size:
             return
         ratio = difference / turn
         if 0.5 * abs(turn) > IMPOSSIBLE_YAW * fastest:
@@ -478,11 +516,16 @@ class OnlineChecks:
                 yield 'backwards', i, i in backwards, ratio
 
     def _of_frozen_rates(self, window: _Window) -> Iterator[Evidence]:
-        """A rate that stays the very same number while the others change."""
+        """A rate that stays the very same number while the others change; no wheel that is held."""
         for i, (rim, changes) in enumerate(zip(window.rims, window.changes, strict=True)):
             others = [n for j, n in enumerate(window.changes) if j != i]
-            if not isnan(rim) and rim != 0.0 and len(others) > 1 and median(others) >= BUSY:
-                yield 'frozen', i, changes == 0, rim
+            if isnan(rim) or len(others) < 2 or median(others) < BUSY:
+                continue
+            if rim == 0.0:
+                beside = [abs(t) for j, t in enumerate(window.torques) if j != i and not isnan(t)]
+                if not beside or not abs(window.torques[i]) < HELD_TORQUE * median(beside):
+                    continue
+            yield 'frozen', i, changes == 0, rim
 
     def _of_the_reference(self, window: _Window) -> Iterator[Evidence]:
         typical, reference = window.typical, window.reference
@@ -532,16 +575,160 @@ class OnlineChecks:
         """Word what stands, by rule; what follows from another finding is left out."""
         tallies = self._verdicts.tallies
         standing = {key: tally.score for key, tally in tallies.items() if tally.stands}
-        backwards = tuple(wheel for name, wheel in standing if name == 'backwards')
         left_out: set[str] = set()
         for name, _ in standing:
             left_out |= _CONSEQUENCES.get(name, set())
-        for (name, wheel), score in standing.items():
-            if name not in left_out:
-                seen = Seen(self._verdicts.figures[name, wheel], wheel, backwards)
-                sure = min(1.0 - 0.5 ** (score + 1), GREATEST_SURE)
-                yield name, self._wording.finding(name, seen, sure)
+        for name in dict.fromkeys(name for name, _ in standing):
+            if name in left_out:
+                continue
+            wheels = [wheel for other, wheel in standing if other == name]
+            score = min(standing[name, wheel] for wheel in wheels)
+            figure = self._verdicts.figures[name, wheels[0]]
+            sure = min(1.0 - 0.5 ** (score + 1), GREATEST_SURE)
+            yield name, self._worded(name, [w for w in wheels if w >= 0], figure, sure)
 
+    def _worded(self, name: str, wheels: list[int], figure: float, sure: float) -> Finding:
+        """Return the finding of a rule in the words of its fault."""
+        if name in IMU_RULES:
+            return self._of_imu(name, figure, sure)
+        if name in ('reference_sign', 'reference_delay'):
+            return self._of_reference(name, figure, sure)
+        if name in ('sides', 'exchanged', 'backwards', 'one_side_backwards'):
+            return self._of_places(name, wheels, figure, sure)
+        who = ', '.join(self._names[i] for i in wheels) or None
+        odometry = self._odometry
+        if name in ('rate_unit', 'rate_unit_in_turns'):
+            unit = rate_unit(figure) if name == 'rate_unit' else _unit_of_turns(figure)
+            how = f'rim speed {figure:.3g} times the reference'
+            if name != 'rate_unit':
+                how = f'turns {figure:.3g} times those of the gyro'
+            value = RATE_UNITS[unit or RPM]
+            return found('rate_unit', odometry, sure, value=value, unit=unit, how=how)
+        if name == 'frozen':
+            how = f'rim speed stays at exactly {figure:.4g} m/s'
+            return found('rate_frozen', odometry, sure, wheel=who, how=how)
+        if name in ('torque', 'torque_of_wheel'):
+            all_of_them = who or 'all wheels'
+            return found('torque_sign', odometry, sure, wheel=who, wheels=all_of_them, value=-1.0)
+        if name == 'sinkage':
+            return found('sinkage_above', 'sinkage', sure, value=-1.0, height=-1000.0 * figure)
+        key = {'absurd_rate': 'absurd_rate', 'torque_unit': 'torque_absurd'}[name]
+        return found(key, odometry, sure, figure=figure)
+
+    def _of_imu(self, name: str, figure: float, sure: float) -> Finding:
+        imu = 'imu/data'
+        if name == 'gravity':
+            return self._of_size(figure, sure)
+        if name == 'imu_frozen':
+            how = 'its numbers stay the same while the rover moves'
+            return found('sensor_frozen', imu, sure, how=how)
+        if name == 'gyro_unit':
+            value = math.pi / 180.0
+            return found('gyro_degrees', imu, sure, value=value, times=1.0 / value, how='rims')
+        if name == 'imu_yaw':
+            key, angle = 'sensors.imu_mounting_yaw_deg', math.degrees(figure)
+            off = math.degrees(LEAST_YAW) / YAW_SIGMAS
+            return found(
+                'imu_yaw', imu, sure, angle=angle, off=off, angles=_SEE_CHECK, parameter=key
+            )
+        tilt = math.degrees(math.acos(max(-1.0, min(1.0, figure))))
+        key = 'sensors.imu_mounting_roll_deg'
+        return found(
+            'imu_upside',
+            imu,
+            sure,
+            force=f'gravity points {tilt:.0f} degrees off straight down',
+            angles=f'{key}: 180.0' if tilt > UPSIDE_DOWN else _SEE_CHECK,
+            parameter=key,
+        )
+
+    def _of_places(self, name: str, wheels: list[int], figure: float, sure: float) -> Finding:
+        odometry = self._odometry
+        if name == 'sides':
+            mirrored = ', '.join(f'{-y:g}' for y in self._lateral)
+            return found(
+                'swapped_sides',
+                odometry,
+                sure,
+                rival=', all wheels count backwards, or the gyro counts yaw to the right',
+                names=', '.join(self._names),
+                mirrored=f', or wheels.y: [{mirrored}]; or negate angular_velocity.z in the driver',
+            )
+        if name == 'exchanged':
+            a, b = divmod(int(figure), len(self._names))
+            names = list(self._names)
+            names[a], names[b] = names[b], names[a]
+            pair = f'{self._names[a]}, {self._names[b]}'
+            return found('exchanged', odometry, sure, wheel=pair, names=', '.join(names))
+        if name == 'backwards':
+            return found(
+                'backwards',
+                odometry,
+                sure,
+                wheel=', '.join(self._names[i] for i in wheels),
+                value=-self._direction[wheels[0]],
+                directions=self._directions(wheels),
+                torque='',
+            )
+        left, right = self._directions(self._left), self._directions(self._right)
+        return found('one_side_backwards', odometry, sure, value=-1.0, left=left, right=right)
+
+    def _of_reference(self, name: str, figure: float, sure: float) -> Finding:
+        reference = 'reference_odom'
+        if name == 'reference_sign':
+            every = self._directions(range(len(self._names)))
+            wheels_too = f'; if all wheels count backwards, wheels.direction: [{every}]'
+            return found('reference_reversed', reference, sure, value=-1.0, or_wheels=wheels_too)
+        offset = figure + self._reference_offset
+        return found(
+            'reference_offset',
+            reference,
+            sure,
+            value=round(offset, 2),
+            std=ONLINE_DELAY_STD,
+            channel='reference',
+            offset=offset,
+            offset_left=figure,
+            against='starts and stops of the wheels; wheel-terra check has the exact figure',
+        )
+
+    def _of_size(self, size: float, sure: float) -> Finding:
+        """Return what a specific force of another size than gravity is."""
+        share, imu = size / self._gravity, 'imu/data'
+        told: dict[str, Any] = {'size': size, 'gravity': self._gravity}
+        for unit, factor in (('g', STANDARD_GRAVITY), ('mg', STANDARD_GRAVITY / 1000.0)):
+            if abs(share * factor - 1.0) < GRAVITY_SHARE:
+                return found('force_unit', imu, sure, value=factor, unit=unit, **told)
+        if share < GRAVITY_OFF:
+            return found('gravity_off', imu, sure, **told)
+        place = 'another planet, or another scale'
+        return found('planet', imu, sure, value=size, place=place, **told)
+
+    def _directions(self, flipped: Iterable[int]) -> str:
+        turned = set(flipped)
+        signs = (int(-d if i in turned else d) for i, d in enumerate(self._direction))
+        return ', '.join(str(sign) for sign in signs)
+
+
+def rate_unit(ratio: float) -> str | None:
+    """Return the unit in which wheels read so many times too fast; None: none."""
+    for unit, factor in RATE_UNITS.items():
+        if factor < 1.0 and UNIT_BAND[0] < ratio * factor < UNIT_BAND[1]:
+            return unit
+    return None
+
+
+def _unit_of_turns(ratio: float) -> str:
+    """Return the unit in which turns read so many times too fast; skidding makes it more."""
+    slower = sorted(RATE_UNITS, key=lambda unit: -RATE_UNITS[unit])[1:]
+    return next((unit for unit in slower if ratio * RATE_UNITS[unit] < 3.0), slower[-1])
+
+
+IMU_RULES = ('gravity', 'mounting', 'gyro_unit', 'imu_yaw', 'imu_frozen')
+RPM = 'revolutions per minute'
+ONLINE_DELAY_STD = 0.1
+"""Deviation of a delay that is told while driving: a bin of its history [s]."""
+_SEE_CHECK = 'state sensors.imu_mounting_*_deg (wheel-terra check has the angles)'
 
 _CONSEQUENCES = {
     'reference_sign': {'reference_delay'},

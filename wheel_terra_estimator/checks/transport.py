@@ -63,7 +63,7 @@ def check_transport(
                     channel='imu',
                     offset=offset,
                     offset_left=-difference,
-                    against='by log time, two clocks',
+                    against='log time: two clocks',
                 )
             )
             offset_left = -difference

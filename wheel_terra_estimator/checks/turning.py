@@ -176,11 +176,12 @@ def sign_fixes(count: int, lateral: FloatArray, *, exchanges: bool = True) -> li
     plain = (1,) * count
     fixes = [Fix((1, *signs)) for signs in itertools.product((1, -1), repeat=count - 1)]
     if exchanges and count > 2:
-        fixes += [Fix(plain, pair) for pair in _pairs(lateral)]
+        fixes += [Fix(plain, pair) for pair in pairs_of(lateral)]
     return fixes
 
 
-def _pairs(lateral: FloatArray) -> list[tuple[int, int]]:
+def pairs_of(lateral: FloatArray) -> list[tuple[int, int]]:
+    """Return every left wheel with every right one."""
     left, right = np.flatnonzero(lateral > 0.0), np.flatnonzero(lateral < 0.0)
     return [(int(a), int(b)) for a in left for b in right]
 
@@ -289,7 +290,7 @@ def _best(stretch: Turning, count: int) -> Comparison:
     turns = stretch.turns()
     if best.trial.falls or count < 3 or turns.sum() < 2 * LEAST_TURNING_ROWS:
         return best
-    fixes = [Fix((1,) * count), *(Fix((1,) * count, pair) for pair in _pairs(stretch.lateral))]
+    fixes = [Fix((1,) * count), *(Fix((1,) * count, pair) for pair in pairs_of(stretch.lateral))]
     again = compare(stretch.rows(turns), fixes)
     return again if again.trial.falls else best
 

@@ -64,11 +64,12 @@ def run(arguments: argparse.Namespace) -> int:
 
 def as_text(recording: Recording, report: CheckReport, without_rover: bool) -> str:
     """Return what the command prints."""
+    from wheel_terra_estimator.checks.finding import shown
     from wheel_terra_estimator.checks.names import proposal
 
     count = len(report.findings)
     lines = [f'{recording.name}: {count or "no"} finding{"" if count == 1 else "s"}']
-    lines += [f'  {finding}' for finding in report.findings]
+    lines += [f'  {line}' for line in shown(report.findings)]
     if without_rover:
         lines += ['', '  topics']
         lines += [f'    {name}  {kind}  {count}' for name, kind, count in recording.topics]

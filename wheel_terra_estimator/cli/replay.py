@@ -119,14 +119,14 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _run_one(arguments: argparse.Namespace) -> int:
     from wheel_terra_estimator.bags.reader import parse_remaps
-    from wheel_terra_estimator.checks.finding import INTERNAL_ERROR, CheckReport
+    from wheel_terra_estimator.checks.finding import INTERNAL_ERROR, CheckReport, shown
     from wheel_terra_estimator.fleet.drive import replay_drive
     from wheel_terra_estimator.reporting import track_table
 
     def print_findings(checked: CheckReport) -> None:
         if not arguments.json:
-            for finding in checked.findings:
-                print(f'finding: {finding}')
+            for line in shown(checked.findings):
+                print(f'finding: {line}')
             for entry in checked.not_checked:
                 if entry.reason == INTERNAL_ERROR:
                     print(f'not checked: {entry.kind}: {entry.reason}')

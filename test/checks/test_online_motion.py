@@ -1,0 +1,84 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Within half a minute of driving: an IMU turned about z, two exchanged wheels, a dead sensor."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import rolling_rover as rolling
+from scipy.spatial.transform import Rotation
+
+from wheel_terra_estimator.checks.online import OnlineChecks
+from wheel_terra_estimator.estimation.measurements import (
+    InertialReading,
+    StepInputs,
+    WheelOdometry,
+)
+
+DRIVING = 30.0  # [s]
+
+
+def motion():
+    """Starts and stops for half a minute, then curves, on the level."""
+    time = np.arange(0.0, 70.0, 1.0 / rolling.RATE)
+    knots = [2, 3, 8, 9, 11, 12, 18, 19, 21, 22, 70]
+    speed = np.interp(time, knots, [0, 0.3, 0.3, 0, 0, 0.3, 0.3, 0, 0, 0.3, 0.3])
+    yaw = np.interp(time, [35, 36, 52, 53, 54, 69], [0, 0.3, 0.3, 0, -0.3, -0.3])
+    return rolling.Motion(time, speed, yaw, 0.0 * time)
+
+
+def told(recording, since=0.0):
+    """Return {fault: seconds after a time at which it was told first} over a drive."""
+    joints, imu = recording.joints, recording.imu
+    inputs = {int(s): {} for s in np.union1d(joints.stamp, imu.stamp)}
+    for stamp, rate, torque in zip(joints.stamp, joints.rate, joints.torque, strict=True):
+        inputs[int(stamp)]['wheel_odometry'] = WheelOdometry(int(stamp), rate, torque)
+    for stamp, force, rate in zip(imu.stamp, imu.force, imu.rate, strict=True):
+        inputs[int(stamp)]['inertial'] = InertialReading(int(stamp), force, rate, None)
+    checks, first = OnlineChecks(rolling.rover()), {}
+    for stamp, what in inputs.items():
+        checks.step(stamp, StepInputs(**what))
+        for finding in (*checks.findings, *checks.remarks):
+            seconds = (stamp - rolling.START) * 1e-9 - since
+            first.setdefault(finding.fault, (seconds, finding))
+    return first
+
+
+@pytest.mark.parametrize('seed', range(4))
+def test_a_sound_drive_is_silent(seed):
+    assert not told(rolling.recording(motion(), seed))
+
+
+@pytest.mark.parametrize('degrees', [90.0, -90.0, 180.0])
+def test_an_imu_turned_about_z(degrees):
+    whole = rolling.recording(motion())
+    turn = Rotation.from_euler('z', degrees, degrees=True).as_matrix()
+    imu = replace(whole.imu, force=whole.imu.force @ turn, rate=whole.imu.rate @ turn)
+    ((fault, (seconds, finding)),) = told(replace(whole, imu=imu)).items()
+    assert fault == 'imu_yaw' and finding.kind == 'mounting' and seconds < DRIVING
+    assert finding.parameter == 'sensors.imu_mounting_yaw_deg'
+
+
+def test_two_exchanged_wheels():
+    whole = rolling.recording(motion())
+    order = [1, 0, 2, 3]
+    joints = replace(whole.joints, rate=whole.joints.rate[:, order])
+    first = told(replace(whole, joints=joints), since=35.0)
+    seconds, finding = first['exchanged']
+    assert seconds < DRIVING and finding.wheel == 'front_left, front_right'
+    assert 'wheels.names: [front_right, front_left, rear_left, rear_right]' in finding.cure
+
+
+def test_a_dead_encoder_and_a_dead_imu():
+    whole = rolling.recording(motion())
+    rate = whole.joints.rate.copy()
+    rate[whole.joints.seconds > 24.0, 1] = 0.0
+    first = told(replace(whole, joints=replace(whole.joints, rate=rate)), since=24.0)
+    assert set(first) == {'rate_frozen'}
+    assert first['rate_frozen'][0] < DRIVING and first['rate_frozen'][1].wheel == 'front_right'
+    at = int(np.argmax(whole.imu.seconds > 24.0))
+    force, turning = whole.imu.force.copy(), whole.imu.rate.copy()
+    force[at:], turning[at:] = force[at], turning[at]
+    first = told(replace(whole, imu=replace(whole.imu, force=force, rate=turning)), since=24.0)
+    assert set(first) == {'sensor_frozen'} and first['sensor_frozen'][0] < DRIVING
