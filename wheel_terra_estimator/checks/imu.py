@@ -18,6 +18,12 @@ from scipy.spatial.transform import Rotation
 
 from wheel_terra_estimator.checks.evidence import Evidence
 from wheel_terra_estimator.checks.faults import STANDARD_GRAVITY, found, listed
+from wheel_terra_estimator.checks.felt_motion import (
+    LEAST_YAW,
+    YAW_SIGMAS,
+    felt_motion,
+    yaw_of_motion,
+)
 from wheel_terra_estimator.checks.finding import Finding, NotChecked, Outcome
 from wheel_terra_estimator.checks.rover_facts import RoverFacts
 from wheel_terra_estimator.checks.series import ImuSeries, Recording
@@ -58,11 +64,6 @@ DEGREES = (0.4, 4.0)
 BIAS_FACTOR = 6.0
 """A bias above so many stated deviations is a finding."""
 LEAST_GYRO_BIAS = 0.004  # [rad/s]
-LEAST_YAW = math.radians(25.0)
-"""Yaw of the mounting below which starts, stops and slopes do not tell it [rad]."""
-YAW_SIGMAS = 4.0
-FELT_BLOCKS = 10
-"""Parts of a drive that a deviation comes from."""
 FROZEN_SHARE = 0.3
 """Share of messages that repeat the one before."""
 IMU_ARRAYS = ('stamp', 'log_time', 'force', 'rate', 'orientation')
@@ -339,49 +340,6 @@ def _evenness(heading: FloatArray) -> float:
     return float(np.hypot(np.cos(heading).mean(), np.sin(heading).mean()))
 
 
-def felt_motion(evidence: Evidence) -> tuple[NDArray[np.complex128], float] | None:
-    """Return how a recording's motion is felt; see `felt`."""
-    if evidence.force is None or evidence.gyro is None or evidence.time.size < 100:
-        return None
-    return felt(evidence.rim, evidence.gyro[:, 2], evidence.force[:, :2], evidence.period)
-
-
-def felt(
-    rim: FloatArray, yaw_rate: FloatArray, force: FloatArray, period: float
-) -> tuple[NDArray[np.complex128], float]:
-    """Return sums over blocks of acceleration felt times that of the wheels, and their energy.
-
-    Along x the acceleration of starts and stops, along y that of curves, as complex numbers.
-    """
-    width = max(round(0.4 / period), 1)
-    speed = moving_mean(rim, width)
-    curve = speed * moving_mean(yaw_rate, width)
-    motion = _without_drift(np.gradient(speed, period) + 1j * curve, period)
-    along, across = (moving_mean(column, width) for column in force.T)
-    return felt_blocks(motion, _without_drift(along + 1j * across, period))
-
-
-def felt_blocks(
-    motion: NDArray[np.complex128], seen: NDArray[np.complex128]
-) -> tuple[NDArray[np.complex128], float]:
-    """Return what blocks of equal energy of a motion say of how it is felt, and the energy."""
-    energy = np.cumsum(np.abs(motion) ** 2)
-    edges = np.searchsorted(energy, np.linspace(0.0, energy[-1], FELT_BLOCKS + 1)[1:-1])
-    parts = np.array(
-        [np.vdot(m, s) for m, s in zip(np.split(motion, edges), np.split(seen, edges), strict=True)]
-    )
-    return parts, float(energy[-1])
-
-
-def yaw_of_motion(parts: NDArray[np.complex128], energy: float) -> Estimate | None:
-    """Return the angle by which a motion is felt turned [rad]; None where it is not clear."""
-    total = parts.sum()
-    spread = float(np.sqrt(np.sum(np.abs(parts - total / parts.size) ** 2)))
-    if energy <= 0.0 or not 0.5 < abs(total) / energy < 2.0 or abs(total) < 3.0 * spread:
-        return None
-    return Estimate(float(np.angle(total)), spread / abs(total))
-
-
 def yaw_of_imu(evidence: Evidence) -> tuple[Estimate, Trial] | None:
     """Return the yaw of the IMU in ``base_link`` [rad] and its trial, angles off by half."""
     felt = felt_motion(evidence)
@@ -440,12 +398,6 @@ def without_yaw(seen: Estimate) -> FloatArray:
     if abs(angle - quarter) < 2.5 * max(seen.std, math.radians(4.0)):
         angle = quarter
     return np.asarray(Rotation.from_rotvec([0.0, 0.0, angle]).as_matrix())
-
-
-def _without_drift(values: NDArray[np.complex128], period: float) -> NDArray[np.complex128]:
-    """Return values less their mean over 6 s: slopes change more slowly than speeds."""
-    width = max(round(6.0 / period), 3)
-    return np.asarray(values - moving_mean(values, width))
 
 
 def check_mounting(evidence: Evidence, figures: dict[str, Any]) -> tuple[list[Outcome], FloatArray]:

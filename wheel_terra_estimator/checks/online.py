@@ -17,8 +17,8 @@ from statistics import median
 from typing import Any, NamedTuple
 
 from wheel_terra_estimator.checks.faults import LEAST_TURN_RATE, RATE_UNITS, STANDARD_GRAVITY, found
+from wheel_terra_estimator.checks.felt_motion import LEAST_YAW, YAW_SIGMAS
 from wheel_terra_estimator.checks.finding import Finding
-from wheel_terra_estimator.checks.imu import LEAST_YAW, YAW_SIGMAS
 from wheel_terra_estimator.checks.online_delay import SpeedHistory
 from wheel_terra_estimator.checks.online_motion import MotionHistory
 from wheel_terra_estimator.configuration.configuration import Configuration

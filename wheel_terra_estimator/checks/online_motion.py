@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wheel_terra_estimator.checks.imu import LEAST_YAW, YAW_SIGMAS, felt, yaw_of_motion
+from wheel_terra_estimator.checks.felt_motion import LEAST_YAW, YAW_SIGMAS, felt, yaw_of_motion
 from wheel_terra_estimator.checks.turning import LEAST_TURNING_ROWS, Fix, Turning, compare, pairs_of
 
 BIN = 100_000_000

@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 
 from wheel_terra_estimator.checks.evidence import LEAST_MOVING_ROWS, Evidence, row_medians
 from wheel_terra_estimator.checks.faults import FAULTS, LEAST_TURN_RATE, SKID_TRACKS, found
+from wheel_terra_estimator.checks.felt_motion import felt_motion, yaw_of_motion
 from wheel_terra_estimator.checks.finding import Finding, NotChecked, Outcome
-from wheel_terra_estimator.checks.imu import felt_motion, yaw_of_motion
 from wheel_terra_estimator.checks.statistics import (
     confidence,
     correlation,

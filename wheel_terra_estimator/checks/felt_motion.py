@@ -1,0 +1,70 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Starts, stops and curves of the wheels as the accelerometer feels them: which way it points."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wheel_terra_estimator.checks.evidence import Evidence
+from wheel_terra_estimator.checks.statistics import Estimate, moving_mean
+
+FloatArray = NDArray[np.float64]
+
+LEAST_YAW = math.radians(25.0)
+"""Yaw of the mounting below which starts, stops and slopes do not tell it [rad]."""
+YAW_SIGMAS = 4.0
+FELT_BLOCKS = 10
+"""Parts of a drive that a deviation comes from."""
+
+
+def felt_motion(evidence: Evidence) -> tuple[NDArray[np.complex128], float] | None:
+    """Return how a recording's motion is felt; see `felt`."""
+    if evidence.force is None or evidence.gyro is None or evidence.time.size < 100:
+        return None
+    return felt(evidence.rim, evidence.gyro[:, 2], evidence.force[:, :2], evidence.period)
+
+
+def felt(
+    rim: FloatArray, yaw_rate: FloatArray, force: FloatArray, period: float
+) -> tuple[NDArray[np.complex128], float]:
+    """Return sums over blocks of acceleration felt times that of the wheels, and their energy.
+
+    Along x the acceleration of starts and stops, along y that of curves, as complex numbers.
+    """
+    width = max(round(0.4 / period), 1)
+    speed = moving_mean(rim, width)
+    curve = speed * moving_mean(yaw_rate, width)
+    motion = _without_drift(np.gradient(speed, period) + 1j * curve, period)
+    along, across = (moving_mean(column, width) for column in force.T)
+    return felt_blocks(motion, _without_drift(along + 1j * across, period))
+
+
+def felt_blocks(
+    motion: NDArray[np.complex128], seen: NDArray[np.complex128]
+) -> tuple[NDArray[np.complex128], float]:
+    """Return what blocks of equal energy of a motion say of how it is felt, and the energy."""
+    energy = np.cumsum(np.abs(motion) ** 2)
+    edges = np.searchsorted(energy, np.linspace(0.0, energy[-1], FELT_BLOCKS + 1)[1:-1])
+    parts = np.array(
+        [np.vdot(m, s) for m, s in zip(np.split(motion, edges), np.split(seen, edges), strict=True)]
+    )
+    return parts, float(energy[-1])
+
+
+def yaw_of_motion(parts: NDArray[np.complex128], energy: float) -> Estimate | None:
+    """Return the angle by which a motion is felt turned [rad]; None where it is not clear."""
+    total = parts.sum()
+    spread = float(np.sqrt(np.sum(np.abs(parts - total / parts.size) ** 2)))
+    if energy <= 0.0 or not 0.5 < abs(total) / energy < 2.0 or abs(total) < 3.0 * spread:
+        return None
+    return Estimate(float(np.angle(total)), spread / abs(total))
+
+
+def _without_drift(values: NDArray[np.complex128], period: float) -> NDArray[np.complex128]:
+    """Return values less their mean over 6 s: slopes change more slowly than speeds."""
+    width = max(round(6.0 / period), 3)
+    return np.asarray(values - moving_mean(values, width))
