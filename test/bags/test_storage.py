@@ -159,7 +159,7 @@ def test_recording_without_index_is_read(make_bag: Any, whole: list[RawMessage])
     [
         ('gone', None, 'no such bag'),
         ('notes.txt', b'hello', 'not a bag'),
-        ('empty.mcap', b'', 'holds no messages'),
+        ('empty.mcap', b'', 'not one message can be read'),
         ('rubbish.mcap', b'rubbish' * 100, 'does not begin as an MCAP file'),
         ('rubbish.db3', b'rubbish' * 100, 'cannot be read'),
     ],

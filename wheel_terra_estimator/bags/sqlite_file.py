@@ -2,22 +2,21 @@
 # SPDX-License-Identifier: Apache-2.0
 """Messages of a rosbag2 SQLite file, whole or damaged, in the order of their log times.
 
-Only the table of messages is read, row by row; no index of the file is relied on. Where a page is
-damaged the rows behind it are looked for.
+A file in which SQLite finds no fault is read by SQLite; of another one the rows are found by their
+own bytes (`sqlite_rows`).
 """
 
 from __future__ import annotations
 
+import mmap
 import shutil
 import sqlite3
 from array import array
 from collections import Counter
-from collections.abc import Callable, Collection, Iterator
-from contextlib import ExitStack
-from dataclasses import dataclass
+from collections.abc import Collection, Iterator
+from contextlib import ExitStack, closing, suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
 from urllib.parse import quote
 
 import numpy as np
@@ -25,13 +24,13 @@ import numpy as np
 from wheel_terra_estimator.bags.limits import LIMITS, Limits
 from wheel_terra_estimator.bags.losses import Losses
 from wheel_terra_estimator.bags.raw_messages import RawMessage, Topic
+from wheel_terra_estimator.bags.sqlite_rows import find_rows
 from wheel_terra_estimator.errors import UserError
 
-_LAST_ROW = 2**63 - 1
 # Damaged text may stand in the library's own message, which is decoded as UTF-8.
 _UNREADABLE = (sqlite3.Error, UnicodeDecodeError, MemoryError, OverflowError)
 _MOST_GAPS = 100  # in the numbers of the rows that damage explains
-_ONE_BY_ONE = 1000  # numbers tried behind damage before the search takes longer steps
+_Message = tuple[int, int, bytes]  # number of the topic, log time [ns], data
 
 
 class SqliteFile:
@@ -40,38 +39,30 @@ class SqliteFile:
     Raises
     ------
     UserError
-        It is no rosbag2 file, or so damaged that SQLite cannot find its tables.
+        It is no rosbag2 file, or nothing of one is left.
     """
 
     def __init__(self, path: Path, stack: ExitStack, limits: Limits = LIMITS) -> None:
         self.path = path
         self.losses = Losses()
-        self._limits = limits
-        self._connection = self._open(stack)
-        self._number = array('q')  # of the row, and its log time: only where the order differs
-        self._time = array('q')
-        self._ordered = True
-        self._size = 0  # of all messages [byte]
+        readable, log = _with_log(path, stack)
+        self._table: _WholeTable | _DamagedTable
         try:
-            described = self._read_topics()
+            self._table = _WholeTable(readable, log, stack, limits, self.losses)
         except _UNREADABLE as error:
-            raise UserError(
-                f'{path}: cannot be read ({error}); try `sqlite3 {path.name} .recover`'
-            ) from None
-        self._topic = {number: topic for number, (topic, _) in described.items()}
-        self._damaged_rows = 0
-        counts = self._survey()
-        self.topics = [
-            Topic(topic, kind, counts[number]) for number, (topic, kind) in described.items()
-        ]
+            self._table = _DamagedTable(readable, log, stack, limits, self.losses)
+            if not (self._table.topics or self._table.counts):
+                raise UserError(
+                    f'{path}: cannot be read ({error}), and nothing of a recording is left in it; '
+                    'copy it anew from where it was recorded'
+                ) from None
+        topics, counts = self._table.topics, self._table.counts
+        self.topics = [Topic(*described, counts[number]) for number, described in topics.items()]
         for topic in self.topics:
             found = self.losses.recovered.get(topic.name, 0)
             self.losses.recovered[topic.name] = found + topic.message_count
-        unknown = sum(count for number, count in counts.items() if number not in described)
-        if unknown:
+        if unknown := sum(count for number, count in counts.items() if number not in topics):
             self.losses.left_out.append(f'{unknown} messages of topics that are not described')
-        if self._damaged_rows:
-            self.losses.left_out.append(f'{self._damaged_rows} rows that are no messages left out')
 
     def notes(self) -> list[str]:
         """Return what is wrong with the file."""
@@ -79,239 +70,152 @@ class SqliteFile:
 
     def messages(self, topics: Collection[str]) -> Iterator[RawMessage]:
         """Yield the messages of some topics in the order of their log times."""
-        wanted = {number: name for number, name in self._topic.items() if name in topics}
-        if self._ordered:
-            fetch = self._in_rows()
-        elif self.losses.spans and self._size <= self._limits.held:
-            # A row on a damaged page need not be found by its number.
-            fetch = iter(sorted(self._in_rows(), key=lambda row: row[1]))
-        else:
-            fetch = self._by_number()
-        for topic, time, data in fetch:
-            if topic in wanted:
-                yield RawMessage(time, wanted[topic], data)
-
-    def _open(self, stack: ExitStack) -> sqlite3.Connection:
-        """Open the file without writing to its folder, its write-ahead log included."""
-        path = self.path
-        log = path.with_name(f'{path.name}-wal')
-        immutable = '&immutable=1'
-        if log.is_file() and log.stat().st_size:
-            # The newest messages are in the log; SQLite writes beside a file that has one.
-            folder = Path(stack.enter_context(TemporaryDirectory()))
-            try:
-                for file in (path, log):
-                    shutil.copyfile(file, folder / file.name)
-            except OSError as error:
-                raise UserError(f'{path}: cannot be copied ({error.strerror})') from None
-            path, immutable = folder / path.name, ''
-        try:
-            connection = sqlite3.connect(
-                f'file:{quote(str(path.absolute()))}?mode=ro{immutable}', uri=True
-            )
-        except sqlite3.Error as error:
-            raise UserError(f'{self.path}: cannot be read ({error})') from None
-        stack.callback(connection.close)
-        connection.text_factory = bytes  # names may be damaged
-        return connection
-
-    def _read_topics(self) -> dict[int, tuple[str, str]]:
-        """Return number -> name, type."""
-        run = self._connection.execute
-        run('PRAGMA trusted_schema=OFF')
-        run('PRAGMA writable_schema=ON')  # else a file that is cut off is refused as a whole
-        tables = {
-            name: text or b''
-            for name, text in run("SELECT name, sql FROM sqlite_master WHERE type = 'table'")
-        }
-        for table in (b'topics', b'messages'):
-            if table not in tables or b'virtual' in tables[table].lower()[:32]:
-                raise sqlite3.DatabaseError(f'no table {table.decode()}')
-        found = {}
-        text = 'SELECT id, id, name, type FROM topics'
-        rows = _Table(self._connection, text, _is_topic, self._note_gap).rows()
-        for number, name, kind in rows:
-            if _is_topic((number, name, kind)):
-                found[number] = (name.decode('utf-8', 'replace'), kind.decode('utf-8', 'replace'))
-        return found
-
-    def _survey(self) -> Counter[int]:
-        """Count the rows of each topic, find damage and learn whether rows stand in time order."""
-        counts: Counter[int] = Counter()
-        last = -1
-        text = 'SELECT id, id, topic_id, timestamp, length(data), typeof(data) FROM messages'
-        rows = _Table(self._connection, text, _is_survey_row, self._note_gap).rows()
-        for number, topic, time, size, kind in rows:
-            if not (_is_message(topic, time) and kind == b'blob' and size <= self._limits.chunk):
-                self._damaged_rows += 1
-                continue
-            counts[topic] += 1
-            self._ordered = self._ordered and time >= last
-            last = time
-            self._size += size
-            self._number.append(number)
-            self._time.append(time)
-            losses = self.losses
-            losses.start = time if losses.start is None else min(losses.start, time)
-            losses.last = time if losses.last is None else max(losses.last, time)
-        self._note_missing_numbers()
-        if self._ordered:
-            self._number = self._time = array('q')
-        return counts
-
-    def _note_missing_numbers(self) -> None:
-        """Find rows that SQLite does not miss: their page is left out where the pages are listed.
-
-        Recorders number rows without a gap. Many gaps are no damage: rows were taken out.
-        """
-        number, time = np.asarray(self._number), np.asarray(self._time)
-        order = np.argsort(number, kind='stable')
-        number, time = number[order], time[order]
-        gaps = np.flatnonzero(np.diff(number) > 1)
-        if len(gaps) > _MOST_GAPS:
-            return
-        for gap in gaps.tolist():
-            start, end = sorted(time[gap : gap + 2].tolist())
-            self.losses.spans.setdefault(int(number[gap]), (start, end))
-
-    def _note_gap(self, number: int) -> None:
-        """Remember that rows behind a number cannot be read; the log times around say when."""
-        time = self._time[-1] if self._time else None
-        # Looked through again behind a jump of numbers, a place keeps its time.
-        self.losses.spans.setdefault(number, None if time is None else (time, time))
-
-    def _in_rows(self) -> Iterator[tuple[int, int, bytes]]:
-        text = (
-            'SELECT id, topic_id, timestamp, typeof(data), '
-            f'CASE WHEN length(data) <= {self._limits.chunk} THEN data END FROM messages'
-        )
-        for topic, time, kind, data in _Table(self._connection, text, _is_data_row).rows():
-            if _is_message(topic, time) and kind == b'blob' and data is not None:
-                yield topic, time, data
-
-    def _by_number(self) -> Iterator[tuple[int, int, bytes]]:
-        numbers = np.asarray(self._number)[np.argsort(np.asarray(self._time), kind='stable')]
-        run = self._connection.execute
-        for number in numbers.tolist():
-            try:
-                row = run(
-                    'SELECT topic_id, timestamp, data FROM messages WHERE id = ?', (number,)
-                ).fetchone()
-            except _UNREADABLE:
-                continue
-            if row is not None and _is_message(row[0], row[1]) and isinstance(row[2], bytes):
-                yield row
+        wanted = {n: name for n, (name, _) in self._table.topics.items() if name in topics}
+        for topic, time, data in self._table.rows(wanted):
+            yield RawMessage(time, wanted[topic], data)
 
 
-def _is_message(topic: Any, time: Any) -> bool:
-    return isinstance(topic, int) and isinstance(time, int) and time >= 0
+def _with_log(path: Path, stack: ExitStack) -> tuple[Path, Path | None]:
+    """Return a file to be read and its write-ahead log, if it has one: copies of both."""
+    log = path.with_name(f'{path.name}-wal')
+    if not log.is_file() or not log.stat().st_size:
+        return path, None
+    # The newest messages are in the log; SQLite writes beside a file that has one.
+    folder = Path(stack.enter_context(TemporaryDirectory()))
+    try:
+        for file in (path, log):
+            shutil.copyfile(file, folder / file.name)
+    except OSError as error:
+        raise UserError(f'{path}: cannot be copied ({error.strerror})') from None
+    return folder / path.name, folder / log.name
 
 
-def _is_topic(row: tuple[Any, ...]) -> bool:
-    number, name, kind = row
-    return isinstance(name, bytes) and isinstance(kind, bytes) and isinstance(number, int)
-
-
-def _is_survey_row(row: tuple[Any, ...]) -> bool:
-    _, topic, time, _, kind = row
-    return _is_message(topic, time) and kind == b'blob'
-
-
-def _is_data_row(row: tuple[Any, ...]) -> bool:
-    topic, time, kind, _ = row
-    return _is_message(topic, time) and kind == b'blob'
-
-
-@dataclass
-class _Table:
-    """A table whose rows are read in the order of their numbers, those behind damage too.
+class _WholeTable:
+    """The messages as SQLite gives them.
 
     Attributes
     ----------
-    connection : sqlite3.Connection
-        The file.
-    text : str
-        A ``SELECT`` whose first column is the number of the row; `rows` leaves it out.
-    is_whole : callable
-        Whether the other columns can be a row: the number of another one may be damaged as well,
-        so nothing is concluded from it.
-    on_gap : callable
-        Told the last number before each damage.
+    topics : dict
+        Number -> name and type.
+    counts : Counter
+        Messages by number of the topic.
+
+    Raises
+    ------
+    sqlite3.Error or another of `_UNREADABLE`
+        The file is damaged, or holds no recording.
     """
 
-    connection: sqlite3.Connection
-    text: str
-    is_whole: Callable[[tuple[Any, ...]], bool]
-    on_gap: Callable[[int], None] = lambda number: None
+    def __init__(
+        self, path: Path, log: Path | None, stack: ExitStack, limits: Limits, losses: Losses
+    ) -> None:
+        self._number = array('q')  # of the row, and its log time: only where the order differs
+        self._time = array('q')
+        address = f'file:{quote(str(path.absolute()))}?mode=ro'
+        connection = sqlite3.connect(address + ('' if log else '&immutable=1'), uri=True)
+        stack.callback(connection.close)
+        self._run = connection.execute
+        self._run('PRAGMA trusted_schema=OFF')
+        self._run('PRAGMA ignore_check_constraints=ON')
+        if (fault := self._run('PRAGMA quick_check(1)').fetchone()[0]) != 'ok':
+            raise sqlite3.DatabaseError(fault.splitlines()[-1])
+        # Anything may stand in the columns of a row, and is then no message.
+        self._whole = (
+            "typeof(id) = 'integer' AND typeof(topic_id) = 'integer' AND typeof(data) = 'blob' "
+            "AND typeof(timestamp) = 'integer' AND timestamp >= 0 "
+            f'AND length(data) <= {limits.chunk}'
+        )
+        for table in ('topics', 'messages'):
+            kind = self._run(
+                "SELECT sql FROM sqlite_master WHERE type='table' AND name=?", (table,)
+            )
+            if 'virtual' in (kind.fetchone() or ('virtual',))[0].lower()[:32]:
+                raise sqlite3.DatabaseError(f'no table {table}')
+        self.topics = {
+            number: (str(name), str(kind))
+            for number, name, kind in self._run('SELECT id, name, type FROM topics')
+        }
+        self.counts = self._survey(losses)
 
-    def rows(self) -> Iterator[tuple[Any, ...]]:
-        """Yield the rows."""
-        # A damaged number may be too great: what it seems to jump over is looked for afterwards.
-        jumped = [(-1, _LAST_ROW)]
-        while jumped:
-            yield from self._between(*jumped.pop(), jumped)
+    def rows(self, wanted: Collection[int]) -> Iterator[_Message]:
+        """Yield the messages of some topics in the order of their log times."""
+        text = f'SELECT topic_id, timestamp, data FROM messages WHERE {self._whole}'
+        if self._number:
+            found: Iterator[_Message]
+            order = np.argsort(np.asarray(self._time), kind='stable')
+            numbers = np.asarray(self._number)[order].tolist()
+            found = (self._run(f'{text} AND id = ?', (n,)).fetchone() for n in numbers)
+        else:
+            found = iter(self._run(f'{text} ORDER BY id'))
+        return (row for row in found if row[0] in wanted)
 
-    def _between(
-        self, last: int, end: int, jumped: list[tuple[int, int]]
-    ) -> Iterator[tuple[Any, ...]]:
-        """Yield the rows behind number ``last`` and before ``end``; note where numbers jump."""
-        run = self.connection.execute
-        text = f'{self.text} WHERE id > ? AND id < ? ORDER BY id'
-        while True:
-            jump: tuple[int, int] | None = None
-            try:
-                for row in run(text, (last, end)):
-                    if self.is_whole(row[1:]):
-                        if row[0] > last + 1:
-                            jump = last, row[0]
-                        last = row[0]
-                    yield row[1:]
-                return
-            except _UNREADABLE:
-                pass
-            if jump:
-                jumped.append(jump)
-            # The cursor runs ahead: what stands before the damage comes one by one.
-            while (found := self._row(last + 1, end)) is not None:
-                if found[0] > last + 1:
-                    jumped.append((last, found[0]))
-                last = found[0]
-                yield found[1:]
-            self.on_gap(last)
-            behind = self._number_behind(last, end)
-            if behind is None:
-                return
-            jumped.append((last, behind))
-            last = behind - 1
+    def _survey(self, losses: Losses) -> Counter[int]:
+        """Count the messages of each topic and learn whether they stand in the order of time."""
+        counts: Counter[int] = Counter()
+        last, ordered = -1, True
+        text = f'SELECT id, topic_id, timestamp FROM messages WHERE {self._whole} ORDER BY id'
+        for number, topic, time in self._run(text):
+            counts[topic] += 1
+            ordered = ordered and time >= last
+            last = time
+            self._number.append(number)
+            self._time.append(time)
+        if self._time:
+            losses.start, losses.last = min(self._time), max(self._time)
+        if ordered:
+            self._number = self._time = array('q')
+        others = self._run('SELECT count(*) FROM messages').fetchone()[0] - counts.total()
+        if others:
+            losses.left_out.append(f'{others} rows that are no messages left out')
+        return counts
 
-    def _row(self, number: int, end: int) -> tuple[Any, ...] | None:
-        """Return the first row from a number on; None if none is there, or it cannot be read."""
-        text = f'{self.text} WHERE id >= ? AND id < ? ORDER BY id LIMIT 1'
-        try:
-            cursor = self.connection.execute(text, (number, end))
-            found: tuple[Any, ...] | None = cursor.fetchone()
-        except _UNREADABLE:
-            return None
-        return found if found is not None and self.is_whole(found[1:]) else None
 
-    def _number_behind(self, last: int, end: int) -> int | None:
-        """Return the number of the first row behind damage that can be read, None without one."""
-        # Rows between two damaged pages would be jumped over: at first no number is left out.
-        for number in range(last + 2, min(last + 2 + _ONE_BY_ONE, end)):
-            if (found := self._row(number, end)) is not None:
-                return int(found[0])
-        low, step = last + 1 + _ONE_BY_ONE, 1  # the row from `low` on cannot be read
-        while low + step < end and (found := self._row(low + step, end)) is None:
-            low += step
-            step *= 2
-        if low + step >= end or found is None:
-            return None
-        high, number = low + step, int(found[0])
-        while high - low > 1:
-            middle = (low + high) // 2
-            nearer = self._row(middle, end)
-            if nearer is None:
-                low = middle
-            else:
-                high, number = middle, int(nearer[0])
-        return number
+class _DamagedTable:
+    """The messages that are found in the bytes of a file; attributes as of `_WholeTable`."""
+
+    def __init__(
+        self, path: Path, log: Path | None, stack: ExitStack, limits: Limits, losses: Losses
+    ) -> None:
+        self._content = b'' if not path.stat().st_size else _mapped(path, log, stack)
+        self._rows = rows = find_rows(self._content, limits.chunk)
+        self.topics = rows.topics
+        numbers, counts = np.unique(rows.topic, return_counts=True)
+        self.counts = Counter(dict(zip(numbers.tolist(), counts.tolist(), strict=True)))
+        losses.state = 'is cut off' if rows.cut else 'is damaged'
+        if len(rows.time):
+            losses.start, losses.last = int(rows.time.min()), int(rows.time.max())
+        if rows.free_unknown:
+            losses.left_out.append('deleted rows may be among them: the list of free pages is lost')
+        self._note_missing_numbers(losses)
+
+    def rows(self, wanted: Collection[int]) -> Iterator[_Message]:
+        """Yield the messages of some topics in the order of their log times."""
+        rows = self._rows
+        for place in np.lexsort((rows.number, rows.time)).tolist():
+            if (topic := int(rows.topic[place])) in wanted:
+                yield topic, int(rows.time[place]), rows.data(self._content, place)
+
+    def _note_missing_numbers(self, losses: Losses) -> None:
+        """Say between which log times rows are missing; many gaps are rows that were taken out.
+
+        Recorders number the rows of a file from 1 on, without a gap.
+        """
+        number, time = self._rows.number, self._rows.time
+        gaps = np.flatnonzero(np.diff(number, prepend=0) > 1)
+        if len(gaps) > _MOST_GAPS:
+            return
+        for gap in gaps.tolist():
+            span = sorted(time[max(gap - 1, 0) : gap + 1].tolist())
+            losses.spans[gap] = span[0], span[-1]
+
+
+def _mapped(path: Path, log: Path | None, stack: ExitStack) -> mmap.mmap:
+    """Return the bytes of a file, those of its log brought in and behind it."""
+    if log:
+        frames = log.read_bytes()
+        with suppress(*_UNREADABLE), closing(sqlite3.connect(path)) as connection:
+            connection.execute('PRAGMA wal_checkpoint(TRUNCATE)')
+        with path.open('ab') as more:
+            more.write(frames)
+    file = stack.enter_context(path.open('rb'))
+    return stack.enter_context(mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ))

@@ -109,6 +109,11 @@ def open_bag(path: str | Path, limits: Limits = LIMITS) -> Iterator[Bag]:
     with ExitStack() as stack:
         bag = Bag(path, _open_sources(path, notes, stack, limits), notes, limits)
         try:
+            if not bag.message_count and bag.notes:
+                raise UserError(
+                    f'{path}: not one message can be read; copy the bag anew from where it was '
+                    'recorded'
+                )
             if not bag.message_count:
                 raise UserError(
                     f'{path}: the bag holds no messages; was the recorder stopped before a '

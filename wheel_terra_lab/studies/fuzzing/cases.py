@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import io
 import random
-import sqlite3
 from collections import Counter
 from collections.abc import Callable
 from contextlib import redirect_stderr, redirect_stdout
@@ -33,7 +32,8 @@ from wheel_terra_estimator.estimation.measurements import (
     SinkageReading,
     WheelOdometry,
 )
-from wheel_terra_lab.studies.fuzzing.damage import Damaged, damage, touches
+from wheel_terra_lab.studies.fuzzing import sqlite_maker
+from wheel_terra_lab.studies.fuzzing.damage import damage, touches
 from wheel_terra_lab.studies.fuzzing.mcap_maker import Layout, Sample, make
 
 TYPES = {
@@ -49,12 +49,6 @@ LAYOUTS = tuple(
     # Packed only in chunks; schemas and channels have to stand somewhere.
     if (choice[0] or not choice[1]) and (choice[4] or (choice[3] and choice[6]))
 )
-
-
-_PAGE = 4096
-"""Page of an SQLite file [byte]."""
-_SQLITE_TABLES = (0, 1, 2)
-"""Pages of the list of tables, of the topics, and of the root of the messages' tree."""
 
 
 class FaultError(AssertionError):
@@ -90,19 +84,21 @@ def mcap_case(dice: random.Random, folder: Path) -> None:
 
 
 def sqlite_case(dice: random.Random, folder: Path) -> None:
-    """Damage an SQLite file; no message on a page that is not touched may be missing."""
+    """Damage an SQLite file; no message whose own bytes are intact may be missing."""
     samples = _samples(dice)
     path = folder / 'drive.db3'
-    path.unlink(missing_ok=True)
-    _write_sqlite(path, samples)
+    sqlite_maker.write(path, samples, TYPES)
     content = path.read_bytes()
     damaged = damage(content, dice)
     path.write_bytes(damaged.content)
     found, notes = _read(path)
-    pages = _touched_pages(content, damaged)
-    if pages.isdisjoint(_SQLITE_TABLES):
+    places = sqlite_maker.message_places(content, samples, TYPES)
+    topics = sqlite_maker.topic_places(content, TYPES)
+    if not any(touches(damaged.places, *place) for place in topics):
         intact = Counter(
-            tuple(sample) for sample in samples if content.index(sample.data) // _PAGE not in pages
+            tuple(sample)
+            for sample, pieces in zip(samples, places, strict=True)
+            if not any(touches(damaged.places, *piece) for piece in pieces)
         )
         if missing := intact - found:
             raise FaultError(f'{missing.total()} of {intact.total()} intact rows missing')
@@ -265,35 +261,6 @@ def _samples(dice: random.Random, count: int = 120) -> list[Sample]:
         data = b'\0\1\0\0' + number.to_bytes(4, 'little') + body
         found.append(Sample(time, dice.choice(list(TYPES)), data))
     return found
-
-
-def _touched_pages(content: bytes, damaged: Damaged) -> set[int]:
-    """Return the numbers of the pages that are not as they were, or not where they were."""
-    moved = len(damaged.content) != len(content)
-    return {
-        page
-        for begin, end in damaged.places
-        for page in range(begin // _PAGE, (len(content) if moved else end - 1) // _PAGE + 1)
-    }
-
-
-def _write_sqlite(path: Path, samples: list[Sample]) -> None:
-    connection = sqlite3.connect(path)
-    connection.executescript(
-        'PRAGMA journal_mode=OFF; PRAGMA synchronous=OFF;'  # it need not outlive a power loss
-        'CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT, type TEXT);'
-        'CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER, timestamp INTEGER,'
-        ' data BLOB); CREATE INDEX timestamp_idx ON messages (timestamp ASC);'
-    )
-    topics = list(TYPES)
-    rows = [(i + 1, topic, kind) for i, (topic, kind) in enumerate(TYPES.items())]
-    connection.executemany('INSERT INTO topics VALUES(?,?,?)', rows)
-    connection.executemany(
-        'INSERT INTO messages(topic_id, timestamp, data) VALUES(?,?,?)',
-        [(topics.index(s.topic) + 1, s.log_time, s.data) for s in samples],
-    )
-    connection.commit()
-    connection.close()
 
 
 @cache

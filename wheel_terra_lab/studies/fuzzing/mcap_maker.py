@@ -49,11 +49,14 @@ class Made:
         Begin, end and messages of each chunk, or of each message outside of chunks.
     definitions : list
         For each copy of the schemas and channels the places on which it depends.
+    messages : list
+        Begin, end and message, for each: its record, or the packed bytes in which it stands.
     """
 
     content: bytes
     parts: list[tuple[int, int, list[Sample]]] = field(default_factory=list)
     definitions: list[tuple[int, int]] = field(default_factory=list)
+    messages: list[tuple[int, int, Sample]] = field(default_factory=list)
 
 
 def make(samples: Sequence[Sample], types: dict[str, str], layout: Layout) -> Made:
@@ -81,8 +84,12 @@ def make(samples: Sequence[Sample], types: dict[str, str], layout: Layout) -> Ma
             entry, more = _chunk(group, first, topics, layout, begin)
             out += entry
             made.parts.append((begin, len(out), group))
-            if first:
+            if first and layout.codec:
                 made.definitions.append((begin, len(out)))
+            elif first:
+                at = begin + 9 + 40
+                made.definitions.append((at, at + len(first)))
+            _note_places(made, bytes(out[begin:]), group, layout)
             out += more[0]
             index.append(_record(8, more[1]))
     else:
@@ -94,6 +101,7 @@ def make(samples: Sequence[Sample], types: dict[str, str], layout: Layout) -> Ma
             begin = len(out)
             out += _message(sample, topics, number)
             made.parts.append((begin, len(out), [sample]))
+            made.messages.append((begin, len(out), sample))
     if layout.closed:
         _close(out, made, ordered, types, index, layout)
     made.content = bytes(out)
@@ -132,6 +140,18 @@ def _close(
     foot = struct.pack('<BQQQ', 2, 20, begin if layout.summary else 0, 0)
     checksum = crc32(bytes(out[begin:]) + foot) if layout.checksums and layout.summary else 0
     out += foot + struct.pack('<I', checksum) + MAGIC
+
+
+def _note_places(made: Made, chunk: bytes, group: list[Sample], layout: Layout) -> None:
+    begin, end, _ = made.parts[-1]
+    at = end
+    for sample in reversed(group):
+        if layout.codec:
+            made.messages.append((begin + 49 + len(layout.codec), end, sample))
+        else:  # the records stand one behind the other, up to the end of the chunk
+            at -= 31 + len(sample.data)
+            made.messages.append((at, at + 31 + len(sample.data), sample))
+            assert chunk[at - begin] == 5
 
 
 def _groups(samples: Sequence[Sample], size: int) -> list[list[Sample]]:
