@@ -61,7 +61,8 @@ def stresses(contacts, slip):
 
     def bearing(depth):
         mobilised = strip * (1 - np.exp(-depth / PLAIN.settling))
-        return PLAIN.bearing * (mobilised + weight * nq * depth)
+        subsoil = 1 + (depth / (0.5 * radius)) ** 3
+        return subsoil * PLAIN.bearing * (mobilised + weight * nq * depth)
 
     def sigma(theta):
         raised = radius * (1 - np.cos(theta))

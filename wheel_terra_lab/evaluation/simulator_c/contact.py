@@ -22,6 +22,7 @@ FloatArray = NDArray[np.float64]
 NODES = 32
 SMALL = 1e-9
 _DEEPEST = 0.9  # sinkage over radius at which the hull would lie on the ground [-]
+_FIRM_DEPTH = 0.5  # over the radius, at which the subsoil doubles the bearing pressure [-]
 _LEAST_PENETRATION = 2e-5  # over the radius [-]
 _TOUCH = 100.0  # pressure at which cohesion acts in full [Pa]
 _DIG_BAND = 0.03  # soil that a smooth rim carries off, over its radius [-]
@@ -168,10 +169,14 @@ class Contacts:
         depth = self.sinkage[:, None] - rut
         deepest = np.maximum(depth - dug, 0.0)
         used = np.maximum(rut, 0.1 * terms[2])
-        reload = np.asarray(ground.rebound)[:, None] * pressure(terms, used) / used
+
+        def virgin(depth: FloatArray) -> FloatArray:
+            return pressure(terms, depth) * (1.0 + (depth / (_FIRM_DEPTH * radius)) ** 3)
 
         def loaded(penetration: FloatArray) -> FloatArray:
-            return np.minimum(reload * penetration, pressure(terms, rut + penetration))
+            return np.minimum(reload * penetration, virgin(rut + penetration))
+
+        reload = np.asarray(ground.rebound)[:, None] * virgin(used) / used
 
         cut = np.clip(1.0 - np.abs(theta) / np.maximum(self._front, SMALL)[:, None], 0.0, 1.0)
         front = loaded(np.maximum(depth - raised - dug * cut, 0.0))

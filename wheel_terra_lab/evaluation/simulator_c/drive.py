@@ -38,9 +38,11 @@ FloatArray = NDArray[np.float64]
 
 _TRIES = 6
 """How often the land is changed until a drive becomes what its kind promises."""
-_NEAR_MISS = (0.6, 0.82)  # greatest median slip
+_NEAR_MISS = (0.58, 0.84)  # greatest median slip
 _EARLIEST_TRAP = 12.0  # [s]
-_OFTEN = 0.05  # share of the time with high slip of a rover that is about to be trapped [-]
+_START_TIME = 4.0  # of a drive, in which slips mean little [s]
+_ALMOST_TRAPPED, _OFTEN = 0.85, 0.05  # median slip, and for which share of the time at most
+_HARDER, _EASIER = 1.25, 0.75  # steps of hardness until the right one is bracketed
 _UNKNOWN = 255
 
 
@@ -116,36 +118,40 @@ def _driven(name: str, kind: Kind, seed: int) -> tuple[Rover, Site, Course]:
         rover = draw_rover(rng, family, float(rng.choice(kind.gravity)))
         site = draw_site(rng, kind, rover)
         locked = int(rng.integers(rover.count)) if kind.dragged else None
+        patience = float(rng.uniform(2.0, 8.0))
+        hardness, easy, hard = 1.0, 0.0, np.inf
         for _ in range(_TRIES):
-            patience = float(rng.uniform(2.0, 8.0))
-            course = drive(
-                Motion(rover, site.land()),
-                Driver(rover, kind.phases, patience, locked, name not in ENTRAPMENTS),
-                kind.duration,
-            )
-            change = _wanted_change(name, kind, rover, course)
-            if change == 1.0:
+            gives_up = name not in ENTRAPMENTS
+            driver = Driver(rover, kind.phases, patience, locked, gives_up, site.end(rover))
+            course = drive(Motion(rover, site.land()), driver, kind.duration)
+            verdict = _verdict(name, kind, rover, course)
+            if verdict == 0:
                 return rover, site, course
-            site.change(change)
+            easy, hard = (hardness, hard) if verdict < 0 else (easy, hardness)
+            wanted = 0.5 * (easy + hard) if np.isfinite(hard) else _HARDER * hardness
+            wanted = max(wanted, _EASIER * hardness)
+            if not site.change(wanted / hardness):
+                break
+            hardness = wanted
     return rover, site, course
 
 
-def _wanted_change(name: str, kind: Kind, rover: Rover, course: Course) -> float:
-    """Return by how much harder the land must be (a factor, 1: as it is)."""
+def _verdict(name: str, kind: Kind, rover: Rover, course: Course) -> int:
+    """Return whether a drive is too easy for its kind (-1), right (0) or too hard (1)."""
     median = _driving_median(course, rover.rims.radius + rover.rims.lug_height)
     began = _beginning(median)
     if name in ENTRAPMENTS:
-        if began is not None and course.time[began] < _EARLIEST_TRAP:
-            return 0.9
-        return 1.0 if began is not None else 1.25
-    trapped = began is not None or np.mean(median[course.time > 4.0] > 0.85) > _OFTEN
+        if began is None:
+            return -1
+        return int(course.time[began] < _EARLIEST_TRAP)
+    late = course.time > _START_TIME
+    if began is not None or np.mean(median[late] > _ALMOST_TRAPPED) > _OFTEN:
+        return 1
     if kind.patch == 'near_miss':
         moving = np.abs(course.velocity[:, 0]) > 0.05 * rover.speed
-        worst = median[moving & (course.time > 4.0)].max(initial=0.0)
-        if trapped or worst > _NEAR_MISS[1]:
-            return 0.93
-        return 1.0 if worst > _NEAR_MISS[0] else 1.05
-    return 0.8 if trapped else 1.0
+        worst = median[moving & late].max(initial=0.0)
+        return int(worst > _NEAR_MISS[1]) - int(worst < _NEAR_MISS[0])
+    return 0
 
 
 def _driving_median(course: Course, radius: FloatArray) -> FloatArray:

@@ -143,11 +143,13 @@ class Driver:
         patience: float,
         locked: int | None = None,
         gives_up: bool = False,
+        until: float = np.inf,
     ) -> None:
         self._rover, self._phases = rover, list(phases)
         self._patience = patience  # after an entrapment [s]
         self._locked = locked
         self._gives_up = gives_up  # ends the drive with an entrapment
+        self._until = until  # place along the way at which the drive ends [m]
         self._phase_start = self._speed = self._spin = self._yaw = 0.0
         self._above = 0.0  # how long the median slip has been above `TRAPPED_SLIP` [s]
         self._turned = False
@@ -156,7 +158,7 @@ class Driver:
     def __call__(self, state: State) -> Command | None:
         """Return what the drives are told now; None ends the drive."""
         phase = self._phase(state)
-        if phase is None:
+        if phase is None or state.x > self._until:
             return None
         most = STEP / _RAMP_TIME
         self._speed += np.clip(phase.speed - self._speed, -most, most)

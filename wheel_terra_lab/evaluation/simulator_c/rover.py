@@ -216,9 +216,8 @@ class Suspension:
             lifted = loads < 0.0
             if not self._bogies and lifted.sum() < len(loads) - 2:
                 spring = np.where(lifted, 1e-6, 1.0) * self._rover.spring
-                by_height, by_moment, inverse, transfer = self._solve(spring)
+                by_height, by_moment, *_ = self._solve(spring)
                 loads = by_height @ heights + by_moment @ moments
-                freedoms = inverse @ (transfer @ heights - moments)
             loads = np.maximum(loads, 0.0)
             loads *= force[2] / max(loads.sum(), 1e-6)
         return loads, self._attitude(freedoms)

@@ -28,6 +28,8 @@ SLIPS = np.array([0.02, 0.08, 0.18, 0.3, 0.45, 0.6, 0.72, 0.84, 0.94])
 AMOUNTS = np.array([0.0, 0.15, 0.3, 0.45, 0.6, 0.8, 1.0, 1.25, 1.5])
 """Slips and shares of the soft soil at which the pull of a single wheel is tabulated."""
 _LEAST_PULL = 0.2  # of a base soil, over the load [-]
+_RUN_OUT = 12.0  # [s]
+_ENDLESS = 1e3  # [m]
 _OF_BEST_PULL = 0.8  # that a slope asks for at most
 _STEEPEST = np.sin(np.radians(26.0))
 _BENCH_STEP, _BENCH_STEPS = 0.04, 320  # [s] at one radian per second
@@ -71,13 +73,24 @@ class Site:
         rng = np.random.default_rng(self.seed)
         return Land(self.base, self.soft, rng, patch=self.patch, **self.settings)
 
-    def change(self, factor: float) -> None:
-        """Make patch and slopes harder (above 1) or easier."""
-        if self.patch is not None:
+    def change(self, factor: float) -> bool:
+        """Make the drive harder (above 1) or easier, by patch or slope; return whether it is."""
+        if self.patch is not None and self.patch.length < _ENDLESS:
+            self.patch = replace(self.patch, length=self.patch.length * factor)
+        elif self.patch is not None:
             self.patch = replace(self.patch, amount=self.patch.amount * factor)
         else:
-            for name in ('slope', 'cross_slope'):
-                self.settings[name] *= factor
+            self.settings['slope'] *= factor
+            self.settings['cross_slope'] *= factor
+            return bool(self.settings['slope'])
+        return True
+
+    def end(self, rover: Rover) -> float:
+        """Return where a drive over a patch ends, well behind it [m]."""
+        if self.patch is None:
+            return np.inf
+        behind = (self.patch.start + self.patch.length) / np.cos(self.patch.angle)
+        return float(behind + 3.0 * rover.x.max() + _RUN_OUT * rover.speed)
 
 
 def draw_site(rng: np.random.Generator, kind: Kind, rover: Rover) -> Site:
@@ -118,7 +131,7 @@ def _soils(rng: np.random.Generator, rover: Rover) -> tuple[Ground, Ground, Floa
 def _softest(
     rover: Rover, base: Ground, soft: Ground, table: FloatArray
 ) -> tuple[Ground, Ground, FloatArray]:
-    """Return soils of which the base is as soft as still drives on the level with some room."""
+    """Return soils of which the base is as soft as still drives on the sine with some room."""
     best = table.max(axis=1)
     amount = float(np.interp(-0.15, -best, AMOUNTS)) if best[0] > 0.15 else 0.0
     base_log, soft_log = base.logarithms(), soft.logarithms()
@@ -158,20 +171,19 @@ def _patch(
     length = 2.0 * rover.x.max()
     start = rover.x.max() + rover.speed * rng.uniform(10.0, 18.0)
     angle = rng.choice([-1.0, 1.0]) * rng.uniform(np.radians(12.0), np.radians(45.0))
-    ramp, size = 0.03, 1e3
-    level = sine * np.cos(angle) if abs(sine) < 1e-9 else sine
+    ramp, size = 0.03, _ENDLESS
     best = table.max(axis=1)
     if kind.patch == 'cross':
         slip = rng.uniform(0.25, 0.5)
         available = np.array([np.interp(slip, SLIPS, row) for row in table])
-        amount, size = _where(available, level), rng.uniform(2.0, 4.0) * length
+        amount, size = _where(available, sine), rng.uniform(2.0, 4.0) * length
     elif kind.patch == 'near_miss':
-        amount, size = _where(best, level - 0.01), rng.uniform(1.0, 2.0) * length
+        amount, size = _where(best, sine - 0.03), rng.uniform(0.5, 1.2) * length
     elif kind.patch == 'slow':
-        amount, ramp = _where(best, level - 0.05), rover.speed * rng.uniform(20.0, 45.0)
+        amount, ramp = _where(best, sine - 0.05), rover.speed * rng.uniform(20.0, 45.0)
         start = rover.x.max() + rover.speed * rng.uniform(6.0, 12.0)
     else:
-        amount = _where(best, level - rng.uniform(0.06, 0.15))
+        amount = _where(best, sine - rng.uniform(0.06, 0.15))
     return Patch(float(start), float(size), float(angle), float(ramp), amount)
 
 
