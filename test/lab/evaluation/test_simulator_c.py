@@ -213,14 +213,19 @@ def test_slip_is_that_of_the_interface():
     assert slip_ratio(rim, speed) == pytest.approx([0.2, 1.0, -0.5, -1.0, 1.0, 0.2, -0.5])
 
 
-def test_a_drive_is_the_same_for_the_same_seed_and_another_for_the_next():
-    one, again = (simulator.simulate('cruise', 1, 20.0) for _ in range(2))
-    other = simulator.simulate('cruise', 2, 20.0)
-    assert np.array_equal(one.truth.slip, again.truth.slip, equal_nan=True)
-    assert [a.arrival for a in one.arrivals] == [a.arrival for a in again.arrivals]
-    assert one.rover.mass != other.rover.mass
-    assert one.configuration.flat() == again.configuration.flat()
-    assert one.configuration.rover.mass == pytest.approx(one.rover.mass, rel=0.1)
+@pytest.fixture(scope='module')
+def firm():
+    return simulator.simulate('firm', 1)
+
+
+def test_a_drive_is_the_same_for_the_same_seed_and_another_for_the_next(firm):
+    again, other = simulator.simulate('firm', 1), simulator.simulate('firm', 2, 20.0)
+    assert np.array_equal(firm.truth.slip, again.truth.slip, equal_nan=True)
+    assert [a.arrival for a in firm.arrivals] == [a.arrival for a in again.arrivals]
+    assert firm.configuration.flat() == again.configuration.flat()
+    assert firm.rover.mass != other.rover.mass
+    assert firm.configuration.rover.mass == pytest.approx(firm.rover.mass, rel=0.1)
+    assert other.course.time[-1] == pytest.approx(20.0, abs=0.02)
 
 
 def check(found):
@@ -243,12 +248,11 @@ def check(found):
         assert np.all(np.isfinite(getattr(truth, name)))
 
 
-def test_firm_ground_slips_little():
-    found = simulator.simulate('firm', 1)
-    check(found)
-    moving = np.abs(found.truth.wheel_rate * found.configuration.wheels.slip_radius) > 0.02
-    assert np.nanmax(np.abs(found.truth.slip[moving])) < 0.05
-    assert found.truth.first_stuck() is None
+def test_firm_ground_slips_little(firm):
+    check(firm)
+    moving = np.abs(firm.truth.wheel_rate * firm.configuration.wheels.slip_radius) > 0.02
+    assert np.nanmax(np.abs(firm.truth.slip[moving])) < 0.05
+    assert firm.truth.first_stuck() is None
 
 
 def test_an_entrapment_entraps():

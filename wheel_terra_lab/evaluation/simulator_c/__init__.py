@@ -3,5 +3,6 @@
 """Simulator C: a third simulator of rover drives, written without sight of the other two.
 
 It shares no physics with the estimator: bearing by capacity factors, shear by an elastoplastic
-state that travels through the contact, sinkage by excavation over time. See docs/simulator_c.md.
+state that travels through the contact, sinkage by excavation over time. See
+docs/laboratory/simulator_c.md.
 """

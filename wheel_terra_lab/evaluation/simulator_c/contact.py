@@ -28,7 +28,7 @@ _TOUCH = 100.0  # pressure at which cohesion acts in full [Pa]
 _DIG_BAND = 0.03  # soil that a smooth rim carries off, over its radius [-]
 _DEEPEST_DIG = 0.45  # over the radius: then as much slides back as is thrown out [-]
 _LOOSE = 0.4  # bearing strength of thrown-up soil over that of the ground [-]
-_APPROACH = 0.35  # share of the way to the sinkage that bears the load, per step [-]
+_APPROACH = 0.6  # share of the way to the sinkage that bears the load, per step [-]
 _FASTEST = 0.02  # greatest change of sinkage per step, over the radius [-]
 
 
@@ -69,6 +69,7 @@ class Contacts:
         self.dug = np.zeros(n)  # soil thrown out from below the wheel [m]
         self.heap = np.zeros(n)  # height of the soil heaped up behind [m]
         self.heading = np.ones(n)  # 1 forward, -1 backward; in between while it turns round
+        self.lug_ripple = np.ones(n)  # of the friction, as lugs come and go [-]
         self._place = (np.arange(nodes) + 0.5) / nodes
         self._front = np.arccos(1.0 - self.sinkage / rims.radius)
         self._low, self._high = np.zeros(n), self._front
@@ -224,7 +225,7 @@ class Contacts:
         length = np.asarray(ground.shear_length)[:, None]
         lost = -np.asarray(ground.softening)[:, None] * np.expm1(-slid / (3.0 * length))
         sigma *= 1.0 - lost
-        friction = (np.asarray(ground.friction) * self.rims.grip)[:, None]
+        friction = (np.asarray(ground.friction) * self.rims.grip * self.lug_ripple)[:, None]
         full = np.asarray(ground.cohesion)[:, None] * sigma / (sigma + _TOUCH) + friction * sigma
         far = slid / (3.0 * length)
         residual = np.asarray(ground.residual)[:, None]

@@ -9,13 +9,13 @@ ground (a rubber tyre on asphalt) needs no shorter steps than sand.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wheel_terra_lab.evaluation.simulator_c.contact import Contacts, Forces
-from wheel_terra_lab.evaluation.simulator_c.ground import Ground, Land
+from wheel_terra_lab.evaluation.simulator_c.ground import Land
 from wheel_terra_lab.evaluation.simulator_c.rover import Rover, Suspension
 
 FloatArray = NDArray[np.float64]
@@ -25,7 +25,7 @@ STEP = 0.01
 SETTLING_TIME = 1.5  # at rest before a drive begins [s]
 _STEERING_RATE = 0.5  # [rad/s]
 _TRAIL = 1.5  # cells behind the hub at which a rut is kept [-]
-_LUG_RIPPLE = 0.03  # of the strength while a lug goes round [-]
+_LUG_RIPPLE = 0.06  # of the friction from lug to lug [-]
 
 
 @dataclass
@@ -97,6 +97,7 @@ class Motion:
         self._integral = np.zeros(n)
         self._angle = np.linspace(0.0, 1.0, n)  # of the wheels, for the passing of the lugs
         self._forward = np.ones(n)
+        self._ripple = np.where(rover.rims.lug_height > 0.0, _LUG_RIPPLE, 0.0)
         self._level: tuple[float, float] = (0.0, 0.0)  # sines of pitch and roll
         self._bogie_pull = np.zeros(2)
         zero = np.zeros(n)
@@ -133,7 +134,8 @@ class Motion:
         x, y = place[0][:n], place[1][:n]
         lead, heading = contacts.lead(), state.yaw + state.steering
         rut = self.land.rut(x + lead * np.cos(heading), y + lead * np.sin(heading))
-        ground = self._ground(x, y)
+        ground = self.land.at(x, y)
+        contacts.lug_ripple = 1.0 + self._ripple * np.sin(rover.lug_count * self._angle)
         contacts.travel(ground, STEP, state.rate, speed, rut)
         forces, shear = contacts.step(ground, STEP, state.rate, speed, side_speed)
         rise = np.clip((heights[n : 2 * n] - heights[2 * n :]) / rover.rims.radius, -0.9, 0.9)
@@ -187,12 +189,6 @@ class Motion:
         )
         c, s = np.cos(state.yaw), np.sin(state.yaw)
         return state.x + bx * c - by * s, state.y + bx * s + by * c
-
-    def _ground(self, x: FloatArray, y: FloatArray) -> Ground:
-        ground = self.land.at(x, y)
-        lugs = np.sin(self.rover.lug_count * self._angle)
-        ripple = 1.0 + _LUG_RIPPLE * lugs * (self.rover.rims.lug_height > 0.0)
-        return replace(ground, friction=ground.friction * ripple)
 
     def _gravity(self) -> FloatArray:
         """Return gravity in the body frame: forward, left, down [m/s^2]."""

@@ -123,7 +123,12 @@ KINDS = {
     'no_references': Kind(slip=(0.05, 0.35), reference_period=0.0),
     'no_soil': Kind(slip=(0.05, 0.35), file='lines'),
     'firm': Kind(
-        families=('four_tyres',), firm=True, degrees=(-5.0, 5.0), file='lines', sinkage=False
+        families=('four_tyres',),
+        gravity=(9.80665,),
+        degrees=(-5.0, 5.0),
+        firm=True,
+        file='lines',
+        sinkage=False,
     ),
     'turns_in_sand': Kind(phases=_TURNS, soft=True),
     'wild_imu': Kind(slip=(0.05, 0.35), wild=True),

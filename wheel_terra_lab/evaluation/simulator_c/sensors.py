@@ -96,7 +96,7 @@ def draw_instruments(rng: np.random.Generator, kind: Kind, rover: Rover) -> Inst
         gyro_bias=rng.normal(0.0, 0.001, 3),
         orientation=bool(rng.uniform() < 0.7),
         tilt_error=np.radians(rng.normal(0.0, 0.3, 2)),
-        wild_share=0.004 if kind.wild else 0.0,
+        wild_share=0.0007 if kind.wild else 0.0,
         sinkage_rate=float(rng.choice([2, 5, 10, 15])) if has_sinkage else 0.0,
         sinkage_std=float(radius * rng.uniform(0.004, 0.02)),
         sinkage_zero=rng.normal(0.0, 0.008, n) * radius,
@@ -148,10 +148,9 @@ class Sensing:
         rng, tools, stamps = self._rng, self._with, self.odometry_stamps
         steps = np.diff(self._course.time, prepend=0.0)[:, None]
         angle = self._at(stamps, np.cumsum(self._course.rate * steps, axis=0))
-        before = self._at(stamps - round(1e9 / tools.odometry_rate), self._course.rate * 0.0)
         counted = np.round(angle / tools.encoder_step) * tools.encoder_step
         period = np.diff(stamps, prepend=stamps[0] - round(1e9 / tools.odometry_rate)) * 1e-9
-        rate = np.diff(counted, axis=0, prepend=counted[:1] + before[:1]) / period[:, None]
+        rate = np.diff(counted, axis=0, prepend=counted[:1]) / period[:, None]
         turning = np.tanh(self._at(stamps, self._course.rate) / 0.02)
         torque = self._at(stamps, self._course.motor) + tools.torque_friction * turning
         torque = tools.torque_gain * torque + tools.torque_zero
