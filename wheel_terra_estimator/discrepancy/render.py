@@ -61,7 +61,7 @@ def render(
     findings, after, variance = decision.findings, decision.after, decision.variance
     setting, known, left = findings.setting, catalogue(), decision.left
     effects = _effects(decision, known)
-    nearest = () if after.names else _nearest(findings)
+    nearest = () if after.names else _nearest(decision)
     stretch = changed_stretch(both, setting, after, variance)
     proposal = _proposal(decision)
     gap_p_value = _gap_p_value(decision, known)
@@ -221,11 +221,11 @@ def _proposal(decision: Decision) -> Proposal | None:
     )
 
 
-def _nearest(findings: Findings) -> tuple[str, ...]:
-    """Return up to three single effects that the rows favour most."""
-    weights = findings.selection.single_weights()
-    order = sorted(weights, key=lambda name: -weights[name])
-    return tuple(dict.fromkeys(effect_of(key) for key in order))[:_NEAREST]
+def _nearest(decision: Decision) -> tuple[str, ...]:
+    """Return up to three effects: those that were too doubtful to be named, then single ones."""
+    weights = decision.findings.selection.single_weights()
+    keys = [*(name.key for name in decision.doubtful), *sorted(weights, key=lambda k: -weights[k])]
+    return tuple(dict.fromkeys(map(effect_of, keys)))[:_NEAREST]
 
 
 def _distance_to_nothing(findings: Findings, fitted: Fit) -> float:
