@@ -212,8 +212,9 @@ def notes(
         if c.owner == 'soil' and abs(pull) > STRONG_PULL:
             unit = '' if c.unit == '-' else f' {c.unit}'
             found.append(
-                f'{_SOIL_KEYS.get(c.name, f"soil.{c.name}")} was pulled {pull:+.1f} of its stated '
-                f'deviations to {number(float(c.value(u)))}{unit}: look at it before any effect'
+                f'{_SOIL_KEYS.get(c.name, f"soil.{c.name}")} was pulled {pull:+.1f} of its '
+                f'deviations ({c.source}) to {number(float(c.value(u)))}{unit}: '
+                'look at it before any effect'
             )
         if c.owner != 'soil' and (u - c.lower < 1e-3 or c.upper - u < 1e-3):
             found.append(f'{c.key} stands at the end of its range ({number(float(c.value(u)))})')
