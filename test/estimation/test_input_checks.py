@@ -159,3 +159,19 @@ def test_variance_that_says_nothing_is_known(checks, variance):
 def test_velocity_that_is_none(checks, forward):
     assert check(checks, reference(0.0, forward=forward)) is None
     assert reasons(checks) == ['velocity not finite or absurd']
+
+
+def test_a_single_sample_that_no_body_makes_is_dropped_and_counted(checks):
+    inertial = CHANNELS[InertialReading]
+
+    def passes(k, x, turn=0.0):
+        force, rate = np.array([x, 0.0, 9.8]), np.array([0.0, 0.0, turn])
+        reading = InertialReading(10**9 + k * 20_000_000, force, rate, None)
+        return checks.check(inertial, reading) is not None
+
+    assert all(passes(k, 0.1 * (k % 3)) for k in range(10))
+    assert not passes(10, 80.0) and passes(11, 0.2)
+    assert not passes(12, 0.2, turn=20.0) and passes(13, 0.2)
+    assert checks.refused[inertial] == 2
+    assert checks.rejected[inertial] == {'a single sample that no body makes': 2}
+    assert not passes(14, 90.0) and passes(15, 88.0), 'two alike are no single sample'

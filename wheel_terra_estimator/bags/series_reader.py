@@ -207,7 +207,12 @@ class _Imu(_Collector):
         f, w, q = message.linear_acceleration, message.angular_velocity, message.orientation
         known = message.orientation_covariance[0] != -1.0
         orientation = (q.x, q.y, q.z, q.w) if known else (math.nan,) * 4
-        return (f.x, f.y, f.z, w.x, w.y, w.z, *orientation)
+        force, rate = (f.x, f.y, f.z), (w.x, w.y, w.z)
+        if message.linear_acceleration_covariance[0] == -1.0:  # says that there is none
+            force = (math.nan,) * 3
+        if message.angular_velocity_covariance[0] == -1.0:
+            rate = (math.nan,) * 3
+        return (*force, *rate, *orientation)
 
     def series(self) -> Any:
         table = credible(np.array(self.rows, dtype=float))

@@ -135,6 +135,11 @@ def _open_sources(path: Path, notes: list[str], stack: ExitStack, limits: Limits
     if not there:
         raise UserError(f'{path}: no such bag; give a rosbag2 folder, a .mcap or a .db3 file')
     if not folder:
+        if path.suffix == '.bag':
+            raise UserError(
+                f'{path}: a bag of ROS 1; convert it: pip install rosbags, then rosbags-convert '
+                f'--src {path} --dst {path.stem}'
+            )
         if not path.name.endswith(STORAGE_SUFFIXES):
             raise UserError(f'{path}: not a bag; give a rosbag2 folder, a .mcap or a .db3 file')
         return [_open_file(path, notes, stack, limits)]

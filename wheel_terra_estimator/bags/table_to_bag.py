@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import csv
 import math
+from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -28,7 +29,7 @@ EXAMPLE = """\
 time: {column: time, unit: s}             # s, ms, us or ns; any zero
 joint_states:                             # one entry per wheel, as in wheels.names
   front_left:
-    velocity: {column: rpm_fl, unit: rpm} # rad/s, deg/s, rpm or rev/s
+    velocity: {column: rpm_fl, unit: rpm} # rad/s, deg/s, rpm, rev/s, or m/s with radius: 0.15
     effort: {column: torque_fl, unit: N m}  # N m or N mm; leave it out if there is none
   front_right:
     velocity: {column: rpm_fr, unit: rpm, sign: -1}
@@ -45,7 +46,9 @@ imu/data:                                 # leave out what there is not
 sinkage:
   front_left: {column: sinkage_fl, unit: mm}     # m, cm or mm
 reference_odom:
-  linear.x: {column: gps_speed, unit: m/s}       # m/s or km/h
+  linear.x: {column: gps_speed, unit: m/s}       # m/s or km/h; or positions, as below
+# position.x: {column: east, unit: m}            # with position.y; or latitude and longitude:
+# latitude: {column: lat, unit: deg}
 """
 
 UNITS: dict[str, dict[str, float]] = {
@@ -65,7 +68,18 @@ _IMU = {
     **{f'angular_velocity.{axis}': 'rate' for axis in _AXES},
     **{f'orientation.{axis}': 'number' for axis in (*_AXES, 'w')},
 }
-_REFERENCE = {'linear.x': 'speed', 'variance': 'number'}
+_REFERENCE = {
+    'linear.x': 'speed',
+    'variance': 'number',
+    'position.x': 'length',
+    'position.y': 'length',
+    'latitude': 'angle',
+    'longitude': 'angle',
+}
+_PLACES = (('position.x', 'position.y'), ('latitude', 'longitude'))
+EARTH_RADIUS = 6_371_000.0  # mean [m]
+BASELINE = 1.0
+"""Positions so far apart [s] make a speed: closer ones are noise."""
 _JOINT = {'velocity': 'rate', 'effort': 'torque', 'position': 'angle'}
 _TOPICS = ('joint_states', 'imu/data', 'sinkage', 'reference_odom')
 
@@ -170,6 +184,13 @@ def _read_map(path: Path, header: list[str], table: Path) -> ColumnMap:
     }
     imu = reader.group('imu/data', document.get('imu/data') or {}, _IMU)
     reference = reader.group('reference_odom', document.get('reference_odom') or {}, _REFERENCE)
+    given = sum(key in reference for key in ('linear.x', *_PLACES[0], *_PLACES[1]))
+    whole = sum(2 for pair in _PLACES if set(pair) <= set(reference)) + ('linear.x' in reference)
+    if reference and (given != whole or whole not in (1, 2)):
+        raise UserError(
+            f'{path}: reference_odom: give linear.x, or position.x and position.y, or latitude and '
+            'longitude'
+        )
     time = reader.column('time', document['time'], 'time')
     return ColumnMap(time, joints, imu, sinkage, reference)
 
@@ -198,6 +219,9 @@ class _MapReader:
     def column(self, where: str, entry: Any, kind: str) -> Column:
         entry = self.mapping(where, entry)
         units = UNITS[kind]
+        if kind == 'rate' and 'radius' in entry:
+            units = self._rim_speeds(where, entry['radius'])
+            entry = {key: value for key, value in entry.items() if key != 'radius'}
         unknown = set(entry) - {'column', 'unit', 'sign'}
         if unknown or 'column' not in entry:
             raise UserError(f'{self.path}: {where}: give column, unit and, if turned round, sign')
@@ -214,6 +238,11 @@ class _MapReader:
             raise UserError(f'{self.path}: {where}: sign must be 1 or -1')
         return Column(name, self.header.index(name), sign * units[unit])
 
+    def _rim_speeds(self, where: str, radius: Any) -> dict[str, float]:
+        if not isinstance(radius, (int, float)) or not 0.0 < radius < math.inf:
+            raise UserError(f'{self.path}: {where}: radius [m] must be a number above 0')
+        return {unit: factor / radius for unit, factor in UNITS['speed'].items()}
+
 
 class _Sender:
     """Writes the messages of each row, at its own stamp."""
@@ -225,6 +254,7 @@ class _Sender:
         self.decimal_comma = decimal_comma
         self.make = bag.messages
         self.sent = 0
+        self.places: deque[tuple[int, float, float]] = deque()  # stamp [ns], place
 
     def send(self, number: int, row: list[str]) -> None:
         seconds = self.value(number, row, self.layout.time)
@@ -249,7 +279,7 @@ class _Sender:
             self.bag.write('/joint_states', message, stamp)
         self._imu(number, row, stamp)
         self._sinkage(number, row, stamp)
-        self._reference(number, row, stamp)
+        self._reference(number, row, stamp, -1.0 if _mean(rates) < 0.0 else 1.0)
         self.sent += 1
 
     def value(self, number: int, row: list[str], column: Column | None) -> float:
@@ -282,6 +312,22 @@ class _Sender:
         message = self.make.imu(self.make.header(stamp), force, rate, orientation)
         self.bag.write('/imu/data', message, stamp)
 
+    def _speed(self, stamp: int, place: list[float], *, degrees: bool) -> tuple[int, float]:
+        """Return the speed between two positions, at the stamp in their middle; nan for none."""
+        x, y = place
+        if math.isnan(x) or math.isnan(y):
+            return stamp, math.nan
+        self.places.append((stamp, x, y))
+        first = self.places[0]
+        seconds = (stamp - first[0]) * 1e-9
+        if seconds < BASELINE:
+            return stamp, math.nan
+        self.places.popleft()
+        there, across = x - first[1], y - first[2]
+        if degrees:  # latitude, longitude [rad], on a sphere
+            there, across = EARTH_RADIUS * there, EARTH_RADIUS * across * math.cos(x)
+        return (stamp + first[0]) // 2, math.hypot(there, across) / seconds
+
     def _sinkage(self, number: int, row: list[str], stamp: int) -> None:
         columns = self.layout.sinkage
         depths = [self.value(number, row, column) for column in columns.values()]
@@ -289,9 +335,14 @@ class _Sender:
             message = self.make.joint_state(self.make.header(stamp), list(columns), position=depths)
             self.bag.write('/sinkage', message, stamp)
 
-    def _reference(self, number: int, row: list[str], stamp: int) -> None:
-        columns = self.layout.reference
+    def _reference(self, number: int, row: list[str], stamp: int, sense: float) -> None:
+        columns, arrival = self.layout.reference, stamp
         speed = self.value(number, row, columns.get('linear.x'))
+        for pair in _PLACES:
+            if set(pair) <= set(columns):
+                place = [self.value(number, row, columns[key]) for key in pair]
+                stamp, speed = self._speed(stamp, place, degrees=pair == _PLACES[1])
+                speed *= sense
         if math.isnan(speed):
             return
         variance = self.value(number, row, columns.get('variance'))
@@ -299,7 +350,12 @@ class _Sender:
         covariance[0] = 0.0 if math.isnan(variance) else variance  # 0: the rover file decides
         twist = self.make.twist_with_covariance(speed, 0.0, covariance)
         message = self.make.odometry(self.make.header(stamp, 'odom'), twist)
-        self.bag.write('/reference_odom', message, stamp)
+        self.bag.write('/reference_odom', message, arrival)
+
+
+def _mean(values: list[float]) -> float:
+    known = [value for value in values if not math.isnan(value)]
+    return sum(known) / len(known) if known else 0.0
 
 
 def _any_told(values: list[float]) -> bool:

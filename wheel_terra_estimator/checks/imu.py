@@ -112,7 +112,10 @@ def _placeholders(imu: ImuSeries, state: ImuState) -> tuple[list[Outcome], ImuSt
     words = {'force': 'linear_acceleration', 'rate': 'angular_velocity'}
     for name, field in words.items():
         values = getattr(imu, name)
-        if not np.any(np.nan_to_num(values)):
+        if not np.isfinite(values).any():  # its covariance says that there is none
+            blind = 'usable_force' if name == 'force' else 'usable_gyro'
+            state = replace(state, **{blind: False})  # type: ignore[arg-type]
+        elif not np.any(np.nan_to_num(values)):
             outcomes.append(found('force_zero', imu.topic, 0.999, field=field))
             blind = 'usable_force' if name == 'force' else 'usable_gyro'
             state = replace(state, **{blind: False})  # type: ignore[arg-type]

@@ -185,7 +185,9 @@ def _whole_rows(recording: Recording) -> Recording:
     """Leave out IMU and reference messages with values that are no numbers."""
     imu, velocity = recording.imu, recording.reference
     if imu is not None:
-        imu = _rows(imu, np.isfinite(np.hstack([imu.force, imu.rate])))
+        both = np.hstack([imu.force, imu.rate])
+        there = np.isfinite(both).any(axis=0)  # a field may say that it is not there
+        imu = _rows(imu, np.isfinite(both[:, there]))
     if velocity is not None:
         velocity = _rows(velocity, np.isfinite(velocity.velocity))
     return replace(recording, imu=imu, reference=velocity)

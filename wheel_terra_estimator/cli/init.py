@@ -31,7 +31,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     source = parser.add_mutually_exclusive_group()
     source.add_argument('--urdf', type=Path, metavar='F', help='robot description (URDF)')
-    source.add_argument('--bag', type=Path, metavar='BAG', help='recording, for the wheel names')
+    source.add_argument(
+        '--bag',
+        type=Path,
+        metavar='BAG',
+        help='recording: its /robot_description, else the names of its wheels',
+    )
     parser.add_argument(
         '--wheels', metavar='NAMES', help='wheel joints, comma between, front to rear, left first'
     )
@@ -49,6 +54,9 @@ _MEASURES = (
     ('wheelbase', 'M', 'distance of the first and last axle [m]'),
     ('mass', 'KG', 'mass of the rover [kg]'),
 )
+DESCRIPTION = '/robot_description'
+TEXT_AT = 8
+"""Bytes of a std_msgs/String before its text: encapsulation and length."""
 _NEEDED = ('radius', 'track', 'wheelbase', 'mass')
 
 
@@ -96,11 +104,29 @@ def _sketch(arguments: argparse.Namespace) -> RoverSketch:
             guessed = sketch.guessed - {'rover.mass'}
             sketch = replace(sketch, mass=arguments.mass, guessed=guessed)
         return replace(sketch, name=arguments.name or sketch.name)
+    described = _description_of(arguments) if arguments.bag and not arguments.radius else None
+    if described is not None:
+        return replace(described, name=arguments.name or described.name)
     if arguments.bag:
         wheels = wheels or _wheels_of(arguments.bag, bag_limits.from_arguments(arguments))
     elif not wheels:
         wheels = _ask_wheels()
     return _from_measures(arguments, wheels)
+
+
+def _description_of(arguments: argparse.Namespace) -> RoverSketch | None:
+    """Return the rover of /robot_description; None where the recording has none."""
+    from wheel_terra_estimator.bags.storage import open_bag
+    from wheel_terra_estimator.configuration.urdf import read_urdf
+
+    with open_bag(arguments.bag, bag_limits.from_arguments(arguments)) as bag:
+        if DESCRIPTION not in bag.topics:
+            return None
+        messages = bag.messages([DESCRIPTION])
+        data = next((bytes(data) for _, _, data in messages if len(data) > TEXT_AT), b'')
+    text = data[TEXT_AT:].rstrip(b'\0')  # std_msgs/String in CDR
+    wheels = [n.strip() for n in (arguments.wheels or '').split(',') if n.strip()]
+    return read_urdf(Path(f'{arguments.bag}:{DESCRIPTION}'), wheels, text)
 
 
 def _wheels_of(path: Path, limits: Limits) -> list[str]:
@@ -124,6 +150,8 @@ def _from_measures(arguments: argparse.Namespace, wheels: list[str]) -> RoverSke
     )
 
     measures = {name: getattr(arguments, name) for name, _, _ in _MEASURES}
+    if measures['wheelbase'] is None and len(wheels) == 2:
+        measures['wheelbase'] = 0.0  # one axle
     missing = [name for name in _NEEDED if measures[name] is None]
     if missing and not sys.stdin.isatty():
         words = {name: f'--{name} {unit} ({meaning})' for name, unit, meaning in _MEASURES}

@@ -34,7 +34,7 @@ _UPRIGHT = 0.8
 Pose = NDArray[np.float64]  # (4, 4)
 
 
-def read_urdf(path: Path, wheels: Sequence[str] = ()) -> RoverSketch:
+def read_urdf(path: Path, wheels: Sequence[str] = (), data: bytes | None = None) -> RoverSketch:
     """Return the rover that a URDF describes.
 
     Parameters
@@ -43,13 +43,15 @@ def read_urdf(path: Path, wheels: Sequence[str] = ()) -> RoverSketch:
         URDF file (xacro has to be expanded first).
     wheels : sequence of str
         Names of the wheel joints; default: continuous joints whose name or link says wheel.
+    data : bytes, optional
+        The document, where it does not stand in a file; ``path`` then names it in errors.
 
     Raises
     ------
     UserError
         Not a URDF, no wheels, or a wheel without a radius.
     """
-    robot = _parse(path)
+    robot = _parse(path, data)
     joints = {j.get('name', ''): j for j in robot.iter('joint') if j.get('type')}
     links = {link.get('name', ''): link for link in robot.iter('link')}
     names = list(wheels) or [name for name, joint in joints.items() if _is_wheel(name, joint)]
@@ -93,9 +95,9 @@ def read_urdf(path: Path, wheels: Sequence[str] = ()) -> RoverSketch:
     )
 
 
-def _parse(path: Path) -> ElementTree.Element:
+def _parse(path: Path, data: bytes | None) -> ElementTree.Element:
     try:
-        data = path.read_bytes()
+        data = path.read_bytes() if data is None else data
     except OSError as error:
         raise UserError(f'{path}: cannot be read: {error.strerror}') from None
     if len(data) > LARGEST_FILE:
@@ -112,7 +114,8 @@ def _parse(path: Path) -> ElementTree.Element:
         raise UserError(f'{path}: not valid XML: {error}') from None
     if robot.tag != 'robot':
         raise UserError(f'{path}: the root is <{robot.tag}>, a URDF has <robot>')
-    if '${' in text or 'xacro:' in text.split('>', 2)[-1]:
+    told = re.sub(r'<!--.*?-->', '', text, flags=re.DOTALL)  # xacro leaves its banner there
+    if '${' in told or '<xacro:' in told:
         raise UserError(f'{path}: is a xacro; expand it first: xacro {path.name} > rover.urdf')
     return robot
 

@@ -32,6 +32,9 @@ GREATEST_STEERING = math.pi  # [rad]
 GREATEST_TORQUE = 1.0e5  # [N m]
 GREATEST_FORCE = 500.0  # specific force [m/s^2], 50 g
 GREATEST_RATE = 50.0  # angular rate [rad/s]
+WILD_FORCE = 30.0  # change of the specific force from one message to the next [m/s^2], 3 g
+WILD_RATE = 5.0  # change of the angular rate from one message to the next [rad/s]
+WILD_TIME = 500_000_000  # messages further apart are not compared [ns]
 GREATEST_VARIANCE = GREATEST_SPEED**2  # says that nothing is known
 LATEST_STAMP = 2**31 * 1_000_000_000  # builtin_interfaces/Time ends in 2038 [ns]
 
@@ -57,6 +60,15 @@ CURES = {
 
 _UNKNOWN = np.full(3, math.nan)
 _UNKNOWN.setflags(write=False)
+
+
+def _far(one: InertialReading, other: InertialReading) -> bool:
+    """Whether no body gets from one reading to the other in the time between."""
+    if abs(one.stamp - other.stamp) > WILD_TIME:
+        return False
+    force = np.abs(one.specific_force - other.specific_force).max()
+    rate = np.abs(one.angular_rate - other.angular_rate).max()
+    return bool(force > WILD_FORCE or rate > WILD_RATE)  # nan is not far
 
 
 class InputChecks:
@@ -86,6 +98,8 @@ class InputChecks:
         self.rejected: list[Counter[str]] = [Counter() for _ in self.names]
         self.refused = [0] * len(self.names)
         self.latest = [''] * len(self.names)
+        self._inertial_before: InertialReading | None = None
+        self._wild: InertialReading | None = None
         self._count = wheels.count
         self._radius = wheels.radius.tolist()
         self._greatest_rate = (GREATEST_SPEED / wheels.slip_radius).tolist()
@@ -165,7 +179,19 @@ class InputChecks:
                 specific_force=_UNKNOWN if bad_force else m.specific_force,
                 angular_rate=_UNKNOWN if bad_rate else m.angular_rate,
             )
+        if self._is_wild(m):
+            self.refuse(INERTIAL, 'a single sample that no body makes')
+            return None
         return m if m.orientation is None else self._oriented(m, m.orientation)
+
+    def _is_wild(self, m: InertialReading) -> bool:
+        """Whether a message leaves the one before too far, and is not borne out by another."""
+        before, wild = self._inertial_before, self._wild
+        if before is not None and _far(m, before) and (wild is None or _far(m, wild)):
+            self._wild = m
+            return True
+        self._inertial_before, self._wild = m, None
+        return False
 
     def _tell_inertial(
         self, m: InertialReading, bad_force: bool, bad_rate: bool, *, silent: bool
