@@ -12,6 +12,7 @@ from wheel_terra_estimator.bags.limits import LIMITS, MEGABYTE, Limits, in_words
 from wheel_terra_estimator.errors import UserError
 
 ZSTD_MAGIC = b'\x28\xb5\x2f\xfd'
+MAGICS = {ZSTD_MAGIC: 'zstd', b'\x04\x22\x4d\x18': 'lz4'}
 CODECS = ('', 'zstd', 'lz4')
 """Compressions of MCAP chunks that can be read; empty: none."""
 
@@ -35,22 +36,28 @@ def unpack(codec: str, packed: bytes | memoryview, size: int, limits: Limits = L
     packed : bytes-like
         Packed data, maybe cut or damaged.
     size : int
-        Unpacked size that the file states [byte].
+        Unpacked size that the file states [byte]; 0: none. It may be damaged: how much there is
+        decides, not what is stated.
     limits : Limits
         Nothing above ``limits.chunk`` is unpacked.
     """
-    if size > limits.chunk:
-        return Unpacked(b'', f'a chunk of {in_words(size)} is above {in_words(limits.chunk)}')
+    too_large = f'a chunk is above {in_words(limits.chunk)}'
     if codec not in CODECS:
         return Unpacked(b'', f'the compression {codec!r} is not known')
     if not codec:
-        content = bytes(packed[:size])
-        return Unpacked(content, '' if len(content) == size else 'a chunk is cut off')
-    whole = _all_at_once(codec, packed, size)
+        if len(packed) > limits.chunk:
+            return Unpacked(b'', too_large)
+        return Unpacked(bytes(packed), '' if len(packed) == size else 'a chunk is cut off')
+    whole = _all_at_once(codec, packed, size) if 0 < size <= limits.chunk else None
     if whole is not None and len(whole) == size:
         return Unpacked(whole, '')
-    content = b''.join(_piecewise(_decompressor(codec), packed, size))
-    return Unpacked(content[:size], f'a chunk cannot be unpacked beyond {len(content)} of {size} B')
+    decompressor = _decompressor(codec)
+    content = b''.join(_piecewise(decompressor, packed, limits.chunk + 1))
+    if len(content) > limits.chunk:
+        return Unpacked(b'', too_large)
+    if decompressor.eof and not size:
+        return Unpacked(content, '')
+    return Unpacked(content, f'a chunk of {size} B unpacks to {len(content)} B')
 
 
 def unpack_message(packed: bytes, limits: Limits = LIMITS) -> bytes:

@@ -19,13 +19,13 @@ from collections import Counter, defaultdict
 from collections.abc import Collection, Iterator
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field
-from itertools import accumulate
+from itertools import accumulate, pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 from zlib import crc32
 
 from wheel_terra_estimator.bags import mcap_records as mcap
-from wheel_terra_estimator.bags.compression import unpack
+from wheel_terra_estimator.bags.compression import MAGICS, unpack
 from wheel_terra_estimator.bags.limits import LIMITS, MEGABYTE, Limits, in_words
 from wheel_terra_estimator.bags.losses import Losses
 from wheel_terra_estimator.bags.raw_messages import RawMessage, Topic
@@ -41,6 +41,7 @@ _UNPACKED = 3  # in a compressed chunk without checksum that unpacked without an
 _LISTED = 2  # in the recorder's own list of topics
 _PLAIN = 2
 _DAMAGED = 1  # in a chunk whose checksum is wrong, or that cannot be unpacked to its end
+_PACKED = re.compile(b'|'.join(map(re.escape, MAGICS)))  # the first bytes of packed data
 _TOPIC = re.compile(r'[/~A-Za-z_][A-Za-z0-9_/~{}.-]*')
 _TYPE = re.compile(r'[A-Za-z][A-Za-z0-9_]*(/|::)[A-Za-z0-9_/:.-]+')
 
@@ -221,6 +222,7 @@ class McapFile:
             self.losses.state = 'was not closed'
         gaps: list[mcap.Gap] = []
         self._take_records(begin, end, gaps)
+        self._take_headless_chunks(gaps)
         damaged = []
         for piece in self._pieces:  # grows
             if not self._count(piece, again=False):
@@ -260,6 +262,16 @@ class McapFile:
                 self._add_message_index(item, gaps)
             else:
                 self._define(item, gaps)
+
+    def _take_headless_chunks(self, gaps: list[mcap.Gap]) -> None:
+        """Note packed chunks in gaps: they say themselves where they begin and end."""
+        assert self._map is not None
+        for gap in gaps:
+            found = _PACKED.finditer(self._map, gap.begin, gap.end)
+            begins = [(match.start(), MAGICS[match[0]]) for match in found]
+            for (at, codec), (end, _) in pairwise([*begins, (gap.end, '')]):
+                head = mcap.ChunkHead(0, mcap.LATEST, 0, 0, codec, at, end - at)
+                self._pieces.append(Piece(at, end, head, head.start, head.end))
 
     def _look_inside(self, piece: Piece, gaps: list[mcap.Gap]) -> None:
         """Find what a packed chunk seems to hold that reaches too far, as it lost bytes."""

@@ -1,0 +1,52 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Whatever field of a chunk's head is damaged, its messages are found."""
+
+from __future__ import annotations
+
+import random
+from pathlib import Path
+
+import pytest
+
+from wheel_terra_estimator.bags.storage import open_bag
+from wheel_terra_lab.studies.fuzzing.mcap_maker import Layout, Sample, make
+
+TYPES = {'/joint_states': 'sensor_msgs/msg/JointState', '/imu/data': 'sensor_msgs/msg/Imu'}
+START = 1_700_000_000_000_000_000
+FIELDS = {  # of a chunk's record: offset and size [byte]
+    'opcode': (0, 1),
+    'length': (1, 8),
+    'unpacked size': (25, 8),
+    'checksum': (33, 4),
+    'letters of the compression': (37, 4),
+    'packed size': (41, 8),  # without the letters of the compression
+}
+
+
+@pytest.mark.parametrize('value', [b'\0', b'\xff', b'\x11'])
+@pytest.mark.parametrize('summary', [True, False])
+@pytest.mark.parametrize('codec', ['', 'zstd', 'lz4'])
+@pytest.mark.parametrize('name', FIELDS)
+def test_messages_of_a_chunk_with_a_damaged_head(
+    tmp_path: Path, name: str, codec: str, summary: bool, value: bytes
+) -> None:
+    dice = random.Random(2)
+    topics = list(TYPES)
+    samples = [
+        Sample(START + 10_000_000 * i, topics[i % 2], b'\0\1\0\0' + dice.randbytes(80))
+        for i in range(200)
+    ]
+    made = make(samples, TYPES, Layout(4000, codec, summary=summary))
+    offset, size = FIELDS[name]
+    if name == 'packed size':
+        offset += len(codec)
+    at = made.parts[1][0] + offset
+    path = tmp_path / 'a.mcap'
+    path.write_bytes(made.content[:at] + value * size + made.content[at + size :])
+    with open_bag(path) as bag:
+        found = [tuple(message) for message in bag.messages(topics)]
+        notes = ' '.join(bag.notes)
+    assert found == [tuple(sample) for sample in samples]
+    assert notes or value == b'\0'  # no checksum, no size stated
+    assert 'GB' not in notes
