@@ -4,8 +4,10 @@
 
 from __future__ import annotations
 
+import struct
 from pathlib import Path
 from typing import Any
+from zlib import crc32
 
 import numpy as np
 import pytest
@@ -186,3 +188,35 @@ def test_a_reset_clears_the_stuck_warning(tmp_path: Path) -> None:
         writer.clear_stuck(STAMP)
     said = [message.data for _, topic, message in messages(path) if topic.endswith('/stuck')]
     assert said == [False, True, False, True, False]
+
+
+def test_bags_carry_checksums(make_bag: Any) -> None:
+    """As the format asks: of a chunk over its records, of the summary up to the checksum itself."""
+    (file,) = make_bag().glob('*.mcap')
+    content = file.read_bytes()
+    at, chunks = 8, 0
+    while content[at] != 2:
+        opcode, length = struct.unpack_from('<BQ', content, at)
+        if opcode == 6:
+            checksum, letters = struct.unpack_from('<II', content, at + 33)
+            assert not letters
+            assert checksum == crc32(content[at + 49 : at + 9 + length])
+            chunks += 1
+        at += 9 + length
+    summary, _, checksum = struct.unpack_from('<QQI', content, at + 9)
+    assert chunks
+    assert checksum == crc32(content[summary : at + 25])
+
+
+def test_a_changed_byte_in_a_message_is_said(make_bag: Any) -> None:
+    folder = make_bag()
+    (file,) = folder.glob('*.mcap')
+    with open_bag(folder) as bag:
+        whole = list(bag.messages(tuple(bag.topics)))
+        assert not bag.notes
+    content = bytearray(file.read_bytes())
+    content[content.index(whole[40].data) + len(whole[40].data) - 1] ^= 1
+    file.write_bytes(content)
+    with open_bag(folder) as bag:
+        assert len(list(bag.messages(tuple(bag.topics)))) == 84
+        assert 'stand in a chunk with a wrong checksum' in bag.notes[0]

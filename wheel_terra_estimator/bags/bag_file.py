@@ -11,7 +11,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, NamedTuple, TypeVar
 
-from wheel_terra_estimator.bags.mcap_closing import close_cut_file
+from wheel_terra_estimator.bags.mcap_closing import add_checksums, close_cut_file
 from wheel_terra_estimator.bags.message_factory import MessageFactory
 from wheel_terra_estimator.output_folder import check_folder, new_folder
 
@@ -103,8 +103,11 @@ class BagFile:
             if isinstance(error, OSError):
                 self._close_cut()
             else:  # not the library's own exit, which leaves a file without index after an error
+                storage: Any = self._writer.storage
                 try:
                     self._writer.close()
+                    if self._storage == 'mcap':
+                        add_checksums(storage.path)
                 except OSError:
                     self._close_cut()
                     raise
@@ -120,16 +123,18 @@ class BagFile:
             return
         with suppress(OSError):  # the first error is the one to be said
             storage.bio.raw.close()  # what is buffered has no place any more
+            path: Path = storage.path
             try:
-                kept = close_cut_file(storage.path)
+                kept = close_cut_file(path)
             except OSError:
-                storage.path.unlink()
+                path.unlink()
                 return
             self._writer.counts = {c.id: kept.counts[c.id] for c in self._connections.values()}
             self._writer.min_timestamp, self._writer.max_timestamp = kept.start, kept.end
             writer: Any = self._writer
-            writer.storage = _ClosedFile(storage.path)
+            writer.storage = _ClosedFile(path)
             self._writer.close()  # writes the metadata
+            add_checksums(path)
 
     def note(self, key: str, value: str) -> None:
         """State something about the bag in the `custom_data` of its metadata."""

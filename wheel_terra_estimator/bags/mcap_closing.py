@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""An MCAP file whose disk is full is cut behind its last whole chunk and given its summary."""
+"""What the writing library leaves out of an MCAP file: checksums, and an end on a full disk."""
 
 from __future__ import annotations
 
@@ -37,6 +37,26 @@ class _Chunk:
     head: mcap.ChunkHead
     behind: int = 0  # end of its message indexes
     indexes: list[tuple[int, int, int]] = field(default_factory=list)  # channel, place, messages
+
+
+def add_checksums(path: Path) -> None:
+    """Give the chunks and the summary of a whole file their checksums, in place."""
+    with path.open('r+b') as file:
+        place = file.fileno()
+        with mmap.mmap(place, 0, access=mmap.ACCESS_READ) as content:
+            end = len(content) - len(mcap.MAGIC)
+            for item in mcap.records(content, len(mcap.MAGIC), end, mcap.Possible()):
+                if isinstance(item, mcap.Gap):
+                    continue
+                if item.opcode == mcap.CHUNK:
+                    head = mcap.chunk_head(content, item.begin - mcap.HEAD, end)
+                    assert head is not None
+                    data = unpack(head.codec, content[head.begin : item.end], head.size).content
+                    os.pwrite(place, crc32(data).to_bytes(4, 'little'), item.begin + 24)
+                elif item.opcode == mcap.FOOTER:
+                    begin = int.from_bytes(content[item.begin : item.begin + 8], 'little')
+                    checksum = crc32(content[begin : item.begin + 16])
+                    os.pwrite(place, checksum.to_bytes(4, 'little'), item.begin + 16)
 
 
 def close_cut_file(path: Path) -> Kept:
