@@ -78,10 +78,11 @@ def test_other_formulas_and_outliers_do_not_mislead(records):
     assert summary.share(seen, summary.in_set).value >= 0.6
 
 
-def test_one_of_two_effects_comes_first(records):
+def test_one_of_two_effects_is_in_the_first_set(records):
     two = [r for r in of(records, 'two') if min(r['distance'], r['distance_second']) > 5]
     assert len(two) >= 2
-    assert sum(summary.first(r) for r in two) >= len(two) - 1
+    # The headline is a set: the name, or one that the rows cannot tell from it.
+    assert sum(summary.in_set(r) for r in two) >= len(two) - 1
 
 
 def test_a_stranger_is_not_named_with_certainty(records):
