@@ -12,9 +12,9 @@ from wheel_terra_estimator.errors import UserError
 
 
 def read(folder, text):
-    soil = folder / 'soil.yaml'
-    soil_file.state_path(soil).write_text(text)
-    return soil_file.read_state(soil)
+    path = soil_file.state_path(folder / 'soil.yaml')
+    path.write_text(text)
+    return soil_file.read_state(path)
 
 
 def test_what_was_written_comes_back(tmp_path):

@@ -1,163 +1,169 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""The limiter passes, slows and stops commands, and is careful without estimates."""
+"""Wiring of the limiter over DDS; what passes is tested in estimation/test_limiter_cases."""
 
+import json
 import signal
 import time
-from itertools import pairwise
+from pathlib import Path
 
 import pytest
-from test_estimator_node import ROVER, latched, parameters, wheel_message
+from test_estimator_node import ROVER, parameters, wheel_message
 
 __all__ = ['parameters']
-ESTIMATOR = '/wheel_terra_estimator'
 
 
-# -- States, without ROS ------------------------------------------------------------------------
+class Operator:
+    """Commands, and wheel odometry of the present time, as long as a condition does not hold."""
+
+    def __init__(self, listener, names=()):
+        from geometry_msgs.msg import TwistStamped
+        from sensor_msgs.msg import JointState
+
+        self.node, self.until = listener
+        self.names = names
+        self.out = []
+        self.node.create_subscription(TwistStamped, 'cmd_vel_out', self.out.append, 10)
+        self.commands = self.node.create_publisher(TwistStamped, 'cmd_vel_in', 10)
+        self.wheels = self.node.create_publisher(JointState, 'joint_states', 10)
+        self.command = TwistStamped()
+        self.command.header.stamp.sec = 7
+        self._sent = 0.0
+
+    def drive(self, condition, forward=0.0, turn=0.0, rate=1.0):
+        self.command.twist.linear.x, self.command.twist.angular.z = forward, turn
+
+        def step():
+            if time.monotonic() - self._sent > 0.02:  # fifty a second are enough
+                self._sent = time.monotonic()
+                if self.names:
+                    self.wheels.publish(wheel_message(self.names, time.time(), rate))
+                self.commands.publish(self.command)
+            return condition()
+
+        self.until(step)
+
+    def comes_to(self, share, forward=0.0, turn=0.0, **more):
+        expected = pytest.approx([share * forward, share * turn], abs=1e-6)
+        del self.out[:]
+        self.drive(lambda: self.out and self._last() == expected, forward, turn, **more)
+        assert self.out[-1].header.stamp.sec == 7
+
+    def _last(self):
+        return [self.out[-1].twist.linear.x, self.out[-1].twist.angular.z]
+
+    def call(self, service):
+        from std_srvs.srv import Trigger
+
+        client = self.node.create_client(Trigger, service)
+        self.until(client.service_is_ready)
+        future = client.call_async(Trigger.Request())
+        self.until(future.done)
+        return future.result()
 
 
-def states(**tuning):
-    from wheel_terra_estimator.estimation.traction_law import TractionLimits
-    from wheel_terra_estimator.ros.limiter_states import LimiterStates, LimiterTuning
-
-    return LimiterStates(TractionLimits(), LimiterTuning(**tuning))
-
-
-def estimate(limiter, now, slip=0.1, slip_class=0, travel=10.0, velocity=0.01):
-    limiter.hear_slip(now, [slip] * 4, [velocity] * 4)
-    limiter.hear_classes(now, [slip_class] * 4)
-    limiter.hear_mobility(now, [travel] * 4)
-
-
-def test_without_an_estimate_only_the_stale_share_passes_at_start_and_later():
-    limiter = states()
-    assert limiter.decide(0.0, 0.1, 0.0)[:2] == (0.3, 'no estimate')
-    estimate(limiter, 1.0)
-    assert limiter.decide(1.5, 0.1, 0.0).scale == 1.0
-    assert limiter.decide(2.1, 0.1, 0.0)[:2] == (0.3, 'no estimate')
-
-
-def test_unknown_slip_lets_a_rover_start_but_not_drive_on():
-    limiter = states(stale_after=1.0)
-    for now in (0.0, 0.5, 1.0, 1.1, 1.5):
-        estimate(limiter, now, slip_class=255)
-        expected = (1.0, 'starting') if now <= 1.0 else (0.3, 'unknown')
-        assert limiter.decide(now, 0.1, 0.0)[:2] == expected
-    assert limiter.decide(1.6, 0.0, 0.0).state == 'zero'
-    assert limiter.decide(1.7, 0.1, 0.0).state == 'starting', 'zero restarts the clock'
-
-
-@pytest.mark.parametrize('direction', [1.0, -1.0])
-def test_out_of_stuck_only_the_way_back_also_when_the_estimator_is_dead(direction):
-    limiter = states()
-    estimate(limiter, 0.0)
-    limiter.decide(0.0, 0.1 * direction, 0.0)
-    limiter.hear_stuck(True)
-    for now in (0.1, 100.0):
-        assert limiter.decide(now, 0.1 * direction, 0.1)[:2] == (0.0, 'stuck')
-        assert limiter.decide(now, 0.0, 0.1).scale == 0.0, 'no turning on the spot'
-        assert limiter.decide(now, -0.1 * direction, 0.0)[:2] == (0.3, 'backing out')
-    limiter.hear_stuck(False)
-    estimate(limiter, 101.0)
-    assert limiter.decide(101.0, 0.1 * direction, 0.0).scale == 1.0
-
-
-def test_stuck_before_any_command_takes_the_direction_of_the_wheels_or_none():
-    limiter = states()
-    limiter.hear_stuck(True)
-    assert [limiter.decide(0.0, v, 0.0).scale for v in (0.1, -0.1)] == [0.0, 0.0]
-    limiter = states()
-    estimate(limiter, 0.0, velocity=-0.05)
-    limiter.hear_stuck(True)
-    assert [limiter.decide(0.0, v, 0.0).scale for v in (0.1, -0.1)] == [0.3, 0.0]
-
-
-def test_acceleration_is_limited_both_ways_and_zero_passes_at_once():
-    limiter = states(max_acceleration=0.5, max_angular_acceleration=100.0)
-    out = []
-    for i in range(60):
-        now = 10.0 + 0.05 * i
-        estimate(limiter, now, slip=0.1 if i < 30 else 0.9, slip_class=0 if i < 30 else 2)
-        decision = limiter.decide(now, 0.4, 0.2)
-        out.append(limiter.limited(now, decision, 0.4, 0.2))
-    steps = [abs(b[0] - a[0]) for a, b in pairwise(out[1:])]
-    assert max(steps) <= 0.5 * 0.05 + 1e-12
-    assert out[29] == pytest.approx((0.4, 0.2)) and out[59] == pytest.approx((0.12, 0.06))
-    decision = limiter.decide(13.0, 0.0, 0.0)
-    assert limiter.limited(13.0, decision, 0.0, 0.0) == (0.0, 0.0)
-
-
-# -- Over DDS -----------------------------------------------------------------------------------
-
-
-def test_states_over_dds_with_an_estimator_that_is_killed_and_restarted(
-    start, parameters, listener
+def test_estimator_and_limiter_restarted_while_stuck_release_and_reset(
+    start, parameters, listener, tmp_path
 ):
-    """Start, drive, joint states lost, clock jump, estimator killed, restarted, stuck latched."""
     from diagnostic_msgs.msg import DiagnosticArray
-    from geometry_msgs.msg import TwistStamped
-    from std_msgs.msg import Bool, Float64
 
     from wheel_terra_estimator.configuration import reader
 
-    node, until = listener
-    start('traction_limiter_node', '--ros-args', '-p', 'stale_after:=1', '-p', 'stale_scale:=0.25')
-    estimator = start('estimator_node', *ROVER, parameters)
-    heard, scales, said = [], [], []
-    node.create_subscription(TwistStamped, 'cmd_vel_out', heard.append, 10)
-    node.create_subscription(Float64, 'traction_limiter/scale', scales.append, 10)
-    node.create_subscription(DiagnosticArray, '/diagnostics', said.append, 10)
-    commands = node.create_publisher(TwistStamped, 'cmd_vel_in', 10)
-    wheels = node.create_publisher(type(wheel_message([], 0.0)), 'joint_states', 10)
-    names = reader.load(['pathfinder']).wheels.names
-    until(lambda: commands.get_subscription_count())
-    command = TwistStamped()
-    command.twist.linear.x, command.twist.angular.z = 0.1, -0.2
-    command.header.stamp.sec = 7
-    clock, sent = 100.0, 0.0
+    soil = tmp_path / 'soil.yaml'
+    kept = {'stuck': True, 'reason': 'digs in', 'stamp': time.time_ns(), 'direction': 1}
+    soil.with_name('soil.yaml.state.json').write_text(json.dumps(kept))
+    limiter = start('traction_limiter_node', '--ros-args', '-p', 'stale_scale:=0.25')
+    operator = Operator(listener, reader.load(['pathfinder']).wheels.names)
+    said = []
+    operator.node.create_subscription(DiagnosticArray, '/diagnostics', said.append, 10)
+    operator.comes_to(0.25, 0.1)
+    estimator = [
+        *ROVER,
+        parameters,
+        '-p',
+        f'soil_file:={soil}',
+        '-p',
+        'filter.stuck_clear_time:=99',
+    ]
+    start('estimator_node', *estimator)
+    operator.comes_to(0.0, 0.1, rate=0.0)
+    operator.comes_to(0.3, -0.1, rate=0.0)
+    operator.comes_to(0.3, turn=0.1, rate=0.0)
+    limiter.kill()
+    start('traction_limiter_node')
+    operator.comes_to(0.3, -0.1, rate=0.0)
+    operator.comes_to(0.0, 0.1, rate=0.0)
+    released = operator.call('traction_limiter/release')
+    assert released.success and released.message.startswith('still stuck')
+    operator.comes_to(0.3, 0.1, rate=0.0)
+    assert operator.call('wheel_terra_estimator/reset').success
+    operator.comes_to(1.0, 0.05)
+    states = {
+        value.value
+        for message in said
+        for status in message.status
+        if status.name == 'traction_limiter: limiter'
+        for value in status.values
+        if value.key == 'state'
+    }
+    assert {'no estimate', 'stuck', 'backing out', 'released', 'command passes'} <= states
 
-    def comes_to(share, *, drive, back=False):
-        """Send commands, and wheel odometry if `drive`, until this share comes out."""
 
-        def arrived():
-            nonlocal clock, sent
-            if time.monotonic() - sent < 0.01:  # a hundred a second are enough
-                return False
-            sent = time.monotonic()
-            clock += 0.05
-            command.twist.linear.x = -0.1 if back else 0.1
-            if drive:
-                wheels.publish(wheel_message(names, clock))
-            commands.publish(command)
-            expected = command.twist.linear.x * share
-            return heard and heard[-1].twist.linear.x == pytest.approx(expected, abs=1e-6)
+def test_a_stop_by_its_topics_outlives_the_limiter(start, listener, tmp_path):
+    from sensor_msgs.msg import JointState
+    from std_msgs.msg import Float64, UInt8MultiArray
 
-        until(arrived)
-        assert heard[-1].header.stamp.sec == 7
+    operator = Operator(listener)
+    scales = []
+    operator.node.create_subscription(Float64, 'traction_limiter/scale', scales.append, 10)
+    slip, mobility = (
+        operator.node.create_publisher(JointState, f'wheel_terra_estimator/{name}', 10)
+        for name in ('slip', 'mobility')
+    )
+    classes = operator.node.create_publisher(
+        UInt8MultiArray, 'wheel_terra_estimator/slip_class', 10
+    )
 
-    def state():
-        status = [s for m in said for s in m.status if s.name == 'traction_limiter: limiter'][-1]
-        return next(v.value for v in status.values if v.key == 'state')
+    def comes_to(share, forward, travel=10.0, age=0.0, **more):
+        def published():
+            stamped = wheel_message(['a', 'b'], time.time() - age)
+            values = JointState(header=stamped.header, name=['a', 'b'])
+            values.position, values.velocity = [0.2, 0.2], [0.02, 0.02]
+            slip.publish(values)
+            classes.publish(UInt8MultiArray(data=[0, 0]))
+            values.position, values.velocity = [travel, travel], []
+            mobility.publish(values)
+            return scales and scales[-1].data == pytest.approx(share)
 
-    comes_to(0.25, drive=False)
-    until(lambda: wheels.get_subscription_count())
-    comes_to(1.0, drive=True)
-    comes_to(0.25, drive=False)  # joint states lost: old or unknown estimates
-    comes_to(1.0, drive=True)
-    clock = 20.0  # the clock steps back
-    comes_to(1.0, drive=True)
-    estimator.kill()
-    comes_to(0.25, drive=False)
-    until(lambda: commands.publish(command) or state() == 'no estimate')
-    start('estimator_node', *ROVER, parameters)
-    until(lambda: wheels.get_subscription_count())
-    comes_to(1.0, drive=True)
-    stuck = node.create_publisher(Bool, f'{ESTIMATOR}/stuck', latched())
-    until(lambda: stuck.get_subscription_count())
-    stuck.publish(Bool(data=True))
-    comes_to(0.0, drive=False)
-    comes_to(0.3, drive=False, back=True)
-    assert scales[-1].data == pytest.approx(0.3)
+        del scales[:]
+        operator.drive(published, forward)
+
+    keeps = ['--ros-args', '-p', f'state_file:={tmp_path / "limiter.json"}']
+    limiter = start('traction_limiter_node', *keeps)
+    comes_to(1.0, 0.1)
+    comes_to(0.3, 0.1, age=2.0)
+    comes_to(0.0, 0.1, travel=0.2)
+    comes_to(0.3, -0.1, travel=0.2)
+    limiter.kill()
+    limiter = start('traction_limiter_node', *keeps)
+    comes_to(0.3, -0.1)
+    comes_to(0.0, 0.1)
+    assert operator.call('traction_limiter/release').message.startswith('released')
+    comes_to(0.3, 0.1)
+    status, words = limiter.stop(signal.SIGTERM)
+    assert status == 0 and 'Traceback' not in words, words
+
+
+@pytest.mark.parametrize(
+    ('parameter', 'said'),
+    [('state_file:={rover}', 'remove it'), ('critical_slip:=0.1', 'must be below')],
+)
+def test_what_cannot_be_used_is_refused_at_the_start(start, parameters, parameter, said):
+    before = Path(parameters).read_text()
+    parameter = parameter.format(rover=parameters)
+    status, words = start('traction_limiter_node', '--ros-args', '-p', parameter).end()
+    assert status == 2 and said in words and 'Traceback' not in words, words
+    assert Path(parameters).read_text() == before
 
 
 def test_plain_twist(start, listener):
@@ -170,7 +176,7 @@ def test_plain_twist(start, listener):
     commands = node.create_publisher(Twist, 'cmd_vel_in', 10)
     command = Twist()
     command.linear.x = 0.1
-    until(lambda: commands.publish(command) or (heard and heard[-1].linear.x > 0.0))
-    assert heard[-1].linear.x == pytest.approx(0.03)
+    reached = pytest.approx(0.03)
+    until(lambda: commands.publish(command) or (heard and heard[-1].linear.x == reached))
     status, words = process.stop(signal.SIGTERM)
     assert status == 0, words

@@ -102,7 +102,7 @@ def write_values(soil_file: Path, learned: Mapping[str, Any], overwrite: bool = 
         ros_yaml.write(path, values, _COMMENT)
 
 
-def read_state(soil_file: Path) -> StuckState:
+def read_state(path: Path) -> StuckState:
     """Return the warning as it was last written; none where there is no such file.
 
     A warning stands also where its stamp or its direction cannot be used: these are unknown then.
@@ -112,11 +112,8 @@ def read_state(soil_file: Path) -> StuckState:
     UserError
         If the file cannot be used.
     """
-    path = state_path(soil_file)
-    return _state_in(path) if path.exists() else StuckState()
-
-
-def _state_in(path: Path) -> StuckState:
+    if not path.exists():
+        return StuckState()
     try:
         found = json.loads(read_text(path))
         stuck, reason, stamp = found['stuck'], str(found['reason']), found['stamp']
@@ -131,7 +128,7 @@ def _state_in(path: Path) -> StuckState:
     )
 
 
-def write_state(soil_file: Path, state: StuckState) -> None:
+def write_state(path: Path, state: StuckState) -> None:
     """Write the warning, at once and whole.
 
     Raises
@@ -139,18 +136,18 @@ def write_state(soil_file: Path, state: StuckState) -> None:
     UserError
         If there is a file that is no state of the estimator, or it cannot be written.
     """
-    with new_file(state_path(soil_file), overwrite=True, foreign=_why_no_state) as path:
-        path.write_text(json.dumps(asdict(state)) + '\n', encoding='utf-8')
+    with new_file(path, overwrite=True, foreign=_why_no_state) as fresh:
+        fresh.write_text(json.dumps(asdict(state)) + '\n', encoding='utf-8')
 
 
-def clear_state(soil_file: Path) -> None:
+def clear_state(path: Path) -> None:
     """Forget the warning."""
-    state_path(soil_file).unlink(missing_ok=True)
+    path.unlink(missing_ok=True)
 
 
 def _why_no_state(path: Path) -> str:
     try:
-        _state_in(path)
+        read_state(path)
     except UserError:
         return 'is no state of the estimator'
     return ''

@@ -10,106 +10,97 @@ class and as the rim travel left shrinks, and stops before the wheels dig.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from statistics import median
+from typing import Any
 
-from wheel_terra_estimator.estimation.estimates import NO_ENTRAPMENT_IN_SIGHT, SlipClass
+from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.estimation.estimates import NO_ENTRAPMENT_IN_SIGHT
+
+
+def _parameter(default: float, upper: float, meaning: str, lower: float = 0.0) -> Any:
+    """Return a field of `LimiterTuning` with its bounds and its meaning."""
+    bounds = {'lower': lower, 'upper': upper, 'meaning': meaning}
+    return field(default=default, metadata=bounds)
 
 
 @dataclass(frozen=True)
-class TractionLimits:
-    """Tuning of the limiter.
+class LimiterTuning:
+    """Parameters of the limiter; the node declares them as they stand here.
 
-    Attributes
-    ----------
-    comfortable_slip : float
-        Median slip up to which the command passes unchanged [-].
-    critical_slip : float
-        Median slip at which only ``creep_scale`` of the command is left [-].
-    creep_scale : float
-        Least scale while moving on [-].
-    stop_rim_travel : float
-        The rover stops when less rim travel than this is left before entrapment [m].
-    slow_rim_travel : float
-        The scale starts to fall below this rim travel left [m].
+    Raises
+    ------
+    UserError
+        A bound is not below the one that it must be below.
     """
 
-    comfortable_slip: float = 0.3
-    critical_slip: float = 0.6
-    creep_scale: float = 0.3
-    stop_rim_travel: float = 0.6
-    slow_rim_travel: float = 1.4
+    comfortable_slip: float = _parameter(
+        0.3, 1.0, 'median slip up to which the command passes unchanged [-]'
+    )
+    critical_slip: float = _parameter(
+        0.6, 1.0, 'median slip at which only creep_scale of the command is left [-]'
+    )
+    creep_scale: float = _parameter(
+        0.3, 1.0, 'least share of the command while moving on, and share of a crawl [-]', 0.01
+    )
+    stop_rim_travel: float = _parameter(
+        0.6, 10.0, 'stop when less rim travel than this is left before entrapment [m]'
+    )
+    slow_rim_travel: float = _parameter(1.4, 10.0, 'the share falls below this rim travel left [m]')
+    stale_after: float = _parameter(
+        1.0, 10.0, 'an estimate older than this, by its stamp, is not trusted [s]'
+    )
+    stale_scale: float = _parameter(
+        0.3, 1.0, 'greatest share of the command that passes without a fresh estimate [-]'
+    )
+    max_acceleration: float = _parameter(
+        0.5, 10.0, 'greatest increase of the speed that goes out [m/s^2]', 0.01
+    )
+    max_angular_acceleration: float = _parameter(
+        1.0, 10.0, 'greatest increase of the turn rate that goes out [rad/s^2]', 0.01
+    )
+
+    def __post_init__(self) -> None:
+        """Check the bounds that belong together."""
+        for lower, upper in (
+            ('comfortable_slip', 'critical_slip'),
+            ('stop_rim_travel', 'slow_rim_travel'),
+        ):
+            if not getattr(self, lower) < getattr(self, upper):
+                raise UserError(f'{lower} must be below {upper}')
 
 
-@dataclass(frozen=True)
-class TractionDecision:
-    """What to do with the command: multiply it by ``scale``; ``stop`` says why it is 0."""
-
-    scale: float
-    stop: bool
-    reason: str
-
-
-def traction_decision(
-    slip: Sequence[float],
-    slip_class: Sequence[int],
-    rim_travel_left: Sequence[float],
-    stuck: bool,
-    limits: TractionLimits = TractionLimits(),
-) -> TractionDecision:
-    """Return the scale in [0, 1] of a velocity command and the decision to stop.
+def traction_scale(
+    slip: Sequence[float], rim_travel_left: Sequence[float], tuning: LimiterTuning
+) -> tuple[float, str]:
+    """Return the scale in [0, 1] of a command on this soil, and why; 0 is a stop.
 
     Parameters
     ----------
     slip : sequence of float
-        Slip ratio per wheel [-] (``~/slip`` position).
-    slip_class : sequence of int
-        Class per wheel; wheels of class 255 are not counted.
+        Slip ratio per wheel [-]; at least one.
     rim_travel_left : sequence of float
-        Rim travel left before entrapment per wheel [m] (``~/mobility`` position).
-    stuck : bool
-        ``~/stuck``.
-    limits : TractionLimits, optional
-        Tuning.
-
-    Returns
-    -------
-    TractionDecision
+        Rim travel left before entrapment per wheel [m].
+    tuning : LimiterTuning
+        Parameters.
     """
-    if stuck:
-        return TractionDecision(0.0, True, 'stop: entrapment under way or close ahead')
-    known = [
-        i
-        for i, c in enumerate(slip_class)
-        if c != SlipClass.UNKNOWN and math.isfinite(slip[i]) and math.isfinite(rim_travel_left[i])
-    ]
-    if not known:
-        return TractionDecision(1.0, False, 'slip unknown: command passes')
-    # A single spinning wheel (on a stone, lifted off) is no entrapment.
-    typical_slip = _median([abs(slip[i]) for i in known if slip[i] > 0.0] or [0.0])
+    # The median: a single spinning wheel (on a stone, lifted off) is no entrapment, nor is braking.
+    typical = median([max(s, 0.0) for s in slip])
     # Two wheels that dig in are the begin of an entrapment, whatever the others still do.
-    nearest = sorted(rim_travel_left[i] for i in known)
+    nearest = sorted(rim_travel_left)
     travel = nearest[min(1, len(nearest) - 1)]
-    if travel <= limits.stop_rim_travel:
-        return TractionDecision(0.0, True, f'stop: {travel:.2f} m of rim travel left')
+    if travel <= tuning.stop_rim_travel:
+        return 0.0, f'stop: {travel:.2f} m of rim travel left'
     scale, reason = 1.0, 'command passes'
-    if typical_slip > limits.comfortable_slip:
-        span = limits.critical_slip - limits.comfortable_slip
-        fraction = min((typical_slip - limits.comfortable_slip) / span, 1.0)
-        scale = 1.0 - (1.0 - limits.creep_scale) * fraction
-        reason = f'slowed: median slip {typical_slip:.2f}'
-    if travel < min(limits.slow_rim_travel, NO_ENTRAPMENT_IN_SIGHT):
-        span = limits.slow_rim_travel - limits.stop_rim_travel
-        by_travel = max((travel - limits.stop_rim_travel) / span, limits.creep_scale)
+    if typical > tuning.comfortable_slip:
+        span = tuning.critical_slip - tuning.comfortable_slip
+        fraction = min((typical - tuning.comfortable_slip) / span, 1.0)
+        scale = 1.0 - (1.0 - tuning.creep_scale) * fraction
+        reason = f'slowed: median slip {typical:.2f}'
+    if travel < min(tuning.slow_rim_travel, NO_ENTRAPMENT_IN_SIGHT):
+        span = tuning.slow_rim_travel - tuning.stop_rim_travel
+        by_travel = max((travel - tuning.stop_rim_travel) / span, tuning.creep_scale)
         if by_travel < scale:
             scale, reason = by_travel, f'slowed: {travel:.2f} m of rim travel left'
-    return TractionDecision(scale, False, reason)
-
-
-def _median(values: Sequence[float]) -> float:
-    ordered = sorted(values)
-    middle = len(ordered) // 2
-    if len(ordered) % 2:
-        return ordered[middle]
-    return 0.5 * (ordered[middle - 1] + ordered[middle])
+    return scale, reason

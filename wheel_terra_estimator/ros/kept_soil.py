@@ -48,6 +48,7 @@ class KeptSoil:
 
     def __init__(self, path: Path, inputs: Iterable[Path] = ()) -> None:
         self.path = path.resolve()
+        self._state_path = soil_file.state_path(self.path)
         self.fault = ''
         self._lock: IO[str] | None = None
         self._unusable = ''
@@ -78,7 +79,7 @@ class KeptSoil:
     def warning(self) -> StuckState:
         """Return the stuck warning that was kept."""
         try:
-            return soil_file.read_state(self.path)
+            return soil_file.read_state(self._state_path)
         except UserError as error:
             self.fault = str(error)
             return StuckState()
@@ -99,7 +100,7 @@ class KeptSoil:
                 if learned:
                     soil_file.write_values(self.path, learned)
             finally:
-                soil_file.write_state(self.path, warning)
+                soil_file.write_state(self._state_path, warning)
         except UserError as error:
             self.fault = str(error)
             raise
@@ -109,7 +110,7 @@ class KeptSoil:
         """Remove the warning that was kept."""
         try:
             self._claim()
-            soil_file.clear_state(self.path)
+            soil_file.clear_state(self._state_path)
         except UserError as error:
             self.fault = str(error)
 

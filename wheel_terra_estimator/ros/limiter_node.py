@@ -3,14 +3,16 @@
 """Scales velocity commands by what the soil still gives, as the estimator sees it.
 
 Stands between whoever drives and the base: ``cmd_vel_in`` to ``cmd_vel_out``, as
-geometry_msgs/Twist or geometry_msgs/TwistStamped (parameter ``stamped``). It hears ``slip``,
-``slip_class``, ``mobility`` and ``stuck`` below the name of the estimator; the states stand in
-``limiter_states``. It says what it does on ``~/scale``, on ``/diagnostics`` and in the log.
+geometry_msgs/Twist or geometry_msgs/TwistStamped (parameter ``stamped``). What passes is decided
+by `traction_limiter`; this is its transport. It says what it does on ``~/scale``, on
+``/diagnostics`` and in the log.
 """
 
 from __future__ import annotations
 
 import math
+from dataclasses import Field, fields
+from pathlib import Path
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -21,30 +23,24 @@ from rclpy.clock_type import ClockType
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Bool, Float64, UInt8MultiArray
+from std_msgs.msg import Bool, Float64, Int8, UInt8MultiArray
+from std_srvs.srv import Trigger
 
-from wheel_terra_estimator.estimation.traction_law import TractionLimits
-from wheel_terra_estimator.messages.diagnostics import NODE, OK, STALE
-from wheel_terra_estimator.ros.limiter_states import Decision, LimiterStates, LimiterTuning
+from wheel_terra_estimator.configuration import soil_file
+from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.estimation import traction_limiter as limiter
+from wheel_terra_estimator.estimation.traction_law import LimiterTuning
+from wheel_terra_estimator.estimation.traction_limiter import Interlock, LimiterState, Velocity
+from wheel_terra_estimator.messages.convert import stamp_of
+from wheel_terra_estimator.messages.diagnostics import ERROR, NODE, OK, STALE, WARN
 from wheel_terra_estimator.ros.qos import input_profile, output_profile
 
-LIMITS = {
-    'comfortable_slip': 'median slip up to which the command passes unchanged [-]',
-    'critical_slip': 'median slip at which only creep_scale of the command is left [-]',
-    'creep_scale': 'least share of the command while moving on, and share while backing out [-]',
-    'stop_rim_travel': 'stop when less rim travel than this is left before entrapment [m]',
-    'slow_rim_travel': 'the share falls below this rim travel left [m]',
-}
-TUNING = {
-    'stale_after': 'an estimate older than this is not trusted [s]',
-    'stale_scale': 'share of the command that passes without a fresh estimate [-]',
-    'max_acceleration': 'greatest change of the forward speed that goes out [m/s^2]',
-    'max_angular_acceleration': 'greatest change of the yaw rate that goes out [rad/s^2]',
-}
-AT_MOST_ONE = ('creep_scale', 'stale_scale', 'comfortable_slip', 'critical_slip')
-
 DIAGNOSTICS_PERIOD = 1.0  # [s]
-COMMAND_MEMORY = 2.0  # [s] after which a command is no longer spoken of
+NOT_NUMBERED = 2**64 - 1
+"""Number of a message where the middleware does not count them."""
+UNLIMITED = ('zero', 'starting', 'command passes')
+"""States of which nothing is to be said."""
+_SECOND = 1e-9
 
 
 class TractionLimiter(Node):
@@ -52,68 +48,137 @@ class TractionLimiter(Node):
 
     def __init__(self, **options: Any) -> None:
         super().__init__('traction_limiter', **options)
-        limits, tuning = TractionLimits(), LimiterTuning()
-        self._states = LimiterStates(
-            TractionLimits(
-                **{n: self._number(n, getattr(limits, n), m) for n, m in LIMITS.items()}
-            ),
-            LimiterTuning(**{n: self._number(n, getattr(tuning, n), m) for n, m in TUNING.items()}),
-        )
-        stamped = self.declare_parameter(
-            'stamped', True, ParameterDescriptor(description='TwistStamped rather than Twist')
-        ).value
-        kind = TwistStamped if stamped else Twist
-        self._stamped = bool(stamped)
+        self._tuning = LimiterTuning(**{f.name: self._number(f) for f in fields(LimiterTuning)})
+        self._stamped = bool(self._declare('stamped', True, 'TwistStamped rather than Twist'))
+        words = 'file that keeps a stop over a restart of this node; empty: none does'
+        name = str(self._declare('state_file', '', words))
+        self._file = Path(name).expanduser() if name else None
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self._last: Decision | None = None
-        self._command_at = float('-inf')
+        self._state = self._start()
+        self._decision: limiter.Decision | None = None
+        self._message: Any = None  # the last command
+        self._command: Velocity = limiter.ZERO
+        self._slip: JointState | None = None
+        self._classes: tuple[float, tuple[int, ...]] = -math.inf, ()  # when, what
+        self._stuck_number: int | None = None  # a publisher that begins counts from 1 again
+        kind = TwistStamped if self._stamped else Twist
         self._output = self.create_publisher(kind, 'cmd_vel_out', QoSProfile(depth=1))
         self._scale = self.create_publisher(Float64, '~/scale', output_profile())
         self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', output_profile())
-        self.create_subscription(kind, 'cmd_vel_in', self._command, QoSProfile(depth=1))
-        for message_kind, topic, callback, profile in (
+        self.create_subscription(kind, 'cmd_vel_in', self._on_command, QoSProfile(depth=1))
+        latched = output_profile(latched=True)
+        # The direction before the warning: in this order they are taken where both are there.
+        topics: tuple[tuple[type, str, Any, QoSProfile], ...] = (
             (JointState, 'slip', self._on_slip, input_profile()),
-            (UInt8MultiArray, 'slip_class', self._on_class, input_profile()),
+            (UInt8MultiArray, 'slip_class', self._on_classes, input_profile()),
             (JointState, 'mobility', self._on_mobility, input_profile()),
-            (Bool, 'stuck', self._on_stuck, output_profile(latched=True)),
-        ):
+            (Int8, 'stuck_direction', self._on_direction, latched),
+            (Bool, 'stuck', self._on_stuck, latched),
+        )
+        for message_kind, topic, callback, profile in topics:
             self.create_subscription(message_kind, f'{NODE}/{topic}', callback, profile)
+        self.create_service(Trigger, '~/release', self._release)
         self.create_timer(DIAGNOSTICS_PERIOD, self._say, clock=self._steady)
 
-    def _command(self, message: Any) -> None:
-        now = self._seconds()
+    # -- What is received -----------------------------------------------------------------------
+
+    def _on_command(self, message: Any) -> None:
         twist = message.twist if self._stamped else message
-        forward, turning = twist.linear.x, twist.angular.z
-        if not (math.isfinite(forward) and math.isfinite(turning)):
-            forward = turning = 0.0
-        decision = self._states.decide(now, forward, turning)
-        out = self._states.limited(now, decision, forward, turning)
-        twist.linear.x, twist.angular.z = out
-        for vector, axes in ((twist.linear, 'yz'), (twist.angular, 'xy')):
-            for axis in axes:
-                value = decision.scale * getattr(vector, axis)
-                setattr(vector, axis, value if math.isfinite(value) else 0.0)
-        self._output.publish(message)
-        self._scale.publish(Float64(data=float(decision.scale)))
-        before, self._last, self._command_at = self._last, decision, now
+        parts = (twist.linear, twist.angular)
+        self._message, self._command = message, tuple(v for p in parts for v in (p.x, p.y, p.z))
+        self._send(*limiter.after_command(self._state, self._now(), self._command, self._tuning))
+
+    def _on_slip(self, message: JointState) -> None:
+        self._slip = message
+
+    def _on_classes(self, message: UInt8MultiArray) -> None:
+        self._classes = self._now(), tuple(message.data)
+
+    def _on_mobility(self, message: JointState) -> None:
+        """Take the last message of a set."""
+        now, clock = self._now(), self.get_clock().now().nanoseconds
+        received, classes = self._classes
+        if self._slip is None or now - received > self._tuning.stale_after:
+            return
+        estimates = limiter.Estimates(
+            (clock - min(stamp_of(self._slip), stamp_of(message))) * _SECOND,
+            self._slip.position,
+            self._slip.velocity,
+            classes,
+            message.position,
+        )
+        self._follow(limiter.after_estimates(self._state, now, estimates, self._tuning))
+
+    def _on_direction(self, message: Int8) -> None:
+        self._follow(limiter.after_direction(self._state, message.data))
+
+    def _on_stuck(self, message: Bool, info: dict[str, Any]) -> None:
+        number, before = int(info['publication_sequence_number']), self._stuck_number
+        self._stuck_number = number
+        change = before is not None and (number > before or number == NOT_NUMBERED)
+        self._follow(limiter.after_stuck(self._state, message.data, change=change))
+
+    def _release(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        state, response.message = limiter.after_release(self._state, self._now())
+        response.success = True
+        self.get_logger().warning(f'~/release: {response.message}')
+        self._follow(state)
+        return response
+
+    # -- What goes out --------------------------------------------------------------------------
+
+    def _follow(self, state: LimiterState) -> None:
+        """Take over a state; what it takes off the last command does not wait for the next."""
+        before, self._state = self._state, state
+        if (state.interlock, state.direction) != (before.interlock, before.direction):
+            self._keep()
+            self.get_logger().info(f'{state.interlock.value} {state.reason}')
+            self._say()
+        if (state.clock_offset is None) != (before.clock_offset is None):
+            self.get_logger().warning(
+                f'stamps of the estimates and the clock here differ by {state.delay:.1f} s: their '
+                'age is by how much later than the quickest they come'
+                if before.clock_offset is None
+                else 'stamps of the estimates and the clock here agree again'
+            )
+        now = self._now()
+        if self._decision is None or now - state.sent_at > limiter.COMMAND_TIMEOUT:
+            return
+        state, decision = limiter.after_command(state, now, self._command, self._tuning)
+        if decision.scale < self._decision.scale:
+            self._send(state, decision)
+
+    def _send(self, state: LimiterState, decision: limiter.Decision) -> None:
+        """Publish what is to go out, in the message of the command."""
+        self._state = state
+        before, self._decision = self._decision, decision
+        twist = self._message.twist if self._stamped else self._message
+        twist.linear.x, twist.linear.y, twist.linear.z = state.sent[:3]
+        twist.angular.x, twist.angular.y, twist.angular.z = state.sent[3:]
+        self._output.publish(self._message)
+        self._scale.publish(Float64(data=decision.scale))
         if before is None or before.state != decision.state:
             self.get_logger().info(decision.reason)
-        if before is None or before.level != decision.level:
             self._say()
 
     def _say(self) -> None:
         """Publish diagnostics."""
-        now = self._seconds()
+        now, state, decision = self._now(), self._state, self._decision
         name = self.get_fully_qualified_name().lstrip('/')
-        last = self._last
-        fresh = last is not None and now - self._command_at < COMMAND_MEMORY
-        words = last.reason if last is not None and fresh else 'no commands'
-        level = last.level if last is not None and fresh else STALE if last is not None else OK
-        age = self._states.age(now)
+        words, level = 'no commands', OK if decision is None else STALE
+        if decision is not None and now - state.sent_at < limiter.COMMAND_TIMEOUT:
+            words, level = decision.reason, OK if decision.state in UNLIMITED else WARN
+        if state.interlock is not Interlock.FREE:
+            level = ERROR
+            words = words if state.reason in words else f'{state.reason}; {words}'
+        age = limiter.estimate_age(state, now)
         values = {
-            'scale': f'{last.scale:.3f}' if last is not None else '',
-            'state': last.state if last is not None else 'no command yet',
-            'estimate_age_s': f'{age:.2f}' if math.isfinite(age) else 'never heard',
+            'scale': f'{decision.scale:.3f}' if decision is not None else '',
+            'state': decision.state if decision is not None else 'no command yet',
+            'interlock': state.interlock.value,
+            'direction': str(state.direction),
+            'estimate_age_s': f'{age:.2f}' if math.isfinite(age) else 'never received',
+            'clock_offset_s': f'{state.clock_offset or 0.0:.2f}',
         }
         status = DiagnosticStatus(
             level=bytes([level]),
@@ -126,28 +191,44 @@ class TractionLimiter(Node):
         message.header.stamp = self.get_clock().now().to_msg()
         self._diagnostics.publish(message)
 
-    def _on_slip(self, message: JointState) -> None:
-        self._states.hear_slip(self._seconds(), message.position, message.velocity)
+    # -- What is kept over a restart ------------------------------------------------------------
 
-    def _on_class(self, message: UInt8MultiArray) -> None:
-        self._states.hear_classes(self._seconds(), message.data)
+    def _start(self) -> LimiterState:
+        """Return the state at the start, stopped where the file says so."""
+        state = LimiterState(still_since=self._now())
+        if self._file is None:
+            return state
+        kept = soil_file.read_state(self._file)
+        if kept.stuck:
+            self.get_logger().error(f'stopped before the restart: {kept.reason}')
+            state = limiter.after_event(state, limiter.Event.STOP, kept.direction, kept.reason)
+        soil_file.write_state(self._file, kept)  # says at once where it cannot be written
+        return state
 
-    def _on_mobility(self, message: JointState) -> None:
-        self._states.hear_mobility(self._seconds(), message.position)
+    def _keep(self) -> None:
+        if self._file is None:
+            return
+        stopped = self._state.interlock is not Interlock.FREE
+        stamp = self.get_clock().now().nanoseconds
+        kept = soil_file.StuckState(stopped, self._state.reason, stamp, self._state.direction)
+        try:
+            soil_file.write_state(self._file, kept)
+        except UserError as error:
+            self.get_logger().error(str(error))
 
-    def _on_stuck(self, message: Bool) -> None:
-        self._states.hear_stuck(message.data)
+    # -- Parameters and time --------------------------------------------------------------------
 
-    def _number(self, name: str, default: float, meaning: str) -> float:
-        """Declare a number that is read at start; an integer will do."""
-        most = 1.0 if name in AT_MOST_ONE else 10.0
-        descriptor = ParameterDescriptor(
-            description=meaning,
-            read_only=True,
-            dynamic_typing=True,
-            floating_point_range=[FloatingPointRange(from_value=0.0, to_value=most, step=0.0)],
-        )
-        return float(self.declare_parameter(name, default, descriptor).value)
+    def _declare(self, name: str, default: Any, meaning: str, **bounds: Any) -> Any:
+        """Return a parameter that is read at start."""
+        descriptor = ParameterDescriptor(description=meaning, read_only=True, **bounds)
+        return self.declare_parameter(name, default, descriptor).value
 
-    def _seconds(self) -> float:
-        return float(self._steady.now().nanoseconds) * 1e-9
+    def _number(self, parameter: Field[float]) -> float:
+        """Return a number of the tuning; an integer will do."""
+        given = parameter.metadata
+        bounds = FloatingPointRange(from_value=given['lower'], to_value=given['upper'], step=0.0)
+        more = {'dynamic_typing': True, 'floating_point_range': [bounds]}
+        return float(self._declare(parameter.name, parameter.default, given['meaning'], **more))
+
+    def _now(self) -> float:
+        return float(self._steady.now().nanoseconds) * _SECOND

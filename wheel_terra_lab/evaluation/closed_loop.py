@@ -13,10 +13,16 @@ from numpy.typing import NDArray
 
 from wheel_terra_estimator.checks.watched_estimator import WatchedEstimator
 from wheel_terra_estimator.estimation.core import EstimatorCore
-from wheel_terra_estimator.estimation.traction_law import (
-    TractionDecision,
-    TractionLimits,
-    traction_decision,
+from wheel_terra_estimator.estimation.estimates import EstimateSet
+from wheel_terra_estimator.estimation.traction_law import LimiterTuning
+from wheel_terra_estimator.estimation.traction_limiter import (
+    Estimates,
+    Interlock,
+    LimiterState,
+    after_command,
+    after_direction,
+    after_estimates,
+    after_stuck,
 )
 from wheel_terra_estimator.simulation.commands import Command
 from wheel_terra_estimator.simulation.drive import Drive
@@ -26,6 +32,7 @@ from wheel_terra_lab.evaluation.kinds import LIMITER
 from wheel_terra_lab.evaluation.tables import table
 
 FloatArray = NDArray[np.float64]
+DEFAULTS = LimiterTuning()
 _FRONT = 0.5  # [m] from the middle of the rover to beyond its front wheels
 
 
@@ -44,40 +51,32 @@ class ClosedLoopDrive:
 
 
 def closed_loop(
-    scenario: Scenario, seed: int, *, limited: bool, limits: TractionLimits | None = None
+    scenario: Scenario, seed: int, *, limited: bool, tuning: LimiterTuning = DEFAULTS
 ) -> ClosedLoopDrive:
-    """Drive the scenario's profile, the command scaled by the traction law or not.
-
-    A stop is latched, as the node does it until a reset: what was about to entrap the rover is
-    still below its wheels.
-    """
+    """Drive the scenario's profile, with the traction limiter or without."""
     drive = Drive(scenario, seed)
     core = EstimatorCore(drive.configuration, watched_by=WatchedEstimator)
-    limits = limits or TractionLimits()
-    decision = TractionDecision(1.0, False, 'command passes')
+    state = LimiterState(still_since=drive.plant.time)
     pending: list[Arrival] = []
     rows: list[tuple[float, float, FloatArray, FloatArray, float]] = []
     stopped: float | None = None
+    reason = ''
     while drive.plant.time < scenario.duration - 1e-9:
         wanted = scenario.profile.at(drive.plant.time)
-        scale = decision.scale if limited else 1.0
-        pending += drive.step(Command(scale * wanted.forward, scale * wanted.turn_rate))
+        command = (wanted.forward, 0.0, 0.0, 0.0, 0.0, wanted.turn_rate)
+        state, decision = after_command(state, drive.plant.time, command, tuning)
+        sent = state.sent if limited else command
+        pending += drive.step(Command(sent[0], sent[5]))
         truth = drive.last_truth
         now = START + round(truth.time * 1e9)
         due = sorted((a for a in pending if a.arrival <= now), key=lambda a: a.arrival)
         pending = [a for a in pending if a.arrival > now]
         for arrival in due:
-            for s in core.add(arrival.measurement):
-                if stopped is None:
-                    decision = traction_decision(
-                        s.slip.tolist(),
-                        s.slip_class.tolist(),
-                        s.rim_travel_left.tolist(),
-                        s.stuck,
-                        limits,
-                    )
-                    if limited and decision.stop:
-                        stopped = truth.time
+            for estimates in core.add(arrival.measurement):
+                state = _after_set(state, truth.time, now, estimates, tuning)
+        if stopped is None and state.interlock is not Interlock.FREE:
+            stopped, reason = (truth.time if limited else None), state.reason
+        scale = decision.scale if limited else 1.0
         rows.append(
             (truth.time, float(truth.position[0]), truth.sinkage.copy(), truth.slip.copy(), scale)
         )
@@ -89,9 +88,27 @@ def closed_loop(
         slip=np.array(columns[3]),
         scale=np.array(columns[4]),
         stopped=stopped,
-        reason=decision.reason,
+        reason=reason,
         health=core.health(),
     )
+
+
+def _after_set(
+    state: LimiterState, time: float, now: int, estimates: EstimateSet, tuning: LimiterTuning
+) -> LimiterState:
+    """Return the state of the limiter after all messages of a set, as the nodes send them."""
+    received = Estimates(
+        (now - estimates.stamp) * 1e-9,
+        estimates.slip.tolist(),
+        estimates.slip_velocity.tolist(),
+        estimates.slip_class.tolist(),
+        estimates.rim_travel_left.tolist(),
+    )
+    state = after_estimates(state, time, received, tuning)
+    if estimates.stuck != (state.interlock is Interlock.STUCK):
+        state = after_direction(state, estimates.stuck_direction)
+        state = after_stuck(state, estimates.stuck, change=True)
+    return state
 
 
 @dataclass(frozen=True)

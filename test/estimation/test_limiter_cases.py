@@ -1,0 +1,376 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""What the limiter lets pass: named cases. Any sequence of events: test_limiter_sequences."""
+
+import math
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+
+from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.estimation.traction_law import LimiterTuning
+from wheel_terra_estimator.estimation.traction_limiter import (
+    INTERLOCK,
+    ZERO,
+    Estimates,
+    Event,
+    Interlock,
+    LimiterState,
+    after_command,
+    after_direction,
+    after_estimates,
+    after_event,
+    after_release,
+    after_stuck,
+    decide,
+)
+
+PAGE = Path(__file__).resolve().parents[2] / 'docs' / 'limiter.md'
+UNKNOWN = 255
+STEP = 0.05  # [s] between two commands and two sets
+
+
+class Rover:
+    """A limiter over time: commands and sets of four wheels at 20 Hz."""
+
+    def __init__(self, now=100.0, **tuning):
+        self.tuning = LimiterTuning(**tuning)
+        self.now = now
+        self.state = LimiterState(still_since=now)
+        self.sent = []
+
+    def estimate(self, slip=0.1, slip_class=0, travel=10.0, rim=0.1, age=0.02):
+        """Take a set of wheels that all turn at `rim` [m/s]."""
+        sets = Estimates(age, [slip] * 4, [slip * rim] * 4, [slip_class] * 4, [travel] * 4)
+        self.state = after_estimates(self.state, self.now, sets, self.tuning)
+
+    def rest(self):
+        """Take a set of a rover at rest."""
+        self.estimate(slip=0.7, slip_class=UNKNOWN, rim=0.0)
+
+    def command(self, forward=0.0, turn=0.0):
+        """Send a command; return what was decided."""
+        self.now += STEP
+        wanted = (forward, 0.0, 0.0, 0.0, 0.0, turn)
+        self.state, decision = after_command(self.state, self.now, wanted, self.tuning)
+        self.sent.append(self.state.sent)
+        return decision
+
+    def drive(self, seconds, forward=0.0, turn=0.0, **estimate):
+        """Send a command again and again, with a set before each; return the last decision."""
+        for _ in range(round(seconds / STEP)):
+            self.estimate(**estimate)
+            decision = self.command(forward, turn)
+        return decision
+
+    def stuck(self, stuck=True, direction=1, change=True):
+        """Take what an estimator publishes."""
+        self.state = after_direction(self.state, direction if stuck else 0)
+        self.state = after_stuck(self.state, stuck, change=change)
+
+    def scale(self, forward=0.0, turn=0.0):
+        """Return what would pass of a command that comes now."""
+        return decide(self.state, self.now, (forward, 0.0, 0.0, 0.0, 0.0, turn), self.tuning).scale
+
+
+# -- The direction that led in --------------------------------------------------------------------
+
+
+@pytest.mark.parametrize('led', [1, -1])
+def test_a_limiter_that_is_restarted_while_stuck_opens_the_way_out(led):
+    rover = Rover()
+    rover.command(-led * 0.1)  # the first command after the restart is the way out
+    rover.stuck(direction=led, change=False)
+    assert rover.command(-led * 0.1)[:2] == (0.3, 'backing out')
+    assert rover.command(led * 0.1)[:2] == (0.0, 'stuck')
+
+
+def test_a_warning_while_the_operator_already_tries_reverse_is_not_turned_round():
+    rover = Rover()
+    rover.drive(2.0, 0.1)
+    rover.drive(0.5, 0.0)
+    rover.drive(0.2, -0.1)
+    rover.stuck(direction=1)
+    assert rover.command(-0.1).scale == 0.3
+    assert rover.command(0.1).scale == 0.0
+
+
+@pytest.mark.parametrize('first', ['direction', 'warning'])
+def test_warning_and_direction_come_in_either_order(first):
+    state = LimiterState()
+    if first == 'direction':
+        state = after_stuck(after_direction(state, -1), True, change=True)
+    else:
+        state = after_direction(after_stuck(state, True, change=True), -1)
+    assert state.direction == -1
+
+
+def test_out_of_stuck_and_on_the_spot_also_with_a_dead_estimator():
+    rover = Rover(stale_scale=0.0)
+    rover.drive(2.0, 0.1)
+    rover.stuck()
+    for _ in range(2):
+        assert (rover.scale(0.1), rover.scale(-0.1), rover.scale(turn=0.2)) == (0.0, 0.3, 0.3)
+        assert rover.scale(0.1, 0.2) == 0.0, 'nothing in that direction, in a curve neither'
+        rover.now += 1000.0
+
+
+def test_an_unknown_direction_opens_both_ways_but_one_at_a_time():
+    rover = Rover()
+    rover.stuck(direction=0)
+    assert rover.command(0.1).scale == 0.3
+    rover.command(0.1)
+    assert rover.command(-0.1).scale == 0.0
+    found = [rover.command(-0.1).scale for _ in range(30)]
+    assert found.index(0.3) * STEP == pytest.approx(1.0, abs=2 * STEP)
+    assert set(found[found.index(0.3) :]) == {0.3}
+
+
+# -- Stop -----------------------------------------------------------------------------------------
+
+
+def test_a_stop_holds_at_rest_however_long_forward_is_commanded():
+    rover = Rover()
+    rover.drive(3.0, 0.1)
+    assert rover.drive(0.05, 0.1, slip=0.7, slip_class=2, travel=0.3)[:2] == (0.0, 'stopped')
+    for _ in range(400):
+        rover.rest()
+        assert rover.command(0.1).scale == 0.0
+    assert rover.sent[-400:] == [ZERO] * 400
+    assert rover.scale(-0.1) == 0.3
+
+
+def test_a_stop_ends_by_motion_out_with_little_slip_for_three_seconds():
+    rover = Rover()
+    rover.drive(1.0, 0.1, slip=0.7, slip_class=2, travel=0.3)
+    assert rover.drive(5.0, -0.1, slip=0.8, slip_class=2, rim=-0.03).scale == 0.3
+    assert rover.scale(0.1) == 0.0, 'the wheels spin: that is no way out'
+    rover.drive(2.5, -0.1, rim=-0.03)
+    assert rover.scale(0.1) == 0.0
+    rover.drive(1.0, -0.1, rim=-0.03)
+    assert rover.scale(0.1) == 1.0
+
+
+@pytest.mark.parametrize(('change', 'scale'), [(True, 0.3), (False, 0.0)])
+def test_a_stop_ends_by_a_reset_of_the_estimator_but_not_by_its_restart(change, scale):
+    rover = Rover()
+    rover.drive(1.0, 0.1, slip=0.7, slip_class=2, travel=0.3)
+    rover.stuck(False, change=change)
+    rover.now += 5.0
+    assert rover.scale(0.1) == scale
+
+
+def test_a_warning_that_an_estimator_without_memory_forgets_stands_as_a_stop():
+    rover = Rover()
+    rover.stuck(direction=-1)
+    rover.stuck(False, change=False)
+    assert (rover.scale(-0.1), rover.scale(0.1)) == (0.0, 0.3)
+    state, words = after_release(rover.state, rover.now)
+    assert state.interlock is Interlock.FREE and words.startswith('released')
+
+
+def test_release_opens_a_crawl_of_ten_seconds():
+    rover = Rover()
+    rover.stuck()
+    rover.state, words = after_release(rover.state, rover.now)
+    assert words.startswith('still stuck') and '10 s' in words
+    assert rover.drive(9.9, 0.1, slip=0.95, slip_class=3, travel=0.0)[:2] == (0.3, 'released')
+    assert rover.drive(0.2, 0.1, slip=0.95, slip_class=3, travel=0.0)[:2] == (0.0, 'stuck')
+
+
+def test_release_of_a_stop_opens_a_crawl_then_the_law_decides_anew():
+    rover = Rover()
+    rover.drive(1.0, 0.1, slip=0.7, slip_class=2, travel=0.3)
+    rover.state, _ = after_release(rover.state, rover.now)
+    assert rover.drive(9.9, 0.1, slip=0.7, slip_class=2, travel=0.3)[:2] == (0.3, 'released')
+    assert rover.drive(0.2, 0.1, slip=0.7, slip_class=2, travel=0.3)[:2] == (0.0, 'stopped')
+    rover.state, _ = after_release(rover.state, rover.now)
+    assert rover.drive(9.9, 0.1).scale == 0.3
+    assert rover.drive(0.2, 0.1).scale == 1.0
+
+
+def test_what_would_stop_the_rover_during_a_release_is_not_kept_beyond_it():
+    rover = Rover()
+    rover.drive(1.0, 0.1, slip=0.7, slip_class=2, travel=0.3)
+    rover.state, _ = after_release(rover.state, rover.now)
+    rover.drive(5.0, 0.1, slip=0.7, slip_class=2, travel=0.3)
+    assert rover.drive(5.1, 0.1).scale == 1.0
+
+
+def test_a_gap_in_the_estimates_is_no_motion_out():
+    rover = Rover()
+    rover.drive(1.0, 0.1, slip=0.7, slip_class=2, travel=0.3)
+    for _ in range(3):
+        rover.drive(2.0, -0.1, rim=-0.03)
+        rover.now += 1.5
+    assert rover.scale(0.1) == 0.0
+
+
+def test_release_in_advance_is_none():
+    rover = Rover()
+    rover.state, words = after_release(rover.state, rover.now)
+    assert words == 'nothing is stopped'
+    rover.stuck()
+    assert rover.scale(0.1) == 0.0
+
+
+def test_the_table_is_that_of_the_page():
+    rows = [line.strip('|\n ').split(' | ') for line in PAGE.open() if line.startswith('| ')]
+    states = [cell.strip('`') for cell in next(row for row in rows if row[0] == 'event')[1:]]
+    written = {
+        Event(row[0]): {
+            Interlock(state): Interlock(cell.strip('`'))
+            for state, cell in zip(states, row[1:], strict=True)
+        }
+        for row in rows
+        if row[0] in {event.value for event in Event}
+    }
+    assert written == dict(INTERLOCK)
+    assert set(INTERLOCK) == set(Event)
+    assert all(set(row) == set(Interlock) for row in INTERLOCK.values())
+
+
+# -- What is not known ----------------------------------------------------------------------------
+
+
+def test_a_pulsed_command_with_all_classes_unknown_is_cut():
+    rover = Rover()
+    scales = []
+    for i in range(1200):
+        rover.estimate(slip_class=UNKNOWN, rim=0.1 if i % 19 else 0.0)
+        scales.append(rover.command(0.1 if i % 19 else 0.0).scale if i % 19 else 0.3)
+    assert max(scales[40:]) == 0.3
+
+
+def test_pulses_from_rest_pass_whole_only_once_until_a_class_is_known():
+    rover = Rover()
+    pulses = []
+    for _ in range(5):
+        for _ in range(20):
+            rover.rest()
+            rover.command()
+        pulses.append(rover.drive(0.5, 0.1, slip_class=UNKNOWN).scale)
+    assert pulses == [1.0, 0.3, 0.3, 0.3, 0.3]
+    rover.drive(0.5, 0.1)
+    for _ in range(20):
+        rover.rest()
+        rover.command()
+    assert rover.drive(0.5, 0.1, slip_class=UNKNOWN).scale == 1.0
+
+
+def test_doubt_lets_the_last_known_class_count_on_then_the_cautious_one():
+    rover = Rover()
+    rover.drive(1.0, 0.1, slip=0.45, slip_class=1)
+    before = rover.scale(0.1)
+    assert before == pytest.approx(0.65)
+    found = [rover.drive(STEP, 0.1, slip=0.0, slip_class=UNKNOWN).scale for _ in range(40)]
+    assert found[:19] == [before] * 19 and found[-19:] == [0.3] * 19
+
+
+def test_some_wheels_in_doubt_never_raise_the_scale():
+    rover = Rover()
+
+    def estimate(classes, slips):
+        rates = [0.1 * s for s in slips]
+        sets = Estimates(0.0, slips, rates, classes, [10.0] * 4)
+        rover.state = after_estimates(rover.state, rover.now, sets, rover.tuning)
+        return rover.command(0.1).scale
+
+    before = estimate([1, 1, 0, 0], [0.55, 0.55, 0.2, 0.2])
+    later = [estimate([UNKNOWN, UNKNOWN, 0, 0], [0.0, 0.0, 0.2, 0.2]) for _ in range(100)]
+    assert before == pytest.approx(0.825)
+    assert later[0] == before and later[-1] == pytest.approx(1.0 - 0.7 / 3.0)
+    assert all(b <= a for a, b in pairwise(later))
+
+
+@pytest.mark.parametrize('age', [1.2, 2.8, 59.0])
+def test_estimates_are_fresh_by_their_stamp(age):
+    rover = Rover()
+    decision = rover.drive(3.0, 0.1, age=age)
+    assert decision[:2] == (0.3, 'no estimate') and f'{age:.1f} s old' in decision.reason
+
+
+@pytest.mark.parametrize('offset', [-3600.0, -5.0, 1.7e9])
+def test_where_the_clocks_disagree_age_is_by_how_much_later_than_the_quickest_a_set_comes(offset):
+    rover = Rover()
+    assert rover.drive(1.0, 0.1, age=offset).scale == 1.0
+    late = [rover.drive(STEP, 0.1, age=offset + 0.9 * STEP * i).scale for i in range(60)]
+    assert late == sorted(late, reverse=True) and late[-1] == 0.3, 'a node that starves'
+    assert rover.drive(STEP, 0.1, age=offset).scale == 1.0
+    for step in (20.0, -20.0, 1e4):
+        offset += step  # of either clock
+        assert rover.drive(0.5, 0.1, age=offset - 1e4).scale == 1.0, step
+
+
+def test_an_estimate_grows_old_where_none_follows():
+    rover = Rover()
+    rover.drive(3.0, 0.1, age=0.5)
+    assert rover.scale(0.1) == 1.0
+    rover.now += 0.6
+    assert rover.scale(0.1) == 0.3
+
+
+@pytest.mark.parametrize('slip', [0.0, 0.5])
+def test_late_news_counts_only_where_it_is_bad(slip):
+    rover = Rover(stale_scale=1.0)
+    rover.drive(1.0, 0.1, slip=0.45, slip_class=1)
+    rover.estimate(slip=slip, slip_class=1, age=5.0)
+    expected = {0.0: 0.65, 0.5: 1.0 - 0.7 * 2.0 / 3.0}[slip]
+    assert rover.scale(0.1) == pytest.approx(expected)
+    rover.estimate(slip=0.7, slip_class=2, travel=0.1, age=5.0)
+    assert rover.scale(0.1) == 0.0
+
+
+# -- The way up, and down -------------------------------------------------------------------------
+
+
+def test_the_first_command_takes_the_ramp():
+    rover = Rover(stale_scale=1.0)
+    for _ in range(30):
+        rover.command(0.5)
+    speeds = [sent[0] for sent in rover.sent]
+    assert speeds[0] == 0.0 and speeds[-1] == 0.5
+    assert max(b - a for a, b in pairwise(speeds)) <= 0.5 * STEP + 1e-12
+
+
+def test_a_stop_and_a_reduction_act_at_once():
+    rover = Rover()
+    rover.drive(3.0, 0.5, turn=0.2)
+    rover.drive(STEP, 0.5, turn=0.2, slip=0.45, slip_class=1)
+    assert rover.sent[-1] == pytest.approx((0.325, 0.0, 0.0, 0.0, 0.0, 0.13))
+    rover.drive(STEP, 0.5, slip=0.7, slip_class=2, travel=0.1)
+    assert rover.sent[-1] == ZERO
+
+
+def test_a_turn_back_stops_at_once_and_then_takes_the_ramp():
+    rover = Rover()
+    rover.drive(3.0, 0.5)
+    rover.drive(STEP, -0.5)
+    assert rover.sent[-1][0] == pytest.approx(-0.5 * STEP)
+
+
+def test_a_curve_stays_the_same_curve_on_the_way_up():
+    rover = Rover()
+    rover.drive(1.0, 0.4, turn=0.2)
+    assert all(s[5] == pytest.approx(0.5 * s[0]) for s in rover.sent[-20:])
+
+
+def test_what_is_no_number_stops():
+    rover = Rover()
+    rover.drive(3.0, 0.5)
+    assert rover.command(math.nan).state == 'zero'
+    assert rover.sent[-1] == ZERO
+
+
+@pytest.mark.parametrize('wrong', [{'critical_slip': 0.3}, {'stop_rim_travel': 2.0}])
+def test_bounds_that_cross_are_refused(wrong):
+    with pytest.raises(UserError, match='must be below'):
+        LimiterTuning(**wrong)
+
+
+def test_an_event_that_opens_nothing_keeps_direction_and_reason():
+    state = after_event(LimiterState(), Event.STOP, 1, 'stop: 0.3 m')
+    assert after_event(state, Event.STOP, -1, 'other') == state
+    assert after_event(state, Event.BEGUN) == state
+    assert after_event(state, Event.STUCK, 0, 'stuck').direction == 1
