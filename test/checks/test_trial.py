@@ -128,3 +128,15 @@ def test_a_cure_that_one_half_contradicts_does_not_pass():
     assert not tried(lambda rows: float(value[rows].mean()), 1.0, np.ones(100)).falls
     assert tried(lambda rows: 1.1, 1.0, np.ones(100)).falls
     assert Trial(1.0, 0.1, 0.5).passes and not Trial(1.0, 0.1, 0.11).passes
+
+
+def test_turns_on_the_spot_without_a_gyro_or_a_wheel_say_nothing_of_signs_and_units():
+    sound = rolling.recording(spot_turns())
+    dead = replace(sound.imu, rate=0.0 * sound.imu.rate)
+    found = check_recording(replace(sound, imu=dead), rolling.rover()).findings
+    assert {f.kind for f in found} == {'placeholder'}, [str(f) for f in found]
+    rate = sound.joints.rate.copy()
+    rate[:, 0] = np.nan
+    joints = replace(sound.joints, rate=rate)
+    found = check_recording(replace(sound, joints=joints), rolling.rover()).findings
+    assert {f.kind for f in found} == {'missing_wheel'}, [str(f) for f in found]

@@ -32,6 +32,8 @@ TOO_SMALL_STD = 4.0
 """Seen standard deviation over the stated one from which a variance that changes is too small."""
 LEAST_STD = 1e-4
 """Standard deviation [m/s] that is proposed at least."""
+AHEAD = 0.5
+"""Mean of the rims over the usual size of one, above which the rover goes ahead [-]."""
 LEAST_UNIT_RATIO = 1.3
 """Speed over rim speed below which it may be the radius, not the unit [-]."""
 KNOWN_UNITS = {'kilometres per hour': 3.6, 'millimetres per second': 1000.0, 'knots': 1.9438}
@@ -115,7 +117,9 @@ def _unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         return [], evidence
     rim = np.abs(evidence.rim_at(reference.stamp, evidence.rim, 0.3))
     speed = np.abs(reference.velocity[:, 0])
-    rows = np.isfinite(rim) & (rim > 0.4 * np.nanquantile(rim, 0.9)) & (rim > 0.0)
+    # In turns on the spot the mean of the rims is next to nothing.
+    least = AHEAD * evidence.working_rate * float(np.nanmean(evidence.facts.radius))
+    rows = np.isfinite(rim) & (rim > max(0.4 * float(np.nanquantile(rim, 0.9)), least, 1e-9))
     if rows.sum() < 8:
         return [], evidence
     ratio = float(np.median(speed[rows] / rim[rows]))

@@ -135,7 +135,8 @@ def _sign_and_zero(
             typical = float(np.nanmedian(others))
             mirrored = abs(-middle[index] - typical) < 0.6 * typical
             kind = 'sign' if mirrored and _skew(reading) <= 0.0 else 'zero'
-            outcomes.append(_one_wheel(evidence, name, kind, middle[index], typical))
+            if kind == 'sign' or abs(far) > ODD_ZERO:
+                outcomes.append(_one_wheel(evidence, name, kind, middle[index], typical))
         elif abs(far) > max(ODD_ZERO, 3.0 * spread) and _lasting(table, index, far):
             outcomes.append(
                 _one_wheel(evidence, name, 'zero', middle[index], float(np.nanmedian(others)))

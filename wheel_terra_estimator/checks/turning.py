@@ -271,6 +271,8 @@ def _chosen(evidence: Evidence, there: NDArray[np.intp], rows: Mask) -> _Chosen:
         return _Chosen(signs, fit.track if abs(fit.correlation) > LEAST_CORRELATION else 0.0)
     turn = best.fit.track if abs(best.fit.correlation) > LEAST_CORRELATION else 0.0
     signs[there] = best.fix.signs
+    if evidence.gyro is None and _like_a_spin(evidence, signs):
+        return _Chosen(np.ones(signs.size))
     doubled = 2 * int(np.sum(signs < 0.0))
     if doubled > there.size or (doubled == there.size and turn < 0.0):
         signs, turn = -signs, -turn  # the pair with fewer reversed wheels is meant
@@ -300,6 +302,15 @@ def _told(fix: Fix, names: Sequence[str]) -> str:
         return f'{names[fix.exchanged[0]]} and {names[fix.exchanged[1]]} exchanged'
     backwards = [name for name, sign in zip(names, fix.signs, strict=True) if sign < 0]
     return f'{", ".join(backwards)} backwards'
+
+
+def _like_a_spin(evidence: Evidence, signs: FloatArray) -> bool:
+    """Whether a whole side is reversed and no reference says that this is no turn on the spot."""
+    side = evidence.facts.side
+    if not evidence.facts.has_sides() or np.ptp(signs * side) > 0.0:
+        return False
+    told = _told_direction(evidence, signs).reference
+    return told is None
 
 
 class _Told(NamedTuple):

@@ -26,6 +26,8 @@ USUAL_TRACK = 2.0
 """The same, of rovers that turn by skidding [-]."""
 ONLY_BY_SPEED = ('thousandths of rad/s',)
 """Units that a skidding rover's turns do not tell from counts of an encoder."""
+AHEAD = 0.5
+"""Mean of the rims over the usual size of one, above which the rover goes ahead [-]."""
 UNIT_TOLERANCE = 0.35
 """Share by which a speed ratio may lie off a unit's factor (slip makes it smaller)."""
 FASTEST_RIM = 15.0
@@ -195,7 +197,8 @@ def _speed_ratio(evidence: Evidence) -> float | None:
     rim = evidence.rim_at(reference.stamp, np.abs(evidence.rim), 0.3)
     speed = np.linalg.norm(reference.velocity[:, :2], axis=1)
     working = np.nanquantile(rim, 0.9) if np.isfinite(rim).any() else 0.0
-    rows = (rim > 0.4 * working) & np.isfinite(speed)
+    least = AHEAD * evidence.working_rate * float(np.nanmean(evidence.facts.radius))
+    rows = (rim > max(0.4 * working, least)) & np.isfinite(speed)
     if working <= 0.0 or rows.sum() < 8:
         return None
     noise = robust_std(np.diff(reference.velocity[:, 0], 2)) / math.sqrt(6.0)
@@ -211,7 +214,9 @@ def _odometry_ratio(evidence: Evidence) -> float | None:
     assert odometry is not None
     rim = evidence.rim_at(odometry.stamp, np.abs(evidence.rim), 0.2)
     speed = np.abs(odometry.velocity[:, 0])
-    rows = np.isfinite(rim) & (rim > 0.3 * np.nanquantile(rim, 0.9)) & (rim > 0.0)
+    # In turns on the spot the mean of the rims is next to nothing.
+    least = AHEAD * evidence.working_rate * float(np.nanmean(evidence.facts.radius))
+    rows = np.isfinite(rim) & (rim > max(0.3 * float(np.nanquantile(rim, 0.9)), least, 1e-9))
     return float(np.median(speed[rows] / rim[rows])) if rows.sum() > 8 else None
 
 
