@@ -1,0 +1,602 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Estimator of one rover on the traction curve: candidate for the core, behind the same interface.
+
+State: the shift of the soil file's traction curve (offset, ln scale, ln strength) and the strength
+under each wheel. It walks with the travel of the rims. The speed of the body is no state: it is
+the one at which the curve gives the torques that are measured; a reference velocity corrects the
+curve. Sinkage and stiffness, and the pulls, follow wheel by wheel.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from math import isnan
+from typing import Any, NamedTuple
+
+import numpy as np
+from filterpy.kalman import ExtendedKalmanFilter
+from numpy.typing import NDArray
+
+from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.estimation.contacts.loads import WheelLoads
+from wheel_terra_estimator.estimation.contacts.steering import Headings, Steering
+from wheel_terra_estimator.estimation.contacts.turning import Turning
+from wheel_terra_estimator.estimation.estimates import NO_ENTRAPMENT_IN_SIGHT, EstimateSet
+from wheel_terra_estimator.estimation.filter.initial_state import SoilPriors
+from wheel_terra_estimator.estimation.inputs.contact_sensors import (
+    LeavingAngleInput,
+    SinkageInput,
+)
+from wheel_terra_estimator.estimation.inputs.inertial import GyroZero, InertialInput
+from wheel_terra_estimator.estimation.inputs.wheel_odometry import WheelOdometryInput
+from wheel_terra_estimator.estimation.judgement.slip import BodyMotion, SlipJudge
+from wheel_terra_estimator.estimation.judgement.stuck.monitor import StuckAssessment, StuckMonitor
+from wheel_terra_estimator.estimation.judgement.stuck.settings import StuckSettings
+from wheel_terra_estimator.estimation.judgement.stuck.situation import (
+    RoverMotion,
+    WheelMotion,
+    driving_share,
+)
+from wheel_terra_estimator.estimation.measurements import ReferenceVelocity, StepInputs
+from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
+from wheel_terra_estimator.estimation.scalars import NAN, gain_of, known
+from wheel_terra_lab.traction_filter.curve import LOG_SCALE, LOG_STRENGTH, OFFSET, WHEELS
+from wheel_terra_lab.traction_filter.pulls import Contact, PullModel, SumOfPulls, WheelPulls
+from wheel_terra_lab.traction_filter.sinkage import SinkageFilter
+from wheel_terra_lab.traction_filter.speed import BodySlip, Rims, rims_at, solved
+from wheel_terra_lab.traction_filter.steady_wheel import SteadyWheel
+
+FloatArray = NDArray[np.float64]
+_SECOND = 1e-9  # of a nanosecond
+
+
+@dataclass(frozen=True)
+class TractionTuning:
+    """Numbers of the filter; tuned on simulators A and B, seeds 1000 to 1002."""
+
+    offset_std: float = 0.03  # what no deviation of the soil explains [-]
+    log_scale_std: float = 0.2
+    log_strength_std: float = 0.1
+    wheel_std: float = 0.15  # ln strength of one wheel against the others
+    offset_walk: float = 0.03  # [1/sqrt(m)] of rim travel, as all walks
+    log_scale_walk: float = 0.05
+    log_strength_walk: float = 0.05
+    wheel_walk: float = 0.15
+    reversal_std: float = 0.03  # of the offset, at a change of direction
+    torque_time: float = 0.25  # low-pass of the torques [s]
+    torque_std: float = 0.02  # of a torque coefficient, what the sensor's noise leaves
+    wheel_noise: float = 0.07  # of a wheel's torque coefficient against the curve
+    freedom: float = 4.0  # of the heavy tail of references and torques
+    slip_std: float = 0.005  # floor
+    start_std: float = 0.1  # of a torque coefficient, contact fresh after a start
+    start_share: float = 0.5  # of the contact length, after which it is not
+    rest_time: float = 0.5  # [s] of standing wheels after which the gyro's zero is learned
+    most_yaw_rate: float = 0.05  # [rad/s] of a rover that stands
+    most_cycles: float = 200.0  # in the mean of the gyro's zero
+    blind_std: float = 0.3  # of the slip where nothing tells
+    speed_std: float = 5e-4  # [m/s]
+    weight_std: float = 0.005  # of the weight that acts along: attitude, small bumps
+    limits: tuple[float, float, float, float] = (0.6, 2.5, 1.5, 0.8)
+    """Of offset, ln scale, ln strength and ln strength of a wheel."""
+
+
+class Memory(NamedTuple):
+    """All that is remembered besides the filters and the parts."""
+
+    origin: int = -1  # [ns]
+    stamp: int = 0
+    time: float = 0.0  # [s]
+    cycle_time: float = NAN
+    demand: FloatArray | None = None  # (n,) low-passed torque coefficients; None = not yet
+    solution: BodySlip | None = None
+    slip: float = 0.1  # of the body, last known
+    travel: float = 0.0  # of the rims since a start or reversal [m]
+    direction: float = 1.0
+    still_since: float = NAN
+    zero: GyroZero = GyroZero()
+    zero_weight: float = 0.0
+    reference_time: float = -math.inf
+    rejected: int = 0
+    speed: tuple[float, float] = (0.0, 1.0)  # of the body and its variance
+    pulls: WheelPulls | None = None
+    assessment: StuckAssessment = StuckAssessment()
+
+
+class TractionEstimator:
+    """Estimator of one rover; sees stamps in order and only checked numbers.
+
+    Parameters
+    ----------
+    configuration : Configuration
+        Rover, soil, sensors, tuning.
+    """
+
+    def __init__(
+        self, configuration: Configuration, tuning: TractionTuning = TractionTuning()
+    ) -> None:
+        self._tuning = tuning
+        self._rover = rover = Rover.from_configuration(configuration)
+        self._sensors = sensors = SensorFigures.from_configuration(configuration)
+        self._steady = SteadyWheel(configuration, rover)
+        priors = SoilPriors.from_configuration(configuration)
+        n = rover.wheel_count
+        self._n, self._radius = n, np.array(rover.slip_radius)
+        self._inertial = InertialInput(rover.gravity, given=configuration.stated)
+        self._wheels = WheelOdometryInput(rover, sensors)
+        self._sinkages = SinkageInput(n)
+        self._leaving_angles = LeavingAngleInput(n)
+        self._steering = Steering(rover)
+        self._turning = Turning(rover, sensors)
+        self._loads = WheelLoads(rover)
+        self._sinkage = SinkageFilter(rover, self._steady, priors)
+        self._pull_model = PullModel(configuration, rover, sensors)
+        self._slips = SlipJudge(configuration, rover, sensors)
+        self._stuck = StuckMonitor(StuckSettings.from_configuration(configuration))
+        self._parts: tuple[Any, ...] = (
+            self._inertial,
+            self._wheels,
+            self._sinkages,
+            self._leaving_angles,
+            self._steering,
+            self._turning,
+            self._loads,
+            self._sinkage,
+            self._slips,
+            self._stuck,
+        )
+        self._start_covariance = self._prior(priors)
+        self._ekf = ExtendedKalmanFilter(dim_x=3 + n, dim_z=1)
+        self._memory = Memory()
+        self._begin()
+
+    def _prior(self, priors: SoilPriors) -> FloatArray:
+        """Return the covariance that follows from the deviations of the soil."""
+        tuning, n = self._tuning, self._n
+        columns = []
+        for name, std in (
+            ('strength', priors.strength_std),
+            ('shear_modulus', priors.shear_modulus_std),
+        ):
+            up, down = (self._steady.shift_to(**{name: sign * std}) for sign in (1.0, -1.0))
+            columns.append(
+                [
+                    0.5 * (up.offset - down.offset),
+                    0.5 * (up.log_scale - down.log_scale),
+                    0.5 * (up.log_strength - down.log_strength),
+                ]
+            )
+        shifts = np.array(columns).T
+        own = [tuning.offset_std, tuning.log_scale_std, tuning.log_strength_std]
+        P = np.diag(np.square(own + [tuning.wheel_std] * n))
+        P[:3, :3] += shifts @ shifts.T
+        return P
+
+    def _begin(self) -> None:
+        self._ekf.x, self._ekf.P = np.zeros(3 + self._n), self._start_covariance.copy()
+        self._memory = Memory()
+
+    # -- Runs and snapshots ----------------------------------------------------------------------
+
+    def begin_run(self, stamp: int, keep_soil: bool) -> None:
+        """Start anew at a stamp [ns]; with `keep_soil` curve and biases are kept, widened."""
+        x, P, memory = self._ekf.x, self._ekf.P, self._memory
+        for part in self._parts:
+            part.reset()
+        self._begin()
+        if keep_soil:
+            self._ekf.x, self._ekf.P = x, 0.5 * (P + self._start_covariance)
+            self._memory = Memory(
+                zero=memory.zero, zero_weight=0.5 * memory.zero_weight, rejected=memory.rejected
+            )
+        self._memory = self._memory._replace(origin=stamp, stamp=stamp)
+
+    def snapshot(self) -> tuple[Any, ...]:
+        """Return what `restore` needs to come back to this state."""
+        filters = self._ekf.x, self._ekf.P
+        return self._memory, filters, tuple([part.snapshot() for part in self._parts])
+
+    def restore(self, snapshot: tuple[Any, ...]) -> None:
+        """Go back to a snapshot."""
+        self._memory, (self._ekf.x, self._ekf.P), states = snapshot
+        for part, state in zip(self._parts, states, strict=True):
+            part.restore(state)
+
+    # -- One stamp -------------------------------------------------------------------------------
+
+    def step(self, stamp: int, inputs: StepInputs) -> None:
+        """Bring the state to a stamp [ns] with the measurements of that stamp."""
+        memory = self._memory
+        origin = stamp if memory.origin < 0 else memory.origin
+        time = (stamp - origin) * _SECOND
+        self._memory = memory._replace(origin=origin, stamp=stamp, time=time)
+        self._take(time, inputs)
+        rolled = inputs.wheel_odometry is not None
+        silent = self._wheels.silent(time)
+        due = isnan(memory.cycle_time) or time - memory.cycle_time >= self._rover.period - 1e-4
+        if inputs.reference is not None or (due and (rolled or silent)):
+            self._run_cycle(time, inputs.reference)
+        if rolled or silent:
+            self._judge(time)
+
+    def _take(self, time: float, inputs: StepInputs) -> None:
+        if inputs.inertial is not None:
+            self._inertial.update(time, inputs.inertial, self._memory.zero)
+        if inputs.sinkage is not None:
+            self._sinkages.update(inputs.sinkage)
+        if inputs.leaving_angle is not None:
+            self._leaving_angles.update(time, inputs.leaving_angle)
+        if inputs.wheel_odometry is not None:
+            self._wheels.update(time, inputs.wheel_odometry)
+            if inputs.wheel_odometry.steering is not None:
+                self._steering.update(inputs.wheel_odometry.steering)
+
+    # -- One cycle of the filter -----------------------------------------------------------------
+
+    def _run_cycle(self, time: float, reference: ReferenceVelocity | None) -> None:
+        """Walk on, solve for the speed, fuse what came since the last cycle."""
+        memory, rover, tuning = self._memory, self._rover, self._tuning
+        dt = 0.0 if isnan(memory.cycle_time) else time - memory.cycle_time
+        window = self._inertial.take()
+        headings = self._steering.state.headings
+        speeds = self._wheels.rim_speeds(time)
+        fastest = self._wheels.fastest()
+        silent_gyro = time - self._inertial.state.rate_time > rover.silence
+        turning = self._turning.update(
+            window, dt, memory.speed[0], fastest, headings, speeds, gyro_silent=silent_gyro
+        )
+        torque = np.array(self._wheels.take_torque())
+        pulls = memory.pulls
+        held = np.nan_to_num(np.array(self._wheels.state.torque))
+        share = self._loads.state.slope_share
+        model_pull = pulls.pull if pulls else share * np.array(self._loads.state.load)
+        loads = self._loads.update(
+            window, tuple(model_pull), tuple(held), (False,) * self._n, headings
+        )
+        load = np.array(loads.load)
+        heard = known(speeds)
+        still = bool(heard) and all(abs(rim) < rover.rest_speed for rim in heard)
+        self._note_rest(time, still, turning.yaw_rate, window)
+        rims = rims_at(speeds, headings, turning.yaw_rate, rover.low_rim)
+        travel = float(np.abs(rims.speed).max(initial=0.0)) * dt
+        self._walk(travel, rims, still)
+        self._note_demand(dt, torque, load, loads.slope_share, rims, still=still)
+        self._solve(rims, headings, turning.yaw_rate, load)
+        if reference is not None:
+            self._fuse_reference(time, reference, rims, headings, turning.yaw_rate, load)
+        self._follow_wheels(torque, load)
+        self._sink(dt, rims, load)
+        self._pull(time, rims, load, loads.slope_share, self._total(window, memory.speed[0], load))
+        self._memory = self._memory._replace(cycle_time=time)
+
+    def _note_rest(self, time: float, still: bool, yaw_rate: float, window: Any) -> None:
+        """Learn the zero of the gyro where all wheels stand."""
+        memory, tuning = self._memory, self._tuning
+        if not still:
+            self._memory = memory._replace(still_since=NAN)
+            return
+        since = time if isnan(memory.still_since) else memory.still_since
+        zero, weight = memory.zero, memory.zero_weight
+        if time - since > tuning.rest_time and window.rates and abs(yaw_rate) < tuning.most_yaw_rate:
+            weight = min(weight + 1.0, tuning.most_cycles)
+            pitch = window.pitch_rate / window.rates
+            zero = GyroZero(zero.yaw + yaw_rate / weight, zero.pitch + pitch / weight)
+        self._memory = memory._replace(still_since=since, zero=zero, zero_weight=weight)
+
+    def _walk(self, travel: float, rims: Rims, still: bool) -> None:
+        """Let the curve change over the travel of the rims [m]."""
+        memory, tuning, ekf, n = self._memory, self._tuning, self._ekf, self._n
+        walks = [tuning.offset_walk, tuning.log_scale_walk, tuning.log_strength_walk]
+        Q = np.square(walks + [tuning.wheel_walk] * n) * travel
+        keep = np.ones(3 + n)
+        keep[WHEELS:] = 1.0 - Q[WHEELS:] / (2.0 * tuning.wheel_std**2)
+        direction = 1.0 if rims.body >= 0.0 else -1.0
+        reverses = abs(rims.body) > self._rover.rest_speed and direction != memory.direction
+        if reverses:
+            Q[OFFSET] += tuning.reversal_std**2
+        ekf.F, ekf.Q = np.diag(keep), np.diag(Q)
+        ekf.predict()
+        begun = still or reverses
+        self._memory = memory._replace(
+            travel=0.0 if begun else memory.travel + travel,
+            direction=direction if reverses else memory.direction,
+            demand=None if begun else memory.demand,
+        )
+
+    def _note_demand(
+        self,
+        dt: float,
+        torque: FloatArray,
+        load: FloatArray,
+        slope_share: float,
+        rims: Rims,
+        *,
+        still: bool,
+    ) -> None:
+        """Low-pass what each wheel is asked to give: its torque over load and radius."""
+        if still or not rims.turning.any():
+            self._memory = self._memory._replace(demand=None, solution=None)
+            return
+        before = self._memory.demand
+        carried = load > 0.05 * load.mean()
+        now = torque / (self._radius * np.where(carried, load, np.inf))
+        if before is None:
+            demand = now
+        else:
+            gain = gain_of(max(dt, 1e-6), self._tuning.torque_time)
+            there = ~np.isnan(now)
+            demand = np.where(there, before + gain * (now - before), before)
+            demand = np.where(np.isnan(before), now, demand)
+        self._memory = self._memory._replace(demand=demand)
+
+    def _solve(self, rims: Rims, headings: Headings, yaw_rate: float, load: FloatArray) -> None:
+        """Find the slip of the body."""
+        memory = self._memory
+        demand = memory.demand
+        if demand is None:
+            return
+        told = ~np.isnan(demand) & rims.turning
+        if not told.any():
+            self._memory = memory._replace(solution=None)
+            return
+        found = solved(
+            self._steady,
+            self._ekf.x,
+            rims._replace(turning=told),
+            headings,
+            yaw_rate,
+            demand=np.nan_to_num(demand),
+            load=np.maximum(load, 0.0) + 1e-9,
+            stiffness=self._sinkage.relative_stiffness(np.maximum(load, 1e-3)),
+            start=memory.slip,
+        )
+        self._memory = memory._replace(solution=found, slip=found.slip)
+
+    def _torque_variance(self) -> float:
+        """Return the variance of the mean torque coefficient [-]."""
+        tuning, contact = self._tuning, self._rover.contact_length
+        fresh = math.exp(-self._memory.travel / (tuning.start_share * contact))
+        return tuning.torque_std**2 / self._n + (tuning.start_std * fresh) ** 2
+
+    def _fuse_reference(
+        self,
+        time: float,
+        reference: ReferenceVelocity,
+        rims: Rims,
+        headings: Headings,
+        yaw_rate: float,
+        load: FloatArray,
+    ) -> None:
+        """Correct the curve by a reference velocity, with a heavy-tailed error (Student t)."""
+        memory, tuning, ekf, sensors = self._memory, self._tuning, self._ekf, self._sensors
+        found = memory.solution
+        self._memory = memory = memory._replace(reference_time=time)
+        if found is None:
+            return
+        stated = reference.variance if reference.variance > 0.0 else sensors.reference_std**2
+        R = max(stated, sensors.reference_std_floor**2)
+        R += rims.scale**2 * self._torque_variance() / found.slope**2
+        H = -rims.scale * found.gradient
+        expected = rims.body - found.slip * rims.scale
+        residual = reference.forward - expected
+        weight = (tuning.freedom + 1.0) / (tuning.freedom + residual**2 / (H @ ekf.P @ H + R))
+        if weight < 0.3:
+            self._memory = memory._replace(rejected=memory.rejected + 1)
+        ekf.update(
+            np.array([reference.forward]),
+            lambda x: H[None, :],
+            lambda x: np.array([expected]),
+            R=np.array([[R / min(weight, 1.0)]]),
+        )
+        limits = np.array([*tuning.limits[:3], *[tuning.limits[3]] * self._n])
+        ekf.x = np.clip(ekf.x, -limits, limits)
+        self._solve(rims, headings, yaw_rate, load)
+
+    def _follow_wheels(self, torque: FloatArray, load: FloatArray) -> None:
+        """Learn the strength under each wheel from its torque against that of the curve."""
+        memory, tuning, ekf = self._memory, self._tuning, self._ekf
+        found, demand = memory.solution, memory.demand
+        if found is None or demand is None:
+            return
+        use = np.flatnonzero(~np.isnan(torque) & ~np.isnan(demand) & (found.weight > 0.0))
+        H = np.zeros((len(use), 3 + self._n))
+        H[np.arange(len(use)), WHEELS + use] = found.expected[use]
+        residual = demand[use] - found.expected[use]
+        spread = found.expected[use] ** 2 * np.diagonal(ekf.P)[WHEELS + use] + tuning.wheel_noise**2
+        weight = np.minimum(
+            (tuning.freedom + 1.0) / (tuning.freedom + residual**2 / spread), 1.0
+        )
+        for row, r, w in zip(H, residual, weight, strict=True):
+            place = int(np.argmax(row != 0.0)) if row.any() else -1
+            if place < 0:
+                continue
+            h, p = row[place], ekf.P[place, place]
+            gain = h * p / (h * h * p + tuning.wheel_noise**2 / w)
+            ekf.x[place] += gain * r
+            keep = 1.0 - gain * h
+            ekf.P[place, :] *= keep
+            ekf.P[:, place] *= keep
+            ekf.P[place, place] = p * keep
+
+    def _wheel_slips(self, rims: Rims) -> tuple[FloatArray, FloatArray]:
+        """Return slip (n,) of the turning wheels and its deviation."""
+        headings, yaw_rate = self._steering.state.headings, self._turning.state.yaw_rate
+        speed, variance = self._body_speed(rims)
+        ground = np.array(headings.by_speed) * speed + np.array(headings.by_yaw_rate) * yaw_rate
+        larger = np.maximum(np.maximum(np.abs(rims.speed), np.abs(ground)), 1e-3)
+        slip = (rims.speed - ground) / larger * np.where(rims.speed >= 0.0, 1.0, -1.0)
+        return np.clip(slip, -1.0, 1.0), np.minimum(math.sqrt(variance) / larger, 1.0)
+
+    def _sink(self, dt: float, rims: Rims, load: FloatArray) -> None:
+        slip, std = self._wheel_slips(rims)
+        self._sinkage.predict(slip, std, np.abs(rims.speed) * dt, np.maximum(load, 1e-3), dt)
+        self._sinkage.update(self._sinkages.take(), self._sensors.sinkage_std**2)
+
+    def _total(self, window: Any, speed: float, load: FloatArray) -> SumOfPulls | None:
+        """Return what the specific force of a cycle says of the sum of the pulls."""
+        if not window.readings:
+            return None
+        rover, sensors = self._rover, self._sensors
+        force = window.mean_force()
+        weight = rover.mass * force[2]
+        # Ruts of unequal depth pitch the body up; on curved ground the wheels' slopes differ.
+        tilt = float(np.array(rover.rut_tilt) @ self._sinkage.sinkage)
+        curvature = self._turning.curvature(speed)
+        uphill = curvature * float(load @ np.array(rover.longitudinal))
+        std = window.stated.specific_force_std or sensors.specific_force_std
+        noise = std**2 / window.readings + sensors.specific_force_bias_std**2
+        if window.duration > 0.0:
+            noise += window.noise_density / window.duration
+        return SumOfPulls(
+            rover.mass * force[0] + uphill - weight * tilt,
+            rover.mass**2 * noise + (self._tuning.weight_std * weight) ** 2,
+        )
+
+    def _pull(
+        self,
+        time: float,
+        rims: Rims,
+        load: FloatArray,
+        slope_share: float,
+        total: SumOfPulls | None,
+    ) -> None:
+        memory, n = self._memory, self._n
+        slip, std = self._wheel_slips(rims)
+        ratio = np.where(slip >= 0.0, 1.0 - slip, 1.0 / np.maximum(1.0 + slip, 0.3))
+        rolling = np.where(rims.turning, np.sign(rims.speed), 0.0)
+        demand = memory.demand if memory.demand is not None else np.full(n, NAN)
+        headings, turning = self._steering.state.headings, self._turning.state
+        side = np.abs(np.array(headings.side_speeds(memory.speed[0], turning.yaw_rate)))
+        contact = Contact(
+            speed_ratio=ratio,
+            ratio_std=std * np.maximum(ratio, 1.0),
+            sinkage=np.maximum(self._sinkage.sinkage, 1e-4),
+            sinkage_std=self._sinkage.std[:n],
+            load=load,
+            torque=demand * self._radius * load * np.where(rolling, rolling, 1.0),
+            rolling=rolling,
+            sideways=np.minimum(side / np.maximum(np.abs(rims.speed), 1e-3), 1.0) * (rolling != 0),
+            leaving_angle=self._leaving_angles.angles(time),
+        )
+        before = memory.pulls.strength if memory.pulls else np.zeros(n)
+        along = np.array(headings.along)
+        pulls = self._pull_model.pulls(contact, before, slope_share, total, along)
+        self._memory = memory._replace(pulls=pulls)
+
+    # -- What it means ---------------------------------------------------------------------------
+
+    def _body_speed(self, rims: Rims) -> tuple[float, float]:
+        """Return speed of the body [m/s] and its variance."""
+        memory, tuning = self._memory, self._tuning
+        found, least = memory.solution, tuning.speed_std**2
+        if not isnan(memory.still_since):
+            return 0.0, least
+        if found is None:
+            speed = rims.body - memory.slip * rims.scale
+            return speed, least + (tuning.blind_std * rims.scale) ** 2
+        spread = float(found.gradient @ self._ekf.P @ found.gradient)
+        spread += self._torque_variance() / found.slope**2 + tuning.slip_std**2
+        return rims.body - found.slip * rims.scale, least + rims.scale**2 * min(spread, 1.0)
+
+    def _judge(self, time: float) -> None:
+        """Judge slip and class of each wheel and the stuck warning at a time [s]."""
+        rover, headings, turning = self._rover, self._steering.state.headings, self._turning.state
+        speeds = self._wheels.rim_speeds(time)
+        speed, variance = self._body_speed(
+            rims_at(speeds, headings, turning.yaw_rate, rover.low_rim)
+        )
+        body = BodyMotion(
+            speed,
+            math.sqrt(variance),
+            turning.yaw_rate,
+            turning.yaw_rate_std,
+            headings,
+            turning.lateral_motion,
+            stopped=not isnan(self._memory.still_since),
+        )
+        slips = self._slips.update(time, speeds, body)
+        assessment = self._warned(time, speeds, speed)
+        self._memory = self._memory._replace(speed=(speed, variance), assessment=assessment)
+        del slips
+
+    def _warned(self, time: float, speeds: tuple[float, ...], speed: float) -> StuckAssessment:
+        rover, wheels = self._rover, self._wheels
+        onward = max(known(speeds), key=abs, default=0.0)
+        seen = []
+        for i, (wheel, rim) in enumerate(zip(self._slips.state, speeds, strict=True)):
+            torque = wheels.state.torque[i]
+            turns = abs(rim) > rover.rest_speed
+            seen.append(
+                WheelMotion(
+                    wheel.slip,
+                    wheel.std,
+                    0.0 if isnan(rim) else rim,
+                    turns and not wheel.resting,
+                    driving_share(torque, rover.torque_limit[i], rim if turns else onward),
+                    float(self._sinkage.sinkage[i]),
+                    rover.rim_radius[i],
+                    rate_told=not isnan(rim),
+                )
+            )
+        known_reference = time - self._memory.reference_time < 5.0
+        return self._stuck.update(
+            time,
+            RoverMotion(
+                speed,
+                known_reference,
+                tuple(seen),
+                slip_told=known_reference or wheels.torque_known(time),
+                turning=self._turning.state.lateral_motion > 0.3,
+            ),
+        )
+
+    # -- Outputs ---------------------------------------------------------------------------------
+
+    def estimates(self) -> EstimateSet:
+        """Return all outputs at the present stamp; nothing changes."""
+        memory, n = self._memory, self._n
+        load = np.array(self._loads.state.load)
+        rims = np.nan_to_num(np.array(self._wheels.rim_speeds(memory.time)))
+        headings, turning = self._steering.state.headings, self._turning.state
+        speed, variance = memory.speed
+        ground = np.array(headings.by_speed) * speed
+        ground = ground + np.array(headings.by_yaw_rate) * turning.yaw_rate
+        pulls = memory.pulls or WheelPulls(np.zeros(n), load, np.zeros(n))
+        ahead = memory.assessment.wheels
+        return EstimateSet(
+            stamp=memory.stamp,
+            slip=np.array([wheel.slip for wheel in self._slips.state]),
+            slip_std=np.array([wheel.std for wheel in self._slips.state]),
+            slip_velocity=rims - ground,
+            slip_velocity_std=np.full(n, math.sqrt(variance)),
+            drawbar_pull=pulls.pull,
+            drawbar_pull_std=pulls.std + 1e-3,
+            sinkage=self._sinkage.sinkage.copy(),
+            sinkage_std=np.hypot(self._sinkage.std[:n], self._sensors.sinkage_zero_std),
+            sinkage_rate=np.zeros(n),
+            sinkage_rate_std=np.ones(n),
+            normal_load=load,
+            normal_load_std=np.full(n, self._rover.load_std * max(float(load.mean()), 1e-3)),
+            slip_class=np.array(
+                [wheel.slip_class.current for wheel in self._slips.state], dtype=np.uint8
+            ),
+            rim_travel_left=np.array([w.travel for w in ahead] or [NO_ENTRAPMENT_IN_SIGHT] * n),
+            pull_margin=np.zeros(n),
+            soil_names=(),
+            soil=np.zeros(0),
+            soil_std=np.zeros(0),
+            forward_velocity=speed,
+            forward_velocity_variance=variance,
+            yaw_rate=turning.yaw_rate,
+            yaw_rate_variance=turning.yaw_rate_std**2,
+            stuck=memory.assessment.stuck,
+            stuck_probability=np.array([w.probability for w in ahead] or [0.0] * n),
+            time_to_stuck=np.array([w.time for w in ahead] or [0.0] * n),
+            reasons=('',) * n,
+            faults={},
+        )
+
+    def health(self) -> dict[str, Any]:
+        """Return counters for diagnostics."""
+        return {'rejected_reference': self._memory.rejected}

@@ -1,0 +1,180 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""A wheel that drives steadily on the configured soil: torque, pull and sinkage over slip.
+
+The closed form (Ding et al. 2015) is evaluated once, for the mean wheel under its load on level
+ground, on a grid of slips and of soil stiffnesses. Load over stiffness is what the bearing law
+asks, so another load is read as another stiffness.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import PchipInterpolator
+from scipy.optimize import brentq, least_squares
+
+from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.estimation.contacts.wheel_models import WheelModels, WheelState
+from wheel_terra_estimator.estimation.rover import Rover
+
+FloatArray = NDArray[np.float64]
+
+_SLIPS = np.array(
+    [-1.0, -0.6, -0.4, -0.25, -0.15, -0.1, -0.05, 0.0, 0.025, 0.05]
+    + [0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.65, 0.8, 1.0]
+)
+"""Slips at which the closed form is evaluated [-], close together where the curve is steep."""
+_STIFFNESS = np.linspace(-2.4, 2.4, 9)
+"""Logarithms of the factor on the bearing moduli [-]."""
+_STEPS = 400  # of the even grid over slips -1 to 1, read linearly
+_LARGEST_RATIO = 3.0  # v/(r w) of a wheel that is dragged
+_SINKAGE_RANGE = (1e-5, 0.9)  # of the radius, within which the load is carried
+_FITTED = _SLIPS >= -0.15  # slips over which a curve of another soil is fitted
+_LEAST_SLOPE = 1e-3  # of the torque coefficient over the slip [-]
+
+
+@dataclass(frozen=True)
+class CurveShift:
+    """What turns the torque coefficient u0(s) of the soil file into that of another soil.
+
+    u(s) = exp(log_strength) u0((s - offset) / exp(log_scale)): three numbers, as the shear law of
+    Janosi and Hanamoto (1961) has: greatest coefficient, slip that mobilises it, and an offset for
+    what resists.
+    """
+
+    offset: float = 0.0  # [-]
+    log_scale: float = 0.0
+    log_strength: float = 0.0
+
+
+class SteadyWheel:
+    """Tables of one rover on its configured soil.
+
+    Parameters
+    ----------
+    configuration : Configuration
+        Soil, wheels, effects.
+    rover : Rover
+        Its constants.
+
+    Attributes
+    ----------
+    load : float
+        Mean load of a wheel on level ground, for which the tables hold [N].
+    """
+
+    def __init__(self, configuration: Configuration, rover: Rover) -> None:
+        self._models = WheelModels(configuration)
+        self._rover = rover
+        self.load = rover.mass * rover.gravity / rover.wheel_count
+        rows = [self._row(float(k)) for k in _STIFFNESS]
+        even = np.linspace(-1.0, 1.0, _STEPS + 1)
+        torque, pull, sinkage = (np.array(columns) for columns in zip(*rows, strict=True))
+        curves = [PchipInterpolator(_SLIPS, _increasing(row)) for row in torque]
+        self._torque = np.array([curve(even) for curve in curves])
+        self._slope = np.array(
+            [np.maximum(curve.derivative()(even), _LEAST_SLOPE) for curve in curves]
+        )
+        self._pull = np.array([PchipInterpolator(_SLIPS, row)(even) for row in pull])
+        self._log_sinkage = np.array([PchipInterpolator(_SLIPS, np.log(row))(even) for row in sinkage])
+
+    def torque(self, slip: FloatArray, stiffness: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return torque / (load x radius) and its slope over the slip, (n,) each [-].
+
+        Parameters
+        ----------
+        slip : numpy.ndarray
+            (n,) slip ratios; held at -1 and 1 beyond.
+        stiffness : numpy.ndarray
+            (n,) logarithm of stiffness over load, against soil file and mean load.
+        """
+        place = _place(slip, stiffness)
+        return _read(self._torque, place), _read(self._slope, place)
+
+    def at_zero(self, stiffness: FloatArray) -> FloatArray:
+        """Return the torque coefficient of a wheel that rolls without slip (n,) [-]."""
+        return self.torque(np.zeros_like(stiffness), stiffness)[0]
+
+    def pull(self, slip: FloatArray, stiffness: FloatArray) -> FloatArray:
+        """Return the drawbar pull over the load (n,) [-]; arguments as of `torque`."""
+        return _read(self._pull, _place(slip, stiffness))
+
+    def sinkage(self, slip: FloatArray, stiffness: FloatArray) -> FloatArray:
+        """Return the steady sinkage (n,) [m]; arguments as of `torque`."""
+        return np.exp(_read(self._log_sinkage, _place(slip, stiffness)))
+
+    def shift_to(self, *, strength: float = 0.0, shear_modulus: float = 0.0) -> CurveShift:
+        """Return the shift of the curve to a soil with other logarithmic factors.
+
+        Parameters
+        ----------
+        strength, shear_modulus : float
+            Logarithms of the factors on c and tan(phi), and on K.
+        """
+        wanted = np.array(self._row(0.0, strength, shear_modulus)[0])[_FITTED]
+        level = np.zeros(np.count_nonzero(_FITTED))
+
+        def misfit(x: FloatArray) -> FloatArray:
+            torque, _ = self.torque((_SLIPS[_FITTED] - x[0]) * math.exp(-x[1]), level)
+            return math.exp(x[2]) * torque - wanted
+
+        found = least_squares(misfit, np.zeros(3), bounds=([-0.5, -3.0, -3.0], [0.5, 3.0, 3.0]))
+        return CurveShift(*found.x.tolist())
+
+    def _row(
+        self, stiffness: float, strength: float = 0.0, shear_modulus: float = 0.0
+    ) -> tuple[list[float], list[float], list[float]]:
+        """Return torque coefficient, pull over load and sinkage [m] at each slip of the grid."""
+        torques, pulls, sinkages = [], [], []
+        radius = self._rover.rim_radius[0]
+        for slip in _SLIPS.tolist():
+            ratio = 1.0 - slip if slip >= 0.0 else 1.0 / max(1.0 + slip, 1.0 / _LARGEST_RATIO)
+            wheel = WheelState(
+                ratio, 0.0, self.load, strength, shear_modulus, stiffness=stiffness
+            )
+            sinkage = self._sinkage_of(wheel, radius)
+            forces = self._models.forces(0, wheel._replace(sinkage=sinkage))
+            torques.append(forces.torque / (self.load * self._rover.slip_radius[0]))
+            pulls.append(forces.pull / self.load)
+            sinkages.append(sinkage)
+        return torques, pulls, sinkages
+
+    def _sinkage_of(self, wheel: WheelState, radius: float) -> float:
+        """Return the sinkage at which the bearing law carries the load [m]."""
+
+        def lacking(log_sinkage: float) -> float:
+            at = wheel._replace(sinkage=math.exp(log_sinkage))
+            return math.log(self._models.bearing(0, at).load / wheel.load)
+
+        low, high = (math.log(share * radius) for share in _SINKAGE_RANGE)
+        if lacking(low) >= 0.0:
+            return math.exp(low)
+        if lacking(high) <= 0.0:
+            return math.exp(high)
+        return math.exp(float(brentq(lacking, low, high, xtol=1e-3)))
+
+
+def _increasing(torques: list[float]) -> FloatArray:
+    """Return the torques, held where they would fall: a curve that can be read backwards."""
+    return np.maximum.accumulate(np.array(torques)) + 1e-6 * np.arange(len(torques))
+
+
+def _place(slip: FloatArray, stiffness: FloatArray) -> tuple[FloatArray, ...]:
+    """Return row, column and the shares of their successors on the even grids."""
+    column = np.clip((slip + 1.0) * (_STEPS / 2), 0.0, _STEPS - 1e-9)
+    step = _STIFFNESS[1] - _STIFFNESS[0]
+    row = np.clip((stiffness - _STIFFNESS[0]) / step, 0.0, len(_STIFFNESS) - 1 - 1e-9)
+    i, j = row.astype(np.intp), column.astype(np.intp)
+    return i, j, row - i, column - j
+
+
+def _read(table: FloatArray, place: tuple[FloatArray, ...]) -> FloatArray:
+    """Return a table read linearly between its rows and columns."""
+    i, j, a, b = place
+    low = table[i, j] * (1.0 - b) + table[i, j + 1] * b
+    high = table[i + 1, j] * (1.0 - b) + table[i + 1, j + 1] * b
+    return np.asarray(low * (1.0 - a) + high * a)
