@@ -35,8 +35,10 @@ class PullTuning:
     scrub_std: float = 0.3  # at full sideways motion
     gain_share: float = 0.5  # of the torques' gain error that the pull takes over
     most_strength: float = 1.2  # of its logarithm
-    steps: int = 2  # of Newton's method in a cycle
-    least_torque: float = 1e-6  # derivative by the strength [N m]
+    steps: int = 3  # of Newton's method in a cycle, at most
+    near: float = 0.05  # step of ln strength that needs no further one
+    floor_share: float = 0.03
+    """Of load times radius: derivative of the torque by ln strength below which it tells little."""
     most_pull: float = 1.0  # of the load
 
 
@@ -144,19 +146,18 @@ class PullModel:
             0.0,
             leaving_angle=contact.leaving_angle[i],
         )
-        most = tuning.most_strength
+        most, floor = tuning.most_strength, tuning.floor_share * load * self._rover.rim_radius[i]
         for _ in range(tuning.steps):
             forces = self._models.forces(i, state)
-            by_strength = forces.d_torque[_STRENGTH]
-            if abs(by_strength) < tuning.least_torque:
+            by_strength, lacking = forces.d_torque[_STRENGTH], torque - forces.torque
+            # Damped where the torque hardly hangs on the strength: a wheel that rolls freely.
+            inverse = by_strength / (by_strength**2 + floor**2)
+            strength = clipped(state.strength + lacking * inverse, -most, most)
+            if abs(strength - state.strength) < tuning.near:
                 break
-            step = (torque - forces.torque) / by_strength
-            state = state._replace(strength=clipped(state.strength + step, -most, most))
-        forces = self._models.forces(i, state)
-        by_torque = forces.d_pull[_STRENGTH] / max(
-            abs(forces.d_torque[_STRENGTH]), tuning.least_torque
-        )
-        pull = forces.pull + by_torque * (torque - forces.torque)
+            state = state._replace(strength=strength)
+        by_torque = forces.d_pull[_STRENGTH] * inverse
+        pull = forces.pull + by_torque * lacking
         pull = clipped(pull, -tuning.most_pull * load, tuning.most_pull * load)
         by_ratio, by_sinkage = (
             forces.d_pull[k] - by_torque * forces.d_torque[k] for k in (_RATIO, _SINKAGE)
@@ -169,4 +170,4 @@ class PullModel:
             + (by_sinkage * float(contact.sinkage_std[i])) ** 2
             + (self._rover.load_std * pull) ** 2
         )
-        return pull, min(math.sqrt(variance), load), state.strength
+        return pull, min(math.sqrt(variance), load), strength
