@@ -104,7 +104,7 @@ def blocks(text: str) -> Iterator[Block]:
 
 
 def slip_errors(results: Results, width: float) -> Figure:
-    """Draw the slip error of each kind in each mode, beside the better two-state filter."""
+    """Draw the slip error of each kind in each mode, beside the best baseline filter."""
     from matplotlib.figure import Figure
 
     modes = list(dict.fromkeys(drive.mode for drive in results.drives))

@@ -58,6 +58,8 @@ class Samples:
     torque_filter_std: FloatArray
     pitch_filter_error: FloatArray
     pitch_filter_std: FloatArray
+    curve_filter_error: FloatArray
+    curve_filter_std: FloatArray
     shared_pull_error: FloatArray  # over the load, baseline: m f_x shared by load
 
     @classmethod
@@ -95,6 +97,7 @@ class BaselineSlips:
     dead_reckoned: FloatArray
     torque_filter: SlipCourse
     pitch_filter: SlipCourse
+    curve_filter: SlipCourse
 
 
 def samples(
@@ -116,6 +119,7 @@ def samples(
 
     slip_error = record.slip[position] - truth.slip
     torque, pitch = baselines.torque_filter, baselines.pitch_filter
+    curve = baselines.curve_filter
     return Samples(
         true_slip=take(truth.slip),
         slip_error=take(slip_error),
@@ -134,6 +138,8 @@ def samples(
         torque_filter_std=take(torque.std),
         pitch_filter_error=take(pitch.slip - truth.slip),
         pitch_filter_std=take(pitch.std),
+        curve_filter_error=take(curve.slip - truth.slip),
+        curve_filter_std=take(curve.std),
         shared_pull_error=over_load(shared - truth.drawbar_pull),
     )
 
@@ -245,14 +251,18 @@ def squared_over_variance(error: FloatArray, std: FloatArray) -> tuple[float, fl
 
 
 def better_baseline(data: Samples) -> tuple[str, FloatArray]:
-    """Return which two-state filter has the smaller slip error here, and its errors."""
-    found = (('torque', data.torque_filter_error), ('pitch', data.pitch_filter_error))
+    """Return which baseline filter has the smallest slip error here, and its errors."""
+    found = (
+        ('torque', data.torque_filter_error),
+        ('pitch', data.pitch_filter_error),
+        ('curve', data.curve_filter_error),
+    )
     return min(found, key=lambda pair: rms(pair[1]))
 
 
 @dataclass(frozen=True)
 class Ratio:
-    """Slip RMSE over that of the better two-state filter; from drives drawn anew in pairs."""
+    """Slip RMSE over that of the best baseline filter; from drives drawn anew in pairs."""
 
     value: float
     low: float  # of the 95 % interval

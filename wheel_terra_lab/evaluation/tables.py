@@ -33,6 +33,8 @@ _MODES = {
     'reference_2s_late': 'Reference 2 s late',
     'smoothed': 'Smoother with reference at 1 Hz',
     'smoothed_no_reference': 'Smoother without reference',
+    'traction_filter': 'Traction filter (candidate) with reference',
+    'traction_filter_no_reference': 'Traction filter (candidate) without reference',
 }
 
 
@@ -109,6 +111,7 @@ def _two_states(by_kind: dict[str, list[DriveScore]]) -> str:
                 f'{scores.rms(data.slip_error):.4f}',
                 f'{scores.rms(data.torque_filter_error):.4f}',
                 f'{scores.rms(data.pitch_filter_error):.4f}',
+                f'{scores.rms(data.curve_filter_error):.4f}',
                 better,
                 _interval(ratio),
                 _RULE[ratio.keeps_the_rule],
@@ -120,7 +123,7 @@ def _two_states(by_kind: dict[str, list[DriveScore]]) -> str:
             )
         )
     head = (
-        *('drives', 'slip RMSE', 'two states, torque', 'two states, pitch', 'better'),
+        *('drives', 'slip RMSE', 'two states, torque', 'two states, pitch', 'three states', 'best'),
         *(
             'ratio (95 % interval)',
             'rule kept',
@@ -135,7 +138,7 @@ def _two_states(by_kind: dict[str, list[DriveScore]]) -> str:
     if not judged:
         verdict = f'not judged with fewer than {scores.FEWEST_DRIVES} drives of a kind'
     return (
-        f'{table(head, rows)}\n\nThe rule of the bench (slip RMSE not above the better two-state '
+        f'{table(head, rows)}\n\nThe rule of the bench (slip RMSE not above the best baseline '
         f'filter by more than 5 % plus two standard errors of the paired drives): {verdict}.'
     )
 
@@ -183,7 +186,7 @@ def _figures(drives: Sequence[DriveScore]) -> dict[str, str]:
         'drives': str(len(drives)),
         'slip RMSE': f'{scores.rms(data.slip_error):.4f}',
         'worst kind': f'{worst[hardest]:.4f} ({hardest})',
-        'better two-state filter': f'{scores.rms(error):.4f} ({better})',
+        'best baseline filter': f'{scores.rms(error):.4f} ({better})',
         'ratio (95 % interval)': _interval(ratio),
         'last reference held': f'{scores.rms(data.held_error):.4f}',
         'dead reckoning': f'{scores.rms(data.dead_reckoned_error):.4f}',
@@ -396,7 +399,7 @@ def _numbers(drives: Sequence[DriveScore]) -> dict[str, Any]:
         'coverage': {
             name: _or_none(scores.coverage(error, std)) for name, (error, std) in errors.items()
         },
-        'better_two_state_filter': {'name': better, 'slip_rms': _or_none(scores.rms(baseline))},
+        'best_baseline_filter': {'name': better, 'slip_rms': _or_none(scores.rms(baseline))},
         'entrapped': len(trapped),
         'warned_before': sum(w.lead_time is not None for w in trapped),
         'false_alarms': sum(w.false_alarms for w in warnings),

@@ -1,11 +1,12 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""The simplest filters with which the estimator has to bear comparison: two states, no soil.
+"""The simplest filters with which the estimator has to bear comparison: two or three states.
 
-The slip of the rover is s = a + k q, where q is what the wheels are asked to give: the mean
-torque over the load times the radius, or the slope. The offset a walks with the travel of the
-rims, k is learned, and each reference velocity v = (1 - a - k q) r w is fused at its own stamp.
-They see the measurements that the estimator sees, in the order of arrival.
+The slip of the rover follows what the wheels are asked to give, q: the mean torque over the load
+times the radius, or the slope. Two states: s = a + k q. Three states: the shear law of Janosi and
+Hanamoto (1961) read backwards, s = a - s0 sign(q) ln(1 - |q| / q_max). The offset a walks with the
+travel of the rims, the rest is learned, and each reference velocity v = (1 - s) r w is fused at its
+own stamp. They see the measurements that the estimator sees, in the order of arrival.
 """
 
 from __future__ import annotations
@@ -28,7 +29,8 @@ from wheel_terra_estimator.estimation.measurements import (
 from wheel_terra_estimator.terramechanics.kinematics import slip_ratio
 
 FloatArray = NDArray[np.float64]
-Demand = Literal['torque', 'pitch']
+Demand = Literal['torque', 'pitch', 'curve']
+"""Two states over the torque, two over the slope, three over the torque."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +53,11 @@ class TwoStateTuning:
 TUNING: dict[Demand, TwoStateTuning] = {
     'torque': TwoStateTuning(),
     'pitch': TwoStateTuning(gain=1.0, gain_std=1.0),
+    'curve': TwoStateTuning(offset=0.0, offset_std=0.1, offset_walk=0.03, smoothing=0.4),
 }
+_SLIP_SCALE, _SLIP_SCALE_STD = 0.5, 0.4  # s0 of three states, and of its logarithm
+_LARGEST_DEMAND, _LARGEST_DEMAND_STD = 0.6, 0.3  # q_max, and of its logarithm
+_NEAREST = 0.97  # |q| / q_max beyond which the curve is read no further
 
 
 _YAW_BIAS = 5e-4  # [rad/s], left of the gyro's bias after a rest
@@ -134,10 +140,10 @@ class TwoStateFilter:
         kept = self._odometry
         rim, demand = kept.rim[-1], kept.demand[-1]
         mean = float(np.mean(rim))
-        row = np.array([1.0, demand])
+        slip, row = self._slip(demand)
         covariance = self._covariance + self._walked(kept.travel[-1])
         tuning = self._tuning
-        slip = min(float(row @ self._state), tuning.largest_slip)
+        slip = min(slip, tuning.largest_slip)
         wheel_speed = (1.0 - slip) * mean - kept.yaw_rate[-1] * self._configuration.wheels.y
         found = np.nan_to_num(slip_ratio(wheel_speed, rim, self._configuration.rest_speed))
         spread = (row @ covariance @ row + tuning.radius_std**2) * mean**2
@@ -164,7 +170,7 @@ class TwoStateFilter:
             force = float(np.mean(m.torque[working] / wheels.slip_radius[working]))
             force *= wheels.count / (rover.mass * rover.gravity)
             self._torque.add(m.stamp, force)
-        demand = self._torque.value if self._demand == 'torque' else self._pitch.value
+        demand = self._pitch.value if self._demand == 'pitch' else self._torque.value
         travelled = 0.0
         if kept.stamp:
             travelled = abs(mean) * min((m.stamp - kept.stamp[-1]) * 1e-9, 1.0)
@@ -200,21 +206,49 @@ class TwoStateFilter:
         variance = m.variance if m.variance > 0.0 else self._configuration.sensors.reference_std**2
         self._covariance = self._covariance + self._walked(kept.travel[row])
         self._fused_travel = max(kept.travel[row], self._fused_travel or 0.0)
-        sensitivity = -mean * np.array([1.0, kept.demand[row]])
-        innovation = m.forward - (mean + sensitivity @ self._state)
+        slip, gradient = self._slip(kept.demand[row])
+        sensitivity = -mean * gradient
+        innovation = m.forward - (1.0 - slip) * mean
         spread = sensitivity @ self._covariance @ sensitivity + variance
         gain = self._covariance @ sensitivity / spread
         self._state = self._state + gain * innovation
-        kept_share = np.eye(2) - np.outer(gain, sensitivity)
+        kept_share = np.eye(len(gain)) - np.outer(gain, sensitivity)
         self._covariance = kept_share @ self._covariance @ kept_share.T + variance * np.outer(
             gain, gain
         )
+
+    def _slip(self, demand: float) -> tuple[float, FloatArray]:
+        """Return the slip at a demand and its gradient by the state."""
+        row = np.array([1.0, demand])
+        return float(row @ self._state), row
 
     def _walked(self, travel: float) -> FloatArray:
         """Return the covariance that the travel since the last fused reference adds."""
         tuning = self._tuning
         since = max(travel - (self._fused_travel or 0.0), 0.0)
         return np.asarray(np.diag([tuning.offset_walk**2, tuning.gain_walk**2]) * since)
+
+
+class ThreeStateFilter(TwoStateFilter):
+    """Offset, ln s0 and ln q_max of the traction curve; arguments as of `TwoStateFilter`."""
+
+    def __init__(self, configuration: Configuration, tuning: TwoStateTuning | None = None) -> None:
+        super().__init__(configuration, 'curve', tuning or TUNING['curve'])
+        self._state = np.array([0.0, np.log(_SLIP_SCALE), np.log(_LARGEST_DEMAND)])
+        deviations = [self._tuning.offset_std, _SLIP_SCALE_STD, _LARGEST_DEMAND_STD]
+        self._covariance = np.diag(np.square(deviations))
+
+    def _slip(self, demand: float) -> tuple[float, FloatArray]:
+        offset, log_scale, log_most = self._state
+        scale, most = np.exp(log_scale), np.exp(log_most)
+        sign, share = np.sign(demand), min(abs(demand) / most, _NEAREST)
+        mobilised = -sign * np.log1p(-share)
+        gradient = np.array([1.0, scale * mobilised, -scale * sign * share / (1.0 - share)])
+        return float(offset + scale * mobilised), gradient
+
+    def _walked(self, travel: float) -> FloatArray:
+        since = max(travel - (self._fused_travel or 0.0), 0.0)
+        return np.diag([self._tuning.offset_walk**2 * since, 0.0, 0.0])
 
 
 def slip_course(
@@ -225,7 +259,11 @@ def slip_course(
     tuning: TwoStateTuning | None = None,
 ) -> SlipCourse:
     """Return the slip that the filter had, in the order of arrival, when each stamp came."""
-    two_states = TwoStateFilter(configuration, demand, tuning)
+    two_states = (
+        ThreeStateFilter(configuration, tuning)
+        if demand == 'curve'
+        else TwoStateFilter(configuration, demand, tuning)
+    )
     times: list[int] = []
     rows: list[tuple[FloatArray, FloatArray]] = []
     for m in measurements:

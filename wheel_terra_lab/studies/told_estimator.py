@@ -174,7 +174,7 @@ def figures(
     data = scores.samples(
         drive.truth,
         kept,
-        scores.BaselineSlips(nothing, nothing, course, course),
+        scores.BaselineSlips(nothing, nothing, course, course, course),
         drive.configuration.wheels.slip_radius,
     )
     return {

@@ -73,6 +73,7 @@ def coefficients(
     ) * rolling
     e = (slip - state[OFFSET]) / scale
     b = sideways / larger / scale
+    b_by_ground = np.where(np.abs(rim) >= np.abs(ground), 0.0, -b * np.sign(ground) / larger)
     total = np.sqrt(e * e + b * b + _LEAST_SLIP**2)
     along = np.abs(e) / total
     torque, slope = steady.torque(np.where(e >= 0.0, total, -total), stiffness)
@@ -84,7 +85,7 @@ def coefficients(
     by_b = strength * (slope * sign * along - sheared * np.abs(e) / total**2) * b / total
     return Coefficients(
         value=strength * (at_rest + sheared * along) * rolling,
-        by_ground_speed=by_e / scale * slip_by_ground * rolling,
+        by_ground_speed=(by_e / scale * slip_by_ground + by_b * b_by_ground) * rolling,
         by_offset=-by_e / scale * rolling,
         by_log_scale=-(by_e * e + by_b * b) * rolling,
     )

@@ -42,7 +42,7 @@ from wheel_terra_estimator.estimation.judgement.stuck.situation import (
 from wheel_terra_estimator.estimation.measurements import ReferenceVelocity, StepInputs
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
 from wheel_terra_estimator.estimation.scalars import NAN, gain_of, known
-from wheel_terra_lab.traction_filter.curve import LOG_SCALE, LOG_STRENGTH, OFFSET, WHEELS
+from wheel_terra_lab.traction_filter.curve import OFFSET, WHEELS
 from wheel_terra_lab.traction_filter.pulls import Contact, PullModel, SumOfPulls, WheelPulls
 from wheel_terra_lab.traction_filter.sinkage import SinkageFilter
 from wheel_terra_lab.traction_filter.speed import BodySlip, Rims, rims_at, solved
@@ -236,7 +236,7 @@ class TractionEstimator:
 
     def _run_cycle(self, time: float, reference: ReferenceVelocity | None) -> None:
         """Walk on, solve for the speed, fuse what came since the last cycle."""
-        memory, rover, tuning = self._memory, self._rover, self._tuning
+        memory, rover = self._memory, self._rover
         dt = 0.0 if isnan(memory.cycle_time) else time - memory.cycle_time
         window = self._inertial.take()
         headings = self._steering.state.headings
@@ -278,7 +278,11 @@ class TractionEstimator:
             return
         since = time if isnan(memory.still_since) else memory.still_since
         zero, weight = memory.zero, memory.zero_weight
-        if time - since > tuning.rest_time and window.rates and abs(yaw_rate) < tuning.most_yaw_rate:
+        if (
+            time - since > tuning.rest_time
+            and window.rates
+            and abs(yaw_rate) < tuning.most_yaw_rate
+        ):
             weight = min(weight + 1.0, tuning.most_cycles)
             pitch = window.pitch_rate / window.rates
             zero = GyroZero(zero.yaw + yaw_rate / weight, zero.pitch + pitch / weight)
@@ -404,9 +408,7 @@ class TractionEstimator:
         H[np.arange(len(use)), WHEELS + use] = found.expected[use]
         residual = demand[use] - found.expected[use]
         spread = found.expected[use] ** 2 * np.diagonal(ekf.P)[WHEELS + use] + tuning.wheel_noise**2
-        weight = np.minimum(
-            (tuning.freedom + 1.0) / (tuning.freedom + residual**2 / spread), 1.0
-        )
+        weight = np.minimum((tuning.freedom + 1.0) / (tuning.freedom + residual**2 / spread), 1.0)
         for row, r, w in zip(H, residual, weight, strict=True):
             place = int(np.argmax(row != 0.0)) if row.any() else -1
             if place < 0:

@@ -71,9 +71,7 @@ def rims_at(
     """Return what is needed of rim speeds (n,) [m/s], nan = unknown."""
     rim = np.nan_to_num(np.array(speeds))
     bodies = [
-        headings.body_speed(i, speed, yaw_rate)
-        for i, speed in enumerate(speeds)
-        if speed == speed
+        headings.body_speed(i, speed, yaw_rate) for i, speed in enumerate(speeds) if speed == speed
     ]
     body = median(bodies) if bodies else 0.0
     size = max(abs(body), tuning.scale_share * float(np.abs(rim).max(initial=0.0)))
@@ -95,8 +93,8 @@ def solved(
 ) -> BodySlip:
     """Return the slip at which the curve gives the demand, and its gradient by the state.
 
-    Newton's method with bisection on sum(W weight (demand - u)) = 0, twice: then wheels that
-    disagree with the others have lost their weight (Student t). The gradient follows from the
+    Newton's method with bisection on sum(W weight (demand - u)) = 0, three times: each time wheels
+    that disagree with the others lose weight. The gradient follows from the
     implicit function theorem.
 
     Parameters
@@ -111,7 +109,10 @@ def solved(
         A slip near the solution.
     """
     by_speed, by_yaw = np.array(headings.by_speed), np.array(headings.by_yaw_rate)
-    side_by_speed, side_by_yaw = np.array(headings.side_by_speed), np.array(headings.side_by_yaw_rate)
+    side_by_speed, side_by_yaw = (
+        np.array(headings.side_by_speed),
+        np.array(headings.side_by_yaw_rate),
+    )
     direction = 1.0 if rims.scale >= 0.0 else -1.0
     size = abs(rims.scale)
     carried = load * rims.turning
@@ -123,7 +124,7 @@ def solved(
         return coefficients(steady, state, WheelSpeeds(rims.speed, ground, sideways), stiffness)
 
     slip, weight = start, carried / carried.sum()
-    for last in (False, True):
+    for last in (False, False, True):
         low, high = -tuning.most_slip, tuning.most_slip
         for _ in range(tuning.iterations):
             u = at(slip)
@@ -142,7 +143,7 @@ def solved(
             usual = tuning.agreement + tuning.agreement_share * float(
                 np.median(np.abs(demand[rims.turning]))
             )
-            weight = carried / (1.0 + (residual / usual) ** 2 / tuning.freedom)
+            weight = carried / (1.0 + (residual / usual) ** 2 / tuning.freedom) ** 2
             weight = weight / weight.sum()
     slope = max(-float(weight @ (u.by_ground_speed * by_speed)) * size, tuning.least_slope)
     gradient = np.empty(len(state))

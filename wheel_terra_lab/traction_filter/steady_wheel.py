@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,10 +24,9 @@ from wheel_terra_estimator.estimation.rover import Rover
 
 FloatArray = NDArray[np.float64]
 
-_SLIPS = np.array(
-    [-1.0, -0.6, -0.4, -0.25, -0.15, -0.1, -0.05, 0.0, 0.025, 0.05]
-    + [0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.65, 0.8, 1.0]
-)
+_SKIDDING = (-1.0, -0.6, -0.4, -0.25, -0.15, -0.1, -0.05)
+_DRIVING = (0.0, 0.025, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.65, 0.8, 1.0)
+_SLIPS = np.array((*_SKIDDING, *_DRIVING))
 """Slips at which the closed form is evaluated [-], close together where the curve is steep."""
 _STIFFNESS = np.linspace(-2.4, 2.4, 9)
 """Logarithms of the factor on the bearing moduli [-]."""
@@ -80,7 +80,9 @@ class SteadyWheel:
             [np.maximum(curve.derivative()(even), _LEAST_SLOPE) for curve in curves]
         )
         self._pull = np.array([PchipInterpolator(_SLIPS, row)(even) for row in pull])
-        self._log_sinkage = np.array([PchipInterpolator(_SLIPS, np.log(row))(even) for row in sinkage])
+        self._log_sinkage = np.array(
+            [PchipInterpolator(_SLIPS, np.log(row))(even) for row in sinkage]
+        )
 
     def torque(self, slip: FloatArray, stiffness: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return torque / (load x radius) and its slope over the slip, (n,) each [-].
@@ -93,7 +95,8 @@ class SteadyWheel:
             (n,) logarithm of stiffness over load, against soil file and mean load.
         """
         place = _place(slip, stiffness)
-        return _read(self._torque, place), _read(self._slope, place)
+        slope = np.where(np.abs(slip) < 1.0, _read(self._slope, place), _LEAST_SLOPE)
+        return _read(self._torque, place), slope
 
     def at_zero(self, stiffness: FloatArray) -> FloatArray:
         """Return the torque coefficient of a wheel that rolls without slip (n,) [-]."""
@@ -133,9 +136,7 @@ class SteadyWheel:
         radius = self._rover.rim_radius[0]
         for slip in _SLIPS.tolist():
             ratio = 1.0 - slip if slip >= 0.0 else 1.0 / max(1.0 + slip, 1.0 / _LARGEST_RATIO)
-            wheel = WheelState(
-                ratio, 0.0, self.load, strength, shear_modulus, stiffness=stiffness
-            )
+            wheel = WheelState(ratio, 0.0, self.load, strength, shear_modulus, stiffness=stiffness)
             sinkage = self._sinkage_of(wheel, radius)
             forces = self._models.forces(0, wheel._replace(sinkage=sinkage))
             torques.append(forces.torque / (self.load * self._rover.slip_radius[0]))
@@ -163,7 +164,7 @@ def _increasing(torques: list[float]) -> FloatArray:
     return np.maximum.accumulate(np.array(torques)) + 1e-6 * np.arange(len(torques))
 
 
-def _place(slip: FloatArray, stiffness: FloatArray) -> tuple[FloatArray, ...]:
+def _place(slip: FloatArray, stiffness: FloatArray) -> tuple[Any, ...]:
     """Return row, column and the shares of their successors on the even grids."""
     column = np.clip((slip + 1.0) * (_STEPS / 2), 0.0, _STEPS - 1e-9)
     step = _STIFFNESS[1] - _STIFFNESS[0]
@@ -172,7 +173,7 @@ def _place(slip: FloatArray, stiffness: FloatArray) -> tuple[FloatArray, ...]:
     return i, j, row - i, column - j
 
 
-def _read(table: FloatArray, place: tuple[FloatArray, ...]) -> FloatArray:
+def _read(table: FloatArray, place: tuple[Any, ...]) -> FloatArray:
     """Return a table read linearly between its rows and columns."""
     i, j, a, b = place
     low = table[i, j] * (1.0 - b) + table[i, j + 1] * b

@@ -109,8 +109,17 @@ def test_modes_change_what_the_estimator_gets():
     assert list(inputs_of_mode(arrivals, 'no_orientation'))[1].orientation is None
 
 
-def _two_state_drive(noise=0.0, delay=4):
-    """Slip 0.1 + 0.8 q with q the mean torque over W r; references `delay` rows late."""
+def _straight(demand):
+    return 0.1 + 0.8 * demand
+
+
+def _curved(demand):
+    """Janosi and Hanamoto: the slip runs away where the demand comes near the greatest one."""
+    return 0.02 - 0.3 * np.log(1.0 - demand / 0.4)
+
+
+def _two_state_drive(noise=0.0, delay=4, law=_straight):
+    """Slip by a law of the mean torque over W r; references `delay` rows late."""
     rover = reader.load(['generic_six_wheel'])
     generator = np.random.default_rng(3)
     weight = rover.rover.mass * rover.rover.gravity
@@ -121,7 +130,7 @@ def _two_state_drive(noise=0.0, delay=4):
         demand = 0.2 + 0.15 * np.sin(i / 60.0)
         torque = demand * weight / 6 * radius
         arrivals.append((stamp, WheelOdometry(stamp, np.full(6, rate), torque)))
-        slip = 0.1 + 0.8 * demand
+        slip = law(demand)
         truth.append(slip)
         stamps.append(stamp)
         if i % 10 == 0:
@@ -143,6 +152,18 @@ def test_two_states_learn_how_slip_follows_torque_though_the_reference_is_late(d
     rim = np.full((len(stamps), 6), 0.4 * rover.wheels.slip_radius[0])
     held_slip = baselines.slip_of(held, np.zeros(len(stamps)), rim, rover.wheels.y)
     assert np.abs(held_slip[late] - truth[late, None]).max() > np.abs(error).max()
+
+
+def test_three_states_learn_the_curvature_that_two_cannot():
+    rover, measurements, stamps, truth = _two_state_drive(law=_curved)
+    late = slice(300, None)
+    errors = [
+        np.abs(slip_course(rover, measurements, stamps, filter_name).slip[late, 0] - truth[late])
+        for filter_name in ('curve', 'torque')
+    ]
+    assert np.ptp(truth[late]) > 0.3
+    assert errors[0].max() < 0.04  # the low-pass of the torque lags behind by as much
+    assert errors[0].mean() < 0.6 * errors[1].mean()
 
 
 def test_deviation_of_two_states_grows_with_travel_and_falls_with_a_reference():

@@ -67,6 +67,7 @@ def take(true, record):
         true.slip - 0.2,
         SlipCourse(true.slip + 0.06, std),
         SlipCourse(true.slip - 0.04, std),
+        SlipCourse(true.slip + 0.07, std),
     )
     return scores.samples(true, record, baselines, RADIUS)
 

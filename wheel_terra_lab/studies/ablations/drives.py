@@ -262,7 +262,7 @@ def _figures(drive: BenchDrive, kept: Record) -> Figures:
     radius = drive.configuration.wheels.slip_radius
     nothing = np.full(drive.truth.slip.shape, np.nan)
     course = SlipCourse(nothing, nothing)
-    baselines = scores.BaselineSlips(nothing, nothing, course, course)
+    baselines = scores.BaselineSlips(nothing, nothing, course, course, course)
     data = scores.samples(drive.truth, kept, baselines, radius)
     warnings = scores.warnings(drive.truth, kept, radius)
     told = data.said_class != SlipClass.UNKNOWN
