@@ -15,7 +15,13 @@ from wheel_terra_lab.evaluation.simulator_c import drive as simulator
 from wheel_terra_lab.evaluation.simulator_c import ground as soils
 from wheel_terra_lab.evaluation.simulator_c.contact import Contacts, Rims
 from wheel_terra_lab.evaluation.simulator_c.dynamics import Command, Motion, drive
-from wheel_terra_lab.evaluation.simulator_c.plans import ENTRAPMENTS, KINDS, slip_ratio
+from wheel_terra_lab.evaluation.simulator_c.plans import (
+    ENTRAPMENTS,
+    KINDS,
+    Driver,
+    Phase,
+    slip_ratio,
+)
 from wheel_terra_lab.evaluation.simulator_c.rover import FAMILIES, draw_rover
 
 EARTH = 9.80665
@@ -206,6 +212,25 @@ def test_a_later_wheel_runs_in_the_rut_of_the_first():
     assert np.all(contacts.rut[2:] > 0.3 * contacts.bottom[:2].mean())
 
 
+BEND, SPIN = Phase(8.0, 1.0, 0.3), Phase(8.0, 0.0, 0.0, 0.8)
+
+
+@pytest.mark.parametrize(
+    ('family', 'turn'),
+    [('four_front', BEND)]
+    + [(f, t) for f in ('four_skid', 'four_all', 'six_rocker') for t in (BEND, SPIN)],
+)
+def test_positive_turns_go_to_the_left(family, turn):
+    rover, motion = rover_on(family, {})
+    course = drive(motion, Driver(rover, (Phase(1.0, 0.0), turn), 0.0), 9.0)
+    assert course.yaw[-1] > 0.1
+    if turn.turn and rover.steered.any():
+        ahead = rover.steered & (rover.x > 0.0)
+        assert np.all(course.steering[-1][ahead] > 0.05)
+        wanted = turn.turn / (rover.x.max() - rover.x.min())
+        assert course.velocity[-1, 2] / course.velocity[-1, 0] == pytest.approx(wanted, rel=0.35)
+
+
 def test_slip_is_that_of_the_interface():
     #               driving, spinning, skidding, locked, sliding back, reverse, fast reverse skid
     rim = np.array([0.10, 0.10, 0.05, 0.0, 0.10, -0.10, -0.05])
@@ -253,6 +278,29 @@ def test_firm_ground_slips_little(firm):
     moving = np.abs(firm.truth.wheel_rate * firm.configuration.wheels.slip_radius) > 0.02
     assert np.nanmax(np.abs(firm.truth.slip[moving])) < 0.05
     assert firm.truth.first_stuck() is None
+
+
+def test_sensors_read_the_truth_with_their_errors():
+    found = simulator.simulate('entrapment_fast', 1)
+    course, gravity = found.course, found.rover.gravity
+    inertial = [a.measurement for a in found.arrivals if hasattr(a.measurement, 'specific_force')]
+    resting = [m for m in inertial if m.stamp - simulator.START < 1_500_000_000]
+    felt = np.mean([m.specific_force for m in resting], axis=0)
+    pitch, roll = course.pitch[:150].mean(), course.roll[:150].mean()
+    up = np.array([np.sin(pitch), np.sin(roll), 1.0])
+    assert felt / gravity == pytest.approx(up, abs=0.25 / gravity)
+    if inertial[0].orientation is not None:
+        x, y, z, w = np.array([m.orientation for m in inertial]).T
+        nose_up = np.interp(
+            [(m.stamp - simulator.START) * 1e-9 for m in inertial], course.time, course.pitch
+        )
+        assert np.arcsin(2 * (z * x - w * y)) == pytest.approx(nose_up, abs=0.03)
+    odometry = [a.measurement for a in found.arrivals if hasattr(a.measurement, 'rate')]
+    measured = np.array([m.rate for m in odometry])
+    assert measured.mean(axis=0) == pytest.approx(found.truth.wheel_rate.mean(axis=0), rel=0.02)
+    torque = np.array([m.torque for m in odometry]).mean(axis=0)
+    usual = found.rover.mean_load * found.rover.rims.radius
+    assert torque == pytest.approx(course.torque.mean(axis=0), abs=0.25 * usual.max())
 
 
 def test_an_entrapment_entraps():
