@@ -280,9 +280,13 @@ def test_firm_ground_slips_little(firm):
     assert firm.truth.first_stuck() is None
 
 
-def test_sensors_read_the_truth_with_their_errors():
-    found = simulator.simulate('entrapment_fast', 1)
-    course, gravity = found.course, found.rover.gravity
+@pytest.fixture(scope='module')
+def trap():
+    return simulator.simulate('entrapment_fast', 1)
+
+
+def test_sensors_read_the_truth_with_their_errors(trap):
+    found, course, gravity = trap, trap.course, trap.rover.gravity
     inertial = [a.measurement for a in found.arrivals if hasattr(a.measurement, 'specific_force')]
     resting = [m for m in inertial if m.stamp - simulator.START < 1_500_000_000]
     felt = np.mean([m.specific_force for m in resting], axis=0)
@@ -303,14 +307,13 @@ def test_sensors_read_the_truth_with_their_errors():
     assert torque == pytest.approx(course.torque.mean(axis=0), abs=0.25 * usual.max())
 
 
-def test_an_entrapment_entraps():
-    found = simulator.simulate('entrapment_fast', 1)
-    check(found)
-    since = found.truth.first_stuck()
+def test_an_entrapment_entraps(trap):
+    check(trap)
+    since = trap.truth.first_stuck()
     assert since is not None
-    time = (found.truth.stamp - found.truth.stamp[0]) * 1e-9
+    time = (trap.truth.stamp - trap.truth.stamp[0]) * 1e-9
     second = (time >= since) & (time <= since + 1.0)
-    assert np.median(found.truth.slip[second], axis=1).min() > 0.88
+    assert np.median(trap.truth.slip[second], axis=1).min() > 0.88
 
 
 @pytest.mark.slow
