@@ -343,31 +343,47 @@ def cannot_write(path: Path, error: OSError) -> UserError:
     return UserError(f'{path}: cannot be written ({reason}){cure}')
 
 
+def refuse_inputs(path: Path, inputs: Iterable[Path]) -> None:
+    """Refuse a path that is what the command reads, or holds it, or lies in it.
+
+    Raises
+    ------
+    UserError
+        It is.
+    """
+    target = _resolved(path)
+    for given in inputs:
+        try:
+            source = given.resolve()
+            same = target.exists() and source.exists() and target.samefile(source)
+        except (OSError, RuntimeError):  # whoever reads it will say so
+            continue
+        if same or source == target or target in source.parents or source in target.parents:
+            raise UserError(
+                f'{path}: is, or lies in, or holds {given}, which the command reads; '
+                'choose another path'
+            )
+
+
+def _resolved(path: Path) -> Path:
+    try:
+        return path.resolve()
+    except (OSError, RuntimeError) as error:  # RuntimeError: a loop of links (Python < 3.13)
+        raise UserError(f'{path}: cannot be followed ({error}); choose another path') from None
+
+
 def _refuse_place(path: Path, inputs: Iterable[Path]) -> None:
     """Refuse places that no command may replace, whatever they hold."""
     if path.is_symlink():
         raise UserError(f'{path}: is a link; name what it leads to, or choose another path')
-    try:
-        target = path.resolve()
-    except (OSError, RuntimeError) as error:  # RuntimeError: a loop of links (Python < 3.13)
-        raise UserError(f'{path}: cannot be followed ({error}); choose another path') from None
+    target = _resolved(path)
     for place, words in (
         (Path.cwd(), 'is the working folder or holds it'),
         (_home(), 'is a home folder or holds one'),
     ):
         if place is not None and (target == place or target in place.parents):
             raise UserError(f'{path}: {words}; name a new folder')
-    for given in inputs:
-        try:
-            source = given.resolve()
-        except (OSError, RuntimeError):  # whoever reads it will say so
-            continue
-        same = target.exists() and source.exists() and target.samefile(source)
-        if same or source == target or target in source.parents or source in target.parents:
-            raise UserError(
-                f'{path}: is, or lies in, or holds {given}, which the command reads; '
-                'choose another path'
-            )
+    refuse_inputs(path, inputs)
 
 
 def _remove_left_behind(path: Path) -> None:

@@ -16,6 +16,7 @@ from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.configuration.soil_file import HEADER, StuckState, write_values
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.ros.kept_soil import KeptSoil
+from wheel_terra_estimator.ros.lifecycle_node import why_no_arrival_log
 
 __all__ = ['parameters']
 LEARNED = {'soil.cohesion': 400.0, 'soil.cohesion_std': 100.0}
@@ -195,14 +196,21 @@ def test_a_place_that_takes_no_file_is_told_at_the_start(
     process.stop(signal.SIGINT)
 
 
-def test_a_node_whose_soil_file_is_its_rover_file_ends_at_the_start(start, parameters):
+@pytest.mark.parametrize('name', ['soil_file', 'record_arrival'])
+def test_a_node_writes_to_no_file_that_it_reads(start, parameters, name):
     before = Path(parameters).read_text()
-    options = ['-p', f'soil_file:={parameters}']
-    status, words = start('estimator_node', *ROVER, parameters, *options).end()
+    status, words = start('estimator_node', *ROVER, parameters, '-p', f'{name}:={parameters}').end()
     assert status == 2
-    assert 'leave it out of the files that the node reads' in words
+    assert f'{name}: {parameters}: is, or lies in' in words
     assert 'Traceback' not in words
     assert Path(parameters).read_text() == before
+
+
+def test_an_arrival_log_replaces_nothing_but_an_arrival_log(tmp_path):
+    log = write(tmp_path / 'arrival.txt', 'imu/data 1700000000000000000\nreset\n')
+    assert not why_no_arrival_log(log)
+    for content in ('years of work\n', 'imu/data\n', b'\xff' * 1000):
+        assert why_no_arrival_log(write(log, content))
 
 
 def test_a_damaged_state_is_told_and_the_soil_is_kept_all_the_same(tmp_path):

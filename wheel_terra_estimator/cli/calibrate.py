@@ -9,6 +9,7 @@ from pathlib import Path
 
 from wheel_terra_estimator.bags import limits as bag_limits
 from wheel_terra_estimator.cli import bag_arguments
+from wheel_terra_estimator.cli.outputs import Output
 from wheel_terra_estimator.configuration import reader as configuration_reader
 
 EXAMPLES = (
@@ -28,7 +29,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     configuration_reader.add_arguments(parser)
     parser.add_argument(
-        '-o', dest='output', type=Path, metavar='F', required=True, help='rover file to be written'
+        '-o',
+        dest='output',
+        action=Output,
+        type=Path,
+        metavar='F',
+        required=True,
+        help='rover file to be written',
     )
     bag_arguments.add_arguments(parser)
     parser.add_argument('--overwrite', action='store_true', help='replace an earlier file')
@@ -43,7 +50,7 @@ def run(arguments: argparse.Namespace) -> int:
     from wheel_terra_estimator.output_folder import check_file, new_file
 
     configuration = configuration_reader.from_arguments(arguments)
-    check_file(arguments.output, arguments.overwrite, [arguments.bag])
+    check_file(arguments.output, arguments.overwrite)
     with open_bag(arguments.bag, bag_limits.from_arguments(arguments)) as bag:
         name = arguments.bag.resolve().name
         remaps = parse_remaps(arguments.remap)

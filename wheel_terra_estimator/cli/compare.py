@@ -9,6 +9,7 @@ import json
 from pathlib import Path
 
 from wheel_terra_estimator.bags import limits as bag_limits
+from wheel_terra_estimator.cli.outputs import Output
 
 EXAMPLES = (
     'wheel-terra compare estimates_a estimates_b',
@@ -22,7 +23,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('second', type=Path, metavar='B', help='bag of estimates of the same drive')
     parser.add_argument('--truth', type=Path, metavar='BAG', help='recording with ground truth')
     parser.add_argument('--json', action='store_true', help='print the differences as JSON')
-    parser.add_argument('--report', type=Path, metavar='F.html', help='page with both overlaid')
+    parser.add_argument(
+        '--report', action=Output, type=Path, metavar='F.html', help='page with both overlaid'
+    )
     bag_limits.add_arguments(parser)
     parser.add_argument('--overwrite', action='store_true', help='replace an earlier report')
 
@@ -46,7 +49,7 @@ def run(arguments: argparse.Namespace) -> int:
     inputs = [arguments.first, arguments.second]
     if arguments.report:
         check_page(arguments.report)
-        check_file(arguments.report, arguments.overwrite, inputs)
+        check_file(arguments.report, arguments.overwrite)
     limits = bag_limits.from_arguments(arguments)
     histories = []
     notes: list[str] = []

@@ -22,7 +22,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from wheel_terra_estimator.cli.outputs import Output
 from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.output_folder import working_folder
 
 if TYPE_CHECKING:
     from wheel_terra_estimator.bags.truth import Truth
@@ -61,6 +63,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '-o',
         dest='output',
+        action=Output,
         type=Path,
         default=Path('demo_output'),
         metavar='DIR',
@@ -77,7 +80,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Run the command."""
     output: Path = arguments.output
-    _make_room(output, arguments.overwrite)
+    entries = [f'{drive.name}{end}' for drive in DRIVES for end in ('/', '.html', '.png')]
+    working_folder(output, arguments.overwrite, False, [*entries, 'trial/'])
     live = not arguments.no_node and importlib.util.find_spec('rclpy') is not None
     if live:
         print('The drives go over DDS to estimator_node, as fast as it takes them.')
@@ -125,20 +129,6 @@ def _trial(folder: Path) -> int:
         judged = 'right' if said == hidden else 'wrong'
         print(f'seal opened: {hidden} was hidden; said: {said}: {judged}')
     return status
-
-
-def _make_room(output: Path, overwrite: bool) -> None:
-    """Refuse what is taken; each file of an earlier demo is replaced as it is written anew."""
-    if output.exists() and not output.is_dir():
-        raise UserError(f'{output}: is a file; choose another folder with -o')
-    if output.exists() and any(output.iterdir()) and not overwrite:
-        raise UserError(f'{output}: exists already; choose another with -o or add --overwrite')
-    try:
-        output.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise UserError(
-            f'{output}: cannot be made ({error.strerror}); choose another with -o'
-        ) from None
 
 
 def _command(drive: DemoDrive, output: Path, live: bool) -> list[str]:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from wheel_terra_estimator.bags import limits as bag_limits
 from wheel_terra_estimator.cli import bag_arguments
+from wheel_terra_estimator.cli.outputs import Output
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.output_folder import check_folder, new_folder
 from wheel_terra_estimator.scheduler import add_jobs_argument, finished
@@ -34,11 +35,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
     parser.add_argument(
         'data',
+        type=Path,
         nargs='+',
         metavar='DATA',
         help='CSV table of steady rows, or a rosbag2; several: see --soil',
     )
-    parser.add_argument('-o', '--output', required=True, metavar='DIR', help='folder to be written')
+    parser.add_argument(
+        '-o',
+        '--output',
+        action=Output,
+        type=Path,
+        required=True,
+        metavar='DIR',
+        help='folder to be written',
+    )
     parser.add_argument(
         '--soil',
         choices=('shared', 'own'),
@@ -49,12 +59,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_jobs_argument(parser, words='tables with their own soil side by side (default 1)')
     parser.add_argument(
         '--reference',
+        type=Path,
         metavar='A.csv',
         help='table in which the effect in question is absent; fitted first, so that structural '
         'error common to both cancels',
     )
     parser.add_argument(
         '--effects',
+        type=Path,
         action='append',
         default=[],
         metavar='FILE.py',
@@ -108,9 +120,8 @@ def run(arguments: argparse.Namespace) -> int:
     """Run the command."""
     from wheel_terra_estimator.discrepancy.report.files import write_files
 
-    output = Path(arguments.output)
-    inputs = [Path(path) for path in (*arguments.data, arguments.reference) if path]
-    check_folder(output, arguments.overwrite, inputs)
+    output: Path = arguments.output
+    check_folder(output, arguments.overwrite)
     if arguments.floor is not None and not 0.0 <= arguments.floor <= 0.2:
         raise UserError(f'--floor {arguments.floor:g}: must be a share between 0 and 0.2')
     if not 0.0 <= arguments.allowed_error <= 0.5:
@@ -122,7 +133,7 @@ def run(arguments: argparse.Namespace) -> int:
             f'--soil-known-to {arguments.soil_known_to:g}: must be a share above 0, at most 2'
         )
     given = [*arguments.data, *([arguments.reference] if arguments.reference else [])]
-    if not any(_is_bag(Path(path)) for path in given):
+    if not any(map(_is_bag, given)):
         if arguments.remap:
             raise UserError(
                 f'--remap {arguments.remap[0]}: renames topics of a bag, but {given[0]} is a '
@@ -131,9 +142,9 @@ def run(arguments: argparse.Namespace) -> int:
         if arguments.smooth:
             raise UserError(f'--smooth: goes with a bag, but {given[0]} is a table; leave it out')
     if arguments.soil == 'own' and len(arguments.data) > 1:
-        return _each_with_its_soil(arguments, inputs)
+        return _each_with_its_soil(arguments)
     diagnosis = _diagnosed(arguments)
-    with new_folder(output, arguments.overwrite, inputs) as folder:
+    with new_folder(output, arguments.overwrite) as folder:
         write_files(diagnosis, folder, pictures=not arguments.no_pictures)
     if arguments.json:
         print((output / 'report.json').read_text(encoding='utf-8').rstrip())
@@ -168,7 +179,7 @@ def _diagnosed(arguments: argparse.Namespace) -> Diagnosis:
     return diagnosis
 
 
-def _each_with_its_soil(arguments: argparse.Namespace, inputs: list[Path]) -> int:
+def _each_with_its_soil(arguments: argparse.Namespace) -> int:
     """Diagnose each table with a soil of its own, side by side, and sum up what they favour."""
     from wheel_terra_estimator.discrepancy.report.files import write_files
     from wheel_terra_estimator.discrepancy.report.several import (
@@ -186,8 +197,8 @@ def _each_with_its_soil(arguments: argparse.Namespace, inputs: list[Path]) -> in
             raise outcome
         found[names[index]] = outcome
     found = {name: found[name] for name in names}
-    output = Path(arguments.output)
-    with new_folder(output, arguments.overwrite, inputs) as folder:
+    output: Path = arguments.output
+    with new_folder(output, arguments.overwrite) as folder:
         for name, diagnosis in found.items():
             (folder / name).mkdir()
             write_files(diagnosis, folder / name, pictures=not arguments.no_pictures)
@@ -240,14 +251,14 @@ def _tell(diagnosis: Diagnosis, output: Path) -> None:
     print(f'  written: {output}')
 
 
-def _load_effects(files: list[str]) -> dict[str, Path]:
+def _load_effects(files: list[Path]) -> dict[str, Path]:
     """Register the user's own effects; return the file of each."""
     from wheel_terra_estimator.terramechanics.effects import load_file
 
     found: dict[str, Path] = {}
     for file in files:
         try:
-            found.update({effect.name: Path(file).resolve() for effect in load_file(file)})
+            found.update({effect.name: file.resolve() for effect in load_file(file)})
         except ValueError as error:
             raise UserError(f'--effects {error}') from None
     return found
@@ -268,9 +279,8 @@ def _is_bag(path: Path) -> bool:
     return path.is_dir() or path.name.endswith(STORAGE_SUFFIXES)
 
 
-def _read(data: str, arguments: argparse.Namespace, configuration: Configuration) -> SteadyTable:
+def _read(path: Path, arguments: argparse.Namespace, configuration: Configuration) -> SteadyTable:
     """Read a table, or extract the steady windows of a drive."""
-    path = Path(data)
     if _is_bag(path):
         from wheel_terra_estimator.bags.reader import parse_remaps
         from wheel_terra_estimator.discrepancy.drives.windows import rows_from_bag

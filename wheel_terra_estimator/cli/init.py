@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from wheel_terra_estimator.bags import limits as bag_limits
+from wheel_terra_estimator.cli.outputs import Output
 from wheel_terra_estimator.errors import UserError
 
 if TYPE_CHECKING:
@@ -27,7 +28,13 @@ EXAMPLES = (
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
     parser.add_argument(
-        '-o', dest='output', type=Path, metavar='F', required=True, help='rover file to be written'
+        '-o',
+        dest='output',
+        action=Output,
+        type=Path,
+        metavar='F',
+        required=True,
+        help='rover file to be written',
     )
     source = parser.add_mutually_exclusive_group()
     source.add_argument('--urdf', type=Path, metavar='F', help='robot description (URDF)')
@@ -76,8 +83,7 @@ def run(arguments: argparse.Namespace) -> int:
     from wheel_terra_estimator.configuration.rover_template import rover_file
     from wheel_terra_estimator.output_folder import check_file, new_file
 
-    inputs = [path for path in (arguments.urdf, arguments.bag) if path]
-    check_file(arguments.output, arguments.overwrite, inputs)
+    check_file(arguments.output, arguments.overwrite)
     sketch = _sketch(arguments)
     with new_file(arguments.output, arguments.overwrite) as path:
         path.write_text(rover_file(sketch), encoding='utf-8')

@@ -19,6 +19,7 @@ from contextlib import suppress
 from typing import Any, NoReturn
 
 from wheel_terra_estimator import __version__
+from wheel_terra_estimator.cli import outputs
 from wheel_terra_estimator.cli.terminal import (
     discard_output,
     harmless_output,
@@ -226,6 +227,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             logging.basicConfig()
             logging.getLogger('wheel_terra_estimator').setLevel(logging.DEBUG)
         with harmless_output(), termination_as_interrupt():
+            outputs.check(arguments)
             status = int(arguments.run(arguments) or 0)
             sys.stdout.flush()
             return status

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wheel_terra_estimator.cli.climb import WHO, climb
+from wheel_terra_estimator.cli.outputs import Output
 from wheel_terra_estimator.configuration import reader as configuration_reader
 from wheel_terra_estimator.configuration.readings import Readings
 from wheel_terra_estimator.discrepancy.tables.steady_table import INPUT_UNITS
@@ -107,6 +108,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '-o',
         dest='output',
+        action=Output,
         type=Path,
         metavar='FILE',
         help='write a picture (.png, .svg, .pdf) or a table (.csv) instead',
@@ -119,7 +121,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Run the command."""
     output: Path | None = arguments.output
     if output is not None:
-        _check_output(output, arguments.overwrite, _tables(arguments))
+        _check_output(output, arguments.overwrite)
     # The mass is needed for the default load only.
     brings_load = bool(arguments.load or arguments.points) and arguments.climb != 'rover'
     configuration = configuration_reader.from_arguments(arguments, complete=not brings_load)
@@ -222,7 +224,7 @@ def _write(
     if output is None:
         (_write_csv if arguments.table == 'csv' else _write_text)(result, sys.stdout)
         return
-    with new_file(output, arguments.overwrite, _tables(arguments)) as fresh:
+    with new_file(output, arguments.overwrite) as fresh:
         if output.suffix.lower() == '.csv':
             with fresh.open('w', encoding='utf-8', newline='') as stream:
                 _write_csv(result, stream)
@@ -251,11 +253,7 @@ def _measured(columns: dict[str, FloatArray], text: str, seed: int) -> dict[str,
     return result
 
 
-def _tables(arguments: argparse.Namespace) -> list[Path]:
-    return [Path(arguments.points)] if arguments.points else []
-
-
-def _check_output(output: Path, overwrite: bool, inputs: list[Path]) -> None:
+def _check_output(output: Path, overwrite: bool) -> None:
     if output.suffix.lower() not in (*PICTURES, '.csv'):
         raise UserError(
             f'{output}: what is wanted cannot be told from the name; end it in '
@@ -263,7 +261,7 @@ def _check_output(output: Path, overwrite: bool, inputs: list[Path]) -> None:
         )
     if not output.parent.is_dir():
         raise UserError(f'{output}: there is no folder {output.parent}; make it first')
-    check_file(output, overwrite, inputs)
+    check_file(output, overwrite)
 
 
 def _points(arguments: argparse.Namespace, configuration: Configuration) -> dict[str, FloatArray]:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from wheel_terra_estimator.bags import limits as bag_limits
 from wheel_terra_estimator.cli import bag_arguments
+from wheel_terra_estimator.cli.outputs import Output
 from wheel_terra_estimator.configuration import reader as configuration_reader
 from wheel_terra_estimator.configuration import soil_file
 from wheel_terra_estimator.errors import UserError
@@ -43,6 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '-o',
         dest='output',
+        action=Output,
         type=Path,
         metavar='DIR',
         help='rosbag2 folder (MCAP) for the estimates, under the names that the node has; with '
@@ -50,6 +52,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         '--table',
+        action=Output,
         type=Path,
         metavar='F.csv|F.parquet',
         help='table of the estimates, one row per set and wheel, units in the header; with several '
@@ -57,6 +60,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         '--track',
+        action=Output,
         type=Path,
         metavar='F.csv|F.geojson',
         help='map of the drive: position, slip, class, sinkage, pull margin and learned soil along '
@@ -78,6 +82,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         '--save-soil',
+        action=Output,
         type=Path,
         metavar='F.yaml',
         help='parameter file with the soil and the sensor biases that were learned, a further '
@@ -92,6 +97,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--json', action='store_true', help='print the summary as JSON')
     parser.add_argument(
         '--report',
+        action=Output,
         type=Path,
         metavar='F.html',
         help='report with pictures; with several recordings a name, for one in the folder of each',
@@ -160,30 +166,24 @@ def _run_one(arguments: argparse.Namespace) -> int:
     return INTERRUPTED if drive.result.interrupted else 0
 
 
-def _inputs(arguments: argparse.Namespace) -> list[Path]:
-    """Return what no output may be written over."""
-    return [*arguments.bags, *([arguments.arrival] if arguments.arrival else [])]
-
-
 def _check_outputs(arguments: argparse.Namespace) -> None:
     """Refuse outputs that cannot be written, before hours of work."""
     from wheel_terra_estimator.output_folder import check_file, check_folder
     from wheel_terra_estimator.reporting import estimates_table, track_table
     from wheel_terra_estimator.reporting.html import check_page
 
-    inputs = _inputs(arguments)
     for path, check_kind in (
         (arguments.report, check_page),
         (arguments.table, estimates_table.check_table),
         (arguments.track, track_table.check_track),
-        (arguments.save_soil, None),
     ):
-        if path and check_kind:
-            check_kind(path)
         if path:
-            check_file(path, arguments.overwrite, inputs)
+            check_kind(path)
+            check_file(path, arguments.overwrite)
+    if arguments.save_soil:
+        check_file(arguments.save_soil, arguments.overwrite, foreign=soil_file.why_foreign)
     if arguments.output:
-        check_folder(arguments.output, arguments.overwrite, inputs)
+        check_folder(arguments.output, arguments.overwrite)
 
 
 def _as_dict(drive: Drive, smoothed: bool) -> dict[str, Any]:

@@ -8,6 +8,7 @@ import argparse
 import sys
 from pathlib import Path
 
+from wheel_terra_estimator.cli.outputs import Output
 from wheel_terra_estimator.configuration import reader as configuration_reader
 from wheel_terra_estimator.errors import UserError
 
@@ -20,16 +21,19 @@ LONGEST = 86400.0  # [s]
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
+    from wheel_terra_estimator.configuration import shipped
     from wheel_terra_estimator.simulation.scenario import DEFAULT
 
     parser.add_argument(
         '--scenario',
+        type=shipped.FileName,
         default=DEFAULT,
         metavar='F',
         help=f'scenario file, or the bare name of a shipped one (default: {DEFAULT})',
     )
     parser.add_argument(
         '--rover',
+        type=shipped.FileName,
         metavar='F',
         help="rover file, or the bare name of a shipped one, in place of the scenario's rover",
     )
@@ -38,7 +42,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--duration', type=float, metavar='S', help="length of the drive in place of the scenario's"
     )
-    parser.add_argument('-o', dest='output', type=Path, metavar='DIR', help='rosbag2 folder (MCAP)')
+    parser.add_argument(
+        '-o', dest='output', action=Output, type=Path, metavar='DIR', help='rosbag2 folder (MCAP)'
+    )
     configuration_reader.add_arguments(parser)
     parser.add_argument(
         '--overwrite', action='store_true', help='replace an earlier bag of the same name'

@@ -74,6 +74,18 @@ def load(
     return _checked(sourced, complete, allow_effect_files)
 
 
+def files_behind(name: str | Path) -> list[Path]:
+    """Return a parameter file and the Python file that its ``effect_file`` names.
+
+    Nothing for the bare name of a shipped file.
+    """
+    path = Path(name).expanduser()
+    if not path.is_file():
+        return []
+    effects = ros_yaml.read(path).get('effect_file')
+    return [path, *([path.parent / str(effects)] if effects else [])]
+
+
 def from_parameters(
     parameters: Mapping[str, Any],
     *,
@@ -103,6 +115,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare ``--config`` and ``-p``, the same for every command."""
     parser.add_argument(
         '--config',
+        type=shipped.FileName,
         action='append',
         default=[],
         metavar='F',

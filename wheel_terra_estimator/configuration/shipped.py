@@ -75,6 +75,10 @@ def _files_below(folder: Path) -> dict[str, Path]:
     return {p.relative_to(folder).with_suffix('').as_posix(): p for p in found}
 
 
+class FileName(str):
+    """A path, or the bare name of a shipped file, as an option of a command has it."""
+
+
 def find(name: str | Path, kind: str = '', folder: Path | None = None) -> Path:
     """Return the file that ``name`` means: a path, or the bare name of a shipped file.
 

@@ -48,6 +48,7 @@ from wheel_terra_estimator.messages.diagnostics import (
     stale_statuses,
 )
 from wheel_terra_estimator.messages.pipeline import Pipeline
+from wheel_terra_estimator.output_folder import check_target
 from wheel_terra_estimator.ros import parameters
 from wheel_terra_estimator.ros.input_watch import InputWatch
 from wheel_terra_estimator.ros.kept_soil import KeptSoil
@@ -73,6 +74,8 @@ WATCH_PERIOD = 0.25  # [s]
 DIAGNOSTICS_PERIOD = 1.0  # [s] of the steady clock, while nothing is heard
 SILENCE = 1.5  # [s] of the steady clock without a set
 SAVE_PERIOD = 10.0  # [s]
+RESET = 'reset'  # line of an arrival log
+LONGEST_LINE = 100  # of an arrival log [byte]
 NAMES_PERIOD = 1.0  # [s] between two looks for a node of the same name
 
 LEVELS = ('OK', 'WARN', 'ERROR', 'STALE')
@@ -84,6 +87,15 @@ def _topic_messages(topic: str) -> TopicMessages:
     """Return what unpacks the messages of an input topic; rclpy where it is not done quickly."""
     kind = MESSAGE_TYPES[topic]
     return TopicMessages(INPUT_TYPES[topic], lambda data: deserialize_message(data, kind))
+
+
+def why_no_arrival_log(path: Path) -> str:
+    """Return why a file is no arrival log of a node; empty where it is one."""
+    with path.open('rb') as file:
+        topic, _, stamp = file.readline(LONGEST_LINE).decode(errors='replace').partition(' ')
+    if topic in MESSAGE_TYPES and stamp.strip().lstrip('-').isdigit():
+        return ''
+    return '' if topic.strip() == RESET else 'is no arrival log of this program'
 
 
 class WithInfo:
@@ -333,7 +345,7 @@ class EstimatorNode(LifecycleNode):
             response.success, response.message = False, 'not configured: there is no state'
             return response
         if self._arrival is not None:
-            self._arrival.write('reset\n')
+            self._arrival.write(f'{RESET}\n')
         self._pipeline.reset()
         self._latest = None
         self._warned = self._pipeline.core.warning.state
@@ -570,12 +582,14 @@ class EstimatorNode(LifecycleNode):
         name = str(configuration.flat()['record_arrival'])
         if not name:
             return None
+        path = Path(name).expanduser()
         try:
-            return Path(name).expanduser().open('w', encoding='utf-8', buffering=1)
-        except OSError as error:
-            raise UserError(
-                f'record_arrival: {name} cannot be written ({error.strerror})'
-            ) from None
+            check_target(path, True, self._files, foreign=why_no_arrival_log)
+            return path.open('w', encoding='utf-8', buffering=1)
+        except (OSError, UserError) as error:
+            reason = getattr(error, 'strerror', None)
+            words = f'{path} cannot be written ({reason})' if reason else str(error)
+            raise UserError(f'record_arrival: {words}') from None
 
     def _nanoseconds(self) -> int:
         """Return the time of the node's clock; the system's is asked without a detour by rcl."""

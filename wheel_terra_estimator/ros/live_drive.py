@@ -345,9 +345,12 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _run(arguments: argparse.Namespace) -> None:
     configuration = configuration_reader.from_arguments(arguments)
     remaps = parse_remaps(arguments.remap)
+    inputs = [arguments.bag]
+    for name in arguments.config:
+        inputs += configuration_reader.files_behind(name)
     if arguments.report:
-        check_file(arguments.report, arguments.overwrite, [arguments.bag])
-    check_folder(arguments.output, arguments.overwrite, [arguments.bag])
+        check_file(arguments.report, arguments.overwrite, inputs)
+    check_folder(arguments.output, arguments.overwrite, inputs)
     with open_bag(arguments.bag) as bag:
         reader = MeasurementReader(bag, remaps, configuration)
         heard = drive(bag, configuration, remaps, arguments.rate, arguments.arrival)

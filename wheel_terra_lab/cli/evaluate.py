@@ -10,6 +10,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from wheel_terra_estimator.cli.outputs import Output
+from wheel_terra_estimator.configuration.shipped import FileName
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.scheduler import add_jobs_argument
 
@@ -58,6 +60,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         '--rover',
+        type=FileName,
         metavar='F',
         help="rover file, or the bare name of a shipped one, in place of the kinds' own rover "
         '(simulator A)',
@@ -101,6 +104,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '-o',
         dest='output',
+        action=Output,
         type=Path,
         metavar='F.md|F.html|DIR',
         help='write the tables; as a page with a picture where the name ends in .html; with '

@@ -8,6 +8,8 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from wheel_terra_estimator.cli.outputs import Output
+from wheel_terra_estimator.configuration.shipped import FileName
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.scheduler import add_jobs_argument, add_scheduler_argument
 
@@ -26,12 +28,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
     one = actions.add_parser('run', help='run one wheel over one bed')
     one.add_argument(
-        'files', nargs='*', metavar='FILE', help='case, wheel or grain files (path or shipped name)'
+        'files',
+        type=FileName,
+        nargs='*',
+        metavar='FILE',
+        help='case, wheel or grain files (path or shipped name)',
     )
-    one.add_argument('-o', '--output', type=Path, required=True, metavar='DIR')
+    one.add_argument('-o', '--output', action=Output, type=Path, required=True, metavar='DIR')
     one.add_argument('--overwrite', action='store_true', help='replace an output folder')
     one.add_argument('--resume', action='store_true', help='go on with an interrupted run')
-    one.add_argument('--wheel', metavar='N', help="one of the paper's wheels, 1 to 9, or a file")
+    one.add_argument(
+        '--wheel', type=FileName, metavar='N', help="one of the paper's wheels, 1 to 9, or a file"
+    )
     one.add_argument('--load', type=float, metavar='N', help='vertical load W [N]')
     one.add_argument('--slope', type=float, metavar='DEG', help='slope [deg]')
     one.add_argument('--gravity', type=float, metavar='G', help='gravity [m/s^2]')
@@ -54,7 +62,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         ('rows', 'virtual measurements for diagnose: pull sweep or slip sweep'),
     ):
         study = actions.add_parser(name, help=text, description=text)
-        study.add_argument('-o', '--output', type=Path, required=True, metavar='DIR')
+        study.add_argument('-o', '--output', action=Output, type=Path, required=True, metavar='DIR')
         study.add_argument('--resume', action='store_true', help='go on with the study in DIR')
         study.add_argument('--overwrite', action='store_true', help='start the study in DIR anew')
         study.add_argument('--seeds', type=int, default=0, metavar='N', help='beds per case')
@@ -85,7 +93,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _common(parser: argparse.ArgumentParser, studies: bool) -> None:
-    parser.add_argument('--cache', type=Path, metavar='DIR', help='where settled beds are kept')
+    parser.add_argument(
+        '--cache', action=Output, type=Path, metavar='DIR', help='where settled beds are kept'
+    )
     parser.add_argument('--no-cache', action='store_true', help='settle every bed anew')
     if studies:
         add_jobs_argument(

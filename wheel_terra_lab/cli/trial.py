@@ -8,6 +8,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from wheel_terra_estimator.cli.outputs import Output
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.output_folder import check_folder, new_folder
 
@@ -35,14 +36,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--many', type=int, metavar='N', help='N trials from the seed on, and their score'
     )
-    parser.add_argument('-o', '--output', required=True, metavar='DIR', help='folder to be written')
+    parser.add_argument(
+        '-o',
+        '--output',
+        action=Output,
+        type=Path,
+        required=True,
+        metavar='DIR',
+        help='folder to be written',
+    )
     parser.add_argument('--no-pictures', action='store_true', help='no report.html')
     parser.add_argument('--overwrite', action='store_true', help='replace DIR if it exists')
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the command."""
-    output = Path(arguments.output)
+    output: Path = arguments.output
     if arguments.seed < 0:
         raise UserError(f'--seed {arguments.seed}: must be 0 or more')
     if arguments.many is not None and not 1 <= arguments.many <= MOST:

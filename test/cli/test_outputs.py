@@ -1,0 +1,146 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""No command writes to what it reads: every output of every command against every input."""
+
+from __future__ import annotations
+
+import argparse
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from wheel_terra_estimator.cli.main import main, sub_parsers
+from wheel_terra_estimator.cli.outputs import Output
+from wheel_terra_estimator.configuration import reader, soil_file
+from wheel_terra_estimator.configuration.shipped import FileName
+from wheel_terra_estimator.output_folder import new_folder
+
+PATH_LIKE = re.compile(r'(^|\|)(F|FILE|DIR|BAG|DATA|A|B|LOG|MAP)($|\||\.)')
+"""Placeholders that stand for a path in the help of a command."""
+HARMLESS = argparse._HelpAction, argparse._StoreTrueAction, argparse._StoreConstAction
+ROVER = 'wheels.names: [left, right]\n    rover.mass: 50.0\n'
+
+
+def leaves(
+    parsers: dict[str, argparse.ArgumentParser], prefix: tuple[str, ...] = ()
+) -> Iterator[tuple[tuple[str, ...], argparse.ArgumentParser]]:
+    for name, parser in parsers.items():
+        below = [a for a in parser._actions if isinstance(a, argparse._SubParsersAction)]
+        if below:
+            yield from leaves(dict(below[0].choices), (*prefix, name))
+        else:
+            yield (*prefix, name), parser
+
+
+COMMANDS = dict(leaves(sub_parsers()))
+
+
+def outputs(parser: argparse.ArgumentParser) -> list[argparse.Action]:
+    return [action for action in parser._actions if isinstance(action, Output)]
+
+
+def inputs(parser: argparse.ArgumentParser) -> list[argparse.Action]:
+    return [a for a in parser._actions if a.type in (Path, FileName) and not isinstance(a, Output)]
+
+
+PAIRS = [
+    pytest.param(words, output.dest, given.dest, id=f'{"_".join(words)}-{output.dest}-{given.dest}')
+    for words, parser in COMMANDS.items()
+    for output in outputs(parser)
+    for given in inputs(parser)
+]
+
+
+@pytest.mark.parametrize('words', COMMANDS, ids=' '.join)
+def test_every_option_says_whether_it_is_read_or_written(words: tuple[str, ...]) -> None:
+    for action in COMMANDS[words]._actions:
+        if isinstance(action, HARMLESS) or action.choices or isinstance(action, Output):
+            continue
+        metavar = action.metavar if isinstance(action.metavar, str) else action.dest
+        if PATH_LIKE.search(metavar) and action.dest != 'name':  # of `config`, a shipped name
+            assert action.type in (Path, FileName), f'{action.dest}: type=Path or action=Output'
+
+
+def test_the_walk_finds_what_it_is_for() -> None:
+    assert len(PAIRS) > 30
+    assert {words[0] for words, parser in COMMANDS.items() if outputs(parser)} == {
+        'simulate', 'calibrate', 'init', 'compare', 'convert', 'replay', 'predict', 'diagnose',
+        'trial', 'soilbin', 'evaluate', 'demo',
+    }  # fmt: skip
+
+
+def command_line(words: tuple[str, ...], given: dict[str, Path], spare: Path) -> list[str]:
+    """Return a command line with all that is required; `spare` stands for files not given."""
+    line = list(words)
+    for action in COMMANDS[words]._actions:
+        wanted = action.dest in given
+        if not (wanted or action.required) or isinstance(action, HARMLESS):
+            continue
+        value = str(given.get(action.dest, spare))
+        if action.choices:
+            value = str(next(iter(action.choices)))
+        line += [*([action.option_strings[-1]] if action.option_strings else []), value]
+    return [*line, '--overwrite']
+
+
+@pytest.mark.parametrize(('words', 'output', 'given'), PAIRS)
+def test_no_output_is_an_input_or_holds_one_or_lies_in_it(
+    words: tuple[str, ...],
+    output: str,
+    given: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture,
+) -> None:
+    """By whatever name: the path itself, another spelling, a hard link, our own folder."""
+    ours = tmp_path / 'ours'
+    with new_folder(ours) as folder:
+        (folder / 'mine.yaml').write_text(f'/**:\n  ros__parameters:\n    {ROVER}')
+    mine = ours / 'mine.yaml'
+    before = mine.read_bytes()
+    (tmp_path / 'hard.yaml').hardlink_to(mine)
+    for target in (mine, ours / '..' / 'ours' / 'mine.yaml', tmp_path / 'hard.yaml', ours):
+        line = command_line(words, {given: mine, output: target}, tmp_path / 'spare.yaml')
+        assert main(line) == 2, line
+        said = capsys.readouterr().err
+        assert 'which the command reads' in said, line
+        assert said.count('\n') == 1
+        assert mine.read_bytes() == before
+    if next(a for a in inputs(COMMANDS[words]) if a.dest == given).type is Path:
+        line = command_line(words, {given: ours, output: mine}, tmp_path / 'spare.yaml')
+        assert main(line) == 2
+        assert 'which the command reads' in capsys.readouterr().err
+    assert [p.name for p in ours.iterdir() if p.name != '.wheel-terra.json'] == ['mine.yaml']
+
+
+def test_the_effect_file_of_a_rover_file_is_an_input(
+    tmp_path: Path, capsys: pytest.CaptureFixture
+) -> None:
+    effects = tmp_path / 'effects.py'
+    effects.write_text('mine = 1\n')
+    rover = tmp_path / 'rover.yaml'
+    rover.write_text(f'/**:\n  ros__parameters:\n    {ROVER}    effect_file: effects.py\n')
+    line = ['calibrate', 'bag', '--config', str(rover), '-o', str(effects), '--overwrite']
+    assert main(line) == 2
+    assert 'effects.py, which the command reads' in capsys.readouterr().err
+    assert effects.read_text() == 'mine = 1\n'
+
+
+def test_one_path_for_two_outputs_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    out = str(tmp_path / 'out.csv')
+    assert main(['replay', 'bag', '--table', out, '--track', out]) == 2
+    assert 'named for two outputs' in capsys.readouterr().err
+
+
+def test_a_soil_file_replaces_no_file_of_another_kind(
+    tmp_path: Path, capsys: pytest.CaptureFixture
+) -> None:
+    """--overwrite is for earlier soil files: a rover file is none."""
+    mine = tmp_path / 'my_rover.yaml'
+    reader.load(['pathfinder']).write(mine)
+    before = mine.read_bytes()
+    line = ['replay', 'bag', '--config', 'pathfinder', '--save-soil', str(mine), '--overwrite']
+    assert main(line) == 2
+    assert f"does not begin with '# {soil_file.HEADER}'" in capsys.readouterr().err
+    assert mine.read_bytes() == before

@@ -1,0 +1,64 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""What a command line reads is never written to: told by the options themselves, for all commands.
+
+An option that names what is written has ``action=Output``; one that names what is read has
+``type=Path``, or ``type=FileName`` where the bare name of a shipped file will do.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+from itertools import combinations
+from pathlib import Path
+from typing import Any
+
+from wheel_terra_estimator.configuration import reader, shipped
+from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.output_folder import refuse_inputs
+
+
+class Output(argparse.Action):
+    """An option that names a file or folder to be written."""
+
+    def __call__(
+        self,
+        parser: argparse.ArgumentParser,
+        namespace: argparse.Namespace,
+        values: Any,
+        option_string: str | None = None,
+    ) -> None:
+        """Keep the path, and that it is an output."""
+        setattr(namespace, self.dest, values)
+        namespace.outputs = {**getattr(namespace, 'outputs', {}), self.dest: values}
+
+
+def check(arguments: argparse.Namespace) -> None:
+    """Refuse outputs that are, or hold, or lie in what the command reads, and those named twice.
+
+    Raises
+    ------
+    UserError
+        An output is one of these, or a parameter file cannot be read.
+    """
+    outputs: dict[str, Path] = getattr(arguments, 'outputs', {})
+    if not outputs:
+        return
+    inputs = list(_inputs(arguments, outputs))
+    for path in outputs.values():
+        refuse_inputs(path, inputs)
+    for one, other in combinations(outputs.values(), 2):
+        if one.absolute() == other.absolute():
+            raise UserError(f'{one}: is named for two outputs; give each a path of its own')
+
+
+def _inputs(arguments: argparse.Namespace, outputs: dict[str, Path]) -> Iterator[Path]:
+    for name, value in vars(arguments).items():
+        if name in outputs:
+            continue
+        for item in value if isinstance(value, list) else [value]:
+            if isinstance(item, shipped.FileName):
+                yield from reader.files_behind(item)
+            elif isinstance(item, Path):
+                yield item
