@@ -50,3 +50,22 @@ def test_messages_of_a_chunk_with_a_damaged_head(
     assert found == [tuple(sample) for sample in samples]
     assert notes or value == b'\0'  # no checksum, no size stated
     assert 'GB' not in notes
+
+
+def test_messages_outside_of_the_times_of_their_chunk_are_said(tmp_path: Path) -> None:
+    """No checksum covers them; the head of the chunk states between which times they lie."""
+    samples = [Sample(START + 10_000_000 * i, '/imu/data', bytes(80)) for i in range(200)]
+    layout = Layout(4000, 'lz4', checksums=False)
+    first, moved = make(samples, TYPES, layout).parts[1][2][0], samples[60]
+    samples[60] = moved._replace(log_time=START)
+    made = make(samples, TYPES, layout)
+    begin, _, part = made.parts[1]
+    assert samples[60] in part
+    content = bytearray(made.content)
+    content[begin + 9 : begin + 17] = first.log_time.to_bytes(8, 'little')
+    path = tmp_path / 'a.mcap'
+    path.write_bytes(content)
+    with open_bag(path) as bag:
+        assert len(list(bag.messages(list(TYPES)))) == 200
+        assert bag.notes[0].startswith('a.mcap is damaged')
+        assert f'from {(first.log_time - START) * 1e-9:.1f} s' in bag.notes[0]

@@ -440,14 +440,14 @@ class McapFile:
         whole = self._whole_pass(piece.begin, content.data, possible[0], wanted, allowed)
         if whole is not None:
             return whole
-        best = None
-        for each in possible:
-            reading = self._pass(piece.begin, content.data, each, wanted, allowed)
-            if best is None or reading.lost_bytes < best.lost_bytes:
-                best = reading
-            if not best.lost_bytes:
-                break
-        assert best is not None
+        found = [self._pass(piece.begin, content.data, possible[0], wanted, allowed)]
+        for each in possible[1:]:
+            if found[-1].lost_bytes:
+                found.append(self._pass(piece.begin, content.data, each, wanted, allowed))
+        best = min(found, key=lambda reading: reading.lost_bytes)
+        if best is not found[0] and 2 * found[0].counts.total() > best.counts.total():
+            # Few messages lie outside of the times of the head: these are damaged, not the head.
+            best.lost_between.append((None, None))
         return best
 
     def _whole_pass(

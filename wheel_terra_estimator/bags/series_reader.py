@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -96,6 +97,7 @@ def read_series(
     }
     unpack = {own: topic_messages(INPUT_TYPES[own]).unpack for own in collectors}
     shortened = False
+    garbage: Counter[str] = Counter()
     for log_time, topic, data in bag.messages([chosen[own] for own in collectors]):
         own = by_topic[topic]
         collector = collectors[own]
@@ -107,8 +109,15 @@ def read_series(
         try:
             message = unpack[own](data)
         except DamagedMessageError:
+            garbage[topic] += 1
             continue
         collector.add(log_time, message)
+    if garbage or bag.damaged:
+        for collector in collectors.values():
+            garbage[collector.topic] += collector.leave_out_strays()
+    left_out = [
+        f'{n} damaged messages on {topic} were left out' for topic, n in garbage.items() if n
+    ]
 
     def made(own: str) -> Any:
         collector = collectors.get(own)
@@ -123,12 +132,16 @@ def read_series(
         reference=made('reference_odom'),
         wheel_odometry=made('odom'),
         shortened=shortened,
-        notes=tuple(bag.notes),
+        notes=(*bag.notes, *left_out),
     )
 
 
 LARGEST = 1e9
 """A number beyond this is damage in any unit."""
+_STRAY = 1e9
+"""Stamps of a damaged recording that lie so far [ns] from where the others do are damaged."""
+_STRAYS = 0.2
+"""Greatest share of such stamps that damage explains."""
 
 
 def credible(values: Any) -> Any:
@@ -150,6 +163,19 @@ class _Collector:
         self.stamps.append(stamp_of(message))
         self.log_times.append(log_time)
         self.rows.append(self.row(message))
+
+    def leave_out_strays(self) -> int:
+        """Leave out what is stamped far from its log time, unless much is; return how many."""
+        stamps, log_times = (times.astype(float) for times in self.times)
+        delays = log_times - stamps
+        stray = np.abs(delays - np.median(delays)) > _STRAY if delays.size else np.zeros(0, bool)
+        if np.mean(stray) > _STRAYS:  # a clock that was set, not damage
+            return 0
+        keep = np.flatnonzero(~stray).tolist()
+        self.stamps = [self.stamps[i] for i in keep]
+        self.log_times = [self.log_times[i] for i in keep]
+        self.rows = [self.rows[i] for i in keep]
+        return int(stray.sum())
 
     def row(self, message: Any) -> Any:
         raise NotImplementedError

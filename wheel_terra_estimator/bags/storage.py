@@ -72,6 +72,11 @@ class Bag:
         return [*self._notes, *(note for source in self._sources for note in source.notes())]
 
     @property
+    def damaged(self) -> bool:
+        """Whether something of a file was lost, as far as it is known by now."""
+        return any(source.notes() for source in self._sources)
+
+    @property
     def message_count(self) -> int:
         """Number of messages on all topics."""
         return sum(topic.message_count for topic in self.topics.values())

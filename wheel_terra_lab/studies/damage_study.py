@@ -150,7 +150,8 @@ def judge(path: Path, made: Made, touched: Places, score: Score) -> list[str]:
     faults = []
     if found.total() < recorded.total() and not notes:
         faults.append(f'{recorded.total() - found.total()} messages lost in silence')
-    if found.total() > recorded.total() or twice(found, recorded):
+    # Packed bytes that are damaged may unpack to a second copy of a message: it counts as altered.
+    if found.total() > recorded.total() or (path.suffix == '.db3' and twice(found, recorded)):
         faults.append('messages that were never recorded')
     if missing.total() > 0.1 * intact.total():
         faults.append(f'{missing.total()} of {intact.total()} intact messages lost ({notes})')
