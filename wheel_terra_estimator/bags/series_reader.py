@@ -168,7 +168,9 @@ class _Collector:
         """Leave out what is stamped far from its log time, unless much is; return how many."""
         stamps, log_times = (times.astype(float) for times in self.times)
         delays = log_times - stamps
-        stray = np.abs(delays - np.median(delays)) > _STRAY if delays.size else np.zeros(0, bool)
+        if not delays.size:
+            return 0
+        stray = np.abs(delays - np.median(delays)) > _STRAY
         if np.mean(stray) > _STRAYS:  # a clock that was set, not damage
             return 0
         keep = np.flatnonzero(~stray).tolist()
