@@ -238,6 +238,22 @@ def beyond(place, allowed, libraries):
                 yield f'{file} imports {name}'
 
 
+def test_the_reader_of_damaged_recordings_could_be_a_library_of_its_own():
+    """It knows nothing of rovers: of the package it imports itself and the error alone."""
+    own = f'{PACKAGE.name}.bags.salvage'
+    libraries = {'numpy', 'lz4', 'compression', 'backports', '__future__'}
+    named = {
+        name
+        for file in (PACKAGE / 'bags' / 'salvage').rglob('*.py')
+        for name in imported_names(ast.parse(file.read_text()))
+        if name.partition('.')[0] not in sys.stdlib_module_names | libraries
+    }
+    assert own in named
+    assert not {name for name in named if name != own and not name.startswith(f'{own}.')} - {
+        f'{PACKAGE.name}.errors'
+    }
+
+
 def test_the_product_never_imports_the_laboratory():
     named = [
         f'{file.relative_to(PACKAGE)}: {name}'

@@ -15,8 +15,8 @@ from typing import Any
 
 import pytest
 
-from wheel_terra_estimator.bags.limits import Limits
-from wheel_terra_estimator.bags.raw_messages import RawMessage
+from wheel_terra_estimator.bags.salvage.limits import Limits
+from wheel_terra_estimator.bags.salvage.raw_messages import RawMessage
 from wheel_terra_estimator.bags.storage import open_bag
 from wheel_terra_estimator.cli.main import main
 from wheel_terra_estimator.errors import UserError

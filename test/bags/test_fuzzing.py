@@ -30,7 +30,7 @@ def test_a_message_that_lost_bytes_hides_no_chunk_behind_it() -> None:
 
 def test_the_judgement_can_fail(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A reader that drops one message is found out."""
-    from wheel_terra_estimator.bags.mcap_file import McapFile
+    from wheel_terra_estimator.bags.salvage.mcap_file import McapFile
 
     honest = McapFile.messages
 

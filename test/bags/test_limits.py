@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 from wheel_terra_estimator.bags import limits, storage
+from wheel_terra_estimator.bags.salvage.limits import LIMITS, Limits, in_words
 from wheel_terra_estimator.cli.main import main
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_lab.studies.fuzzing.cases import _real_messages
@@ -19,14 +20,14 @@ from wheel_terra_lab.studies.fuzzing.mcap_maker import Layout, Sample, make
 TYPES = {'/joint_states': 'sensor_msgs/msg/JointState', '/imu/data': 'sensor_msgs/msg/Imu'}
 
 
-def parsed(*options: str) -> limits.Limits:
+def parsed(*options: str) -> Limits:
     parser = argparse.ArgumentParser()
     limits.add_arguments(parser)
     return limits.from_arguments(parser.parse_args(options))
 
 
 def test_without_options_the_limits_are_the_usual_ones() -> None:
-    assert parsed() == limits.LIMITS
+    assert parsed() == LIMITS
 
 
 @pytest.mark.parametrize(
@@ -47,7 +48,7 @@ def test_no_sizes(text: str, capsys: Any) -> None:
 
 def test_sizes_in_words() -> None:
     sizes = (300, 5000, 2**28, 3 * 2**29)
-    assert [limits.in_words(size) for size in sizes] == ['300 B', '4.88 kB', '256 MB', '1.5 GB']
+    assert [in_words(size) for size in sizes] == ['300 B', '4.88 kB', '256 MB', '1.5 GB']
 
 
 def commands(bag: Path, folder: Path) -> dict[str, list[str]]:
@@ -72,9 +73,9 @@ NAMES = sorted(commands(Path(), Path()))
 def test_each_command_hands_its_limits_to_the_reader(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Any
 ) -> None:
-    seen: list[limits.Limits] = []
+    seen: list[Limits] = []
 
-    def refuse(path: Path, notes: Any, stack: Any, given: limits.Limits) -> Any:
+    def refuse(path: Path, notes: Any, stack: Any, given: Limits) -> Any:
         seen.append(given)
         raise UserError('seen')
 
@@ -84,7 +85,7 @@ def test_each_command_hands_its_limits_to_the_reader(
     command = [name, *commands(bag, tmp_path)[name]]
     assert main(command) == 2
     assert main([*command, '--largest-message', '3MB', '--most-held=2GB']) == 2
-    assert seen == [limits.LIMITS, limits.Limits(3 * 2**20, 2**31, 3 * 2**20)]
+    assert seen == [LIMITS, Limits(3 * 2**20, 2**31, 3 * 2**20)]
 
 
 def test_more_than_may_be_held_is_refused_with_the_cure(
@@ -114,7 +115,7 @@ def test_a_message_that_is_heard_has_a_limit_of_its_own(make_bag: Any, rover: An
     from wheel_terra_estimator.bags.reader import MeasurementReader
     from wheel_terra_estimator.bags.storage import open_bag
 
-    with open_bag(make_bag(), limits.Limits(message=200)) as bag:
+    with open_bag(make_bag(), Limits(message=200)) as bag:
         reader = MeasurementReader(bag, {}, rover)
         heard = list(reader.measurements())
     assert heard

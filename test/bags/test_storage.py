@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 import yaml
 
-from wheel_terra_estimator.bags.raw_messages import RawMessage
+from wheel_terra_estimator.bags.salvage.raw_messages import RawMessage
 from wheel_terra_estimator.bags.storage import open_bag
 from wheel_terra_estimator.errors import UserError
 

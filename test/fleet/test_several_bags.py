@@ -48,7 +48,7 @@ def test_several_are_what_each_is_alone(
     assert main(arguments) == 1
     said = capsys.readouterr().out.splitlines()
     assert said[-2] == '1 of 4 recordings failed:'
-    assert said[-1].startswith(f'  {bags[1]}: the bag holds no messages')
+    assert said[-1].startswith(f'  {bags[1]}: not one message can be read')
     for name in ('drive3', 'drive2', 'drive1'):
         alone = tmp_path / 'alone' / name
         assert main(['replay', str(tmp_path / name), *config, '-o', str(alone)]) == 0

@@ -11,8 +11,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, NamedTuple, TypeVar
 
-from wheel_terra_estimator.bags.mcap_closing import add_checksums, close_cut_file
 from wheel_terra_estimator.bags.message_factory import MessageFactory
+from wheel_terra_estimator.bags.salvage.mcap_closing import add_checksums, close_cut_file
 from wheel_terra_estimator.output_folder import check_folder, new_folder
 
 Self = TypeVar('Self', bound='BagFile')

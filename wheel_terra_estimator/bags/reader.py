@@ -9,8 +9,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from wheel_terra_estimator.bags.limits import LIMITS, Limits, in_words
 from wheel_terra_estimator.bags.message_types import topic_messages
+from wheel_terra_estimator.bags.salvage.limits import LIMITS, Limits, in_words
 from wheel_terra_estimator.bags.storage import Bag, open_bag
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.configuration.parameters import nearest

@@ -18,12 +18,12 @@ from tempfile import TemporaryDirectory
 from typing import Protocol
 
 from wheel_terra_estimator.bags import bag_metadata
-from wheel_terra_estimator.bags.compression import ZSTD_MAGIC, unpack_file, unpack_message
-from wheel_terra_estimator.bags.limits import LIMITS, Limits
-from wheel_terra_estimator.bags.losses import Losses
-from wheel_terra_estimator.bags.mcap_file import McapFile
-from wheel_terra_estimator.bags.raw_messages import RawMessage, Topic
-from wheel_terra_estimator.bags.sqlite_file import SqliteFile
+from wheel_terra_estimator.bags.salvage.compression import ZSTD_MAGIC, unpack_file, unpack_message
+from wheel_terra_estimator.bags.salvage.limits import LIMITS, Limits
+from wheel_terra_estimator.bags.salvage.losses import Losses
+from wheel_terra_estimator.bags.salvage.mcap_file import McapFile
+from wheel_terra_estimator.bags.salvage.raw_messages import RawMessage, Topic
+from wheel_terra_estimator.bags.salvage.sqlite_file import SqliteFile
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.input_file import check_regular
 

@@ -15,7 +15,7 @@ from wheel_terra_estimator.cli.outputs import Output
 from wheel_terra_estimator.errors import UserError
 
 if TYPE_CHECKING:
-    from wheel_terra_estimator.bags.limits import Limits
+    from wheel_terra_estimator.bags.salvage.limits import Limits
     from wheel_terra_estimator.configuration.rover_template import RoverSketch
 
 EXAMPLES = (

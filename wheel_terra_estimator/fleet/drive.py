@@ -8,8 +8,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from wheel_terra_estimator.bags.limits import LIMITS, Limits
 from wheel_terra_estimator.bags.replay import Replay, replay
+from wheel_terra_estimator.bags.salvage.limits import LIMITS, Limits
 from wheel_terra_estimator.bags.series_reader import read_series
 from wheel_terra_estimator.bags.storage import Bag, open_bag
 from wheel_terra_estimator.bags.truth import Truth, read_truth

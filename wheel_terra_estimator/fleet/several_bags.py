@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from wheel_terra_estimator import __version__
-from wheel_terra_estimator.bags.limits import LIMITS, Limits
+from wheel_terra_estimator.bags.salvage.limits import LIMITS, Limits
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.errors import UserError, outside_cause
 from wheel_terra_estimator.fleet.drive import replay_drive

@@ -21,8 +21,8 @@ from pathlib import Path
 import numpy as np
 
 from wheel_terra_estimator.bags.message_factory import MessageFactory
-from wheel_terra_estimator.bags.raw_messages import RawMessage, Topic
 from wheel_terra_estimator.bags.replay import replay
+from wheel_terra_estimator.bags.salvage.raw_messages import RawMessage, Topic
 from wheel_terra_estimator.bags.storage import Bag
 from wheel_terra_estimator.configuration import reader as configuration_reader
 from wheel_terra_estimator.messages.convert import INPUT_TYPES

@@ -48,7 +48,7 @@ from wheel_terra_estimator.estimation.sensor_errors import SensorErrors
 from wheel_terra_estimator.terramechanics.kinematics import slip_ratio
 
 if TYPE_CHECKING:
-    from wheel_terra_estimator.bags.limits import Limits
+    from wheel_terra_estimator.bags.salvage.limits import Limits
 
 FloatArray = NDArray[np.float64]
 
@@ -186,8 +186,8 @@ def rows_from_bag(
     UserError
         If the bag cannot be read, lacks a sensor, or holds no steady window.
     """
-    from wheel_terra_estimator.bags.limits import LIMITS
     from wheel_terra_estimator.bags.reader import MeasurementReader
+    from wheel_terra_estimator.bags.salvage.limits import LIMITS
     from wheel_terra_estimator.bags.storage import open_bag
 
     with open_bag(path, limits or LIMITS) as bag:

@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import NamedTuple
 from zlib import crc32
 
-from wheel_terra_estimator.bags import mcap_records as mcap
-from wheel_terra_estimator.bags.compression import unpack
+from wheel_terra_estimator.bags.salvage import mcap_records as mcap
+from wheel_terra_estimator.bags.salvage.compression import unpack
 
 ROOM = 2**16
 """Left free for the summary and the metadata [byte]; an entry of the index takes `PER_CHUNK`."""

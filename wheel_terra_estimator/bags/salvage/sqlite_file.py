@@ -21,10 +21,10 @@ from urllib.parse import quote
 
 import numpy as np
 
-from wheel_terra_estimator.bags.limits import LIMITS, Limits
-from wheel_terra_estimator.bags.losses import Losses
-from wheel_terra_estimator.bags.raw_messages import RawMessage, Topic
-from wheel_terra_estimator.bags.sqlite_rows import find_rows
+from wheel_terra_estimator.bags.salvage.limits import LIMITS, Limits
+from wheel_terra_estimator.bags.salvage.losses import Losses
+from wheel_terra_estimator.bags.salvage.raw_messages import RawMessage, Topic
+from wheel_terra_estimator.bags.salvage.sqlite_rows import find_rows
 from wheel_terra_estimator.errors import UserError
 
 # Damaged text may stand in the library's own message, which is decoded as UTF-8.

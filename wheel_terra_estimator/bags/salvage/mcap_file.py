@@ -24,11 +24,11 @@ from pathlib import Path
 from typing import Any, NamedTuple
 from zlib import crc32
 
-from wheel_terra_estimator.bags import mcap_records as mcap
-from wheel_terra_estimator.bags.compression import MAGICS, unpack
-from wheel_terra_estimator.bags.limits import LIMITS, MEGABYTE, Limits, in_words
-from wheel_terra_estimator.bags.losses import Losses
-from wheel_terra_estimator.bags.raw_messages import RawMessage, Topic
+from wheel_terra_estimator.bags.salvage import mcap_records as mcap
+from wheel_terra_estimator.bags.salvage.compression import MAGICS, unpack
+from wheel_terra_estimator.bags.salvage.limits import LIMITS, MEGABYTE, Limits, in_words
+from wheel_terra_estimator.bags.salvage.losses import Losses
+from wheel_terra_estimator.bags.salvage.raw_messages import RawMessage, Topic
 from wheel_terra_estimator.errors import UserError
 
 _FOOTER = mcap.HEAD + 20 + len(mcap.MAGIC)  # [byte], with the closing magic

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from wheel_terra_estimator.bags.limits import LIMITS, MEGABYTE, Limits, in_words
+from wheel_terra_estimator.bags.salvage.limits import LIMITS, MEGABYTE, Limits, in_words
 from wheel_terra_estimator.errors import UserError
 
 ZSTD_MAGIC = b'\x28\xb5\x2f\xfd'
