@@ -105,7 +105,15 @@ def test_the_configuration_is_read_without_the_heavy_libraries():
 
 # Folder -> (folders of the package, libraries beyond the standard one) that its modules may
 # import, at the top or inside a function. A new folder needs a line here.
-COMMON = {'errors', 'input_file', 'output_folder', 'scheduler', 'worker_pool', '__version__'}
+COMMON = {
+    'errors',
+    'csv_file',
+    'input_file',
+    'output_folder',
+    'scheduler',
+    'worker_pool',
+    '__version__',
+}
 PICTURES = {'matplotlib', 'jinja2'}
 MAY_USE = {
     'terramechanics': (set(), {'numpy'}),

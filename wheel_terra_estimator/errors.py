@@ -40,6 +40,10 @@ class UserError(Exception):
         super().__init__(' '.join(line.splitlines()))  # cells and keys may hold line feeds
 
 
+class UnitWarning(UserWarning):
+    """A number that can be, but looks as if it were in another unit."""
+
+
 def outside_cause(error: BaseException) -> str | None:
     """Return in words what outside the program an error comes from; None: the program itself."""
     if isinstance(error, UserError):

@@ -12,7 +12,7 @@ from wheel_terra_estimator.errors import UserError
 LARGEST_TEXT = 2**20
 """A configuration file has some kilobytes; a text above this size [byte] is none."""
 
-LARGEST_TABLE = 16 * 2**20
+LARGEST_TABLE = 128 * 2**20
 """A table of measurements above this size [byte] has more rows than can be worked on."""
 
 
@@ -40,6 +40,21 @@ def check_regular(path: Path) -> int:
     return found.st_size
 
 
+def check_size(path: Path, largest: int | None) -> None:
+    """Refuse what is no regular file, or larger than so many bytes (None: of any size).
+
+    Raises
+    ------
+    UserError
+        As said, or nothing there.
+    """
+    size = check_regular(path)
+    if largest is not None and size > largest:
+        raise UserError(
+            f'{path}: {size / 2**20:.0f} MB; of such a file at most {largest / 2**20:g} MB are read'
+        )
+
+
 def read_text(path: Path, largest: int = LARGEST_TEXT) -> str:
     """Return the text of a file.
 
@@ -55,15 +70,12 @@ def read_text(path: Path, largest: int = LARGEST_TEXT) -> str:
     UserError
         Not there, no regular file, too large, not UTF-8.
     """
-    if check_regular(path) > largest:
-        raise UserError(f'{path}: is larger than {largest / 2**20:g} MB; it cannot be such a file')
+    check_size(path, largest)
     try:
         with path.open('rb') as file:
-            content = file.read(largest + 1)
+            content = file.read(largest)
     except OSError as error:
         raise UserError(f'{path}: cannot be read: {error.strerror}') from None
-    if len(content) > largest:
-        raise UserError(f'{path}: is larger than {largest / 2**20:g} MB; it cannot be such a file')
     try:
         return content.decode('utf-8-sig')
     except UnicodeDecodeError as error:

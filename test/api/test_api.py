@@ -172,7 +172,7 @@ def test_diagnose_and_the_corrected_model(named):
 
 
 def test_diagnose_refuses_unknown_columns():
-    with pytest.raises(api.UserError, match='rename it to one of'):
+    with pytest.raises(api.UserError, match=r"no column 'slip'.*'slipp' \(slip\?\)"):
         api.diagnose({'slipp': [0.1]}, 'hit_wh3')
 
 

@@ -113,7 +113,7 @@ def test_a_map_that_cannot_be_used(files, capsys, old, new, words):
 def test_a_cell_that_is_no_number(files, capsys):
     (files / 'log.csv').write_text('\n'.join([HEADER, ROWS[0], ROWS[1].replace('30', 'abc')]))
     assert main(command(files)) == 2
-    assert "log.csv: row 3: rpm_fl: 'abc' is no number" in capsys.readouterr().err
+    assert "log.csv, line 3, column rpm_fl: 'abc' is not a number" in capsys.readouterr().err
 
 
 def test_the_example_is_plain_yaml(files):

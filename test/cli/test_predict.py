@@ -73,15 +73,15 @@ def test_points_of_a_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -
     got = table(capsys.readouterr().out)
     assert got['lug_height'].tolist() == [0.01, 0.0, 0.01]
     assert len(set(got['drawbar_pull'].tolist())) == 3
-    path.write_text('slip,load\n0.2,80\n')
+    path.write_text('slip,Fz\n0.2,80\n')
     assert main([*BASE, '--points', str(path)]) == 2
-    assert 'no column normal_load' in capsys.readouterr().err
+    assert "no column 'normal_load'" in capsys.readouterr().err
     path.write_text('slip,normal_load\n')
     assert main([*BASE, '--points', str(path)]) == 2
     assert 'no rows below the column names' in capsys.readouterr().err
     path.write_text('slip,normal_load\n0.2,80\n0.3,heavy\n')
     assert main([*BASE, '--points', str(path)]) == 2
-    assert "row 3: normal_load is 'heavy'" in capsys.readouterr().err
+    assert "line 3, column normal_load: 'heavy' is not a number" in capsys.readouterr().err
 
 
 def test_picture_and_the_refusal_to_overwrite(

@@ -16,6 +16,7 @@ from wheel_terra_estimator.api.frames import Columns, to_frame
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.configuration.readings import Readings
+from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.terramechanics import soil as terramechanics_soil
 from wheel_terra_estimator.terramechanics.effects import EffectSettings
 from wheel_terra_estimator.terramechanics.effects.base import OUTPUTS
@@ -100,8 +101,8 @@ class Model:
     ----------
     wheel : Wheel
         One wheel (floats).
-    soil : Soil
-        Its soil.
+    soil : Soil, str or pathlib.Path
+        Its soil, or the name of a shipped one.
     effects : mapping, optional
         Effect name -> parameter -> value; a missing parameter takes its default. Names and
         parameters: ``wheel-terra effects``.
@@ -130,13 +131,21 @@ class Model:
     def __init__(
         self,
         wheel: Wheel,
-        soil: terramechanics_soil.Soil,
+        soil: terramechanics_soil.Soil | str | Path,
         effects: EffectSettings | None = None,
         *,
         slip_radius: str = 'lug_tip',
         gravity: float = STANDARD_GRAVITY,
         method: str = 'quadrature',
     ) -> None:
+        if isinstance(soil, str | Path):
+            soil = Soil.load(soil)
+        for given, kind in ((wheel, Wheel), (soil, terramechanics_soil.Soil)):
+            if not isinstance(given, kind):
+                raise UserError(
+                    f'Model: {given!r} is no {kind.__name__}; give Wheel(radius=0.13, width=0.16) '
+                    "and Soil.load('dlr_mss'), or use Model.load('hit_wh3', 'hit_fit')"
+                )
         self._set(_configuration(wheel, soil, effects or {}, slip_radius, gravity), method)
 
     @classmethod

@@ -8,14 +8,13 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from wheel_terra_estimator.api.frames import columns_of
 from wheel_terra_estimator.api.models import Model
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.configuration.configuration import Configuration
-from wheel_terra_estimator.errors import UserError
 
 if TYPE_CHECKING:
     from wheel_terra_estimator.discrepancy.result import Diagnosis
+    from wheel_terra_estimator.discrepancy.tables.header import Choice
     from wheel_terra_estimator.discrepancy.tables.steady_table import SteadyTable
 
 
@@ -27,6 +26,8 @@ def diagnose(
     effects: Sequence[str] | None = None,
     remaps: Mapping[str, str] | None = None,
     smooth: bool = False,
+    columns: Mapping[str, Any] | str | Path | None = None,
+    ignore_columns: Sequence[str] = (),
 ) -> Diagnosis:
     """Find where measurements and a model disagree, and name the effect that is missing.
 
@@ -45,6 +46,11 @@ def diagnose(
         For a bag: the estimator's topic -> the bag's.
     smooth : bool
         For a bag: slip from the fixed-interval smoother, see ``docs/discrepancy/drives.md``.
+    columns : mapping or path, optional
+        Which column of the table is what, where its titles do not say: ``{'sinkage': '-z [mm]'}``,
+        or a YAML file of such lines.
+    ignore_columns : sequence of str
+        Titles of columns of numbers that are left out; ``['all']``: whatever is not understood.
 
     Returns
     -------
@@ -65,14 +71,16 @@ def diagnose(
     >>> diagnose(measured, ['hit_wh3', 'hit_fit'], effects=['cohesion']).verdict
     'agrees'
     """
+    from wheel_terra_estimator.discrepancy.tables.header import Choice
     from wheel_terra_estimator.discrepancy.workflow import Options
     from wheel_terra_estimator.discrepancy.workflow import diagnose as run
 
     configuration = _configuration(model)
-    table = _table(data, 'data', configuration, remaps or {}, smooth)
+    choice = Choice.of(columns or {}, ignore_columns)
+    table = _table(data, 'data', configuration, remaps or {}, smooth, choice)
     before = None
     if reference is not None:
-        before = _table(reference, 'reference', configuration, remaps or {}, smooth)
+        before = _table(reference, 'reference', configuration, remaps or {}, smooth, choice)
     options = Options(tuple(effects) if effects is not None else None)
     return run(table, configuration, before, options)
 
@@ -99,24 +107,20 @@ def _configuration(
 
 
 def _table(
-    data: Any, name: str, configuration: Configuration, remaps: Mapping[str, str], smooth: bool
+    data: Any,
+    name: str,
+    configuration: Configuration,
+    remaps: Mapping[str, str],
+    smooth: bool,
+    choice: Choice,
 ) -> SteadyTable:
-    from wheel_terra_estimator.discrepancy.tables.checks import check_table
-    from wheel_terra_estimator.discrepancy.tables.parsing import read_table
-    from wheel_terra_estimator.discrepancy.tables.steady_table import COLUMNS
+    from wheel_terra_estimator.discrepancy.tables.parsing import read_table, table_of
 
     if not isinstance(data, str | Path):
-        columns = columns_of(data, name)
-        for key in columns:
-            if key not in COLUMNS:
-                raise UserError(
-                    f'{name}: unknown column {key!r}; leave it out, or rename it to one of '
-                    + ', '.join(COLUMNS)
-                )
-        return check_table(name, columns)
+        return table_of(data, name, choice)
     path = Path(data)
     if path.suffix.lower() in ('.csv', '.txt'):
-        return read_table(path)
+        return read_table(path, choice)
     from wheel_terra_estimator.discrepancy.drives.windows import rows_from_bag
 
     return rows_from_bag(path, configuration, remaps, smooth=smooth).table()

@@ -7,7 +7,6 @@ A map says which column is what, in which unit and with which sign (`EXAMPLE`).
 
 from __future__ import annotations
 
-import csv
 import math
 from collections import deque
 from collections.abc import Mapping
@@ -15,12 +14,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from wheel_terra_estimator.bags.bag_file import BagFile
+from wheel_terra_estimator.configuration.column_map import UNITS, entry_of, factor, read_map
 from wheel_terra_estimator.configuration.parameters import nearest
+from wheel_terra_estimator.csv_file import number, open_csv
 from wheel_terra_estimator.errors import UserError
-from wheel_terra_estimator.input_file import check_regular, read_text
 from wheel_terra_estimator.messages.convert import INPUT_TYPES
 
 EXAMPLE = """\
@@ -51,17 +49,16 @@ reference_odom:
 # latitude: {column: lat, unit: deg}
 """
 
-UNITS: dict[str, dict[str, float]] = {
-    'time': {'s': 1.0, 'ms': 1e-3, 'us': 1e-6, 'ns': 1e-9},
-    'rate': {'rad/s': 1.0, 'deg/s': math.pi / 180, 'rpm': math.pi / 30, 'rev/s': 2 * math.pi},
-    'angle': {'rad': 1.0, 'deg': math.pi / 180},
-    'torque': {'N m': 1.0, 'N mm': 1e-3},
-    'acceleration': {'m/s^2': 1.0, 'g': 9.80665},
-    'length': {'m': 1.0, 'cm': 1e-2, 'mm': 1e-3},
-    'speed': {'m/s': 1.0, 'km/h': 1 / 3.6, 'mm/s': 1e-3},
-    'number': {'-': 1.0},
+_SI = {
+    'time': 's',
+    'rate': 'rad/s',
+    'angle': 'rad',
+    'torque': 'N m',
+    'acceleration': 'm/s^2',
+    'length': 'm',
+    'speed': 'm/s',
+    'number': '-',
 }
-_DELIMITERS = (',', ';', '\t')  # where two are as frequent, the first
 _AXES = 'xyz'
 _IMU = {
     **{f'linear_acceleration.{axis}': 'acceleration' for axis in _AXES},
@@ -117,34 +114,16 @@ def convert(table: Path, columns: Path, output: Path, overwrite: bool = False) -
     UserError
         Map or table cannot be used; names file, row, column and cure.
     """
-    check_regular(table)
-    try:
-        with table.open(newline='', encoding='utf-8-sig') as file:
-            delimiter = _delimiter(file.readline())
-            file.seek(0)
-            rows = csv.reader(file, delimiter=delimiter)
-            header = [cell.strip() for cell in next(rows, [])]
-            layout = _read_map(columns, header, table)
-            topics = {f'/{name}': INPUT_TYPES[name] for name in _used(layout)}
-            with BagFile(output, topics, overwrite=overwrite, inputs=[table, columns]) as bag:
-                sender = _Sender(bag, layout, table, decimal_comma=delimiter != ',')
-                for number, row in enumerate(rows, start=2):
-                    if any(cell.strip() for cell in row):
-                        sender.send(number, row)
-                if not sender.sent:
-                    raise UserError(f'{table}: no rows below the header')
-            return bag
-    except UnicodeDecodeError:
-        raise UserError(
-            f'{table}: not a UTF-8 text; save it as CSV (UTF-8), or: iconv -f cp1252 -t utf8'
-        ) from None
-    except csv.Error as error:
-        raise UserError(f'{table}: not a CSV table: {error}') from None
-
-
-def _delimiter(header: str) -> str:
-    """Return what stands between the columns: semicolon, tab or comma."""
-    return max(_DELIMITERS, key=header.count)
+    with open_csv(table) as file:
+        layout = _read_map(columns, file.header, table)
+        topics = {f'/{name}': INPUT_TYPES[name] for name in _used(layout)}
+        with BagFile(output, topics, overwrite=overwrite, inputs=[table, columns]) as bag:
+            sender = _Sender(bag, layout, table, file.decimal_comma)
+            for line, row in file.rows:
+                sender.send(line, row)
+            if not sender.sent:
+                raise UserError(f'{table}: no rows below the header')
+        return bag
 
 
 def _used(layout: ColumnMap) -> list[str]:
@@ -153,12 +132,7 @@ def _used(layout: ColumnMap) -> list[str]:
 
 
 def _read_map(path: Path, header: list[str], table: Path) -> ColumnMap:
-    try:
-        document = yaml.safe_load(read_text(path))
-    except yaml.YAMLError as error:
-        raise UserError(f'{path}: not valid YAML: {str(error).splitlines()[0]}') from None
-    if not isinstance(document, Mapping):
-        raise UserError(f'{path}: not a map of columns; see wheel-terra convert --example')
+    document = read_map(path)
     known = ('time', *_TOPICS)
     for key in document:
         if key not in known:
@@ -216,32 +190,28 @@ class _MapReader:
             found[str(key)] = self.column(f'{where}.{key}', value, kinds[key])
         return found
 
-    def column(self, where: str, entry: Any, kind: str) -> Column:
-        entry = self.mapping(where, entry)
-        units = UNITS[kind]
-        if kind == 'rate' and 'radius' in entry:
-            units = self._rim_speeds(where, entry['radius'])
-            entry = {key: value for key, value in entry.items() if key != 'radius'}
-        unknown = set(entry) - {'column', 'unit', 'sign'}
-        if unknown or 'column' not in entry:
-            raise UserError(f'{self.path}: {where}: give column, unit and, if turned round, sign')
-        name, unit = str(entry['column']), str(entry.get('unit', next(iter(units))))
-        if unit not in units:
-            raise UserError(f"{self.path}: {where}: unit '{unit}' is none of {', '.join(units)}")
-        if name not in self.header:
+    def column(self, where: str, value: Any, kind: str) -> Column:
+        value = dict(self.mapping(where, value))
+        si, radius = _SI[kind], 1.0
+        if kind == 'rate' and 'radius' in value:  # a rim speed
+            si, radius = 'm/s', self._radius(where, value.pop('radius'))
+        entry = entry_of(value, f'{self.path}: {where}')
+        times = factor(si, entry.unit) if entry.unit else 1.0
+        if times is None:
+            known = ', '.join(UNITS[si])
+            raise UserError(f"{self.path}: {where}: unit '{entry.unit}' is none of {known}")
+        if entry.column not in self.header:
             raise UserError(
-                f"{self.table}: no column '{name}' ({self.path}: {where}); nearest: "
-                f"'{nearest(name, self.header) if self.header else ''}'"
+                f"{self.table}: no column '{entry.column}' ({self.path}: {where}); nearest: "
+                f"'{nearest(entry.column, self.header) if self.header else ''}'"
             )
-        sign = entry.get('sign', 1)
-        if sign not in (1, -1):
-            raise UserError(f'{self.path}: {where}: sign must be 1 or -1')
-        return Column(name, self.header.index(name), sign * units[unit])
+        place = self.header.index(entry.column)
+        return Column(entry.column, place, entry.sign * times / radius)
 
-    def _rim_speeds(self, where: str, radius: Any) -> dict[str, float]:
+    def _radius(self, where: str, radius: Any) -> float:
         if not isinstance(radius, (int, float)) or not 0.0 < radius < math.inf:
             raise UserError(f'{self.path}: {where}: radius [m] must be a number above 0')
-        return {unit: factor / radius for unit, factor in UNITS['speed'].items()}
+        return float(radius)
 
 
 class _Sender:
@@ -256,16 +226,16 @@ class _Sender:
         self.sent = 0
         self.places: deque[tuple[int, float, float]] = deque()  # stamp [ns], place
 
-    def send(self, number: int, row: list[str]) -> None:
-        seconds = self.value(number, row, self.layout.time)
+    def send(self, line: int, row: list[str]) -> None:
+        seconds = self.value(line, row, self.layout.time)
         if not math.isfinite(seconds) or not 0.0 <= seconds < 9e9:
             column = self.layout.time.name
-            raise UserError(f'{self.table}: row {number}: {column}: no time from 0 on')
+            raise UserError(f'{self.table}, line {line}, column {column}: no time from 0 on')
         stamp = max(round(seconds * 1e9), 1)  # 0 is no stamp
         header = self.make.header(stamp)
         joints = self.layout.joints
         rates, torques, angles = (
-            [self.value(number, row, columns.get(field)) for columns in joints.values()]
+            [self.value(line, row, columns.get(field)) for columns in joints.values()]
             for field in _JOINT
         )
         if _any_told(rates) or _any_told(angles):
@@ -277,29 +247,20 @@ class _Sender:
                 position=angles if _any_told(angles) else (),
             )
             self.bag.write('/joint_states', message, stamp)
-        self._imu(number, row, stamp)
-        self._sinkage(number, row, stamp)
-        self._reference(number, row, stamp, -1.0 if _mean(rates) < 0.0 else 1.0)
+        self._imu(line, row, stamp)
+        self._sinkage(line, row, stamp)
+        self._reference(line, row, stamp, -1.0 if _mean(rates) < 0.0 else 1.0)
         self.sent += 1
 
-    def value(self, number: int, row: list[str], column: Column | None) -> float:
+    def value(self, line: int, row: list[str], column: Column | None) -> float:
         if column is None or column.index >= len(row):
             return math.nan
-        cell = row[column.index].strip()
-        if not cell:
-            return math.nan
-        try:
-            point = cell.replace(',', '.') if self.decimal_comma else cell
-            return column.factor * float(point)
-        except ValueError:
-            raise UserError(
-                f"{self.table}: row {number}: {column.name}: '{cell}' is no number; leave the cell "
-                'empty where nothing was measured'
-            ) from None
+        where = f'{self.table}, line {line}, column {column.name}'
+        return column.factor * number(row[column.index], where, self.decimal_comma)
 
-    def _imu(self, number: int, row: list[str], stamp: int) -> None:
+    def _imu(self, line: int, row: list[str], stamp: int) -> None:
         columns = self.layout.imu
-        values = {name: self.value(number, row, column) for name, column in columns.items()}
+        values = {name: self.value(line, row, column) for name, column in columns.items()}
         if not values or any(math.isnan(value) for value in values.values()):
             return
         force, rate = (
@@ -328,24 +289,24 @@ class _Sender:
             there, across = EARTH_RADIUS * there, EARTH_RADIUS * across * math.cos(x)
         return (stamp + first[0]) // 2, math.hypot(there, across) / seconds
 
-    def _sinkage(self, number: int, row: list[str], stamp: int) -> None:
+    def _sinkage(self, line: int, row: list[str], stamp: int) -> None:
         columns = self.layout.sinkage
-        depths = [self.value(number, row, column) for column in columns.values()]
+        depths = [self.value(line, row, column) for column in columns.values()]
         if _any_told(depths):
             message = self.make.joint_state(self.make.header(stamp), list(columns), position=depths)
             self.bag.write('/sinkage', message, stamp)
 
-    def _reference(self, number: int, row: list[str], stamp: int, sense: float) -> None:
+    def _reference(self, line: int, row: list[str], stamp: int, sense: float) -> None:
         columns, arrival = self.layout.reference, stamp
-        speed = self.value(number, row, columns.get('linear.x'))
+        speed = self.value(line, row, columns.get('linear.x'))
         for pair in _PLACES:
             if set(pair) <= set(columns):
-                place = [self.value(number, row, columns[key]) for key in pair]
+                place = [self.value(line, row, columns[key]) for key in pair]
                 stamp, speed = self._speed(stamp, place, degrees=pair == _PLACES[1])
                 speed *= sense
         if math.isnan(speed):
             return
-        variance = self.value(number, row, columns.get('variance'))
+        variance = self.value(line, row, columns.get('variance'))
         covariance = [0.0] * 36
         covariance[0] = 0.0 if math.isnan(variance) else variance  # 0: the rover file decides
         twist = self.make.twist_with_covariance(speed, 0.0, covariance)

@@ -65,6 +65,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         'error common to both cancels',
     )
     parser.add_argument(
+        '--columns',
+        action='append',
+        default=[],
+        metavar='FILE|NAME=COLUMN',
+        help='which column of the table is what, where its title does not say: sinkage=-z (a minus '
+        'turns the sign round), "torque=M [N mm]", or a YAML file of lines NAME: COLUMN',
+    )
+    parser.add_argument(
+        '--ignore-columns',
+        action='append',
+        default=[],
+        metavar='COLUMN',
+        help='column of numbers that is left out (several with commas between, or all that are not '
+        'understood: all); without it a column that is not used is an error',
+    )
+    parser.add_argument(
         '--effects',
         type=Path,
         action='append',
@@ -289,6 +305,7 @@ def _read(path: Path, arguments: argparse.Namespace, configuration: Configuratio
         return rows_from_bag(
             path, configuration, remaps, limits=limits, smooth=arguments.smooth
         ).table()
+    from wheel_terra_estimator.discrepancy.tables.header import Choice
     from wheel_terra_estimator.discrepancy.tables.parsing import read_table
 
-    return read_table(path)
+    return read_table(path, Choice.of(arguments.columns, arguments.ignore_columns))

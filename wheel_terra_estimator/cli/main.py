@@ -14,8 +14,10 @@ import importlib
 import logging
 import os
 import sys
-from collections.abc import Container, Sequence
+import warnings
+from collections.abc import Callable, Container, Sequence
 from contextlib import suppress
+from functools import partial
 from typing import Any, NoReturn
 
 from wheel_terra_estimator import __version__
@@ -28,7 +30,7 @@ from wheel_terra_estimator.cli.terminal import (
     open_closed_streams,
     termination_as_interrupt,
 )
-from wheel_terra_estimator.errors import UserError, outside_cause
+from wheel_terra_estimator.errors import UnitWarning, UserError, outside_cause
 
 COMMANDS = {
     'simulate': 'drive a simulated rover and write a rosbag2 with ground truth',
@@ -226,7 +228,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         if arguments.debug:  # what is mended in silence is told, too
             logging.basicConfig()
             logging.getLogger('wheel_terra_estimator').setLevel(logging.DEBUG)
-        with harmless_output(), termination_as_interrupt():
+        with harmless_output(), termination_as_interrupt(), warnings.catch_warnings():
+            warnings.simplefilter('always', UnitWarning)
+            warnings.showwarning = partial(_show_warning, arguments.command, warnings.showwarning)
             outputs.check(arguments)
             status = int(arguments.run(arguments) or 0)
             sys.stdout.flush()
@@ -243,6 +247,16 @@ def main(argv: Sequence[str] | None = None) -> int:
             raise
         discard_output()
         return _ended_by(error, arguments.command)
+
+
+def _show_warning(
+    command: str, others: Callable[..., None], message: Any, category: type[Warning], *where: Any
+) -> None:
+    """Show doubtful units in one line, other warnings as Python does."""
+    if issubclass(category, UnitWarning):
+        _complain(f'wheel-terra {command}: warning: {message}')
+    else:
+        others(message, category, *where)
 
 
 def _ended_by(error: BaseException, command: str) -> int:

@@ -10,7 +10,6 @@ import math
 import re
 import sys
 from collections.abc import Iterable, Mapping, Sequence
-from io import StringIO
 from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -24,7 +23,6 @@ from wheel_terra_estimator.configuration import reader as configuration_reader
 from wheel_terra_estimator.configuration.readings import Readings
 from wheel_terra_estimator.discrepancy.tables.steady_table import INPUT_UNITS
 from wheel_terra_estimator.errors import UserError
-from wheel_terra_estimator.input_file import LARGEST_TABLE, read_text
 from wheel_terra_estimator.output_folder import check_file, new_file
 from wheel_terra_estimator.terramechanics.model import METHODS, OVERLOADED, WheelSoilModel
 from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
@@ -345,31 +343,16 @@ def _numbers(option: str, text: str) -> FloatArray:
 
 def _read_points(path: Path) -> dict[str, FloatArray]:
     """Read the input columns of a table; others are left alone."""
-    try:
-        table = csv.DictReader(StringIO(read_text(path, LARGEST_TABLE), newline=''))
-        rows, header = list(table), list(table.fieldnames or ())
-    except csv.Error as error:
-        raise UserError(f'{path}: not a CSV text in UTF-8 ({error})') from None
-    for needed in ('slip', 'normal_load'):
-        if needed not in header:
-            raise UserError(
-                f'{path}: row 1: no column {needed} among {", ".join(header) or "none"}'
-            )
-    if not rows:
+    from wheel_terra_estimator.discrepancy.tables.header import ALL, Choice
+    from wheel_terra_estimator.discrepancy.tables.parsing import read_columns
+
+    lines, columns, _ = read_columns(path, Choice(ignored=(ALL,)), INPUTS)
+    if not lines.size:
         raise UserError(f'{path}: no rows below the column names; add one per operating point')
-    columns = {name: np.full(len(rows), np.nan) for name in INPUTS if name in header}
-    for index, row in enumerate(rows):
-        for name, values in columns.items():
-            cell = (row[name] or '').strip()
-            try:
-                values[index] = float(cell) if cell else np.nan
-            except ValueError:
-                raise UserError(
-                    f'{path}: row {index + 2}: {name} is {cell!r}; it must be a number'
-                ) from None
-        for needed in ('slip', 'normal_load'):
-            if not np.isfinite(columns[needed][index]):
-                raise UserError(f'{path}: row {index + 2}: {needed} is missing; fill the cell')
+    for needed in ('slip', 'normal_load'):
+        missing = lines[~np.isfinite(columns[needed])]
+        if missing.size:
+            raise UserError(f'{path}, line {missing[0]}: {needed} is missing; fill the cell')
     return columns
 
 

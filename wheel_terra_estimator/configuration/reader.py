@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 import math
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -23,7 +24,8 @@ from wheel_terra_estimator.configuration.parameters import (
     nearest,
 )
 from wheel_terra_estimator.configuration.ros_yaml import Value
-from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.configuration.soil_units import doubtful_units
+from wheel_terra_estimator.errors import UnitWarning, UserError
 from wheel_terra_estimator.terramechanics.effects.base import Effect
 
 # Parameters that every ROS node has; they may stand in the same file.
@@ -174,7 +176,10 @@ def _checked(
     for key, parameter in table.items():
         values[key] = checked_value(parameter, stated, wheels)
     _cross_check(values, stated, sources)
-    return Configuration.from_values(values, stated)
+    configuration = Configuration.from_values(values, stated)
+    for key, words in doubtful_units(configuration.soil, stated):
+        warnings.warn(f'{stated[key][1]}: {words}', UnitWarning, stacklevel=3)
+    return configuration
 
 
 def _load_effect_file(sourced: Sequence[tuple[str, str, Any]], allowed: bool) -> None:

@@ -367,10 +367,9 @@ def _without_copies(table: SteadyTable) -> tuple[SteadyTable, int]:
     everything = np.column_stack(
         [*table.columns.values(), table.measured, table.stated_std, table.slip_std]
     )
-    keys = [row.tobytes() for row in everything]
-    first = {key: index for index, key in reversed(list(enumerate(keys)))}
-    keep = np.array(sorted(first.values()), dtype=np.intp)
-    return table.select(keep), len(keys) - len(keep)
+    whole = np.ascontiguousarray(everything).view(f'V{everything.shape[1] * 8}')
+    _, first = np.unique(whole, return_index=True)
+    return table.select(np.sort(first)), len(everything) - len(first)
 
 
 def _rows(count: int) -> str:

@@ -1,0 +1,123 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Units that columns of a table may have, and how a user says which column is what."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from wheel_terra_estimator.configuration import bounded_yaml
+from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.input_file import read_text
+
+_DEGREE = math.pi / 180.0
+_FOOT, _POUND = 0.3048, 4.4482216152605  # [m], [N]
+UNITS: dict[str, dict[str, float]] = {
+    's': {'s': 1.0, 'ms': 1e-3, 'us': 1e-6, 'ns': 1e-9},
+    'm': {'m': 1.0, 'cm': 1e-2, 'mm': 1e-3, 'in': _FOOT / 12, 'ft': _FOOT},
+    'm/s': {'m/s': 1.0, 'km/h': 1 / 3.6, 'mm/s': 1e-3},
+    'm/s^2': {'m/s^2': 1.0, 'g': 9.80665, 'm/s2': 1.0, 'm/s\u00b2': 1.0},
+    'N': {'N': 1.0, 'kN': 1e3, 'lbf': _POUND},
+    'N m': {
+        'N m': 1.0,
+        'N mm': 1e-3,
+        'N cm': 1e-2,
+        'kN m': 1e3,
+        'lbf ft': _POUND * _FOOT,
+        'ft lbf': _POUND * _FOOT,
+    },
+    'rad': {'rad': 1.0, 'deg': _DEGREE, '\u00b0': _DEGREE, 'degree': _DEGREE, 'degrees': _DEGREE},
+    'rad/s': {
+        'rad/s': 1.0,
+        'deg/s': _DEGREE,
+        'rpm': math.pi / 30,
+        'rev/s': 2 * math.pi,
+        'rad_s': 1.0,
+        'deg_s': _DEGREE,
+        '\u00b0/s': _DEGREE,
+        '1/s': 1.0,
+    },
+    '-': {'-': 1.0, '%': 0.01, '1': 1.0, 'percent': 0.01, 'pct': 0.01},
+}
+"""SI unit -> spelling of a unit -> factor to the SI unit."""
+_SPACES = re.compile('[\\s*\u00b7.]+')
+
+
+def _plain(unit: str) -> str:
+    return _SPACES.sub('', unit.lower())
+
+
+_FACTORS = {si: {_plain(unit): f for unit, f in units.items()} for si, units in UNITS.items()}
+
+
+def factor(si: str, unit: str) -> float | None:
+    """Return the factor from a unit, however it is spelt, to the SI unit; None: not known."""
+    return _FACTORS[si].get(_plain(unit))
+
+
+def is_unit(text: str) -> bool:
+    """Return whether a text spells a unit of any kind."""
+    return any(_plain(text) in units for units in _FACTORS.values())
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A column of a table as a user names it.
+
+    Attributes
+    ----------
+    column : str
+        Its title.
+    unit : str
+        Its unit; empty: that of the title, else SI.
+    sign : int
+        -1 turns it round.
+    """
+
+    column: str
+    unit: str = ''
+    sign: int = 1
+
+
+def entry_of(value: Any, where: str) -> Entry:
+    """Return an entry from ``TITLE`` or ``{column: TITLE, unit: mm, sign: -1}``.
+
+    Raises
+    ------
+    UserError
+        It is neither.
+    """
+    if isinstance(value, str):
+        return Entry(value)
+    if not isinstance(value, Mapping):
+        raise UserError(f'{where}: give column, unit and, if turned round, sign')
+    if set(value) - {'column', 'unit', 'sign'} or 'column' not in value:
+        raise UserError(f'{where}: give column, unit and, if turned round, sign')
+    sign = value.get('sign', 1)
+    if sign not in (1, -1):
+        raise UserError(f'{where}: sign must be 1 or -1')
+    return Entry(str(value['column']), str(value.get('unit', '')), int(sign))
+
+
+def read_map(path: Path) -> Mapping[Any, Any]:
+    """Return the entries of a map of columns, a YAML file.
+
+    Raises
+    ------
+    UserError
+        It cannot be read, or is no map.
+    """
+    try:
+        document = bounded_yaml.load(read_text(path), yaml.SafeLoader)
+    except (yaml.YAMLError, ValueError) as error:
+        raise UserError(f'{path}: not valid YAML: {str(error).splitlines()[0]}') from None
+    if not isinstance(document, Mapping):
+        raise UserError(f'{path}: not a map of columns: one NAME: COLUMN a line')
+    return document

@@ -1,0 +1,162 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""CSV files as people export them: comma, semicolon or tab, point or decimal comma, UTF-8."""
+
+from __future__ import annotations
+
+import csv
+import math
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.input_file import check_size
+
+DELIMITERS = (',', ';', '\t')  # where two are as frequent, the first
+_NOT_MEASURED = frozenset({'', 'nan', 'na', 'n/a', '-', '<na>', 'none', 'nat'})
+_DECIMAL_COMMA = re.compile(r'[-+]?\d*,\d+([eE][-+]?\d+)?')
+_STATED_DELIMITER = re.compile(r'"?sep=(.)"?\s*', re.IGNORECASE)  # of spreadsheets, line 1
+_QUOTED = re.compile('"[^"]*"')
+
+
+@dataclass(frozen=True)
+class CsvFile:
+    """An open table.
+
+    Attributes
+    ----------
+    path : Path
+        The file.
+    header : list of str
+        Titles of the columns; empty for an empty file.
+    line : int
+        Line of the header.
+    delimiter : str
+        What stands between the cells; where it is no comma, a comma is a decimal mark.
+    rows : iterator of (int, list of str)
+        Line and cells of each row below the header in which something stands.
+    """
+
+    path: Path
+    header: list[str]
+    line: int
+    delimiter: str
+    rows: Iterator[tuple[int, list[str]]]
+
+    @property
+    def decimal_comma(self) -> bool:
+        """Whether a comma in a number is its decimal mark."""
+        return self.delimiter != ','
+
+
+@contextmanager
+def open_csv(path: Path, largest: int | None = None) -> Iterator[CsvFile]:
+    """Open a table for one pass over its rows.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    largest : int, optional
+        Greatest size that is read [byte].
+
+    Raises
+    ------
+    UserError
+        Not there, too large, not a CSV text in UTF-8; also while its rows are read.
+    """
+    check_size(path, largest)
+    try:
+        with path.open('rb') as file:
+            if file.read(4) == b'PK\x03\x04':
+                raise UserError(
+                    f'{path}: a spreadsheet or archive, not text; export the table as CSV'
+                )
+        with path.open(newline='', encoding='utf-8-sig') as text:
+            first = text.readline()
+            stated = _STATED_DELIMITER.fullmatch(first)
+            before = 1 if stated else 0
+            titles = text.readline() if stated else first
+            text.seek(0)
+            delimiter = stated[1] if stated else max(DELIMITERS, key=_unquoted(titles).count)
+            reader = csv.reader(text, delimiter=delimiter)
+            for _ in range(before):
+                next(reader)
+            cells = ((reader.line_num, [cell.strip() for cell in row]) for row in reader)
+            rows = ((line, row) for line, row in cells if any(row))
+            line, header = next(rows, (1, []))
+            yield CsvFile(path, header, line, delimiter, rows)
+    except UnicodeDecodeError:
+        raise UserError(
+            f'{path}: not a UTF-8 text; save it as CSV (UTF-8), or: iconv -f cp1252 -t utf8'
+        ) from None
+    except csv.Error as error:
+        raise UserError(f'{path}: not a CSV text ({error}); export it again') from None
+
+
+def _unquoted(line: str) -> str:
+    return _QUOTED.sub('', line)
+
+
+def number(cell: Any, where: str, decimal_comma: bool = False) -> float:
+    """Return the number in a cell; nan where nothing was measured.
+
+    Parameters
+    ----------
+    cell : str, or a value of a DataFrame
+        What stands there.
+    where : str
+        What an error names: file, line, column.
+    decimal_comma : bool
+        Whether a comma is the decimal mark.
+
+    Raises
+    ------
+    UserError
+        Not a number, or not a finite one.
+    """
+    value = value_of(cell, decimal_comma)
+    if value is None:
+        text = str(cell).strip()
+        raise UserError(f'{where}: {text[:40]!r} is not a number; {_cure(text)}')
+    if math.isinf(value):
+        raise UserError(
+            f'{where}: {cell} is not finite; leave the cell empty where nothing was measured'
+        )
+    return value
+
+
+def value_of(cell: Any, decimal_comma: bool) -> float | None:
+    """Return the number in a cell, nan where nothing was measured, None for something else."""
+    try:
+        return float(cell)
+    except (TypeError, ValueError):
+        text = str(cell).strip()
+    if text.lower() in _NOT_MEASURED:
+        return math.nan
+    if decimal_comma and _DECIMAL_COMMA.fullmatch(text):
+        return float(text.replace(',', '.'))
+    return None
+
+
+def is_number(cell: Any, decimal_comma: bool = False) -> bool:
+    """Return whether a number stands in a cell."""
+    value = value_of(cell, decimal_comma)
+    return value is not None and math.isfinite(value)
+
+
+def _cure(cell: str) -> str:
+    """Return what to do about a cell that is no number."""
+    if _DECIMAL_COMMA.fullmatch(cell):
+        return 'use a point as decimal mark, without marks between thousands'
+    if is_number(cell.replace(',', '')) or is_number(cell.replace('.', ''), decimal_comma=True):
+        return 'take out the marks between thousands'
+    if is_number(cell.rstrip('% ')):
+        return 'give the ratio, without a percent sign'
+    if is_number(cell.replace('\u2212', '-').replace('\u2013', '-')):
+        return 'use the plain minus sign'
+    return 'leave the cell empty where nothing was measured'

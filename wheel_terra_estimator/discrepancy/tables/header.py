@@ -1,0 +1,415 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Titles of columns: which quantity each is, in which unit, and what has to be asked."""
+
+from __future__ import annotations
+
+import difflib
+import re
+import shlex
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from wheel_terra_estimator.configuration.column_map import (
+    UNITS,
+    Entry,
+    entry_of,
+    factor,
+    is_unit,
+    read_map,
+)
+from wheel_terra_estimator.configuration.parameters import nearest
+from wheel_terra_estimator.discrepancy.tables.steady_table import (
+    COLUMNS,
+    INPUT_UNITS,
+    ORDER_COLUMNS,
+    STD_COLUMNS,
+)
+from wheel_terra_estimator.discrepancy.tables.steady_table import UNITS as QUANTITY_UNITS
+from wheel_terra_estimator.errors import UserError
+
+_WORDS: dict[str, tuple[str, ...]] = {
+    'slip': ('slip ratio', 'wheel slip', 'longitudinal slip', 'schlupf'),
+    'normal_load': (
+        'load',
+        'vertical load',
+        'wheel load',
+        'normal force',
+        'vertical force',
+        'radlast',
+    ),
+    'sinkage': ('wheel sinkage', 'rim sinkage', 'sinkage depth', 'einsinkung'),
+    'drawbar_pull': ('drawbar', 'drawbar force', 'pull', 'net traction', 'zugkraft'),
+    'torque': ('drive torque', 'driving torque', 'wheel torque', 'drehmoment'),
+    'slope': ('slope angle', 'inclination', 'incline'),
+    'wheel_radius': ('rim radius',),
+    'wheel_width': ('rim width',),
+    'lug_height': ('grouser height',),
+    'lug_count': ('number of lugs', 'lugs', 'grouser count', 'number of grousers'),
+    'angular_velocity': ('angular speed', 'wheel rate', 'rotational speed'),
+    'pass_number': ('pass', 'pass no'),
+    'leaving_angle': ('exit angle', 'rear angle'),
+}
+"""Names of the field that mean one thing only."""
+_SYMBOLS: dict[str, tuple[str, ...]] = {
+    'slip': ('s', 'i', 'sr'),
+    'normal_load': ('fn',),
+    'drawbar_pull': ('dp', 'dbp', 'fdp'),
+    'torque': ('t', 'm', 'md', 'moment'),
+    'wheel_radius': ('r',),
+    'wheel_width': ('b',),
+    'gravity': ('g',),
+    'angular_velocity': ('omega', 'rpm', 'wheel rpm', 'wheel speed', 'rim speed'),
+}
+"""Abbreviations: read where a unit of their kind stands beside them, else asked for."""
+_ASKED: dict[str, tuple[tuple[str, ...], str]] = {
+    'sinkage': (
+        ('z', 'depth', 'rut depth', 'vertical displacement', 'settlement'),
+        'the depth of the rim below the undisturbed surface, positive down',
+    ),
+    'drawbar_pull': (
+        ('fx', 'force x', 'horizontal force', 'traction', 'tractive force', 'thrust', 'force'),
+        'the net force of the soil on the wheel along the slope, positive forward',
+    ),
+    'torque': (('my', 'mz', 'torque y', 'moment y'), 'positive when it drives the wheel forward'),
+    'normal_load': (
+        ('w', 'fz', 'weight', 'force z'),
+        'the load perpendicular to the slope, positive',
+    ),
+    'slip': (('slippage', 'skid', 'slide'), 'the slip ratio, positive when driving'),
+    'slope': (('alpha', 'theta', 'beta', 'angle', 'tilt', 'pitch'), 'positive uphill'),
+    'wheel_radius': (('radius',), 'that of the rim, lugs not counted'),
+    'wheel_width': (('width',), 'that of the rim'),
+}
+"""Names that may mean it, with another sign or axis, or something else; and what it has to be."""
+_STD_ENDS = ('std', 'sd', 'stddev', 'stdev', 'sigma')
+_HARMLESS = frozenset(
+    {'time', 'timestamp', 'stamp', 'duration', 'index', 'id', 'no', 'nr', 'number', 'run', 'test'}
+    | {'testno', 'testnumber', 'sample', 'point', 'row', 'series', 'seed', 'repeat', 'replicate'}
+    | {'temperature', 'humidity', 'entranceangle', 'peakstressangle'}
+)
+"""Numbers that no diagnosis needs: when, which, and what the model itself gives beside."""
+_HARMLESS_UNITS = frozenset({'s', 'ms', 'min', 'h', 'k', '\u00b0c', 'degc', 'celsius', '%rh'})
+_BRACKETS = re.compile(r'(.*?)\s*[\[(]([^\])]*)[\])]')
+_BETWEEN = re.compile(r'\s+in\s+|\s*[/,]\s*|[_\s]+')  # a name and its unit without brackets
+ALL = 'all'
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What a user says of the columns.
+
+    Attributes
+    ----------
+    entries : mapping of str to Entry
+        Name of a column of ours -> the table's.
+    ignored : tuple of str
+        Titles that are left out; ``all``: whatever is not understood.
+    source : str
+        What an error names.
+    """
+
+    entries: Mapping[str, Entry] = field(default_factory=dict)
+    ignored: tuple[str, ...] = ()
+    source: str = '--columns'
+
+    @classmethod
+    def of(cls, columns: Any, ignored: Sequence[str] = ()) -> Choice:
+        """Return the choice in options, or in arguments of Python.
+
+        Parameters
+        ----------
+        columns : path, mapping, or sequence of str
+            ``FILE`` (YAML), ``{NAME: COLUMN}``, or ``NAME=COLUMN`` and files in any number.
+        ignored : sequence of str
+            Titles, also several with commas between.
+        """
+        entries: dict[str, Entry] = {}
+        if isinstance(columns, Mapping):
+            entries = _entries(columns, 'columns')
+        else:
+            for text in [columns] if isinstance(columns, str | Path) else columns:
+                name, equals, title = str(text).partition('=')
+                if equals:
+                    entries |= _entries({name.strip(): title.strip()}, '--columns')
+                else:
+                    entries |= _entries(read_map(Path(text)), str(text))
+        return cls(entries, tuple([ignored] if isinstance(ignored, str) else ignored))
+
+    def leaves_out(self, title: str) -> bool:
+        """Return whether a column is ignored by its name."""
+        return any(
+            title == text or title in [part.strip() for part in text.split(',')]
+            for text in self.ignored
+        )
+
+
+def _entries(columns: Mapping[Any, Any], source: str) -> dict[str, Entry]:
+    for name in columns:
+        if name not in COLUMNS:
+            raise UserError(
+                f"{source}: no column '{name}' is read; nearest: '{nearest(str(name), COLUMNS)}'"
+            )
+    return {str(name): entry_of(value, f'{source}: {name}') for name, value in columns.items()}
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column that is read: its place in the table, its name, the factor to SI."""
+
+    place: int
+    name: str
+    factor: float = 1.0
+
+
+@dataclass(frozen=True)
+class Title:
+    """What a title says: the column, its unit as spelt, and whether it has to be asked for."""
+
+    name: str
+    unit: str = ''
+    asked: bool = False
+
+
+def unit_of(name: str) -> str:
+    """Return the SI unit of a column."""
+    quantity = name.removesuffix('_std')
+    if quantity == 'leaving_angle':
+        return 'rad'
+    if quantity in ORDER_COLUMNS:
+        return '-'
+    return INPUT_UNITS.get(quantity) or QUANTITY_UNITS[quantity]
+
+
+def _key(text: str) -> str:
+    return re.sub(r'[\W_]+', '', text.lower())
+
+
+def _keys(names: Mapping[str, Sequence[str]]) -> dict[str, str]:
+    """Return key -> column, standard deviations with it."""
+    keys = {_key(word): name for name, words in names.items() for word in (*words, name)}
+    for word, name in list(keys.items()):
+        if f'{name}_std' in STD_COLUMNS:
+            for end in _STD_ENDS:
+                keys[f'{word}{end}'] = keys[f'{end}{word}'] = f'{name}_std'
+    return keys
+
+
+_OWN = {_key(name): name for name in COLUMNS}
+_SURE = {**_keys(_WORDS), **_OWN}
+_SHORT = {key: name for key, name in _keys(_SYMBOLS).items() if key not in _SURE}
+_OPEN = {_key(word): name for name, (words, _) in _ASKED.items() for word in words}
+
+
+def meaning_of(title: str) -> Title | None:
+    """Return which column a title names; None for none."""
+    for base, unit in _readings(title):
+        key = _key(base)
+        if key in _SURE:
+            return Title(_SURE[key], unit)
+        if key in _SHORT:
+            name = _SHORT[key]
+            if key.endswith('rpm') and not unit:
+                return Title(name, 'rpm')
+            if not unit or factor(unit_of(name), unit) is None:
+                return None if unit.lower() in _HARMLESS_UNITS else Title(name, unit, asked=True)
+            return Title(name, unit)
+        if key in _OPEN:
+            return Title(_OPEN[key], unit, asked=True)
+    return None
+
+
+def _readings(title: str) -> Iterator[tuple[str, str]]:
+    """Yield what may be name and unit in a title."""
+    brackets = _BRACKETS.fullmatch(title)
+    if brackets:
+        yield brackets[1], brackets[2].strip()
+        return
+    yield title, ''
+    for between in _BETWEEN.finditer(title):
+        unit = title[between.end() :]
+        if between.start() and is_unit(unit):
+            yield title[: between.start()], unit
+
+
+class Header:
+    """What the titles of a table say, and what is wrong with them.
+
+    Parameters
+    ----------
+    source : str
+        What an error names.
+    titles : sequence of str
+        In the order of the table.
+    choice : Choice
+        What the user says of them.
+    wanted : sequence of str
+        Columns of ours that are read.
+
+    Attributes
+    ----------
+    columns : list of Column
+        Those that are read.
+    unused : list of (int, str)
+        Place and title of the others, but for those that the user leaves out.
+    notes : list of str
+        What is read otherwise than it stands there.
+    """
+
+    def __init__(
+        self,
+        source: str,
+        titles: Sequence[str],
+        choice: Choice,
+        wanted: Sequence[str] = COLUMNS,
+    ) -> None:
+        self.source, self.titles = source, titles
+        self.columns: list[Column] = []
+        self.unused: list[tuple[int, str]] = []
+        self.notes: list[str] = []
+        self._faults: list[str] = []
+        self._leave_all = ALL in choice.ignored
+        taken = set(self._chosen(choice))
+        for place, title in enumerate(titles):
+            if place in taken or choice.leaves_out(title):
+                continue
+            meaning = meaning_of(title)
+            if meaning is None or meaning.asked:
+                self.unused.append((place, title))
+            elif meaning.name in wanted:
+                self._take(place, title, meaning.name, meaning.unit)
+        mended = [
+            f'{titles[c.place]!r} as {c.name}'
+            + (f' (times {c.factor:.4g})' if c.factor != 1 else '')
+            for c in self.columns
+            if titles[c.place] != c.name
+        ]
+        if mended:
+            self.notes.append(f'read {", ".join(mended)}')
+        self.notes += [
+            f'{name} is not used: there is no column {name.removesuffix("_std")}'
+            for name in self.names
+            if name in STD_COLUMNS and name.removesuffix('_std') not in self.names
+        ]
+
+    @property
+    def names(self) -> list[str]:
+        """Columns that are read."""
+        return [column.name for column in self.columns]
+
+    def _chosen(self, choice: Choice) -> Iterator[int]:
+        """Take the columns that the user names; yield their places."""
+        for name, entry in choice.entries.items():
+            found = _find(self.titles, entry)
+            if found is None:
+                if name not in self.titles:  # of several tables not all need the map
+                    close = nearest(entry.column, self.titles) if self.titles else ''
+                    self._faults.append(
+                        f"no column {entry.column!r} for {name}; nearest: '{close}'"
+                    )
+                continue
+            place, unit, sign = found
+            self._take(place, self.titles[place], name, unit, sign)
+            yield place
+
+    def _take(self, place: int, title: str, name: str, unit: str, sign: int = 1) -> None:
+        times = factor(unit_of(name), unit) if unit else 1.0
+        if name in ORDER_COLUMNS:
+            times = 1.0
+        if times is None:
+            known = ', '.join(UNITS[unit_of(name)])
+            self._faults.append(f'the unit of {title!r} is not known; give one of {known}')
+        elif name in self.names:
+            other = next(self.titles[c.place] for c in self.columns if c.name == name)
+            twice = f'column {title!r} stands there twice; delete one'
+            both = f'{other!r} and {title!r} are both {name}; leave one out: --ignore-columns'
+            self._faults.append(twice if other == title else both)
+        else:
+            self.columns.append(Column(place, name, sign * times))
+
+    def check(self, required: Sequence[str], one_of: Sequence[str] = ()) -> None:
+        """Raise with all faults of the titles in one line."""
+        faults = [*self._faults]
+        missing = [repr(name) for name in required if name not in self.names]
+        if one_of and not set(one_of) & set(self.names):
+            missing.append(f'none of {", ".join(one_of)}')
+        if missing:
+            faults.append(f'no column {", ".join(missing)} among {", ".join(self.titles)}')
+        if faults:
+            if self.unused:
+                faults.append(self._question([title for _, title in self.unused]))
+            raise UserError(f'{self.source}: {"; ".join(faults)}')
+
+    def check_unused(self, hold_numbers: Sequence[int]) -> None:
+        """Raise for columns of numbers that are not used; note the others.
+
+        Parameters
+        ----------
+        hold_numbers : sequence of int
+            Places of unused columns with numbers that are not those of the rows.
+        """
+        asked = [
+            title for place, title in self.unused if place in hold_numbers and not _harmless(title)
+        ]
+        if asked and not self._leave_all:
+            raise UserError(f'{self.source}: {self._question(asked)}')
+        named = [title for _, title in self.unused if title]
+        if named:
+            self.notes.append(f'columns not used: {", ".join(named)}')
+
+    def _question(self, titles: Sequence[str]) -> str:
+        free = [name for name in COLUMNS if name not in self.names]
+        hints = [_hint(title, free) for title in titles]
+        listed = ', '.join(
+            repr(title) + (f' ({hint})' if hint else '')
+            for title, (_, hint) in zip(titles, hints, strict=True)
+        )
+        example = shlex.quote(f'{hints[0][0] or "NAME"}={titles[0]}')
+        return (
+            f'numbers that are not used: {listed}; say what they are, --columns {example} (a minus '
+            'before the title turns the sign), or leave them out, --ignore-columns '
+            f'{shlex.quote(titles[0])} (in Python: columns, ignore_columns)'
+        )
+
+
+def _harmless(title: str) -> bool:
+    return any(
+        _key(base) in _HARMLESS or unit.lower() in _HARMLESS_UNITS
+        for base, unit in _readings(title)
+    )
+
+
+def _hint(title: str, free: Sequence[str]) -> tuple[str, str]:
+    """Return which of the free columns a title may be, and the same with what it has to hold."""
+    meaning = meaning_of(title)
+    if meaning is not None:
+        name = meaning.name
+        unit = f' [{unit_of(name)}]' if unit_of(name) != '-' else ''
+        holds = f', {_ASKED[name][1]}' if name in _ASKED else ''
+        return name, f'{name}{unit}{holds}?'
+    keys = {key: name for key, name in _SURE.items() if name in free}
+    for base, _ in _readings(title):
+        close = difflib.get_close_matches(_key(base), keys, n=1, cutoff=0.78)
+        if close:
+            return keys[close[0]], f'{keys[close[0]]}?'
+    return '', ''
+
+
+def _find(titles: Sequence[str], entry: Entry) -> tuple[int, str, int] | None:
+    """Return place, unit and sign of the column that a user names."""
+    text, sign = entry.column, entry.sign
+    if text not in titles and text.startswith('-'):
+        text, sign = text[1:].strip(), -sign
+    unit = entry.unit
+    if text not in titles:
+        brackets = _BRACKETS.fullmatch(text)
+        if not brackets or brackets[1] not in titles:
+            return None
+        text, unit = brackets[1], brackets[2].strip()
+    return titles.index(text), unit or _unit_in(text), sign
+
+
+def _unit_in(title: str) -> str:
+    return next((unit for _, unit in _readings(title) if unit), '')
