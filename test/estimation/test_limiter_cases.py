@@ -207,6 +207,15 @@ def test_a_gap_in_the_estimates_is_no_motion_out():
     assert rover.scale(0.1) == 0.0
 
 
+def test_a_warning_that_rises_ends_the_release_of_a_stop():
+    rover = Rover()
+    rover.drive(1.0, 0.1, slip=0.7, slip_class=2, travel=0.3)
+    rover.state, _ = after_release(rover.state, rover.now)
+    assert rover.scale(0.1) == 0.3
+    rover.stuck()
+    assert rover.scale(0.1) == 0.0
+
+
 def test_release_in_advance_is_none():
     rover = Rover()
     rover.state, words = after_release(rover.state, rover.now)

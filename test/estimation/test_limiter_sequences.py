@@ -156,7 +156,7 @@ class World(RuleBasedStateMachine):
         self.stuck, self.stuck_direction = True, direction
         self.tell(change=True, direction_first=direction_first)
         self.led = direction or self.led or 0
-        self.by_estimator, self.out = True, None
+        self.by_estimator, self.out, self.released_until = True, None, 0.0
 
     @rule(direction_first=EITHER)
     def warning_falls_or_is_reset(self, direction_first):

@@ -41,17 +41,11 @@ def test_numbers_that_are_none_are_told_and_recovered_from(soak, tmp_path, monke
 
 
 @pytest.mark.slow
-def test_no_fault_ends_the_node_and_all_are_recovered_from():
-    command = [
-        sys.executable,
-        '-m',
-        'wheel_terra_lab.studies.soak',
-        '--minutes',
-        '2',
-        '--seed',
-        '3',
-    ]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=280, check=False)
+@pytest.mark.parametrize('program', ['soak', 'soak_limiter'])
+def test_no_fault_ends_a_node_and_all_are_recovered_from(program):
+    module = f'wheel_terra_lab.studies.{program}'
+    command = [sys.executable, '-m', module, '--minutes', '2', '--seed', '3']
+    done = subprocess.run(command, capture_output=True, text=True, timeout=400, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
     assert 'Traceback' not in done.stderr
     assert 'PROBLEM' not in done.stdout

@@ -134,6 +134,8 @@ def after_event(
     forgotten for one that is not.
     """
     following = INTERLOCK[event][state.interlock]
+    if event is Event.STUCK and state.interlock is not Interlock.STUCK:
+        state = replace(state, released_until=-math.inf)  # what was released was less than this
     if following is Interlock.FREE:
         return replace(state, interlock=following, direction=0, reason='', out=None)
     if event in (Event.STOP, Event.STUCK):

@@ -38,6 +38,8 @@ from wheel_terra_estimator.ros.qos import input_profile, output_profile
 DIAGNOSTICS_PERIOD = 1.0  # [s]
 NOT_NUMBERED = 2**64 - 1
 """Number of a message where the middleware does not count them."""
+AS_THE_SOIL_GIVES = {'slowed', 'command passes'}
+"""States that come and go as the rover drives: no line in the log for each."""
 UNLIMITED = ('zero', 'starting', 'command passes')
 """States of which nothing is to be said."""
 _SECOND = 1e-9
@@ -132,7 +134,8 @@ class TractionLimiter(Node):
         before, self._state = self._state, state
         if (state.interlock, state.direction) != (before.interlock, before.direction):
             self._keep()
-            self.get_logger().info(f'{state.interlock.value} {state.reason}')
+            why = f': {state.reason}' if state.reason else ''
+            self.get_logger().info(f'interlock {state.interlock.value}{why}')
             self._say()
         if (state.clock_offset is None) != (before.clock_offset is None):
             self.get_logger().warning(
@@ -158,7 +161,8 @@ class TractionLimiter(Node):
         self._output.publish(self._message)
         self._scale.publish(Float64(data=decision.scale))
         if before is None or before.state != decision.state:
-            self.get_logger().info(decision.reason)
+            if before is None or {before.state, decision.state} != AS_THE_SOIL_GIVES:
+                self.get_logger().info(decision.reason)
             self._say()
 
     def _say(self) -> None:

@@ -47,9 +47,13 @@ class Process:
         """Whether it has not ended."""
         return self._popen.poll() is None
 
+    def signal(self, number: int) -> None:
+        """Send a signal."""
+        self._popen.send_signal(number)
+
     def end(self, number: int) -> int:
         """Send a signal and return the exit status."""
-        self._popen.send_signal(number)
+        self.signal(number)
         return self._popen.wait(20.0)
 
 
