@@ -162,6 +162,13 @@ def test_a_gap_between_two_sets_is_no_time_driven_free():
     assert 'warned 10 s ago' in apart[0].reasons[0]
 
 
+def test_sets_that_come_seldom_are_no_gap():
+    config = configuration(output_rate=0.5, max_lag=0.0)
+    core = EstimatorCore(config, Digging(config, 'raise'))
+    core.warning.restore(StuckState(True, 'digs in', stamp_at(-10.0), -1))
+    assert not play(core, [odometry(0.1 * i) for i in range(100)])[-1].stuck
+
+
 @pytest.mark.filter_fails
 def test_a_step_that_fails_before_its_set_is_told_with_the_set():
     told = []

@@ -17,7 +17,7 @@ from wheel_terra_estimator.configuration.soil_file import StuckState
 from wheel_terra_estimator.estimation.estimates import EstimateSet, SlipClass
 
 _SECOND = 1e-9
-_LONGEST_GAP = 1.0  # [s] between two sets of one drive
+_LONGEST_GAP = 1.0  # [s] between two sets of one drive, or two of their periods
 
 
 class StuckMemory:
@@ -44,6 +44,8 @@ class StuckMemory:
         """Take over other tuning."""
         self._clear_slip = float(configuration.filter.stuck_clear_slip)
         self._clear_time = float(configuration.filter.stuck_clear_time)
+        rate = float(configuration.output_rate)
+        self._longest_gap = max(_LONGEST_GAP, 2.0 / rate if rate > 0.0 else 0.0)
 
     def restore(self, state: StuckState) -> None:
         """Take over a warning as it was written before."""
@@ -93,7 +95,7 @@ class StuckMemory:
             self._free = None
             return False
         stamp = estimates.stamp
-        if self._free is None or not 0 <= (stamp - self._free[1]) * _SECOND <= _LONGEST_GAP:
+        if self._free is None or not 0 <= (stamp - self._free[1]) * _SECOND <= self._longest_gap:
             self._free = stamp, stamp
         self._free = self._free[0], stamp
         return (stamp - self._free[0]) * _SECOND >= self._clear_time
