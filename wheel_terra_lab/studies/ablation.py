@@ -3,7 +3,7 @@
 """What each special treatment of the estimator is worth: each switched off by itself.
 
     python -m wheel_terra_lab.studies.ablation run ablation.jsonl --measured ../shared/measured
-    python -m wheel_terra_lab.studies.ablation show ablation.jsonl -o docs/development/ablation.md
+    python -m wheel_terra_lab.studies.ablation show ablation.jsonl -o ablation.md
 
 ``run`` goes through simulated drives of simulators A and B (``ablations/drives.py``) and the
 recorded ones; on each it runs the estimator as it is and with each treatment of
@@ -59,11 +59,11 @@ _ESTIMATOR = 'wheel_terra_estimator/estimation'
 _HEAD = """# What each special treatment of the estimator is worth
 
     python -m wheel_terra_lab.studies.ablation run ablation.jsonl --measured ../shared/measured
-    python -m wheel_terra_lab.studies.ablation show ablation.jsonl -o docs/development/ablation.md
+    python -m wheel_terra_lab.studies.ablation show ablation.jsonl -o ablation.md
 
 Each treatment is switched off by itself (`ablations/treatments.py` says how) and the
 estimator run again over those of the drives on which it can act: drives of
-[simulators A and B](../laboratory/simulators.md), with and without a reference, torque or sinkage,
+simulators A and B (docs/laboratory/simulators.md), with and without a reference, torque or sinkage,
 each with a seed of its own, and recorded ones (`ablations/drives.py`).
 A loss is the price of doing without; a
 negative one says that the treatment did harm. Guards and signs of the stuck warning are also tried

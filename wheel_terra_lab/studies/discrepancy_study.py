@@ -5,7 +5,7 @@
     python -m wheel_terra_lab.studies.discrepancy_study run study.csv  # about 2,000 campaigns
     python -m wheel_terra_lab.studies.discrepancy_study run study.csv --jobs 3  # same, faster
     python -m wheel_terra_lab.studies.discrepancy_study show study.csv  # tables on the terminal
-    python -m wheel_terra_lab.studies.discrepancy_study show study.csv -o docs/development
+    python -m wheel_terra_lab.studies.discrepancy_study show study.csv -o study_tables
 
 ``run`` adds to the CSV file row by row and skips what is already there: stop it at any time, start
 it again. ``--groups one none``, ``--designs lugs48``, ``--share 0.1`` (a tenth of the campaigns)

@@ -41,7 +41,7 @@ class TurningTuning:
     """Of the gyro's noise that the smoothing leaves: sqrt(g / (2 - g)) for the least gain."""
     skid_yaw_share: float = 0.6
     """Yaw rate over that of rolling wheels, of a rover that has to skid to turn, and its doubt: it
-    turns as one with 1.3 to 3 times its track (docs/development/checks_study.md)."""
+    turns as one with 1.3 to 3 times its track (docs/own_rover.md)."""
     skid_yaw_doubt: float = 0.4  # of that yaw rate
     roll_yaw_doubt: float = 0.15  # of a rover that does not skid
     least_wheel_yaw_std: float = 0.005  # [rad/s]
