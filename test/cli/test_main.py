@@ -251,7 +251,10 @@ EFFECT = Effect(
 
 @pytest.mark.parametrize('words', ['sys.exit(0)', 'raise SystemExit', '1 / 0', '[][1]'])
 @pytest.mark.parametrize('where', ['top', 'body'])
-def test_a_file_of_effects_that_fails_or_ends_the_program(tmp_path, capsys, words, where):
+def test_a_file_of_effects_that_fails_or_ends_the_program(
+    tmp_path, capsys, monkeypatch, words, where
+):
+    monkeypatch.setattr('wheel_terra_estimator.terramechanics.effects._registered', {})
     file = tmp_path / 'own.py'
     file.write_text(EFFECTS.format(**{'top': '', 'body': 'pass', where: words}))
     rows = tmp_path / 'rows.csv'
