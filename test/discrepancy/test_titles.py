@@ -50,6 +50,8 @@ READ = {
     'omega [rad/s]': ('angular_velocity', 1.0),
     'angular_velocity_rad_s': ('angular_velocity', 1.0),
     'pass no.': ('pass_number', 1.0),
+    'meas_torque_nm': ('torque', 1.0),
+    'Mean sinkage [mm]': ('sinkage', 1e-3),
 }
 ASKED = (
     'DP', 'DBP', 'Fx [N]', 'Fx', 'depth', 'depth [mm]', 'z [mm]', 'z', 'T', 'M', 'Fz', 'W [N]', 's',

@@ -94,6 +94,7 @@ _HARMLESS = frozenset(
 _HARMLESS_UNITS = frozenset({'s', 'ms', 'min', 'h', 'k', '\u00b0c', 'degc', 'celsius', '%rh'})
 _BRACKETS = re.compile(r'(.*?)\s*[\[(]([^\])]*)[\])]')
 _BETWEEN = re.compile(r'\s+in\s+|\s*[/,]\s*|[_\s]+')  # a name and its unit without brackets
+_MEASURED = re.compile(r'^(meas|measured|mean|avg|average)[_\s]+', re.IGNORECASE)
 ALL = 'all'
 
 
@@ -206,7 +207,7 @@ _OPEN = {_key(word): name for name, (words, _) in _ASKED.items() for word in wor
 def meaning_of(title: str) -> Title | None:
     """Return which column a title names; None for none."""
     for base, unit in _readings(title):
-        key = _key(base)
+        key = _key(_MEASURED.sub('', base))
         if key in _SURE:
             return Title(_SURE[key], unit)
         if key in _SHORT:
@@ -304,7 +305,8 @@ class Header:
         for name, entry in choice.entries.items():
             found = _find(self.titles, entry)
             if found is None:
-                if name not in self.titles:  # of several tables not all need the map
+                said = [meaning_of(title) for title in self.titles]
+                if name not in [m.name for m in said if m and not m.asked]:  # needs no map
                     close = nearest(entry.column, self.titles) if self.titles else ''
                     self._faults.append(
                         f"no column {entry.column!r} for {name}; nearest: '{close}'"
@@ -332,14 +334,15 @@ class Header:
     def check(self, required: Sequence[str], one_of: Sequence[str] = ()) -> None:
         """Raise with all faults of the titles in one line."""
         faults = [*self._faults]
-        missing = [repr(name) for name in required if name not in self.names]
+        missing = [f'no column {name!r}' for name in required if name not in self.names]
         if one_of and not set(one_of) & set(self.names):
             missing.append(f'none of {", ".join(one_of)}')
         if missing:
-            faults.append(f'no column {", ".join(missing)} among {", ".join(self.titles)}')
+            faults.append(f'{" and ".join(missing)} among {", ".join(self.titles)}')
         if faults:
-            if self.unused:
-                faults.append(self._question([title for _, title in self.unused]))
+            meant = [title for _, title in self.unused if _hint(title, self._free())[0]]
+            if meant:
+                faults.append(self._question(meant))
             raise UserError(f'{self.source}: {"; ".join(faults)}')
 
     def check_unused(self, hold_numbers: Sequence[int]) -> None:
@@ -359,16 +362,18 @@ class Header:
         if named:
             self.notes.append(f'columns not used: {", ".join(named)}')
 
+    def _free(self) -> list[str]:
+        return [name for name in COLUMNS if name not in self.names]
+
     def _question(self, titles: Sequence[str]) -> str:
-        free = [name for name in COLUMNS if name not in self.names]
-        hints = [_hint(title, free) for title in titles]
+        hints = [_hint(title, self._free()) for title in titles]
         listed = ', '.join(
             repr(title) + (f' ({hint})' if hint else '')
             for title, (_, hint) in zip(titles, hints, strict=True)
         )
         example = shlex.quote(f'{hints[0][0] or "NAME"}={titles[0]}')
         return (
-            f'numbers that are not used: {listed}; say what they are, --columns {example} (a minus '
+            f'not used: {listed}; say what they are, --columns {example} (a minus '
             'before the title turns the sign), or leave them out, --ignore-columns '
             f'{shlex.quote(titles[0])} (in Python: columns, ignore_columns)'
         )
@@ -391,7 +396,7 @@ def _hint(title: str, free: Sequence[str]) -> tuple[str, str]:
         return name, f'{name}{unit}{holds}?'
     keys = {key: name for key, name in _SURE.items() if name in free}
     for base, _ in _readings(title):
-        close = difflib.get_close_matches(_key(base), keys, n=1, cutoff=0.78)
+        close = difflib.get_close_matches(_key(base), keys, n=1, cutoff=0.86)
         if close:
             return keys[close[0]], f'{keys[close[0]]}?'
     return '', ''
