@@ -20,6 +20,14 @@ _OUTSIDE = re.compile(r'\[([^\]]+)\]\((?!docs/|https?:)([^)\s]+)\)')
 _LINK = re.compile(r'(?<!!)\[([^\]]+)\]\(((?:\.\./)+[^)#\s]+)(#[^)\s]*)?\)')
 
 
+def on_config(config: Any, **_: Any) -> Any:
+    """State the version of the package at the foot of each page."""
+    source = Path(config.config_file_path).parent / 'wheel_terra_estimator' / '__init__.py'
+    version = re.search(r"__version__ = '([^']+)'", source.read_text(encoding='utf-8'))
+    config.copyright = f'version {version[1]}' if version else None
+    return config
+
+
 def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
     """Turn links that leave ``docs/`` into the path of the file in the repository."""
     if page.file.src_uri == CONTRIBUTING:

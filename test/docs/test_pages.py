@@ -38,6 +38,7 @@ def test_every_page_is_within_two_clicks():
     assert set(reached) <= set(NAMES), 'nav names pages that are not there'
     # A tab opens on a page of its own; its other pages and sub-sections stand beside it.
     assert max(reached.values()) <= 3
+    assert len(SITE['nav']) <= 7
 
 
 def text_without_code(page: Path) -> str:
