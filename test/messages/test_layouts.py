@@ -9,7 +9,7 @@ import re
 from pathlib import Path
 from xml.etree import ElementTree
 
-import pytest
+import yaml
 
 from wheel_terra_estimator.messages.convert import JOINT_OUTPUTS, OUTPUT_TYPES
 from wheel_terra_estimator.messages.diagnostics import NODE
@@ -30,19 +30,26 @@ def foxglove() -> list[str]:
     return paths + [panel['path'] for panel in panels if 'path' in panel]
 
 
-def plotjuggler() -> list[str]:
-    curves = ElementTree.parse(LAYOUTS / 'plotjuggler.xml').iter('curve')
-    return [re.sub(r'/(\w+)((\[\d+\])?)$', r'.\1\2', curve.attrib['name']) for curve in curves]
-
-
-@pytest.mark.parametrize('paths', [foxglove(), plotjuggler()], ids=['foxglove', 'plotjuggler'])
-def test_paths_are_published(paths: list[str]) -> None:
-    assert len(paths) > 20
-    for path in paths:
+def test_foxglove_paths_are_published() -> None:
+    assert len(foxglove()) > 20
+    for path in foxglove():
         found = re.fullmatch(rf'/{NODE}/(\w+)\.([\w.]+?)(\[[0-5]\])?', path)
         assert found, path
         assert found[1] in OUTPUT_TYPES
         assert found[2] in FIELDS[found[1]], path
+
+
+def test_plotjuggler_curves_are_its_names_of_joint_states() -> None:
+    """PlotJuggler names a series topic/joint/field (its ros2_parsers/jointstates_msg.h)."""
+    rover = yaml.safe_load((LAYOUTS.parent / 'rovers' / 'generic_six_wheel.yaml').read_text())
+    wheels = rover['/**']['ros__parameters']['wheels']['names']
+    plots = ElementTree.parse(LAYOUTS / 'plotjuggler.xml').iter('plot')
+    curves = [[curve.attrib['name'] for curve in plot.iter('curve')] for plot in plots]
+    shown = (('slip', 'position'), ('slip', 'effort'), ('sinkage', 'position'))
+    assert curves == [
+        [f'/{NODE}/{topic}/{wheel}/{field}' for wheel in wheels]
+        for topic, field in (*shown, ('mobility', 'position'))
+    ]
 
 
 def test_panels_of_the_layout_are_there() -> None:
