@@ -52,9 +52,11 @@ def unpack(codec: str, packed: bytes | memoryview, size: int, limits: Limits = L
     if whole is not None and len(whole) == size:
         return Unpacked(whole, '')
     decompressor = _decompressor(codec)
-    content = b''.join(_piecewise(decompressor, packed, limits.chunk + 1))
-    if len(content) > limits.chunk:
+    pieces = list(_piecewise(decompressor, packed, limits.chunk + 1))
+    if sum(map(len, pieces)) > limits.chunk:  # known before they are joined, which doubles them
         return Unpacked(b'', too_large)
+    content = b''.join(pieces)
+    del pieces
     if decompressor.eof and not size:
         return Unpacked(content, '')
     return Unpacked(content, f'a chunk of {size} B unpacks to {len(content)} B')
@@ -121,7 +123,7 @@ def _piecewise(decompressor: Any, packed: bytes | memoryview, size: int) -> Iter
         piece = bytes(packed[at : at + _SLICE])
         while left > 0 and not decompressor.eof:
             try:
-                content = bytes(decompressor.decompress(piece, left))
+                content = bytes(decompressor.decompress(piece, min(left, MEGABYTE)))
             except Exception:  # see above
                 return
             yield content
