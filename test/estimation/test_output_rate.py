@@ -267,7 +267,7 @@ def test_what_is_later_than_can_be_run_again_is_bounded_counted_and_told():
     assert health['late_inputs_deferred'] > 100
     assert fake.steps < 20 * (20 + 2 + 60) + 2 * 60 + 200
     told = [s for s in sets if 'late inputs' in s.faults]
-    assert len(told) > 300
+    assert len(told) > 200, 'about each second one, also where those between are in time'
     assert health['late_inputs_dropped'] == 0
 
 

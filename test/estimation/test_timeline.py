@@ -282,7 +282,7 @@ def test_sets_go_on_at_five_hertz_while_the_wheel_odometry_is_silent():
     assert times(silent) == [1.5, 1.7, 1.9, 2.1, 2.3, 2.5, 2.7, 2.9]
     for estimates in silent:
         assert (estimates.slip_class == SlipClass.UNKNOWN).all()
-        assert 'silent' in estimates.faults['joint_states']
+        assert 'joint_states silent' in estimates.faults['wheel_odometry']
     returned = [s for s in sets if s.stamp >= stamp_at(3.0)]
     assert times(returned) == [round(3.0 + 0.1 * i, 6) for i in range(10)]
     assert all((s.slip_class == 0).all() for s in returned)

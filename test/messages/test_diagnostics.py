@@ -4,19 +4,22 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
 from estimate_sets import STAMP, some_estimates
 
+from wheel_terra_estimator.bags.message_factory import MessageFactory
+from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.messages.diagnostics import (
     ERROR,
     OK,
     STALE,
     WARN,
     Diagnostics,
-    stale_statuses,
 )
+from wheel_terra_estimator.messages.pipeline import Pipeline
 
 NAMES = ('left', 'right')
 
@@ -68,40 +71,97 @@ def test_levels_follow_class_and_warning() -> None:
     resting = Diagnostics(NAMES).due(at(0.0, slip_class=unknown, reasons=('at rest', 'no rate')))
     assert levels(resting) == [OK, OK, WARN]
     silent = {'wheel_odometry': 'silent'}
-    assert levels(Diagnostics(NAMES).due(at(0.0, slip_class=unknown, faults=silent))) == [
-        WARN,
-        STALE,
-        STALE,
-    ]
+    diagnostics = Diagnostics(NAMES)
+    diagnostics.follow(at(0.0))
+    found = diagnostics.due(at(1.0, slip_class=unknown, faults=silent))
+    assert levels(found) == [WARN, STALE, STALE]
 
 
 def test_a_sensor_that_was_never_there_is_no_fault_one_that_fell_silent_is() -> None:
     diagnostics = Diagnostics(NAMES)
     lacking = {'sinkage': 'no sinkage: held by its model'}
     assert levels(diagnostics.due(at(0.0, faults=lacking)))[0] == OK
-    assert 'no sinkage' in diagnostics.now(at(0.0, faults=lacking))[0].message
-    assert not diagnostics.due(at(0.1))  # the sensor is heard
-    assert levels(diagnostics.due(at(0.2, faults=lacking)))[0] == WARN
+    assert diagnostics.now(at(0.0, faults=lacking))[0].message == 'waiting for sinkage'
+    found = diagnostics.due(at(1.0, faults=lacking))
+    assert levels(found)[0] == OK
+    assert found[0].message == 'sinkage: no sinkage: held by its model'
+    assert not diagnostics.due(at(1.1))  # the sensor is heard
+    assert levels(diagnostics.due(at(1.2, faults=lacking)))[0] == WARN
 
 
-def test_faults_of_the_transport_are_shown() -> None:
-    found = Diagnostics(NAMES, faults=lambda stamp: {'odom': 'wrong QoS'}).due(at(0.0))
-    assert found[0].level == WARN
-    assert 'odom: wrong QoS' in found[0].message
+def test_the_first_second_waits_for_inputs_and_for_nothing_else() -> None:
+    missing = {'imu': 'no IMU', 'wheel_odometry': 'joint_states silent', 'filter': 'started anew'}
+    for faults in (missing, {'imu': 'no IMU'}):
+        diagnostics = Diagnostics(NAMES)
+        found = diagnostics.due(at(0.0, faults=faults))
+        assert levels(found)[0] == (WARN if 'filter' in faults else OK)
+        assert 'waiting for imu' in found[0].message
+        assert 'no IMU' not in found[0].message
+    assert not diagnostics.due(at(0.9, faults=faults))
+    assert diagnostics.due(at(1.0, faults=faults))[0].message == 'imu: no IMU'
 
 
-def test_silence_is_stale_for_all() -> None:
-    found = stale_statuses(NAMES, 'nothing heard', {'resets': 0})
-    assert levels(found) == [STALE] * 3
-    assert found[0].message == 'nothing heard'
+LOST = 'messages lost on the way so far'
 
 
-def test_silence_holds_the_values_but_not_the_class() -> None:
-    for latest in (None, at(0.0)):
-        for status in stale_statuses(NAMES, 'nothing heard', {}, latest)[1:]:
-            values = dict(status.values)
-            assert {'stuck_probability', 'time_to_stuck_s', 'reason'} <= values.keys()
-            assert values['reason'] == status.message == 'nothing heard'
-            assert float(values['time_to_stuck_s']) >= 0.0
-    assert values['slip_class'] == 'unknown'
-    assert float(values['drawbar_pull_N']) > 0.0
+def once(faults: Any) -> Any:
+    """Return what gives faults when it is first asked, and none later."""
+    left = iter([faults])
+    return lambda: next(left, [])
+
+
+def test_a_fault_is_told_until_it_was_published_and_for_ten_seconds() -> None:
+    """Whatever comes between: sets that tell nothing, messages of the topic, other faults."""
+    lost = [('imu/data', f'299 {LOST}'), ('joint_states', f'300 {LOST}')]
+    diagnostics = Diagnostics(NAMES, faults=once(lost))
+    diagnostics.follow(at(0.0))
+    said = [diagnostics.due(at(0.1 * i)) for i in range(1, 130)]
+    told = [(i, s[0]) for i, s in enumerate(said, 1) if s]
+    for i, status in told:
+        assert (status.level == WARN) is (i < 100)
+        told_both = status.message == '; '.join(f'{topic}: {words}' for topic, words in lost)
+        assert told_both is (i < 100)
+    assert said[0], 'at once'
+    assert any(i > 100 for i, _ in told)
+
+
+def test_a_fault_that_nobody_could_be_told_of_waits_for_who_can() -> None:
+    diagnostics = Diagnostics(NAMES, faults=once([('joint_states', f'3 {LOST}')]))
+    for i in range(100):
+        diagnostics.follow(at(float(i)))  # inactive: nothing is published
+    assert f'joint_states: 3 {LOST}' in diagnostics.stale('inactive')[0].message
+    diagnostics.due(at(100.0))
+    assert diagnostics.now(at(111.0))[0].message == 'running'
+
+
+def test_a_fault_seen_again_is_one_fault_with_its_latest_count() -> None:
+    counts = iter(range(30))
+    diagnostics = Diagnostics(NAMES, faults=lambda: [('joint_states', f'{next(counts)} {LOST}')])
+    for i in range(30):
+        message = diagnostics.due(at(float(i)))[0].message
+        assert message == f'joint_states: {i} {LOST}'
+        assert bool(diagnostics.new_faults) is (i == 0)
+
+
+def test_two_faults_of_a_topic_are_both_told() -> None:
+    both = [('odom', 'silent for 2.1 s'), ('odom', f'7 {LOST}')]
+    assert (
+        Diagnostics(NAMES, faults=once(both)).due(at(0.0))[0].message
+        == f'odom: silent for 2.1 s; odom: 7 {LOST}'
+    )
+
+
+def test_what_is_left_out_of_the_inputs_is_told_by_reason() -> None:
+    """By the pipeline of node and replay alike, each reason apart, with its count."""
+    pipeline = Pipeline(reader.load(['generic_six_wheel']))
+    names, make = pipeline.names, MessageFactory()
+    wild = np.full(len(names), math.inf)
+    header = make.header(100_000_000_000, '')
+    pipeline.hear('joint_states', make.joint_state(header, names, velocity=wild, effort=wild))
+    header = make.header(0, '')
+    pipeline.hear('joint_states', make.joint_state(header, names, velocity=np.ones(len(names))))
+    pipeline.refuse('imu/data', 'damaged')
+    message = pipeline.diagnostics.stale('no estimates')[0].message
+    for words in ('wheel rate infinite', 'torque infinite', 'stamp is zero', 'imu/data: damaged'):
+        assert words in message
+    assert message.count('(1 so far)') == 4

@@ -10,6 +10,7 @@ same numbers.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -28,13 +29,10 @@ from wheel_terra_estimator.estimation.timing.clock_watch import (
     Judgement,
     Suspicion,
 )
-from wheel_terra_estimator.estimation.timing.input_checks import CHANNELS, CURES, InputChecks
+from wheel_terra_estimator.estimation.timing.input_checks import CHANNELS, InputChecks
 from wheel_terra_estimator.estimation.timing.input_log import Estimator
 from wheel_terra_estimator.estimation.timing.lag import LagLearner
 from wheel_terra_estimator.estimation.timing.timeline import Fate, Timeline, TimeSettings
-
-FAULT_MEMORY = 5_000_000_000
-"""How long a rejected input is told of in the sets [ns of stamps]."""
 
 _SECOND = 1_000_000_000
 
@@ -77,8 +75,7 @@ class EstimatorCore:
         self._watch = self._new_watch()
         self._received = [0] * len(CHANNELS)
         self._late = [0] * len(CHANNELS)
-        self._told: list[tuple[str, int] | None] = [None] * len(CHANNELS)  # words, stamp of set
-        self._deferred_at: int | None = None
+        self._deferred = False  # since the last set
         self._latest: EstimateSet | None = None
         self._clock_steps = 0
         self._resets = 0
@@ -137,10 +134,16 @@ ReferenceVelocity
         return dict(getattr(self._estimator, 'learned', dict)())
 
     @property
-    def last_reasons(self) -> dict[str, str]:
-        """Input topic -> why something of it was last rejected."""
-        told = zip(self._checks.names, self._told, strict=True)
-        return {name: told_of[0] for name, told_of in told if told_of is not None}
+    def rejected(self) -> Counter[tuple[str, str]]:
+        """Messages, or parts of them, that were left out, by (input topic, reason in words)."""
+        counted = zip(self._checks.names, self._checks.rejected, strict=True)
+        return Counter({(name, why): n for name, counts in counted for why, n in counts.items()})
+
+    @property
+    def repeated(self) -> dict[str, int]:
+        """Messages whose stamp was given before and that were merged, by input topic."""
+        counted = zip(self._checks.names, self._timeline.repeated, strict=True)
+        return {name: count for name, count in counted if count}
 
     def health(self) -> dict[str, Any]:
         """Return counters and words for diagnostics: key (with unit where it has one) -> value."""
@@ -207,8 +210,7 @@ ReferenceVelocity
             return sets
         if fate in (Fate.LATE, Fate.DEFERRED):
             self._late[channel] += 1
-            if fate is Fate.DEFERRED:
-                self._deferred_at = arrival.measurement.stamp
+            self._deferred |= fate is Fate.DEFERRED
         elif fate is Fate.TOO_OLD:
             self._checks.refuse(channel, 'stamp older than the history')
         elif fate is Fate.FULL:
@@ -219,7 +221,7 @@ ReferenceVelocity
         self, stamp: int, outcome: EstimateSet | Exception, silent: bool
     ) -> tuple[EstimateSet, bool]:
         estimates, failed = self._guard.repaired(stamp, outcome)
-        faults = self._faults(stamp, silent)
+        faults = self._faults(silent)
         if faults:
             estimates = replace(estimates, faults={**estimates.faults, **faults})
         if silent:
@@ -231,26 +233,17 @@ ReferenceVelocity
         self._latest = estimates
         return estimates, failed
 
-    def _faults(self, stamp: int, silent: bool) -> dict[str, str]:
-        """Return what was left out of late, and silence, in words."""
+    def _faults(self, silent: bool) -> dict[str, str]:
+        """Return what became of the inputs since the last set, in words."""
         faults = {}
-        checks = self._checks
-        for channel, reason in enumerate(checks.latest):
-            if reason:
-                count = checks.rejected[channel][reason]
-                cure = f' -> {CURES[reason]}' if reason in CURES else ''
-                self._told[channel] = f'{reason} ({count} so far){cure}', stamp
-                checks.latest[channel] = ''
-            told = self._told[channel]
-            if told is not None and abs(stamp - told[1]) < FAULT_MEMORY:
-                faults[checks.names[channel]] = told[0]
-        if self._deferred_at is not None and abs(stamp - self._deferred_at) < FAULT_MEMORY:
+        if self._deferred:
+            self._deferred = False
             faults['late inputs'] = (
                 f'more than {self._settings.rerun_rate:.0f} steps a second would be run again '
                 '(filter.rerun_rate): fused with delay'
             )
         if silent:
-            faults[checks.names[0]] = 'silent: wheel rates unknown'
+            faults['wheel_odometry'] = f'{self._checks.names[0]} silent: wheel rates unknown'
         return faults
 
 

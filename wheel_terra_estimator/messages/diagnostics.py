@@ -4,13 +4,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from wheel_terra_estimator.estimation.estimates import EstimateSet, SlipClass
+from wheel_terra_estimator.estimation.outputs import MissingInputs
+from wheel_terra_estimator.messages.fault_log import FaultLog
 
 OK, WARN, ERROR, STALE = range(4)
 
@@ -21,12 +23,13 @@ PERIOD = 1_000_000_000
 NO_TIME_TO_STUCK = 600.0
 """Time to an entrapment [s] that is said where none is in sight."""
 
-LEVEL_HOLD = 1_000_000_000
-"""A level of the node's own must be over for so long [ns of stamps] before it falls."""
+START = 1_000_000_000
+"""In the first second inputs may be on their way [ns]."""
 
 SMALLEST = 1e-12
 """Smaller numbers are written as 0: no unit of this package makes them anything else."""
 
+INPUTS = frozenset(MissingInputs._fields)
 _NEEDED = frozenset({'wheel_odometry', 'imu'})  # that no rover does without
 
 _CLASS_WORDS = {
@@ -47,36 +50,6 @@ class Status(NamedTuple):
     values: list[tuple[str, str]]
 
 
-def stale_statuses(
-    names: Sequence[str],
-    words: str,
-    counters: Mapping[str, Any],
-    latest: EstimateSet | None = None,
-    node_name: str = NODE,
-) -> list[Status]:
-    """Return the statuses of a node without estimates; values are held as in the latest set."""
-    stuck = latest is not None and latest.stuck
-    values = [('stuck', str(stuck).lower()), *_values(counters)]
-    node = Status(STALE, f'{node_name}: estimator', words, node_name, values)
-    if latest is None:
-        values = _values({'stuck_probability': 0.0, 'time_to_stuck_s': NO_TIME_TO_STUCK})
-        values.append(('reason', words))
-        return [
-            node,
-            *(
-                Status(STALE, f'{node_name}: {n}', words, _hardware(node_name, n), values)
-                for n in names
-            ),
-        ]
-    unknown = replace(
-        latest,
-        slip_class=np.full(len(names), SlipClass.UNKNOWN, dtype=np.uint8),
-        reasons=(words,) * len(names),
-    )
-    wheels = (_wheel_status(unknown, i, name, node_name) for i, name in enumerate(names))
-    return [node, *(status._replace(level=STALE) for status in wheels)]
-
-
 class Diagnostics:
     """Decides for each estimate set whether a message is due, and what it says.
 
@@ -87,35 +60,67 @@ class Diagnostics:
     counters : callable
         Returns further key-values of the node (unit in the key); asked only when one is due.
     faults : callable
-        Takes a stamp [ns], returns faults that the set does not know of, in words.
+        Returns faults that the sets do not know of, since it was last asked: subject and words.
     node_name : str
         Name of the node with its namespace, for names and hardware ids.
+
+    Attributes
+    ----------
+    clock : callable
+        Stamp of a set [ns] -> time by which faults stand and are cleared [ns]: that stamp itself,
+        or for whoever looks on live the time of a clock.
+    new_faults : list of str
+        Faults that the latest message was the first to tell.
     """
 
     def __init__(
         self,
         names: Sequence[str],
         counters: Callable[[], Mapping[str, Any]] = dict,
-        faults: Callable[[int], Mapping[str, str]] = lambda stamp: {},
+        faults: Callable[[], Iterable[tuple[str, str]]] = tuple,
         node_name: str = NODE,
     ) -> None:
         self.node_name = node_name
+        self.clock: Callable[[int], int] = _stamp_itself
+        self.new_faults: list[str] = []
         self._names = names
         self._counters = counters
         self._faults = faults
+        self._log = FaultLog()
         self._stamp: int | None = None
         self._levels: list[int] = []
-        self._raised: tuple[int, int] | None = None  # level of the node, when it was last that high
+        self._begun: int | None = None  # by the clock
         self._lacking: set[str] | None = None  # subjects with a fault in every set so far
+        self._awaited: set[str] = set()  # inputs that may be on their way
+
+    def look(self, stamp: int = 0) -> None:
+        """Ask for the faults that the sets do not know of."""
+        self._log.note(self._faults(), self.clock(stamp))
+
+    def follow(self, estimates: EstimateSet) -> None:
+        """Take the faults of a set.
+
+        A rover without a sensor is not at fault; a sensor that fell silent is. What is missing in
+        the first second may be on its way.
+        """
+        now, faults = self.clock(estimates.stamp), estimates.faults
+        if self._begun is None or now < self._begun:
+            self._begun = now
+        optional = faults.keys() & (INPUTS - _NEEDED)
+        self._lacking = optional if self._lacking is None else self._lacking & faults.keys()
+        starts = now - self._begun < START
+        self._awaited = faults.keys() & INPUTS if starts else set()
+        passed_over = self._lacking | self._awaited
+        self._log.note(((s, w) for s, w in faults.items() if s not in passed_over), now)
+        self.look(estimates.stamp)
 
     def due(self, estimates: EstimateSet) -> list[Status]:
         """Return the statuses if a message is due, else nothing.
 
         It is due every second of stamps, and at once when a level changes.
         """
-        found = estimates.faults.keys()
-        self._lacking = found - _NEEDED if self._lacking is None else self._lacking & found
-        levels = [self._node_level(estimates)]
+        self.follow(estimates)
+        levels = [self._level(estimates)]
         levels += [_wheel_level(estimates, i) for i in range(len(self._names))]
         stamp = estimates.stamp
         if (
@@ -129,43 +134,71 @@ class Diagnostics:
 
     def now(self, estimates: EstimateSet) -> list[Status]:
         """Return the status of the node, then of each wheel."""
+        words = ['stuck, or about to be'] if estimates.stuck else []
+        words += self._log.standing(self.clock(estimates.stamp))
+        # Of these nothing is remembered: they hold for this set.
+        lacking = sorted((self._lacking or set()) - self._awaited)
+        words += [f'{subject}: {estimates.faults[subject]}' for subject in lacking]
+        if self._awaited:
+            words.append(f'waiting for {", ".join(sorted(self._awaited))}')
+        values = [('stuck', str(estimates.stuck).lower()), *_values(self._counters())]
+        node = self._node_status(self._level(estimates), '; '.join(words) or 'running', values)
+        return [node, *self._wheel_statuses(estimates)]
+
+    def stale(self, words: str, latest: EstimateSet | None = None, stamp: int = 0) -> list[Status]:
+        """Return the statuses while there are no estimates; values are held as in the latest set.
+
+        Parameters
+        ----------
+        words : str
+            Why there are none.
+        latest : EstimateSet, optional
+            The latest set, if there ever was one.
+        stamp : int
+            Time of the message [ns].
+        """
+        self.look(stamp)
+        told = '; '.join([words, *self._log.standing(self.clock(stamp))])
+        stuck = latest is not None and latest.stuck
+        values = [('stuck', str(stuck).lower()), *_values(self._counters())]
+        node = self._node_status(STALE, told, values)
+        if latest is not None:
+            unknown = replace(
+                latest,
+                slip_class=np.full(len(self._names), SlipClass.UNKNOWN, dtype=np.uint8),
+                reasons=(words,) * len(self._names),
+            )
+            return [node, *(s._replace(level=STALE) for s in self._wheel_statuses(unknown))]
+        values = _values({'stuck_probability': 0.0, 'time_to_stuck_s': NO_TIME_TO_STUCK})
+        values.append(('reason', words))
+        names = self._names
+        hardware = (_hardware(self.node_name, name) for name in names)
         return [
-            self._node_status(estimates),
+            node,
             *(
-                _wheel_status(estimates, i, name, self.node_name)
-                for i, name in enumerate(self._names)
+                Status(STALE, f'{self.node_name}: {name}', words, identity, values)
+                for name, identity in zip(names, hardware, strict=True)
             ),
         ]
 
-    def _node_level(self, estimates: EstimateSet) -> int:
-        """Return the level: it rises at once and falls a while after what raised it."""
-        level, stamp = self._level_of_now(estimates), estimates.stamp
-        raised = self._raised
-        if raised is None or level >= raised[0] or not 0 <= stamp - raised[1] < LEVEL_HOLD:
-            self._raised = level, stamp
-            return level
-        return raised[0]
-
-    def _level_of_now(self, estimates: EstimateSet) -> int:
-        """A rover without a sensor is not at fault; a sensor that fell silent is."""
+    def _level(self, estimates: EstimateSet) -> int:
         if estimates.stuck:
             return ERROR
-        lost = estimates.faults.keys() - (self._lacking or set())
-        return WARN if lost or self._faults(estimates.stamp) else OK
+        return WARN if self._log.standing(self.clock(estimates.stamp)) else OK
 
-    def _node_status(self, estimates: EstimateSet) -> Status:
-        faults = {**estimates.faults, **self._faults(estimates.stamp)}
-        words = ['stuck, or about to be'] if estimates.stuck else []
-        words += [f'{subject}: {fault}' for subject, fault in faults.items()]
-        level = self._node_level(estimates)
-        running = 'running' if level == OK else 'running again'
-        return Status(
-            level=level,
-            name=f'{self.node_name}: estimator',
-            message='; '.join(words) or running,
-            hardware_id=self.node_name,
-            values=[('stuck', str(estimates.stuck).lower()), *_values(self._counters())],
-        )
+    def _node_status(self, level: int, words: str, values: list[tuple[str, str]]) -> Status:
+        """Return the status of the node; its faults are published with it."""
+        self.new_faults = self._log.publish()
+        return Status(level, f'{self.node_name}: estimator', words, self.node_name, values)
+
+    def _wheel_statuses(self, estimates: EstimateSet) -> list[Status]:
+        return [
+            _wheel_status(estimates, i, name, self.node_name) for i, name in enumerate(self._names)
+        ]
+
+
+def _stamp_itself(stamp: int) -> int:
+    return stamp
 
 
 def _wheel_level(estimates: EstimateSet, i: int) -> int:

@@ -8,7 +8,7 @@ They differ in nothing but who brings the messages and where the sets go.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 from wheel_terra_estimator.checks.watched_estimator import WatchedEstimator
@@ -16,15 +16,10 @@ from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.core import EstimatorCore
 from wheel_terra_estimator.estimation.estimates import EstimateSet
 from wheel_terra_estimator.estimation.measurements import Measurement
+from wheel_terra_estimator.estimation.timing.input_checks import CURES
 from wheel_terra_estimator.estimation.timing.input_log import Estimator
 from wheel_terra_estimator.messages.convert import InputConverter, input_layout
 from wheel_terra_estimator.messages.diagnostics import NODE, Diagnostics
-
-FAULT_MEMORY = 5_000_000_000
-"""How long a refused message is shown as a fault [ns of stamps]."""
-
-_REPEATED = '_stamp_repeated'  # likewise, behind the topic
-_REJECTED = '_rejected: '  # between topic and reason in the keys of the core's counters
 
 
 class Pipeline:
@@ -43,9 +38,9 @@ class Pipeline:
     ----------
     received : Counter
         Messages heard, by input topic.
-    transport_faults, transport_values : dict, callable
-        What whoever brings the messages has to say for itself in diagnostics: faults in words, and
-        a function that returns key-values.
+    transport_faults, transport_values : callable
+        Return what whoever brings the messages has to say in diagnostics: faults since it was last
+        asked (subject and words), and key-values.
     on_measurement : callable or None
         Gets each measurement before the core does.
     diagnostics : Diagnostics
@@ -64,11 +59,12 @@ class Pipeline:
         self.core = EstimatorCore(configuration, estimator, watched_by=WatchedEstimator)
         self.received: Counter[str] = Counter()
         self.diagnostics = Diagnostics(self.names, self.counters, self._faults, node_name)
-        self.transport_faults: dict[str, str] = {}
+        self.transport_faults: Callable[[], Iterable[tuple[str, str]]] = tuple
         self.transport_values: Callable[[], dict[str, Any]] = dict
         self.on_measurement: Callable[[Measurement], object] | None = None
         self._published = 0
-        self._refused: dict[tuple[str, str], tuple[int, int]] = {}  # -> count, stamp
+        self._refused: Counter[tuple[str, str]] = Counter()  # as told
+        self._reasons: dict[str, str] = {}  # of the last refusal, by topic
 
     def hear(self, topic: str, message: Any) -> list[EstimateSet]:
         """Take a message of an input topic and return the sets that it completed."""
@@ -105,24 +101,16 @@ class Pipeline:
     @property
     def rejected(self) -> Counter[tuple[str, str]]:
         """Messages that could not be used, by (input topic, reason in words)."""
-        found = Counter(self.converter.rejected)
-        for key, count in self.core.health().items():
-            topic, mark, reason = key.partition(_REJECTED)
-            if mark:
-                found[topic, reason] += count
-            elif key.endswith(_REPEATED):
-                found[key.removesuffix(_REPEATED), 'stamp repeated, merged'] += count
-        return found
+        repeated = {(t, 'stamp repeated, merged'): n for t, n in self.core.repeated.items()}
+        return self.converter.rejected + self.core.rejected + Counter(repeated)
 
     def counters(self) -> dict[str, Any]:
         """Return what happened so far, for diagnostics and summaries."""
         result: dict[str, Any] = {'sets_published': self._published}
         result.update((f'{topic}_received', count) for topic, count in self.received.items())
         for (topic, reason), count in self.converter.rejected.items():
-            result[f'{topic}{_REJECTED}{reason}'] = count
-        result.update(
-            (f'{topic}_last_reason', reason) for topic, reason in self._last_reasons().items()
-        )
+            result[f'{topic}_rejected: {reason}'] = count
+        result.update((f'{topic}_last_reason', why) for topic, why in self._reasons.items())
         result.update(self.transport_values())
         result.update(self.core.health())
         return result
@@ -131,22 +119,15 @@ class Pipeline:
         self._published += len(sets)
         return sets
 
-    def _last_reasons(self) -> dict[str, str]:
-        """Return input topic -> why something of it was last rejected."""
-        found = {
-            topic: reason
-            for (topic, reason), _ in sorted(self._refused.items(), key=lambda item: item[1][1])
-        }
-        return found | self.core.last_reasons
-
-    def _faults(self, stamp: int) -> dict[str, str]:
-        """Return the messages that were refused of late, in words."""
-        for key, count in self.converter.rejected.items():
-            if count != self._refused.get(key, (0, 0))[0]:
-                self._refused[key] = count, stamp
-        refused = {
-            topic: f'{self.converter.in_words(topic, reason)} ({count} messages)'
-            for (topic, reason), (count, since) in self._refused.items()
-            if 0 <= stamp - since < FAULT_MEMORY
-        }
-        return {**refused, **self.transport_faults}
+    def _faults(self) -> list[tuple[str, str]]:
+        """Return what was lost and left out of the inputs since this was last asked, in words."""
+        found = list(self.transport_faults())
+        rejected = self.converter.rejected + self.core.rejected
+        for (topic, reason), count in rejected.items():
+            if count != self._refused[topic, reason]:
+                cure = f' -> {CURES[reason]}' if reason in CURES else ''
+                words = f'{self.converter.in_words(topic, reason)} ({count} so far){cure}'
+                self._reasons[topic] = words
+                found.append((topic, words))
+        self._refused = rejected
+        return found

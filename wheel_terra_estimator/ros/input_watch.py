@@ -14,14 +14,13 @@ PERIODS_TO_SILENCE = 3.0
 LEAST_SILENCE = 0.75  # [s]
 MESSAGES_TO_PERIOD = 3  # from which the period of a topic is known
 UNKNOWN_PERIOD = 5.0  # [s] of silence until then
-MEMORY = 5.0  # [s] for which a loss is told
 _SMOOTHING = 0.1
 
 
 class _Topic:
     """What is known of one topic."""
 
-    __slots__ = ('delay', 'heard', 'lost', 'lost_at', 'number', 'period', 'received', 'stamp')
+    __slots__ = ('delay', 'heard', 'lost', 'number', 'period', 'received', 'stamp', 'told')
 
     def __init__(self) -> None:
         self.received = 0
@@ -31,7 +30,7 @@ class _Topic:
         self.stamp = 0
         self.number: int | None = None  # of the publisher's last message
         self.lost = 0
-        self.lost_at = float('-inf')
+        self.told = 0  # of these
 
 
 class InputWatch:
@@ -63,14 +62,12 @@ class InputWatch:
         state.heard = now
         state.received += 1
         if number is not None and state.number is not None and number > state.number + 1:
-            self.lost(topic, number - state.number - 1, now)
+            self.lost(topic, number - state.number - 1)
         state.number = number
 
-    def lost(self, topic: str, count: int, now: float) -> None:
+    def lost(self, topic: str, count: int) -> None:
         """Note messages that were sent and not heard."""
-        state = self._topics.setdefault(topic, _Topic())
-        state.lost += count
-        state.lost_at = now
+        self._topics.setdefault(topic, _Topic()).lost += count
 
     def age(self, topic: str, now: float) -> float | None:
         """Return for how long a topic has been silent [s]; None if it was never heard."""
@@ -86,14 +83,15 @@ class InputWatch:
         least = LEAST_SILENCE if state.received > MESSAGES_TO_PERIOD else UNKNOWN_PERIOD
         return age > max(least, PERIODS_TO_SILENCE * state.period)
 
-    def faults(self, now: float) -> dict[str, str]:
-        """Return topic -> what is wrong, in words."""
-        found = {}
+    def faults(self, now: float) -> list[tuple[str, str]]:
+        """Return topics that are silent, and losses since this was last asked, in words."""
+        found = []
         for topic, state in self._topics.items():
+            if state.lost != state.told:
+                found.append((topic, f'{state.lost} messages lost on the way so far'))
+                state.told = state.lost
             if self.is_silent(topic, now):
-                found[topic] = f'silent for {now - state.heard:.1f} s'
-            elif now - state.lost_at < MEMORY:
-                found[topic] = f'{state.lost} messages lost on the way so far'
+                found.append((topic, f'silent for {now - state.heard:.1f} s'))
         return found
 
     def values(self, now: float) -> Mapping[str, Any]:

@@ -45,7 +45,6 @@ from wheel_terra_estimator.messages.diagnostics import (
     OK,
     STALE,
     Status,
-    stale_statuses,
 )
 from wheel_terra_estimator.messages.pipeline import Pipeline
 from wheel_terra_estimator.output_folder import check_target
@@ -73,6 +72,8 @@ and not when a set is due, which is then there sooner."""
 WATCH_PERIOD = 0.25  # [s]
 DIAGNOSTICS_PERIOD = 1.0  # [s] of the steady clock, while nothing is heard
 SILENCE = 1.5  # [s] of the steady clock without a set
+START = 1.0  # [s] in which the node says what it waits for, and not what is missing
+DISCOVERY = 5.0  # [s] in which publishers may not have been found yet: no warning in the log
 SAVE_PERIOD = 10.0  # [s]
 RESET = 'reset'  # line of an arrival log
 LONGEST_LINE = 100  # of an arrival log [byte]
@@ -141,7 +142,7 @@ class EstimatorNode(LifecycleNode):
         self._active = False
         self._enabled = True
         self._arrival: TextIO | None = None
-        self._level = -1
+        self._said = (-1, False)  # level of the node that was logged last, and whether quietly
         self.create_service(Trigger, '~/reset', self._reset)
         self.create_service(Trigger, '~/save_soil', self._save_soil)
         self.create_service(SetBool, '~/set_enabled', self._set_enabled)
@@ -219,6 +220,8 @@ class EstimatorNode(LifecycleNode):
         self._numbered: set[str] = set()
         self._same_name = self._said_ready = False
         self._pipeline.transport_values = self._transport_values
+        self._pipeline.transport_faults = self._transport_faults
+        self._pipeline.diagnostics.clock = lambda stamp: time.monotonic_ns()
         self._publisher = EstimatePublisher(self, self._pipeline.names)
         self._publisher.publish_stuck(self._warned.stuck, self._warned.direction)
         self._views = self._live_views(configuration)
@@ -300,8 +303,6 @@ class EstimatorNode(LifecycleNode):
         number = info.get('publication_sequence_number') if topic in self._numbered else None
         self._watch_inputs.heard(topic, now, (self._nanoseconds() - stamp) / _SECOND, number)
         self._incompatible.pop(topic, None)
-        if pipeline.transport_faults:
-            pipeline.transport_faults.pop(topic, None)  # no longer silent; the watch knows the rest
         for estimates in pipeline.hear(topic, message):
             self._take(estimates, now)
         if topic not in FREQUENT:
@@ -316,6 +317,7 @@ class EstimatorNode(LifecycleNode):
             self._log_stuck()
             self._save_warning()
         if not (self._active and self._enabled):
+            self._pipeline.diagnostics.follow(estimates)
             return
         self._publisher.publish(estimates)
         if self._views is not None:
@@ -336,7 +338,7 @@ class EstimatorNode(LifecycleNode):
     def _on_message_lost(self, topic: str, event: Any) -> None:
         if topic in self._numbered:
             return  # gaps in the publisher's own count say it at once, and exactly
-        self._watch_inputs.lost(topic, event.total_count_change, self._seconds())
+        self._watch_inputs.lost(topic, event.total_count_change)
 
     # -- Services -------------------------------------------------------------------------------
 
@@ -348,6 +350,7 @@ class EstimatorNode(LifecycleNode):
             self._arrival.write(f'{RESET}\n')
         self._pipeline.reset()
         self._latest = None
+        self._started = self._seconds()
         self._warned = self._pipeline.core.warning.state
         if self._kept is not None:
             self._kept.forget_warning()
@@ -442,64 +445,73 @@ class EstimatorNode(LifecycleNode):
         else:
             self.get_logger().info(f'no longer stuck: {self._warned.reason}')
 
-    def _say(self, stamp: Any, statuses: list[Status], now: float) -> None:
-        """Publish diagnostics; log a change of the node's level."""
-        assert self._publisher is not None
+    def _say(
+        self, stamp: Any, statuses: list[Status], now: float, *, expected: bool = False
+    ) -> None:
+        """Publish diagnostics; log a change of the node's level, and each fault when it is new.
+
+        What is `expected` (there were no inputs yet, somebody stopped the node) is no warning.
+        """
+        assert self._publisher is not None and self._pipeline is not None
         self._diagnostics_at = now
         self._publisher.publish_diagnostics(stamp, statuses)
         level, message = statuses[0].level, statuses[0].message
-        if level != self._level:
-            self._level = level
+        new_faults = '; '.join(self._pipeline.diagnostics.new_faults)
+        log = self.get_logger()
+        if (level, expected) != self._said:
+            self._said = level, expected
             words = f'{LEVELS[level]}: {message}'
-            if level == OK:
-                self.get_logger().info(words)
+            if level == OK or expected:
+                log.info(words)
             elif level == ERROR:
-                self.get_logger().error(words)
+                log.error(words)
             else:
-                self.get_logger().warning(words)
+                log.warning(words)
+                return
+        if new_faults:
+            log.warning(new_faults)
 
     def _watch(self) -> None:
         """Keep diagnostics going when stamps do not: silence, or a slowly played bag."""
         assert self._pipeline is not None
         self._say_ready()
         now = self._seconds()
-        self._look_at_transport(now)
+        diagnostics = self._pipeline.diagnostics
+        diagnostics.look()
         silent = now - self._set_at > SILENCE
         stopped = self._stopped_in_words()
         # While sets flow they bring their own diagnostics; leave them the first word.
         flowing = not (silent or stopped)
-        level_changes = (silent or bool(stopped)) and self._level != STALE
+        level_changes = (silent or bool(stopped)) and self._said[0] != STALE
         wait = DIAGNOSTICS_PERIOD + (WATCH_PERIOD if flowing else 0.0)
         if now - self._diagnostics_at < wait and not level_changes:
             return
         stamp = self.get_clock().now().to_msg()
-        if silent or stopped or self._latest is None:
-            words = stopped or self._silence_in_words(now)
-            counters = self._pipeline.counters()
-            statuses = stale_statuses(
-                self._pipeline.names, words, counters, self._latest, self._full_name
-            )
-        else:
-            statuses = self._pipeline.diagnostics.now(self._latest)
-        self._say(stamp, statuses, now)
+        if not (silent or stopped) and self._latest is not None:
+            self._say(stamp, diagnostics.now(self._latest), now)
+            return
+        words = stopped or self._silence_in_words(now)
+        expected = bool(stopped) or (self._latest is None and now - self._started < DISCOVERY)
+        self._say(stamp, diagnostics.stale(words, self._latest), now, expected=expected)
 
     def _stopped_in_words(self) -> str:
         if not self._active:
             return 'inactive: estimates go on but are not published'
         return '' if self._enabled else 'disabled by ~/set_enabled: estimates are not published'
 
-    def _look_at_transport(self, now: float) -> None:
-        """Tell the pipeline what is wrong with the transport."""
-        assert self._pipeline is not None
-        faults = self._watch_inputs.faults(now) | self._incompatible
+    def _transport_faults(self) -> list[tuple[str, str]]:
+        """Return what is wrong with the transport, and what was lost since this was last asked."""
+        now = self._seconds()
+        faults = self._watch_inputs.faults(now)
+        faults += [(self.resolve_topic_name(t), words) for t, words in self._incompatible.items()]
         if self._same_name:
-            faults['name'] = f'another node is called /{self._full_name}: both publish estimates'
+            words = f'another node is called /{self._full_name}: both publish estimates'
+            faults.append(('name', words))
         if self._kept is not None and self._kept.fault:
-            faults['soil_file'] = self._kept.fault
-        if self._has_no_clock():
-            faults['clock'] = 'use_sim_time is true, but nothing comes on /clock'
-        self._pipeline.transport_faults.clear()
-        self._pipeline.transport_faults.update(faults)
+            faults.append(('soil_file', self._kept.fault))
+        if self._has_no_clock() and now - self._started > DISCOVERY:
+            faults.append(('clock', 'use_sim_time is true, but nothing comes on /clock'))
+        return faults
 
     def _has_no_clock(self) -> bool:
         sim_time = self.get_parameter('use_sim_time').value
@@ -520,24 +532,20 @@ class EstimatorNode(LifecycleNode):
 
     def _silence_in_words(self, now: float) -> str:
         assert self._pipeline is not None
+        topics = self._pipeline.converter.layout.topics
+        if self._latest is None and now - self._started < START:
+            return f'waiting for {", ".join(topics)}'
         words = []
-        for topic in self._pipeline.converter.layout.topics:
+        for topic in topics:
             name = self.resolve_topic_name(topic)
             age = self._watch_inputs.age(topic, now)
-            if topic in self._incompatible:
-                words.append(f'{name}: {self._incompatible[topic]}')
-            elif age is None:
+            if age is None:
                 words.append(f'{name}: never heard ({self._publishers_in_words(topic)})')
             elif age > SILENCE:
                 words.append(f'{name}: silent for {age:.0f} s')
         for (topic, reason), count in self._pipeline.rejected.items():
             reason = self._pipeline.converter.in_words(topic, reason)
             words.append(f'{self.resolve_topic_name(topic)}: rejected: {reason} ({count} messages)')
-        words += [
-            f'{subject}: {self._pipeline.transport_faults[subject]}'
-            for subject in ('clock', 'name', 'soil_file')
-            if subject in self._pipeline.transport_faults
-        ]
         seconds = now - max(self._set_at, self._started)
         return '; '.join([f'no estimates for {seconds:.0f} s', *words])
 

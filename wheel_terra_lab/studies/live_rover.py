@@ -100,6 +100,7 @@ class Rover(Node):
         self.levels: list[tuple[float, int, str]] = []
         self.values: dict[str, str] = {}
         self.said = ''
+        self.diagnostics = 0  # messages
         self.shift = 0  # of all stamps [ns]
         count = 2 * len(self.names)
         self._noise = [[random.gauss(0.0, 1.0) for _ in range(count)] for _ in range(NOISES)]
@@ -169,6 +170,7 @@ class Rover(Node):
                 level = status.level[0]
                 self.values = {value.key: value.value for value in status.values}
                 self.said = status.message
+                self.diagnostics += 1
                 if not self.levels or self.levels[-1][1] != level:
                     self.levels.append((time.monotonic(), level, status.message))
 

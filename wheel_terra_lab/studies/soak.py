@@ -36,7 +36,7 @@ from wheel_terra_lab.studies.live_rover import Process, Rover, quantile
 
 RATES = {'joint_states': 50.0, 'imu/data': 100.0, 'sinkage': 10.0, 'reference_odom': 1.0}
 HEALTH = 4.0  # [s] between two faults at least
-RECOVERY = 12.0  # [s]: a fault is told of for 5 s
+RECOVERY = 17.0  # [s]: a fault is told of for 10 s
 SETTLED = 600.0  # [s] after which memory must not grow
 GROWTH = 2.0  # [MB]
 LOST = 'messages lost on the way so far'

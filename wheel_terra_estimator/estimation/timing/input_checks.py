@@ -82,8 +82,6 @@ class InputChecks:
         Per channel: reason in words -> how often something was left out for it.
     refused : list of int
         Per channel: messages of which nothing was left to use.
-    latest : list of str
-        Per channel: reason of the latest rejection since this was last emptied.
     """
 
     def __init__(self, configuration: Configuration) -> None:
@@ -97,7 +95,6 @@ class InputChecks:
         )
         self.rejected: list[Counter[str]] = [Counter() for _ in self.names]
         self.refused = [0] * len(self.names)
-        self.latest = [''] * len(self.names)
         self._inertial_before: InertialReading | None = None
         self._wild: InertialReading | None = None
         self._count = wheels.count
@@ -126,7 +123,6 @@ class InputChecks:
     def reject(self, channel: int, reason: str) -> None:
         """Count a part of a message that was left out."""
         self.rejected[channel][reason] += 1
-        self.latest[channel] = reason
 
     def refuse(self, channel: int, reason: str) -> None:
         """Count a message that was left out."""

@@ -1,0 +1,114 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""No input is lost without a word, whatever holds the node up; an orderly life is quiet."""
+
+import re
+import signal
+import time
+
+import pytest
+
+from wheel_terra_estimator.configuration import reader
+
+ROVER = 'generic_six_wheel'
+RATES = {'joint_states': 100.0, 'imu/data': 100.0, 'sinkage': 10.0, 'reference_odom': 5.0}
+STANDS = 4.0  # [s]: more than the queues hold at 100 Hz
+
+
+@pytest.fixture
+def drive(node_server, tmp_path):
+    """A rover that publishes all inputs, and what turns it and starts a node."""
+    import rclpy
+    from rclpy.context import Context
+    from rclpy.executors import SingleThreadedExecutor
+
+    from wheel_terra_lab.studies.live_rover import Rover
+
+    configuration = reader.load([ROVER])
+    path = tmp_path / 'rover.yaml'
+    configuration.write(path)
+    context = Context()
+    rclpy.init(args=[], context=context)
+    rover = Rover(configuration.wheels.names, RATES, context=context)
+    executor = SingleThreadedExecutor(context=context)
+    executor.add_node(rover)
+
+    def until(condition, seconds=60.0):
+        end = time.monotonic() + seconds
+        while not condition():
+            assert time.monotonic() < end, f'not in time; the node says: {rover.said}'
+            rover.publish_due()
+            executor.spin_once(timeout_sec=0.001)
+
+    processes = []
+
+    def start():
+        arguments = ['--ros-args', '--params-file', str(path)]
+        processes.append(node_server.start('estimator_node', arguments))
+        return processes[-1]
+
+    yield rover, until, start
+    for process in processes:
+        if process.poll() is None:
+            process.kill()
+            process.wait(60.0)
+    executor.shutdown()
+    rover.destroy_node()
+    rclpy.shutdown(context=context)
+
+
+def lasts(seconds):
+    end = time.monotonic() + seconds
+    return lambda: time.monotonic() > end
+
+
+def lost(rover):
+    return {
+        key.removesuffix('_lost'): int(count)
+        for key, count in rover.values.items()
+        if key.endswith('_lost') and int(count)
+    }
+
+
+def test_a_process_that_stood_tells_each_loss_with_its_count(drive):
+    rover, until, start = drive
+    process = start()
+    until(lambda: rover.sets > 20)
+    until(lambda: rover.said == 'running')
+    process.send_signal(signal.SIGSTOP)
+    until(lasts(STANDS))
+    process.send_signal(signal.SIGCONT)
+    until(lambda: {'joint_states', 'imu/data'} <= lost(rover).keys())
+    first = time.monotonic()
+    while time.monotonic() < first + 5.0:
+        for topic, count in lost(rover).items():
+            assert f'{topic}: {count} messages lost on the way so far' in rover.said
+        before = rover.diagnostics
+        until(lambda before=before: rover.diagnostics > before)
+    until(lambda: rover.said == 'running')
+    assert time.monotonic() - first > 9.0, 'ten seconds in words'
+
+
+def test_an_orderly_life_is_quiet(drive):
+    """The inputs are there, or come within a second; nothing warns from start to end."""
+    rover, until, start = drive
+    process = start()
+    until(lambda: rover.sets > 20)
+    until(lambda: rover.said == 'running')
+    process.send_signal(signal.SIGINT)
+    until(lambda: process.poll() is not None)
+    said, _ = process.communicate(60.0)
+    assert process.returncode == 0
+    assert not re.search(r'WARN|ERROR|FATAL|Traceback', said), said
+    assert 'OK: ' in said
+
+
+def test_a_node_without_inputs_waits_at_first_and_warns_then(drive):
+    _, _, start = drive
+    process = start()
+    time.sleep(8.0)  # nothing is published
+    process.send_signal(signal.SIGINT)
+    said, _ = process.communicate(60.0)
+    waits, _, warns = said.partition('[WARN]')
+    assert 'waiting for joint_states, imu/data' in waits
+    assert 'never heard' in warns
