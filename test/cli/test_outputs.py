@@ -12,13 +12,14 @@ from pathlib import Path
 import pytest
 
 from wheel_terra_estimator.cli.main import main, sub_parsers
-from wheel_terra_estimator.cli.outputs import Output
+from wheel_terra_estimator.cli.outputs import Output, file_or_entry
 from wheel_terra_estimator.configuration import reader, soil_file
 from wheel_terra_estimator.configuration.shipped import FileName
 from wheel_terra_estimator.output_folder import new_folder
 
 PATH_LIKE = re.compile(r'(^|\|)(F|FILE|DIR|BAG|DATA|A|B|LOG|MAP)($|\||\.)')
 """Placeholders that stand for a path in the help of a command."""
+READ = Path, FileName, file_or_entry
 HARMLESS = argparse._HelpAction, argparse._StoreTrueAction, argparse._StoreConstAction
 ROVER = 'wheels.names: [left, right]\n    rover.mass: 50.0\n'
 
@@ -42,7 +43,7 @@ def outputs(parser: argparse.ArgumentParser) -> list[argparse.Action]:
 
 
 def inputs(parser: argparse.ArgumentParser) -> list[argparse.Action]:
-    return [a for a in parser._actions if a.type in (Path, FileName) and not isinstance(a, Output)]
+    return [a for a in parser._actions if a.type in READ and not isinstance(a, Output)]
 
 
 PAIRS = [
@@ -60,7 +61,7 @@ def test_every_option_says_whether_it_is_read_or_written(words: tuple[str, ...])
             continue
         metavar = action.metavar if isinstance(action.metavar, str) else action.dest
         if PATH_LIKE.search(metavar) and action.dest != 'name':  # of `config`, a shipped name
-            assert action.type in (Path, FileName), f'{action.dest}: type=Path or action=Output'
+            assert action.type in READ, f'{action.dest}: type=Path or action=Output'
 
 
 def test_the_walk_finds_what_it_is_for() -> None:

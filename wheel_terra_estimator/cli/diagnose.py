@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from wheel_terra_estimator.bags import limits as bag_limits
 from wheel_terra_estimator.cli import bag_arguments
-from wheel_terra_estimator.cli.outputs import Output
+from wheel_terra_estimator.cli.outputs import Output, file_or_entry
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.output_folder import check_folder, new_folder
 from wheel_terra_estimator.scheduler import add_jobs_argument, finished
@@ -66,6 +66,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         '--columns',
+        type=file_or_entry,
         action='append',
         default=[],
         metavar='FILE|NAME=COLUMN',

@@ -53,6 +53,11 @@ def check(arguments: argparse.Namespace) -> None:
             raise UserError(f'{one}: is named for two outputs; give each a path of its own')
 
 
+def file_or_entry(text: str) -> Path | str:
+    """Return the value of an option ``FILE|NAME=VALUE``: a path counts as an input."""
+    return text if '=' in text else Path(text)
+
+
 def _inputs(arguments: argparse.Namespace, outputs: dict[str, Path]) -> Iterator[Path]:
     for name, value in vars(arguments).items():
         if name in outputs:
