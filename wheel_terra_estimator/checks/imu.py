@@ -200,6 +200,8 @@ def _against_orientation(
     dt = time[step:] - time[:-step]
     good = np.isfinite(before).all(axis=1) & np.isfinite(after).all(axis=1) & (dt > 0.0)
     good &= (np.linalg.norm(before, axis=1) > 0.0) & (np.linalg.norm(after, axis=1) > 0.0)
+    if not good.any():
+        return [], state
     turned = _rotation_between(before[good], after[good]) / dt[good, None]
     total = np.vstack([np.zeros(3), np.cumsum(imu.rate, axis=0)])
     mean = ((total[step:] - total[:-step]) / step)[: good.size][good]
