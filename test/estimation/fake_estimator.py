@@ -80,6 +80,7 @@ class FakeEstimator:
             stamp=self.stamp,
             forward_velocity=self.value,
             yaw_rate=float(self.references),
+            slip_std=np.full(2, 0.01),
             slip_class=np.zeros(2, dtype=np.uint8),
         )
 

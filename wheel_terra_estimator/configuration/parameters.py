@@ -827,8 +827,15 @@ DECLARED: tuple[Parameter, ...] = (
         'filter.class_dwell',
         0.3,
         's',
-        'how long a new class must hold before it is taken',
+        'how long |slip| must be outside of a class before it changes',
         at_least=0.0,
+    ),
+    number(
+        'filter.class_std',
+        0.25,
+        '-',
+        'deviation of the slip above which the class is unknown (255)',
+        above=0.0,
     ),
     number(
         'filter.rest_time',
@@ -850,6 +857,14 @@ DECLARED: tuple[Parameter, ...] = (
         'm',
         'an entrapment expected within this rim travel raises the stuck warning',
         above=0.0,
+    ),
+    number(
+        'filter.stuck_threshold',
+        0.5,
+        '-',
+        'probability of an entrapment within them that raises the stuck warning',
+        above=0.0,
+        at_most=1.0,
     ),
     number(
         'filter.stuck_clear_slip',

@@ -19,6 +19,7 @@ import numpy as np
 
 from wheel_terra_estimator.configuration import Configuration
 from wheel_terra_estimator.estimation.estimates import EstimateSet, SlipClass
+from wheel_terra_estimator.estimation.judgement.classes import PublishedClasses
 from wheel_terra_estimator.estimation.judgement.stuck.memory import StuckMemory
 from wheel_terra_estimator.estimation.measurements import Measurement
 from wheel_terra_estimator.estimation.output_guard import OutputGuard
@@ -69,6 +70,7 @@ class EstimatorCore:
         self._errors = SensorErrors(configuration)
         self._checks = InputChecks(configuration)
         self._guard = OutputGuard(configuration)
+        self._classes = PublishedClasses(configuration)
         self.warning = StuckMemory(configuration)
         self._timeline = Timeline(self._estimator, self._settings, self._finish)
         self._contradicted = self._timeline.contradicted  # counts as it goes on
@@ -121,6 +123,7 @@ ReferenceVelocity
         self._settings = _time_settings(configuration)
         self._lags.fixed = _max_lag(configuration)
         self._clock_step = _nanoseconds(configuration.filter.clock_step)
+        self._classes.retune(configuration)
         self.warning.retune(configuration)
         self._timeline.retune(self._estimator, self._settings)
 
@@ -198,6 +201,7 @@ ReferenceVelocity
 
     def _end_run(self, keep_soil: bool) -> None:
         self._timeline.end_run(keep_soil=keep_soil)
+        self._classes.reset()
         self._lags.begin_run()
 
     def _insert(self, arrival: Arrival) -> list[EstimateSet]:
@@ -227,7 +231,7 @@ ReferenceVelocity
         if silent:
             unknown = np.full(len(estimates.slip_class), SlipClass.UNKNOWN, dtype=np.uint8)
             estimates = replace(estimates, slip_class=unknown)
-        estimates = self.warning.follow(estimates)
+        estimates = self.warning.follow(self._classes.follow(estimates))
         if failed:
             self.warning.begin_anew()
         self._latest = estimates

@@ -48,6 +48,7 @@ class EstimateSet:
     normal_load: FloatArray  # [N]
     normal_load_std: FloatArray
     slip_class: NDArray[np.uint8]
+    """The estimator says only which wheels are not judged (255); the core gives the classes."""
     rim_travel_left: FloatArray  # [m]
     pull_margin: FloatArray  # [N]
     soil_names: tuple[str, ...]

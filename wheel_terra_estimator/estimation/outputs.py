@@ -15,7 +15,11 @@ from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.contacts.loads import LoadState
 from wheel_terra_estimator.estimation.contacts.pulls import PullState
 from wheel_terra_estimator.estimation.contacts.steering import Headings
-from wheel_terra_estimator.estimation.estimates import NO_ENTRAPMENT_IN_SIGHT, EstimateSet
+from wheel_terra_estimator.estimation.estimates import (
+    NO_ENTRAPMENT_IN_SIGHT,
+    EstimateSet,
+    SlipClass,
+)
 from wheel_terra_estimator.estimation.filter.sinkage_process import SinkageState
 from wheel_terra_estimator.estimation.filter.state import (
     SHEAR_MODULUS,
@@ -147,7 +151,8 @@ class Outputs:
             sinkage=given.mean[layout.sinkage].copy(),
             sinkage_std=np.minimum(sinkage_std, rover.rim_radius),
             slip_class=np.array(
-                [wheel.slip_class.current for wheel in given.slips], dtype=np.uint8
+                [SlipClass.LOW if wheel.judged else SlipClass.UNKNOWN for wheel in given.slips],
+                dtype=np.uint8,
             ),
             soil_names=names,
             soil=soil,

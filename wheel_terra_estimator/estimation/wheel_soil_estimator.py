@@ -208,7 +208,7 @@ class WheelSoilEstimator:
         self._balance = ForceBalance(configuration, rover, sensors, layout)
         self._whiteness = Whiteness()
         # What it means.
-        self._slips = SlipJudge(configuration, rover, sensors)
+        self._slips = SlipJudge(rover, sensors)
         self._margin = PullMargin(sensors, layout, models)
         self._stuck = StuckMonitor(StuckSettings.from_configuration(configuration))
         self._outputs = Outputs(configuration, rover, sensors, layout)
@@ -668,7 +668,7 @@ class WheelSoilEstimator:
     # -- What it means ---------------------------------------------------------------------------
 
     def _judge(self, time: float) -> None:
-        """Judge slip and class of each wheel and the stuck warning at a time [s]."""
+        """Judge the slip of each wheel and the stuck warning at a time [s]."""
         rover, wheels = self._rover, self._wheels
         rims = wheels.rim_speeds(time)
         speed, variance = self._present_speed(rims)

@@ -23,7 +23,11 @@ from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.contacts.loads import WheelLoads
 from wheel_terra_estimator.estimation.contacts.steering import Headings, Steering
 from wheel_terra_estimator.estimation.contacts.turning import Turning
-from wheel_terra_estimator.estimation.estimates import NO_ENTRAPMENT_IN_SIGHT, EstimateSet
+from wheel_terra_estimator.estimation.estimates import (
+    NO_ENTRAPMENT_IN_SIGHT,
+    EstimateSet,
+    SlipClass,
+)
 from wheel_terra_estimator.estimation.filter.initial_state import SoilPriors
 from wheel_terra_estimator.estimation.inputs.contact_sensors import (
     LeavingAngleInput,
@@ -132,7 +136,7 @@ class TractionEstimator:
         self._loads = WheelLoads(rover)
         self._sinkage = SinkageFilter(rover, self._steady, priors)
         self._pull_model = PullModel(configuration, rover, sensors)
-        self._slips = SlipJudge(configuration, rover, sensors)
+        self._slips = SlipJudge(rover, sensors)
         self._stuck = StuckMonitor(StuckSettings.from_configuration(configuration))
         self._parts: tuple[Any, ...] = (
             self._inertial,
@@ -581,7 +585,8 @@ class TractionEstimator:
             normal_load=load,
             normal_load_std=np.full(n, self._rover.load_std * max(float(load.mean()), 1e-3)),
             slip_class=np.array(
-                [wheel.slip_class.current for wheel in self._slips.state], dtype=np.uint8
+                [SlipClass.LOW if w.judged else SlipClass.UNKNOWN for w in self._slips.state],
+                dtype=np.uint8,
             ),
             rim_travel_left=np.array([w.travel for w in ahead] or [NO_ENTRAPMENT_IN_SIGHT] * n),
             pull_margin=np.zeros(n),

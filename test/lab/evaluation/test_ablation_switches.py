@@ -84,7 +84,7 @@ def test_warning_told_again_is_the_same_and_feels_its_own_switches():
     # Late references: steps are made again, from kept states.
     case = short('B', 'climb', 10.0).make()
     always = both(
-        tuned('judgement.stuck.signs:SignTuning', likely=-1.0),
+        tuned('judgement.stuck.settings:StuckSettings', threshold=-1.0),
         tuned('judgement.stuck.situation:SituationTuning', settling_travel=0.0),
     )
     with always(), listening() as told:

@@ -1,35 +1,37 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Slip classes with hysteresis and dwell.
+"""Slip classes of the slips that are published, with hysteresis and dwell.
 
-A class changes when |s| has been beyond its border by half the hysteresis for the whole dwell time.
-The less the slip is known, the farther beyond it must be.
+A class stands until the published |s| has been outside of it, by half the hysteresis, for the dwell
+time; then it becomes that of |s|. Behind unknown it is that of |s| at once, the highest one after
+the dwell: where wheels begin to turn, their speed comes before that of the body. It is unknown
+where a wheel is not judged (at rest, no rate) or where the deviation of its slip exceeds
+``filter.class_std``; nothing else depends on the deviation.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
+from dataclasses import replace
+from math import isnan
 from typing import NamedTuple
 
-from wheel_terra_estimator.estimation.estimates import SlipClass
+import numpy as np
+
+from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.estimation.estimates import EstimateSet, SlipClass
+from wheel_terra_estimator.estimation.scalars import NAN
 
 UNKNOWN = int(SlipClass.UNKNOWN)
+_SECOND = 1e-9
 _TIME_ROUNDING = 1e-9  # [s]
-_KNOWN_STD = 0.05  # deviation up to which a slip is well known; tuned, seeds 1000 to 1019
-_BAND_PER_STD, _WIDEST_BAND = 0.25, 0.1  # band added for each deviation beyond, at most
-_GUESS_STD, _BAND_PER_GUESS = 0.25, 2.0
-"""Deviation from which a slip is a guess, and what of it must lie beyond the border of a higher
-class: nobody is told of high slip by a guess."""
-_LEAST_STD = 1e-6
 
 
 class ClassState(NamedTuple):
     """What is remembered of one wheel's class."""
 
     current: int = UNKNOWN
-    candidate: int = UNKNOWN
-    since: float = 0.0  # [s], start of the candidate's run
+    left: float = NAN  # [s], since when |s| has been outside of it; nan = it is inside
 
 
 def instantaneous_class(slip: float, borders: Sequence[float]) -> int:
@@ -51,7 +53,7 @@ class SlipClassifier:
     hysteresis : float
         Width of the band [-] that |s| must cross to leave a class.
     dwell : float
-        Time [s] for which the new class must hold.
+        Time [s] for which |s| must be outside of a class to leave it.
     """
 
     def __init__(self, borders: Sequence[float], hysteresis: float, dwell: float) -> None:
@@ -59,68 +61,74 @@ class SlipClassifier:
         self._half_band = 0.5 * hysteresis
         self._dwell = dwell
 
-    def update(
-        self, state: ClassState, time: float, slip: float, slip_std: float, sliding_back: bool
-    ) -> ClassState:
-        """Return the class of a wheel after a new estimate of its slip.
-
-        Parameters
-        ----------
-        state : ClassState
-            Before.
-        time : float
-            [s].
-        slip, slip_std : float
-            Estimate and standard deviation [-].
-        sliding_back : bool
-            Whether the wheel moves against its own turning.
-        """
-        current, candidate, since = state
-        target = self._target(current, slip, slip_std, sliding_back)
+    def update(self, state: ClassState, time: float, slip: float) -> ClassState:
+        """Return the class of a wheel that is judged, at a time [s], from its published slip."""
+        current, left = state
         if current == UNKNOWN:
-            return self._first_class(state, time, target)
-        if target == current:
-            return ClassState(current, target, time)
-        if target != candidate:
-            # A run towards higher (or lower) classes goes on when it skips a class.
-            same_way = (target > current) == (candidate > current)
-            if candidate == current or not same_way:
-                since = time
+            target = instantaneous_class(slip, self._borders)
+            if target < len(self._borders):
+                return ClassState(target)
+        else:
+            target = self._target(current, abs(slip))
+            if target == current:
+                return ClassState(current)
+        since = time if isnan(left) else left
         if time - since >= self._dwell - _TIME_ROUNDING:
-            return ClassState(target, target, time)
-        return ClassState(current, target, since)
+            return ClassState(target)
+        return ClassState(current, since)
 
-    def _first_class(self, state: ClassState, time: float, target: int) -> ClassState:
-        """Return the first class of a wheel: the highest one only after the dwell time.
-
-        Where wheels begin to turn, the first rim speed comes before the body's speed has followed,
-        which looks like spinning on the spot.
-        """
-        if target < len(self._borders):
-            return ClassState(target, target, time)
-        since = state.since if state.candidate == target else time
-        proven = time - since >= self._dwell - _TIME_ROUNDING
-        return ClassState(target if proven else UNKNOWN, target, since)
-
-    def _target(self, current: int, slip: float, slip_std: float, sliding_back: bool) -> int:
-        top = len(self._borders)
-        if sliding_back:
-            return top
-        if current == UNKNOWN:
-            return instantaneous_class(slip, self._borders)
-        magnitude = abs(slip)
-        # Far from knowing the slip, stay: the band grows with the deviation, up to half a class.
-        doubt = _BAND_PER_STD * max(slip_std - _KNOWN_STD, 0.0)
-        band = self._half_band + min(doubt, _WIDEST_BAND)
-        target = current
-        rising = band + _BAND_PER_GUESS * max(slip_std - _GUESS_STD, 0.0)
-        while target < top and magnitude > self._borders[target] + rising:
+    def _target(self, current: int, magnitude: float) -> int:
+        target, top = current, len(self._borders)
+        while target < top and magnitude > self._borders[target] + self._half_band:
             target += 1
-        while target > 0 and magnitude <= self._borders[target - 1] - band:
+        while target > 0 and magnitude <= self._borders[target - 1] - self._half_band:
             target -= 1
         return target
 
 
-def exceedance_probability(slip: float, slip_std: float, border: float) -> float:
-    """Return the probability that a driving slip exceeds a border [-]."""
-    return 0.5 * math.erfc((border - slip) / (math.sqrt(2.0) * max(slip_std, _LEAST_STD)))
+class PublishedClasses:
+    """Gives the sets of a drive their classes, in the order in which they are published.
+
+    Parameters
+    ----------
+    configuration : Configuration
+        The keys ``filter.class_*``.
+    """
+
+    def __init__(self, configuration: Configuration) -> None:
+        self._states = [ClassState()] * configuration.wheels.count
+        self.retune(configuration)
+
+    def retune(self, configuration: Configuration) -> None:
+        """Take over other tuning."""
+        figures = configuration.filter
+        self._classifier = SlipClassifier(
+            [float(border) for border in figures.class_thresholds],
+            float(figures.class_hysteresis),
+            float(figures.class_dwell),
+        )
+        self._most_std = float(figures.class_std)
+
+    def reset(self) -> None:
+        """Forget the classes: a new run begins."""
+        self._states = [ClassState()] * len(self._states)
+
+    def follow(self, estimates: EstimateSet) -> EstimateSet:
+        """Return a set with the classes that follow from its slips and those before it.
+
+        A wheel whose class is unknown in the set given stays so.
+        """
+        time = estimates.stamp * _SECOND
+        update, most_std = self._classifier.update, self._most_std
+        self._states = [
+            ClassState() if told == UNKNOWN or std > most_std else update(state, time, slip)
+            for state, told, slip, std in zip(
+                self._states,
+                estimates.slip_class.tolist(),
+                estimates.slip.tolist(),
+                estimates.slip_std.tolist(),
+                strict=True,
+            )
+        ]
+        classes = np.array([state.current for state in self._states], dtype=np.uint8)
+        return replace(estimates, slip_class=classes)

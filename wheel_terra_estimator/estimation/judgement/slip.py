@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Slip ratio, rest and class of each wheel at the present stamp."""
+"""Slip ratio and rest of each wheel at the present stamp."""
 
 from __future__ import annotations
 
@@ -9,14 +9,8 @@ from dataclasses import dataclass
 from math import isnan
 from typing import NamedTuple
 
-from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.contacts.steering import Headings
-from wheel_terra_estimator.estimation.judgement.classes import (
-    UNKNOWN,
-    ClassState,
-    SlipClassifier,
-)
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
 from wheel_terra_estimator.estimation.scalars import NAN
 
@@ -54,26 +48,19 @@ class WheelSlip(NamedTuple):
     std: float = 1.0
     rest_since: float = NAN  # [s], nan = not at rest
     resting: bool = False
-    slip_class: ClassState = ClassState()
+    judged: bool = False  # its rate is known and it is not at rest: it has a class
 
 
 class SlipJudge(Component[tuple[WheelSlip, ...]]):
-    """Judges slip and class of all wheels."""
+    """Judges the slip of all wheels."""
 
     def __init__(
         self,
-        configuration: Configuration,
         rover: Rover,
         sensors: SensorFigures,
         tuning: SlipTuning = SlipTuning(),
     ) -> None:
         super().__init__((WheelSlip(),) * rover.wheel_count)
-        figures = configuration.filter
-        self._classifier = SlipClassifier(
-            [float(border) for border in figures.class_thresholds],
-            float(figures.class_hysteresis),
-            float(figures.class_dwell),
-        )
         self._rover, self._tuning = rover, tuning
         self._rim_std = tuple(sensors.wheel_rate_std * r for r in rover.slip_radius)
 
@@ -92,7 +79,7 @@ class SlipJudge(Component[tuple[WheelSlip, ...]]):
     ) -> WheelSlip:
         if isnan(rim):
             std = min(before.std + self._tuning.forgetting, 1.0)
-            return before._replace(std=std, resting=False, slip_class=ClassState())
+            return before._replace(std=std, resting=False, judged=False)
         rest = self._rover.rest_speed
         if body.stopped and abs(body.speed) < rest:
             # All wheels stand: what the gyro says beside them is noise.
@@ -108,21 +95,14 @@ class SlipJudge(Component[tuple[WheelSlip, ...]]):
         if abs(rim) < rest and abs(v) < max(rest, 2.0 * v_std):
             return self._at_rest(before, time)
         slip, std = slip_and_deviation(rim, v, v_std, self._rim_std[i], rest)
-        slip_class = before.slip_class
-        if std >= 1.0 and slip_class.current == UNKNOWN:
-            slip_class = ClassState()  # nothing is known of it yet
-        else:
-            # Sliding back is told from standing still only where it is more than noise.
-            backwards = abs(rim) > rest and v * rim < 0.0 and abs(v) > max(rest, v_std)
-            slip_class = self._classifier.update(slip_class, time, slip, std, backwards)
-        return WheelSlip(slip, min(max(std, self._tuning.least_std), 1.0), NAN, False, slip_class)
+        return WheelSlip(slip, min(max(std, self._tuning.least_std), 1.0), judged=True)
 
     def _at_rest(self, before: WheelSlip, time: float) -> WheelSlip:
         """Return a wheel that stands: its slip holds its last value."""
         since = time if isnan(before.rest_since) else before.rest_since
         resting = time - since >= self._rover.rest_time - _TIME_ROUNDING
-        slip_class = ClassState() if resting else before.slip_class
-        return before._replace(rest_since=since, resting=resting, slip_class=slip_class)
+        judged = before.judged and not resting
+        return before._replace(rest_since=since, resting=resting, judged=judged)
 
 
 def slip_and_deviation(

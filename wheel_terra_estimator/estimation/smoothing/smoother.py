@@ -32,6 +32,7 @@ from wheel_terra_estimator.estimation.filter.force_balance import rut_tilt
 from wheel_terra_estimator.estimation.filter.initial_state import layout_of
 from wheel_terra_estimator.estimation.filter.speed_process import least_slip_std
 from wheel_terra_estimator.estimation.filter.state import SPEED
+from wheel_terra_estimator.estimation.judgement.classes import PublishedClasses
 from wheel_terra_estimator.estimation.judgement.slip import SlipJudge
 from wheel_terra_estimator.estimation.output_guard import OutputGuard
 from wheel_terra_estimator.estimation.outputs import MissingInputs, Outputs
@@ -121,12 +122,16 @@ class DriveSmoother:
         """
         parts = _Judges(self._configuration, self._tuning)
         guard = OutputGuard(self._configuration)
+        classes, last = PublishedClasses(self._configuration), 0
         for kept, moment in centred(self._moments(parts)):
-            if moment is None:
-                yield kept
-                continue
-            judged = parts.judge(moment, kept.estimates)
-            yield Kept(guard.repaired(judged.stamp, judged)[0], kept.companion)
+            estimates = kept.estimates
+            if moment is not None:
+                judged = parts.judge(moment, estimates)
+                estimates = guard.repaired(judged.stamp, judged)[0]
+            if estimates.stamp < last:  # the clock stepped back
+                classes.reset()
+            last = estimates.stamp
+            yield Kept(classes.follow(estimates), kept.companion)
 
     def _moments(self, parts: _Judges) -> Iterator[tuple[Kept, Moment | None]]:
         """Yield each set that was kept with what is smoothed of its instant."""
@@ -176,8 +181,8 @@ class _Judges:
         self._rover = rover = Rover.from_configuration(configuration)
         sensors = SensorFigures.from_configuration(configuration)
         self._layout = layout = layout_of(rover, sensors)
-        self._tuning = tuning
-        self._slips = SlipJudge(configuration, rover, sensors)
+        self._tuning, self._most_std = tuning, float(configuration.filter.class_std)
+        self._slips = SlipJudge(rover, sensors)
         self._pulls = Pulls(rover, sensors, WheelLoads(rover).state.load)
         self._outputs = Outputs(configuration, rover, sensors, layout)
 
@@ -231,11 +236,12 @@ class _Judges:
             ),
             _NOTHING_MISSING,
         )
-        unknown = live.slip_class == SlipClass.UNKNOWN
+        # Where the filter alone knew the slip too badly, the smoother may know it.
+        unjudged = (live.slip_class == SlipClass.UNKNOWN) & (live.slip_std <= self._most_std)
         return replace(
             smoothed,
             drawbar_pull=moment.pull,
             drawbar_pull_std=live.drawbar_pull_std,
-            slip_class=np.where(unknown, live.slip_class, smoothed.slip_class),
+            slip_class=np.where(unjudged, live.slip_class, smoothed.slip_class),
             **{name: getattr(live, name) for name in _OF_THE_FILTER},
         )

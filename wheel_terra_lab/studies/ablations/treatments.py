@@ -453,14 +453,6 @@ _FILTER = (
         'steered',
     ),
     Treatment(
-        'no higher class by a guess', _CLASS, patched('judgement.classes:_BAND_PER_GUESS', 0.0)
-    ),
-    Treatment(
-        'wider border of a class in doubt',
-        _CLASS,
-        patched('judgement.classes:_BAND_PER_STD', 0.0),
-    ),
-    Treatment(
         'a spin is one by its wheels',
         _GUARD,
         patched('wheel_soil_estimator:sides_oppose', lambda *_: False),

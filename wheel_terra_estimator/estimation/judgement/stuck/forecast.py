@@ -22,7 +22,6 @@ from math import exp, sqrt
 from typing import TYPE_CHECKING, NamedTuple
 
 from wheel_terra_estimator.estimation.estimates import NO_ENTRAPMENT_IN_SIGHT
-from wheel_terra_estimator.estimation.judgement.classes import exceedance_probability
 from wheel_terra_estimator.estimation.scalars import median
 
 if TYPE_CHECKING:
@@ -34,6 +33,7 @@ LONGEST_TIME = 600.0
 """Time to entrapment that is said where none is in sight [s]."""
 _LEAST_RIM = 1e-3
 """Rim speed [m/s] below which no travel is foreseen."""
+_LEAST_STD = 1e-6
 _LEAST_VARIANCE = 1e-12  # of a slip
 _LONGEST_HORIZON = 60.0
 """Time within which a crawling rover is looked at over ``filter.stuck_travel`` [s]."""
@@ -186,3 +186,8 @@ def _time_left(slip: float, off: float, lacking: float, ahead: list[_Ahead]) -> 
             return min(since + before / (before - after) * (time - since), LONGEST_TIME)
         before, since = after, time
     return LONGEST_TIME
+
+
+def exceedance_probability(slip: float, slip_std: float, border: float) -> float:
+    """Return the probability that a driving slip exceeds a border [-]."""
+    return 0.5 * math.erfc((border - slip) / (sqrt(2.0) * max(slip_std, _LEAST_STD)))

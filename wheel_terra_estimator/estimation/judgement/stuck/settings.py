@@ -15,6 +15,7 @@ class StuckSettings:
 
     horizon: float = 15.0  # [s]
     travel: float = 0.3  # [m]
+    threshold: float = 0.5  # probability
     clear_slip: float = 0.6
     clear_time: float = 3.0  # [s]
 
@@ -25,6 +26,7 @@ class StuckSettings:
         return cls(
             horizon=float(figures.stuck_horizon),
             travel=float(figures.stuck_travel),
+            threshold=float(figures.stuck_threshold),
             clear_slip=float(figures.stuck_clear_slip),
             clear_time=float(figures.stuck_clear_time),
         )

@@ -15,8 +15,10 @@ from dataclasses import dataclass
 from enum import Flag, auto
 from math import isnan
 
-from wheel_terra_estimator.estimation.judgement.classes import exceedance_probability
-from wheel_terra_estimator.estimation.judgement.stuck.forecast import ENTRAPPED_SLIP
+from wheel_terra_estimator.estimation.judgement.stuck.forecast import (
+    ENTRAPPED_SLIP,
+    exceedance_probability,
+)
 from wheel_terra_estimator.estimation.judgement.stuck.situation import Situation
 from wheel_terra_estimator.estimation.scalars import median
 
@@ -36,7 +38,6 @@ class SignTuning:
     (Dartmouth, 2021), where half of the wheels stall.
     """
 
-    likely: float = 0.5  # probability of an entrapment that raises ``~/stuck``
     digging_slip: float = 0.8
     sure_std: float = 0.25  # of the slip, to call it digging
     trend_doubt: float = 0.45
@@ -128,7 +129,7 @@ def _digging(s: Situation, t: SignTuning) -> bool:
 
 def _likely(s: Situation, t: SignTuning) -> bool:
     """Find an entrapment within the horizon more likely than not."""
-    return s.settled and s.outlook.probability > t.likely
+    return s.settled and s.outlook.probability > s.settings.threshold
 
 
 def _time_to_entrapment(s: Situation, t: SignTuning) -> float:
