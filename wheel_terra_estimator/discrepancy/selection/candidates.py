@@ -88,11 +88,11 @@ class Setting:
         variance: FloatArray | None = None,
         iterations: int = 10,
     ) -> list[Fit]:
-        """Fit sets of effects; all rows start at the entrance angles `angle` (N,)."""
+        """Fit sets of effects, from entrance angles (N,) of all or (B, N) of each."""
         if not sets:
             return []
         weights = self.problem.variance(FIT_FLOOR) if variance is None else variance
-        angles = None if angle is None else np.broadcast_to(angle, (len(sets), len(angle)))
+        angles = None if angle is None else np.broadcast_to(angle, (len(sets), angle.shape[-1]))
         return fit(
             self.forward,
             self.problem,

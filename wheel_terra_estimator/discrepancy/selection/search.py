@@ -35,9 +35,7 @@ from wheel_terra_estimator.discrepancy.selection.weights import (
     MISFIT,
     MOST_EFFECTS,
     Selection,
-    explain_members,
     explain_more,
-    explain_pairs,
     explain_singles,
     explain_swaps,
     weigh,
@@ -52,6 +50,7 @@ _ROBUST_FLOOR = 0.02  # floor of the later ones
 _PASSES = 5
 _LATENT_FLOOR = 0.03  # structural error allowed while slips are moved [share of range]
 _CELLS = 8  # measured cells for each effect of a set, at least
+_FIRST_SEEDS = 4  # best single effects to which a second one is added
 _SEEDS = 3  # sets of each size to which one effect more is added
 _BEHIND = 3.0  # nats behind the best of all, up to which that is done
 _ROUNDS = 2  # of adding and swapping
@@ -206,51 +205,39 @@ def _fit_nothing(
 
 
 def _select(setting: Setting, nothing: Fit) -> Selection:
-    singles = explain_singles(setting, nothing)
-    incompatible = {name: e.incompatible_with for name, e in setting.effects.items()}
-    explanations: list[Explanation] = list(singles)
-    explanations += explain_pairs(setting, singles, incompatible)
-    selection = weigh(explanations, setting.floors, setting.effects)
-    if len(selection.explanations[0].names) < 2:
-        if selection.misfit < MISFIT and not _seeds(selection, 2):
-            return selection
-        return _with_more(setting, selection, incompatible)
-    # A pair may have found a layer's depth or a mound's onset that its member alone had missed.
-    again = {e.names: e for e in explain_members(setting, selection.explanations[0])}
-    better = [
-        again[e.names]
-        if e.names in again and again[e.names].fitted.objective < e.fitted.objective
-        else e
-        for e in selection.explanations
-    ]
-    return _with_more(setting, weigh(better, setting.floors, setting.effects), incompatible)
-
-
-def _with_more(
-    setting: Setting, selection: Selection, incompatible: Mapping[str, frozenset[str]]
-) -> Selection:
-    """Go on from the best sets of each size: one effect more, while that is near the best of all.
+    """Weigh nothing, single effects and larger sets, as long as these come near the best of all.
 
     A set that costs more than it gains may lead to one that gains, so that sets some nats behind
     are gone on from as well. Then each effect of the best set is left out, and others are put in
     its place; where that changes it, once more from there. The best sets are those that would be
     if no misfit asked for a name, though none of them may be good enough yet.
     """
+    singles = explain_singles(setting, nothing)
+    selection = weigh(singles, setting.floors, setting.effects)
+    ranked = sorted((e for e in singles if e.names), key=lambda e: -e.log_evidence)
+    seeds, extended = ranked[:_FIRST_SEEDS], set[tuple[str, ...]]()
     most = min(MOST_EFFECTS, setting.problem.size // _CELLS)
-    extended: set[tuple[str, ...]] = set()
     swapped: set[frozenset[str]] = set()
     for _ in range(_ROUNDS):
         for size in range(1, most):
-            seeds = [e for e in _seeds(selection, size) if e.names not in extended]
             extended |= {e.names for e in seeds}
-            more = [e for seed in seeds for e in explain_more(setting, seed, incompatible)]
-            selection = _joined_by(setting, selection, more)
+            selection = _joined_by(setting, selection, explain_more(setting, seeds))
+            if _is_enough(selection):
+                return selection
+            seeds = [e for e in _seeds(selection, size + 1) if e.names not in extended]
         before = selection.without_misfit(1)[0][1].names
-        selection = _with_swaps(setting, selection, incompatible, swapped)
+        selection = _with_swaps(setting, selection, swapped)
         top = selection.without_misfit(1)[0][1]
         if top.names == before or len(top.names) >= most:
             break
+        seeds = [e for e in _seeds(selection, 1) if e.names not in extended]
     return selection
+
+
+def _is_enough(selection: Selection) -> bool:
+    """Return whether one effect or none leaves no misfit, and no two come near it."""
+    single = len(selection.explanations[0].names) < 2
+    return single and selection.misfit < MISFIT and not _seeds(selection, 2)
 
 
 def _seeds(selection: Selection, size: int) -> list[Explanation]:
@@ -265,12 +252,7 @@ def _seeds(selection: Selection, size: int) -> list[Explanation]:
     return list(found.values())[:_SEEDS]
 
 
-def _with_swaps(
-    setting: Setting,
-    selection: Selection,
-    incompatible: Mapping[str, frozenset[str]],
-    done: set[frozenset[str]],
-) -> Selection:
+def _with_swaps(setting: Setting, selection: Selection, done: set[frozenset[str]]) -> Selection:
     """Put others in the place of each effect of the best sets."""
     for _ in range(_SWAPS):
         leaders = selection.without_misfit(_SEEDS)
@@ -287,7 +269,7 @@ def _with_swaps(
         if best is None:
             break
         done.add(_effects(best))
-        selection = _joined_by(setting, selection, explain_swaps(setting, best, incompatible))
+        selection = _joined_by(setting, selection, explain_swaps(setting, best))
     return selection
 
 
@@ -296,10 +278,12 @@ def _effects(explanation: Explanation) -> frozenset[str]:
 
 
 def _joined_by(setting: Setting, selection: Selection, more: list[Explanation]) -> Selection:
-    """Return the selection with further explanations, each set of effects once."""
-    known = {frozenset(e.names): e for e in (*more[::-1], *selection.explanations)}
-    if len(known) == len(selection.explanations):
-        return selection
+    """Return the selection with further explanations, each set of effects once, in its best fit."""
+    known = {frozenset(e.names): e for e in selection.explanations}
+    for explanation in more:
+        key = frozenset(explanation.names)
+        if key not in known or explanation.fitted.objective < known[key].fitted.objective:
+            known[key] = explanation
     return weigh(tuple(known.values()), setting.floors, setting.effects)
 
 

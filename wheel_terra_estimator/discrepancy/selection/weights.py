@@ -11,15 +11,16 @@ from __future__ import annotations
 import itertools
 import math
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wheel_terra_estimator.discrepancy.effect_keys import effect_of
 from wheel_terra_estimator.discrepancy.fitting.evidence import Floor, log_sum
-from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit, fit
+from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
 from wheel_terra_estimator.discrepancy.selection.candidates import (
     Explanation,
     Setting,
@@ -42,12 +43,13 @@ _UNEXPLAINED = (0.08, 0.16, 0.35)
 _UNEXPLAINED_SOME = (0.015, 0.03, 0.06, 0.15, 0.4)
 _SOME = ((1, 0, 0), (0, 1, 0), (0, 0, 1), (0, 1, 1))
 
-_PAIR_SEEDS = 4  # best single effects to which a second one is added
-_FURTHER = 4  # sets with one effect more that are fitted, at most
+_FURTHER = 8  # sets with one effect more that are fitted, at most
 _RIVALS = 2  # other effects that are put in the place of each effect of a set
-_PAIRS = 8  # pairs that are fitted, at most
-# A pair must promise so many nats over the best single effect: its prior alone costs it four.
+# A further effect must promise so many nats over the best set without: its prior costs four.
 _PROMISE = 1.5
+
+Start: TypeAlias = tuple[tuple[str, ...], FloatArray, FloatArray]
+"""Effects of a set, coordinates and entrance angles from which it is fitted."""
 
 
 def default_floors(greatest: float | None = None) -> tuple[Floor, ...]:
@@ -194,114 +196,59 @@ def explain_singles(setting: Setting, nothing: Fit) -> list[Explanation]:
     return [setting.explain(f) for f in (nothing, *fits)]
 
 
-def explain_pairs(
-    setting: Setting, singles: Sequence[Explanation], incompatible: Mapping[str, frozenset[str]]
-) -> list[Explanation]:
-    """Add a second effect to the best single ones, where the linear evidence promises most."""
-    ranked = sorted((e for e in singles if e.names), key=lambda e: -e.log_evidence)
-    proposals: dict[frozenset[str], tuple[float, tuple[str, ...], FloatArray, FloatArray]] = {}
-    for seed in ranked[:_PAIR_SEEDS]:
-        first = seed.names[0]
-        others = _compatible(setting, (first,), incompatible)
-        for score, names, start in linear_starts(setting, seed.fitted, others):
-            key = frozenset(names)
-            total = score - seed.fitted.objective
-            if key not in proposals or proposals[key][0] < total:
-                proposals[key] = (total, names, start, seed.fitted.angle)
-    enough = _PROMISE - min(e.fitted.objective for e in singles)
-    worth = [proposal for proposal in proposals.values() if proposal[0] > enough]
-    best = sorted(worth, key=lambda proposal: -proposal[0])[:_PAIRS]
-    if not best:
-        return []
-    variance = ranked[0].fitted.variance
-    fits = fit(
-        setting.forward,
-        setting.problem,
-        setting.observed,
-        [(names, setting.coordinates(names)) for _, names, _, _ in best],
-        [start for _, _, start, _ in best],
-        [variance] * len(best),
-        np.array([angle for _, _, _, angle in best]),
-    )
-    return [setting.explain(f) for f in fits]
-
-
-def _compatible(
-    setting: Setting, names: Sequence[str], incompatible: Mapping[str, frozenset[str]]
-) -> list[str]:
+def _compatible(setting: Setting, names: Sequence[str]) -> list[str]:
     """Return the effects that may stand beside a set; never two forms of one effect."""
-    taken = {effect_of(key) for key in names}
-    excluded = set().union(*(incompatible.get(key, frozenset()) for key in names))
+    effects, taken = setting.effects, {effect_of(key) for key in names}
+    excluded = set().union(*(effects[key].incompatible_with for key in names))
     return [
         key
-        for key in setting.effects
-        if effect_of(key) not in taken | excluded and not taken & incompatible.get(key, frozenset())
+        for key, effect in effects.items()
+        if effect_of(key) not in taken | excluded and not taken & effect.incompatible_with
     ]
 
 
-def explain_more(
-    setting: Setting, best: Explanation, incompatible: Mapping[str, frozenset[str]]
-) -> list[Explanation]:
-    """Add one effect to a set, where the linear evidence promises most; all are refitted."""
-    fitted = best.fitted
-    starts = linear_starts(setting, fitted, _compatible(setting, best.names, incompatible))
-    worth = sorted((s for s in starts if s[0] > _PROMISE), key=lambda s: -s[0])[:_FURTHER]
-    fits = setting.fit([n for _, n, _ in worth], [u for _, _, u in worth], fitted.angle)
-    return [setting.explain(f) for f in fits]
+def explain_more(setting: Setting, seeds: Sequence[Explanation]) -> list[Explanation]:
+    """Add one effect to sets of one size, where the linear evidence promises most; all refitted."""
+    starts: dict[frozenset[str], tuple[float, Start]] = {}
+    for seed in seeds:
+        others = _compatible(setting, seed.names)
+        for gain, names, start in linear_starts(setting, seed.fitted, others):
+            promise, key = gain - seed.fitted.objective, frozenset(names)
+            if key not in starts or starts[key][0] < promise:
+                starts[key] = promise, (names, start, seed.fitted.angle)
+    enough = _PROMISE - min((e.fitted.objective for e in seeds), default=0.0)
+    worth = sorted((s for s in starts.values() if s[0] > enough), key=lambda s: -s[0])
+    return _explained(setting, [start for _, start in worth[:_FURTHER]])
+
+
+def _explained(setting: Setting, starts: Sequence[Start]) -> list[Explanation]:
+    """Fit sets of effects, each from its own start and entrance angles, and weigh them."""
+    names, values, angles = zip(*starts, strict=True) if starts else ((), (), ())
+    return [setting.explain(f) for f in setting.fit(names, values, np.array(angles))]
 
 
 def explain_fewer(setting: Setting, best: Explanation) -> list[Explanation]:
     """Leave one effect of a set out; the others are refitted from where they are."""
     fitted = best.fitted
-    sets = [tuple(n for n in best.names if n != name) for name in best.names]
-    starts = [
-        np.array([u for c, u in zip(fitted.coordinates, fitted.u, strict=True) if c.owner != name])
-        for name in best.names
-    ]
-    return [setting.explain(f) for f in setting.fit(sets, starts, fitted.angle)]
+    starts = []
+    for name in best.names:
+        own = [c.key for c in setting.coordinates((name,))[len(setting.nuisance) :]]
+        kept = [u for c, u in zip(fitted.coordinates, fitted.u, strict=True) if c.key not in own]
+        left = tuple(n for n in best.names if n != name)
+        starts.append((left, np.array(kept), fitted.angle))
+    return _explained(setting, starts)
 
 
-def explain_swaps(
-    setting: Setting, best: Explanation, incompatible: Mapping[str, frozenset[str]]
-) -> list[Explanation]:
+def explain_swaps(setting: Setting, best: Explanation) -> list[Explanation]:
     """Leave each effect of a set out, and put others in its place: other forms, best rivals."""
-    starts: list[tuple[tuple[str, ...], FloatArray, FloatArray]] = []
+    starts: list[Start] = []
     fewer = explain_fewer(setting, best)
     for reduced in fewer:
         (left_out,) = set(best.names) - set(reduced.names)
-        others = [
-            key for key in _compatible(setting, reduced.names, incompatible) if key != left_out
-        ]
-        found = linear_starts(setting, reduced.fitted, others)
+        others = [key for key in _compatible(setting, reduced.names) if key != left_out]
+        found = sorted(linear_starts(setting, reduced.fitted, others), key=lambda s: -s[0])
         forms = [s for s in found if effect_of(s[1][-1]) == effect_of(left_out)]
         rivals = [s for s in found if effect_of(s[1][-1]) != effect_of(left_out)]
-        kept = [*forms, *sorted(rivals, key=lambda s: -s[0])[:_RIVALS]]
+        kept = [*forms, *rivals[:_RIVALS]]
         starts += [(names, start, reduced.fitted.angle) for _, names, start in kept]
-    if not starts:
-        return fewer
-    fits = fit(
-        setting.forward,
-        setting.problem,
-        setting.observed,
-        [(names, setting.coordinates(names)) for names, _, _ in starts],
-        [start for _, start, _ in starts],
-        [best.fitted.variance] * len(starts),
-        np.array([angle for _, _, angle in starts]),
-    )
-    return [*fewer, *(setting.explain(f) for f in fits)]
-
-
-def explain_members(setting: Setting, pair: Explanation) -> list[Explanation]:
-    """Fit each effect of a pair alone, from where the pair has it."""
-    starts = [
-        np.array(
-            [
-                u
-                for c, u in zip(pair.fitted.coordinates, pair.fitted.u, strict=True)
-                if c.owner == name or c.owner not in pair.names
-            ]
-        )
-        for name in pair.names
-    ]
-    sets = [(name,) for name in pair.names]
-    return [setting.explain(f) for f in setting.fit(sets, starts, pair.fitted.angle)]
+    return [*fewer, *_explained(setting, starts)]
