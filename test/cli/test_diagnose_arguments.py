@@ -65,7 +65,7 @@ def test_overwrite_never_deletes_what_is_no_diagnosis(
     # A folder of an earlier diagnosis is no obstacle, so the table is what is complained about.
     earlier = tmp_path / 'earlier'
     with new_folder(earlier) as folder:
-        for name in ('report.json', 'model.yaml', 'report.html', 'gap.png'):
+        for name in ('report.json', 'model.yaml', 'report.html', 'where.png'):
             (folder / name).write_text('')
     assert main(['diagnose', 'table.csv', '-o', str(earlier), '--overwrite']) == 2
     assert 'table.csv' in capsys.readouterr().err

@@ -13,8 +13,8 @@ from wheel_terra_estimator.discrepancy import decision
 from wheel_terra_estimator.discrepancy.assessment.gaps import channels_off
 from wheel_terra_estimator.discrepancy.report.words import sentence
 from wheel_terra_estimator.discrepancy.result import QuantityGap
+from wheel_terra_estimator.discrepancy.tables.averaging import together
 from wheel_terra_estimator.discrepancy.tables.checks import check_table
-from wheel_terra_estimator.discrepancy.tables.together import together
 from wheel_terra_estimator.discrepancy.workflow import Options, diagnose, operating_points
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.terramechanics.effects import catalogue

@@ -173,7 +173,7 @@ def run(arguments: argparse.Namespace) -> int:
 def _diagnosed(arguments: argparse.Namespace) -> Diagnosis:
     """Return the diagnosis of all data as one table."""
     from wheel_terra_estimator.configuration import reader
-    from wheel_terra_estimator.discrepancy.tables.together import together
+    from wheel_terra_estimator.discrepancy.tables.averaging import together
     from wheel_terra_estimator.discrepancy.workflow import Options, diagnose
 
     own = _load_effects(arguments.effects)

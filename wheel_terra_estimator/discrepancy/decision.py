@@ -321,10 +321,6 @@ def _curves(
     moved[problem.row, problem.quantity] = setting.observed - problem.observed
     refit_error, after_error = refit_error - moved, after_error - moved
     band = np.sqrt(findings.noise.std**2 + (floor * problem.scale) ** 2)
-    singles = [e.fitted for e in findings.selection.explanations if len(e.names) == 1]
-    ordered = ([after] if after.names else []) + [f for f in singles if f.names != after.names]
-    shapes = [_signature_shape(findings, f) for f in ordered[:2]]
-    labels = [' + '.join(effect_of(key) for key in f.names) for f in ordered[:2]]
     return Curves(
         (configured.outputs[0] - moved)[:rows],
         (findings.nothing.outputs + refit_error)[:rows],
@@ -332,10 +328,6 @@ def _curves(
         (held_refit + refit_error)[:rows],
         (held_after + after_error)[:rows],
         band[:rows],
-        shapes[0][:rows] if shapes else None,
-        labels[0] if labels else '',
-        shapes[1][:rows] if len(shapes) > 1 else None,
-        labels[1] if len(labels) > 1 else '',
     )
 
 
@@ -346,8 +338,3 @@ def _shared_error(findings: Findings, fitted: Fit, floor: float) -> FloatArray:
     if active is None or floor == 0.0:
         return np.zeros_like(fitted.outputs)
     return shared_error(setting.problem, fitted, setting.observed, floor, active)
-
-
-def _signature_shape(findings: Findings, fitted: Fit) -> FloatArray:
-    """(N, 3) change of the model from soil refit to fitted effect: comparable with the residual."""
-    return fitted.outputs - findings.nothing.outputs

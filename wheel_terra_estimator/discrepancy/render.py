@@ -64,7 +64,7 @@ def render(
     nearest = () if after.names else _nearest(decision)
     stretch = changed_stretch(both, setting, after, variance)
     proposal = _proposal(decision)
-    gap_p_value = _gap_p_value(decision, known)
+    gap_p_value = significance.chi_square_p_value(decision.nothing, decision.variance)
     law = None if proposal is None else proposal.fit
     covariance = np.asarray(np.linalg.inv(after.precision()), dtype=float)
     curves = decision.curves
@@ -119,19 +119,6 @@ def render(
             beyond_law=law is not None,
         ),
     )
-
-
-def _gap_p_value(decision: Decision, known: Mapping[str, Effect]) -> float:
-    """P-value of "the soil alone explains these rows": two tests, the smaller one twice."""
-    findings = decision.findings
-    tried = findings.setting.effects
-    names = {name: s for name, s in findings.signatures.items() if name in tried}
-    one_sided = {
-        name for name in names if all(p.prior == 'half_normal' for p in known[name].parameters[:1])
-    }
-    scan = significance.scan_p_value(decision.nothing, decision.variance, names, one_sided)
-    square = significance.chi_square_p_value(decision.nothing, decision.variance)
-    return min(1.0, 2.0 * min(scan, square))
 
 
 def _effects(decision: Decision, known: Mapping[str, Effect]) -> tuple[NamedEffect, ...]:

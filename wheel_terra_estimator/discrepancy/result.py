@@ -249,8 +249,6 @@ class Where:
         The same in noise standard deviations.
     p_value : float
         Of the box, calibrated by the parametric bootstrap of the soil refit.
-    trend_input, trend_correlation : str, float
-        Input with the largest rank correlation with the residual.
     """
 
     json_also: ClassVar[Mapping[str, str]] = {'unit': 'unit'}
@@ -265,8 +263,6 @@ class Where:
     mean: float
     mean_in_noise_std: float
     p_value: float
-    trend_input: str
-    trend_correlation: float
 
     @property
     def unit(self) -> str:
@@ -324,8 +320,7 @@ class Curves:
 
     ``before`` = as configured, ``refit`` = soil refitted, ``after`` = effects added; the
     ``held_out`` pair was computed row by row from fits that did not see the row. ``band`` is one
-    standard deviation of noise plus floor; ``signature`` the part of the named (or best) effect
-    that the soil cannot imitate, ``rival_signature`` the same of the next best one.
+    standard deviation of noise plus floor.
     """
 
     before: FloatArray
@@ -334,10 +329,6 @@ class Curves:
     held_out_refit: FloatArray
     held_out_after: FloatArray
     band: FloatArray
-    signature: FloatArray | None = None
-    signature_name: str = ''
-    rival_signature: FloatArray | None = None
-    rival_name: str = ''
 
 
 @dataclass(frozen=True)

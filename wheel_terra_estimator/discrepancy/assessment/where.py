@@ -76,7 +76,6 @@ def locate(
     mean, size = float(np.mean(physical)), float(np.sqrt(np.mean(physical**2)))
     noise = float(np.sqrt(np.mean(std**2)))
     in_std = mean / noise
-    trend, correlation = _trend(table, names, residual[:, worst], mine)
     one_sign = abs(mean) > _ONE_SIGN * size
     whole = 'everywhere alike' if one_sign else 'over the whole table'
     where = ' and '.join(_text(side) for side in box) if box else whole
@@ -106,8 +105,6 @@ def locate(
         mean,
         in_std,
         p_value,
-        trend,
-        correlation,
     )
 
 
@@ -169,27 +166,6 @@ def _std_of_rows(problem: Problem, quantity: int, rows: int) -> FloatArray:
     mine = problem.quantity == quantity
     std[problem.row[mine]] = problem.std[mine]
     return std
-
-
-def _trend(
-    table: SteadyTable, names: list[str], residual: FloatArray, mine: NDArray[np.bool_]
-) -> tuple[str, float]:
-    best, value = '', 0.0
-    ranks = _ranks(residual[mine])
-    for name in names:
-        column = table.columns[name][mine]
-        if np.ptp(column) == 0.0 or len(column) < 4:
-            continue
-        correlation = float(np.corrcoef(_ranks(column), ranks)[0, 1])
-        if abs(correlation) > abs(value):
-            best, value = name, correlation
-    return best, value
-
-
-def _ranks(values: FloatArray) -> FloatArray:
-    """Return ranks, equal values sharing their mean (as `scipy.stats`, which loads slowly)."""
-    _, place, count = np.unique(values, return_inverse=True, return_counts=True)
-    return (np.cumsum(count) - 0.5 * (count - 1))[np.ravel(place)]
 
 
 def _text(side: InputRange) -> str:

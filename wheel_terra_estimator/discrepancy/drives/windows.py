@@ -35,6 +35,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import brentq
 
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.discrepancy.drives.series import Channel, DriveSeries, collect
@@ -53,12 +54,11 @@ if TYPE_CHECKING:
 FloatArray = NDArray[np.float64]
 
 _GREATEST_CORRELATION = 0.95  # of neighbouring segments
-_HALVINGS = 30
 
 LEAST_PASSAGES = 10  # lug passages in a window
 LEAST_DURATION = 4.0  # [s]
 LEAST_SEGMENTS = 8  # into which a window is cut to judge drift and scatter
-MAXIMUM_ROWS = 120  # more windows are merged with their likes
+MOST_ROWS = 120  # more are averaged over windows of like slip, slope and rate
 TURNING = 0.03  # mean yaw rate [rad/s] beyond which a window counts as a turn
 SLIP_SPREAD = 0.15  # between wheels, beyond which there is no mean wheel
 SETTLING_TRAVEL = 0.5  # rim travel after standing, in wheel radii, that is not used
@@ -153,8 +153,8 @@ class DriveRows:
 
     def table(self) -> SteadyTable:
         """Return the rows as a checked table: the stated errors of the sensors are off already."""
-        table = check_table(self.name, self.columns, notes=self.notes)
-        return replace(table, corrected=np.ones(len(table), dtype=bool))
+        table = check_table(self.name, self.columns, notes=self.notes, most=MOST_ROWS)
+        return replace(table, true_rows=np.ones(len(table), dtype=bool))
 
 
 def rows_from_bag(
@@ -220,16 +220,15 @@ def rows_from_measurements(
             f'{name}: no steady window of {LEAST_DURATION:g} s and {LEAST_PASSAGES} lug passages '
             f'({seen or "nothing"}); drive straight at constant wheel rate, a few seconds per slope'
         )
-    merged = _merge(windows, max(MAXIMUM_ROWS // (wheels.count + 1), 6))
-    columns, left_out = _columns(merged, configuration)
-    _add_shared_errors(columns, configuration, len(merged))
+    columns, left_out = _columns(windows, configuration)
+    _add_shared_errors(columns, configuration, len(windows))
     return DriveRows(
         name,
         columns,
         tuple(windows),
         dict(finder.stretches),
         dict(finder.seconds),
-        _notes(finder, windows, merged, left_out),
+        _notes(finder, windows, left_out),
     )
 
 
@@ -449,17 +448,13 @@ def pooled_correlation(blocks: Iterable[FloatArray]) -> float:
     if below <= 0.0:
         return 0.0
 
-    def expected(correlation: float) -> float:
+    def excess(correlation: float) -> float:
         sums = [(n, block_moments(k, correlation)) for k, n in columns.items()]
-        return sum(n * m[0] for n, m in sums) / sum(n * m[1] for n, m in sums)
+        return sum(n * m[0] for n, m in sums) / sum(n * m[1] for n, m in sums) - above / below
 
-    low, high = 0.0, _GREATEST_CORRELATION
-    if above / below <= expected(low):
-        return low
-    for _ in range(_HALVINGS):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if above / below > expected(middle) else (low, middle)
-    return 0.5 * (low + high)
+    if excess(0.0) >= 0.0 or excess(_GREATEST_CORRELATION) <= 0.0:
+        return 0.0 if excess(0.0) >= 0.0 else _GREATEST_CORRELATION
+    return float(brentq(excess, 0.0, _GREATEST_CORRELATION))
 
 
 def _with_deviations(windows: list[Window], configuration: Configuration) -> list[Window]:
@@ -507,53 +502,6 @@ def _variance(values: FloatArray, correlation: float) -> FloatArray:
     good = np.isfinite(values).all(0)
     squares = len(values) * np.var(np.where(good, values, 0.0), axis=0)
     return np.where(good, squares / block_moments(len(values), correlation)[1], np.nan)
-
-
-def _merge(windows: list[Window], most: int) -> list[Window]:
-    """Merge windows of like slip, slope, rate and direction until at most ``most`` are left."""
-    groups = [[w] for w in windows]
-    cell = 0.01
-    while len(groups) > most and cell < 0.2:
-        cells: dict[tuple[int, ...], list[Window]] = {}
-        for w in windows:
-            rate = float(np.mean(w.rate))
-            key = (
-                round(float(np.mean(w.slip)) / cell),
-                round(w.slope / cell),
-                round(np.log(abs(rate)) / (4 * cell)),
-                int(np.sign(rate)),
-            )
-            cells.setdefault(key, []).append(w)
-        groups = list(cells.values())
-        cell *= 1.25
-    return [_mean_window(group) for group in groups]
-
-
-def _mean_window(group: list[Window]) -> Window:
-    if len(group) == 1:
-        return group[0]
-    count = len(group)
-
-    def mean(name: str) -> FloatArray:
-        return np.mean([getattr(w, name) for w in group], axis=0)
-
-    return replace(
-        group[0],
-        slip=mean('slip'),
-        normal_load=mean('normal_load'),
-        torque=mean('torque'),
-        sinkage=mean('sinkage'),
-        rate=mean('rate'),
-        pull=float(mean('pull')),
-        slope=float(mean('slope')),
-        passages=sum(w.passages for w in group),
-        start=float(mean('start')),
-        end=float(mean('end')),
-        std={
-            name: np.sqrt(np.mean([w.std[name] ** 2 for w in group], axis=0) / count)
-            for name in group[0].std
-        },
-    )
 
 
 def _columns(
@@ -648,9 +596,7 @@ def _wheel(wheels: object, i: int) -> dict[str, float]:
     }
 
 
-def _notes(
-    finder: _WindowFinder, windows: list[Window], merged: list[Window], left_out: int
-) -> tuple[str, ...]:
+def _notes(finder: _WindowFinder, windows: list[Window], left_out: int) -> tuple[str, ...]:
     used = finder.seconds.get(GOOD, 0.0)
     total = sum(finder.seconds.values())
     passages = [w.passages for w in windows]
@@ -670,8 +616,6 @@ def _notes(
     ]
     if rest:
         notes.append('not used: ' + ', '.join(rest))
-    if len(merged) < len(windows):
-        notes.append(f'windows of like slip, slope and rate merged into {len(merged)}')
     if finder.series.smoothed is not None:
         notes.append(SMOOTHED)
     notes.append(

@@ -289,21 +289,30 @@ class Forward:
     ) -> FloatArray:
         """Return (N, 3) derivative of the outputs by the recorded slip."""
         step = np.where(self.points.slip > 0.99, -1e-4, 1e-4)
-        beside = replace(self.points, slip=self.points.slip + step)
-        base = self.solve([hypothesis], [u], angle[None], jacobian=False).outputs[0]
-        other = self.at(beside).solve([hypothesis], [u], angle[None], jacobian=False).outputs[0]
-        return (other - base) / step[:, None]
+        return self._by_input('slip', step, hypothesis, u, angle)
 
     def by_leaving_angle(
         self, hypothesis: Sequence[Coordinate], u: FloatArray, angle: FloatArray
     ) -> FloatArray:
         """Return (N, 3) derivative of the outputs by the measured leaving angle; 0 without one."""
-        step = 1e-4
-        given = np.asarray(self.points.leaving_angle, dtype=float)
-        beside = self.at(replace(self.points, leaving_angle=given - step))
-        base = self.solve([hypothesis], [u], angle[None], jacobian=False).outputs[0]
-        other = beside.solve([hypothesis], [u], angle[None], jacobian=False).outputs[0]
-        return np.where(np.isnan(given)[:, None], 0.0, (base - other) / step)
+        step = np.full(len(self.points), -1e-4)
+        return np.nan_to_num(self._by_input('leaving_angle', step, hypothesis, u, angle))
+
+    def _by_input(
+        self,
+        name: str,
+        step: FloatArray,
+        hypothesis: Sequence[Coordinate],
+        u: FloatArray,
+        angle: FloatArray,
+    ) -> FloatArray:
+        given = np.asarray(getattr(self.points, name), dtype=float)
+        beside = self.at(replace(self.points, **{name: given + step}))
+        base, other = (
+            model.solve([hypothesis], [u], angle[None], jacobian=False).outputs[0]
+            for model in (self, beside)
+        )
+        return np.asarray((other - base) / np.where(np.isnan(given), np.nan, step)[:, None])
 
     def _balance(
         self,

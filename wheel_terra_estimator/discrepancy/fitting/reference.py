@@ -14,7 +14,11 @@ from numpy.typing import NDArray
 
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
 from wheel_terra_estimator.discrepancy.fitting.problem import Problem
-from wheel_terra_estimator.discrepancy.tables.steady_table import INPUT_UNITS, SteadyTable
+from wheel_terra_estimator.discrepancy.tables.steady_table import (
+    INPUT_UNITS,
+    SteadyTable,
+    concatenated,
+)
 from wheel_terra_estimator.errors import UserError
 
 FloatArray = NDArray[np.float64]
@@ -39,33 +43,9 @@ def join(table: SteadyTable, reference: SteadyTable) -> tuple[SteadyTable, NDArr
             raise UserError(
                 f'{lacks.name}: no column {column!r}, which {has.name} has; state it in both'
             )
-    joined = SteadyTable(
-        table.name,
-        np.concatenate([table.lines, reference.lines]),
-        {
-            name: np.concatenate([values, reference.columns[name]])
-            for name, values in table.columns.items()
-            if name != 'time'  # of one drive only
-        },
-        np.concatenate([table.measured, reference.measured]),
-        np.concatenate([table.stated_std, reference.stated_std]),
-        np.concatenate([table.slip_std, reference.slip_std]),
-        (*table.notes, f'{len(reference)} rows of {reference.name} as reference'),
-        _both_angle_stds(table, reference),
-        np.concatenate([table.true_rows, reference.true_rows]),
-    )
+    notes = (*table.notes, f'{len(reference)} rows of {reference.name} as reference')
+    joined = concatenated(table.name, (table, reference), notes)
     return joined, np.arange(len(joined)) < len(table)
-
-
-def _both_angle_stds(table: SteadyTable, reference: SteadyTable) -> FloatArray | None:
-    if table.leaving_angle_std is None and reference.leaving_angle_std is None:
-        return None
-    return np.concatenate(
-        [
-            np.zeros(len(one)) if one.leaving_angle_std is None else one.leaving_angle_std
-            for one in (table, reference)
-        ]
-    )
 
 
 def shared_error(

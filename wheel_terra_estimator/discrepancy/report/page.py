@@ -219,9 +219,7 @@ def _figures(folder: Path, diagnosis: Diagnosis) -> dict[str, Any]:
         ),
         'residuals': residuals,
         'where': keep('where', partial(pictures.where_map, diagnosis)),
-        'signature': keep('signature', partial(pictures.signature, diagnosis)),
         'structural_error': keep('structural_error', partial(pictures.structural_error, diagnosis)),
-        'gap': keep('gap', partial(pictures.gap, diagnosis)),
         'rivals': keep('next_measurement', partial(pictures.rivals, proposed))
         if proposed
         else None,

@@ -33,7 +33,7 @@ SHOWN_INPUT = {
     'lug_height': (1e3, 'mm'),
     'leaving_angle': (180.0 / np.pi, 'deg'),
 }
-BLUE, RED, GREEN, PURPLE = LINE_COLOURS[0], LINE_COLOURS[1], LINE_COLOURS[2], LINE_COLOURS[6]
+BLUE, RED, GREEN, PURPLE = (LINE_COLOURS[i] for i in (0, 1, 2, 6))
 GREY = '#9aa5b1'
 COLOUR_MAP = 'viridis'
 # Levels differ in brightness and in shape as well, for the colour-blind and for grey prints.
@@ -241,7 +241,7 @@ def residuals(diagnosis: Diagnosis, colour_by: str, narrow: bool = False) -> Fig
 def where_map(diagnosis: Diagnosis, narrow: bool = False) -> Figure:
     """Draw where the soil-refitted model and the measurement disagree, for every quantity."""
     table, curves, where = diagnosis.table, diagnosis.curves, diagnosis.where
-    second = _second_input(diagnosis)
+    second = next(iter(colour_inputs(diagnosis)), 'normal_load')
     factor, unit = shown_input(second)
     x, y = table.columns['slip'], factor * table.columns[second]
     with _style():
@@ -270,57 +270,6 @@ def where_map(diagnosis: Diagnosis, narrow: bool = False) -> Figure:
         for axis in axes[0] if narrow else axes[0][:1]:
             axis.set_ylabel(label(second, unit))
         _colour_bar(figure, drawn, 'measured minus model [s.d.]')
-    return figure
-
-
-def signature(diagnosis: Diagnosis, narrow: bool = False) -> Figure | None:
-    """Draw the signature of the named (or best) effect over what the soil refit left."""
-    table, curves = diagnosis.table, diagnosis.curves
-    if curves.signature is None:
-        return None
-    slip = table.columns['slip']
-    with _style():
-        names = ['measured minus soil refit', words(curves.signature_name)]
-        if curves.rival_signature is not None:
-            names.append(f'next best: {words(curves.rival_name)}')
-        lines = _legend_lines(names, table.quantities, narrow)
-        figure, axes = _panels(1, table.quantities, height=2.5, legend=lines, narrow=narrow)
-        for axis, name in zip(axes[0], table.quantities, strict=True):
-            q, (scale, unit) = QUANTITIES.index(name), SHOWN[name]
-            residual = scale * (table.measured[:, q] - curves.refit[:, q])
-            inside = ~_set_apart(diagnosis, q)
-            _band(axis, slip, 2 * scale * curves.band[:, q])
-            axis.plot(
-                slip[inside],
-                residual[inside],
-                'o',
-                ms=3.5,
-                color='#7b8794',
-                label='measured minus soil refit',
-            )
-            axis.plot(
-                slip,
-                scale * curves.signature[:, q],
-                'o',
-                ms=4.5,
-                color=BLUE,
-                label=words(curves.signature_name),
-                alpha=0.85,
-            )
-            if curves.rival_signature is not None:
-                axis.plot(
-                    slip,
-                    scale * curves.rival_signature[:, q],
-                    'D',
-                    ms=4,
-                    mfc='none',
-                    mec=RED,
-                    label=f'next best: {words(curves.rival_name)}',
-                )
-            axis.set(xlabel='slip', title=words(name))
-            axis.set_ylabel(f'[{unit}]')
-        handles, labels = axes[0][0].get_legend_handles_labels()
-        _legend(figure, handles, labels, lines=lines)
     return figure
 
 
@@ -353,40 +302,6 @@ def structural_error(diagnosis: Diagnosis, narrow: bool = False) -> Figure | Non
             axis.set(xlabel='slip', title=words(name))
             axis.set_ylabel(f'[{unit}]')
         _legend(figure, [dots[0], bars], names, lines=lines)
-    return figure
-
-
-def gap(diagnosis: Diagnosis, narrow: bool = False) -> Figure:
-    """Draw the error on unseen rows: as configured, soil refitted, effect added, noise floor."""
-    names = list(diagnosis.gap)
-    with _style():
-        figure, axes = _panels(1, names, height=2.2, narrow=narrow)
-        for axis, name in zip(axes[0], names, strict=True):
-            (scale, unit), item = SHOWN[name], diagnosis.gap[name]
-            stages = [('as\nconfigured', item.before, GREY), ('soil\nrefitted', item.refit, PURPLE)]
-            if diagnosis.effects:
-                stages.append(('effect\nadded', item.after, BLUE))
-            intervals = _intervals(diagnosis, name)
-            for i, (_, value, colour) in enumerate(stages):
-                axis.bar(i, scale * value, width=0.62, color=colour)
-                low, high = intervals[i]
-                axis.plot([i, i], [scale * low, scale * high], color=INK, lw=1.2)
-                axis.annotate(
-                    f'{scale * value:.3g}',
-                    (i, scale * max(high, value)),
-                    (0, 3),
-                    textcoords='offset points',
-                    ha='center',
-                    fontsize=8.5,
-                )
-            if item.noise is not None:
-                floor = scale * float(np.hypot(item.noise, item.floor))
-                axis.axhline(floor, color=RED, lw=1.1, ls='--')
-            axis.set_xticks(range(len(stages)), [s[0] for s in stages])
-            axis.set(title=words(name), xlim=(-0.55, len(stages) - 0.45))
-            axis.set_ylabel(f'rms on unseen rows [{unit}]')
-            axis.grid(axis='x', visible=False)
-            axis.margins(y=0.14)
     return figure
 
 
@@ -424,16 +339,11 @@ def rivals(item: NextMeasurement, narrow: bool = False) -> Figure | None:
 
 
 def colour_inputs(diagnosis: Diagnosis) -> list[str]:
-    """Return the inputs by which residuals are coloured: load, slope, and what matters most."""
+    """Return the inputs by which residuals are coloured: where the gap is, load, slope, any."""
     varying = diagnosis.table.varying()
-    chosen: list[str] = [name for name in ('normal_load', 'slope') if name in varying]
-    trend = diagnosis.where.trend_input
-    for name in (trend, *varying):
-        if len(chosen) < 2 and name in varying and name not in chosen and name != 'slip':
-            chosen.append(name)
-    if trend in varying and trend not in chosen and trend != 'slip':
-        chosen.append(trend)
-    return chosen or ['normal_load']
+    box = [side.input for side in diagnosis.where.box]
+    wanted = dict.fromkeys((*box, 'normal_load', 'slope', *varying))
+    return [name for name in wanted if name in varying and name != 'slip'][:2] or ['normal_load']
 
 
 @contextmanager
@@ -557,16 +467,6 @@ def _set_apart(diagnosis: Diagnosis, q: int) -> NDArray[np.bool_]:
     return mask
 
 
-def _second_input(diagnosis: Diagnosis) -> str:
-    """Input beside slip that the map is drawn over."""
-    varying = [name for name in diagnosis.table.varying() if name != 'slip']
-    box = [side.input for side in diagnosis.where.box if side.input != 'slip']
-    for name in (*box, diagnosis.where.trend_input, 'normal_load', *varying):
-        if name in varying:
-            return name
-    return 'normal_load'
-
-
 def _box(axis: Axes, diagnosis: Diagnosis, second: str) -> None:
     """Frame the region in which the gap is largest."""
     from matplotlib.patches import Rectangle
@@ -588,21 +488,6 @@ def _box(axis: Axes, diagnosis: Diagnosis, second: str) -> None:
     axis.add_patch(
         Rectangle((x0, y0), x1 - x0, y1 - y0, fill=False, ec=RED, lw=1.4, ls='--', zorder=3)
     )
-
-
-def _intervals(diagnosis: Diagnosis, name: str) -> list[tuple[float, float]]:
-    """Return 90 % bootstrap intervals over the rows of the three root-mean-square errors."""
-    q = QUANTITIES.index(name)
-    curves, measured = diagnosis.curves, diagnosis.table.measured[:, q]
-    good = np.isfinite(measured) & ~_set_apart(diagnosis, q)
-    draws = np.random.default_rng(0).integers(0, good.sum(), (400, good.sum()))
-    result = []
-    for values in (curves.before, curves.held_out_refit, curves.held_out_after):
-        squared = (measured - values[:, q])[good] ** 2
-        rms = np.sqrt(np.nanmean(squared[draws], axis=1))
-        low, high = np.nanquantile(rms, [0.05, 0.95])
-        result.append((float(low), float(high)))
-    return result
 
 
 def _widest(rows: Any) -> str:

@@ -341,7 +341,7 @@ class _Builder:
 
     def read_leaving_angles(self, nothing: Fit) -> None:
         """Find how the stated errors of measured leaving angles act on the cells."""
-        if self.table.leaving_angle_std is not None:
+        if self.table.leaving_angle_std.any():
             self._by_angle = self.forward.by_leaving_angle(
                 nothing.coordinates, nothing.u, nothing.angle
             )
@@ -350,7 +350,7 @@ class _Builder:
         found = []
         if self._by_slip is not None:
             found.append(CommonError(self._by_slip, self.table.slip_std, self._group))
-        if self._by_angle is not None and self.table.leaving_angle_std is not None:
+        if self._by_angle is not None:
             rows = np.arange(len(self.table), dtype=np.intp)
             found.append(CommonError(self._by_angle, self.table.leaving_angle_std, rows))
         return found

@@ -1,10 +1,8 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Is the gap real? Two tests of "the soil alone explains these rows", calibrated by simulation."""
+"""Is the gap real, and is the soil that closes it believable? Absolute tests of a fit."""
 
 from __future__ import annotations
-
-from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,12 +10,8 @@ from scipy.special import chdtrc, ndtr  # scipy.stats takes longer to load than 
 
 from wheel_terra_estimator.discrepancy.fitting.coordinates import SOIL_WIDTHS, WIDENING
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
-from wheel_terra_estimator.discrepancy.selection.signatures import Signature, against_soil
 
 FloatArray = NDArray[np.float64]
-
-_DRAWS = 20000
-_SEED = 20261121  # the same table gives the same report
 
 
 def chi_square_p_value(fitted: Fit, variance: FloatArray) -> float:
@@ -58,42 +52,3 @@ def soil_p_value(fitted: Fit) -> float:
     shares = np.array([share for _, share in SOIL_WIDTHS])
     one = float(shares @ (2.0 * ndtr(-pulls.max() / scales)))
     return float(-np.expm1(pulls.size * np.log1p(-min(one, 1.0 - 1e-12))))
-
-
-def scan_p_value(
-    nothing: Fit, variance: FloatArray, signatures: Mapping[str, Signature], one_sided: set[str]
-) -> float:
-    """P-value of the strongest agreement with any effect's signature, among all effects.
-
-    A goodness-of-fit test is blind to a small but systematic misfit; this one looks along the
-    signatures, and its null distribution (parametric bootstrap of the soil refit) contains the
-    choice among them.
-
-    Parameters
-    ----------
-    one_sided : set of str
-        Effects whose strength has one sign only.
-    """
-    names = [name for name, s in signatures.items() if s.distance > 1e-6]
-    if not names:
-        return 1.0
-    changes = np.column_stack([signatures[name].change for name in names])
-    # Score of each signature, soil integrated out: linear in the data, so that its joint null
-    # distribution is a Gaussian of as many dimensions as there are effects.
-    forms = against_soil(nothing, variance, changes)
-    spread = changes.T @ forms
-    std = np.sqrt(np.diag(spread))
-    target = nothing.residual + nothing.jacobian @ nothing.u
-    observed = forms.T @ target / std
-    sided = np.array([name in one_sided for name in names])
-    values, vectors = np.linalg.eigh(spread / np.outer(std, std))
-    rng = np.random.default_rng(_SEED)
-    root = vectors * np.sqrt(np.maximum(values, 0.0))
-    draws = rng.standard_normal((_DRAWS, len(names))) @ root.T
-    strongest = _strength(draws, sided).max(axis=1)
-    exceeding = int((strongest >= _strength(observed, sided).max()).sum())
-    return (exceeding + 1) / (_DRAWS + 1)
-
-
-def _strength(forms: FloatArray, one_sided: NDArray[np.bool_]) -> FloatArray:
-    return np.where(one_sided, forms, np.abs(forms))

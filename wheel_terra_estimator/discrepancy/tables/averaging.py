@@ -1,15 +1,20 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Long tables averaged over neighbouring inputs."""
+"""Long tables averaged over neighbouring inputs; several tables as one."""
 
 from __future__ import annotations
 
 import heapq
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from wheel_terra_estimator.discrepancy.tables.steady_table import INPUT_UNITS, SteadyTable
+from wheel_terra_estimator.discrepancy.tables.steady_table import (
+    INPUT_UNITS,
+    SteadyTable,
+    concatenated,
+)
 
 FloatArray = NDArray[np.float64]
 
@@ -54,13 +59,30 @@ def averaged(table: SteadyTable, most: int) -> SteadyTable:
         table.name,
         np.array([table.lines[cell].min() for cell in cells], dtype=np.intp),
         {name: np.array([np.mean(table.columns[name][c]) for c in cells]) for name in names},
-        np.column_stack([mean(table.measured[:, q]) for q in range(3)]),
-        np.column_stack([of_mean(table.stated_std[:, q]) for q in range(3)]),
+        np.column_stack([mean(column) for column in table.measured.T]),
+        np.column_stack([of_mean(column) for column in table.stated_std.T]),
         of_mean(table.slip_std),
-        table.notes,
-        None if table.leaving_angle_std is None else of_mean(table.leaving_angle_std),
+        of_mean(table.leaving_angle_std),
         np.array([table.true_rows[cell].all() for cell in cells]),
+        table.notes,
     )
+
+
+def together(tables: Sequence[SteadyTable]) -> SteadyTable:
+    """Return several tables as one, the soil in common; what one does not state is the model's.
+
+    Long tables are averaged first, each to its share of what a diagnosis takes.
+    """
+    if len(tables) == 1:
+        return tables[0]
+    share = MOST_ROWS // len(tables)
+    parts = [averaged(t, share) if len(t) > share else t for t in tables]
+    listed = ', '.join(f'{part.name} ({len(part)} rows)' for part in parts)
+    notes = (
+        f'{len(parts)} tables share one soil: {listed}; a line number is that of its own table',
+        *dict.fromkeys(f'{part.name}: {note}' for part in parts for note in part.notes),
+    )
+    return concatenated(' + '.join(part.name for part in parts), parts, notes)
 
 
 def _halved(scaled: FloatArray, cells: list[NDArray[np.intp]], most: int) -> list[NDArray[np.intp]]:

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from typing import TypeAlias
 
 import numpy as np
@@ -27,19 +28,11 @@ _Test: TypeAlias = Callable[[FloatArray], Mask]
 _Refuse: TypeAlias = Callable[[Mask, str, str], None]
 
 MINIMUM_ROWS = 6
-
-
 MINIMUM_SLIP_SPAN = 0.1
-
-
 MINIMUM_LOAD_RATIO = 1.5
 SAME_SLIP = 1e-3
 FLIPPED = 0.5  # a sign is wrong where the other one halves the misfit of the whole column
-
-
 CLEAR_SLIP = 0.2  # beyond it a wheel's torque has the sign of its slip
-
-
 LIKE_WHEEL = 1.4  # factor within which a row's wheel may differ from that of the model file
 
 
@@ -48,6 +41,7 @@ def check_table(
     values: Mapping[str, Iterable[float]],
     lines: Sequence[int] | NDArray[np.intp] | None = None,
     notes: Sequence[str] = (),
+    most: int = MOST_ROWS,
 ) -> SteadyTable:
     """Check columns of numbers (SI, nan = not measured) and return them as a table.
 
@@ -83,10 +77,9 @@ def check_table(
     # No inputs of the model: a measured angle, and when the rows of a drive were.
     beside = ('leaving_angle', 'time', *ORDER_COLUMNS)
     inputs.update({key: arrays[key] for key in beside if key in arrays})
-    angle_std = arrays.get('leaving_angle_std')
-    if angle_std is not None:
-        angle_std = np.nan_to_num(angle_std, nan=0.0)
-    table = SteadyTable(name, where, inputs, measured, stated, slip_std, (), angle_std)
+    angle_std = np.nan_to_num(arrays.get('leaving_angle_std', np.zeros(count)), nan=0.0)
+    readings = np.zeros(count, dtype=bool)
+    table = SteadyTable(name, where, inputs, measured, stated, slip_std, angle_std, readings)
     table, copies = _without_copies(table)
     if copies:
         remarks.append(
@@ -95,8 +88,8 @@ def check_table(
         )
     _check_dead_columns(table, remarks)
     _check_range_of_design(table, remarks)
-    if len(table) > MOST_ROWS:
-        before, table = len(table), averaged(table, MOST_ROWS)
+    if len(table) > most:
+        before, table = len(table), averaged(table, most)
         remarks.append(
             f'{before} rows were averaged to {len(table)} over neighbouring inputs; '
             'a line number below is the first of its rows'
@@ -104,17 +97,7 @@ def check_table(
     constant = [key for key in inputs if key in INPUT_UNITS and key not in table.varying()]
     if constant:
         remarks.append(f'constant in this table: {", ".join(constant)}')
-    return SteadyTable(
-        name,
-        table.lines,
-        table.columns,
-        table.measured,
-        table.stated_std,
-        table.slip_std,
-        tuple(remarks),
-        table.leaving_angle_std,
-        table.corrected,
-    )
+    return replace(table, notes=tuple(remarks))
 
 
 def _columns(arrays: Mapping[str, FloatArray], names: Sequence[str], count: int) -> FloatArray:

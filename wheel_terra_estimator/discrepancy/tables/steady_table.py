@@ -4,8 +4,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,11 +14,7 @@ from numpy.typing import NDArray
 FloatArray = NDArray[np.float64]
 
 QUANTITIES = ('sinkage', 'drawbar_pull', 'torque')
-
-
 UNITS = {'sinkage': 'm', 'drawbar_pull': 'N', 'torque': 'N m'}
-
-
 INPUT_UNITS = {
     'slip': '-',
     'normal_load': 'N',
@@ -30,15 +27,9 @@ INPUT_UNITS = {
     'angular_velocity': 'rad/s',
     'pass_number': '-',
 }
-
-
 STD_COLUMNS = ('slip_std', *(f'{quantity}_std' for quantity in QUANTITIES), 'leaving_angle_std')
-
-
 # When and how the rows were taken: no inputs of the model, but residuals may change along them.
 ORDER_COLUMNS = ('row_order', 'trial', 'date', 'direction')
-
-
 COLUMNS = (*INPUT_UNITS, *QUANTITIES, 'leaving_angle', *STD_COLUMNS, *ORDER_COLUMNS)
 
 
@@ -60,11 +51,11 @@ class SteadyTable:
         (N, 3) stated standard deviations; nan = not stated.
     slip_std : numpy.ndarray
         (N,) standard deviation of the recorded slip; 0 = exact.
-    leaving_angle_std : numpy.ndarray or None
-        (N,) standard deviation of the measured leaving angle [rad]; None = exact.
-    corrected : numpy.ndarray or None
-        (N,) rows whose readings the stated zeros and gains of the sensors (``sensors.*``) were
-        taken off before, as a drive's; None = none.
+    leaving_angle_std : numpy.ndarray
+        (N,) standard deviation of the measured leaving angle [rad]; 0 = exact.
+    true_rows : numpy.ndarray
+        (N,) rows that hold true values instead of readings: the stated zeros and gains of the
+        sensors (``sensors.*``) were taken off before, as of a drive's.
     notes : tuple of str
         What the reader found odd but usable.
     """
@@ -75,9 +66,9 @@ class SteadyTable:
     measured: FloatArray
     stated_std: FloatArray
     slip_std: FloatArray
+    leaving_angle_std: FloatArray
+    true_rows: NDArray[np.bool_]
     notes: tuple[str, ...] = ()
-    leaving_angle_std: FloatArray | None = None
-    corrected: NDArray[np.bool_] | None = None
 
     def __len__(self) -> int:
         return len(self.lines)
@@ -90,11 +81,6 @@ class SteadyTable:
             for q, quantity in enumerate(QUANTITIES)
             if np.isfinite(self.measured[:, q]).any()
         )
-
-    @property
-    def true_rows(self) -> NDArray[np.bool_]:
-        """(N,) rows that hold true values instead of readings."""
-        return np.zeros(len(self), dtype=bool) if self.corrected is None else self.corrected
 
     def varying(self) -> tuple[str, ...]:
         """Return the input columns that hold more than one value."""
@@ -115,14 +101,30 @@ class SteadyTable:
 
     def select(self, rows: NDArray[np.intp] | NDArray[np.bool_]) -> SteadyTable:
         """Return the table of these rows."""
-        return SteadyTable(
-            self.name,
-            self.lines[rows],
-            {name: values[rows] for name, values in self.columns.items()},
-            self.measured[rows],
-            self.stated_std[rows],
-            self.slip_std[rows],
-            self.notes,
-            None if self.leaving_angle_std is None else self.leaving_angle_std[rows],
-            None if self.corrected is None else self.corrected[rows],
+        return self.each(lambda values: values[rows])
+
+    def each(self, change: Callable[[Any], Any]) -> SteadyTable:
+        """Return the table with every column changed in the same way."""
+        return replace(
+            self,
+            columns={name: change(values) for name, values in self.columns.items()},
+            **{name: change(getattr(self, name)) for name in _BY_ROW},
         )
+
+
+_BY_ROW = ('lines', 'measured', 'stated_std', 'slip_std', 'leaving_angle_std', 'true_rows')
+
+
+def concatenated(name: str, parts: Sequence[SteadyTable], notes: tuple[str, ...]) -> SteadyTable:
+    """Return the rows of all tables; a column that one does not have is not stated there."""
+    names = dict.fromkeys(key for part in parts for key in part.columns if key != 'time')
+
+    def column(part: SteadyTable, key: str) -> FloatArray:
+        return part.columns.get(key, np.full(len(part), np.nan))
+
+    return SteadyTable(
+        name,
+        columns={key: np.concatenate([column(part, key) for part in parts]) for key in names},
+        notes=notes,
+        **{key: np.concatenate([getattr(part, key) for part in parts]) for key in _BY_ROW},
+    )
