@@ -14,7 +14,7 @@ LABORATORY = 'wheel_terra_lab'
 HERE = Path(__file__).resolve().parent
 SHARED = ('config', 'data', 'launch', 'layouts')
 """Folders of files that are installed as they are; one that is absent is passed over."""
-PACKAGE_DATA = ('html', 'css', 'js', 'json', 'csv', 'npz', 'txt')
+PACKAGE_DATA = ('html', 'js', 'json', 'csv', 'npz', 'txt', 'yaml')
 CLASSIFIERS = [
     'Development Status :: 4 - Beta',
     'Environment :: Console',
@@ -70,7 +70,7 @@ setup(
     version=version(),
     packages=find_packages(include=[PACKAGE, f'{PACKAGE}.*', LABORATORY, f'{LABORATORY}.*']),
     package_data={
-        PACKAGE: ['py.typed', '**/*.html', '**/*.json', '**/*.csv', '**/*.npz', '**/*.js'],
+        PACKAGE: ['py.typed', *(f'**/*.{end}' for end in PACKAGE_DATA)],
         LABORATORY: ['py.typed', '**/*.html', '**/*.csv', '**/*.yaml'],
     },
     data_files=shared_files(),

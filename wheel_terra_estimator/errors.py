@@ -40,8 +40,8 @@ class UserError(Exception):
         super().__init__(' '.join(line.splitlines()))  # cells and keys may hold line feeds
 
 
-class UnitWarning(UserWarning):
-    """A number that can be, but looks as if it were in another unit."""
+class ConfigurationWarning(UserWarning):
+    """A number that looks as if it were in another unit, or a key of an earlier version."""
 
 
 def outside_cause(error: BaseException) -> str | None:

@@ -7,13 +7,19 @@ import copy
 import math
 import pickle
 from array import array
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from wheel_terra_estimator.configuration import reader, shipped
-from wheel_terra_estimator.configuration.parameters import DECLARED, by_spelling, declared
-from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.configuration import parameters, reader, shipped
+from wheel_terra_estimator.configuration.parameters import (
+    DECLARED,
+    RETIRED,
+    by_spelling,
+    declared,
+)
+from wheel_terra_estimator.errors import ConfigurationWarning, UserError
 from wheel_terra_estimator.terramechanics.effects import catalogue
 
 ROVER = {
@@ -46,7 +52,21 @@ def parameter_file(tmp_path, name, body):
 def test_spellings_are_unique():
     table = declared()
     assert len(by_spelling(table)) == len(table) + sum(len(p.aliases) for p in table.values())
-    assert len({p.key for p in DECLARED}) == len(DECLARED)
+    stated = Path(parameters.__file__).with_name('parameters.yaml').read_text()
+    assert len({p.key for p in DECLARED}) == stated.count('{type: '), 'a key stands twice'
+    assert not set(RETIRED) & set(by_spelling(table))
+
+
+def test_a_retired_key_is_left_out_and_said(tmp_path):
+    with_it = parameter_file(tmp_path, 'old.yaml', 'rover.name: mine\nfilter.demand_walk: 0.02')
+    with pytest.warns(ConfigurationWarning) as said:
+        read = reader.load([with_it], complete=False)
+    assert [str(warning.message) for warning in said] == [
+        f'{with_it}: filter.demand_walk no longer exists and is left out: '
+        'filter.ratio_walk holds on every ground; delete this line'
+    ]
+    assert read.rover.name == 'mine'
+    assert 'filter.demand_walk' not in read.flat()
 
 
 @pytest.mark.parametrize('parameter', DECLARED, ids=lambda p: p.key)

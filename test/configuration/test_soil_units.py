@@ -10,7 +10,7 @@ import pytest
 from wheel_terra_estimator import api
 from wheel_terra_estimator.cli.main import main
 from wheel_terra_estimator.configuration import reader, shipped
-from wheel_terra_estimator.errors import UnitWarning
+from wheel_terra_estimator.errors import ConfigurationWarning
 
 SOILS = [name for name in shipped.files() if name.startswith('soils/')]
 WHEEL = api.Wheel(radius=0.13, width=0.16)
@@ -34,7 +34,7 @@ def test_soils_of_the_literature_are_not_doubted_and_a_thousandth_of_them_is(nam
         expected.add('soil.shear_modulus')
     values['soil.friction_angle_deg'] = soil.friction_angle
     expected.add('soil.friction_angle_deg')
-    with pytest.warns(UnitWarning) as caught:
+    with pytest.warns(ConfigurationWarning) as caught:
         reader.from_parameters(values, source='mine', complete=False)
     found = {str(warning.message).split()[1] for warning in caught}
     assert found == expected
@@ -49,7 +49,7 @@ def test_the_words_name_the_place_and_the_cure(capsys):
         'wheel-terra predict: warning: -p soil.cohesion:=0.3: soil.cohesion is 0.3 Pa; in kPa? '
         'then times 1000'
     )
-    with pytest.warns(UnitWarning, match='in kPa'):
+    with pytest.warns(ConfigurationWarning, match='in kPa'):
         api.Model(WHEEL, api.Soil(5790.0, 180e3, 1.1, 0.3, 0.3, 0.01))
 
 

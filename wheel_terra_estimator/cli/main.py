@@ -30,7 +30,7 @@ from wheel_terra_estimator.cli.terminal import (
     open_closed_streams,
     termination_as_interrupt,
 )
-from wheel_terra_estimator.errors import UnitWarning, UserError, outside_cause
+from wheel_terra_estimator.errors import ConfigurationWarning, UserError, outside_cause
 
 COMMANDS = {
     'simulate': 'drive a simulated rover and write a rosbag2 with ground truth',
@@ -229,7 +229,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             logging.basicConfig()
             logging.getLogger('wheel_terra_estimator').setLevel(logging.DEBUG)
         with harmless_output(), termination_as_interrupt(), warnings.catch_warnings():
-            warnings.simplefilter('always', UnitWarning)
+            warnings.simplefilter('always', ConfigurationWarning)
             warnings.showwarning = partial(_show_warning, arguments.command, warnings.showwarning)
             outputs.check(arguments)
             status = int(arguments.run(arguments) or 0)
@@ -252,8 +252,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _show_warning(
     command: str, others: Callable[..., None], message: Any, category: type[Warning], *where: Any
 ) -> None:
-    """Show doubtful units in one line, other warnings as Python does."""
-    if issubclass(category, UnitWarning):
+    """Show what is doubtful in a configuration in one line, other warnings as Python does."""
+    if issubclass(category, ConfigurationWarning):
         _complain(f'wheel-terra {command}: warning: {message}')
     else:
         others(message, category, *where)

@@ -18,6 +18,7 @@ from typing import Any
 from wheel_terra_estimator.configuration import ros_yaml, shipped
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.configuration.parameters import (
+    RETIRED,
     Parameter,
     by_spelling,
     declared,
@@ -25,7 +26,7 @@ from wheel_terra_estimator.configuration.parameters import (
 )
 from wheel_terra_estimator.configuration.ros_yaml import Value
 from wheel_terra_estimator.configuration.soil_units import doubtful_units
-from wheel_terra_estimator.errors import UnitWarning, UserError
+from wheel_terra_estimator.errors import ConfigurationWarning, UserError
 from wheel_terra_estimator.terramechanics.effects.base import Effect
 
 # Parameters that every ROS node has; they may stand in the same file.
@@ -160,6 +161,9 @@ def _checked(
     for key, source, value in sourced:
         if key in STANDARD_PARAMETERS or key.startswith(STANDARD_PREFIXES):
             continue
+        if key in RETIRED:
+            _warn(f'{source}: {key} no longer exists and is left out: {RETIRED[key]}')
+            continue
         parameter = spellings.get(key)
         if parameter is None:
             raise UserError(_unknown(key, source, spellings))
@@ -178,8 +182,12 @@ def _checked(
     _cross_check(values, stated, sources)
     configuration = Configuration.from_values(values, stated)
     for key, words in doubtful_units(configuration.soil, stated):
-        warnings.warn(f'{stated[key][1]}: {words}', UnitWarning, stacklevel=3)
+        _warn(f'{stated[key][1]}: {words}')
     return configuration
+
+
+def _warn(words: str) -> None:
+    warnings.warn(words, ConfigurationWarning, stacklevel=4)
 
 
 def _load_effect_file(sourced: Sequence[tuple[str, str, Any]], allowed: bool) -> None:

@@ -203,7 +203,7 @@ class EstimatorNode(LifecycleNode):
         UserError
             If a parameter is unknown or its value cannot be used.
         """
-        configuration = parameters.configuration(self._given)
+        configuration = parameters.configuration(self._given, self.get_logger().warning)
         self._kept = self._kept_over_restart(configuration)
         kept = self._kept.values(configuration) if self._kept is not None else {}
         configuration = configuration.replace(kept) if kept else configuration

@@ -4,7 +4,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import warnings
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from rclpy.node import Node
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.configuration.parameters import Parameter, declared
+from wheel_terra_estimator.errors import ConfigurationWarning
 
 TUNING = ('output_rate', 'max_lag', 'history', 'reference_odom_max_rate')
 """May be changed while the node runs, as all of ``filter.*``."""
@@ -49,15 +51,20 @@ def files(arguments: Sequence[str]) -> list[Path]:
     ]
 
 
-def configuration(given: Mapping[str, Any]) -> Configuration:
-    """Return the checked configuration.
+def configuration(given: Mapping[str, Any], warn: Callable[[str], Any]) -> Configuration:
+    """Return the checked configuration; hand what is doubtful in it to ``warn``.
 
     Raises
     ------
     UserError
         If a parameter is unknown or its value cannot be used.
     """
-    return reader.from_parameters(given, source='parameters')
+    with warnings.catch_warnings(record=True) as doubtful:
+        warnings.simplefilter('always', ConfigurationWarning)
+        checked = reader.from_parameters(given, source='parameters')
+    for warning in doubtful:
+        warn(str(warning.message))
+    return checked
 
 
 def declare(node: Node, configuration: Configuration) -> None:

@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Scenario files: which rover drives where, with which sensors and faults, and what is random.
 
-A scenario is a ROS parameter file like every configuration file. The declared keys below are all
-there are. What starts with ``variation.`` is drawn anew for each seed.
+A scenario is a ROS parameter file like every configuration file. The keys in
+``scenario_keys.yaml`` are all there are. What starts with ``variation.`` is drawn anew for each
+seed.
 """
 
 from __future__ import annotations
@@ -18,14 +19,7 @@ from numpy.typing import NDArray
 
 from wheel_terra_estimator.configuration import reader, ros_yaml, shipped
 from wheel_terra_estimator.configuration.configuration import Configuration, Section
-from wheel_terra_estimator.configuration.parameters import (
-    Parameter,
-    flag,
-    integer,
-    nearest,
-    number,
-    text,
-)
+from wheel_terra_estimator.configuration.parameters import nearest, read_table
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.simulation.commands import DriveProfile
 from wheel_terra_estimator.simulation.terrain import SOIL_QUANTITIES, Patch
@@ -33,140 +27,13 @@ from wheel_terra_estimator.simulation.terrain import SOIL_QUANTITIES, Patch
 FloatArray = NDArray[np.float64]
 DEFAULT = 'climb_soft_patch'
 
+DECLARED = {
+    item.key: item for item in read_table(Path(__file__).with_name('scenario_keys.yaml'))[0]
+}
+"""What a scenario may state, by key."""
+
 WHEEL_FAULTS = ('overspeed', 'locked', 'coasting', 'weak', 'lifted')
-SENSOR_FAULTS = (
-    'no_wheel_odometry',
-    'no_torque',
-    'no_imu',
-    'no_orientation',
-    'no_sinkage',
-    'no_reference',
-    'sinkage_stuck',
-    'torque_spikes',
-    'reference_wild',
-    'imu_bias',
-    'nan_values',
-    'zero_stamps',
-    'repeated_stamps',
-)
-
-_FACTORS = {
-    'stiffness': 'bearing modulus',
-    'cohesion': 'cohesion',
-    'friction': 'tangent of the friction angle',
-    'shear_modulus': 'shear modulus',
-    'slip_sinkage': 'growth of the sinkage exponent with slip',
-}
-
-TRUE_EFFECTS = {
-    'slip_sinkage_exponent.enabled': 'true',
-    'slip_sinkage_exponent.n1': '0.35',
-    'stress_peak_shift.enabled': 'true',
-    'stress_peak_shift.c2': '0.15',
-    'lug_shear_radius.enabled': 'true',
-    'lug_digging.enabled': 'true',
-    'soil_mound.enabled': 'true',
-    'multipass.enabled': 'true',
-    'bulldozing.enabled': 'true',
-    'bulldozing.kb': '0.3',
-}
-"""Effects that are at work in the simulated soil where a scenario does not say otherwise."""
-
-DECLARED: tuple[Parameter, ...] = (
-    text('description', '', 'what happens in the drive'),
-    text('configuration', ['generic_six_wheel'], 'rover and soil files', size=0),
-    text('parameters', [], 'NAME:=VALUE on top of these files, known to the estimator', size=0),
-    text(
-        'truth',
-        [f'effects.{name}:={value}' for name, value in TRUE_EFFECTS.items()],
-        'NAME:=VALUE that hold in the simulation, whatever the estimator is told',
-        size=0,
-    ),
-    number('duration', 120.0, 's', 'length of the drive', above=0.0, at_most=1e6),
-    # What the rover is told
-    number('drive.time', [0.0], 's', 'knots of the command, linear between', size=0),
-    number('drive.forward', [0.05], 'm/s', 'commanded speed at the knots', size=0),
-    number('drive.turn_rate', [0.0], 'rad/s', 'commanded yaw rate at the knots', size=0),
-    number('drive.acceleration', 0.1, 'm/s^2', 'greatest change of rim speed', above=0.0),
-    number(
-        'drive.torque_ratio',
-        0.0,
-        '-',
-        'torque limit over mean load times radius; 0 = wheels.torque_limit',
-        at_least=0.0,
-    ),
-    # Ground
-    number('slope.position', [0.0], 'm', 'knots of the slope along the path', size=0),
-    number(
-        'slope.angle_deg',
-        [0.0],
-        'deg',
-        'slope there, uphill positive',
-        size=0,
-        at_least=-60.0,
-        at_most=60.0,
-    ),
-    number('slope.side_deg', 0.0, 'deg', 'slope across, left high', at_least=-45.0, at_most=45.0),
-    number('slope.undulation_deg', 0.0, 'deg', 'unevenness, standard deviation', at_least=0.0),
-    number('slope.undulation_length', 0.6, 'm', 'its correlation length', above=0.0),
-    number('patches.start', [], 'm', 'patches of other soil begin here', size=0),
-    number('patches.end', [], 'm', 'and end here', size=0),
-    number('patches.right', [], 'm', 'right borders (default: none)', size=0),
-    number('patches.left', [], 'm', 'left borders (default: none)', size=0),
-    *(
-        number(f'patches.{name}', [], '-', f'factor on the {meaning}', size=0, above=0.0)
-        for name, meaning in _FACTORS.items()
-    ),
-    number('patches.border', 0.3, 'm', 'width of the transition', above=0.0),
-    number('patchiness', 0.0, '-', 'relative unevenness of the stiffness', at_least=0.0),
-    number('patchiness_length', 0.6, 'm', 'its correlation length', above=0.0),
-    number(
-        'dig_efficiency',
-        0.05,
-        '-',
-        'share of the soil between passing lugs that a spinning wheel throws out',
-        at_least=0.0,
-        at_most=1.0,
-    ),
-    # Drawn for each seed: relative standard deviations
-    *(
-        number(f'variation.{name}', 0.0, '-', f'of the {meaning}', at_least=0.0, at_most=2.0)
-        for name, meaning in _FACTORS.items()
-    ),
-    number('variation.patch', 0.0, '-', 'of the stiffness of each patch', at_least=0.0),
-    number('variation.slope_deg', 0.0, 'deg', 'of the slope, all knots alike', at_least=0.0),
-    number('variation.speed', 0.0, '-', 'of the commanded speeds', at_least=0.0),
-    number('variation.mass', 0.0, '-', 'of the mass', at_least=0.0),
-    number('variation.radius', 0.0, '-', 'of the wheel radius, all wheels alike', at_least=0.0),
-    # Sensors; noise and rates are those of the configuration (sensors.*)
-    flag('sensors.torque', True, 'drives report torque'),
-    flag('sensors.imu', True, 'there is an IMU'),
-    flag('sensors.orientation', True, 'the IMU reports its orientation'),
-    flag('sensors.sinkage', True, 'sinkage is measured'),
-    flag('sensors.leaving_angle', False, 'the leaving angle is measured'),
-    flag('sensors.reference', True, 'there is a reference velocity'),
-    number('sensors.noise', 1.0, '-', 'factor on all noise and zero errors', at_least=0.0),
-    number(
-        'sensors.reference_rate',
-        0.0,
-        'Hz',
-        '0 = sensors.reference_rate of the rover',
-        at_least=0.0,
-    ),
-    number('sensors.reference_delay', -1.0, 's', 'negative = that of the rover file', at_most=10.0),
-    integer('sensors.encoder_counts', 20000, '1/rev', 'per turn of a wheel; 0 = exact', at_least=0),
-    number('sensors.sinkage_outliers', 0.01, '-', 'share of wild readings', at_least=0.0),
-    number('sensors.sinkage_dropouts', 0.02, '-', 'share of missing readings', at_least=0.0),
-    number('sensors.reference_dropouts', 0.02, '-', 'share of missing messages', at_least=0.0),
-    number('sensors.reference_outliers', 0.0, '-', 'share of wild messages', at_least=0.0),
-    number('sensors.jitter', 0.005, 's', 'mean of the random delay of messages', at_least=0.0),
-    # Faults
-    text('faults.kind', [], 'faults', size=0, choices=WHEEL_FAULTS + SENSOR_FAULTS),
-    text('faults.wheel', [], 'wheel concerned; "" = all, or none in particular', size=0),
-    number('faults.start', [], 's', 'from', size=0),
-    number('faults.end', [], 's', 'to', size=0),
-    number('faults.random_rate', 0.0, '1/h', 'rate of random sensor faults', at_least=0.0),
-)
+SENSOR_FAULTS = tuple(k for k in DECLARED['faults.kind'].choices if k not in WHEEL_FAULTS)
 
 
 @dataclass(frozen=True)
@@ -319,14 +186,14 @@ def shipped_scenarios() -> dict[str, str]:
 
 
 def _checked(name: str, values: Mapping[str, Any]) -> dict[str, Any]:
-    table = {parameter.key: parameter for parameter in DECLARED}
     for key in values:
-        if key not in table:
-            close = nearest(key, table)
-            hint = f"; the nearest known one is '{close}'" if close else ''
-            raise UserError(f"{name}: unknown key '{key}' of a scenario{hint}")
+        if key not in DECLARED:
+            close = nearest(key, DECLARED)
+            raise UserError(
+                f"{name}: unknown key '{key}' of a scenario; the nearest known one is '{close}'"
+            )
     stated = {key: (value, name) for key, value in values.items() if value != []}
-    return {key: reader.checked_value(table[key], stated, 0) for key in table}
+    return {key: reader.checked_value(item, stated, 0) for key, item in DECLARED.items()}
 
 
 def _columns(
