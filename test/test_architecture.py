@@ -108,6 +108,7 @@ def test_the_configuration_is_read_without_the_heavy_libraries():
 COMMON = {
     'errors',
     'csv_file',
+    'frames',
     'input_file',
     'output_folder',
     'scheduler',

@@ -110,16 +110,30 @@ def test_the_page_of_the_interface_has_every_name():
     assert not missing, f'add to docs/api.md: {sorted(missing)}'
 
 
-def test_python_of_the_readme_runs():
+def python_blocks(page: Path) -> list[str]:
+    return re.findall(r'^```python\n(.*?)^```', page.read_text(encoding='utf-8'), re.M | re.S)
+
+
+@pytest.mark.parametrize(
+    'page',
+    [p for p in (ROOT / 'README.md', *PAGES) if p.parent.name != 'tutorials' and python_blocks(p)],
+    ids=lambda page: page.stem,
+)
+def test_python_of_a_page_runs(page, tmp_path, monkeypatch):
+    """Tutorials are run elsewhere, with their commands."""
     mpl = pytest.importorskip('matplotlib')
     mpl.use('agg')
     from matplotlib import pyplot
 
-    text = (ROOT / 'README.md').read_text(encoding='utf-8')
-    blocks = re.findall(r'^```python\n(.*?)^```', text, re.M | re.S)
-    assert blocks
-    for block in blocks:
-        exec(compile(block, 'README.md', 'exec'), {})
+    from wheel_terra_estimator.api import Model
+    from wheel_terra_estimator.configuration import reader
+
+    monkeypatch.chdir(tmp_path)
+    reader.load(['hit_wh3', 'hit_fit'], complete=False).write('my_soil.yaml')
+    rows = Model.load('my_soil.yaml').sweep([0.1, 0.2, 0.3, 0.4, 0.5, 0.6], [60.0, 90.0])
+    rows.iloc[:, :6].to_csv('DATA.csv', index=False)
+    for block in python_blocks(page):
+        exec(compile(block, page.name, 'exec'), {})
     pyplot.close('all')
 
 

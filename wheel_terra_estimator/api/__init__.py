@@ -3,9 +3,9 @@
 """The Python interface: models to curves, drives to estimates, tables to diagnoses, and pictures.
 
 What stands here keeps its name, units and meaning within a major version; everything else of the
-package is free to move. SI units and radians throughout; frames, signs and the definition of slip
-are those of ``docs/nomenclature.md``. pandas is optional: where it is missing, ``as_frame=False``
-gives the same columns as arrays.
+package is free to move. SI units and radians throughout (degrees only in names that end in
+``_deg``); frames, signs and the definition of slip are those of ``docs/nomenclature.md``. pandas is
+optional: where it is missing, ``as_frame=False`` gives the same columns as arrays.
 
 Examples
 --------
@@ -18,15 +18,24 @@ True
 
 from wheel_terra_estimator import __version__
 from wheel_terra_estimator.api.drives import estimate, simulate, smooth
-from wheel_terra_estimator.api.models import Curve, Model, Soil, Wheel
+from wheel_terra_estimator.api.models import Curve, Model
 from wheel_terra_estimator.api.pictures import plot_curve, plot_diagnosis, plot_estimates
+from wheel_terra_estimator.api.soils import Soil
 from wheel_terra_estimator.api.tables import corrected_model, diagnose
-from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.discrepancy.result import Diagnosis
+from wheel_terra_estimator.errors import UnitWarning, UserError
+from wheel_terra_estimator.simulation.drive import SimulatedDrive
+from wheel_terra_estimator.simulation.truth import TruthTable
+from wheel_terra_estimator.terramechanics.wheel import Wheel
 
 __all__ = [
     'Curve',
+    'Diagnosis',
     'Model',
+    'SimulatedDrive',
     'Soil',
+    'TruthTable',
+    'UnitWarning',
     'UserError',
     'Wheel',
     '__version__',

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wheel_terra_estimator.api.frames import Columns, columns_of, to_frame
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.errors import UserError
@@ -23,6 +22,7 @@ from wheel_terra_estimator.estimation.measurements import (
     SinkageReading,
     WheelOdometry,
 )
+from wheel_terra_estimator.frames import Columns, columns_of, to_frame
 from wheel_terra_estimator.simulation.drive import SimulatedDrive
 
 if TYPE_CHECKING:
@@ -64,7 +64,9 @@ def estimate(
         ``leaving_angle.<wheel>`` [rad], ``steering.<wheel>`` [rad]; ``specific_force.x`` (y, z)
         [m/s^2], ``angular_rate.x`` (y, z) [rad/s], ``orientation.x`` (y, z, w);
         ``reference_velocity`` [m/s] and ``reference_velocity_std``, in the row of the instant of
-        measurement. Vectors are in ``base_link``; rates are positive forward.
+        measurement. A DataFrame may have an index of dates or durations in place of ``time``, and
+        other units in ``attrs['units']`` ({'rate.fl': 'rpm'}). Vectors are in
+        ``base_link``; rates are positive forward.
     rover : str, path, sequence or Configuration
         Configuration files, or bare names of shipped ones; not needed for a simulated drive.
     parameters : sequence of str
@@ -72,7 +74,9 @@ def estimate(
     remaps : mapping, optional
         For a bag: the estimator's topic -> the bag's.
     as_frame : bool
-        True: a DataFrame (needs pandas); False: the same columns as a dict of arrays.
+        True: a DataFrame (needs pandas), its index the ROS time as dates (UTC), so that
+        ``resample``, slices of time and ``join`` with ``truth.to_frame()`` work, its units in
+        ``attrs['units']``; False: the same columns as a dict of arrays.
 
     Returns
     -------
@@ -151,7 +155,7 @@ def simulate(
     -------
     SimulatedDrive
         ``arrivals`` (typed measurements in order of arrival), ``truth`` (arrays (k, n) of slip,
-        sinkage, drawbar pull, ... at ``truth.stamp``), ``configuration``.
+        sinkage, drawbar pull, ... at ``truth.stamp``; ``truth.to_frame()``), ``configuration``.
 
     Examples
     --------
@@ -162,6 +166,8 @@ def simulate(
     from wheel_terra_estimator.simulation import drive as simulation
     from wheel_terra_estimator.simulation.scenario import load
 
+    if duration is not None and not duration > 0.0:
+        raise UserError(f'simulate: duration is {duration}; give seconds above 0')
     result = simulation.simulate(load(scenario), seed, duration)
     if output is not None:
         from wheel_terra_estimator.bags.simulated_drive import write_simulated_drive
@@ -251,7 +257,7 @@ def _result(history: Any, as_frame: bool) -> DataFrame | Columns:
     }
     for field, values in {**history.values, 'slip_class': history.slip_class}.items():
         columns |= {f'{field}.{name}': values[:, i] for i, name in enumerate(history.names)}
-    return to_frame(columns) if as_frame else columns
+    return to_frame(columns, history.stamp) if as_frame else columns
 
 
 def _measurements(

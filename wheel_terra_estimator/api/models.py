@@ -1,22 +1,24 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Wheel, soil and the steady curves that follow from them."""
+"""The wheel-soil model and the steady curves that follow from it."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
+from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from wheel_terra_estimator.api.frames import Columns, to_frame
+from wheel_terra_estimator.api.soils import Soil, configuration_of
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.configuration.readings import Readings
 from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.frames import Columns, to_frame, unit_of
 from wheel_terra_estimator.terramechanics import soil as terramechanics_soil
 from wheel_terra_estimator.terramechanics.effects import EffectSettings
 from wheel_terra_estimator.terramechanics.effects.base import OUTPUTS
@@ -31,34 +33,6 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
 FloatArray = NDArray[np.float64]
-__all__ = ['Curve', 'Model', 'Soil', 'Wheel']
-
-
-@dataclass(frozen=True)
-class Soil(terramechanics_soil.Soil):
-    """Soil parameters; fields and units as in ``terramechanics.soil.Soil``.
-
-    Examples
-    --------
-    >>> sand = Soil.load('dlr_mss')
-    >>> sand.cohesion
-    300.0
-    """
-
-    @classmethod
-    def load(cls, name: str | Path) -> Soil:
-        """Return a shipped soil by its bare name, or that of a configuration file.
-
-        Raises
-        ------
-        UserError
-            If no file answers to the name, or it states no soil.
-        """
-        return cls._of(reader.load([name], complete=False).soil)
-
-    @classmethod
-    def _of(cls, soil: terramechanics_soil.Soil) -> Soil:
-        return cls(**{f.name: getattr(soil, f.name) for f in fields(soil)})
 
 
 @dataclass(frozen=True)
@@ -90,8 +64,16 @@ class Curve:
         return {f.name: getattr(self, f.name) for f in fields(self)}
 
     def to_frame(self) -> DataFrame:
-        """Return the columns as a DataFrame (needs pandas)."""
+        """Return the columns as a DataFrame (needs pandas), units in ``attrs['units']``."""
         return to_frame(self.columns())
+
+    def __repr__(self) -> str:
+        """Return the ranges of slip, load and answers."""
+        return f'Curve of {self.slip.size} points\n  ' + '\n  '.join(
+            f'{name} {np.nanmin(values):.4g} to {np.nanmax(values):.4g} {unit_of(name)}'
+            for name, values in self.columns().items()
+            if name in ('slip', *OUTPUTS)
+        )
 
 
 class Model:
@@ -146,7 +128,12 @@ class Model:
                     f'Model: {given!r} is no {kind.__name__}; give Wheel(radius=0.13, width=0.16) '
                     "and Soil.load('dlr_mss'), or use Model.load('hit_wh3', 'hit_fit')"
                 )
-        self._set(_configuration(wheel, soil, effects or {}, slip_radius, gravity), method)
+        if effects is not None and not isinstance(effects, Mapping):
+            raise UserError(
+                f"Model: effects are a mapping, not {effects!r}; give {{'lug_digging': {{}}}}, or "
+                "{'lug_digging': {'kd': 1.0}}"
+            )
+        self._set(configuration_of(wheel, soil, effects or {}, slip_radius, gravity), method)
 
     @classmethod
     def load(
@@ -182,7 +169,7 @@ class Model:
 
     def _set(self, configuration: Configuration, method: str) -> None:
         self.configuration = configuration
-        self.soil = Soil._of(configuration.soil)
+        self.soil = Soil._of(configuration)
         self.effects = configuration.effects
         self._model = WheelSoilModel(configuration.soil, self.effects, method, strict=False)
 
@@ -200,6 +187,18 @@ class Model:
                     wheels.lug_count,
                     wheels.lug_thickness,
                 )
+            )
+        )
+
+    def __repr__(self) -> str:
+        """Return wheel, effects and soil in five lines, the first line of the soil's left out."""
+        wheel, on = self.wheel, ', '.join(self.effects) or 'none'
+        return '\n'.join(
+            (
+                f'Model, wheel radius {wheel.radius:g} m, width {wheel.width:g} m, '
+                f'{wheel.lug_count:g} lugs of {wheel.lug_height:g} m',
+                f'  effects: {on}',
+                *repr(self.soil).splitlines()[1:],
             )
         )
 
@@ -250,29 +249,50 @@ class Model:
         inputs = (np.array(values) for values in (points.slip, points.normal_load, points.slope))
         return Curve(*inputs, **answers)
 
+    def sweep(
+        self,
+        slip: ArrayLike,
+        normal_load: ArrayLike,
+        slope: ArrayLike = 0.0,
+        *,
+        parameters: Mapping[str, Sequence[Any]] | None = None,
+        as_frame: bool = True,
+    ) -> DataFrame | Columns:
+        """Return the curves of every combination of operating points and parameters.
 
-def _configuration(
-    wheel: Wheel,
-    soil: terramechanics_soil.Soil,
-    effects: EffectSettings,
-    slip_radius: str,
-    gravity: float,
-) -> Configuration:
-    """Return the parameters that say the same as these objects."""
-    values: dict[str, Any] = {
-        'wheels.names': ['wheel'],
-        'slip_radius': slip_radius,
-        'rover.gravity': float(gravity),
-    }
-    values |= {f'wheels.{f.name}': [float(getattr(wheel, f.name))] for f in fields(wheel)}
-    values['wheels.lug_count'] = [round(float(wheel.lug_count))]
-    for f in fields(soil):
-        value = getattr(soil, f.name)
-        if f.name == 'friction_angle':
-            values['soil.friction_angle_deg'] = float(np.degrees(value))
-        else:
-            values[f'soil.{f.name}'] = value if isinstance(value, str) else float(value)
-    for name, settings in effects.items():
-        values[f'effects.{name}.enabled'] = True
-        values |= {f'effects.{name}.{key}': value for key, value in settings.items()}
-    return reader.from_parameters(values, source='model', complete=False)
+        Parameters
+        ----------
+        slip, normal_load, slope : array_like
+            One-dimensional, or one number: slip ratio [-], load [N], slope [rad].
+        parameters : mapping of str to sequence
+            Key of the configuration -> values, such as ``{'soil.cohesion': [100.0, 300.0]}`` [Pa]
+            or ``{'soil.friction_angle_deg': [25, 30, 35]}`` [deg].
+        as_frame : bool
+            True: a DataFrame (needs pandas); False: the same columns as a dict of arrays.
+
+        Returns
+        -------
+        DataFrame or dict
+            A column per parameter, then those of `Curve`; one row per combination, slip changing
+            fastest. Units are in ``attrs['units']``.
+
+        Examples
+        --------
+        >>> model = Model(Wheel(radius=0.13, width=0.16), 'dlr_mss')
+        >>> rows = model.sweep([0.1, 0.3], [60, 90], parameters={'soil.cohesion': [100, 500]})
+        >>> rows.groupby('soil.cohesion')['drawbar_pull'].max().round(1).to_dict()
+        {100: -1.8, 500: 1.1}
+        """
+        axes = (np.atleast_1d(np.asarray(a, dtype=np.float64)) for a in (slip, normal_load, slope))
+        # Transposed, so that slip changes fastest and each curve stands in one piece.
+        points = [grid.T.ravel() for grid in np.meshgrid(*axes, indexing='ij')]
+        keys = dict(parameters or {})
+        found: dict[str, list[NDArray[Any]]] = {}
+        for values in product(*keys.values()):
+            changes = dict(zip(keys, values, strict=True))
+            model = Model.of(self.configuration.replace(changes), method=self._model.method)
+            answer = model.curve(*points).columns()
+            for name, column in {**changes, **answer}.items():
+                found.setdefault(name, []).append(np.broadcast_to(column, points[0].shape))
+        columns = {name: np.concatenate(parts) for name, parts in found.items()}
+        return to_frame(columns) if as_frame else columns

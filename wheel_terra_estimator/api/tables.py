@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,11 +12,15 @@ from typing import TYPE_CHECKING, Any
 from wheel_terra_estimator.api.models import Model
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.errors import UserError
 
 if TYPE_CHECKING:
     from wheel_terra_estimator.discrepancy.result import Diagnosis
     from wheel_terra_estimator.discrepancy.tables.header import Choice
     from wheel_terra_estimator.discrepancy.tables.steady_table import SteadyTable
+
+_WORSE = 1.05
+"""Error on unseen rows, refitted over as configured, that is told."""
 
 
 def diagnose(
@@ -34,14 +39,16 @@ def diagnose(
     Parameters
     ----------
     data : DataFrame, mapping or path
-        Columns of steady measurements (``docs/tables.md``), a CSV file of them, or a rosbag2.
+        Columns of steady measurements (``docs/tables.md``), a CSV file of them, or a rosbag2. Units
+        stand in the titles (``sinkage [mm]``) or in ``attrs['units']`` of a DataFrame; else SI.
     model : Model, Configuration, or names of configuration files
         The model believed in.
     reference : DataFrame, mapping or path, optional
         Measurements in which the effect in question is absent; fitted first, so that structural
         error common to both cancels.
     effects : sequence of str, optional
-        Effects that may be named; default: all of the catalogue.
+        Effects that may be named; default: all of the catalogue. None at all (``[]``) fits the soil
+        alone, as ``Soil.fit`` does.
     remaps : mapping, optional
         For a bag: the estimator's topic -> the bag's.
     smooth : bool
@@ -89,9 +96,28 @@ def corrected_model(diagnosis: Diagnosis) -> Model:
     """Return the model after a diagnosis: soil refitted, named effects added.
 
     The same as ``Model.load`` of the configuration and the written ``model.yaml``.
+
+    Warns
+    -----
+    UserWarning
+        If the verdict is open and a quantity is predicted worse on rows that the fit did not see
+        than by the model as configured: the refit makes up for what is missing.
     """
     from wheel_terra_estimator.discrepancy.report.model_file import corrected
+    from wheel_terra_estimator.discrepancy.result import OPEN
 
+    worse = [
+        f'{name} {100.0 * (gap.after / gap.before - 1.0):.0f} %'
+        for name, gap in diagnosis.gap.items()
+        if gap.after > _WORSE * gap.before
+    ]
+    if diagnosis.verdict in OPEN and worse:
+        words = (
+            f'verdict {diagnosis.verdict}: the refitted soil predicts unseen rows worse than the '
+            f'configured one ({", ".join(worse)}); keep that (diagnosis.configuration) until the '
+            'verdict is settled (diagnosis.next_measurement)'
+        )
+        warnings.warn(words, stacklevel=2)
     return Model.of(corrected(diagnosis)[0])
 
 
@@ -102,8 +128,21 @@ def _configuration(
         return model.configuration
     if isinstance(model, Configuration):
         return model
-    files = [model] if isinstance(model, str | Path) else list(model)
+    files = [model] if isinstance(model, str | Path) else model
+    if not isinstance(files, Sequence):
+        raise UserError(
+            f"diagnose: {model!r} is no model; give Model(wheel, soil) or ['hit_wh3', 'hit_fit']"
+        )
     return reader.load(files, complete=False)
+
+
+def read(data: Any, name: str, choice: Choice) -> SteadyTable:
+    """Return a table of steady rows: a DataFrame, a mapping, or a CSV file."""
+    from wheel_terra_estimator.discrepancy.tables.parsing import read_table, table_of
+
+    if isinstance(data, str | Path):
+        return read_table(data, choice)
+    return table_of(data, name, choice)
 
 
 def _table(
@@ -114,13 +153,8 @@ def _table(
     smooth: bool,
     choice: Choice,
 ) -> SteadyTable:
-    from wheel_terra_estimator.discrepancy.tables.parsing import read_table, table_of
-
-    if not isinstance(data, str | Path):
-        return table_of(data, name, choice)
-    path = Path(data)
-    if path.suffix.lower() in ('.csv', '.txt'):
-        return read_table(path, choice)
+    if not isinstance(data, str | Path) or Path(data).suffix.lower() in ('.csv', '.txt'):
+        return read(data, name, choice)
     from wheel_terra_estimator.discrepancy.drives.windows import rows_from_bag
 
-    return rows_from_bag(path, configuration, remaps, smooth=smooth).table()
+    return rows_from_bag(Path(data), configuration, remaps, smooth=smooth).table()

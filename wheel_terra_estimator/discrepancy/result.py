@@ -428,6 +428,15 @@ class Diagnosis:
     not_tried: Mapping[str, str] = field(default_factory=dict)
     seconds: float = field(default=0.0, metadata=_ASIDE)
 
+    def __repr__(self) -> str:
+        """Return the verdict in words, and the error of each quantity on unseen rows."""
+        errors = (
+            f'{name} [{UNITS[name]}]: unseen rows off by {gap.before:.3g} as configured, '
+            f'{gap.refit:.3g} soil refitted, {gap.after:.3g} in the end'
+            for name, gap in self.gap.items()
+        )
+        return '\n  '.join((f'Diagnosis: {self.sentence}', *errors))
+
     def to_dict(self) -> dict[str, Any]:
         """Return the content of ``report.json``: finite numbers, text and lists only."""
         freely = {

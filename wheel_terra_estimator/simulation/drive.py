@@ -50,6 +50,10 @@ class SimulatedDrive:
         """What the estimator is told."""
         return self.scenario.configuration
 
+    def __repr__(self) -> str:
+        """Return the scenario, the seed and what the truth says."""
+        return f'SimulatedDrive, seed {self.seed}, {len(self.arrivals)} arrivals\n  {self.truth!r}'
+
 
 class Drive:
     """A seeded rover with its sensors, one step at a time.
@@ -180,7 +184,9 @@ class Drive:
                 progress(1)
         arrivals.sort(key=lambda a: a.arrival)
         thresholds = self.configuration.filter.class_thresholds
-        table = TruthTable.from_rows(stamps, rows, thresholds)
+        table = TruthTable.from_rows(
+            stamps, rows, thresholds, self.scenario.configuration.wheels.names
+        )
         return SimulatedDrive(self.scenario, self.seed, arrivals, table)
 
     def _drives(self, fastest: float) -> Drives:

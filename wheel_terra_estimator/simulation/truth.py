@@ -6,9 +6,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+
+from wheel_terra_estimator.frames import Columns, to_frame
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 FloatArray = NDArray[np.float64]
 
@@ -64,6 +70,8 @@ class TruthTable:
         (k,).
     position : numpy.ndarray
         (k, 3) x, y, heading.
+    wheels : tuple of str
+        Names of the n wheels.
     """
 
     stamp: NDArray[np.int64]
@@ -81,6 +89,7 @@ class TruthTable:
     yaw_rate: FloatArray
     slope: FloatArray
     position: FloatArray
+    wheels: tuple[str, ...] = ()
 
     @classmethod
     def from_rows(
@@ -88,6 +97,7 @@ class TruthTable:
         stamps: Sequence[int],
         rows: Sequence[Truth],
         thresholds: FloatArray,
+        wheels: Sequence[str],
     ) -> TruthTable:
         """Collect rows and add class and stuck."""
         own = {f.name for f in fields(Truth)}
@@ -101,7 +111,36 @@ class TruthTable:
             stamp=stamp,
             slip_class=slip_classes(columns['slip'], thresholds),
             stuck=entrapped(stamp, columns['slip']),
+            wheels=tuple(wheels),
             **columns,
+        )
+
+    def to_frame(self) -> DataFrame:
+        """Return a DataFrame (needs pandas): columns and index as those of ``api.estimate``.
+
+        ``<quantity>.<wheel>``, ``position.x``, ``position.y``, ``heading``, ``forward_velocity``,
+        ``yaw_rate``, ``slope`` and ``stuck``; units are in ``attrs['units']``.
+        """
+        columns: Columns = {'stamp': self.stamp, 'time': (self.stamp - self.stamp[:1]) * 1e-9}
+        for f in fields(self):
+            values = getattr(self, f.name)
+            if f.name in ('stamp', 'wheels', 'position'):
+                continue
+            if values.ndim == 1:
+                columns[f.name] = values
+            else:
+                columns |= {f'{f.name}.{w}': values[:, i] for i, w in enumerate(self.wheels)}
+        columns |= zip(('position.x', 'position.y', 'heading'), self.position.T, strict=True)
+        return to_frame(columns, self.stamp)
+
+    def __repr__(self) -> str:
+        """Return length, wheels and greatest slip."""
+        seconds = float(self.stamp[-1] - self.stamp[0]) * 1e-9 if self.stamp.size else 0.0
+        greatest = np.nanmax(np.abs(self.slip), initial=0.0)
+        stuck = 'stuck' if self.stuck.any() else 'not stuck'
+        return (
+            f'TruthTable of {self.stamp.size} rows over {seconds:.1f} s, '
+            f'{len(self.wheels)} wheels, greatest slip {greatest:.2f}, {stuck}'
         )
 
     def time_in_class(self) -> dict[str, float]:

@@ -52,7 +52,17 @@ def check_range(
     raise ValueError(
         f'{quantity} is {shown}{unit_text}{where}; '
         f'allowed is {bracket}{lower:g}, {upper:g}{close}{unit_text}'
+        + _other_unit(first, upper, unit)
     )
+
+
+def _other_unit(value: float, upper: float, unit: str) -> str:
+    """Return the cure of a number that may be in degrees or per cent."""
+    if unit == 'rad' and abs(value) <= 180.0:
+        return f'; from degrees: math.radians({value:g})'
+    if unit == '-' and upper == 1.0 < abs(value) <= 100.0:
+        return f'; from per cent: {value:g} / 100'
+    return ''
 
 
 def numbers(quantity: str, value: ArrayLike) -> NDArray[np.float64]:

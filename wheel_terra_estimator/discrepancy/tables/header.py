@@ -222,6 +222,13 @@ def meaning_of(title: str) -> Title | None:
     return None
 
 
+def with_unit(title: str, unit: str) -> str:
+    """Return a title with a unit that is known from elsewhere, unless it says so itself."""
+    meaning = meaning_of(title)
+    si = unit_of(meaning.name) if meaning else '-'
+    return title if unit in ('', si) or (meaning and meaning.unit) else f'{title} [{unit}]'
+
+
 def _readings(title: str) -> Iterator[tuple[str, str]]:
     """Yield what may be name and unit in a title."""
     brackets = _BRACKETS.fullmatch(title)
@@ -408,6 +415,9 @@ def _find(titles: Sequence[str], entry: Entry) -> tuple[int, str, int] | None:
     if text not in titles and text.startswith('-'):
         text, sign = text[1:].strip(), -sign
     unit = entry.unit
+    if text not in titles:  # z stands for 'z [mm]'
+        named = (found for found in map(_BRACKETS.fullmatch, titles) if found)
+        text = next((found[0] for found in named if found[1] == text), text)
     if text not in titles:
         brackets = _BRACKETS.fullmatch(text)
         if not brackets or brackets[1] not in titles:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from wheel_terra_estimator.csv_file import CsvFile, is_number, number, open_csv, value_of
 from wheel_terra_estimator.discrepancy.tables.checks import check_table
-from wheel_terra_estimator.discrepancy.tables.header import Choice, Header, meaning_of
+from wheel_terra_estimator.discrepancy.tables.header import Choice, Header, meaning_of, with_unit
 from wheel_terra_estimator.discrepancy.tables.steady_table import (
     COLUMNS,
     ORDER_COLUMNS,
@@ -26,6 +26,7 @@ from wheel_terra_estimator.discrepancy.tables.steady_table import (
     SteadyTable,
 )
 from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.frames import units_in
 from wheel_terra_estimator.input_file import LARGEST_TABLE
 
 FloatArray = NDArray[np.float64]
@@ -105,7 +106,8 @@ def table_of(data: Any, name: str, choice: Choice | None = None) -> SteadyTable:
     Parameters
     ----------
     data : DataFrame or mapping of str to array_like
-        The columns; its rows count from line 2, as below a header.
+        The columns; its rows count from line 2, as below a header. ``attrs['units']`` of a
+        DataFrame has the units of columns that do not say them.
     name : str
         What messages call it.
     choice : Choice, optional
@@ -116,7 +118,10 @@ def table_of(data: Any, name: str, choice: Choice | None = None) -> SteadyTable:
     UserError
         As `read_table`.
     """
-    columns = {str(key).strip(): np.asarray(data[key]) for key in data}
+    units = units_in(data)
+    columns = {
+        with_unit(str(key).strip(), units.get(key, '')): np.asarray(data[key]) for key in data
+    }
     for title, column in columns.items():
         if column.ndim != 1:
             raise UserError(f'{name}: column {title!r} is not one-dimensional')

@@ -1,0 +1,127 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Columns of numbers to and from pandas, which is optional and imported late.
+
+Units go with a DataFrame in ``attrs['units']``: column -> unit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wheel_terra_estimator.errors import UserError
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
+Columns: TypeAlias = dict[str, NDArray[Any]]
+
+SI_UNITS: Mapping[str, str] = {
+    'stamp': 'ns',
+    'time': 's',
+    'position': 'm',
+    'normal_load': 'N',
+    'drawbar_pull': 'N',
+    'pull_margin': 'N',
+    'torque': 'N m',
+    'rim_travel_left': 'm',
+    'specific_force': 'm/s^2',
+    **dict.fromkeys(('sinkage', 'wheel_radius', 'wheel_width', 'lug_height'), 'm'),
+    **dict.fromkeys(('forward_velocity', 'slip_velocity', 'sinkage_rate'), 'm/s'),
+    'reference_velocity': 'm/s',
+    **dict.fromkeys(('slope', 'heading', 'steering', 'leaving_angle'), 'rad'),
+    **dict.fromkeys(('entrance_angle', 'peak_stress_angle'), 'rad'),
+    **dict.fromkeys(
+        ('yaw_rate', 'wheel_rate', 'angular_rate', 'angular_velocity', 'rate'), 'rad/s'
+    ),
+}
+"""Quantity (a column's name up to its point, without ``_std``) -> unit; all others are ratios."""
+
+
+def unit_of(column: str) -> str:
+    """Return the SI unit of a column such as ``slip_std.front_left``."""
+    return SI_UNITS.get(column.partition('.')[0].removesuffix('_std'), '-')
+
+
+def units_in(table: Any) -> Mapping[str, str]:
+    """Return column -> unit as a DataFrame carries them; empty where it does not."""
+    units: Mapping[str, str] = getattr(table, 'attrs', {}).get('units', {})
+    return units
+
+
+def to_frame(
+    columns: Mapping[str, NDArray[Any]], stamp: NDArray[np.int64] | None = None
+) -> DataFrame:
+    """Return columns as a DataFrame with their units in ``attrs['units']``.
+
+    Parameters
+    ----------
+    columns : mapping of str to numpy.ndarray
+        Columns of one length, in SI units.
+    stamp : numpy.ndarray, optional
+        (N,) ROS time [ns]; becomes the index, as dates (UTC).
+
+    Raises
+    ------
+    UserError
+        If pandas is not installed.
+    """
+    try:
+        from pandas import DataFrame, DatetimeIndex
+    except ImportError:
+        raise UserError(
+            'pandas is not installed; run pip install pandas, or ask for arrays (as_frame=False)'
+        ) from None
+    frame = DataFrame(dict(columns))
+    if stamp is not None:
+        frame.index = DatetimeIndex(stamp.astype('datetime64[ns]'), name='ros_time')
+    frame.attrs['units'] = {name: unit_of(name) for name in columns}
+    return frame
+
+
+def columns_of(table: Any, name: str) -> dict[str, NDArray[np.float64]]:
+    """Return the columns of a DataFrame or mapping as arrays of one length.
+
+    An index of dates or durations of a DataFrame stands for a column ``time`` that is not there.
+
+    Parameters
+    ----------
+    table : DataFrame or mapping of str to array_like
+        The columns, in SI units unless ``attrs['units']`` says otherwise.
+    name : str
+        What messages call it.
+
+    Raises
+    ------
+    UserError
+        For a column that is no list of numbers, of another length than the others, or in a unit
+        that is not known.
+    """
+    from wheel_terra_estimator.configuration.column_map import UNITS, factor
+
+    units = units_in(table)
+    columns: dict[str, NDArray[np.float64]] = {}
+    for key in table:
+        try:
+            column = np.asarray(table[key], dtype=np.float64)
+        except (TypeError, ValueError):
+            raise UserError(f'{name}: column {key!r} does not hold numbers; convert it') from None
+        if column.ndim != 1:
+            raise UserError(f'{name}: column {key!r} is not one-dimensional')
+        si = unit_of(str(key))
+        given = units.get(key, si)
+        times = 1.0 if given == si else factor(si, given) if si in UNITS else None
+        if times is None:
+            raise UserError(f'{name}: column {key!r} is in {given!r} (attrs); give it in {si}')
+        columns[str(key)] = times * column
+    lengths = {len(column) for column in columns.values()}
+    if len(lengths) > 1:
+        raise UserError(f'{name}: columns are of different lengths {sorted(lengths)}')
+    index = np.asarray(getattr(table, 'index', ()))
+    if 'time' not in columns and index.dtype.kind in 'mM':
+        columns['time'] = (index - index[:1]).astype('timedelta64[ns]').astype(np.float64) * 1e-9
+    return columns
