@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from wheel_terra_estimator.frames import Columns, to_frame
 
 if TYPE_CHECKING:
-    from pandas import DataFrame
+    from wheel_terra_estimator.frames import DataFrame
 
 FloatArray = NDArray[np.float64]
 
