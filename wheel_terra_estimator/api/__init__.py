@@ -23,19 +23,19 @@ from wheel_terra_estimator.api.pictures import plot_curve, plot_diagnosis, plot_
 from wheel_terra_estimator.api.soils import Soil
 from wheel_terra_estimator.api.tables import corrected_model, diagnose
 from wheel_terra_estimator.discrepancy.result import Diagnosis
-from wheel_terra_estimator.errors import UnitWarning, UserError
+from wheel_terra_estimator.errors import ConfigurationWarning, UserError
 from wheel_terra_estimator.simulation.drive import SimulatedDrive
 from wheel_terra_estimator.simulation.truth import TruthTable
 from wheel_terra_estimator.terramechanics.wheel import Wheel
 
 __all__ = [
+    'ConfigurationWarning',
     'Curve',
     'Diagnosis',
     'Model',
     'SimulatedDrive',
     'Soil',
     'TruthTable',
-    'UnitWarning',
     'UserError',
     'Wheel',
     '__version__',
