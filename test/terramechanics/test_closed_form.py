@@ -117,17 +117,6 @@ def test_pull_from_torque_hardly_asks_for_the_soil() -> None:
     assert wrong == pytest.approx(right, abs=0.01 * 80.0)
 
 
-def test_derivatives_of_the_decoupled_pull() -> None:
-    base = np.array([4.0, 80.0, 0.5, 0.2, -0.15])
-    exact = closed_form.decoupled_pull_jacobian(*base, 0.16)
-    for k in range(5):
-        moved = base.astype(complex)
-        moved[k] += 1e-30j
-        assert exact[k] == pytest.approx(
-            closed_form.decoupled_pull(*moved, 0.16).imag / 1e-30, rel=1e-12
-        )
-
-
 def conditioned(effects: dict, wheel: Wheel = WHEEL) -> ConditionedForces:
     return ConditionedForces(wheel, SAND, effects)
 

@@ -10,15 +10,12 @@ import numpy as np
 import pytest
 
 from wheel_terra_estimator.terramechanics.kinematics import (
-    change_of_radius,
-    lug_passage_period,
     shear_displacement,
     slip_of_speed_ratio,
     slip_ratio,
     speed_ratio,
 )
 from wheel_terra_estimator.terramechanics.maths import ScalarMaths
-from wheel_terra_estimator.terramechanics.wheel import Wheel
 
 
 @pytest.mark.parametrize(
@@ -57,11 +54,6 @@ def test_speed_ratio_is_the_inverse() -> None:
         assert slip_of_speed_ratio(ratio, ScalarMaths) == float(slip_of_speed_ratio(ratio))
 
 
-def test_change_of_radius() -> None:
-    # r = 157 mm, h = 10 mm, rolling at the rim is 0.060 at the tip.
-    assert change_of_radius(0.0, 0.157, 0.167) == pytest.approx(0.0599, abs=1e-4)
-
-
 def test_shear_displacement_starts_at_zero_and_has_its_slope() -> None:
     assert shear_displacement(0.5, 0.5, 0.16, 0.1) == 0.0
     # d j/dt = -(R - (v/w) cos t), from the rim's speed against the soil.
@@ -70,13 +62,3 @@ def test_shear_displacement_starts_at_zero_and_has_its_slope() -> None:
         shear_displacement(t + step, 0.5, 0.16, 0.1) - shear_displacement(t - step, 0.5, 0.16, 0.1)
     ) / (2 * step)
     assert slope == pytest.approx(-(0.16 - 0.1 * math.cos(t)))
-
-
-def test_lug_period() -> None:
-    # 2 pi r (1 - s)/(n v), Ding et al. (2010) eq. 2; falls with slip at constant carriage speed.
-    wheel = Wheel(0.1574, 0.165, 0.01, 30)
-    for slip in (0.0, 0.4):
-        rate = 0.010 / (0.1574 * (1.0 - slip))
-        expected = 2 * math.pi * 0.1574 * (1.0 - slip) / (30 * 0.010)
-        assert lug_passage_period(wheel, rate) == pytest.approx(expected)
-    assert lug_passage_period(Wheel(0.1, 0.1), 1.0) == math.inf

@@ -56,29 +56,6 @@ def coefficients(
     return a, b, 0.5 * (entrance_angle - leaving_angle)
 
 
-def coefficient_rates(
-    entrance_angle: Any, peak_angle: Any, leaving_angle: Any, maths: Any = np
-) -> tuple[tuple[Any, Any, Any], ...]:
-    """Derivatives of (A, B, C) by entrance, peak and leaving angle, one triple each."""
-    front, rear = entrance_angle - peak_angle, peak_angle - leaving_angle
-    (sin_1, cos_1), (sin_m, cos_m), (sin_2, cos_2) = (
-        (maths.sin(angle), maths.cos(angle))
-        for angle in (entrance_angle, peak_angle, leaving_angle)
-    )
-    # Mean slopes of cosine and sine over either side.
-    cos_front, cos_rear = (cos_m - cos_1) / front, (cos_m - cos_2) / rear
-    sin_front, sin_rear = (sin_m - sin_1) / front, (sin_m - sin_2) / rear
-    return (
-        ((sin_1 - cos_front) / front, (-cos_1 - sin_front) / front, 0.5),
-        (
-            (cos_front - sin_m) / front - (sin_m + cos_rear) / rear,
-            (cos_m + sin_front) / front + (cos_m - sin_rear) / rear,
-            0.0,
-        ),
-        ((sin_2 + cos_rear) / rear, (sin_rear - cos_2) / rear, -0.5),
-    )
-
-
 def decoupled_pull(
     torque: Any,
     normal_load: Any,
@@ -94,27 +71,6 @@ def decoupled_pull(
     """
     a, b, c = coefficients(entrance_angle, peak_angle, leaving_angle, maths)
     return (a * a + b * b) / (a * c) * torque / shear_radius - b / a * normal_load
-
-
-def decoupled_pull_jacobian(
-    torque: Any,
-    normal_load: Any,
-    entrance_angle: Any,
-    peak_angle: Any,
-    leaving_angle: Any,
-    shear_radius: Any,
-    maths: Any = np,
-) -> tuple[Any, Any, Any, Any, Any]:
-    """Derivatives of ``decoupled_pull`` by torque, load, entrance, peak and leaving angle."""
-    angles = entrance_angle, peak_angle, leaving_angle
-    a, b, c = coefficients(*angles, maths)
-    gain, lean = (a * a + b * b) / (a * c), b / a
-    by_angle = []
-    for d_a, d_b, d_c in coefficient_rates(*angles, maths):
-        d_gain = 2.0 * (a * d_a + b * d_b) / (a * c) - gain * (d_a / a + d_c / c)
-        d_lean = (d_b - lean * d_a) / a
-        by_angle.append(d_gain * torque / shear_radius - d_lean * normal_load)
-    return gain / shear_radius, -lean, by_angle[0], by_angle[1], by_angle[2]
 
 
 def decoupled_pull_shaped(torque: Any, contact: Contact, maths: Any = np) -> Any:

@@ -53,17 +53,3 @@ def digging_rate(
     """
     turns = np.abs(angular_velocity) / (2.0 * np.pi)
     return digging_per_turn(wheel, efficiency) * turns * digging_share(slip)
-
-
-def rim_travel_to_depth(
-    sinkage: Any, depth: Any, slip: Any, wheel: Any, efficiency: float = DIGGING_EFFICIENCY
-) -> Any:
-    """Rim travel until digging at constant slip takes the sinkage to a depth [m]; inf for never."""
-    for name, value in (('sinkage', sinkage), ('depth', depth)):
-        check_range(name, value, 0.0, float(np.min(wheel.radius)), 'm')
-    check_range('slip', slip, -1.0, 1.0)
-    missing = np.maximum(np.asarray(depth, float) - sinkage, 0.0)
-    rate = digging_rate(slip, wheel, 1.0 / np.asarray(wheel.radius), efficiency)  # per rim travel
-    with np.errstate(divide='ignore', invalid='ignore'):
-        travel = missing / rate
-    return np.where(missing == 0.0, 0.0, np.where(rate > 0.0, travel, np.inf))

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
@@ -64,11 +63,6 @@ def slip_of_speed_ratio(ratio: Any, maths: Any = np) -> Any:
     return maths.where(ratio <= 1.0, driving, braking)
 
 
-def change_of_radius(slip: Any, from_radius: Any, to_radius: Any, maths: Any = np) -> Any:
-    """Slip ratio of the same motion for another reference radius [-]."""
-    return slip_of_speed_ratio(speed_ratio(slip, maths) * from_radius / to_radius, maths)
-
-
 def shear_displacement(
     angle: Any,
     entrance_angle: Any,
@@ -95,13 +89,3 @@ def shear_displacement(
     return shear_radius * (entrance_angle - angle) - velocity_ratio * (
         maths.sin(entrance_angle) - sine
     )
-
-
-def lug_passage_period(wheel: Any, angular_velocity: Any) -> Any:
-    """Time between two lugs [s]: 2 pi/(n w) = 2 pi r (1 - s)/(n v) (Ding et al. 2010 eq. 2).
-
-    Infinite for a smooth or a standing wheel.
-    """
-    rate = np.asarray(wheel.lug_count, float) * np.abs(np.asarray(angular_velocity, float))
-    with np.errstate(divide='ignore'):
-        return 2.0 * math.pi / rate

@@ -38,11 +38,6 @@ def bearing_law(
     return bekker_modulus(cohesive, frictional, width), 1.0
 
 
-def plate_sinkage(load: Any, area: Any, modulus: Any, exponent: Any) -> Any:
-    """Sinkage of a plate, (p/k)^(1/n) [m] (Bekker); the limit of a wheel without curvature."""
-    return (load / (area * modulus)) ** (1.0 / exponent)
-
-
 def rolling_sinkage(
     load: Any, radius: Any, width: Any, modulus: Any, exponent: Any, maths: Any = np
 ) -> Any:
@@ -53,11 +48,6 @@ def rolling_sinkage(
     """
     force = maths.maximum(3.0 - exponent, 0.2) * width * modulus * (2.0 * radius) ** 0.5
     return (3.0 * load / force) ** (2.0 / (2.0 * exponent + 1.0))
-
-
-def compaction_resistance(width: Any, modulus: Any, exponent: Any, sinkage: Any) -> Any:
-    """Work to press a rut of unit length, b k z^(n+1)/(n+1) [N] (Bekker 1969)."""
-    return width * modulus * sinkage ** (exponent + 1.0) / (exponent + 1.0)
 
 
 def front_stress(contact: Contact, angle: Any, maths: Any = np, cosine: Any = None) -> Any:

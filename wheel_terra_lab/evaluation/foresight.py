@@ -102,11 +102,6 @@ def entrapments(time: FloatArray, slip: FloatArray) -> tuple[NDArray[np.int64], 
     return np.array(begins, dtype=np.int64), under_way
 
 
-def brier(probability: FloatArray, came: FloatArray) -> float:
-    """Return the mean squared difference of probability and outcome (Brier 1950)."""
-    return float(np.mean((probability - came) ** 2)) if came.size else float('nan')
-
-
 def brier_interval(parts: Sequence[Foresight]) -> dict[str, tuple[float, float, float]]:
     """Return value and 95 % interval of the Brier scores, over drives drawn anew.
 
