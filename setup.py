@@ -12,7 +12,7 @@ PACKAGE = 'wheel_terra_estimator'
 LABORATORY = 'wheel_terra_lab'
 """What proves the estimator; it imports the package, never the reverse."""
 HERE = Path(__file__).resolve().parent
-SHARED = ('config', 'data', 'launch', 'layouts')
+SHARED = ('config', 'data', 'launch')
 """Folders of files that are installed as they are; one that is absent is passed over."""
 PACKAGE_DATA = ('html', 'js', 'json', 'csv', 'npz', 'txt', 'yaml')
 CLASSIFIERS = [

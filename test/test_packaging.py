@@ -144,7 +144,7 @@ def test_every_shipped_folder_is_installed() -> None:
     installed = {file for _, files in setup_functions()['shared_files']() for file in files}
     on_disk = {
         p.relative_to(ROOT).as_posix()
-        for top in ('config', 'data', 'launch', 'layouts')
+        for top in ('config', 'data', 'launch')
         for p in (ROOT / top).rglob('*')
         if p.is_file() and p.suffix != '.pyc' and not p.name.startswith('.')
     }

@@ -1,20 +1,18 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Every path in the shipped layouts names a field that the node publishes."""
+"""Every path in the layouts names a field that the node publishes, for any wheels."""
 
 from __future__ import annotations
 
 import json
 import re
-from pathlib import Path
 from xml.etree import ElementTree
 
-import yaml
-
+from wheel_terra_estimator.messages import layouts
 from wheel_terra_estimator.messages.convert import JOINT_OUTPUTS, OUTPUT_TYPES
 from wheel_terra_estimator.messages.diagnostics import NODE
 
-LAYOUTS = Path(__file__).resolve().parents[2] / 'config' / 'layouts'
+WHEELS = ['left "<1>" & co', 'right']
 FIELDS = {
     **{topic: {'position', 'velocity', 'effort'} for topic in JOINT_OUTPUTS},
     'mobility': {'position', 'effort'},
@@ -24,41 +22,38 @@ FIELDS = {
 }
 
 
-def foxglove() -> list[str]:
-    panels = json.loads((LAYOUTS / 'foxglove.json').read_text())['configById'].values()
-    paths = [path['value'] for panel in panels for path in panel.get('paths', [])]
-    return paths + [panel['path'] for panel in panels if 'path' in panel]
-
-
-def test_foxglove_paths_are_published() -> None:
-    assert len(foxglove()) > 20
-    for path in foxglove():
-        found = re.fullmatch(rf'/{NODE}/(\w+)\.([\w.]+?)(\[[0-5]\])?', path)
+def test_foxglove_paths_are_published_and_labelled() -> None:
+    document = json.loads(layouts.foxglove(WHEELS))
+    panels = document['configById'].values()
+    paths = [path for panel in panels for path in panel.get('paths', [])]
+    assert len(paths) == 5 * len(WHEELS) + 1
+    for path in [*paths, {'value': panels_path(document), 'timestampMethod': 'receiveTime'}]:
+        found = re.fullmatch(rf'/{NODE}/(\w+)\.([\w.]+?)(\[([01])\])?', path['value'])
         assert found, path
-        assert found[1] in OUTPUT_TYPES
         assert found[2] in FIELDS[found[1]], path
+        if found[3]:
+            assert path['label'] == WHEELS[int(found[4])]
+        # Lichtblick draws nothing by a header stamp that a message does not have.
+        stamped = 'Stamped' in OUTPUT_TYPES[found[1]] or 'JointState' in OUTPUT_TYPES[found[1]]
+        assert (path['timestampMethod'] == 'headerStamp') == stamped, path
+
+    def leaves(node: object) -> list[str]:
+        if isinstance(node, str):
+            return [node]
+        assert isinstance(node, dict)
+        return leaves(node['first']) + leaves(node['second'])
+
+    assert sorted(leaves(document['layout'])) == sorted(document['configById'])
+
+
+def panels_path(document: dict[str, dict[str, dict[str, str]]]) -> str:
+    return document['configById']['Indicator!stuck']['path']
 
 
 def test_plotjuggler_curves_are_its_names_of_joint_states() -> None:
-    """PlotJuggler names a series topic/joint/field (its ros2_parsers/jointstates_msg.h)."""
-    rover = yaml.safe_load((LAYOUTS.parent / 'rovers' / 'generic_six_wheel.yaml').read_text())
-    wheels = rover['/**']['ros__parameters']['wheels']['names']
-    plots = ElementTree.parse(LAYOUTS / 'plotjuggler.xml').iter('plot')
-    curves = [[curve.attrib['name'] for curve in plot.iter('curve')] for plot in plots]
-    shown = (('slip', 'position'), ('slip', 'effort'), ('sinkage', 'position'))
-    assert curves == [
-        [f'/{NODE}/{topic}/{wheel}/{field}' for wheel in wheels]
-        for topic, field in (*shown, ('mobility', 'position'))
-    ]
-
-
-def test_panels_of_the_layout_are_there() -> None:
-    layout = json.loads((LAYOUTS / 'foxglove.json').read_text())
-
-    def leaves(node: object) -> set[str]:
-        if isinstance(node, str):
-            return {node}
-        assert isinstance(node, dict)
-        return leaves(node['first']) | leaves(node['second'])
-
-    assert leaves(layout['layout']) == set(layout['configById'])
+    """PlotJuggler names a series topic/joint/field (ParserROS::parseJointStateMsg)."""
+    plots = ElementTree.fromstring(layouts.plotjuggler(WHEELS)).iter('DockArea')
+    curves = {plot.attrib['name']: [c.attrib['name'] for c in plot.iter('curve')] for plot in plots}
+    assert curves['Sinkage [m]'] == [f'/{NODE}/sinkage/{wheel}/position' for wheel in WHEELS]
+    assert curves['Drawbar pull [N]'] == [f'/{NODE}/slip/{wheel}/effort' for wheel in WHEELS]
+    assert len(curves) == 4

@@ -34,7 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=Path,
         metavar='F',
         required=True,
-        help='rover file to be written',
+        help='rover file to be written; views for PlotJuggler and Foxglove are written beside it',
     )
     source = parser.add_mutually_exclusive_group()
     source.add_argument('--urdf', type=Path, metavar='F', help='robot description (URDF)')
@@ -81,16 +81,19 @@ def run(arguments: argparse.Namespace) -> int:
     """Run the command."""
     from wheel_terra_estimator.configuration import reader
     from wheel_terra_estimator.configuration.rover_template import rover_file
+    from wheel_terra_estimator.messages.layouts import write_layouts
     from wheel_terra_estimator.output_folder import check_file, new_file
 
     check_file(arguments.output, arguments.overwrite)
     sketch = _sketch(arguments)
+    views = write_layouts(sketch.wheels, arguments.output, arguments.overwrite)
     with new_file(arguments.output, arguments.overwrite) as path:
         path.write_text(rover_file(sketch), encoding='utf-8')
     reader.load([arguments.output])
     print(f'rover file: {arguments.output} ({len(sketch.wheels)} wheels, {sketch.mass:g} kg)')
     for key in sorted(sketch.guessed):
         print(f'  {key} is a guess: measure it')
+    print(f'views of its wheels, for PlotJuggler and Foxglove: {", ".join(map(str, views))}')
     print(f'next: wheel-terra check RECORDING --config {arguments.output}')
     return 0
 
