@@ -4,6 +4,7 @@
 
 import csv
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -18,7 +19,8 @@ from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.estimation.estimates import SlipClass
 from wheel_terra_estimator.estimation.measurements import InertialReading
 from wheel_terra_estimator.messages.convert import ODOMETRY
-from wheel_terra_estimator.reporting.track_picture import has_map, map_of
+from wheel_terra_estimator.reporting.drive_figure import way_figure
+from wheel_terra_estimator.reporting.track_picture import STRENGTHS, has_map, is_straight, maps
 from wheel_terra_estimator.reporting.track_table import as_geojson, parse_origin, write_track
 
 SPEED, YAW_RATE, STEP = 0.1, 0.05, 50_000_000
@@ -105,9 +107,23 @@ def test_table_and_map(rover, tmp_path):
     half = math.cos(math.radians(48.0)) * math.sin(turned / 2.0)
     assert 2.0 * 6_378_137.0 * math.asin(half) == pytest.approx(track.values['x'][-1], rel=1e-3)
     assert has_map(track)
-    drawn = map_of(track)
-    drawn.savefig(tmp_path / 'map.svg')
-    assert len(drawn.axes) == 3
+    assert is_straight(track)
+    strip = way_figure(track, STRENGTHS).drawn()[0].curves
+    high = next(curve.path for curve in strip if curve.name == 'high')
+    begin, end = (float(v) for v in re.match(r'M([\d.]+) [\d.]+H([\d.]+)', high).groups())
+    way = track.values['distance'][track.values['slip_class'] == 2]
+    assert (begin, end) == (pytest.approx(way[0], rel=1e-4), pytest.approx(way[-1], abs=0.05))
+
+
+def test_a_way_with_a_bend_is_a_map_in_true_proportion(rover):
+    track = recorded(rover, drive(rover, 400, yaw_rate=0.1)).track()
+    assert not is_straight(track)
+    drawn, _ = maps(track)
+    x, y = track.values['x'], track.values['y']
+    low = next(curve.path for curve in drawn.curves if curve.name == 'low')
+    places = np.array([p.split() for p in re.split('[ML]', low)[1:]], dtype=float)
+    assert np.ptp(places, axis=0) == pytest.approx([np.ptp(x), np.ptp(y)], rel=1e-2)
+    assert (places > 0.0).all() and (places < [drawn.width, drawn.height]).all()
 
 
 def test_a_stretch_whose_class_is_not_known_has_no_slip(rover):

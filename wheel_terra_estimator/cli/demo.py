@@ -80,7 +80,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Run the command."""
     output: Path = arguments.output
-    entries = [f'{drive.name}{end}' for drive in DRIVES for end in ('/', '.html', '.png')]
+    entries = [f'{drive.name}{end}' for drive in DRIVES for end in ('/', '.html')]
     working_folder(output, arguments.overwrite, False, [*entries, 'trial/'])
     live = not arguments.no_node and importlib.util.find_spec('rclpy') is not None
     if live:
@@ -158,14 +158,12 @@ def _environment() -> dict[str, str]:
 
 
 def _key_numbers(drive: DemoDrive, output: Path) -> None:
-    """Draw the drive, and say whether the warning came before the true entrapment."""
+    """Say whether the warning came before the true entrapment."""
     from wheel_terra_estimator.bags.history import read_estimates
     from wheel_terra_estimator.bags.storage import open_bag
     from wheel_terra_estimator.bags.truth import read_truth
     from wheel_terra_estimator.configuration import reader
     from wheel_terra_estimator.configuration.shipped import demo_recording
-    from wheel_terra_estimator.reporting.drive_pictures import overview
-    from wheel_terra_estimator.reporting.style import picture_style
     from wheel_terra_estimator.simulation.truth import entrapped
 
     configuration = reader.load(drive.configuration)
@@ -173,8 +171,6 @@ def _key_numbers(drive: DemoDrive, output: Path) -> None:
         truth = read_truth(bag, {}, configuration)
     with open_bag(output / drive.name) as bag:
         history = read_estimates(bag)
-    with picture_style():
-        overview(history, truth).savefig(output / f'{drive.name}.png', dpi=110)
     if truth is None or truth.slip is None:
         return
     stuck = entrapped(truth.slip.stamp, truth.slip.value)

@@ -18,6 +18,7 @@ from wheel_terra_estimator.checks.run import check_recording, run_apart
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.output_folder import new_file
 from wheel_terra_estimator.reporting import estimates_table, track_table, truth_scores
+from wheel_terra_estimator.reporting.drive_style import Border
 from wheel_terra_estimator.reporting.drive_summary import DriveSummary, summarise
 from wheel_terra_estimator.reporting.replay_report import write_replay_report
 
@@ -126,7 +127,10 @@ def replay_drive(
     notes = list(result.notes)
     if not any(key.startswith('soil.') for key in configuration.stated):
         notes.append(NO_SOIL)
-    summary = summarise(title, result.history, result.topics, result.heard, result.rejected, notes)
+    summary = summarise(
+        title, result.history, result.topics, result.heard, result.rejected, notes,
+        Border.of(configuration),
+    )  # fmt: skip
     return Drive(configuration, checked, result, truth, errors, summary, filter_errors)
 
 

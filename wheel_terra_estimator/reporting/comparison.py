@@ -21,7 +21,7 @@ from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.output_folder import new_file
 from wheel_terra_estimator.reporting import truth_scores
 from wheel_terra_estimator.reporting.drive_figure import SLIP_RANGE
-from wheel_terra_estimator.reporting.drive_style import drawn_slip
+from wheel_terra_estimator.reporting.drive_style import Border, known
 from wheel_terra_estimator.reporting.drive_summary import short_names
 from wheel_terra_estimator.reporting.estimates_table import UNITS
 from wheel_terra_estimator.reporting.style import LINE_COLOURS, RIM_COLOUR
@@ -30,7 +30,6 @@ from wheel_terra_estimator.reporting.time_figure import (
     Switch,
     TimeFigure,
     limits,
-    plotly_script,
 )
 
 FloatArray = NDArray[np.float64]
@@ -246,7 +245,6 @@ def write_comparison(
         ],
         settings_known=all(origin.settings for origin in comparison.origins),
         figure=_figure(histories, truth),
-        library=plotly_script(),
         truth_source=truth.source if truth else '',
     )
     with new_file(path, overwrite) as target:
@@ -289,10 +287,10 @@ def _error_rows(comparison: Comparison) -> list[tuple[str, ...]]:
     return rows
 
 
-def _figure(histories: Sequence[EstimateHistory], truth: Truth | None) -> str:
+def _figure(histories: Sequence[EstimateHistory], truth: Truth | None) -> TimeFigure:
     """Draw both runs in the colours of the runs; of the wheels, the first is on."""
     names, begin = short_names(histories[0].names), int(histories[0].stamp[0])
-    drawn = [drawn_slip(history) for history in histories]
+    drawn = [known(history, 'slip', Border()) for history in histories]
     panels = (
         Panel('slip ratio [-]', 0.3, limits(*drawn, within=SLIP_RANGE)),
         Panel('B minus A: slip ratio [-]', 0.2),
@@ -304,7 +302,7 @@ def _figure(histories: Sequence[EstimateHistory], truth: Truth | None) -> str:
     if truth is not None:
         switches.append(Switch('truth', 'truth'))
     ends = [float((history.stamp[-1] - begin) * 1e-9) for history in histories]
-    figure = TimeFigure(panels, switches, max(ends), 'time since the first set of A [s]')
+    figure = TimeFigure(panels, switches, max(ends), 'time since the first estimate of A [s]')
     a, b = common_rows(histories[0].stamp, histories[1].stamp)
     for wheel, name in enumerate(names):
         switch = f'wheel {wheel}'
@@ -322,13 +320,13 @@ def _figure(histories: Sequence[EstimateHistory], truth: Truth | None) -> str:
         seconds = np.asarray((histories[0].stamp[a] - begin) * 1e-9, dtype=np.float64)
         figure.line(1, seconds, change, f'{name}, B minus A', RIM_COLOUR, switch)
         if truth is not None:
-            for panel, scale, known in (
+            for panel, scale, true in (
                 (0, 1.0, truth.slip),
                 (2, 1e3, truth.sinkage),
                 (3, 1.0, truth.drawbar_pull),
             ):
-                if known is not None:
-                    seconds = np.asarray((known.stamp - begin) * 1e-9, dtype=np.float64)
-                    true = scale * known.value[:, wheel]
-                    figure.truth(panel, seconds, true, f'{name}, truth', switch, 'truth')
-    return figure.as_json()
+                if true is not None:
+                    seconds = np.asarray((true.stamp - begin) * 1e-9, dtype=np.float64)
+                    values = scale * true.value[:, wheel]
+                    figure.truth(panel, seconds, values, f'{name}, truth', switch, 'truth')
+    return figure

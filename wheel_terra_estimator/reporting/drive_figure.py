@@ -5,9 +5,10 @@
 from __future__ import annotations
 
 from wheel_terra_estimator.bags.history import EstimateHistory
+from wheel_terra_estimator.bags.track import Track
 from wheel_terra_estimator.bags.truth import Truth, WheelTruth
 from wheel_terra_estimator.estimation.estimates import SlipClass
-from wheel_terra_estimator.reporting.drive_style import BAND, CLASS_COLOURS, drawn_slip
+from wheel_terra_estimator.reporting.drive_style import BAND, CLASS_COLOURS, Border, known
 from wheel_terra_estimator.reporting.drive_summary import short_names
 from wheel_terra_estimator.reporting.style import LINE_COLOURS, RIM_COLOUR
 from wheel_terra_estimator.reporting.time_figure import Panel, Switch, TimeFigure, limits
@@ -15,34 +16,47 @@ from wheel_terra_estimator.reporting.time_figure import Panel, Switch, TimeFigur
 SLIP_RANGE = (-0.05, 1.0)
 """What the slip panel shows at least [-]."""
 VELOCITY, SLIP, CLASSES, SINKAGE, PULL = range(5)
+QUANTITIES = ((SLIP, 'slip', 1.0), (SINKAGE, 'sinkage', 1e3), (PULL, 'drawbar_pull', 1.0))
+"""Panel, quantity, its factor from SI to the panel."""
 
 
-def drive_figure(history: EstimateHistory, truth: Truth | None) -> str:
-    """Return the figure of a drive as JSON for the page's script."""
+def drive_figure(
+    history: EstimateHistory,
+    truth: Truth | None,
+    border: Border,
+    filtered: EstimateHistory | None = None,
+) -> TimeFigure:
+    """Return the figure of a drive; ``filtered`` is drawn in grey where it was smoothed."""
     names = short_names(history.names)
-    slip = drawn_slip(history)
+    slip = known(history, 'slip', border)
     panels = (
-        Panel('velocity [m/s]', 0.17),
+        Panel('velocity [m/s]; grey: mean rim speed', 0.17),
         Panel('slip ratio [-]', 0.25, limits(slip, within=SLIP_RANGE)),
-        Panel('slip class', 0.16, strips=tuple(names)),
+        Panel('slip class', 0.04 * len(names), strips=tuple(names)),
         Panel('sinkage [mm]', 0.21),
         Panel('drawbar pull [N]', 0.21),
     )
-    figure = TimeFigure(
-        panels,
-        _switches(names, truth),
-        float(history.seconds[-1]),
-        'time since the first set [s]',
-    )
+    end = float(history.seconds[-1])
+    switches = _switches(names, truth, filtered)
+    figure = TimeFigure(panels, switches, end, 'time since the first estimate [s]')
     _velocity(figure, history, truth)
-    for panel, quantity, scale in (
-        (SLIP, 'slip', 1.0),
-        (SINKAGE, 'sinkage', 1e3),
-        (PULL, 'drawbar_pull', 1.0),
-    ):
-        known = getattr(truth, quantity) if truth is not None else None
-        for wheel, name in enumerate(names):
-            _wheel(figure, history, quantity, scale, panel, wheel, name, known)
+    for wheel, name in enumerate(names):
+        switch = f'wheel {wheel}'
+        if filtered is not None:
+            for panel, quantity, scale in QUANTITIES:
+                live = scale * known(filtered, quantity, border)[:, wheel]
+                figure.line(
+                    panel, filtered.seconds, live, f'{name}, filter', RIM_COLOUR, switch, 'filter'
+                )
+        for panel, quantity, scale in QUANTITIES:
+            line = scale * known(history, quantity, border)[:, wheel]
+            half = scale * BAND * history.values[f'{quantity}_std'][:, wheel]
+            colour = LINE_COLOURS[wheel % len(LINE_COLOURS)]
+            figure.band(panel, history.seconds, line, half, colour, switch)
+            figure.line(panel, history.seconds, line, name, colour, switch)
+            true = getattr(truth, quantity) if truth is not None else None
+            if true is not None:
+                _truth(figure, history, panel, scale, wheel, true)
     for slip_class, colour in CLASS_COLOURS.items():
         figure.strips(
             CLASSES,
@@ -52,18 +66,39 @@ def drive_figure(history: EstimateHistory, truth: Truth | None) -> str:
             colour,
             slender=slip_class is SlipClass.UNKNOWN,
         )
-    last = float(history.seconds[-1])
     for warning in history.warnings:
-        begin, end = (
-            None if stamp is None else (stamp - history.stamp[0]) * 1e-9
+        begin, last = (
+            end if stamp is None else (stamp - history.stamp[0]) * 1e-9
             for stamp in (warning.start, warning.end)
         )
-        words = f'stuck warning: {warning.reason or "no reason given"}'
-        figure.shade(SLIP, begin or 0.0, last if end is None else end, words, 'stuck warning')
-    return figure.as_json()
+        figure.shade(begin, last)
+    return figure
 
 
-def _switches(names: list[str], truth: Truth | None) -> list[Switch]:
+def way_figure(track: Track, strengths: tuple[tuple[str, float, float, str], ...]) -> TimeFigure:
+    """Return class and soil strength along the way: the map of a drive that went straight.
+
+    ``strengths`` are words, lower and upper bound of the strength learned over that stated, colour.
+    """
+    values, way = track.values, track.values['distance']
+    panels = (
+        Panel('worst slip class of a wheel', 0.05, strips=('class',)),
+        Panel('shear strength learned, over that stated', 0.05, strips=('soil',)),
+    )
+    figure = TimeFigure(panels, (), float(way[-1]), 'way [m]')
+    for slip_class, colour in CLASS_COLOURS.items():
+        member = (values['slip_class'] == slip_class)[:, None]
+        slender = slip_class is SlipClass.UNKNOWN
+        figure.strips(0, way, member, slip_class.name.lower(), colour, slender=slender)
+    for words, low, high, colour in strengths:
+        member = ((values['soil_strength'] >= low) & (values['soil_strength'] < high))[:, None]
+        figure.strips(1, way, member, words, colour)
+    return figure
+
+
+def _switches(
+    names: list[str], truth: Truth | None, filtered: EstimateHistory | None
+) -> list[Switch]:
     wheels = [
         Switch(f'wheel {i}', name, colour=LINE_COLOURS[i % len(LINE_COLOURS)])
         for i, name in enumerate(names)
@@ -71,6 +106,8 @@ def _switches(names: list[str], truth: Truth | None) -> list[Switch]:
     wheels.append(Switch('band', f'± {BAND:g} standard deviations', on=False))
     if truth is not None:
         wheels.append(Switch('truth', 'truth of each wheel', on=False))
+    if filtered is not None:
+        wheels.append(Switch('filter', 'the filter, as it was live', colour=RIM_COLOUR))
     return wheels
 
 
@@ -84,23 +121,14 @@ def _velocity(figure: TimeFigure, history: EstimateHistory, truth: Truth | None)
         figure.truth(VELOCITY, seconds, truth.velocity.value[:, 0], 'truth')
 
 
-def _wheel(
+def _truth(
     figure: TimeFigure,
     history: EstimateHistory,
-    quantity: str,
-    scale: float,
     panel: int,
+    scale: float,
     wheel: int,
-    name: str,
-    truth: WheelTruth | None,
+    truth: WheelTruth,
 ) -> None:
-    colour, switch = LINE_COLOURS[wheel % len(LINE_COLOURS)], f'wheel {wheel}'
-    values = drawn_slip(history) if quantity == 'slip' else history.values[quantity]
-    line = scale * values[:, wheel]
-    half = scale * BAND * history.values[f'{quantity}_std'][:, wheel]
-    figure.band(panel, history.seconds, line, half, colour, switch)
-    figure.line(panel, history.seconds, line, name, colour, switch)
-    if truth is not None:
-        seconds = (truth.stamp - history.stamp[0]) * 1e-9
-        true = scale * truth.value[:, wheel]
-        figure.truth(panel, seconds, true, f'{name}, truth', switch, 'truth')
+    seconds = (truth.stamp - history.stamp[0]) * 1e-9
+    true = scale * truth.value[:, wheel]
+    figure.truth(panel, seconds, true, 'truth', f'wheel {wheel}', 'truth')

@@ -1,32 +1,58 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""What pictures of drives have in common: colours of the classes, bands, slip that is known."""
+"""What pictures of drives have in common: colours of the classes, and what is known at all."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wheel_terra_estimator.bags.history import EstimateHistory
+from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.estimates import SlipClass
-from wheel_terra_estimator.reporting.style import RIM_COLOUR
+from wheel_terra_estimator.reporting.style import CLASS_LIGHT, RIM_COLOUR
 
 CLASS_COLOURS = {
-    SlipClass.LOW: '#efe3a8',
-    SlipClass.MODERATE: '#e9a94b',
-    SlipClass.HIGH: '#c4552d',
-    SlipClass.STUCK: '#6b1238',
+    SlipClass.LOW: CLASS_LIGHT[0],
+    SlipClass.MODERATE: CLASS_LIGHT[1],
+    SlipClass.HIGH: CLASS_LIGHT[2],
+    SlipClass.STUCK: CLASS_LIGHT[3],
     SlipClass.UNKNOWN: RIM_COLOUR,
 }
-"""Darker is worse: they differ in grey and for every eye; unknown is drawn thinner."""
+"""They differ in grey and for every eye; unknown is drawn thinner."""
 BAND = 2.0
 """Half width of the drawn bands in standard deviations."""
-NEVER_KNOWN = 1.0
-"""Standard deviation of a slip of which nothing is known [-]."""
+SLIP_BORDER = 0.25
+"""Default of ``filter.class_std``: the standard deviation beyond which slip is not known [-]."""
+SINKAGE_BORDER = 0.5
+"""The same of the sinkage, over the wheel radius [-]."""
+NOT_KNOWN = 'not known'
 
 
-def drawn_slip(history: EstimateHistory) -> NDArray[np.float64]:
-    """Return the slip to draw, (k, n): nan where nothing is known of it."""
-    unknown = history.slip_class == SlipClass.UNKNOWN
-    unknown &= history.values['slip_std'] >= NEVER_KNOWN
-    return np.where(unknown, np.nan, history.values['slip'])
+@dataclass(frozen=True)
+class Border:
+    """Standard deviations beyond which slip [-] and sinkage [m] (scalar or (n,)) are not known."""
+
+    slip: float = SLIP_BORDER
+    sinkage: float | NDArray[np.float64] = np.inf
+
+    @classmethod
+    def of(cls, configuration: Configuration) -> Border:
+        """Return the border of a rover."""
+        radius = np.asarray(configuration.wheels.radius, dtype=float)
+        return cls(configuration.filter.class_std, SINKAGE_BORDER * radius)
+
+
+def known(history: EstimateHistory, quantity: str, border: Border) -> NDArray[np.float64]:
+    """Return a quantity of `WHEEL_FIELDS`, (k, n): nan where it is not known."""
+    values = history.values[quantity]
+    if quantity == 'slip':
+        beyond = history.slip_class == SlipClass.UNKNOWN
+        beyond = beyond | (history.values['slip_std'] > border.slip)
+    elif quantity == 'sinkage':
+        beyond = history.values['sinkage_std'] > border.sinkage
+    else:
+        return values
+    return np.where(beyond, np.nan, values)

@@ -6,36 +6,51 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from wheel_terra_estimator.bags.history import DriveFigures, EstimateHistory
+from wheel_terra_estimator.bags.history import EstimateHistory
 from wheel_terra_estimator.estimation.estimates import SlipClass
+from wheel_terra_estimator.reporting import truth_scores
+from wheel_terra_estimator.reporting.drive_style import NOT_KNOWN, Border, known
+
+PERCENTILES = (5.0, 95.0)
 
 
 @dataclass(frozen=True)
 class WarningSpan:
-    """A stuck warning in seconds since the first set; ``end`` None: until the end."""
+    """A stuck warning in seconds since the first set; ``end`` None: until the end.
+
+    ``later`` says whether the slip that was estimated afterwards bears it out.
+    """
 
     start: float
     end: float | None
     reason: str
+    later: str = ''
 
 
 @dataclass(frozen=True)
 class WheelSummary:
-    """Figures of one wheel; ``seconds`` and ``shares`` by name of the slip class."""
+    """Figures of one wheel; ``seconds`` and ``shares`` by name of the slip class.
+
+    ``slip`` (of |slip|) and ``sinkage`` [m] are percentiles 5 and 95, of a long drive over the sets
+    that were kept. They and the extremes are None where slip or sinkage was never known.
+    """
 
     name: str
     seconds: dict[str, float]
     shares: dict[str, float]
-    max_slip: float
-    max_sinkage: float
-    max_sinkage_std: float
+    max_slip: float | None
+    max_sinkage: float | None
+    max_sinkage_std: float | None
     mean_pull: float
     least_margin: float
+    slip: tuple[float, float] | None = field(default=None, compare=False)
+    sinkage: tuple[float, float] | None = field(default=None, compare=False)
 
 
 @dataclass(frozen=True)
@@ -68,14 +83,14 @@ class DriveSummary:
         if self.warnings:
             times = ', '.join(f'{w.start:.1f} s' for w in self.warnings[:5])
             more = f' and {len(self.warnings) - 5} more' if len(self.warnings) > 5 else ''
-            kind = 'Stuck warning' if len(self.warnings) == 1 else 'Stuck warnings'
+            kind = 'A stuck warning' if len(self.warnings) == 1 else 'Stuck warnings'
             return f'{kind} at {times}{more}: {self.warnings[0].reason or "no reason given"}.'
         worst = max(self.wheels, key=lambda wheel: wheel.seconds['stuck'] + wheel.seconds['high'])
         high = worst.seconds['high'] + worst.seconds['stuck']
         if high > 0.0:
             return (
                 f'No stuck warning. {worst.name} slipped most: {high:.1f} s in the classes high '
-                f'and stuck, at most |slip| {worst.max_slip:.2f}.'
+                f'and stuck, at most |slip| {shown(worst.max_slip, ".2f")}.'
             )
         return 'No stuck warning, no wheel in the classes high or stuck.'
 
@@ -87,6 +102,7 @@ def summarise(
     counts: Mapping[str, int],
     rejected: Mapping[tuple[str, str], int],
     notes: Sequence[str],
+    border: Border | None = None,
 ) -> DriveSummary:
     """Sum a drive up.
 
@@ -102,21 +118,27 @@ def summarise(
         (input topic, reason) -> number of rejections.
     notes : sequence of str
         What else the reader should know.
+    border : Border, optional
+        Beyond which standard deviations slip and sinkage are not known.
     """
+    border = border or Border()
     figures = history.figures()
     begin = int(history.stamp[0]) if history.stamp.size else 0
     return DriveSummary(
         title=title,
         duration=figures.duration,
         sets=figures.sets,
-        wheels=_wheels(history.names, figures) if figures.sets else (),
+        wheels=_wheels(history, border) if figures.sets else (),
         warnings=tuple(
             WarningSpan(
                 (w.start - begin) * 1e-9,
                 None if w.end is None else (w.end - begin) * 1e-9,
                 w.reason,
+                later,
             )
-            for w in history.warnings
+            for w, later in zip(
+                history.warnings, truth_scores.seen_later(history, border), strict=True
+            )
         ),
         messages=tuple(
             MessageRow(name, topic, counts.get(name, 0), _rejections(name, rejected))
@@ -134,25 +156,65 @@ def short_names(names: Sequence[str]) -> list[str]:
     return ['_'.join(p) for p in parts]
 
 
-def _wheels(names: Sequence[str], figures: DriveFigures) -> tuple[WheelSummary, ...]:
+def _wheels(history: EstimateHistory, border: Border) -> tuple[WheelSummary, ...]:
+    figures = history.figures()
     times = figures.seconds_in_class
     total = np.maximum(sum(times.values()), 1e-9)
+    slips = np.abs(known(history, 'slip', border))
+    sinkages = known(history, 'sinkage', border)
+    limits = np.broadcast_to(border.sinkage, len(history.names))
     result = []
-    for i, name in enumerate(short_names(names)):
+    for i, name in enumerate(short_names(history.names)):
         seconds = {c.name.lower(): float(times[c][i]) for c in SlipClass}
+        slip, sinkage = _percentiles(slips[:, i]), _percentiles(sinkages[:, i])
+        deepest, std = float(figures.max_sinkage[i]), float(figures.max_sinkage_std[i])
+        if sinkage and std > limits[i]:  # known elsewhere, but not there
+            row = int(np.nanargmax(sinkages[:, i]))
+            deepest = float(sinkages[row, i])
+            std = float(history.values['sinkage_std'][row, i])
         result.append(
             WheelSummary(
                 name=name,
                 seconds=seconds,
                 shares={key: value / float(total[i]) for key, value in seconds.items()},
-                max_slip=float(figures.max_slip[i]),
-                max_sinkage=float(figures.max_sinkage[i]),
-                max_sinkage_std=float(figures.max_sinkage_std[i]),
+                max_slip=float(figures.max_slip[i]) if slip else None,
+                max_sinkage=deepest if sinkage else None,
+                max_sinkage_std=std if sinkage else None,
                 mean_pull=float(figures.mean_pull[i]),
                 least_margin=float(figures.least_margin[i]),
+                slip=slip,
+                sinkage=sinkage,
             )
         )
     return tuple(result)
+
+
+def _percentiles(values: NDArray[np.float64]) -> tuple[float, float] | None:
+    there = values[np.isfinite(values)]
+    if not there.size:
+        return None
+    low, high = np.percentile(there, PERCENTILES)
+    return float(low), float(high)
+
+
+def shown(value: float | None, spec: str, scale: float = 1.0) -> str:
+    """Return a figure in words; "not known" where there is none."""
+    return NOT_KNOWN if value is None else format(scale * value, spec)
+
+
+def spread(ends: tuple[float, float] | None, spec: str, scale: float = 1.0) -> str:
+    """Return percentiles in words, "0.02 to 0.31"; equal ones once."""
+    if ends is None:
+        return NOT_KNOWN
+    low, high = (format(scale * end, spec) for end in ends)
+    return low if low == high else f'{low} to {high}'
+
+
+def deepest(wheel: WheelSummary, plus_minus: str = '±') -> str:
+    """Return the greatest sinkage of a wheel with its standard deviation [mm]."""
+    if wheel.max_sinkage is None or wheel.max_sinkage_std is None:
+        return NOT_KNOWN
+    return f'{1e3 * wheel.max_sinkage:.0f} {plus_minus} {1e3 * wheel.max_sinkage_std:.0f}'
 
 
 def _rejections(name: str, rejected: Mapping[tuple[str, str], int]) -> str:
@@ -171,6 +233,7 @@ def as_text(summary: DriveSummary) -> str:
     for warning in summary.warnings:
         end = 'the end' if warning.end is None else f'{warning.end:.1f} s'
         lines.append(f'  STUCK from {warning.start:.1f} s to {end}: {warning.reason or "-"}')
+        lines += [f'    {warning.later}'] if warning.later else []
     if summary.wheels:
         width = max(len('time in class [s]'), *(len(wheel.name) for wheel in summary.wheels))
         classes = [c.name.lower() for c in SlipClass]
@@ -178,14 +241,14 @@ def as_text(summary: DriveSummary) -> str:
             '',
             f'  {"time in class [s]":{width}}'
             + ''.join(f'{c:>10}' for c in classes)
-            + '   max |slip|   max sinkage [mm]',
+            + '  |slip| 5 to 95 %       max  sinkage [mm]        max',
         ]
         for wheel in summary.wheels:
             lines.append(
                 f'  {wheel.name:{width}}'
                 + ''.join(f'{wheel.seconds[c]:10.1f}' for c in classes)
-                + f'{wheel.max_slip:13.2f}'
-                + f'{1000 * wheel.max_sinkage:12.0f} +- {1000 * wheel.max_sinkage_std:.0f}'
+                + f'{spread(wheel.slip, ".2f"):>17}{shown(wheel.max_slip, ".2f"):>10}'
+                + f'{spread(wheel.sinkage, ".0f", 1e3):>14}{deepest(wheel, "+-"):>11}'
             )
     heard = [
         row.name if row.topic == f'/{row.name}' else f'{row.name} ({row.topic})'

@@ -33,8 +33,8 @@ class DriveRow:
     first_warning: float | None = None  # [s] since the first set
     seconds: Mapping[str, float] = field(default_factory=dict)  # by class, mean of the wheels
     longest_stuck: float = 0.0  # [s], of the wheel that was longest in the class stuck
-    max_slip: float = 0.0
-    max_sinkage: float = 0.0  # [m]
+    max_slip: float | None = None  # None: not known
+    max_sinkage: float | None = None  # [m]
     findings: tuple[str, ...] = ()
 
     @classmethod
@@ -50,8 +50,10 @@ class DriveRow:
             first_warning=summary.warnings[0].start if summary.warnings else None,
             seconds={c: sum(w.seconds[c] for w in wheels) / max(len(wheels), 1) for c in CLASSES},
             longest_stuck=max((w.seconds['stuck'] for w in wheels), default=0.0),
-            max_slip=max((w.max_slip for w in wheels), default=0.0),
-            max_sinkage=max((w.max_sinkage for w in wheels), default=0.0),
+            max_slip=max((w.max_slip for w in wheels if w.max_slip is not None), default=None),
+            max_sinkage=max(
+                (w.max_sinkage for w in wheels if w.max_sinkage is not None), default=None
+            ),
             findings=tuple(str(finding) for finding in checked.findings),
         )
 
@@ -83,7 +85,7 @@ def worst_first(rows: Sequence[DriveRow]) -> list[DriveRow]:
 
     def badness(row: DriveRow) -> tuple[float, ...]:
         high = row.seconds.get('high', 0.0)
-        return (-bool(row.error), row.stuck_warnings, row.longest_stuck, high, row.max_slip)
+        return (-bool(row.error), row.stuck_warnings, row.longest_stuck, high, row.max_slip or 0.0)
 
     return sorted(rows, key=badness, reverse=True)
 
@@ -102,8 +104,9 @@ def write_table(rows: Sequence[DriveRow], path: Path) -> None:
                 first = '' if row.first_warning is None else f'{row.first_warning:.3f}'
                 figures = [f'{row.duration:.3f}', row.sets, row.stuck_warnings, first]
                 figures += [f'{row.seconds[c]:.3f}' for c in CLASSES]
-                figures += [f'{row.longest_stuck:.3f}', f'{row.max_slip:.4f}']
-                figures += [f'{row.max_sinkage:.4f}']
+                figures += [f'{row.longest_stuck:.3f}']
+                extremes = (row.max_slip, row.max_sinkage)
+                figures += ['' if value is None else f'{value:.4f}' for value in extremes]
             findings = '; '.join(row.findings)
             writer.writerow([row.bag, row.folder, *figures, findings, row.error])
 

@@ -45,13 +45,18 @@ def _environment(folder: Path) -> Environment:
     """Return what renders the templates of a folder; each is compiled once."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-    return Environment(
+    from wheel_terra_estimator.reporting.style import DARK
+    from wheel_terra_estimator.reporting.time_figure import nice
+
+    made = Environment(
         loader=FileSystemLoader([folder, TEMPLATES]),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
     )
+    made.globals.update(nice=nice, dark=lambda colour: DARK.get(colour, colour))
+    return made
 
 
 def write_page(path: Path, page: str) -> None:

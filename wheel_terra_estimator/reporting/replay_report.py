@@ -14,12 +14,11 @@ from wheel_terra_estimator.bags.truth import Truth
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.estimates import SlipClass
 from wheel_terra_estimator.output_folder import new_file
-from wheel_terra_estimator.reporting import drive_pictures, track_picture
-from wheel_terra_estimator.reporting.drive_figure import drive_figure
-from wheel_terra_estimator.reporting.drive_style import BAND, CLASS_COLOURS
-from wheel_terra_estimator.reporting.drive_summary import DriveSummary
-from wheel_terra_estimator.reporting.html import picture, render, write_page
-from wheel_terra_estimator.reporting.time_figure import plotly_script
+from wheel_terra_estimator.reporting import track_picture, truth_scores
+from wheel_terra_estimator.reporting.drive_figure import drive_figure, way_figure
+from wheel_terra_estimator.reporting.drive_style import CLASS_COLOURS, Border
+from wheel_terra_estimator.reporting.drive_summary import DriveSummary, deepest, shown, spread
+from wheel_terra_estimator.reporting.html import render, write_page
 from wheel_terra_estimator.reporting.truth_scores import QuantityError, TruthErrors
 
 
@@ -63,26 +62,24 @@ def write_replay_report(
 
     effects = catalogue()
     values = configuration.flat()
+    border = Border.of(configuration)
     page = render(
         'replay.html',
         summary=summary,
         rover=configuration.rover.name or 'rover',
         tone='bad' if summary.warnings or not summary.sets else _tone(summary),
         cards=_cards(summary),
-        classes=[
-            {'key': c.name.lower(), 'name': c.name.lower(), 'colour': colour}
-            for c, colour in CLASS_COLOURS.items()
-        ],
-        pictures=_pictures(history, truth) if summary.sets else [],
-        figure=drive_figure(history, truth) if summary.sets else '',
-        library=plotly_script() if summary.sets else '',
+        classes=[(c.name.lower(), colour) for c, colour in CLASS_COLOURS.items()],
+        wheels=[_wheel_row(wheel) for wheel in summary.wheels],
+        figure=drive_figure(history, truth, border, filtered) if summary.sets else None,
         findings=findings,
+        warnings=_warnings(summary, errors),
         errors=[_error_row(error) for error in errors.quantities] if errors else [],
         filter_errors=(
             [_error_row(error) for error in filter_errors.quantities] if filter_errors else []
         ),
         map=_map(track) if track and track_picture.has_map(track) else None,
-        smoothed=_smoothed_pictures(history, filtered, truth) if summary.sets else [],
+        smoothed=filtered is not None,
         truth_source=truth.source if truth else '',
         provenance=configuration.provenance,
         parameters=[(key, values[key]) for key in values if key in configuration.stated],
@@ -108,84 +105,73 @@ def _tone(summary: DriveSummary) -> str:
     return 'warn' if high else 'good'
 
 
-def _cards(summary: DriveSummary) -> list[dict[str, str]]:
+def _cards(summary: DriveSummary) -> list[tuple[str, str]]:
     if not summary.wheels:
         return []
-    deepest = max(summary.wheels, key=lambda wheel: wheel.max_sinkage)
-    slipping = max(wheel.max_slip for wheel in summary.wheels)
+    slips = [w for w in summary.wheels if w.slip is not None]
+    slipping = max(slips, key=lambda w: w.slip[1], default=summary.wheels[0])
+    deep = max(summary.wheels, key=lambda w: w.max_sinkage or 0.0)
     stuck = max(wheel.seconds['stuck'] for wheel in summary.wheels)
     unknown = sum(wheel.shares[SlipClass.UNKNOWN.name.lower()] for wheel in summary.wheels)
+    unit = '' if deep.max_sinkage is None else ' mm'
     return [
-        {'value': str(len(summary.warnings)), 'label': 'stuck warnings'},
-        {'value': f'{slipping:.2f}', 'label': 'greatest |slip|'},
-        {'value': f'{stuck:.1f} s', 'label': 'longest time of a wheel in class stuck'},
-        {
-            'value': f'{1000 * deepest.max_sinkage:.0f} ± {1000 * deepest.max_sinkage_std:.0f} mm',
-            'label': f'greatest sinkage ({deepest.name})',
-        },
-        {
-            'value': f'{100 * unknown / len(summary.wheels):.0f} %',
-            'label': 'of the time at rest or unknown',
-        },
+        (str(len(summary.warnings)), 'stuck warnings'),
+        (
+            spread(slipping.slip, '.2f'),
+            f'|slip| of {slipping.name}, 5 to 95 % of the time; '
+            f'at most {shown(slipping.max_slip, ".2f")}',
+        ),
+        (f'{stuck:.1f} s', 'longest time of a wheel in class stuck'),
+        (f'{deepest(deep)}{unit}', f'greatest sinkage ({deep.name})'),
+        (f'{100 * unknown / len(summary.wheels):.0f} %', 'of the time at rest or unknown'),
     ]
 
 
-def _map(track: Track) -> dict[str, str]:
+def _wheel_row(wheel: Any) -> dict[str, Any]:
     return {
-        'source': picture(track_picture.map_of(track)),
-        'caption': f'Position {track.source}; circle: start, cross: stuck warning. Strength: what '
-        'was learned of cohesion and friction, over what the soil file states.',
+        'name': wheel.name,
+        'shares': wheel.shares,
+        'seconds': {name: f'{seconds:.1f}' for name, seconds in wheel.seconds.items()},
+        'figures': [
+            ('|slip|', spread(wheel.slip, '.2f')),
+            ('max', shown(wheel.max_slip, '.2f')),
+            ('sinkage [mm]', spread(wheel.sinkage, '.0f', 1e3)),
+            ('max', deepest(wheel)),
+            ('mean pull [N]', f'{wheel.mean_pull:.1f}'),
+            ('least margin [N]', f'{wheel.least_margin:.1f}'),
+        ],
     }
 
 
-def _smoothed_pictures(
-    history: EstimateHistory, filtered: EstimateHistory | None, truth: Truth | None
-) -> list[dict[str, str]]:
-    """Return pictures of smoother and filter; none where there is no smoother."""
-    if filtered is None:
-        return []
-    dashed = ' The truth is dashed.' if truth else ''
-    return [
-        {
-            'title': f'{title}: smoother and filter',
-            'source': picture(drive_pictures.smoother_and_filter(history, filtered, name, truth)),
-            'caption': f'Colour: smoother, with ± {BAND:g} standard deviations; grey: the filter '
-            f'as it was live.{dashed}',
-        }
-        for title, name in (('Slip', 'slip'), ('Drawbar pull', 'drawbar_pull'))
-    ]
+def _warnings(summary: DriveSummary, errors: TruthErrors | None) -> list[dict[str, str]]:
+    """Return for each warning when, one sentence, what to do, and whether it was right."""
+    rows = []
+    for number, warning in enumerate(summary.warnings):
+        reason, _, advice = warning.reason.partition('; ')
+        end = 'to the end' if warning.end is None else f'to {warning.end:.1f} s'
+        verdict = warning.later
+        if errors and errors.warnings:
+            verdict = f'By the truth: {truth_scores.in_words(errors.warnings[number])}.'
+        rows.append(
+            {
+                'when': f'{warning.start:.1f} s {end}',
+                'reason': f'{_capital(reason or "no reason given")}.',
+                'advice': f'{_capital(advice)}.' if advice else '',
+                'verdict': verdict,
+            }
+        )
+    return rows
 
 
-def _pictures(history: EstimateHistory, truth: Truth | None) -> list[dict[str, str]]:
-    beside = f' The truth ({truth.source}) is dashed.' if truth else ''
-    band = f'Bands are ± {BAND:g} standard deviations.'
-    red = ' Red: stuck warning.' if history.warnings else ''
-    drawn = (
-        (
-            'The drive at a glance',
-            drive_pictures.overview(history, truth),
-            'Body velocity against the mean rim speed, then slip, class, sinkage and drawbar pull '
-            f'of each wheel.{beside}{red}',
-        ),
-        (
-            'Slip, wheel by wheel',
-            drive_pictures.slip_by_wheel(history, truth),
-            f'{band} The strip below each line has the colour of the slip class; grey lines are '
-            f'the thresholds 0.3, 0.6 and 0.9.{beside if truth and truth.slip else ""}{red}',
-        ),
-        (
-            'Sinkage, wheel by wheel',
-            drive_pictures.sinkage_by_wheel(history, truth),
-            f'{band}{beside if truth and truth.sinkage else ""}{red}',
-        ),
-        (
-            'Drawbar pull, wheel by wheel',
-            drive_pictures.pull_by_wheel(history, truth),
-            'Net longitudinal force of the soil on the wheel, along the slope. '
-            f'{band}{beside if truth and truth.drawbar_pull else ""}{red}',
-        ),
-    )
-    return [
-        {'title': title, 'source': picture(figure), 'caption': caption}
-        for title, figure, caption in drawn
-    ]
+def _capital(words: str) -> str:
+    return words[:1].upper() + words[1:]
+
+
+def _map(track: Track) -> dict[str, Any]:
+    straight = track_picture.is_straight(track)
+    return {
+        'figure': way_figure(track, track_picture.STRENGTHS) if straight else None,
+        'maps': () if straight else track_picture.maps(track),
+        'strengths': [(words, colour) for words, _, _, colour in track_picture.STRENGTHS],
+        'source': track.source,
+    }

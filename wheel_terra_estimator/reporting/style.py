@@ -16,17 +16,32 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 
-# Okabe and Ito 2008, without the yellow that vanishes on white.
 LINE_COLOURS = (
-    '#0072B2',
-    '#D55E00',
-    '#009E73',
-    '#CC79A7',
-    '#56B4E9',
-    '#E69F00',
-    '#7B4FA3',
-    '#6B6B6B',
+    '#0083d3',
+    '#a93a00',
+    '#069e73',
+    '#ab4d8e',
+    '#3a286e',
+    '#c58801',
+    '#7b4fa3',
+    '#6b6b6b',
 )
+"""On white at least 3:1 (WCAG 2.2, 1.4.11); the first six, as those of `DARK`, also differ by 24
+in CIE L*a*b* for red-blind and green-blind eyes (Machado et al. 2009, doi 10.1109/TVCG.2009.113).
+"""
+CLASS_LIGHT = ('#efe3a8', '#e9a94b', '#c4552d', '#6b1238')
+"""Low, moderate, high, stuck: the worse the further from the page, in both modes."""
+_LINES_DARK = (
+    '#41a4dd',
+    '#e06a20',
+    '#30c090',
+    '#ffbee4',
+    '#7a5ae0',
+    '#ffe070',
+    '#b08ad0',
+    '#a9a9a9',
+)
+_CLASSES_DARK = ('#6f6a4a', '#b98122', '#f59a70', '#ffdbe9')
 INK, SOFT, EDGE, RIM_COLOUR = '#1f2933', '#5b6875', '#8a949e', '#9aa5b0'
 TRUTH_COLOUR = '#111111'
 WARNING_COLOUR = '#b3261e'
@@ -38,9 +53,8 @@ DARK = {
     SOFT: '#a3afba',
     GRID_COLOUR: '#2d3741',
     NOISE_COLOUR: '#2a333c',
-    LINE_COLOURS[0]: '#4ea8de',
-    LINE_COLOURS[6]: '#b08ad0',
-    LINE_COLOURS[7]: '#a9a9a9',
+    **dict(zip(LINE_COLOURS, _LINES_DARK, strict=True)),
+    **dict(zip(CLASS_LIGHT, _CLASSES_DARK, strict=True)),
     WARNING_COLOUR: '#f0776c',
     '#ffffff': 'none',
 }

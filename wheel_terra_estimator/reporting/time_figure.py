@@ -1,42 +1,35 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""A figure over time that can be zoomed: panels on one time axis, lines switched on and off.
+"""A figure over one axis: panels under one another, drawn once as SVG and laid out by the page.
 
-The figure is data for plotly.js, which lies in the page once (template ``time_figure.html``);
-colours of text, grid and truth come from the page, so that they follow its light or dark mode.
+Curves are paths in the data's x and in thousandths of the panel's height; the page stretches them
+to any width, so that screen, phone and paper show the same drawing. All words are HTML beside the
+drawing: none covers a curve. The script of the template only zooms and reads values.
 """
 
 from __future__ import annotations
 
-import json
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from pathlib import Path
-from textwrap import wrap
-from typing import Any
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from wheel_terra_estimator.reporting.style import DARK, LINE_COLOURS, thin
+from wheel_terra_estimator.reporting.style import DARK, thin
 
 FloatArray = NDArray[np.float64]
 
-SCRIPT = Path(__file__).parent / 'static' / 'plotly-basic.min.js'
-
 LINE_POINTS, BAND_POINTS, TRUTH_POINTS = 2000, 300, 600
 """Points of a line in the page: what a wide screen shows, and a file below 4 MB."""
-DIGITS = 4  # significant, of what is drawn
-REASON_WIDTH = 34  # characters of a line of words beside a shaded stretch
-REASON_LINES = 4
-GAP = 0.052  # between two panels, as a share of the height
-STRIP, THIN_STRIP = 11, 2  # widths of a strip [px]
+HEIGHT = 1000
+"""Height of a panel in its drawing; paths are rounded to a tenth of it."""
+TICKS = 4
+"""Numbers beside a panel, about."""
 MARGIN = 0.08  # room above and below a line, as a share of its range
-
-
-def plotly_script() -> str:
-    """Return the library's text, to be embedded once."""
-    return SCRIPT.read_text(encoding='utf-8')
+STRIP, THIN_STRIP = 0.7, 0.16  # heights of a strip, as a share of its row
+NEAREST_MARKS = 0.08
+"""Numbers of shaded stretches stand at least this share of the axis apart."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +44,7 @@ class Panel:
 
 @dataclass(frozen=True)
 class Switch:
-    """A box of the page that shows or hides the traces that name it."""
+    """A box of the page that shows or hides the curves that name it."""
 
     key: str
     text: str
@@ -59,6 +52,60 @@ class Switch:
     colour: str = ''
 
 
+@dataclass(frozen=True)
+class Mark:
+    """A number, or a text, at a share of an axis."""
+
+    text: str
+    share: float
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A path of a panel: its CSS classes, name, colours on light and dark pages."""
+
+    path: str
+    classes: str
+    name: str = ''
+    light: str = ''
+    dark: str = ''
+    width: float = 1.4
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A panel as the template lays it out: ``low`` and ``high`` are its limits."""
+
+    title: str
+    share: float
+    low: float
+    high: float
+    curves: tuple[Curve, ...]
+    ticks: tuple[Mark, ...]
+    strips: bool
+
+
+@dataclass
+class _Line:
+    panel: int
+    x: FloatArray
+    y: FloatArray  # (k,), or (2, k): lower and upper edge of a band
+    classes: str
+    name: str = ''
+    colour: str = ''
+    width: float = 1.4
+
+
+@dataclass
+class _Strip:
+    panel: int
+    stretches: list[tuple[float, float, int]]  # from, to, row
+    name: str
+    colour: str
+    height: float
+
+
+@dataclass
 class TimeFigure:
     """Collects lines, bands, strips and shaded stretches of panels under one another.
 
@@ -67,204 +114,156 @@ class TimeFigure:
     panels : sequence of Panel
         From top to bottom; other methods count them from 0.
     switches : sequence of Switch
-        Boxes above the figure. A trace is drawn while all switches that it names are on.
+        Boxes above the figure. A curve is drawn while all switches that it names are on.
     end : float
-        Last time on the axis [s].
-    time : str
-        Title of the time axis.
+        Last value on the axis, which begins at 0.
+    axis : str
+        Title of the axis, with unit.
     """
 
-    def __init__(
-        self, panels: Sequence[Panel], switches: Sequence[Switch], end: float, time: str
-    ) -> None:
-        self._panels = tuple(panels)
-        self._switches = tuple(switches)
-        self._end = end
-        self._time = time
-        self._traces: list[dict[str, Any]] = []
-        self._shapes: list[dict[str, Any]] = []
-        self._notes: list[dict[str, Any]] = []
+    panels: Sequence[Panel]
+    switches: Sequence[Switch]
+    end: float
+    axis: str
+    shaded: list[tuple[float, float]] = field(default_factory=list)
+    _lines: list[_Line] = field(default_factory=list)
+    _strips: list[_Strip] = field(default_factory=list)
 
     def line(
         self,
         panel: int,
-        seconds: FloatArray,
+        x: FloatArray,
         values: FloatArray,
         name: str,
         colour: str,
         *switches: str,
         width: float = 1.4,
-        dash: str = 'solid',
     ) -> None:
         """Add a line; nan is a gap."""
-        style = {'color': colour, 'width': width, 'dash': dash}
-        self._curve(panel, switches, name, thin(seconds, values, LINE_POINTS), line=style)
+        points = thin(x, values, LINE_POINTS)
+        classes = f'line {self._classes(switches)}'
+        self._lines.append(_Line(panel, *points, classes, name, colour, width))
 
     def truth(
-        self, panel: int, seconds: FloatArray, values: FloatArray, name: str, *switches: str
+        self, panel: int, x: FloatArray, values: FloatArray, name: str, *switches: str
     ) -> None:
         """Add a dashed line in the page's ink."""
-        style = {'dash': 'dash', 'width': 1.0}
-        points = thin(seconds, values, TRUTH_POINTS)
-        self._curve(panel, switches, name, points, line=style, ink=True)
-
-    def _curve(
-        self,
-        panel: int,
-        switches: tuple[str, ...],
-        name: str,
-        points: tuple[FloatArray, FloatArray],
-        **style: Any,
-    ) -> None:
-        """Add a curve whose values are told where the pointer is."""
-        x, y = _seconds(points[0]), _numbers(points[1])
-        self._add(panel, switches, x=x, y=y, name=name, hovertemplate='%{y}', **style)
+        points = thin(x, values, TRUTH_POINTS)
+        self._lines.append(_Line(panel, *points, f'truth {self._classes(switches)}', name))
 
     def band(
         self,
         panel: int,
-        seconds: FloatArray,
+        x: FloatArray,
         values: FloatArray,
         half: FloatArray,
         colour: str,
         *switches: str,
     ) -> None:
         """Add a band of plus and minus ``half``; only while the switch ``band`` is on."""
-        x, low = thin(seconds, values - half, BAND_POINTS)
-        high = np.interp(x, seconds, values + half)
-        whole = np.isfinite(low) & np.isfinite(high)
-        edge: dict[str, Any] = {
-            'x': _seconds(x[whole]),
-            'line': {'width': 0},
-            'hoverinfo': 'skip',
-        }
-        named = ('band', *switches)
-        self._add(panel, named, **edge, y=_numbers(low[whole]))
-        self._add(
-            panel, named, **edge, y=_numbers(high[whole]), fill='tonexty', fillcolor=f'{colour}33'
-        )
+        few, low = thin(x, values - half, BAND_POINTS)
+        edges = np.vstack([low, np.interp(few, x, values + half)])
+        classes = f'band {self._classes(("band", *switches))}'
+        self._lines.append(_Line(panel, few, edges, classes, '', colour))
 
     def strips(
-        self, panel: int, seconds: FloatArray, member: NDArray[np.bool_], name: str, colour: str,
+        self, panel: int, x: FloatArray, member: NDArray[np.bool_], name: str, colour: str,
         *, slender: bool = False,
     ) -> None:  # fmt: skip
         """Add the stretches (k, n) of n strips that belong to one class, first strip on top."""
-        count = member.shape[1]
-        x: list[float | None] = []
-        y: list[int | None] = []
-        for strip in range(count):
-            edges = np.flatnonzero(np.diff(np.concatenate(([0], member[:, strip], [0]))))
+        found = []
+        for row in range(member.shape[1]):
+            edges = np.flatnonzero(np.diff(np.concatenate(([0], member[:, row], [0]))))
             for start, end in edges.reshape(-1, 2):
-                last = seconds[min(end, seconds.size - 1)]
-                x += [round(float(seconds[start]), 2), round(float(last), 2), None]
-                y += [count - 1 - strip, count - 1 - strip, None]
-        width = THIN_STRIP if slender else STRIP
-        self._add(
-            panel,
-            (),
-            x=x,
-            y=y,
-            name=name,
-            line={'color': colour, 'width': width, 'simplify': False},
-            hoverinfo='skip',
-        )
+                found.append((float(x[start]), float(x[min(end, x.size - 1)]), row))
+        height = THIN_STRIP if slender else STRIP
+        self._strips.append(_Strip(panel, found, name, colour, height))
 
-    def shade(self, panel: int, start: float, end: float, words: str, short: str) -> None:
-        """Shade a stretch of all panels; the words stand in one, ``short`` ones on a phone."""
-        self._shapes.append(
-            {'type': 'rect', 'xref': 'x', 'yref': 'paper', 'x0': start, 'x1': end, 'y0': 0, 'y1': 1}
-        )
-        side = 'right' if start > 0.5 * self._end else 'left'
-        self._notes.append(
-            {
-                'name': 'warning',
-                'short': short,
-                'text': '<br>'.join(wrap(words, REASON_WIDTH)[:REASON_LINES]),
-                'xref': 'x',
-                'yref': f'y{panel + 1} domain' if panel else 'y domain',
-                'x': start,
-                'y': 0.98,
-                'xanchor': side,
-                'align': side,
-                'yanchor': 'top',
-                'showarrow': False,
-            }
-        )
+    def shade(self, start: float, end: float) -> None:
+        """Shade a stretch of all panels; it gets the next number, from 1."""
+        self.shaded.append((start, end))
 
-    def as_json(self) -> str:
-        """Return traces, layout, switches and colours on dark pages for the page's script."""
-        content = {
-            'traces': self._traces,
-            'layout': self._layout(),
-            'switches': [vars(switch) for switch in self._switches],
-            'dark': {colour: DARK[colour] for colour in LINE_COLOURS if colour in DARK},
-        }
-        # Text that cannot end the script element in which it stands.
-        text = json.dumps(content, separators=(',', ':'), allow_nan=False)
-        return text.replace('</', '<\\/')
+    def marks(self) -> list[Mark]:
+        """Return the numbers of the shaded stretches; of those that crowd, the first."""
+        marks: list[Mark] = []
+        for number, (start, _) in enumerate(self.shaded, start=1):
+            share = min(start / self.end, 1.0 - 0.5 * NEAREST_MARKS) if self.end > 0.0 else 0.0
+            if not marks or share - marks[-1].share >= NEAREST_MARKS:
+                marks.append(Mark(str(number), share))
+        return marks
 
-    def _add(self, panel: int, switches: Sequence[str], ink: bool = False, **trace: Any) -> None:
-        known = {switch.key for switch in self._switches}
-        named = [key for key in switches if key in known]
-        meta: dict[str, Any] = {'switches': named, 'ink': ink}
-        axis = f'y{panel + 1}' if panel else 'y'
-        self._traces.append({**trace, 'yaxis': axis, 'mode': 'lines', 'meta': meta})
+    def left(self) -> int:
+        """Return the longest text beside a panel, in characters."""
+        return max(len(tick.text) for panel in self.drawn() for tick in panel.ticks)
 
-    def _layout(self) -> dict[str, Any]:
-        """Return axes and titles; every panel hangs on the one time axis ``x``."""
-        room = 1.0 - GAP * (len(self._panels) - 1)
-        total = sum(panel.share for panel in self._panels)
-        last = len(self._panels)
-        layout: dict[str, Any] = {
-            'hovermode': 'x unified',
-            'showlegend': False,
-            'dragmode': 'zoom',
-            'xaxis': {
-                'title': {'text': self._time},
-                'anchor': f'y{last}' if last > 1 else 'y',
-                'showspikes': True,
-                'spikemode': 'across',
-                'spikethickness': 1,
-                'spikedash': 'dot',
-                'range': [0.0, round(self._end, 2)],
-            },
-            'shapes': self._shapes,
-            'annotations': list(self._notes),
-        }
-        top = 1.0
-        for number, panel in enumerate(self._panels, start=1):
-            bottom = top - room * panel.share / total
-            axis: dict[str, Any] = {
-                'domain': [max(bottom, 0.0), top],
-                'anchor': 'x',
-                'automargin': True,
-            }
-            if panel.limits:
-                axis['range'] = [round(limit, 6) for limit in panel.limits]
-            if panel.strips:
-                count = len(panel.strips)
-                axis |= {
-                    'tickvals': list(range(count))[::-1],
-                    'ticktext': list(panel.strips),
-                    'range': [-0.6, count - 0.4],
-                    'showgrid': False,
-                    'fixedrange': True,
-                }
-            layout[f'yaxis{number}' if number > 1 else 'yaxis'] = axis
-            layout['annotations'].append(
-                {
-                    'text': f'<b>{panel.title}</b>',
-                    'xref': 'paper',
-                    'yref': 'paper',
-                    'x': 0,
-                    'y': top,
-                    'xanchor': 'left',
-                    'yanchor': 'bottom',
-                    'showarrow': False,
-                }
+    def drawn(self) -> list[Drawn]:
+        """Return the panels for the template."""
+        return [
+            self._strip_panel(number, panel) if panel.strips else self._line_panel(number, panel)
+            for number, panel in enumerate(self.panels)
+        ]
+
+    def _classes(self, switches: Sequence[str]) -> str:
+        keys = [switch.key for switch in self.switches]
+        return ' '.join(f's{keys.index(key)}' for key in switches if key in keys)
+
+    def _line_panel(self, number: int, panel: Panel) -> Drawn:
+        mine = [line for line in self._lines if line.panel == number]
+        low, high = panel.limits or limits(*(line.y for line in mine if line.y.ndim == 1))
+        curves = tuple(
+            Curve(_path(line, low, high), line.classes, line.name, line.colour,
+                  DARK.get(line.colour, line.colour), line.width)
+            for line in mine
+        )  # fmt: skip
+        ticks = tuple(Mark(text, (high - value) / (high - low)) for value, text in nice(low, high))
+        return Drawn(panel.title, panel.share, low, high, curves, ticks, strips=False)
+
+    def _strip_panel(self, number: int, panel: Panel) -> Drawn:
+        rows = len(panel.strips)
+        curves = []
+        for strip in (strip for strip in self._strips if strip.panel == number):
+            above, high = 0.5 * (1.0 - strip.height), strip.height * HEIGHT / rows
+            path = ''.join(
+                f'M{begin:.6g} {HEIGHT * (row + above) / rows:.1f}H{end:.6g}v{high:.1f}H{begin:.6g}z'
+                for begin, end, row in strip.stretches
             )
-            top = bottom - GAP
-        return layout
+            dark = DARK.get(strip.colour, strip.colour)
+            curves.append(Curve(path, 'strip', strip.name, strip.colour, dark))
+        ticks = tuple(Mark(name, (row + 0.5) / rows) for row, name in enumerate(panel.strips))
+        return Drawn(panel.title, panel.share, 0.0, 1.0, tuple(curves), ticks, strips=True)
+
+
+def _path(line: _Line, low: float, high: float) -> str:
+    """Return the path of a line, broken where it is nan, or of a band."""
+    y = HEIGHT * (high - line.y) / (high - low)
+    if y.ndim == 2:
+        known = np.isfinite(y).all(axis=0)
+        x = np.concatenate([line.x[known], line.x[known][::-1]])
+        return _pieces(x, np.concatenate([y[0, known], y[1, known][::-1]]))
+    return _pieces(line.x, y)
+
+
+def _pieces(x: FloatArray, y: FloatArray) -> str:
+    parts, pen = [], 'M'
+    for px, py in zip(x.tolist(), np.clip(y, -9e4, 9e4).tolist(), strict=True):
+        if math.isnan(py):
+            pen = 'M'
+            continue
+        parts.append(f'{pen}{px:.6g} {py:.1f}')
+        pen = 'L'
+    return ''.join(parts)
+
+
+def nice(low: float, high: float, count: int = TICKS) -> list[tuple[float, str]]:
+    """Return about ``count`` round numbers within limits, each with its text."""
+    if not high > low:
+        return []
+    raw = (high - low) / count
+    unit = 10.0 ** math.floor(math.log10(raw))
+    step = unit * next(factor for factor in (1.0, 2.0, 5.0, 10.0) if factor * unit >= raw)
+    first, last = math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9)
+    digits = max(-math.floor(math.log10(step) + 1e-9), 0)
+    return [(n * step, f'{n * step:.{digits}f}'.replace('-', '−')) for n in range(first, last + 1)]
 
 
 def limits(*lines: FloatArray, within: tuple[float, float] | None = None) -> tuple[float, float]:
@@ -277,15 +276,3 @@ def limits(*lines: FloatArray, within: tuple[float, float] | None = None) -> tup
     low, high = (min(ends), max(ends)) if ends else (0.0, 1.0)
     margin = MARGIN * (high - low) or 1.0
     return low - margin, high + margin
-
-
-def _seconds(values: FloatArray) -> list[float]:
-    return [round(v, 2) for v in values.tolist()]
-
-
-def _numbers(values: FloatArray) -> list[float | None]:
-    """Return rounded numbers; None, a gap, for nan."""
-    return [
-        float(f'{v:.{DIGITS}g}') if known else None
-        for v, known in zip(values.tolist(), np.isfinite(values).tolist(), strict=True)
-    ]

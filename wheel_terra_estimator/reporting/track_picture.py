@@ -1,27 +1,49 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""The map of a drive as a picture: where the ground is bad."""
+"""The map of a drive: where the ground is bad."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import math
+from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from wheel_terra_estimator.bags.track import Track
 from wheel_terra_estimator.estimation.estimates import SlipClass
 from wheel_terra_estimator.reporting.drive_style import CLASS_COLOURS
-from wheel_terra_estimator.reporting.style import INK, WARNING_COLOUR, picture_style
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+from wheel_terra_estimator.reporting.style import DARK, RIM_COLOUR
+from wheel_terra_estimator.reporting.time_figure import Curve, nice
 
 LEAST_EXTENT = 0.5
 """Way below which a drive has no map [m]."""
-MOST_DRAWN = 600  # points of a picture
-STRENGTHS = (0.5, 1.5)
-"""Learned strength over the stated one at the ends of the colours [-]."""
+STRAIGHT = 0.15
+"""Breadth over length of a way below which it is drawn as a strip over the way [-]."""
+MOST_DRAWN = 600  # points of a map
+ROOM = 0.06  # around the way, as a share of its extent
+STRENGTHS = (
+    ('below 0.7', -math.inf, 0.7, '#a6501a'),
+    ('0.7 to 0.9', 0.7, 0.9, '#d99a4e'),
+    ('0.9 to 1.1, as stated', 0.9, 1.1, RIM_COLOUR),
+    ('1.1 to 1.3', 1.1, 1.3, '#6aa6d6'),
+    ('above 1.3', 1.3, math.inf, '#2b6cb0'),
+)
+"""Words, bounds and colour of the learned shear strength over the stated one: brown is weaker."""
+
+
+@dataclass(frozen=True)
+class Map:
+    """A map for the template: places in metres from its upper left corner."""
+
+    width: float
+    height: float
+    grid: str
+    step: str  # of the grid [m]
+    curves: tuple[Curve, ...]
+    start: tuple[float, float]
+    warnings: tuple[tuple[float, float], ...]
 
 
 def has_map(track: Track) -> bool:
@@ -29,48 +51,64 @@ def has_map(track: Track) -> bool:
     return bool(track.stamp.size > 1 and track.values['distance'][-1] > LEAST_EXTENT)
 
 
-def map_of(track: Track) -> Figure:
-    """Draw the way twice: by the worst slip class of a wheel, and by the learned strength."""
-    from matplotlib.figure import Figure
+def is_straight(track: Track) -> bool:
+    """Whether a way is so straight that a map of it would be a line."""
+    points = np.column_stack([track.values['x'], track.values['y']])
+    spans = np.ptp((points - points.mean(axis=0)) @ _main_axes(points), axis=0)
+    return bool(spans.min() < STRAIGHT * spans.max())
 
-    with picture_style():
-        figure = Figure(figsize=(10.5, 4.6))
-        by_class, by_soil = figure.subplots(1, 2)
-        rows = np.unique(np.linspace(0, track.stamp.size - 1, MOST_DRAWN).astype(int))
-        points = np.column_stack([track.values['x'], track.values['y']])[rows]
-        classes = track.values['slip_class'][rows]
-        for slip_class, colour in CLASS_COLOURS.items():
-            mine = classes == slip_class
-            if mine.any():
-                name = 'at rest' if slip_class == SlipClass.UNKNOWN else slip_class.name.lower()
-                by_class.scatter(*points[mine].T, s=9, color=colour, linewidth=0, label=name)
-        by_class.set_title('worst slip class of a wheel')
-        drawn = by_soil.scatter(
-            *points.T,
-            s=9,
-            c=track.values['soil_strength'][rows],
-            cmap='RdYlGn',
-            vmin=STRENGTHS[0],
-            vmax=STRENGTHS[1],
-            linewidth=0,
+
+def _main_axes(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    axes: NDArray[np.float64] = np.linalg.eigh(np.cov(points.T))[1]
+    return axes
+
+
+def maps(track: Track) -> tuple[Map, Map]:
+    """Return the way by the worst slip class of a wheel, and by the learned strength."""
+    classes, strength = track.values['slip_class'], track.values['soil_strength']
+    by_class = [
+        (kind.name.lower(), classes == kind, colour) for kind, colour in CLASS_COLOURS.items()
+    ]
+    by_soil = [
+        (words, (strength >= low) & (strength < high), colour)
+        for words, low, high, colour in STRENGTHS
+    ]
+    return _map(track, by_class), _map(track, by_soil)
+
+
+def _map(track: Track, kinds: list[tuple[str, NDArray[np.bool_], str]]) -> Map:
+    x, y = track.values['x'], track.values['y']
+    extent = max(np.ptp(x), np.ptp(y))
+    left, top = x.min() - ROOM * extent, y.max() + ROOM * extent
+    width, height = x.max() + ROOM * extent - left, top - (y.min() - ROOM * extent)
+    places = np.column_stack([x - left, top - y])
+    rows = np.unique(np.linspace(0, x.size - 1, MOST_DRAWN).astype(int))
+    curves = []
+    for name, member, colour in kinds:
+        path = ''.join(
+            f'M{places[a][0]:.4g} {places[a][1]:.4g}L{places[b][0]:.4g} {places[b][1]:.4g}'
+            for a, b in pairwise(rows.tolist())
+            if member[a]
         )
-        figure.colorbar(drawn, ax=by_soil, label='shear strength learned / stated [-]')
-        by_soil.set_title('soil')
-        for axis in (by_class, by_soil):
-            _mark_ends(axis, track)
-            axis.set_aspect('equal', adjustable='datalim')
-            axis.set_xlabel('x [m]')
-        by_class.set_ylabel('y [m]')
-        by_class.legend(loc='best', markerscale=2.0)
-    return figure
-
-
-def _mark_ends(axis: Axes, track: Track) -> None:
-    """Mark the start, and where stuck warnings were raised."""
-    x, y, stuck = (track.values[name] for name in ('x', 'y', 'stuck'))
-    axis.plot(x[0], y[0], 'o', color=INK, markersize=6, fillstyle='none', label='start')
-    raised = np.flatnonzero(np.diff(np.concatenate([[0.0], stuck])) > 0.0)
-    if raised.size:
-        axis.plot(
-            x[raised], y[raised], 'X', color=WARNING_COLOUR, markersize=9, label='stuck warning'
-        )
+        unknown = name == SlipClass.UNKNOWN.name.lower()
+        dark = DARK.get(colour, colour)
+        if path:
+            curves.append(Curve(path, 'way', name, colour, dark, 1.5 if unknown else 4.0))
+    across = [value for value, _ in nice(left, left + width)]
+    down = np.arange(
+        math.ceil((top - height) / (across[1] - across[0])) * (across[1] - across[0]),
+        top,
+        across[1] - across[0],
+    )
+    grid = ''.join(f'M{v - left:.4g} 0V{height:.4g}' for v in across)
+    grid += ''.join(f'M0 {top - v:.4g}H{width:.4g}' for v in down.tolist())
+    raised = np.flatnonzero(np.diff(np.concatenate([[0.0], track.values['stuck']])) > 0.0)
+    return Map(
+        width=float(width),
+        height=float(height),
+        grid=grid,
+        step=f'{across[1] - across[0]:g}',
+        curves=tuple(curves),
+        start=(float(places[0, 0]), float(places[0, 1])),
+        warnings=tuple((float(px), float(py)) for px, py in places[raised]),
+    )

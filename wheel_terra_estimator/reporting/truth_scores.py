@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from wheel_terra_estimator.bags.history import EstimateHistory
 from wheel_terra_estimator.bags.truth import Truth, WheelTruth
 from wheel_terra_estimator.estimation.estimates import SlipClass
+from wheel_terra_estimator.reporting.drive_style import Border, known
 
 FloatArray = NDArray[np.float64]
 
@@ -94,12 +95,12 @@ def truth_errors(
             history.forward_velocity_std[:, None],
         ),
     )
-    known = history.slip_class != SlipClass.UNKNOWN
+    classed = history.slip_class != SlipClass.UNKNOWN
     for name, unit, true, seen, std in table:
         if true is None or not true.stamp.size:
             continue
         there = at_stamps(true, history.stamp)
-        rows = np.isfinite(there) & (known if name == 'slip' else True)
+        rows = np.isfinite(there) & (classed if name == 'slip' else True)
         if rows.any():
             quantities.append(_error(name, unit, (seen - there)[rows], std[rows]))
     slip = None if truth.slip is None else at_stamps(truth.slip, history.stamp)
@@ -167,6 +168,34 @@ def _warnings(history: EstimateHistory, slip: FloatArray) -> tuple[WarningScore,
     return tuple(scores)
 
 
+def seen_later(history: EstimateHistory, border: Border) -> tuple[str, ...]:
+    """Return for each warning whether the slip estimated after it bears it out, in a sentence."""
+    slip = known(history, 'slip', border)
+    there = np.isfinite(slip).any(axis=1)
+    found = []
+    for score in _warnings(history, slip):
+        after = (history.seconds >= score.start) & (
+            history.seconds <= score.start + WARNING_HORIZON
+        )
+        if not (after & there).any():
+            found.append('Whether it was right is not known: the slip after it is not.')
+        else:
+            found.append(f'By the estimates: {in_words(score)}.')
+    return tuple(found)
+
+
+def in_words(score: WarningScore) -> str:
+    """Return what the slip says of a warning."""
+    if score.lead is None:
+        return (
+            f'not borne out, the median slip did not pass {WARNED_SLIP:g} '
+            f'within {WARNING_HORIZON:g} s'
+        )
+    if score.lead < 0.0:
+        return f'late, the median slip had passed {WARNED_SLIP:g} {-score.lead:.1f} s before it'
+    return f'borne out, the median slip passed {WARNED_SLIP:g} {score.lead:.1f} s after it'
+
+
 def as_lines(errors: TruthErrors) -> list[str]:
     """Return the lines that the terminal shows."""
     lines = [f'  against the truth ({errors.source})']
@@ -182,11 +211,7 @@ def as_lines(errors: TruthErrors) -> list[str]:
             shares = ''.join(f'{100 * share:9.1f}%' for share in row)
             lines.append(f'    {name:18}{shares}')
     for warning in errors.warnings:
-        lead = f'the median slip did not pass {WARNED_SLIP:g} within {WARNING_HORIZON:g} s'
-        if warning.lead is not None:
-            side = 'before' if warning.lead < 0.0 else 'after'
-            lead = f'the median slip passed {WARNED_SLIP:g} {abs(warning.lead):.1f} s {side} it'
-        lines.append(f'    warning at {warning.start:.1f} s: {lead}')
+        lines.append(f'    warning at {warning.start:.1f} s: {in_words(warning)}')
     if errors.first_stuck is not None and not errors.warnings:
         lines.append(f'    no warning, though the slip passed 0.75 at {errors.first_stuck:.1f} s')
     return lines

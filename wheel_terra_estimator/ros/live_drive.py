@@ -56,6 +56,7 @@ from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.messages.convert import JOINT_OUTPUTS, stamp_of
 from wheel_terra_estimator.output_folder import check_file, check_folder
 from wheel_terra_estimator.reporting import truth_scores
+from wheel_terra_estimator.reporting.drive_style import Border
 from wheel_terra_estimator.reporting.drive_summary import as_text, summarise
 from wheel_terra_estimator.reporting.replay_report import write_replay_report
 from wheel_terra_estimator.ros.lifecycle_node import MESSAGE_TYPES
@@ -362,7 +363,7 @@ def _run(arguments: argparse.Namespace) -> None:
         history = read_estimates(estimates)
     title = f'{arguments.bag.resolve().name}, live'
     notes = [f'not in the bag: {", ".join(reader.absent)}'] if reader.absent else []
-    summary = summarise(title, history, reader.topics, counts, {}, notes)
+    summary = summarise(title, history, reader.topics, counts, {}, notes, Border.of(configuration))
     # A truth that the node was given as its reference is none to judge it by.
     judged = truth if truth and truth.source not in reader.topics.values() else None
     thresholds = configuration.filter.class_thresholds

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from wheel_terra_estimator.reporting.style import EDGE, INK, LINE_COLOURS, picture_style
+from wheel_terra_estimator.reporting.time_figure import Panel, Switch, TimeFigure
 from wheel_terra_lab.evaluation import scores
 from wheel_terra_lab.evaluation.bench import Results
 from wheel_terra_lab.evaluation.closed_loop import Comparison
@@ -59,7 +60,6 @@ def write(
         A drive with and without the traction limiter, drawn over time.
     """
     from wheel_terra_estimator.reporting.html import picture, render, write_page
-    from wheel_terra_estimator.reporting.time_figure import plotly_script
 
     found = list(blocks(text))
     page = render(
@@ -74,9 +74,9 @@ def write(
         }
         if results and results.drives
         else None,
-        limiter=limiter_figure(drive) if drive else '',
+        limiter=limiter_figure(drive) if drive else None,
         seed=drive.seed if drive else None,
-        library=plotly_script() if drive else '',
+        stopped=drive.limited.reason if drive and drive.limited.stopped is not None else '',
     )
     write_page(path, page)
 
@@ -156,10 +156,8 @@ def courses(drive: Comparison) -> Iterator[tuple[str, str, str, Any, Any]]:
         yield 'scale of the command [-]', name, colour, run.time, run.scale
 
 
-def limiter_figure(drive: Comparison) -> str:
-    """Return a drive with and without the limiter as data for the page's script."""
-    from wheel_terra_estimator.reporting.time_figure import Panel, Switch, TimeFigure
-
+def limiter_figure(drive: Comparison) -> TimeFigure:
+    """Return a drive with and without the limiter over time."""
     lines = list(courses(drive))
     panels = list(dict.fromkeys(panel for panel, *_ in lines))
     switches = [
@@ -171,8 +169,8 @@ def limiter_figure(drive: Comparison) -> str:
         figure.line(panels.index(panel), time, values, run, colour, run)
     stopped = drive.limited.stopped
     if stopped is not None:
-        figure.shade(1, stopped, end, f'limiter: {drive.limited.reason}', 'limiter stops')
-    return figure.as_json()
+        figure.shade(stopped, end)
+    return figure
 
 
 def draw_limiter(drive: Comparison, path: Path) -> None:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from wheel_terra_estimator.reporting.time_figure import Panel, Switch, TimeFigure
 from wheel_terra_lab.soilbin import pictures
 from wheel_terra_lab.soilbin.case import Case
 
@@ -33,7 +34,6 @@ def write_report(folder: Path, series: np.ndarray, case: Case, figures: Mapping[
         Words of a figure -> its value with unit.
     """
     from wheel_terra_estimator.reporting.html import render, write_page
-    from wheel_terra_estimator.reporting.time_figure import plotly_script
 
     def image(name: str) -> str:
         path = folder / name
@@ -48,7 +48,6 @@ def write_report(folder: Path, series: np.ndarray, case: Case, figures: Mapping[
         case=case,
         figures=figures,
         figure=_figure(series, case),
-        library=plotly_script(),
         bed=image('bed.png'),
         film=image('film.gif'),
         frame=pictures.FRAME,
@@ -60,9 +59,7 @@ def write_report(folder: Path, series: np.ndarray, case: Case, figures: Mapping[
     part.replace(folder / 'report.html')
 
 
-def _figure(series: np.ndarray, case: Case) -> str:
-    from wheel_terra_estimator.reporting.time_figure import Panel, Switch, TimeFigure
-
+def _figure(series: np.ndarray, case: Case) -> TimeFigure:
     titles = list(dict.fromkeys(quantity.panel for quantity in pictures.QUANTITIES))
     panels = [Panel(title, SHARES.get(title, 0.2)) for title in titles]
     forces = [q for q in pictures.QUANTITIES if q.panel == titles[0]]
@@ -72,4 +69,4 @@ def _figure(series: np.ndarray, case: Case) -> str:
     for quantity, time, values in pictures.lines(series, case):
         panel = titles.index(quantity.panel)
         figure.line(panel, time, values, quantity.name, quantity.colour, quantity.name)
-    return figure.as_json()
+    return figure

@@ -26,6 +26,7 @@ from wheel_terra_estimator.bags.salvage.raw_messages import RawMessage, Topic
 from wheel_terra_estimator.bags.storage import Bag
 from wheel_terra_estimator.configuration import reader as configuration_reader
 from wheel_terra_estimator.messages.convert import INPUT_TYPES
+from wheel_terra_estimator.reporting.drive_style import Border
 from wheel_terra_estimator.reporting.drive_summary import as_text, summarise
 from wheel_terra_estimator.reporting.replay_report import write_replay_report
 
@@ -110,8 +111,9 @@ def main() -> int:
     result = replay(drive, configuration, {}, arguments.output)
     drive.measure(arguments.hours * 3600.0)
     summary = summarise(
-        'long drive', result.history, result.topics, result.heard, result.rejected, result.notes
-    )
+        'long drive', result.history, result.topics, result.heard, result.rejected, result.notes,
+        Border.of(configuration),
+    )  # fmt: skip
     if arguments.report:
         write_replay_report(arguments.report, summary, result.history, None, configuration)
         print(f'with the report {resident_memory():.1f} MB')

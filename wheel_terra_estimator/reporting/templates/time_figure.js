@@ -1,99 +1,106 @@
-/* A figure over time: colours from the page, traces on and off, one layout for wide and narrow. */
-(function () {
+/* Figures over one axis: zoom (drag, buttons, double-click for all) and values under the pointer.
+   Curves and boxes work without this script. */
+document.querySelectorAll('.chart').forEach((chart) => {
   'use strict';
-  const data = JSON.parse(document.getElementById('figure-data').textContent);
-  const figure = document.getElementById('figure');
-  const controls = document.getElementById('controls');
-  const dark = window.matchMedia('(prefers-color-scheme: dark)');
-  const NARROW = 600;                                    // width of a phone [px]
-  const on = Object.fromEntries(data.switches.map((entry) => [entry.key, entry.on]));
-  const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
-  const shade = (light) => (dark.matches && data.dark[light]) || light;
-  const keys = [];
-  const isNarrow = () => window.innerWidth < NARROW;
-  const panels = Object.keys(data.layout).filter((name) => /^yaxis/.test(name)).length;
+  const end = parseFloat(chart.dataset.end);
+  const panels = [...chart.querySelectorAll('svg')];
+  const axis = chart.querySelector('.axis');
+  const TICKS = 6;                                       // numbers below the figure, about
+  let view = [0, end];
+  chart.querySelectorAll('.zoom, .zoom-note').forEach((part) => { part.hidden = false; });
 
-  function traces() {
-    return data.traces.map((trace) => {
-      const visible = trace.meta.switches.every((key) => on[key]);
-      const copy = { type: 'scatter', ...trace, visible, line: { ...trace.line } };
-      copy.line.color = trace.meta.ink ? colour('--ink') : shade(copy.line.color);
-      return copy;
+  function show(low, high) {
+    const span = Math.min(Math.max(high - low, end / 1e4), end);
+    low = Math.min(Math.max(low, 0), end - span);
+    view = [low, low + span];
+    for (const svg of panels) svg.setAttribute('viewBox', `${low} 0 ${span} 1000`);
+    chart.querySelectorAll('.marks b').forEach((mark) => {
+      const share = (mark.dataset.x - low) / span;
+      mark.style.left = `${100 * share}%`;
+      mark.hidden = share < 0 || share > 1;
     });
+    const raw = span / TICKS;
+    const unit = 10 ** Math.floor(Math.log10(raw));
+    const step = unit * [1, 2, 5, 10].find((factor) => factor * unit >= raw);
+    const digits = Math.max(-Math.floor(Math.log10(step) + 1e-9), 0);
+    axis.replaceChildren();
+    for (let n = Math.ceil(low / step - 1e-9); n * step <= low + span + 1e-9 * step; n += 1) {
+      const tick = document.createElement('span');
+      tick.className = 'tick';
+      tick.textContent = (n * step).toFixed(digits);
+      tick.style.left = `${100 * (n * step - low) / span}%`;
+      axis.append(tick);
+    }
   }
 
-  function layout() {
-    const narrow = isNarrow();
-    const made = JSON.parse(JSON.stringify(data.layout));
-    const size = narrow ? 12 : 13;
-    Object.assign(made, {
-      height: 80 + panels * (narrow ? 168 : 184),
-      margin: { l: narrow ? 46 : 62, r: 10, t: narrow ? 52 : 40, b: 46 },
-      font: { color: colour('--ink'), size, family: 'system-ui, "Segoe UI", Roboto, Arial, sans-serif' },
-      paper_bgcolor: 'rgba(0,0,0,0)',
-      plot_bgcolor: 'rgba(0,0,0,0)',
-      hoverlabel: { bgcolor: colour('--paper'), bordercolor: colour('--line'), font: { size: 12 } },
-      modebar: { bgcolor: 'rgba(0,0,0,0)', color: colour('--soft'), activecolor: colour('--link') },
-      dragmode: narrow ? false : 'zoom',                 // a finger scrolls the page
+  function points(path) {                                // [[x, y], ...], read from the path once
+    path.points ??= [...path.getAttribute('d').matchAll(/[ML]([-\d.e+]+) ([-\d.]+)/g)]
+      .map((m) => [parseFloat(m[1]), parseFloat(m[2])]);
+    return path.points;
+  }
+
+  function value(path, x, svg) {
+    const all = points(path);
+    let [from, to] = [0, all.length - 1];
+    while (to - from > 1) {
+      const middle = (from + to) >> 1;
+      if (all[middle][0] <= x) from = middle; else to = middle;
+    }
+    if (!all.length || x < all[0][0] || x > all.at(-1)[0]) return null;
+    const nearest = all[Math.abs(all[from][0] - x) <= Math.abs(all[to][0] - x) ? from : to];
+    const [low, high] = [parseFloat(svg.dataset.low), parseFloat(svg.dataset.high)];
+    return high - nearest[1] / 1000 * (high - low);
+  }
+
+  function read(x) {
+    for (const svg of panels) {
+      svg.querySelector('.cursor').setAttribute('d', x === null ? '' : `M${x} 0V1000`);
+      const line = svg.parentElement.previousElementSibling.querySelector('.read');
+      line.replaceChildren();
+      if (x === null) continue;
+      line.append(`at ${x.toPrecision(4)}: `);
+      for (const path of svg.querySelectorAll('path.line')) {
+        const found = getComputedStyle(path).display === 'none' ? null : value(path, x, svg);
+        if (found === null) continue;
+        const key = document.createElement('span');
+        key.className = 'key';
+        key.title = path.dataset.name;
+        key.style.cssText = path.style.cssText;
+        line.append(key, `${parseFloat(found.toPrecision(3))} `);
+      }
+    }
+  }
+
+  const place = (event) => {
+    const box = panels[0].getBoundingClientRect();
+    const share = Math.min(Math.max((event.clientX - box.left) / box.width, 0), 1);
+    return view[0] + share * (view[1] - view[0]);
+  };
+  let pressed = null;
+  for (const svg of panels) {
+    svg.addEventListener('pointermove', (event) => read(place(event)));
+    svg.addEventListener('pointerleave', () => read(null));
+    svg.addEventListener('pointerdown', (event) => {
+      read(place(event));
+      if (event.pointerType === 'mouse') pressed = place(event);
     });
-    for (const key of Object.keys(made).filter((name) => /^[xy]axis/.test(name))) {
-      Object.assign(made[key], {
-        gridcolor: colour('--line'), zerolinecolor: colour('--line'), tickfont: { size: 12 },
-      });
-      if (narrow && key !== 'xaxis') made[key].fixedrange = true;
-    }
-    made.xaxis.spikecolor = colour('--soft');
-    for (const shape of made.shapes) {
-      shape.fillcolor = colour('--bad');
-      shape.opacity = 0.13;
-      shape.line = { width: 0 };
-    }
-    for (const note of made.annotations) {
-      note.font = { size, color: note.name === 'warning' ? colour('--bad') : colour('--ink') };
-      if (note.name !== 'warning') continue;
-      note.bgcolor = colour('--paper');
-      if (narrow) note.text = note.short;
-    }
-    if (figure.layout && figure.layout.xaxis && figure.layout.xaxis.range) {
-      made.xaxis.range = figure.layout.xaxis.range.slice();
-    }
-    return made;
+    svg.addEventListener('dblclick', () => show(0, end));
   }
-
-  function draw() {
-    for (const [key, light] of keys) key.style.background = shade(light);
-    const buttons = isNarrow()
-      ? [['zoomIn2d', 'zoomOut2d', 'pan2d', 'resetScale2d']]
-      : [['zoom2d', 'pan2d', 'zoomIn2d', 'zoomOut2d', 'resetScale2d', 'toImage']];
-    Plotly.react(figure, traces(), layout(), {
-      responsive: true, displaylogo: false, scrollZoom: false,
-      displayModeBar: true, modeBarButtons: buttons,
-    });
-  }
-
-  function box(entry) {
-    const label = document.createElement('label');
-    const input = document.createElement('input');
-    input.type = 'checkbox';
-    input.checked = entry.on;
-    input.addEventListener('change', () => { on[entry.key] = input.checked; draw(); });
-    label.append(input);
-    if (entry.colour) {
-      const key = document.createElement('span');
-      key.className = 'key';
-      keys.push([key, entry.colour]);
-      label.append(key);
-    }
-    label.append(entry.text);
-    controls.append(label);
-  }
-
-  data.switches.forEach(box);
-  draw();
-  dark.addEventListener('change', draw);
-  let width = window.innerWidth;
-  window.addEventListener('resize', () => {
-    if ((window.innerWidth < NARROW) !== (width < NARROW)) draw();
-    width = window.innerWidth;
+  window.addEventListener('pointerup', (event) => {
+    if (pressed === null) return;
+    const [low, high] = [pressed, place(event)].sort((a, b) => a - b);
+    pressed = null;
+    if (high - low > 0.01 * (view[1] - view[0])) show(low, high);
   });
-}());
+  if (!chart.querySelector('.zoom')) return;
+  const [closer, wider, earlier, later, all] = chart.querySelectorAll('.zoom button');
+  const move = (scale, shift) => {
+    const [middle, half] = [(view[0] + view[1]) / 2, (view[1] - view[0]) / 2];
+    show(middle + half * (shift - scale), middle + half * (shift + scale));
+  };
+  closer.addEventListener('click', () => move(0.5, 0));
+  wider.addEventListener('click', () => move(2, 0));
+  earlier.addEventListener('click', () => move(1, -1));
+  later.addEventListener('click', () => move(1, 1));
+  all.addEventListener('click', () => show(0, end));
+});

@@ -1,0 +1,77 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""The drawing of a drive: paths are where the data are, words are beside them."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from wheel_terra_estimator.reporting.html import render
+from wheel_terra_estimator.reporting.time_figure import HEIGHT, Panel, Switch, TimeFigure, nice
+
+LEAST_APART = 14.0  # px between two lines of text of 12 px
+PANELS = 800.0  # px of all panels together (templates/base.html)
+NARROWEST = 230.0  # px of a panel on a phone
+
+
+def a_figure() -> TimeFigure:
+    panels = (Panel('slip [-]', 0.2, (-0.25, 1.0)), Panel('class', 0.12, strips=('a', 'b', 'c')))
+    figure = TimeFigure(panels, (Switch('w', 'wheel'), Switch('band', 'band', on=False)), 50.0, 't')
+    x = np.linspace(0.0, 50.0, 101)
+    y = np.sin(x / 20.0)
+    y[40:45] = np.nan
+    figure.line(0, x, y, 'wheel', '#0083d3', 'w')
+    figure.band(0, x, y, np.full(101, 0.1), '#0083d3', 'w')
+    figure.strips(1, x, np.arange(101)[:, None] >= np.array([20, 50, 80]), 'high', '#c4552d')
+    for start in (10.0, 10.5, 30.0, 49.9):
+        figure.shade(start, start + 0.2)
+    return figure
+
+
+def test_a_path_is_where_the_data_are_and_broken_where_they_are_not() -> None:
+    line = next(c for c in a_figure().drawn()[0].curves if 'line' in c.classes)
+    assert line.path.count('M') == 2
+    places = np.array(re.findall(r'[ML]([-\d.]+) ([-\d.]+)', line.path), dtype=float)
+    assert len(places) == 96
+    slip = 1.0 - places[:, 1] / HEIGHT * 1.25
+    assert slip == pytest.approx(np.sin(places[:, 0] / 20.0), abs=2e-4)
+
+
+def test_strips_begin_and_end_with_their_class() -> None:
+    (strip,) = a_figure().drawn()[1].curves
+    assert [float(v) for v in re.findall(r'M([\d.]+) ', strip.path)] == [10.0, 25.0, 40.0]
+    tops = [float(v) for v in re.findall(r'M[\d.]+ ([\d.]+)H', strip.path)]
+    rows = (np.array(tops) / HEIGHT * 3).astype(int)
+    assert rows.tolist() == [0, 1, 2]
+
+
+def test_no_two_words_meet_and_none_lies_in_a_drawing(tmp_path: Path) -> None:
+    figure = a_figure()
+    for panel in figure.drawn():
+        places = np.sort([tick.share for tick in panel.ticks])
+        assert (places >= 0.0).all() and (places <= 1.0).all()
+        assert (np.diff(places) * panel.share * PANELS > LEAST_APART).all(), panel.title
+    marks = figure.marks()
+    assert [mark.text for mark in marks] == ['1', '3', '4']  # 2 would stand on 1
+    assert (np.diff([mark.share for mark in marks]) * NARROWEST > LEAST_APART).all()
+    (tmp_path / 'page.html').write_text(
+        "{% from 'time_figure.html' import time_figure %}{{ time_figure(figure, 'a', 'b') }}"
+    )
+    page = render('page.html', tmp_path, figure=figure)
+    for drawing in re.findall(r'<svg.*?</svg>', page, re.S):
+        assert not re.search(r'<(text|foreignObject|image)', drawing)
+    assert '<script src' not in page
+
+
+@pytest.mark.parametrize(('low', 'high'), [(0.0, 1.0), (-0.05, 1.2), (-3e3, 7e3), (0.011, 0.0118)])
+def test_round_numbers_within_limits(low: float, high: float) -> None:
+    numbers = nice(low, high)
+    assert 2 <= len(numbers) <= 6
+    for value, text in numbers:
+        assert low - 1e-9 <= value <= high + 1e-9
+        assert float(text.replace('\u2212', '-')) == pytest.approx(value, abs=1e-12)
+    assert nice(1.0, 1.0) == []
