@@ -108,8 +108,7 @@ def _tone(summary: DriveSummary) -> str:
 def _cards(summary: DriveSummary) -> list[tuple[str, str]]:
     if not summary.wheels:
         return []
-    slips = [w for w in summary.wheels if w.slip is not None]
-    slipping = max(slips, key=lambda w: w.slip[1], default=summary.wheels[0])
+    slipping = max(summary.wheels, key=lambda w: w.slip[1] if w.slip else 0.0)
     deep = max(summary.wheels, key=lambda w: w.max_sinkage or 0.0)
     stuck = max(wheel.seconds['stuck'] for wheel in summary.wheels)
     unknown = sum(wheel.shares[SlipClass.UNKNOWN.name.lower()] for wheel in summary.wheels)

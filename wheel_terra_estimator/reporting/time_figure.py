@@ -224,7 +224,8 @@ class TimeFigure:
         for strip in (strip for strip in self._strips if strip.panel == number):
             above, high = 0.5 * (1.0 - strip.height), strip.height * HEIGHT / rows
             path = ''.join(
-                f'M{begin:.6g} {HEIGHT * (row + above) / rows:.1f}H{end:.6g}v{high:.1f}H{begin:.6g}z'
+                f'M{begin:.6g} {HEIGHT * (row + above) / rows:.1f}'
+                f'H{end:.6g}v{high:.1f}H{begin:.6g}z'
                 for begin, end, row in strip.stretches
             )
             dark = DARK.get(strip.colour, strip.colour)
