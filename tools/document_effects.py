@@ -27,12 +27,15 @@ SETTINGS = {
     'slope': {'slope': 0.2},
     'pass_number': {'pass_number': 2},
     'angular_velocity': {'angular_velocity': 2.0},
+    'slip_angle': {'slip_angle': 0.3},
 }
+PANELS = ('sinkage [mm]', 'drawbar pull [N]', 'torque [N m]', 'lateral force [N]')
+SCALES = (1e3, 1.0, 1.0)
 SMOOTH = frozenset({'rim_friction'})
 
 
 def draw(effect: Effect, path: Path) -> None:
-    """Draw sinkage, pull and torque without the effect, at half, one and twice its default."""
+    """Draw its outputs without the effect, at half, one and twice its default."""
     from matplotlib.figure import Figure
 
     parameter = effect.parameters[0]
@@ -44,19 +47,20 @@ def draw(effect: Effect, path: Path) -> None:
     values = [None, *(factor * parameter.default for factor in (0.5, 1.0, 2.0))]
     with picture_style():
         figure = Figure(figsize=(8.2, 2.5))
-        axes = figure.subplots(1, 3)
+        aside = 'lateral_force' in effect.touches
+        texts = PANELS[-1:] if aside else PANELS[:-1]
+        axes = np.atleast_1d(figure.subplots(1, len(texts)))
         for value, colour in zip(values, LINE_COLOURS, strict=False):
             if value is not None and not parameter.lower <= value <= parameter.upper:
                 continue
             settings = {} if value is None else {effect.name: {parameter.name: value}}
-            outputs = WheelSoilModel(SOIL, settings, strict=False).steady_state(points).outputs()
+            state = WheelSoilModel(SOIL, settings, strict=False).steady_state(points)
+            columns = [state.lateral_force] if aside else [*(state.outputs() * SCALES).T]
             unit = '' if parameter.unit == '-' else f' {parameter.unit}'
             label = 'off' if value is None else f'{parameter.name} = {value:g}{unit}'
-            for axis, column, scale in zip(axes, outputs.T, (1e3, 1.0, 1.0), strict=True):
-                axis.plot(SLIP, scale * column, color=colour, label=label)
-        for axis, text in zip(
-            axes, ('sinkage [mm]', 'drawbar pull [N]', 'torque [N m]'), strict=True
-        ):
+            for axis, column in zip(axes, columns, strict=True):
+                axis.plot(SLIP, column, color=colour, label=label)
+        for axis, text in zip(axes, texts, strict=True):
             axis.set_xlabel('slip [-]')
             axis.set_ylabel(text)
         axes[0].invert_yaxis()

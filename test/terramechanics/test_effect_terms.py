@@ -87,6 +87,11 @@ def test_neutral_values_change_nothing_and_defaults_what_is_said(name: str, meth
         output for output, column in zip(OUTPUTS, (np.abs(on - off) > 1e-9).T, strict=True)
         if column.any()
     }  # fmt: skip
+    aside = {**ROW, 'slip_angle': 0.3, 'wheel': wheel, 'method': method}
+    if not changed and not np.array_equal(
+        state(**aside).lateral_force, state(**aside, effects={name: {}}).lateral_force
+    ):
+        changed = {'lateral_force'}
     assert changed == set(effect.touches)
 
 

@@ -15,13 +15,13 @@ from typing import Any
 
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.terramechanics.effects import (
-    OUTPUTS,
     Effect,
     EffectParameter,
     catalogue,
     load_file,
 )
 from wheel_terra_estimator.terramechanics.effects import learned_closure as law
+from wheel_terra_estimator.terramechanics.effects.base import TOUCHABLE
 
 EXAMPLES = (
     'wheel-terra effects',
@@ -251,7 +251,7 @@ def _law(form: Effect) -> dict[str, Any]:
             }
             for p in form.parameters
         ],
-        'touches': [name for name in OUTPUTS if name in form.touches],
+        'touches': [name for name in TOUCHABLE if name in form.touches],
         'needs': list(form.needs),
         'validity': form.validity,
         'source': form.source,
@@ -259,7 +259,7 @@ def _law(form: Effect) -> dict[str, Any]:
 
 
 def _touched(effect: Effect) -> str:
-    return ', '.join(name.replace('_', ' ') for name in OUTPUTS if name in effect.touches)
+    return ', '.join(name.replace('_', ' ') for name in TOUCHABLE if name in effect.touches)
 
 
 def _prior(p: Any) -> str:

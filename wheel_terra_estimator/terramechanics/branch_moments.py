@@ -7,7 +7,8 @@ strength from the shear displacement at that centroid, that of cohesion from the
 of the side (docs/models). Nothing is fitted.
 
 Where the rim skids, shear displacement turns back inside the contact and no one place stands for
-a side: there four nodes on each side take the place of the centroid.
+a side: there four nodes on each side take the place of the centroid, and where the wheel slides
+sideways, where the displacement turns its direction.
 """
 
 from __future__ import annotations
@@ -22,6 +23,9 @@ from wheel_terra_estimator.terramechanics.contact import Contact
 # Skid beyond pure rolling, v/(w R) - 1, from which and over which the nodes take over from the
 # centroid; below the first, one place per side is within 1.3 % of the load.
 _TAKE_OVER_AT, _TAKE_OVER = 0.07, 0.1
+# Lateral speed v_y/(w R) over which they do where the wheel slides sideways.
+_SIDEWAYS_TAKE_OVER = 0.03
+_NO_DISPLACEMENT = 1e-300  # over K [-]; keeps the direction of none finite
 # Gauss-Legendre nodes and weights on (0, 1), squared towards 0, where the stress starts like v^N.
 _NODES = tuple(
     (0.25 * (x + 1.0) ** 2, 0.5 * w * (x + 1.0))
@@ -100,11 +104,11 @@ class BranchForces:
 
     __slots__ = (
         '_abs', '_arc_front', '_arc_rear', '_cohesion_front', '_cohesion_rear', '_copysign',
-        '_edge_front', '_edge_rear', '_exponent', '_friction_front', '_friction_rear', '_further',
-        '_half', '_maths', '_middle_front', '_middle_rear', '_minimum', '_modulus', '_nearer',
-        '_normal_front', '_normal_rear', '_peak', '_place_front', '_place_rear', '_rim_front',
-        '_rim_rear', '_roll', '_shear_radius', '_sin', '_skid', '_skidding', '_sqrt', '_stress',
-        '_turn', '_turns_back', '_width',
+        '_drift', '_edge_front', '_edge_rear', '_exponent', '_friction_front', '_friction_rear',
+        '_further', '_half', '_maths', '_middle_front', '_middle_rear', '_minimum', '_modulus',
+        '_nearer', '_normal_front', '_normal_rear', '_peak', '_place_front', '_place_rear',
+        '_rim_front', '_rim_rear', '_roll', '_shear_radius', '_sin', '_skid', '_skidding', '_sqrt',
+        '_stress', '_turn', '_turns_back', '_width',
     )  # fmt: skip
 
     def __init__(
@@ -125,6 +129,7 @@ class BranchForces:
         r, R = contact.radius, contact.shear_radius
         self._modulus = contact.shear_modulus
         self._shear_radius, self._width = R, contact.width
+        self._drift = 0.0 if contact.straight else contact.lateral_ratio / self._modulus
         self.set_speed(contact.velocity_ratio)
         self._turn = turn = R / self._modulus
         self._rim_front, self._rim_rear = turn * (1.0 - place_front), turn * (1.0 - place_rear)
@@ -149,6 +154,9 @@ class BranchForces:
         skid = velocity_ratio / self._shear_radius - 1.0
         self._turns_back = bool(np.any(skid > 0.0)) if self._maths is np else skid > 0.0
         share = (skid - _TAKE_OVER_AT) / _TAKE_OVER
+        if self._sideways:
+            side = self._abs(self._drift) * self._modulus / self._shear_radius
+            share = self._maths.maximum(share, 0.0) + side / _SIDEWAYS_TAKE_OVER
         if self._maths is np:
             share = np.minimum(np.maximum(share, 0.0), 1.0)
             self._skidding = bool(np.any(share > 0.0))
@@ -156,6 +164,10 @@ class BranchForces:
             share = 0.0 if share <= 0.0 else min(share, 1.0)
             self._skidding = share > 0.0
         self._skid = share * share * (3.0 - 2.0 * share)
+
+    @property
+    def _sideways(self) -> bool:
+        return not (isinstance(self._drift, float) and self._drift == 0.0)
 
     @property
     def exponent(self) -> Any:
@@ -284,23 +296,28 @@ class BranchForces:
         if np.ndim(skid) == 0 or np.shape(skid) != np.shape(angle):
             skidding = self._node_forces(angle)
             load, pull, torque = (
-                r + skid * (s - r) for r, s in zip(rolling, skidding, strict=True)
+                r + skid * (s - r) for r, s in zip(rolling, skidding[:3], strict=True)
             )
             return load, pull, torque
         rows = skid > 0.0
         skidding = self.take(rows)._node_forces(angle[rows])
-        for r, s in zip(rolling, skidding, strict=True):
+        for r, s in zip(rolling, skidding[:3], strict=True):
             r[rows] += skid[rows] * (s - r[rows])
         return rolling
 
-    def _node_forces(self, angle: Any) -> tuple[Any, Any, Any]:
-        """Load, pull and torque from nodes on either side of the peak."""
+    def lateral_force(self, angle: Any) -> Any:
+        """Force of the soil under the rim at an entrance angle, positive left [N]."""
+        return self._node_forces(angle)[3]
+
+    def _node_forces(self, angle: Any) -> tuple[Any, Any, Any, Any]:
+        """Load, pull, torque and lateral force from nodes on either side of the peak."""
         maths, sin, sqrt = self._maths, self._sin, self._sqrt
         R, roll = self._shear_radius, self._roll
         front, top = 2.0 * self._half, sin(angle)
         leaving = 2.0 * self._middle_rear - (1.0 - front)
         rear = 1.0 - front - leaving
-        load = pull = torque = 0.0
+        load = pull = torque = lateral = 0.0
+        sideways = self._sideways
         for place, weight in _NODES:
             ahead = 1.0 - front * place
             depth = sin(0.5 * (1.0 + ahead) * angle) * sin(0.5 * front * place * angle)
@@ -317,14 +334,21 @@ class BranchForces:
                 sine = sin(at * angle)
                 cosine = sqrt(1.0 - sine * sine)
                 x = R / self._modulus * (1.0 - at) * angle - roll * (top - sine)
-                share = self._copysign(-maths.expm1(-self._abs(x)), x)
                 pressed = weight * normal * stress
-                sheared = weight * (friction * stress + cohesion) * share
+                strength = weight * (friction * stress + cohesion)
+                if sideways:
+                    y = self._drift * (1.0 - at) * angle
+                    length = maths.maximum(sqrt(x * x + y * y), _NO_DISPLACEMENT)
+                    share = -maths.expm1(-length) / length
+                    lateral = lateral - strength * share * y
+                    sheared = strength * share * x
+                else:
+                    sheared = strength * self._copysign(-maths.expm1(-self._abs(x)), x)
                 load = load + pressed * cosine + sheared * sine
                 pull = pull + sheared * cosine - pressed * sine
                 torque = torque + sheared
         size = self._width * angle
-        return size * load, size * pull, size * R * torque
+        return size * load, size * pull, size * R * torque, size * lateral
 
     def small_angle(self, load: Any) -> Any:
         """Entrance angle at which the normal stress alone carries a load, for small angles.

@@ -162,9 +162,32 @@ def forces(contact: Contact, terms: Terms, maths: Any = np) -> tuple[Any, Any, A
     form = BranchForces(contact, contact.peak_angle / t1, contact.leaving_angle / t1, maths)
     result = form.forces(t1)
     if terms.stages['on_normal_stress']:
-        added = _added_stress_forces(contact, terms, maths)
+        added = _added_stress_forces(contact, terms, maths)[:3]
         result = tuple(a + b for a, b in zip(result, added, strict=True))
     return result
+
+
+def lateral_force(contact: Contact, terms: Terms, maths: Any = np) -> Any:
+    """Force of the soil under the rim on the wheel, positive left [N], angles given."""
+    t1 = contact.entrance_angle
+    if contact.straight:
+        return 0.0 * t1
+    form = BranchForces(contact, contact.peak_angle / t1, contact.leaving_angle / t1, maths)
+    force = form.lateral_force(t1)
+    if terms.stages['on_normal_stress']:
+        force = force + _added_stress_forces(contact, terms, maths)[3]
+    return force
+
+
+def triangle_lateral_force(contact: Contact, terms: Terms, maths: Any = np) -> Any:
+    """Return the same from triangular stresses: b R C tau_y of the peak angle [N]."""
+    if contact.straight:
+        return 0.0 * contact.entrance_angle
+    sigma, _ = peak_stresses(contact, terms, maths)
+    strength = contact.cohesion + sigma * contact.tan_friction
+    across = strength * stresses.mobilised_shares(contact, contact.peak_angle, maths)[1]
+    span = 0.5 * (contact.entrance_angle - contact.leaving_angle)
+    return contact.width * contact.shear_radius * span * across
 
 
 def angles_in_proportion(terms: Terms) -> bool:
@@ -180,11 +203,11 @@ def proportional_forces(contact: Contact, maths: Any = np) -> BranchForces:
     return BranchForces(contact, peak, leaving, maths)
 
 
-def _added_stress_forces(contact: Contact, terms: Terms, maths: Any) -> tuple[Any, Any, Any]:
-    """Forces of what the effects add to the normal stress, and of its friction."""
+def _added_stress_forces(contact: Contact, terms: Terms, maths: Any) -> tuple[Any, ...]:
+    """Load, pull, torque, lateral force of what effects add to the normal stress, friction too."""
     t1, tm, t2 = contact.entrance_angle, contact.peak_angle, contact.leaving_angle
-    R, ratio = contact.shear_radius, contact.velocity_ratio
-    load = pull = torque = 0.0
+    R = contact.shear_radius
+    load = pull = torque = lateral = 0.0
     for low, high, behind in ((tm, t1, False), (t2, tm, True)):
         for point, weight in zip(_POINTS, _WEIGHTS, strict=True):
             angle = low + (high - low) * point
@@ -193,13 +216,14 @@ def _added_stress_forces(contact: Contact, terms: Terms, maths: Any) -> tuple[An
             contact.angle, contact.normal_stress = angle, stress
             terms.apply('on_normal_stress', contact, maths)
             normal = (contact.normal_stress - stress) * weight * (high - low)
-            displacement = shear_displacement(angle, t1, R, ratio, maths)
-            share = stresses.mobilised_share(displacement, contact.shear_modulus, maths)
-            shear = normal * contact.tan_friction * share * R
+            along, across = stresses.mobilised_shares(contact, angle, maths)
+            friction = normal * contact.tan_friction * R
+            shear = friction * along
             normal = normal * contact.radius
             cosine, sine = maths.cos(angle), maths.sin(angle)
             load = load + normal * cosine + shear * sine
             pull = pull + shear * cosine - normal * sine
             torque = torque + shear
+            lateral = lateral + friction * across
     width = contact.width
-    return width * load, width * pull, width * R * torque
+    return width * load, width * pull, width * R * torque, width * lateral

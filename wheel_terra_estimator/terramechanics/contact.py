@@ -56,6 +56,14 @@ class Contact:
     # Outputs, as an instrument would read them.
     sinkage: Any = 0.0  # [m]
     drawbar_pull: Any = 0.0  # [N]
+    lateral_force: Any = 0.0  # [N], positive left
     torque: Any = 0.0  # [N m]
     # Wheel as built, whatever the effects make of `radius`: resets and arms refer to it.
     rim_radius: Any = 0.0  # [m]
+    # Sideways motion; the float 0.0 where no wheel slides sideways.
+    lateral_ratio: Any = 0.0  # v_y/w [m], positive left
+
+    @property
+    def straight(self) -> bool:
+        """Whether no wheel slides sideways: lateral force is zero and need not be worked out."""
+        return isinstance(self.lateral_ratio, float) and self.lateral_ratio == 0.0

@@ -51,6 +51,8 @@ class SteadyState:
         (N,) as the instruments of the model would read them [m], [N], [N m].
     entrance_angle, peak_stress_angle, leaving_angle : numpy.ndarray
         (N,) [rad].
+    lateral_force : numpy.ndarray
+        (N,) force of the soil on the wheel, positive left [N]; 0 where the slip angle is.
     flags : numpy.ndarray
         (N,) sum of `OVERLOADED` and `OUTSIDE_VALIDITY`.
     """
@@ -61,6 +63,7 @@ class SteadyState:
     entrance_angle: FloatArray
     peak_stress_angle: FloatArray
     leaving_angle: FloatArray
+    lateral_force: FloatArray
     flags: NDArray[np.int_]
 
     def outputs(self) -> FloatArray:
@@ -150,8 +153,11 @@ class WheelSoilModel:
         outputs: Sequence[Any]
         if explicit:
             set_angles(contact, angle, None, terms)
+            contact.lateral_force = self._lateral_force(contact, terms)
             outputs = self._outputs(contact, angle, pull, torque, terms)
         else:
+            set_angles(contact, angle, points.leaving_angle, terms)
+            contact.lateral_force = self._lateral_force(contact, terms)
             _, *outputs = self._response(contact, angle, points, terms)
         return self._pack(contact, points, angle, carries, outputs)
 
@@ -235,6 +241,13 @@ class WheelSoilModel:
             return closed_form.forces(contact, terms)
         return closed_form.triangle_forces(contact, terms)
 
+    def _lateral_force(self, contact: Contact, terms: Terms) -> Any:
+        if self.method == 'quadrature':
+            return quadrature.lateral_force(contact, terms, self.nodes)
+        if self.method == 'closed_form':
+            return closed_form.lateral_force(contact, terms)
+        return closed_form.triangle_lateral_force(contact, terms)
+
     def _response(
         self, contact: Contact, angle: FloatArray, points: OperatingPoints, terms: Terms
     ) -> tuple[Any, Any, Any, Any]:
@@ -267,11 +280,12 @@ class WheelSoilModel:
         weakened |= np.asarray(contact.sinkage_exponent) <= 0.0
         flags = flags + np.where((np.abs(points.slip) > 0.95) | weakened, OUTSIDE_VALIDITY, 0)
         shape = angle.shape
-        columns = (*outputs, angle, contact.peak_angle, contact.leaving_angle)
-        sinkage, pull, torque, entrance, peak, leaving = (
+        angles = angle, contact.peak_angle, contact.leaving_angle
+        columns = (*outputs, *angles, contact.lateral_force)
+        sinkage, pull, torque, entrance, peak, leaving, lateral = (
             np.array(np.broadcast_to(column, shape)) for column in columns
         )
-        return SteadyState(sinkage, pull, torque, entrance, peak, leaving, flags)
+        return SteadyState(sinkage, pull, torque, entrance, peak, leaving, lateral, flags)
 
 
 class _Batch:

@@ -41,6 +41,12 @@ class OperatingPoints:
         (N,) 1 on virgin soil, 2 for the second wheel in the same rut, and so on.
     leaving_angle : array_like
         (N,) measured leaving angle [rad], negative behind the hub; nan = not measured.
+    slip_angle : array_like
+        (N,) angle from the wheel's forward axis to the motion of its hub, positive where it slides
+        left, in [-pi, pi] [rad].
+    lateral_speed_ratio : array_like
+        (N,) sideways over rim speed v_y/(r w), r as `slip_radius` says, positive left [-]; nan =
+        from slip and slip angle, (1 - s) tan(slip angle), which says nothing near 90 degrees.
     """
 
     slip: Any
@@ -52,6 +58,8 @@ class OperatingPoints:
     angular_velocity: Any = np.nan
     pass_number: Any = 1
     leaving_angle: Any = np.nan
+    slip_angle: Any = 0.0
+    lateral_speed_ratio: Any = np.nan
 
     def __post_init__(self) -> None:
         if self.slip_radius not in SLIP_RADII:
@@ -60,7 +68,7 @@ class OperatingPoints:
         names = ('slip', 'normal_load', 'slope', 'gravity', 'angular_velocity', 'pass_number')
         columns = {
             name.replace('_', ' '): numbers(name.replace('_', ' '), getattr(self, name))
-            for name in (*names, 'leaving_angle')
+            for name in (*names, 'leaving_angle', 'slip_angle', 'lateral_speed_ratio')
         }
         wheels = {
             name.replace('_', ' '): getattr(wheel, name)
@@ -78,6 +86,8 @@ class OperatingPoints:
         check_range(
             'leaving angle', self.leaving_angle, -np.pi / 2, np.pi / 4, unit='rad', allow_nan=True
         )
+        check_range('slip angle', self.slip_angle, -np.pi, np.pi, unit='rad')
+        check_range('lateral speed ratio', self.lateral_speed_ratio, allow_nan=True)
 
     def __len__(self) -> int:
         return int(self.slip.shape[0])

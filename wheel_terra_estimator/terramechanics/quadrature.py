@@ -39,6 +39,32 @@ def forces(contact: Contact, terms: Terms, nodes: int = NODES) -> tuple[Any, Any
     tuple of numpy.ndarray
         W [N], F [N] in the direction of motion, T [N m], in the common shape of the contact.
     """
+    weight, cosine, sine = _stressed(contact, terms, nodes)
+    angle, normal = contact.angle, contact.normal_stress
+    shear = stresses.shear_stress(contact, angle, normal, sine=sine)
+    shear *= weight * contact.shear_radius
+    normal = normal * (weight * contact.radius)
+    width = contact.width
+    load = width * np.add.reduce(normal * cosine + shear * sine)
+    pull = width * np.add.reduce(shear * cosine - normal * sine)
+    return load, pull, width * contact.shear_radius * np.add.reduce(shear)
+
+
+def lateral_force(contact: Contact, terms: Terms, nodes: int = NODES) -> Any:
+    """Force of the soil under the rim on the wheel, positive left [N], angles given.
+
+    Ishigami et al. 2007 (doi 10.1002/rob.20187), without the flank: F_y = b R Int tau_y.
+    """
+    if contact.straight:
+        return 0.0 * contact.entrance_angle
+    weight, _, sine = _stressed(contact, terms, nodes)
+    strength = contact.cohesion + contact.normal_stress * contact.tan_friction
+    across = strength * stresses.mobilised_shares(contact, contact.angle, sine=sine)[1]
+    return contact.width * contact.shear_radius * np.add.reduce(across * weight)
+
+
+def _stressed(contact: Contact, terms: Terms, nodes: int) -> tuple[Any, Any, Any]:
+    """Set angle and normal stress of the nodes; return their weights [rad], cosines and sines."""
     t1, tm, t2 = contact.entrance_angle, contact.peak_angle, contact.leaving_angle
     front, rear = t1 - tm, tm - t2
     x, w = _rule(nodes, max(np.ndim(front), np.ndim(rear), np.ndim(contact.slip)))
@@ -47,14 +73,8 @@ def forces(contact: Contact, terms: Terms, nodes: int = NODES) -> tuple[Any, Any
     cosine, sine = np.cos(angle), np.sin(angle)
     # The rear branch mirrors the front one (Wong and Reece), so both share the same stress.
     stress = stresses.front_stress(contact, entry_side, cosine=cosine[:nodes])
-    weight = np.concatenate([front * w, np.broadcast_to(rear * w, entry_side.shape)])
     contact.angle = angle
     contact.normal_stress = np.concatenate([stress, stress])
     terms.apply('on_normal_stress', contact)
-    shear = stresses.shear_stress(contact, angle, contact.normal_stress, sine=sine)
-    shear *= weight * contact.shear_radius
-    normal = contact.normal_stress * (weight * contact.radius)
-    width = contact.width
-    load = width * np.add.reduce(normal * cosine + shear * sine)
-    pull = width * np.add.reduce(shear * cosine - normal * sine)
-    return load, pull, width * contact.shear_radius * np.add.reduce(shear)
+    weight = np.concatenate([front * w, np.broadcast_to(rear * w, entry_side.shape)])
+    return weight, cosine, sine

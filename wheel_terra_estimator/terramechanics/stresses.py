@@ -11,6 +11,8 @@ import numpy as np
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.kinematics import shear_displacement
 
+_NO_DISPLACEMENT = 1e-300  # [m]; keeps the direction of none finite
+
 
 def bekker_modulus(cohesive: Any, frictional: Any, width: Any) -> Any:
     """Pressure at 1 m depth, kc/b + kphi [Pa], for p = (kc/b + kphi) (z/1 m)^n (Bekker 1969)."""
@@ -68,16 +70,37 @@ def mobilised_share(displacement: Any, shear_modulus: Any, maths: Any = np) -> A
     return maths.where(displacement >= 0.0, share, -share)
 
 
+def mobilised_shares(
+    contact: Contact, angle: Any, maths: Any = np, sine: Any = None
+) -> tuple[Any, Any]:
+    """Signed shares of the shear strength along the wheel (forward) and across it (left) [-].
+
+    Across, the soil is displaced by j_y = (v_y/w)(t1 - t), which is R (1 - s)(t1 - t) tan(beta) of
+    Ishigami et al. 2007 eq. 13 (doi 10.1002/rob.20187) written with the two speeds. Both
+    displacements share one strength: the resultant, of the size that Janosi's law gives the length
+    of (j_x, j_y), acts against the rim's motion through the soil (friction circle). The paper takes
+    each by itself, so that the resultant may exceed the strength. ``sine`` of the angle, where it
+    is known already.
+    """
+    along = shear_displacement(
+        angle, contact.entrance_angle, contact.shear_radius, contact.velocity_ratio, maths, sine
+    )
+    if contact.straight:
+        return mobilised_share(along, contact.shear_modulus, maths), 0.0
+    across = contact.lateral_ratio * (contact.entrance_angle - angle)
+    length = maths.maximum(maths.sqrt(along * along + across * across), _NO_DISPLACEMENT)
+    share = -maths.expm1(-length / contact.shear_modulus) / length
+    return share * along, -share * across
+
+
 def shear_stress(
     contact: Contact, angle: Any, normal_stress: Any, maths: Any = np, sine: Any = None
 ) -> Any:
-    """Shear stress (c + sigma tan phi) sgn(j) (1 - exp(-|j|/K)) [Pa].
+    """Shear stress along the wheel (c + sigma tan phi) sgn(j) (1 - exp(-|j|/K)) [Pa].
 
-    Janosi and Hanamoto 1961; Ding et al. 2010 eq. 18 (doi 10.1007/s11771-010-0021-7). ``sine`` of
-    the angle, where it is known already.
+    Janosi and Hanamoto 1961; Ding et al. 2010 eq. 18 (doi 10.1007/s11771-010-0021-7); less where
+    the wheel slides sideways (``mobilised_shares``). ``sine`` of the angle, where it is known
+    already.
     """
-    displacement = shear_displacement(
-        angle, contact.entrance_angle, contact.shear_radius, contact.velocity_ratio, maths, sine
-    )
     strength = contact.cohesion + normal_stress * contact.tan_friction
-    return strength * mobilised_share(displacement, contact.shear_modulus, maths)
+    return strength * mobilised_shares(contact, angle, maths, sine)[0]

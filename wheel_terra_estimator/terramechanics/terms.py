@@ -111,10 +111,23 @@ def build_contact(
         density=soil['density'],
         rim_radius=rim,
     )
+    contact.lateral_ratio = _lateral_ratio(points, contact)
     terms.apply('on_inputs', contact)
     if points.slip_radius == 'shear':
         contact.velocity_ratio = contact.velocity_ratio / contact.radius * contact.shear_radius
     return contact
+
+
+def _lateral_ratio(points: OperatingPoints, contact: Contact) -> Any:
+    """Return v_y/w [m], positive left; the float 0.0 where no wheel slides sideways."""
+    stated = ~np.isnan(points.lateral_speed_ratio)
+    if not (points.slip_angle.any() or stated.any()):
+        return 0.0
+    # In reverse v/w stays positive: left is left whichever way the wheel rolls.
+    ratio = contact.velocity_ratio * np.copysign(np.tan(points.slip_angle), points.slip_angle)
+    radius = {'lug_tip': points.wheel.tip_radius, 'rim': points.wheel.radius}
+    stated_ratio = points.lateral_speed_ratio * radius.get(points.slip_radius, contact.shear_radius)
+    return np.where(stated, stated_ratio, ratio)
 
 
 def set_angles(

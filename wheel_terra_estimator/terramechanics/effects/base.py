@@ -13,6 +13,7 @@ from typing import Any, TypeAlias
 from wheel_terra_estimator.terramechanics.contact import Contact
 
 OUTPUTS = ('sinkage', 'drawbar_pull', 'torque')
+TOUCHABLE = (*OUTPUTS, 'lateral_force')
 PRIORS = ('half_normal', 'normal')
 STAGES = ('on_inputs', 'on_contact', 'on_normal_stress', 'on_outputs')
 
@@ -121,7 +122,7 @@ class Effect:
     parameters : tuple of EffectParameter
         At least one; `on_*` receives their values by name.
     touches : frozenset of str
-        Which of sinkage, drawbar_pull, torque it can change.
+        Which of `TOUCHABLE` it is seen by (soil and rim change the lateral force as they do pull).
     instrument : bool
         True for an error of the measurement, False for physics of the soil.
     needs : tuple of str
@@ -173,8 +174,10 @@ class Effect:
             raise ValueError(f'effect name is {self.name!r}; allowed is a Python identifier')
         if not self.parameters:
             raise ValueError(f'effect {self.name} has no parameter; it needs at least one')
-        if not self.touches or not self.touches <= set(OUTPUTS):
-            raise ValueError(f'effect {self.name} touches {set(self.touches)}; allowed: {OUTPUTS}')
+        if not self.touches or not self.touches <= set(TOUCHABLE):
+            raise ValueError(
+                f'effect {self.name} touches {set(self.touches)}; allowed: {TOUCHABLE}'
+            )
         if all(getattr(self, stage) is None for stage in STAGES):
             raise ValueError(f'effect {self.name} has no term; it needs one of {STAGES}')
         names = [self.form, *(form.name for form in self.other_forms)]

@@ -13,15 +13,23 @@ from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectPara
 _LEAST_FRICTION = 0.02  # tan(phi); Terzaghi's factors divide by it
 
 
-def _push(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
+def wedge_resistance(contact: Contact, depth: Any, maths: Any) -> Any:
+    """Passive resistance of soil to an upright wall, per width [N/m] (Hegedus 1960).
+
+    D1 (c h + D2 rho g h^2/2) at the depth h [m] of its foot.
+    """
     friction = maths.arctan(contact.tan_friction)
     wedge = 0.25 * maths.pi - 0.5 * friction  # angle of the failure plane, Xc
     cot = 1.0 / maths.tan(wedge)
     d1 = cot + maths.tan(wedge + friction)
     d2 = cot + cot * cot * contact.tan_friction
-    depth = contact.radius * (1.0 - maths.cos(contact.entrance_angle))
     weight = contact.density * contact.gravity
-    resistance = contact.width * d1 * (contact.cohesion * depth + 0.5 * d2 * weight * depth**2)
+    return d1 * (contact.cohesion * depth + 0.5 * d2 * weight * depth**2)
+
+
+def _push(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
+    depth = contact.radius * (1.0 - maths.cos(contact.entrance_angle))
+    resistance = contact.width * wedge_resistance(contact, depth, maths)
     contact.drawbar_pull = contact.drawbar_pull - contact.direction * p.kb * resistance
 
 

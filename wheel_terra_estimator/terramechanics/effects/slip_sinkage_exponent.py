@@ -14,16 +14,31 @@ from wheel_terra_estimator.terramechanics.effects.base import (
     Form,
     relative_pressure,
 )
+from wheel_terra_estimator.terramechanics.kinematics import speed_ratio
+
+
+def _sliding(contact: Contact, maths: Any) -> tuple[Any, Any]:
+    """Speed of the rim through the soil, and sideways, over the faster of rim and hub [-].
+
+    The first is |s| of a wheel that does not slide sideways.
+    """
+    if contact.straight:
+        return maths.abs(contact.slip), 0.0
+    forward = speed_ratio(contact.slip, maths)
+    back, aside = 1.0 - forward, maths.abs(contact.lateral_ratio / contact.rim_radius)
+    fastest = maths.maximum(maths.sqrt(forward * forward + aside * aside), 1.0)
+    return maths.sqrt(back * back + aside * aside) / fastest, aside / fastest
 
 
 def _exponent(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
     skid = maths.maximum(-contact.slip, 0.0)
-    growth = p.n1 * maths.abs(contact.slip) + p.n2 * skid
+    sliding, aside = _sliding(contact, maths)
+    growth = p.n1 * sliding + p.n2 * skid + p.n3 * aside
     contact.sinkage_exponent = contact.sinkage_exponent + growth
 
 
 def _lyasko(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
-    slip = maths.abs(contact.slip)
+    slip, _ = _sliding(contact, maths)
     gain = 1.0 + p.gain * ((1.0 + slip) / (1.0 - 0.5 * slip) - 1.0)
     # The load grows with k z^(N + 1/2): this modulus gives the sinkage `gain` times as much.
     weaker = gain ** -(contact.sinkage_exponent + 0.5)
@@ -31,7 +46,7 @@ def _lyasko(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
 
 
 def _with_load(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
-    growth = p.nw * maths.log(relative_pressure(contact)) + p.n1 * maths.abs(contact.slip)
+    growth = p.nw * maths.log(relative_pressure(contact)) + p.n1 * _sliding(contact, maths)[0]
     contact.sinkage_exponent = contact.sinkage_exponent + growth
 
 
@@ -44,7 +59,8 @@ EFFECT = Effect(
     claim='sinkage exponent N = n0 + n1 |s|: slip or skid makes the wheel sink more than its load '
     'does',
     form='linear',
-    symbol='N = n0 + n1 |s| (+ n2 |s| where s < 0)',
+    symbol='N = n0 + n1 |s| (+ n2 |s| where s < 0); sideways |s| becomes |(v - r w, v_y)|/u and '
+    'n3 |v_y|/u is added, u = max(r w, |(v, v_y)|)',
     parameters=(
         _N1,
         EffectParameter(
@@ -58,6 +74,17 @@ EFFECT = Effect(
             'what the coefficient of a skidding wheel has beyond n1',
             free=False,
         ),
+        EffectParameter(
+            'n3',
+            '-',
+            0.0,
+            -2.0,
+            3.0,
+            0.5,
+            'normal',
+            'what sliding sideways adds beyond n1, per share of the speed',
+            free=False,
+        ),
     ),
     touches=frozenset({'sinkage', 'drawbar_pull', 'torque'}),
     needs=('slip',),
@@ -69,7 +96,8 @@ EFFECT = Effect(
     validity='slip 0 to 0.6 in the source, skid to -0.4 against measurements; sinkage well below '
     '1 m, where k z^N has its reference',
     source='Ding et al. 2010 eq. 13 (doi 10.1007/s11771-010-0021-7); |s| and n2: measured rows of '
-    'a single wheel that brakes (docs/models/validation.md)',
+    'a single wheel that brakes, sliding sideways: of one that is dragged at up to 90 degrees '
+    '(docs/models/validation.md)',
     on_inputs=_exponent,
     other_forms=(
         Form(

@@ -1,0 +1,175 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""A wheel that slides sideways: against integrals of its own, symmetry, limits, closed form."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from scipy.optimize import brentq
+from terra_tools import EFFECTS, SAND, WHEEL, points, random_cases, state
+
+from wheel_terra_estimator.terramechanics.model import METHODS, WheelSoilModel
+
+FLANK = {'side_bulldozing': {'ks': 0.8}}
+
+
+def second_model(slip: float, beta: float, load: float, ks: float) -> tuple[float, ...]:
+    """Sinkage, pull, torque, lateral force by scipy's quad and brentq, from the equations alone."""
+    r, b, c, mu = WHEEL.radius, WHEEL.width, SAND.cohesion, math.tan(SAND.friction_angle)
+    tip, stiffness = r + WHEEL.lug_height, SAND.cohesive_modulus / b + SAND.frictional_modulus
+    ratio = tip * (1.0 - slip) if slip >= 0.0 else tip / (1.0 + slip)
+    weight = SAND.density * 9.80665
+    x = math.pi / 4 - SAND.friction_angle / 2
+    d1 = 1 / math.tan(x) + math.tan(x + SAND.friction_angle)
+    d2 = 1 / math.tan(x) + mu / math.tan(x) ** 2
+
+    def edges(t1: float) -> tuple[float, float, float]:
+        return SAND.leaving_angle_ratio * t1, SAND.peak_stress_ratio * t1, t1
+
+    def stresses(t: float, t1: float) -> np.ndarray:
+        t2, tm, _ = edges(t1)
+        mirrored = t if t >= tm else t1 - (t - t2) / (tm - t2) * (t1 - tm)
+        sigma = stiffness * (r * (math.cos(mirrored) - math.cos(t1))) ** SAND.sinkage_exponent
+        j = np.array([r * (t1 - t) - ratio * (math.sin(t1) - math.sin(t)),
+                      ratio * math.tan(beta) * (t1 - t)])  # fmt: skip
+        size = float(np.hypot(*j))
+        tau = (c + sigma * mu) * (1.0 - math.exp(-size / SAND.shear_modulus))
+        return np.array([sigma, *(tau * j / size)])
+
+    def total(weights, t1: float) -> float:
+        t2, tm, _ = edges(t1)
+        return sum(
+            quad(lambda t: float(weights(t) @ stresses(t, t1)), low, high, epsrel=1e-10)[0]
+            for low, high in ((t2, tm), (tm, t1 - 1e-12))
+        )
+
+    def carried(t1: float) -> float:
+        return b * r * total(lambda t: np.array([math.cos(t), math.sin(t), 0.0]), t1)
+
+    t1 = brentq(lambda a: carried(a) - load, 0.01, 1.5, xtol=1e-13)
+
+    def flank(t: float) -> float:
+        h = r * (math.cos(t) - math.cos(t1))
+        moved = -math.expm1(-ratio * math.tan(beta) * (t1 - t) / SAND.shear_modulus)
+        return moved * d1 * (c * h + d2 * weight * h**2 / 2) * (r - h * math.cos(t))
+
+    lateral = -b * r * total(lambda t: np.array([0.0, 0.0, 1.0]), t1)
+    return (
+        r * (1.0 - math.cos(t1)),
+        b * r * total(lambda t: np.array([-math.sin(t), math.cos(t), 0.0]), t1),
+        b * r * r * total(lambda t: np.array([0.0, 1.0, 0.0]), t1),
+        lateral - ks * quad(flank, edges(t1)[0], t1, epsrel=1e-10)[0],
+    )
+
+
+@pytest.mark.parametrize(('slip', 'beta'), [(0.3, 0.1), (-0.4, 0.5), (0.0, 0.8), (0.8, 1.4)])
+def test_agrees_with_integrals_of_its_own(slip: float, beta: float) -> None:
+    truth = second_model(slip, beta, 80.0, 0.8)
+    ours = state([slip], slip_angle=beta, effects=FLANK)
+    found = (*ours.outputs()[0], ours.lateral_force[0])
+    assert found == pytest.approx(truth, rel=3e-4, abs=1e-4)
+
+
+@pytest.mark.parametrize('method', METHODS)
+def test_no_slip_angle_changes_no_digit(method: str) -> None:
+    slip = np.linspace(-0.9, 0.9, 13)
+    plain = state(slip, effects={**EFFECTS, **FLANK}, method=method)
+    told = state(slip, effects={**EFFECTS, **FLANK}, method=method, slip_angle=0.0)
+    without = state(slip, effects=EFFECTS, method=method)
+    for field in fields(plain):
+        assert np.array_equal(getattr(told, field.name), getattr(plain, field.name))
+        assert np.array_equal(getattr(without, field.name), getattr(plain, field.name))
+    assert not plain.lateral_force.any()
+    # A straight row among others that slide sideways keeps its numbers too.
+    mixed = state(slip, effects=EFFECTS, method=method, slip_angle=np.where(slip < 0, 0.3, 0.0))
+    straight = slip >= 0.0
+    tolerance = 1e-9 if method == 'triangles' else 1e-12
+    assert mixed.outputs()[straight] == pytest.approx(plain.outputs()[straight], rel=tolerance)
+
+
+@pytest.mark.parametrize('method', METHODS)
+def test_left_mirrors_right(method: str) -> None:
+    slip = np.tile(np.linspace(-0.8, 0.9, 9), 2)
+    angle = np.repeat([0.2, 1.3], 9)
+    effects = {**EFFECTS, **FLANK}
+    left = state(slip, slip_angle=angle, effects=effects, method=method)
+    right = state(slip, slip_angle=-angle, effects=effects, method=method)
+    assert np.array_equal(left.outputs(), right.outputs())
+    assert np.array_equal(left.lateral_force, -right.lateral_force)
+    assert (left.lateral_force < 0.0).all()
+
+
+def test_reverse_slides_to_the_same_side() -> None:
+    forward = state([0.3], slip_angle=0.4, angular_velocity=1.0)
+    backward = state([0.3], slip_angle=math.pi - 0.4, angular_velocity=-1.0)
+    assert backward.drawbar_pull == pytest.approx(-forward.drawbar_pull)
+    assert backward.lateral_force == pytest.approx(forward.lateral_force)
+
+
+@pytest.mark.parametrize('method', ['quadrature', 'closed_form'])
+def test_at_90_degrees_the_two_speeds_decide(method: str) -> None:
+    # Spinning on the spot while pushed aside: j turns nowhere, so Fy/(T/r) is v_y over r w.
+    for ratio in (0.05, 0.5, 3.0):
+        there = state([1.0], slip_angle=math.pi / 2, lateral_speed_ratio=ratio, method=method)
+        tip = ratio * (WHEEL.radius + WHEEL.lug_height) / WHEEL.radius
+        assert -there.lateral_force == pytest.approx(tip * there.torque / WHEEL.radius, rel=0.01)
+        near = math.atan2(ratio, 1e-5)
+        beside = state([1.0 - 1e-5], slip_angle=near, method=method)
+        assert beside.lateral_force == pytest.approx(there.lateral_force, rel=1e-3)
+        assert beside.drawbar_pull == pytest.approx(there.drawbar_pull, rel=1e-3)
+    # A locked wheel pushed straight aside gives nothing along, all it can across.
+    locked = state([-1.0], slip_angle=math.pi / 2, method=method)
+    assert abs(locked.torque[0]) < 1e-3 * WHEEL.radius * abs(locked.lateral_force[0])
+    assert np.isfinite(locked.outputs()).all()
+
+
+def test_closed_form_keeps_to_the_quadrature_sideways() -> None:
+    drawn = np.random.default_rng(4)
+    errors = []
+    for soil, effects, row in random_cases(120, 4):
+        beta = drawn.uniform(-1.5, 1.5, len(row.slip))
+        tilted = replace(row, slip_angle=beta)
+        truth, other = (
+            WheelSoilModel(soil, effects, method, strict=False, nodes=40).steady_state(tilted)
+            for method in ('quadrature', 'closed_form')
+        )
+        good = (truth.flags == 0) & (other.flags == 0)
+        load = row.normal_load[good]
+        errors += [
+            np.abs((getattr(other, name) - getattr(truth, name))[good] / load)
+            for name in ('drawbar_pull', 'lateral_force')
+        ]
+    off = np.concatenate(errors)
+    assert off.size > 800
+    assert np.quantile(off, 0.95) < 0.005
+    assert off.max() < 0.03
+
+
+def test_flank_needs_sideways_motion_and_grows_with_sinkage() -> None:
+    def flank(load: float, angle: float) -> float:
+        row = points([0.2], load, slip_angle=angle)
+        on, off = (WheelSoilModel(SAND, e).steady_state(row) for e in (FLANK, {}))
+        assert np.array_equal(on.outputs(), off.outputs())
+        return float(off.lateral_force[0] - on.lateral_force[0])
+
+    assert flank(80.0, 0.0) == 0.0
+    assert 0.0 < flank(80.0, 1e-4) < 1e-2 * flank(80.0, 0.5)  # grows from nothing, no step
+    assert flank(200.0, 0.5) > 2.5 * flank(80.0, 0.5)  # faster than the load
+
+
+def test_sliding_sideways_digs_in_as_slip_does() -> None:
+    exponent = {'slip_sinkage_exponent': {'n1': 0.3}}
+    depth = state(np.zeros(4), slip_angle=[0.0, 0.3, 0.8, 1.3], effects=exponent).sinkage
+    assert (np.diff(depth) > 0.0).all()
+    # At 60 degrees and rim speed = speed over ground, the rim moves through the soil as fast as
+    # it rolls: the exponent of a wheel that spins on the spot.
+    beta = math.pi / 3
+    sliding = state([1.0 - math.cos(beta)], slip_angle=beta, effects=exponent, slip_radius='rim')
+    other = replace(SAND, sinkage_exponent=SAND.sinkage_exponent + 0.3)
+    same = state([1.0 - math.cos(beta)], slip_angle=beta, soil=other, slip_radius='rim')
+    assert sliding.sinkage == pytest.approx(same.sinkage)
