@@ -3,6 +3,7 @@
 """Parameter files are read as ROS reads them."""
 
 import math
+import textwrap
 
 import pytest
 import yaml
@@ -129,10 +130,14 @@ wheel_terra_estimator:
 @pytest.mark.parametrize(
     ('text', 'words'),
     [
-        ('', 'not a ROS parameter file'),
-        ('- 1', 'not a ROS parameter file'),
+        ('', 'no parameters'),
+        ('- 1', 'no parameters'),
         ('a: [1, 2', 'not valid YAML: line'),
-        ('wheels: {radius: 1}', "no 'ros__parameters:'"),
+        ('/**: {wheels: {radius: 1}}', "no 'ros__parameters:'"),
+        ('wheel_terra_estimator: {rover.mass: 1}', "no 'ros__parameters:'"),
+        ('[1, 2]', 'no parameters'),
+        ('rover: {mass: 1}\nrover.mass: 2', 'rover.mass is given twice'),
+        ('rover: {mass: }', 'rover.mass has no value'),
         ('/**:\n  ros__parameters: 5', 'holds no keys'),
         ('other:\n  ros__parameters: {a: 1}', "sections there: 'other'"),
         ('/**:\n  ros__parameters:\n    a:', 'a has no value'),
@@ -185,3 +190,12 @@ def test_what_is_written_is_read_back(value):
     read = ros_yaml.parse_value(ros_yaml.format_value(value), 'test')
     assert read == value
     assert type(read) is type(value)
+
+
+def test_a_file_of_keys_alone_is_one_of_ros(tmp_path):
+    plain, ros = tmp_path / 'plain.yaml', tmp_path / 'ros.yaml'
+    text = 'rover:\n  mass: 1e2\nwheels.names: [a, b]\nsoil: {cohesion: 010}\n'
+    plain.write_text(text)
+    ros.write_text('/**:\n  ros__parameters:\n' + textwrap.indent(text, '    '))
+    assert ros_yaml.read(plain) == ros_yaml.read(ros)
+    assert ros_yaml.read(plain)['soil.cohesion'] == 8  # numbers as ROS reads them

@@ -225,10 +225,14 @@ def by_spelling(table: Mapping[str, Parameter]) -> dict[str, Parameter]:
 
 
 def nearest(key: str, known: Iterable[str]) -> str:
-    """Return the known key that looks most like ``key``; a right name in a wrong section wins."""
+    """Return the known key that looks most like ``key``.
+
+    A key that goes on where ``key`` ends wins, then a right name in a wrong section.
+    """
     known = list(known)
     last = key.rsplit('.', 1)[-1]
     for candidates in (
+        sorted((other for other in known if other.startswith(f'{key}_')), key=len),
         difflib.get_close_matches(key, known, n=1, cutoff=0.8),
         [other for other in known if other.rsplit('.', 1)[-1] == last],
         difflib.get_close_matches(key, known, n=1, cutoff=0.0),

@@ -147,7 +147,9 @@ def read(path: Path) -> dict[str, Value]:
     """Return the parameters that a file gives to the estimator, keys dotted.
 
     Sections ``/**``, ``wheel_terra_estimator`` and ``/any/ns/wheel_terra_estimator`` count, in this
-    order (the narrower one wins, as in ROS); sections of other nodes are passed over.
+    order (the narrower one wins, as in ROS); sections of other nodes are passed over. A file of
+    keys alone, dotted or nested, is read as if it stood below ``/**``; the node's ``--params-file``
+    needs the section.
 
     Parameters
     ----------
@@ -166,8 +168,11 @@ def read(path: Path) -> dict[str, Value]:
         raise UserError(f'{path}: {_in_words(error)}') from None
     if not isinstance(document, Mapping):
         raise UserError(
-            f"{path}: not a ROS parameter file; it starts with '/**:' and 'ros__parameters:'"
+            f"{path}: no parameters; give lines 'rover.mass: 22.0', or a ROS parameter file, which "
+            "starts with '/**:' and 'ros__parameters:'"
         )
+    if _is_plain(document):
+        return flatten(document, str(path))
     sections = list(_sections(document, '', path))
     ours = [section for section in sections if _OUR_SECTION.fullmatch(section[0])]
     if not ours:
@@ -235,6 +240,17 @@ def format_value(value: Value) -> str:
 
 
 _ESCAPES = {'\\': '\\\\', '"': '\\"', '\n': '\\n', '\t': '\\t', '\r': '\\r'}
+
+
+def _is_plain(document: Mapping[str, Any]) -> bool:
+    """Return whether a file holds keys alone, without a section of ROS."""
+
+    def of_ros(below: Mapping[str, Any]) -> bool:
+        parts = (value for value in below.values() if isinstance(value, Mapping))
+        return 'ros__parameters' in below or any(map(of_ros, parts))
+
+    named = any(name.startswith('/') or name == NODE_NAME for name in document)
+    return bool(document) and not named and not of_ros(document)
 
 
 def _sections(
