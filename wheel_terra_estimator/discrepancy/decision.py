@@ -63,41 +63,21 @@ class Naming:
 
 @dataclass(frozen=True)
 class Decision:
-    """What was decided, and the fits and predictions that speak for it.
+    """What was decided, and the fits and predictions that speak for it."""
 
-    Attributes
-    ----------
-    findings : Findings
-        Those of the search, with ``nothing`` refitted under the floor of the decision.
-    verdict : Verdict
-    floor_index : int
-        Of ``findings.selection.floors``: the model-error floor in use.
-    after : Fit
-        The chosen explanation, refitted under that floor.
-    groups : numpy.ndarray
-        (N,) groups of slip that were left out in turn; -1 for rows of a reference.
-    curves : Curves
-    gap : mapping
-        Quantity -> QuantityGap.
-    names : tuple of Naming
-        Strongest first; empty unless ``named``.
-    doubtful : tuple of Naming
-        Names that would have been given, were they likely enough.
-    proposal : Proposal or None
-        A law, where something is missing and no name is given.
-    """
-
+    # Those of the search, with ``nothing`` refitted under the floor of the decision
     findings: Findings
     verdict: Verdict
-    floor_index: int
-    after: Fit
+    floor_index: int  # of ``findings.selection.floors``: the model-error floor in use
+    after: Fit  # the chosen explanation, refitted under that floor
     variance: FloatArray
+    # (N,) groups of slip that were left out in turn; -1 for rows of a reference
     groups: IndexArray
     curves: Curves
-    gap: Mapping[str, QuantityGap]
-    names: tuple[Naming, ...] = ()
-    doubtful: tuple[Naming, ...] = ()
-    proposal: Proposal | None = None
+    gap: Mapping[str, QuantityGap]  # quantity -> QuantityGap
+    names: tuple[Naming, ...] = ()  # strongest first; empty unless ``named``
+    doubtful: tuple[Naming, ...] = ()  # names that would have been given, were they likely enough
+    proposal: Proposal | None = None  # A law, where something is missing and no name is given
 
     @property
     def left(self) -> Remainder:

@@ -44,81 +44,44 @@ class FittedParameter:
 
 @dataclass(frozen=True)
 class NamedEffect:
-    """An effect that was added to the model.
+    """An effect that was added to the model."""
 
-    Attributes
-    ----------
-    name, claim, source : str
-        As in the catalogue.
-    parameters : mapping
-        Parameter name -> fitted parameter.
-    confidence : float
-        Probability that the name is right, calibrated on synthetic campaigns.
-    confidence_of_set : float
-        Probability that the name or one of ``confounded_with`` is right.
-    confounded_with : tuple of str
-        Effects that the data cannot tell from it, most probable first.
-    remainder : bool
-        True where something smooth is left that it does not explain.
-    separates : mapping
-        Confounded name -> what would separate the two, from the catalogue.
-    features : mapping
-        What the confidence was computed from (``confidence.FEATURES``).
-    form : str
-        Which form of the effect; empty where it has one only.
-    other_forms : mapping
-        Other form that was tried -> how far it is behind [nats].
-    """
-
-    name: str
-    parameters: Mapping[str, FittedParameter]
-    confidence: float
-    confidence_of_set: float
+    name: str  # as ``claim`` and ``source`` in the catalogue
+    parameters: Mapping[str, FittedParameter]  # parameter name -> fitted parameter
+    confidence: float  # probability that the name is right, calibrated on synthetic campaigns
+    confidence_of_set: float  # probability that the name or one of ``confounded_with`` is right
+    # Effects that the data cannot tell from it, most probable first
     confounded_with: tuple[str, ...] = ()
-    remainder: bool = False
+    remainder: bool = False  # True where something smooth is left that it does not explain
     claim: str = field(default='', metadata=_ASIDE)
     source: str = field(default='', metadata=_ASIDE)
+    # Confounded name -> what would separate the two, from the catalogue
     separates: Mapping[str, str] = field(default_factory=dict, metadata=_ASIDE)
+    # What the confidence was computed from (``confidence.FEATURES``)
     features: Mapping[str, float] = field(default_factory=dict, metadata=_ASIDE)
-    form: str = ''
+    form: str = ''  # which form of the effect; empty where it has one only
+    # Other form that was tried -> how far it is behind [nats]
     other_forms: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """One set of effects that was fitted, the empty one (``nothing``) included.
-
-    Attributes
-    ----------
-    names : tuple of str
-        The effects in it.
-    log_evidence : float
-        Log marginal likelihood relative to ``nothing``: above 0 the data speak for it.
-    probability : float
-        Posterior probability among all fitted sets.
-    held_out_gain : float
-        Log predictive score on groups of rows that the fit did not see, relative to the soil refit.
-    chi2, degrees_of_freedom : float
-        Of the residual after the fit, whitened by the noise.
-    parameters : mapping
-        ``effect.parameter`` -> fitted parameter.
-    size : float
-        Distance d' to the best soil refit, in noise standard deviations, at the fitted values.
-    why_not : str
-        Why it was not added; empty for the chosen one.
-    """
+    """One set of effects that was fitted, the empty one (``nothing``) included."""
 
     json_also: ClassVar[Mapping[str, str]] = {'name': 'label', 'form': 'form'}
 
-    names: tuple[str, ...] = field(metadata=_ASIDE)
+    names: tuple[str, ...] = field(metadata=_ASIDE)  # the effects in it
+    # Log marginal likelihood relative to ``nothing``: above 0 the data speak for it
     log_evidence: float
-    probability: float
+    probability: float  # posterior probability among all fitted sets
+    # Log predictive score on groups of rows that the fit did not see, relative to the soil refit
     held_out_gain: float
-    chi2: float
+    chi2: float  # of the residual after the fit, whitened by the noise
     degrees_of_freedom: float = field(metadata=_ASIDE)
-    parameters: Mapping[str, FittedParameter]
+    parameters: Mapping[str, FittedParameter]  # ``effect.parameter`` -> fitted parameter
+    # Distance d' to the best soil refit, in noise standard deviations, at the fitted values
     size: float = field(metadata=_ASIDE)
-    why_not: str = ''
+    why_not: str = ''  # why it was not added; empty for the chosen one
 
     @property
     def label(self) -> str:
@@ -171,47 +134,28 @@ class LeftOut:
 
 @dataclass(frozen=True)
 class Proposal:
-    """A law in the closures of the model for what no listed effect explains.
+    """A law in the closures of the model for what no listed effect explains."""
 
-    Attributes
-    ----------
-    words : str
-        What it says.
-    targets, features : tuple of str
-        Each term changes a target with a feature (``effects.learned_closure`` lists both).
-    coefficients, coefficients_std : tuple of float
-    gap : mapping
-        Quantity -> as in ``Diagnosis.gap``, with the law as ``after``.
-    resembles : tuple of str
-        Listed effects of like signature.
-    not_trusted : tuple of str
-        Where it must not be used.
-    left_out : mapping
-        Input -> quantity -> errors on whole levels of the input that were left out.
-    soil, refitted
-        As in ``Diagnosis``, refitted with the law.
-    fit : Fit or None
-        The fitted model, law included.
-    soil_held : bool
-        Refit and law hold the soil where it can be believed: another soil alone would leave no
-        gap, but is too far from the configured one.
-    closed : float
-        Share of the refit's gap on left-out levels that the law closes.
-    """
-
-    words: str
+    words: str  # what it says
+    # Each term changes a target with a feature (``effects.learned_closure`` lists both)
     targets: tuple[str, ...]
     features: tuple[str, ...]
     coefficients: tuple[float, ...]
     coefficients_std: tuple[float, ...]
+    # Quantity -> as in ``Diagnosis.gap``, with the law as ``after``
     gap: Mapping[str, QuantityGap]
-    resembles: tuple[str, ...]
-    not_trusted: tuple[str, ...]
+    resembles: tuple[str, ...]  # listed effects of like signature
+    not_trusted: tuple[str, ...]  # where it must not be used
+    # Input -> quantity -> errors on whole levels of the input that were left out
     left_out: Mapping[str, Mapping[str, LeftOut]]
+    # As in ``Diagnosis``, refitted with the law
     soil: tuple[SoilShift, ...] = field(default=(), metadata=_ASIDE)
     refitted: Mapping[str, FittedParameter] = field(default_factory=dict, metadata=_ASIDE)
-    fit: Fit | None = field(default=None, metadata=_ASIDE)
+    fit: Fit | None = field(default=None, metadata=_ASIDE)  # the fitted model, law included
+    # Refit and law hold the soil where it can be believed: another soil alone would leave no gap,
+    # but is too far from the configured one
     soil_held: bool = False
+    # Share of the refit's gap on left-out levels that the law closes
     closed: float = field(default=0.0, metadata=_ASIDE)
 
 
@@ -227,42 +171,23 @@ class InputRange:
 
 @dataclass(frozen=True)
 class Where:
-    """Where model (soil refitted) and measurement disagree most.
-
-    Attributes
-    ----------
-    sentence : str
-        For people.
-    quantity : str
-        The quantity with the largest share of the misfit.
-    shares : mapping
-        Quantity -> share of the squared misfit in excess of the noise, 0..1.
-    box : tuple of InputRange
-        Region with the largest gap; empty = everywhere (a constant shift).
-    rows : numpy.ndarray
-        Indices of the table rows inside the box.
-    share_of_gap, share_of_rows : float
-        Share of the misfit and of the rows inside.
-    mean : float
-        Mean of measured minus model inside, in the unit of ``quantity``.
-    mean_in_noise_std : float
-        The same in noise standard deviations.
-    p_value : float
-        Of the box, calibrated by the parametric bootstrap of the soil refit.
-    """
+    """Where model (soil refitted) and measurement disagree most."""
 
     json_also: ClassVar[Mapping[str, str]] = {'unit': 'unit'}
 
-    sentence: str
-    quantity: str
+    sentence: str  # for people
+    quantity: str  # the quantity with the largest share of the misfit
+    # Quantity -> share of the squared misfit in excess of the noise, 0..1
     shares: Mapping[str, float]
+    # Region with the largest gap; empty = everywhere (a constant shift)
     box: tuple[InputRange, ...]
-    rows: NDArray[np.intp]
+    rows: NDArray[np.intp]  # indices of the table rows inside the box
+    # Shares of the misfit and of the rows inside
     share_of_gap: float
     share_of_rows: float
-    mean: float
-    mean_in_noise_std: float
-    p_value: float
+    mean: float  # mean of measured minus model inside, in the unit of ``quantity``
+    mean_in_noise_std: float  # the same in noise standard deviations
+    p_value: float  # of the box, calibrated by the parametric bootstrap of the soil refit
 
     @property
     def unit(self) -> str:
@@ -272,27 +197,16 @@ class Where:
 
 @dataclass(frozen=True)
 class NextMeasurement:
-    """A measurement that would settle what stays open.
+    """A measurement that would settle what stays open."""
 
-    Attributes
-    ----------
-    what : str
-        For people.
-    separates : tuple of str
-        The two rivals (``nothing`` may be one).
-    distance_now, distance_then : float
-        Distance between the rivals' best fits in noise standard deviations, before and with it.
-    rows : mapping or None
-        Column -> values of the proposed rows (SI); None for a zero check of an instrument.
-    predictions : mapping
-        Rival -> (n, 3) predicted sinkage, drawbar pull, torque of these rows.
-    """
-
-    what: str
-    separates: tuple[str, ...]
+    what: str  # for people
+    separates: tuple[str, ...]  # the two rivals (``nothing`` may be one)
+    # Distances between the rivals' best fits in noise standard deviations, before and with it
     distance_now: float
     distance_then: float
+    # Column -> values of the proposed rows (SI); None for a zero check of an instrument
     rows: Mapping[str, FloatArray] | None = None
+    # Rival -> (n, 3) predicted sinkage, drawbar pull, torque of these rows
     predictions: Mapping[str, FloatArray] = field(default_factory=dict, metadata=_ASIDE)
 
 
@@ -346,87 +260,45 @@ class Noise:
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """Everything a diagnosis found.
+    """Everything a diagnosis found."""
 
-    Attributes
-    ----------
-    verdict : str
-        One of ``VERDICTS``.
-    sentence : str
-        The verdict for people, in one or two sentences.
-    table : SteadyTable
-    configuration : Configuration
-    effects : tuple of NamedEffect
-        Strongest first; empty unless ``named``.
-    candidates : tuple of Candidate
-        Best first, ``nothing`` among them.
-    gap : mapping
-        Quantity -> QuantityGap.
-    not_tried : mapping
-        Effect of the catalogue that was not tried -> why.
-    not_visible : mapping
-        Effect -> why these rows could not have shown it.
-    smallest_visible : mapping
-        Effect -> (parameter, smallest size that these rows would have shown, unit).
-    where : Where
-    next_measurement : tuple of NextMeasurement
-    curves : Curves
-    noise : Noise
-    soil : tuple of SoilShift
-    outliers : tuple of (int, str, float)
-        Row index, quantity, deviation in standard deviations of the cells that were set apart.
-    gap_p_value : float
-        Of the test "the soil alone explains these rows".
-    remainder_p_value, remainder_amplitude : float
-        Of what is left after the fit, and the smooth part in it as a share of the range.
-    floor : float
-        Model-error floor in use, as a share of each quantity's range.
-    notes : tuple of str
-        Warnings for people (units, duplicates, constant columns, soil pulls).
-    base_effects : tuple of str
-        Effects that the configuration had switched on already.
-    refitted : mapping
-        ``effect.parameter`` -> fitted value, of parameters that were on already.
-    along_rows : tuple of Change
-        Quantities whose residuals change along the order of the rows.
-    nearest : tuple of str
-        Where nothing was named: the effects that come nearest.
-    proposal : Proposal or None
-        A law for what no listed effect explains, where one helps.
-    structural_error : StructuralError or None
-        Smooth misfit that is left at the rows, beyond the law where one is proposed.
-    seconds : float
-        Time the diagnosis took.
-    """
-
-    verdict: str
-    sentence: str
+    verdict: str  # one of ``VERDICTS``
+    sentence: str  # the verdict for people, in one or two sentences
     table: SteadyTable = field(metadata=_ASIDE)
     configuration: Configuration = field(metadata=_ASIDE)
-    effects: tuple[NamedEffect, ...]
-    candidates: tuple[Candidate, ...]
-    gap: Mapping[str, QuantityGap]
+    effects: tuple[NamedEffect, ...]  # strongest first; empty unless ``named``
+    candidates: tuple[Candidate, ...]  # best first, ``nothing`` among them
+    gap: Mapping[str, QuantityGap]  # quantity -> QuantityGap
+    # Effect -> why these rows could not have shown it
     not_visible: Mapping[str, str] = field(metadata=_ASIDE)
+    # Effect -> (parameter, smallest size that these rows would have shown, unit)
     smallest_visible: Mapping[str, tuple[str, float, str]] = field(metadata=_ASIDE)
     where: Where
     next_measurement: tuple[NextMeasurement, ...]
     curves: Curves = field(metadata=_ASIDE)
     noise: Noise = field(metadata=_ASIDE)
     soil: tuple[SoilShift, ...]
+    # Row index, quantity, deviation in standard deviations of the cells that were set apart
     outliers: tuple[tuple[int, str, float], ...] = field(metadata=_ASIDE)
-    gap_p_value: float
+    gap_p_value: float  # of the test "the soil alone explains these rows"
+    # Of what is left after the fit, and the smooth part in it as a share of the range
     remainder_p_value: float = field(metadata=_ASIDE)
     remainder_amplitude: float = field(metadata=_ASIDE)
-    floor: float
+    floor: float  # model-error floor in use, as a share of each quantity's range
+    # Warnings for people (units, duplicates, constant columns, soil pulls)
     notes: tuple[str, ...] = ()
-    base_effects: tuple[str, ...] = ()
+    base_effects: tuple[str, ...] = ()  # effects that the configuration had switched on already
+    # ``effect.parameter`` -> fitted value, of parameters that were on already
     refitted: Mapping[str, FittedParameter] = field(default_factory=dict)
-    nearest: tuple[str, ...] = ()
+    nearest: tuple[str, ...] = ()  # where nothing was named: the effects that come nearest
+    # Quantities whose residuals change along the order of the rows
     along_rows: tuple[Change, ...] = ()
-    proposal: Proposal | None = None
+    proposal: Proposal | None = None  # A law for what no listed effect explains, where one helps
+    # Smooth misfit that is left at the rows, beyond the law where one is proposed
     structural_error: StructuralError | None = None
+    # Effect of the catalogue that was not tried -> why
     not_tried: Mapping[str, str] = field(default_factory=dict)
-    seconds: float = field(default=0.0, metadata=_ASIDE)
+    seconds: float = field(default=0.0, metadata=_ASIDE)  # time the diagnosis took
 
     def __repr__(self) -> str:
         """Return the verdict in words, and the error of each quantity on unseen rows."""

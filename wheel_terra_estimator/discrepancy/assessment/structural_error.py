@@ -28,24 +28,16 @@ _SHORTENED = (0.5, 0.25)
 
 @dataclass(frozen=True)
 class StructuralError:
-    """Smooth misfit of the fitted model at the rows of the table.
+    """Smooth misfit of the fitted model at the rows of the table."""
 
-    Attributes
-    ----------
-    amplitude : tuple of float
-        Its most probable standard deviation as a share of the range of each quantity [-].
-    residual, mean, std : numpy.ndarray
-        (N, 3) sinkage [m], drawbar pull [N], torque [N m]: measured minus model, the structural
-        error in it and its standard deviation, the parameters taken as fitted. nan = not measured.
-    beyond_law : bool
-        True where the model is the one with the proposed law.
-    """
-
+    # Its most probable standard deviation as a share of the range of each quantity [-]
     amplitude: tuple[float, float, float]
+    # (N, 3) sinkage [m], drawbar pull [N], torque [N m]: measured minus model, the structural
+    # error in it and its standard deviation, the parameters taken as fitted. nan = not measured.
     residual: FloatArray
     mean: FloatArray
     std: FloatArray
-    beyond_law: bool = False
+    beyond_law: bool = False  # True where the model is the one with the proposed law
 
     def to_json(self) -> dict[str, Any]:
         """Return the keys of ``report.json``; mean and deviation row by row."""

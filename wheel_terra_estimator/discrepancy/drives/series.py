@@ -47,31 +47,18 @@ class Channel:
 
 @dataclass(frozen=True)
 class DriveSeries:
-    """Everything that a drive measured; stamps count from the first wheel odometry.
+    """Everything that a drive measured; stamps count from the first wheel odometry."""
 
-    Attributes
-    ----------
-    rate, torque : Channel
-        (k, n) wheel rates [rad/s] and drive torques [N m] at the same stamps, nan = not in the
-        message.
-    specific_force : Channel
-        (k, 3) [m/s^2].
-    yaw_rate : Channel
-        (k, 1) [rad/s].
-    sinkage : Channel
-        (k, n) [m], nan = no reading.
-    reference : Channel
-        (k, 2) forward velocity of the body [m/s] and its stated variance [(m/s)^2].
-    smoothed : Channel or None
-        The same of the fixed-interval smoother: the slip comes from it where it is there.
-    """
-
+    # (k, n) wheel rates [rad/s] and drive torques [N m] at the same stamps, nan = not in the
+    # message
     rate: Channel
     torque: Channel
-    specific_force: Channel
-    yaw_rate: Channel
-    sinkage: Channel
+    specific_force: Channel  # (k, 3) [m/s^2]
+    yaw_rate: Channel  # (k, 1) [rad/s]
+    sinkage: Channel  # (k, n) [m], nan = no reading
+    # (k, 2) forward velocity of the body [m/s] and its stated variance [(m/s)^2]
     reference: Channel
+    # The same of the fixed-interval smoother: the slip comes from it where it is there
     smoothed: Channel | None = None
 
     @property

@@ -85,71 +85,39 @@ QUALITIES = (
 
 @dataclass(frozen=True)
 class Window:
-    """Means of a steady window and what their scatter says.
+    """Means of a steady window and what their scatter says."""
 
-    Attributes
-    ----------
-    start, end : float
-        [s] from the first wheel odometry.
-    passages : int
-        Lug passages in it (0 for a smooth wheel).
-    slip, normal_load, torque, sinkage, rate : numpy.ndarray
-        (n,) means; nan = not measured.
-    pull : float
-        Mean pull per wheel [N], along the local slope.
-    slope : float
-        Slope of the ground, positive uphill in the direction of travel [rad].
-    scatter : mapping
-        ``slip``, ``torque``, ``sinkage`` -> (n,), ``pull`` -> (1,): variance between segments.
-    segments : int
-        Number of segments.
-    series : mapping
-        As ``scatter``: (segments, n) means, from which the correlation is pooled.
-    reference_std : float
-        Standard deviation of the mean reference velocity as its messages, or the smoother, state
-        it [m/s].
-    """
-
+    # [s] from the first wheel odometry
     start: float
     end: float
-    passages: int
+    passages: int  # lug passages in it (0 for a smooth wheel)
+    # (n,) means; nan = not measured
     slip: FloatArray
     normal_load: FloatArray
     torque: FloatArray
     sinkage: FloatArray
     rate: FloatArray
-    pull: float
-    slope: float
+    pull: float  # mean per wheel [N], along the local slope
+    slope: float  # of the ground, positive uphill in the direction of travel [rad]
     segments: int
+    # ``slip``, ``torque``, ``sinkage``, ``pull`` -> means of the segments, (segments, n or 1)
     series: Mapping[str, FloatArray]
+    # Of the mean reference velocity, as its messages or the smoother state it [m/s]
     reference_std: float
     std: Mapping[str, FloatArray] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
 class DriveRows:
-    """Rows of a drive as columns of the table format, and what was found on the way.
+    """Rows of a drive as columns of the table format, and what was found on the way."""
 
-    Attributes
-    ----------
-    name : str
-        Where the drive came from.
-    columns : mapping
-        Column -> (N,) values [SI], nan = not measured.
-    windows : tuple of Window
-        The steady ones.
-    stretches, seconds : mapping
-        Quality -> number of stretches and how long they were; ``steady`` are the windows.
-    notes : tuple of str
-        For people.
-    """
-
-    name: str
-    columns: Mapping[str, FloatArray]
-    windows: tuple[Window, ...]
+    name: str  # where the drive came from
+    columns: Mapping[str, FloatArray]  # column -> (N,) values [SI], nan = not measured
+    windows: tuple[Window, ...]  # the steady ones
+    # Quality -> number of stretches and how long they were; ``steady`` are the windows
     stretches: Mapping[str, int]
     seconds: Mapping[str, float]
-    notes: tuple[str, ...]
+    notes: tuple[str, ...]  # for people
 
     def table(self) -> SteadyTable:
         """Return the rows as a checked table: the stated errors of the sensors are off already."""

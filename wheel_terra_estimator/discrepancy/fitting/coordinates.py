@@ -42,42 +42,24 @@ LOOSE = 6.0
 
 @dataclass(frozen=True)
 class Coordinate:
-    """One free parameter; value = transform(centre + scale u) with u ~ N(0, 1) in [lower, upper].
+    """One free parameter: transform(centre + scale u) with u ~ N(0, 1) in [lower, upper]."""
 
-    Attributes
-    ----------
-    owner : str
-        ``soil``, or the name of an effect.
-    name : str
-        Field of ``Soil`` (``stiffness`` = both bearing moduli), or parameter of the effect.
-    centre, scale : float
-        In the space of the transform.
-    lower, upper : float
-        Bounds of u.
-    role : str
-        ``soil``, ``strength`` (first of an effect, or without effect at its centre) or ``shape``.
-    logarithmic : bool
-        The transform is the exponential.
-    neutral : float
-        Value of an effect's parameter at which the term vanishes.
-    unit, meaning : str
-        For people.
-    source : str
-        Where the deviation of a soil number comes from.
-    """
-
-    owner: str
+    owner: str  # ``soil``, or the name of an effect
+    # Field of ``Soil`` (``stiffness`` = both bearing moduli), or parameter of the effect
     name: str
-    centre: float
+    centre: float  # as ``scale``, in the space of the transform
     scale: float
+    # Bounds of u
     lower: float = -math.inf
     upper: float = math.inf
-    logarithmic: bool = False
+    logarithmic: bool = False  # the transform is the exponential
+    # ``soil``, ``strength`` (first of an effect, or without effect at its centre) or ``shape``
     role: str = 'soil'
-    neutral: float = 0.0
+    neutral: float = 0.0  # value of an effect's parameter at which the term vanishes
+    # For people
     unit: str = '-'
     meaning: str = ''
-    source: str = ''
+    source: str = ''  # where the deviation of a soil number comes from
 
     @property
     def key(self) -> str:

@@ -46,24 +46,12 @@ class Floor:
 
 @dataclass(frozen=True)
 class Posterior:
-    """Linear posterior of one hypothesis for every floor.
+    """Linear posterior of one hypothesis for every floor."""
 
-    Attributes
-    ----------
-    log_evidence : numpy.ndarray
-        (F,) without the prior of the floor.
-    mean : numpy.ndarray
-        (F, P) of u.
-    covariance : numpy.ndarray
-        (F, P, P).
-    noise_factor : numpy.ndarray
-        (F, 3) most probable factor on the noise.
-    """
-
-    log_evidence: FloatArray
-    mean: FloatArray
-    covariance: FloatArray
-    noise_factor: FloatArray
+    log_evidence: FloatArray  # (F,) without the prior of the floor
+    mean: FloatArray  # (F, P) of u
+    covariance: FloatArray  # (F, P, P)
+    noise_factor: FloatArray  # (F, 3) most probable factor on the noise
 
 
 def log_sum(values: FloatArray, axis: int | None = None) -> FloatArray:

@@ -307,7 +307,8 @@ class Forward:
         angle: FloatArray,
     ) -> FloatArray:
         given = np.asarray(getattr(self.points, name), dtype=float)
-        beside = self.at(replace(self.points, **{name: given + step}))
+        moved: dict[str, Any] = {name: given + step}
+        beside = self.at(replace(self.points, **moved))
         base, other = (
             model.solve([hypothesis], [u], angle[None], jacobian=False).outputs[0]
             for model in (self, beside)

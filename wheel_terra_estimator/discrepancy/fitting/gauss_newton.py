@@ -26,42 +26,20 @@ _CLOSE_ENOUGH = 0.02  # in the objective
 
 @dataclass
 class Fit:
-    """A fitted hypothesis, with its linearisation in rotated coordinates.
+    """A fitted hypothesis, with its linearisation in rotated coordinates."""
 
-    Attributes
-    ----------
-    names : tuple of str
-        The effects in it.
-    coordinates : tuple of Coordinate
-    u : numpy.ndarray
-        (P,) fitted coordinates.
-    outputs : numpy.ndarray
-        (N, 3) fitted values.
-    angle : numpy.ndarray
-        (N,) entrance angles [rad].
-    sensitivity : numpy.ndarray
-        (m, P) derivative of the cells by u.
-    residual, jacobian : numpy.ndarray
-        (m,) and (m, P), whitened and rotated, at u.
-    variance : numpy.ndarray
-        (m,) of the fit.
-    objective : float
-        Half of chi-square plus prior.
-    prior : numpy.ndarray
-        (P,) precision of u in the fit.
-    """
-
-    names: tuple[str, ...]
+    names: tuple[str, ...]  # the effects in it
     coordinates: tuple[Coordinate, ...]
-    u: FloatArray
-    outputs: FloatArray
-    angle: FloatArray
-    sensitivity: FloatArray
+    u: FloatArray  # (P,) fitted coordinates
+    outputs: FloatArray  # (N, 3) fitted values
+    angle: FloatArray  # (N,) entrance angles [rad]
+    sensitivity: FloatArray  # (m, P) derivative of the cells by u
+    # (m,) and (m, P), whitened and rotated, at u
     residual: FloatArray
     jacobian: FloatArray
-    variance: FloatArray
-    objective: float
-    prior: FloatArray
+    variance: FloatArray  # (m,) of the fit
+    objective: float  # half of chi-square plus prior
+    prior: FloatArray  # (P,) precision of u in the fit
 
     def precision(self) -> FloatArray:
         """Posterior precision of u."""

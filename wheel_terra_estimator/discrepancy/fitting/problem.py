@@ -29,40 +29,21 @@ OUTLIER_FACTOR = 12.0
 
 @dataclass(frozen=True)
 class Problem:
-    """Cells of a table in whitened, rotated coordinates.
+    """Cells of a table in whitened, rotated coordinates."""
 
-    Attributes
-    ----------
-    observed : numpy.ndarray
-        (m,) measured values.
-    row, quantity : numpy.ndarray
-        (m,) indices of each cell.
-    std : numpy.ndarray
-        (m,) noise standard deviation, inflated for outliers.
-    outlier : numpy.ndarray
-        (m,) bool.
-    scale : numpy.ndarray
-        (3,) range of each quantity: the unit of the floor.
-    rotation : numpy.ndarray
-        (m, m) whitening and rotation.
-    roughness : numpy.ndarray
-        (m,) variance of the floor along each rotated axis at amplitude 1, in noise variances.
-    block : numpy.ndarray
-        (m,) quantity to which each rotated axis belongs; -1 where slip errors mix them.
-    log_std : float
-        Sum of the logarithms of the noise (half the log determinant at amplitude 0).
-    """
-
-    observed: FloatArray
+    observed: FloatArray  # (m,) measured values
+    # (m,) indices of each cell
     row: IndexArray
     quantity: IndexArray
-    std: FloatArray
-    outlier: NDArray[np.bool_]
-    scale: FloatArray
-    rotation: FloatArray
+    std: FloatArray  # (m,) noise standard deviation, inflated for outliers
+    outlier: NDArray[np.bool_]  # (m,) bool
+    scale: FloatArray  # (3,) range of each quantity: the unit of the floor
+    rotation: FloatArray  # (m, m) whitening and rotation
+    # (m,) variance of the floor along each rotated axis at amplitude 1, in noise variances
     roughness: FloatArray
+    # (m,) quantity to which each rotated axis belongs; -1 where slip errors mix them
     block: IndexArray
-    log_std: float
+    log_std: float  # sum of the logarithms of the noise (half the log determinant at amplitude 0)
 
     @property
     def size(self) -> int:
@@ -109,21 +90,11 @@ class Problem:
 
 @dataclass(frozen=True)
 class CommonError:
-    """Error of an input, felt by all quantities of the rows that share the reading.
+    """Error of an input, felt by all quantities of the rows that share the reading."""
 
-    Attributes
-    ----------
-    slope : numpy.ndarray
-        (N, 3) derivative of the quantities by the input.
-    std : numpy.ndarray
-        (N,) standard deviation of the input.
-    group : numpy.ndarray
-        (N,) rows of the same number share one reading.
-    """
-
-    slope: FloatArray
-    std: FloatArray
-    group: IndexArray
+    slope: FloatArray  # (N, 3) derivative of the quantities by the input
+    std: FloatArray  # (N,) standard deviation of the input
+    group: IndexArray  # (N,) rows of the same number share one reading
 
 
 def kernel(inputs: FloatArray) -> FloatArray:

@@ -21,8 +21,8 @@ from wheel_terra_estimator.discrepancy.report.words import (
     soil_line,
 )
 from wheel_terra_estimator.discrepancy.result import Diagnosis, FittedParameter, NextMeasurement
-from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES
 from wheel_terra_estimator.reporting.html import picture, render, write_page
+from wheel_terra_estimator.terramechanics.effects import catalogue
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -55,6 +55,8 @@ def write_report(diagnosis: Diagnosis, folder: str | Path) -> Path:
     another_soil = far_soil(diagnosis) if diagnosis.verdict == 'agrees' else []
     configuration, keys = corrected(diagnosis)
     new, old = configuration.flat(), diagnosis.configuration.flat()
+    known = catalogue()
+    used = dict.fromkeys([*(e.name for e in diagnosis.effects), *diagnosis.base_effects])
     page = render(
         'diagnosis.html',
         TEMPLATES,
@@ -62,49 +64,44 @@ def write_report(diagnosis: Diagnosis, folder: str | Path) -> Path:
         tone='warn' if another_soil else _TONES[diagnosis.verdict],
         another_soil=another_soil,
         said=in_words(diagnosis),
-        left_out=_left_out(diagnosis),
         title=Path(diagnosis.table.name).name,
         cards=_cards(diagnosis),
         figures=_figures(folder, diagnosis),
-        gap=[_gap_row(name, item) for name, item in diagnosis.gap.items()],
-        effects=[_effect(effect) for effect in diagnosis.effects],
-        candidates=_candidates(diagnosis),
-        soil=[_soil_row(shift) for shift in diagnosis.soil],
-        noise=_noise(diagnosis),
-        outliers=[
-            (int(diagnosis.table.lines[row]), pictures.words(quantity), f'{size:.1f}')
-            for row, quantity, size in diagnosis.outliers
-        ],
-        next_measurements=[_next(item) for item in diagnosis.next_measurement],
-        visible=[
-            (name, f'{parameter} {number(size)}{_unit(unit)}')
-            for name, (parameter, size, unit) in sorted(diagnosis.smallest_visible.items())
-        ],
+        best=max([10.0, *(c.log_evidence for c in diagnosis.candidates)]),
+        noise=diagnosis.to_dict()['noise'],
         changes=[
             (key, _before(diagnosis, key, old.get(key)), shown(new[key]))
             for key in keys
             if key in new and shown(old.get(key)) != shown(new[key])
         ],
-        sources=_sources(diagnosis),
+        sources=[(pictures.words(name), known[name].source) for name in used if name in known],
         sentence=diagnosis.sentence.replace('+-', '±'),
         soil_line=soil_line(diagnosis),
         where=_where(diagnosis),
+        soil_words=SOIL_WORDS,
+        far=STRONG_PULL,
+        # How things are written
+        words=pictures.words,
+        number=number,
+        amount=_amount,
+        unit_of=lambda quantity: pictures.SHOWN[quantity][1],
+        with_unit=_with_unit,
+        parameter=_parameter,
+        share=_share,
+        proposed=_proposed,
     )
     path = folder / 'report.html'
     write_page(path, page)
     return path
 
 
-def _left_out(diagnosis: Diagnosis) -> list[tuple[str, str, str, str]]:
-    """Rows (left out, quantity, refitted, with the law) of a proposed law."""
-    rows = []
-    for name, quantities in (diagnosis.proposal.left_out if diagnosis.proposal else {}).items():
-        for quantity, item in quantities.items():
-            scale, unit = pictures.SHOWN[quantity]
-            texts = [number(scale * value) for value in (item.refit, item.law)]
-            shown_name = f'{pictures.words(quantity)} [{unit}]'
-            rows.append((pictures.words(name), shown_name, texts[0], texts[1]))
-    return rows
+def _amount(quantity: str, value: float | None, digits: int = 3) -> str:
+    """Return a value of a quantity as it is shown, without its unit."""
+    return '-' if value is None else number(pictures.SHOWN[quantity][0] * value, digits)
+
+
+def _with_unit(text: str, unit: str) -> str:
+    return text if unit in ('', '-') else f'{text} {unit}'
 
 
 def shown(value: Any) -> str:
@@ -132,10 +129,6 @@ def _where(diagnosis: Diagnosis) -> str:
     for name in diagnosis.table.columns:
         text = text.replace(name, pictures.words(name))
     return text[:1].upper() + text[1:].rstrip('.') + '.'
-
-
-def _unit(unit: str) -> str:
-    return '' if unit in ('', '-') else f' {unit}'
 
 
 def _cards(diagnosis: Diagnosis) -> list[dict[str, str]]:
@@ -227,75 +220,11 @@ def _figures(folder: Path, diagnosis: Diagnosis) -> dict[str, Any]:
     }
 
 
-def _gap_row(name: str, item: Any) -> dict[str, str]:
-    scale, unit = pictures.SHOWN[name]
-    row = {
-        'name': f'{pictures.words(name)} [{unit}]',
-        'before': number(scale * item.before),
-        'refit': number(scale * item.refit),
-        'after': number(scale * item.after),
-        'noise': '-' if item.noise is None else number(scale * item.noise),
-        'floor': number(scale * item.floor, 2) if item.floor else '-',
-        'rows': str(item.rows),
-        'shrink': '-',
-    }
-    if item.shrink is not None:
-        row['shrink'] = f'{100 * item.shrink:.0f} %'
-        if item.shrink_low is not None and item.shrink_high is not None:
-            row['shrink'] += f' ({100 * item.shrink_low:.0f} to {100 * item.shrink_high:.0f})'
-    return row
-
-
 def _parameter(name: str, item: FittedParameter) -> str:
-    text = f'{name} = {number(item.value)} ± {number(item.std, 2)}{_unit(item.unit)}'
+    value = _with_unit(f'{number(item.value)} ± {number(item.std, 2)}', item.unit)
     reach = item.upper - item.lower
-    if np.isfinite(reach) and min(item.value - item.lower, item.upper - item.value) < 1e-3 * reach:
-        text += ' (at its bound)'
-    return text
-
-
-def _effect(effect: Any) -> dict[str, Any]:
-    return {
-        'name': pictures.words(effect.name),
-        'key': effect.name,
-        'claim': effect.claim,
-        'parameters': [
-            (_parameter(name, item), item.meaning) for name, item in effect.parameters.items()
-        ],
-        'confidence': f'{100 * effect.confidence:.0f} %',
-        'confidence_of_set': f'{100 * effect.confidence_of_set:.0f} %',
-        'confounded': [
-            (pictures.words(name), effect.separates.get(name, ''))
-            for name in effect.confounded_with
-        ],
-        'remainder': effect.remainder,
-    }
-
-
-def _candidates(diagnosis: Diagnosis) -> list[dict[str, Any]]:
-    best = max((c.log_evidence for c in diagnosis.candidates), default=0.0)
-    span = max(best, 10.0)
-    rows = []
-    for candidate in diagnosis.candidates:
-        rows.append(
-            {
-                'label': pictures.words(candidate.full_label),
-                'chosen': bool(candidate.names) and not candidate.why_not,
-                'parameters': [
-                    f'{key.split(".")[-1]} {number(item.value)} ± {number(item.std, 2)}'
-                    + _unit(item.unit)
-                    for key, item in candidate.parameters.items()
-                ],
-                'log_evidence': f'{candidate.log_evidence:.1f}',
-                'bar': f'{100 * float(np.clip(candidate.log_evidence / span, 0.0, 1.0)):.0f}',
-                'probability': _share(candidate.probability),
-                'held_out_gain': f'{candidate.held_out_gain:.1f}',
-                'fit': f'{candidate.chi2:.0f} / {candidate.degrees_of_freedom:.0f}',
-                'size': f'{candidate.size:.1f}',
-                'why_not': candidate.why_not,
-            }
-        )
-    return rows
+    end = np.isfinite(reach) and min(item.value - item.lower, item.upper - item.value)
+    return f'{name} = {value}{" (at its bound)" if end is not False and end < 1e-3 * reach else ""}'
 
 
 def _share(value: float) -> str:
@@ -304,62 +233,14 @@ def _share(value: float) -> str:
     return '> 99.9 %' if value > 0.999 else f'{100 * value:.1f} %'
 
 
-def _soil_row(shift: Any) -> dict[str, Any]:
-    return {
-        'name': SOIL_WORDS.get(shift.name, pictures.words(shift.name)),
-        'unit': '' if shift.unit == '-' else shift.unit,
-        'before': f'{number(shift.before)} ± {number(shift.prior_std, 2)}',
-        'refit': number(shift.refit),
-        'after': f'{number(shift.after)} ± {number(shift.after_std, 2)}',
-        'pull': f'{shift.pull:+.1f}',
-        'source': shift.source,
-        'far': abs(shift.pull) > STRONG_PULL,
-        'left': f'{50 + 25 * float(np.clip(shift.pull / STRONG_PULL, -2, 2)):.1f}',
-    }
-
-
-def _noise(diagnosis: Diagnosis) -> list[tuple[str, str, str]]:
-    rows = []
-    for q, name in enumerate(QUANTITIES):
-        if name in diagnosis.noise.origin and name in diagnosis.table.quantities:
-            scale, unit = pictures.SHOWN[name]
-            std = float(np.nanmedian(diagnosis.noise.std[:, q]))
-            rows.append(
-                (
-                    pictures.words(name),
-                    f'{number(scale * std, 2)} {unit}',
-                    diagnosis.noise.origin[name],
-                )
-            )
-    return rows
-
-
-def _next(item: NextMeasurement) -> dict[str, Any]:
-    rows = None
-    if item.rows is not None:
-        names = [name for name in item.rows if len(item.rows[name])]
-        count = len(item.rows[names[0]]) if names else 0
-        ranges = []
-        for name in names:
-            factor, unit = pictures.shown_input(name)
-            values = factor * np.asarray(item.rows[name], dtype=float)
-            low, high = float(values.min()), float(values.max())
-            text = number(low) if np.isclose(low, high) else f'{number(low)} to {number(high)}'
-            ranges.append(f'{pictures.words(name)} {text}{_unit(unit)}')
-        rows = f'{count} rows: ' + ', '.join(ranges)
-    return {
-        'what': item.what,
-        'rows': rows,
-        'separates': ' / '.join(pictures.words(name) for name in item.separates),
-        'now': f'{item.distance_now:.1f}',
-        'then': f'{item.distance_then:.1f}' if np.isfinite(item.distance_then) else 'decides',
-    }
-
-
-def _sources(diagnosis: Diagnosis) -> list[tuple[str, str]]:
-    """Sources of the effects used: the named ones and those that were on before."""
-    from wheel_terra_estimator.terramechanics.effects import catalogue
-
-    known = catalogue()
-    names = dict.fromkeys([*(e.name for e in diagnosis.effects), *diagnosis.base_effects])
-    return [(pictures.words(name), known[name].source) for name in names if name in known]
+def _proposed(item: NextMeasurement) -> str:
+    """Return the rows of a proposed measurement in words; empty for a check of an instrument."""
+    if item.rows is None:
+        return ''
+    ranges = []
+    for name, column in item.rows.items():
+        factor, unit = pictures.shown_input(name)
+        ends = factor * np.min(column), factor * np.max(column)
+        text = ' to '.join(map(number, ends)) if not np.isclose(*ends) else number(ends[0])
+        ranges.append(_with_unit(f'{pictures.words(name)} {text}', unit))
+    return f'{len(item.rows["slip"])} rows: ' + ', '.join(ranges)

@@ -52,23 +52,13 @@ def evidence_over_all(found: Mapping[str, Diagnosis]) -> dict[str, tuple[float, 
 
 @dataclass(frozen=True)
 class SharedSize:
-    """An effect with one size in several tables, each with a soil of its own.
+    """An effect with one size in several tables, each with a soil of its own."""
 
-    Attributes
-    ----------
-    form : str
-        Name of its form; empty: the first.
-    parameters : mapping
-        Name of the parameter -> value and deviation that all tables give together.
-    log_evidence : float
-        For it, over the soils alone [nats].
-    p_value : float
-        Chance that sizes which are one scatter as much from table to table as these do.
-    """
-
-    form: str
+    form: str  # name of its form; empty: the first
+    # Name of the parameter -> value and deviation that all tables give together
     parameters: Mapping[str, FittedParameter]
-    log_evidence: float
+    log_evidence: float  # for it, over the soils alone [nats]
+    # Chance that sizes which are one scatter as much from table to table as these do
     p_value: float
 
     @property

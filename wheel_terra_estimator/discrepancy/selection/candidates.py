@@ -49,30 +49,17 @@ class Explanation:
 
 @dataclass(frozen=True)
 class Setting:
-    """What all fits of one table share.
-
-    Attributes
-    ----------
-    observed : numpy.ndarray
-        (m,) measured cells (moved along the slip where slip is latent).
-    nuisance : tuple of Coordinate
-        Soil and stated base effects.
-    effects : mapping
-        The visible effects.
-    deepest : float
-        Greatest rim sinkage of the baseline [m].
-    soil_widths : sequence of (width, share)
-        Of the soil's prior, as in ``evidence``.
-    """
+    """What all fits of one table share."""
 
     forward: Forward
     problem: Problem
-    observed: FloatArray
-    nuisance: tuple[Coordinate, ...]
-    effects: Mapping[str, Effect]
+    observed: FloatArray  # (m,) measured cells (moved along the slip where slip is latent)
+    nuisance: tuple[Coordinate, ...]  # soil and stated base effects
+    effects: Mapping[str, Effect]  # the visible effects
     floors: tuple[Floor, ...]
     noise_freedom: FloatArray
-    deepest: float
+    deepest: float  # greatest rim sinkage of the baseline [m]
+    # Of the soil's prior, as in ``evidence``
     soil_widths: Sequence[tuple[float, float]] = SOIL_WIDTHS
 
     def coordinates(self, names: Iterable[str]) -> tuple[Coordinate, ...]:

@@ -28,26 +28,14 @@ IMPROBABLE_SOIL = 0.05
 
 @dataclass(frozen=True)
 class Remainder:
-    """What one explanation leaves.
+    """What one explanation leaves."""
 
-    Attributes
-    ----------
-    probability : float
-        That a smooth misfit beyond the model-error floor is left.
-    probability_of_any : float
-        That any structural error of more than one per cent is left, floor included.
-    amplitude : float
-        Most probable amplitude of the structural error, share of the range.
-    p_value : float
-        Of the whole misfit under the best floor (chi-square).
-    soil_p_value : float
-        Of the soil number that the fit pulls farthest, the choice among them paid for.
-    """
-
-    probability: float
+    probability: float  # that a smooth misfit beyond the model-error floor is left
+    # That any structural error of more than one per cent is left, floor included
     probability_of_any: float
-    amplitude: float
-    p_value: float
+    amplitude: float  # most probable amplitude of the structural error, share of the range
+    p_value: float  # of the whole misfit under the best floor (chi-square)
+    # Of the soil number that the fit pulls farthest, the choice among them paid for
     soil_p_value: float
 
     @property

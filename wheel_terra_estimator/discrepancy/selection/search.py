@@ -61,32 +61,16 @@ _FARTHEST = 2.0  # a slip is moved by at most so many of its deviations
 
 @dataclass(frozen=True)
 class Findings:
-    """Outcome of the search on one table.
+    """Outcome of the search on one table."""
 
-    Attributes
-    ----------
-    setting : Setting
-        Model, cells, noise as used in the end.
-    nothing : Fit
-        Soil refitted only.
-    selection : Selection
-    signatures : mapping
-        Of all effects that the columns can show.
-    not_visible : mapping
-        Effect -> reason.
-    noise : Noise
-    outliers : tuple of (row, quantity, deviation)
-    tried : frozenset of str
-        Effects that might have been named, seen or not, and those that were on already.
-    """
-
-    setting: Setting
-    nothing: Fit
+    setting: Setting  # model, cells, noise as used in the end
+    nothing: Fit  # soil refitted only
     selection: Selection
-    signatures: Mapping[str, Signature]
-    not_visible: Mapping[str, str]
+    signatures: Mapping[str, Signature]  # of all effects that the columns can show
+    not_visible: Mapping[str, str]  # effect -> reason
     noise: Noise
     outliers: tuple[tuple[int, int, float], ...]
+    # Effects that might have been named, seen or not, and those that were on already
     tried: frozenset[str] = frozenset()
 
 

@@ -33,24 +33,13 @@ _DEPTHS = (0.4, 0.65, 0.85)  # of those that are a depth: share of the deepest r
 
 @dataclass(frozen=True)
 class Signature:
-    """Change of the cells by an effect of a large but plausible size.
+    """Change of the cells by an effect of a large but plausible size."""
 
-    Attributes
-    ----------
-    change : numpy.ndarray
-        (m,) whitened and rotated.
-    distance : float
-        d' of that size beyond the soil: noise and prior deviations that a soil refit would need.
-    size : float
-        The size [unit of the first parameter], from neutral.
-    greatest : float
-        d' of the greatest size that is tried (in proportion).
-    """
-
-    change: FloatArray
+    change: FloatArray  # (m,) whitened and rotated
+    # D' of that size beyond the soil: noise and prior deviations that a soil refit would need
     distance: float
-    size: float
-    greatest: float
+    size: float  # the size [unit of the first parameter], from neutral
+    greatest: float  # d' of the greatest size that is tried (in proportion)
 
 
 def against_soil(fitted: Fit, variance: FloatArray, vectors: FloatArray) -> FloatArray:

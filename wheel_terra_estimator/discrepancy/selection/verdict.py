@@ -47,24 +47,13 @@ CLEAN_SHARE = 0.25
 
 @dataclass(frozen=True)
 class Verdict:
-    """What was decided.
+    """What was decided."""
 
-    Attributes
-    ----------
-    word : str
-        ``agrees``, ``named``, ``unexplained`` or ``undecided``.
-    index : int
-        Explanation that is reported as the fit: of the named set, else of nothing.
-    open_sets : tuple of tuple of str
-        For each named effect, the others (in their best form) that the data cannot tell from it.
-    left : Remainder
-        What that explanation leaves.
-    """
-
-    word: str
-    index: int
+    word: str  # ``agrees``, ``named``, ``unexplained`` or ``undecided``
+    index: int  # explanation that is reported as the fit: of the named set, else of nothing
+    # For each named effect, the others (in their best form) that the data cannot tell from it
     open_sets: tuple[tuple[str, ...], ...]
-    left: Remainder
+    left: Remainder  # what that explanation leaves
 
 
 def choose(

@@ -85,22 +85,11 @@ def shared_floors() -> tuple[Floor, ...]:
 
 @dataclass(frozen=True)
 class Selection:
-    """All hypotheses with their posterior probabilities.
+    """All hypotheses with their posterior probabilities."""
 
-    Attributes
-    ----------
-    explanations : tuple of Explanation
-        Best first.
-    log_joint : numpy.ndarray
-        (H, F) log of prior times evidence per explanation and floor.
-    probability : numpy.ndarray
-        (H, F), normalised.
-    floors : tuple of Floor
-    """
-
-    explanations: tuple[Explanation, ...]
-    log_joint: FloatArray
-    probability: FloatArray
+    explanations: tuple[Explanation, ...]  # best first
+    log_joint: FloatArray  # (H, F) log of prior times evidence per explanation and floor
+    probability: FloatArray  # (H, F), normalised
     floors: tuple[Floor, ...]
 
     @property
@@ -118,13 +107,6 @@ class Selection:
         weights = log_sum(self.log_joint[:, ~self.unexplained], axis=1)
         order = np.argsort(-weights)[:count]
         return [(float(weights[h]), self.explanations[h]) for h in order]
-
-    def of(self, names: Sequence[str]) -> float:
-        """Posterior probability of a set of effects, structural error integrated out."""
-        for h, explanation in enumerate(self.explanations):
-            if set(explanation.names) == set(names):
-                return float(self.probability[h].sum())
-        return 0.0
 
     def find(self, names: Sequence[str]) -> Explanation:
         """Return the explanation with exactly these effects."""

@@ -100,21 +100,12 @@ ALL = 'all'
 
 @dataclass(frozen=True)
 class Choice:
-    """What a user says of the columns.
+    """What a user says of the columns."""
 
-    Attributes
-    ----------
-    entries : mapping of str to Entry
-        Name of a column of ours -> the table's.
-    ignored : tuple of str
-        Titles that are left out; ``all``: whatever is not understood.
-    source : str
-        What an error names.
-    """
-
+    # Name of a column of ours -> the table's
     entries: Mapping[str, Entry] = field(default_factory=dict)
-    ignored: tuple[str, ...] = ()
-    source: str = '--columns'
+    ignored: tuple[str, ...] = ()  # titles that are left out; ``all``: whatever is not understood
+    source: str = '--columns'  # what an error names
 
     @classmethod
     def of(cls, columns: Any, ignored: Sequence[str] = ()) -> Choice:

@@ -35,40 +35,21 @@ COLUMNS = (*INPUT_UNITS, *QUANTITIES, 'leaving_angle', *STD_COLUMNS, *ORDER_COLU
 
 @dataclass(frozen=True)
 class SteadyTable:
-    """Checked rows of steady operating points.
+    """Checked rows of steady operating points."""
 
-    Attributes
-    ----------
-    name : str
-        Where the rows came from, for messages.
-    lines : numpy.ndarray
-        (N,) line of each row in the file, the header being line 1.
-    columns : mapping
-        Input column -> (N,) values [SI], only those that the table has; nan = not stated.
-    measured : numpy.ndarray
-        (N, 3) sinkage [m], drawbar pull [N], torque [N m]; nan = not measured.
-    stated_std : numpy.ndarray
-        (N, 3) stated standard deviations; nan = not stated.
-    slip_std : numpy.ndarray
-        (N,) standard deviation of the recorded slip; 0 = exact.
-    leaving_angle_std : numpy.ndarray
-        (N,) standard deviation of the measured leaving angle [rad]; 0 = exact.
-    true_rows : numpy.ndarray
-        (N,) rows that hold true values instead of readings: the stated zeros and gains of the
-        sensors (``sensors.*``) were taken off before, as of a drive's.
-    notes : tuple of str
-        What the reader found odd but usable.
-    """
-
-    name: str
-    lines: NDArray[np.intp]
+    name: str  # where the rows came from, for messages
+    lines: NDArray[np.intp]  # (N,) line of each row in the file, the header being line 1
+    # Input column -> (N,) values [SI], only those that the table has; nan = not stated
     columns: Mapping[str, FloatArray]
-    measured: FloatArray
-    stated_std: FloatArray
-    slip_std: FloatArray
+    measured: FloatArray  # (N, 3) sinkage [m], drawbar pull [N], torque [N m]; nan = not measured
+    stated_std: FloatArray  # (N, 3) stated standard deviations; nan = not stated
+    slip_std: FloatArray  # (N,) standard deviation of the recorded slip; 0 = exact
+    # (N,) standard deviation of the measured leaving angle [rad]; 0 = exact
     leaving_angle_std: FloatArray
+    # (N,) rows that hold true values instead of readings: the stated zeros and gains of the
+    # sensors (``sensors.*``) were taken off before, as of a drive's
     true_rows: NDArray[np.bool_]
-    notes: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()  # what the reader found odd but usable
 
     def __len__(self) -> int:
         return len(self.lines)
