@@ -6,6 +6,9 @@ from __future__ import annotations
 
 import math
 
+# How quantities are shown: factor and unit.
+SHOWN = {'sinkage': (1e3, 'mm'), 'drawbar_pull': (1.0, 'N'), 'torque': (1.0, 'N m')}
+
 
 def number(value: float, digits: int = 3) -> str:
     """Return significant digits, without an exponent but for what is tiny."""
@@ -18,3 +21,8 @@ def number(value: float, digits: int = 3) -> str:
         decimals = max(digits - 1 - math.floor(math.log10(abs(value))), 0)
         text = f'{float(text):.{decimals}f}'
     return text
+
+
+def amount(quantity: str, value: float | None, digits: int = 3) -> str:
+    """Return a value of a quantity as it is shown, without its unit."""
+    return '-' if value is None else number(SHOWN[quantity][0] * value, digits)

@@ -66,9 +66,8 @@ def render(
     proposal = _proposal(decision)
     gap_p_value = significance.chi_square_p_value(decision.nothing, decision.variance)
     law = None if proposal is None else proposal.fit
-    covariance = np.asarray(np.linalg.inv(after.precision()), dtype=float)
-    curves = decision.curves
-    along = changes_along_rows(table, curves.after, curves.band)
+    along = changes_along_rows(table, decision.curves.after, decision.curves.band)
+    soil = _soil_shifts(findings, after, variance)
     return Diagnosis(
         verdict=decision.verdict.word,
         sentence=words.sentence(
@@ -92,7 +91,7 @@ def render(
         next_measurement=_next(decision),
         curves=decision.curves,
         noise=replace(findings.noise, std=findings.noise.std[: len(table)]),
-        soil=_soil_shifts(findings, after, variance),
+        soil=soil,
         outliers=tuple(
             (r, QUANTITIES[q], size) for r, q, size in findings.outliers if r < len(table)
         ),
@@ -101,12 +100,12 @@ def render(
         remainder_amplitude=left.amplitude,
         floor=decision.floor,
         notes=(
-            *words.notes(both, findings, after, stretch),
+            *words.notes(both, findings, after, soil, stretch),
             *(f'{change.text}; look for what changed there' for change in along),
             *words.untried({e.name: known_alike(e.name, findings, known) for e in effects}),
         ),
         base_effects=tuple(configuration.effects),
-        refitted=_parameters(after, covariance, base=True),
+        refitted=_parameters(after, base=True),
         along_rows=tuple(along),
         nearest=nearest,
         proposal=proposal,
@@ -124,8 +123,7 @@ def render(
 def _effects(decision: Decision, known: Mapping[str, Effect]) -> tuple[NamedEffect, ...]:
     """Return the named effects as they are reported."""
     fitted, selection = decision.after, decision.findings.selection
-    covariance = np.asarray(np.linalg.inv(fitted.precision()), dtype=float)
-    parameters = _parameters(fitted, covariance)
+    parameters = _parameters(fitted)
     found = []
     for naming in decision.names:
         key, name = naming.key, effect_of(naming.key)
@@ -176,13 +174,14 @@ def _shown(findings: Findings, chosen: int) -> list[int]:
 
 
 def _parameters(
-    fitted: Fit, covariance: FloatArray, *, base: bool = False
+    fitted: Fit, covariance: FloatArray | None = None, *, base: bool = False
 ) -> dict[str, FittedParameter]:
     """Return the parameters of the effects of a fit, or of those that were on before."""
+    of_u = fitted.covariance() if covariance is None else covariance
     found = {}
     for index, c in enumerate(fitted.coordinates):
         if c.owner != 'soil' and (c.owner in fitted.names) != base:
-            u, std = float(fitted.u[index]), float(np.sqrt(covariance[index, index]))
+            u, std = float(fitted.u[index]), float(np.sqrt(of_u[index, index]))
             found[c.key] = FittedParameter(
                 float(c.value(u)),
                 c.deviation(u, std),
@@ -199,8 +198,7 @@ def _proposal(decision: Decision) -> Proposal | None:
     findings, found = decision.findings, decision.proposal
     if found is None or found.fit is None:
         return None
-    covariance = np.asarray(np.linalg.inv(found.fit.precision()), dtype=float)
-    base = _parameters(found.fit, covariance, base=True)
+    base = _parameters(found.fit, base=True)
     return replace(
         found,
         soil=_soil_shifts(findings, found.fit, decision.variance),

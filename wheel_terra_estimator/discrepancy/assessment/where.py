@@ -11,12 +11,11 @@ from numpy.typing import NDArray
 
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
 from wheel_terra_estimator.discrepancy.fitting.problem import Problem
-from wheel_terra_estimator.discrepancy.numbers import number
+from wheel_terra_estimator.discrepancy.numbers import SHOWN, amount, number
 from wheel_terra_estimator.discrepancy.result import InputRange, Where
 from wheel_terra_estimator.discrepancy.tables.steady_table import (
     INPUT_UNITS,
     QUANTITIES,
-    UNITS,
     SteadyTable,
 )
 
@@ -28,7 +27,6 @@ _DRAWS = 400
 _SEED = 7
 _SURE = 0.05
 _ONE_SIGN = 0.3  # below this share of the size a mean misfit says nothing
-_LABELS = {'sinkage': 'sinkage', 'drawbar_pull': 'drawbar pull', 'torque': 'torque'}
 
 
 def locate(
@@ -75,25 +73,9 @@ def locate(
     physical = values[inside] * std
     mean, size = float(np.mean(physical)), float(np.sqrt(np.mean(physical**2)))
     noise = float(np.sqrt(np.mean(std**2)))
-    in_std = mean / noise
-    one_sign = abs(mean) > _ONE_SIGN * size
-    whole = 'everywhere alike' if one_sign else 'over the whole table'
-    where = ' and '.join(_text(side) for side in box) if box else whole
-    quantity = QUANTITIES[worst]
+    quantity, sentence = QUANTITIES[worst], 'no region stands out from the noise'
     if p_value < _SURE or excess[worst] > 3.0 * np.sqrt(2.0 * mine.sum()):
-        sentence = f'{_LABELS[quantity]} is worst, {where}: measured minus model is '
-        if one_sign:
-            sentence += (
-                f'on average {_amount(mean, quantity)} there '
-                f'({in_std:+.1f} noise standard deviations)'
-            )
-        else:
-            sentence += (
-                f'of both signs there, {_amount(size, quantity).lstrip("+")} '
-                f'({size / noise:.1f} noise standard deviations) in size'
-            )
-    else:
-        sentence = 'no region stands out from the noise'
+        sentence = _sentence(quantity, box, mean, size, noise)
     return Where(
         sentence,
         quantity,
@@ -103,7 +85,7 @@ def locate(
         share_inside,
         float(inside.sum() / mine.sum()),
         mean,
-        in_std,
+        mean / noise,
         p_value,
     )
 
@@ -168,14 +150,22 @@ def _std_of_rows(problem: Problem, quantity: int, rows: int) -> FloatArray:
     return std
 
 
+def _sentence(
+    quantity: str, box: tuple[InputRange, ...], mean: float, size: float, noise: float
+) -> str:
+    """Return where the misfit is, its sign and its size."""
+    one_sign = abs(mean) > _ONE_SIGN * size
+    whole = 'everywhere alike' if one_sign else 'over the whole table'
+    where = ' and '.join(map(_text, box)) or whole
+    value, signed = (mean, 'on average ') if one_sign else (size, 'of both signs there, ')
+    return (
+        f'{quantity.replace("_", " ")} is worst, {where}: measured minus model is {signed}'
+        f'{amount(quantity, value)} {SHOWN[quantity][1]}{" there" if one_sign else ""} '
+        f'({value / noise:+.1f} noise standard deviations{"" if one_sign else " in size"})'
+    )
+
+
 def _text(side: InputRange) -> str:
     unit = '' if side.unit == '-' else f' {side.unit}'
-    if side.low == side.high:
-        return f'at {side.input} {number(side.low)}{unit}'
-    return f'at {side.input} {number(side.low)} to {number(side.high)}{unit}'
-
-
-def _amount(value: float, quantity: str) -> str:
-    if quantity == 'sinkage':
-        return f'{1e3 * value:+.2f} mm'
-    return f'{value:+.3g} {UNITS[quantity]}'
+    ends = dict.fromkeys((number(side.low), number(side.high)))
+    return f'at {side.input} {" to ".join(ends)}{unit}'

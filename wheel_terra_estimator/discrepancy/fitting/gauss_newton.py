@@ -46,6 +46,10 @@ class Fit:
         weighted = self.jacobian / self.variance[:, None]
         return self.jacobian.T @ weighted + np.diag(self.prior)
 
+    def covariance(self) -> FloatArray:
+        """Posterior covariance of u."""
+        return np.asarray(np.linalg.inv(self.precision()), dtype=float)
+
     def within(self, problem: Problem, observed: FloatArray) -> Fit:
         """Return the same fit seen through other noise: same cells, another rotation."""
         return replace(

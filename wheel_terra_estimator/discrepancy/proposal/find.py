@@ -336,7 +336,7 @@ def _proposal(
     slips = np.concatenate([slip_groups(table), np.full(count - rows, -1)]).astype(np.intp)
     by_slip = _left_out(setting, fits, fits[1].variance, slips, findings, table)
     measured = _measured(table, findings)
-    covariance = np.linalg.inv(law.precision())
+    covariance = law.covariance()
     names = [c.name for c in law.coordinates if c.owner == NAME]
     places = [k for k, c in enumerate(law.coordinates) if c.owner == NAME]
     values = [float(law.coordinates[k].value(law.u[k])) for k in places]

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from wheel_terra_estimator.discrepancy.numbers import number
+from wheel_terra_estimator.discrepancy.numbers import SHOWN, amount, number
 from wheel_terra_estimator.discrepancy.report import pictures as pictures
 from wheel_terra_estimator.discrepancy.report.model_file import corrected
 from wheel_terra_estimator.discrepancy.report.words import (
@@ -52,7 +52,7 @@ def write_report(diagnosis: Diagnosis, folder: str | Path) -> Path:
         The page.
     """
     folder = Path(folder)
-    another_soil = far_soil(diagnosis) if diagnosis.verdict == 'agrees' else []
+    another_soil = far_soil(diagnosis.soil) if diagnosis.verdict == 'agrees' else []
     configuration, keys = corrected(diagnosis)
     new, old = configuration.flat(), diagnosis.configuration.flat()
     known = catalogue()
@@ -83,8 +83,8 @@ def write_report(diagnosis: Diagnosis, folder: str | Path) -> Path:
         # How things are written
         words=pictures.words,
         number=number,
-        amount=_amount,
-        unit_of=lambda quantity: pictures.SHOWN[quantity][1],
+        amount=amount,
+        unit_of=lambda quantity: SHOWN[quantity][1],
         with_unit=_with_unit,
         parameter=_parameter,
         share=_share,
@@ -93,11 +93,6 @@ def write_report(diagnosis: Diagnosis, folder: str | Path) -> Path:
     path = folder / 'report.html'
     write_page(path, page)
     return path
-
-
-def _amount(quantity: str, value: float | None, digits: int = 3) -> str:
-    """Return a value of a quantity as it is shown, without its unit."""
-    return '-' if value is None else number(pictures.SHOWN[quantity][0] * value, digits)
 
 
 def _with_unit(text: str, unit: str) -> str:
@@ -156,7 +151,7 @@ def _cards(diagnosis: Diagnosis) -> list[dict[str, str]]:
     )
     if worst is not None:
         name, item = worst
-        scale, unit = pictures.SHOWN[name]
+        scale, unit = SHOWN[name]
         stages = {'as configured': item.before, 'soil refitted': item.refit}
         if diagnosis.effects:
             stages['effect added'] = item.after

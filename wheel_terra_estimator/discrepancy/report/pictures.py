@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from wheel_terra_estimator.discrepancy.numbers import SHOWN
 from wheel_terra_estimator.discrepancy.result import Diagnosis, NextMeasurement
 from wheel_terra_estimator.discrepancy.tables.steady_table import INPUT_UNITS, QUANTITIES
 from wheel_terra_estimator.reporting.style import INK, LINE_COLOURS, NOISE_COLOUR, picture_style
@@ -24,8 +25,6 @@ if TYPE_CHECKING:
 
 FloatArray = NDArray[np.float64]
 
-# How numbers are shown to people: factor and unit.
-SHOWN = {'sinkage': (1e3, 'mm'), 'drawbar_pull': (1.0, 'N'), 'torque': (1.0, 'N m')}
 SHOWN_INPUT = {
     'slope': (180.0 / np.pi, 'deg'),
     'wheel_radius': (1e3, 'mm'),

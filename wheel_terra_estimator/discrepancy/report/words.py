@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,20 +12,20 @@ from numpy.typing import NDArray
 from wheel_terra_estimator.discrepancy.assessment.along import Stretch
 from wheel_terra_estimator.discrepancy.assessment.gaps import channels_off
 from wheel_terra_estimator.discrepancy.effect_keys import effect_of
-from wheel_terra_estimator.discrepancy.fitting.coordinates import WIDENING
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
-from wheel_terra_estimator.discrepancy.numbers import number
+from wheel_terra_estimator.discrepancy.numbers import SHOWN, amount, number
 from wheel_terra_estimator.discrepancy.result import (
     OPEN,
     Diagnosis,
     NamedEffect,
     NextMeasurement,
     QuantityGap,
+    SoilShift,
 )
 from wheel_terra_estimator.discrepancy.selection.remainder import Remainder
 from wheel_terra_estimator.discrepancy.selection.search import Findings
 from wheel_terra_estimator.discrepancy.selection.verdict import Verdict
-from wheel_terra_estimator.discrepancy.tables.steady_table import UNITS, SteadyTable
+from wheel_terra_estimator.discrepancy.tables.steady_table import SteadyTable
 from wheel_terra_estimator.terramechanics.effects import catalogue
 from wheel_terra_estimator.terramechanics.effects.learned_closure import FEATURES
 
@@ -45,18 +45,14 @@ def in_words(diagnosis: Diagnosis) -> dict[str, list[str]]:
     """Return what shrank, what stays open and what to do next, without any statistics."""
     shrank, still_off = [], channels_off(diagnosis.gap)
     for name, item in diagnosis.gap.items():
-        scale, unit = (1e3, 'mm') if name == 'sinkage' else (1.0, UNITS[name])
-        stages = [
-            f'{number(scale * item.before)} as configured',
-            f'{number(scale * item.refit)} refitted',
-        ]
+        stages = {'as configured': item.before, 'refitted': item.refit}
         if diagnosis.effects:
-            stages.append(f'{number(scale * item.after)} with the effect')
+            stages['with the effect'] = item.after
         if diagnosis.proposal and name in diagnosis.proposal.gap:
-            law = diagnosis.proposal.gap[name].after
-            stages.append(f'{number(scale * law)} with the proposed law')
-        noise = f'; its noise is {number(scale * item.noise)}' if item.noise else ''
-        shrank.append(f'{_plain(name)} [{unit}]: off by {", ".join(stages)}{noise}.')
+            stages['with the proposed law'] = diagnosis.proposal.gap[name].after
+        said = ', '.join(f'{amount(name, value)} {stage}' for stage, value in stages.items())
+        noise = f'; its noise is {amount(name, item.noise)}' if item.noise else ''
+        shrank.append(f'{_plain(name)} [{SHOWN[name][1]}]: off by {said}{noise}.')
     left = [
         f'{_plain(name)} is still off by more than noise and the allowed model error.'
         for name in still_off
@@ -122,25 +118,25 @@ def worth(item: NextMeasurement) -> str:
     return f'{item.what} (parts {rivals}: {distances} with it)'
 
 
-def soil_line(diagnosis: Diagnosis) -> str:
-    """Return which soil number the fit pulls farthest, and how well the numbers were known."""
-    shift = max(diagnosis.soil, key=lambda shift: abs(shift.pull))
+def moved(shift: SoilShift) -> str:
+    """Return how far the fit moved a soil number, and how well it was known."""
     name = _SOIL_KEYS.get(shift.name, f'soil.{shift.name}')
-    sources = ', '.join(dict.fromkeys(s.source for s in diagnosis.soil))
     return (
-        f'Soil, farthest: {name} from {number(shift.before)} to {number(shift.after)}, '
-        f'{shift.pull:+.1f} of its deviations ({shift.source}); deviations of all: {sources}.'
+        f'{name} from {number(shift.before)} to {number(shift.after)}, '
+        f'{shift.pull:+.1f} of its deviations ({shift.source})'
     )
 
 
-def far_soil(diagnosis: Diagnosis) -> list[str]:
+def soil_line(diagnosis: Diagnosis) -> str:
+    """Return which soil number the fit pulls farthest, and how well the numbers were known."""
+    shift = max(diagnosis.soil, key=lambda shift: abs(shift.pull))
+    sources = ', '.join(dict.fromkeys(s.source for s in diagnosis.soil))
+    return f'Soil, farthest: {moved(shift)}; deviations of all: {sources}.'
+
+
+def far_soil(soil: Iterable[SoilShift]) -> list[str]:
     """Return the soil numbers that had to move far, in words."""
-    return [
-        f'{_SOIL_KEYS.get(shift.name, "soil." + shift.name)}: {number(shift.before)} stated, '
-        f'{number(shift.after)} here ({abs(shift.pull):.1f} stated deviations)'
-        for shift in diagnosis.soil
-        if abs(shift.pull) > STRONG_PULL
-    ]
+    return [moved(shift) for shift in soil if abs(shift.pull) > STRONG_PULL]
 
 
 def _plain(name: str) -> str:
@@ -177,11 +173,10 @@ def _undecided(gap: Mapping[str, QuantityGap], nearest: tuple[str, ...]) -> str:
     """Return what is off, by how much, and which effects come nearest."""
     parts = []
     for name in channels_off(gap):
-        scale, unit = (1e3, 'mm') if name == 'sinkage' else (1.0, UNITS[name])
         item = gap[name]
         parts.append(
-            f'{_plain(name)} is off by {number(scale * item.after)} {unit} on unseen rows '
-            f'(noise and allowed model error permit {number(scale * item.limit)})'
+            f'{_plain(name)} is off by {amount(name, item.after)} {SHOWN[name][1]} on unseen rows '
+            f'(noise and allowed model error permit {amount(name, item.limit)})'
         )
     text = f'Not decided: {" and ".join(parts)}, but these rows favour neither nothing nor a name'
     return f'{text}; nearest: {", ".join(nearest)}.' if nearest else f'{text}.'
@@ -192,7 +187,11 @@ def _label(names: set[str]) -> str:
 
 
 def notes(
-    table: SteadyTable, findings: Findings, after: Fit, stretch: Stretch | None
+    table: SteadyTable,
+    findings: Findings,
+    after: Fit,
+    soil: Iterable[SoilShift],
+    stretch: Stretch | None,
 ) -> tuple[str, ...]:
     """Return remarks for people: the reader's, noise, outliers, soil far off, effects at bounds."""
     found = list(table.notes)
@@ -207,15 +206,8 @@ def notes(
     if findings.outliers:
         count = len(findings.outliers)
         found.append(f'{count} {"cell was" if count == 1 else "cells were"} set apart as outliers')
+    found += [f'{text}: look at it before any effect' for text in far_soil(soil)]
     for c, u in zip(after.coordinates, after.u, strict=True):
-        pull = WIDENING * u
-        if c.owner == 'soil' and abs(pull) > STRONG_PULL:
-            unit = '' if c.unit == '-' else f' {c.unit}'
-            found.append(
-                f'{_SOIL_KEYS.get(c.name, f"soil.{c.name}")} was pulled {pull:+.1f} of its '
-                f'deviations ({c.source}) to {number(float(c.value(u)))}{unit}: '
-                'look at it before any effect'
-            )
         if c.owner != 'soil' and (u - c.lower < 1e-3 or c.upper - u < 1e-3):
             found.append(f'{c.key} stands at the end of its range ({number(float(c.value(u)))})')
     return tuple(found)

@@ -98,21 +98,23 @@ def _loosened(squashed: float) -> float:
     return 8.0 * float(np.arctanh(np.clip(squashed / 4.0, -0.999, 0.999)))
 
 
-def confidence(values: Mapping[str, float], alike: int = 0) -> Confidence:
+def confidence(values: Mapping[str, float], alike: int = 0, odds: float = 1.0) -> Confidence:
     """Map features to probabilities.
 
     Parameters
     ----------
+    odds : float
+        By which something that the map does not know speaks for the names.
     alike : int
         Effects that are known to look like the name and were not tried: each may be the truth as
         well, and the set does not have it.
     """
     weights = _weights()
     vector = np.array([values[name] for name in FEATURES])
-    of_name = float(expit(vector @ np.array(weights['name'])))
+    of_name = float(expit(vector @ np.array(weights['name']) + np.log(odds)))
     # Never more than the rows themselves say: two names that fit alike share what there is.
     of_name = min(of_name, float(expit(_loosened(values['margin']) / _TEMPERATURE)))
-    of_set = float(expit(vector @ np.array(weights['set'])))
+    of_set = float(expit(vector @ np.array(weights['set']) + np.log(odds)))
     share = 1.0 / (1.0 + alike)
     return Confidence(min(of_name, share), min(max(of_name, of_set), share))
 
