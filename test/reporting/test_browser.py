@@ -245,6 +245,16 @@ def fleet_report(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+@pytest.fixture(scope='module')
+def check_report(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    from wheel_terra_estimator.cli.main import main
+
+    path = tmp_path_factory.mktemp('check') / 'report.html'
+    drive = Path(__file__).resolve().parents[2] / 'data' / 'demo' / 'pathfinder'
+    assert main(['check', str(drive), '--config', 'pathfinder', '--report', str(path)]) == 1
+    return path
+
+
 KINDS = {
     'report': 20,
     'diagnosis_report': 0,
@@ -252,6 +262,7 @@ KINDS = {
     'soilbin_report': 6,
     'limiter_report': 8,
     'fleet_report': 0,
+    'check_report': 0,
 }
 """Page -> lines that its figure has at least."""
 

@@ -9,6 +9,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+from wheel_terra_estimator.cli.outputs import Output
 from wheel_terra_estimator.errors import UserError
 
 LARGEST_FILE = 2**20
@@ -28,12 +29,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='F.json',
         help='output of an earlier --json on this machine, compared by the ratios',
     )
+    parser.add_argument(
+        '--report', action=Output, type=Path, metavar='F.html', help='page with the figures'
+    )
+    parser.add_argument('--overwrite', action='store_true', help='replace an earlier report')
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the command."""
+    from wheel_terra_estimator.output_folder import check_file
+    from wheel_terra_estimator.reporting.html import check_page
     from wheel_terra_lab.benchmarks.run import QUICK, Size, figures
 
+    if arguments.report:
+        check_page(arguments.report)
+        check_file(arguments.report, arguments.overwrite)
     earlier = _earlier(arguments.against) if arguments.against else {}
     told = []
     for figure in figures(QUICK if arguments.quick else Size()):
@@ -45,7 +55,27 @@ def run(arguments: argparse.Namespace) -> int:
             print(_line(entry), flush=True)
     if arguments.json:
         print(json.dumps({'figures': told}, indent=2))
+    if arguments.report:
+        _write_page(arguments.report, told, arguments.overwrite)
     return 0
+
+
+def _write_page(path: Path, figures: list[dict[str, Any]], overwrite: bool) -> None:
+    from wheel_terra_estimator.reporting.tables_page import Table, write_tables
+
+    rows = [
+        (
+            entry['name'],
+            f'{entry["times_as_fast"]:.3g} ({entry["least"]:.3g} to {entry["greatest"]:.3g})',
+            f'{entry["beside"]} ({entry["seconds_beside"]:.3g} s)',
+            f'{entry["seconds"]:.3g} s',
+            f'{entry["change"]:.2f}' if 'change' in entry else '-',
+        )
+        for entry in figures
+    ]
+    head = ('what', 'times as fast', 'as', 'takes', 'times the earlier ratio')
+    words = 'Ratios to another program or way on this machine; seconds alone say little.'
+    write_tables(path, 'Speed', words, 'good', [Table('Figures', head, rows)], overwrite)
 
 
 def _line(entry: dict[str, Any]) -> str:
