@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from estimate_sets import some_estimates
 
+from wheel_terra_estimator.checks.input_judge import LONGEST_WAIT, InputJudge
 from wheel_terra_estimator.checks.online import CAP, OnlineChecks, Rule, Tally
-from wheel_terra_estimator.checks.watched_estimator import LONGEST_WAIT, WatchedEstimator
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.estimation.core import EstimatorCore
 from wheel_terra_estimator.estimation.estimates import SlipClass
@@ -140,7 +140,7 @@ def sets_of(drive, fault, seconds=END):
     core = EstimatorCore(
         drive.configuration,
         AlwaysStuck(drive.configuration.wheels.count),
-        watched_by=WatchedEstimator,
+        judged_by=InputJudge,
     )
     begin = drive.arrivals[0].arrival
     sets = []
@@ -174,7 +174,8 @@ def test_a_fault_is_told_with_its_cure_and_nothing_is_judged(drives, name):
 def test_a_drive_without_fault_is_silent(drives, rover):
     sets = sets_of(drives[rover], lambda m: m)
     assert not any(told(s) for s in sets)
-    assert all(s.stuck for s in sets), 'what the estimator says passes'
+    decided = sets[0].stamp + LONGEST_WAIT
+    assert all(s.stuck for s in sets if s.stamp >= decided), 'what the estimator says passes'
 
 
 class Wheels:
@@ -236,27 +237,15 @@ def test_a_frozen_rate_is_told_and_noisy_ones_are_not():
     assert (finding.kind, finding.wheel) == ('frozen', wheels.configuration.wheels.names[2])
 
 
-class StuckAfter:
-    """An estimator whose warning stands from a stamp on, or between two."""
-
-    def __init__(self, begin, end=np.inf):
-        self.begin, self.end, self.stamp, self.stuck = begin, end, 0, False
-
-    def step(self, stamp, inputs):
-        self.stamp, self.stuck = stamp, self.begin <= stamp < self.end
-
-    def estimates(self):
-        return some_estimates(6, stamp=self.stamp, stuck=self.stuck)
-
-
-def raised(wheels, estimator, seconds=20, flip_from=None):
-    """Return when the published warning stood [s since the first stamp]."""
-    watched, found = WatchedEstimator(wheels.configuration, estimator), []
+def raised(wheels, begin, end=np.inf, seconds=20, flip_from=None):
+    """Return when a warning between two stamps is published [s since the first]."""
+    judge, found = InputJudge(wheels.configuration), []
     for k in range(20 * seconds):
         depth = -0.02 if flip_from is not None and k >= 20 * flip_from else 0.02
         stamp, inputs = wheels.inputs(k, depth=depth)
-        watched.step(stamp, inputs)
-        if watched.estimates().stuck:
+        judge.step(stamp, inputs)
+        estimates = some_estimates(6, stamp=stamp, stuck=begin <= stamp < end)
+        if judge.judged(estimates, {}).stuck:
             found.append((stamp - 1_000_000_000) * 1e-9)
     return found
 
@@ -267,27 +256,22 @@ def at(seconds):
 
 def test_a_warning_waits_while_its_inputs_are_on_trial_and_no_longer():
     wheels = Wheels()
-    first_seconds = raised(wheels, StuckAfter(at(1.0)))
+    first_seconds = raised(wheels, at(1.0))
     assert 1.0 < first_seconds[0] <= 1.0 + LONGEST_WAIT * 1e-9
     assert first_seconds[-1] > 19.0, 'what waited comes and stays'
-    assert raised(wheels, StuckAfter(at(10.0)))[0] == pytest.approx(10.0), 'no wait later'
-    assert not raised(wheels, StuckAfter(at(1.0), at(3.0))), 'fell while it waited'
+    assert raised(wheels, at(10.0))[0] == pytest.approx(10.0), 'no wait later'
+    assert not raised(wheels, at(1.0), at(3.0)), 'fell while it waited'
 
 
 def test_a_warning_waits_for_the_verdict_on_a_suspicion_and_never_comes_if_it_is_one():
     # Three windows spoke for the sign before it flipped at 3 s: after 7 s more speak against it.
-    assert not raised(Wheels(), StuckAfter(at(7.0)), flip_from=3.0)
+    assert not raised(Wheels(), at(7.0), flip_from=3.0)
 
 
 @pytest.mark.parametrize(('nis', 'told'), [(7.0, False), (13.0, True)])
 def test_torques_that_do_not_fit_are_told_and_slip_is_still_judged(nis, told):
-    class Misfit(StuckAfter):
-        def health(self):
-            return {'nis_torque': nis}
-
-    watched = WatchedEstimator(Wheels().configuration, Misfit(0))
-    watched.step(1, StepInputs())
-    estimates = watched.estimates()
+    judge = InputJudge(Wheels().configuration)
+    estimates = judge.judged(some_estimates(6), {'nis_torque': nis})
     assert ('fit of torque' in estimates.faults) is told
     if told:
         assert 'NIS 13' in estimates.faults['fit of torque']
@@ -297,13 +281,9 @@ def test_torques_that_do_not_fit_are_told_and_slip_is_still_judged(nis, told):
 
 @pytest.mark.parametrize(('than', 'told'), [('default', False), ('stated', True)])
 def test_noise_beyond_what_is_stated_is_told_with_its_parameter(than, told):
-    class Noisy(StuckAfter):
-        def health(self):
-            return {f'noise_beyond_{than}': 'torque noise 8 times it (sensors.torque_std: 4.8)'}
-
-    watched = WatchedEstimator(Wheels().configuration, Noisy(0))
-    watched.step(1, StepInputs())
-    estimates = watched.estimates()
+    words = 'torque noise 8 times it (sensors.torque_std: 4.8)'
+    judge = InputJudge(Wheels().configuration)
+    estimates = judge.judged(some_estimates(6), {f'noise_beyond_{than}': words})
     assert ('sensors.torque_std: 4.8' in estimates.faults.get('noise', '')) is told
     np.testing.assert_array_equal(estimates.slip_class, some_estimates(6).slip_class)
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from estimate_sets import some_estimates
 
+from wheel_terra_estimator.checks.input_judge import InputJudge
 from wheel_terra_estimator.checks.online import OnlineChecks
 from wheel_terra_estimator.checks.online_delay import SpeedHistory
-from wheel_terra_estimator.checks.watched_estimator import WatchedEstimator
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.estimation.measurements import (
     ReferenceVelocity,
@@ -78,25 +78,10 @@ def test_without_starts_and_stops_nothing_is_told():
 
 
 def test_slip_is_judged_beside_it():
-    class Plain:
-        stuck = False
-
-        def step(self, stamp, inputs):
-            self.stamp = stamp
-
-        def estimates(self):
-            return some_estimates(6, stamp=self.stamp)
-
-        def snapshot(self):
-            return self.stamp
-
-        def restore(self, snapshot):
-            self.stamp = snapshot
-
-    watched = WatchedEstimator(ROVER, Plain())
+    judge = InputJudge(ROVER)
     for stamp, inputs in steps(late=1.0):
-        watched.step(stamp, inputs)
-    estimates = watched.estimates()
+        judge.step(stamp, inputs)
+    estimates = judge.judged(some_estimates(6), {})
     assert 'late' in estimates.faults['check of reference_odom']
     np.testing.assert_array_equal(estimates.slip_class, some_estimates(6).slip_class)
 

@@ -30,7 +30,7 @@ PRELOADED = (  # what the nodes import beside rclpy, also late
     'filterpy.kalman',
     'scipy.linalg',
     'scipy.special',
-    'wheel_terra_estimator.checks.watched_estimator',
+    'wheel_terra_estimator.checks.input_judge',
     'wheel_terra_estimator.configuration.soil_file',
     'wheel_terra_estimator.estimation.traction_limiter',
     'wheel_terra_estimator.estimation.wheel_soil_estimator',

@@ -223,13 +223,13 @@ def _estimated(
     measurements: Iterable[Measurement], configuration: Configuration, smoothed: bool
 ) -> Any:
     from wheel_terra_estimator.bags.history import HistoryRecorder
-    from wheel_terra_estimator.checks.watched_estimator import WatchedEstimator
+    from wheel_terra_estimator.checks.input_judge import InputJudge
     from wheel_terra_estimator.estimation.core import EstimatorCore
     from wheel_terra_estimator.estimation.smoothing.smoother import DriveSmoother
 
     smoother = DriveSmoother(configuration) if smoothed else None
     estimator = smoother.estimator if smoother else None
-    core = EstimatorCore(configuration, estimator, watched_by=WatchedEstimator)
+    core = EstimatorCore(configuration, estimator, judged_by=InputJudge)
     recorder = HistoryRecorder(configuration.wheels.names)
     take = smoother.keep if smoother else recorder.add
     for measurement in measurements:

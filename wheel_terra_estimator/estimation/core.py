@@ -3,17 +3,19 @@
 """The estimator core: typed measurements in, sets of estimates out; no ROS, no file format.
 
 A measurement loses the stated errors of its sensor, passes the checks of its values, then the watch
-over the clock, then the timeline, which runs the filter in the order of stamps; sets pass the
-guard. The node and the replay differ in nothing but who calls ``add``, and the same calls give the
-same numbers.
+over the clock, then the timeline, which orders by stamps and says when a set is due. Then estimator
+and judge of the inputs step side by side through the log; the judge has its say on the estimates,
+and the set passes the guard. The node and the replay differ in nothing but who calls ``add``, and
+the same calls give the same numbers.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import replace
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -31,11 +33,24 @@ from wheel_terra_estimator.estimation.timing.clock_watch import (
     Suspicion,
 )
 from wheel_terra_estimator.estimation.timing.input_checks import CHANNELS, InputChecks
-from wheel_terra_estimator.estimation.timing.input_log import Estimator
+from wheel_terra_estimator.estimation.timing.input_log import Estimator, InputLog, Stepped
 from wheel_terra_estimator.estimation.timing.lag import LagLearner
-from wheel_terra_estimator.estimation.timing.timeline import Fate, Timeline, TimeSettings
+from wheel_terra_estimator.estimation.timing.step_grid import StepGrid
+from wheel_terra_estimator.estimation.timing.timeline import Due, Fate, Timeline, TimeSettings
 
 _SECOND = 1_000_000_000
+_FAILURES = (ArithmeticError, ValueError, IndexError, np.linalg.LinAlgError)
+"""What a step of the estimator may end with."""
+
+
+class InputJudge(Stepped, Protocol):
+    """What looks at the inputs beside the estimator, and has its say on the estimates."""
+
+    def judged(self, estimates: EstimateSet, health: Mapping[str, Any]) -> EstimateSet:
+        """Return the estimates as they may be published."""
+
+    def retune(self, configuration: Configuration) -> None:
+        """Go on with other tuning."""
 
 
 class EstimatorCore:
@@ -47,8 +62,8 @@ class EstimatorCore:
         Rover, soil, sensors, filter.
     estimator : Estimator, optional
         What runs through the inputs; default: ``WheelSoilEstimator``.
-    watched_by : callable, optional
-        Puts a watch over the inputs around an estimator.
+    judged_by : callable, optional
+        Makes of a configuration what judges the inputs, beside the estimator.
 
     Attributes
     ----------
@@ -60,10 +75,11 @@ class EstimatorCore:
         self,
         configuration: Configuration,
         estimator: Estimator | None = None,
-        watched_by: Callable[[Configuration, Estimator], Estimator] | None = None,
+        judged_by: Callable[[Configuration], InputJudge] | None = None,
     ) -> None:
-        self._watched_by = watched_by
-        self._estimator = self._watched(configuration, estimator or _estimator(configuration))
+        self._judged_by = judged_by
+        self._estimator = estimator or _estimator(configuration)
+        self._judge = judged_by(configuration) if judged_by else None
         self._settings = _time_settings(configuration)
         self._lags = LagLearner(_max_lag(configuration))
         self._clock_step = _nanoseconds(configuration.filter.clock_step)
@@ -72,8 +88,9 @@ class EstimatorCore:
         self._guard = OutputGuard(configuration)
         self._classes = PublishedClasses(configuration)
         self.warning = StuckMemory(configuration)
-        self._timeline = Timeline(self._estimator, self._settings, self._finish)
-        self._contradicted = self._timeline.contradicted  # counts as it goes on
+        grid = StepGrid(self._settings.output_rate)
+        self._log = InputLog(self._runners(), grid, self._settings.reference_period)
+        self._timeline = Timeline(self._log, self._settings)
         self._watch = self._new_watch()
         self._received = [0] * len(CHANNELS)
         self._late = [0] * len(CHANNELS)
@@ -99,13 +116,18 @@ ReferenceVelocity
         return self._follow(self._watch.judge(channel, checked))
 
     def settle(self) -> None:
-        """Take in at once what else the next set would wait for; no number changes."""
-        self._timeline.settle()
+        """Make the steps that the next set would have to make, while nobody waits for it.
+
+        Changes no number: a step that fails is made again, and told of, at the next set.
+        """
+        if self._timeline.released:
+            with suppress(*_FAILURES), np.errstate(all='ignore'):
+                self._log.settle(self._timeline.released - 1)
 
     def flush(self) -> list[EstimateSet]:
         """Return the sets that were held back for late inputs: no more will come."""
         sets = self._follow(self._watch.finish())
-        return sets + self._timeline.flush()
+        return sets + [self._published(due) for due in self._timeline.flush()]
 
     def reset(self) -> None:
         """Forget the state, keep the parameters; the next measurement begins a new run."""
@@ -119,13 +141,17 @@ ReferenceVelocity
 
         What is held back is released first. Wheels, sensors and soil must be the same.
         """
-        self._estimator = self._watched(configuration, _estimator(configuration))
+        self._estimator = _estimator(configuration)
+        if self._judge is not None:
+            self._judge.retune(configuration)
         self._settings = _time_settings(configuration)
         self._lags.fixed = _max_lag(configuration)
         self._clock_step = _nanoseconds(configuration.filter.clock_step)
         self._classes.retune(configuration)
         self.warning.retune(configuration)
-        self._timeline.retune(self._estimator, self._settings)
+        grid = StepGrid(self._settings.output_rate)
+        self._log.retune(self._runners(), grid, self._settings.reference_period)
+        self._timeline.retune(self._settings)
 
     def learned(self) -> dict[str, Any]:
         """Return what was learned of soil and sensors: configuration key -> value, ``_std`` too.
@@ -145,34 +171,37 @@ ReferenceVelocity
     @property
     def repeated(self) -> dict[str, int]:
         """Messages whose stamp was given before and that were merged, by input topic."""
-        counted = zip(self._checks.names, self._timeline.repeated, strict=True)
+        counted = zip(self._checks.names, self._log.repeated, strict=True)
         return {name: count for name, count in counted if count}
 
     def health(self) -> dict[str, Any]:
         """Return counters and words for diagnostics: key (with unit where it has one) -> value."""
         result: dict[str, Any] = {}
-        checks, timeline = self._checks, self._timeline
+        checks, log = self._checks, self._log
         for channel, name in enumerate(checks.names):
             result[f'{name}_used'] = self._received[channel] - checks.refused[channel]
             if self._late[channel]:
                 result[f'{name}_late'] = self._late[channel]
-            if timeline.repeated[channel]:
-                result[f'{name}_stamp_repeated'] = timeline.repeated[channel]
+            if log.repeated[channel]:
+                result[f'{name}_stamp_repeated'] = log.repeated[channel]
             for reason, count in checks.rejected[channel].items():
                 result[f'{name}_rejected: {reason}'] = count
-        result.update(timeline.counts)
+        result |= self._timeline.counts | log.counts
         newest = self._watch.newest
         hold = self._lags.hold(newest) if newest is not None else 0
         result['held_back_s'] = hold * 1e-9
         result['clock_steps_back'] = self._clock_steps
         result['resets'] = self._resets
-        own = dict(getattr(self._estimator, 'health', dict)())
+        own = self._estimator_health()
         # The filter starts itself anew, or the core does it: both count.
         own['filter_restarts'] = own.get('filter_restarts', 0) + result['filter_restarts']
         return result | own
 
-    def _watched(self, configuration: Configuration, estimator: Estimator) -> Estimator:
-        return estimator if self._watched_by is None else self._watched_by(configuration, estimator)
+    def _runners(self) -> list[Stepped]:
+        return [self._estimator] if self._judge is None else [self._judge, self._estimator]
+
+    def _estimator_health(self) -> dict[str, Any]:
+        return dict(getattr(self._estimator, 'health', dict)())
 
     def _new_watch(self) -> ClockWatch:
         settings = self._settings
@@ -187,7 +216,7 @@ ReferenceVelocity
                 self._checks.refuse(arrival.channel, 'stamp far ahead of all others')
         if judgement.stepped_back:
             self._clock_steps += 1
-            sets += self._timeline.flush()
+            sets += [self._published(due) for due in self._timeline.flush()]
             self.warning.begin_anew()
             self._end_run(keep_soil=True)
         for arrival in judgement.accepted:
@@ -196,7 +225,8 @@ ReferenceVelocity
         newest = self._watch.newest
         if judgement.accepted and newest is not None:
             hold = self._lags.hold(newest)
-            sets += self._timeline.advance(newest, hold, self._lags.beyond(hold))
+            beyond = self._lags.beyond(hold)
+            sets += [self._published(due) for due in self._timeline.advance(newest, hold, beyond)]
         return sets
 
     def _end_run(self, keep_soil: bool) -> None:
@@ -206,12 +236,10 @@ ReferenceVelocity
 
     def _insert(self, arrival: Arrival) -> list[EstimateSet]:
         channel, measurement = arrival
-        contradicted = self._contradicted[channel]
-        fate, sets = self._timeline.insert(channel, measurement)
-        if self._contradicted[channel] != contradicted:
+        contradicted = self._log.contradicted[channel]
+        fate, due = self._timeline.insert(channel, measurement)
+        if self._log.contradicted[channel] != contradicted:
             self._checks.reject(channel, 'stamp repeated with other numbers (the newer ones count)')
-        if fate is Fate.IN_ORDER:
-            return sets
         if fate in (Fate.LATE, Fate.DEFERRED):
             self._late[channel] += 1
             self._deferred |= fate is Fate.DEFERRED
@@ -219,12 +247,24 @@ ReferenceVelocity
             self._checks.refuse(channel, 'stamp older than the history')
         elif fate is Fate.FULL:
             self._checks.refuse(channel, 'more inputs than can be sorted')
-        return sets
+        return [] if due is None else [self._published(due)]
 
-    def _finish(
-        self, stamp: int, outcome: EstimateSet | Exception, silent: bool
-    ) -> tuple[EstimateSet, bool]:
-        estimates, failed = self._guard.repaired(stamp, outcome)
+    def _estimated(self, due: Due) -> EstimateSet | Exception:
+        """Bring estimator and judge to a set that is due, and ask both."""
+        try:
+            with np.errstate(all='ignore'):  # the guard looks at the result, number by number
+                self._log.run_to(due.entry)
+                estimates = self._estimator.estimates()
+                if self._judge is None:
+                    return estimates
+                return self._judge.judged(estimates, self._estimator_health())
+        except _FAILURES as error:
+            return error
+
+    def _published(self, due: Due) -> EstimateSet:
+        """Return the set that is due as it goes out."""
+        stamp, silent = due.stamp, due.silent
+        estimates, failed = self._guard.repaired(stamp, self._estimated(due))
         faults = self._faults(silent)
         if faults:
             estimates = replace(estimates, faults={**estimates.faults, **faults})
@@ -234,8 +274,9 @@ ReferenceVelocity
         estimates = self.warning.follow(self._classes.follow(estimates))
         if failed:
             self.warning.begin_anew()
+            self._timeline.begin_after(due)
         self._latest = estimates
-        return estimates, failed
+        return estimates
 
     def _faults(self, silent: bool) -> dict[str, str]:
         """Return what became of the inputs since the last set, in words."""

@@ -782,11 +782,6 @@ class WheelSoilEstimator:
             assessment=self._clock.assessment,
         )
 
-    @property
-    def stuck(self) -> bool:
-        """Whether the stuck warning stands at the present stamp."""
-        return self._clock.assessment.stuck
-
     def learned(self) -> dict[str, Any]:
         """Return what was learned: configuration key -> value, deviations ``_std`` too."""
         ekf = self._ekf

@@ -11,7 +11,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable
 from typing import Any
 
-from wheel_terra_estimator.checks.watched_estimator import WatchedEstimator
+from wheel_terra_estimator.checks.input_judge import InputJudge
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.core import EstimatorCore
 from wheel_terra_estimator.estimation.estimates import EstimateSet
@@ -56,7 +56,7 @@ class Pipeline:
         self.configuration = configuration
         self.names = configuration.wheels.names
         self.converter = InputConverter(input_layout(configuration))
-        self.core = EstimatorCore(configuration, estimator, watched_by=WatchedEstimator)
+        self.core = EstimatorCore(configuration, estimator, judged_by=InputJudge)
         self.received: Counter[str] = Counter()
         self.diagnostics = Diagnostics(self.names, self.counters, self._faults, node_name)
         self.transport_faults: Callable[[], Iterable[tuple[str, str]]] = tuple

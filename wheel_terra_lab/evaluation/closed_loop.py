@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wheel_terra_estimator.checks.watched_estimator import WatchedEstimator
+from wheel_terra_estimator.checks.input_judge import InputJudge
 from wheel_terra_estimator.estimation.core import EstimatorCore
 from wheel_terra_estimator.estimation.estimates import EstimateSet
 from wheel_terra_estimator.estimation.traction_law import LimiterTuning
@@ -55,7 +55,7 @@ def closed_loop(
 ) -> ClosedLoopDrive:
     """Drive the scenario's profile, with the traction limiter or without."""
     drive = Drive(scenario, seed)
-    core = EstimatorCore(drive.configuration, watched_by=WatchedEstimator)
+    core = EstimatorCore(drive.configuration, judged_by=InputJudge)
     state = LimiterState(still_since=drive.plant.time)
     pending: list[Arrival] = []
     rows: list[tuple[float, float, FloatArray, FloatArray, float]] = []

@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wheel_terra_estimator import __version__
-from wheel_terra_estimator.checks.watched_estimator import WatchedEstimator
+from wheel_terra_estimator.checks.input_judge import InputJudge
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.estimation.core import EstimatorCore
 from wheel_terra_estimator.estimation.estimates import EstimateSet
@@ -165,7 +165,7 @@ class LongDrive:
         self.hours, self.seed = hours, seed
         self._scenario = scenario(hours)
         self._drive = Drive(self._scenario, seed)
-        self.core = EstimatorCore(self._scenario.configuration, watched_by=WatchedEstimator)
+        self.core = EstimatorCore(self._scenario.configuration, judged_by=InputJudge)
         self._under_way: list[tuple[int, int, Measurement]] = []  # arrival [ns], order
         self._sent = 0
         self._known: OrderedDict[int, Truth] = OrderedDict()  # by time [ms]

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wheel_terra_estimator.checks.watched_estimator import WatchedEstimator
+from wheel_terra_estimator.checks.input_judge import InputJudge
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.estimates import EstimateSet
 from wheel_terra_estimator.estimation.measurements import (
@@ -100,7 +100,7 @@ def run_estimator(
     """
     from wheel_terra_estimator.estimation.core import EstimatorCore
 
-    core = EstimatorCore(configuration, watched_by=WatchedEstimator)
+    core = EstimatorCore(configuration, judged_by=InputJudge)
     sets: list[EstimateSet] = []
     for measurement in measurements:
         sets += core.add(measurement)
@@ -157,7 +157,7 @@ def run_smoother(
     from wheel_terra_estimator.estimation.smoothing.smoother import DriveSmoother
 
     smoother = DriveSmoother(configuration)
-    core = EstimatorCore(configuration, smoother.estimator, watched_by=WatchedEstimator)
+    core = EstimatorCore(configuration, smoother.estimator, judged_by=InputJudge)
     for measurement in measurements:
         for estimates in core.add(measurement):
             smoother.keep(estimates)

@@ -30,7 +30,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wheel_terra_estimator.checks.watched_estimator import WatchedEstimator
+from wheel_terra_estimator.checks.input_judge import InputJudge
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.core import EstimatorCore
 from wheel_terra_estimator.estimation.measurements import (
@@ -145,7 +145,7 @@ def taught(drive: BenchDrive) -> Iterator[Measurement]:
 def told_soil(drive: BenchDrive, sensors: Configuration) -> Configuration:
     """Return the configuration with the soil that is learned where the speed is known."""
     estimator = WheelSoilEstimator(sensors)
-    core = EstimatorCore(sensors, estimator, watched_by=WatchedEstimator)
+    core = EstimatorCore(sensors, estimator, judged_by=InputJudge)
     looks: list[dict[str, Any]] = []
     count = 0
     for measurement in taught(drive):

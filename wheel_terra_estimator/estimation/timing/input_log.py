@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""The log of a run's inputs, and the estimator that runs through it in steps.
+"""The log of a run's inputs, and the steps through it of the estimator and of the checks.
 
 The log is sorted by stamp, equal stamps merged. How it divides into steps follows from its stamps
 alone (see ``step_grid``), so the state at a stamp does not depend on the order of arrival. Kept
@@ -10,6 +10,7 @@ states make a late input cost a short run and not a long one.
 from __future__ import annotations
 
 from bisect import bisect_left
+from collections.abc import Sequence
 from typing import Any, NamedTuple, Protocol
 
 from wheel_terra_estimator.estimation.estimates import EstimateSet
@@ -34,14 +35,11 @@ TRIM_LENGTH = 64
 """Forgotten entries are taken off the log in pieces of this length."""
 
 
-class Estimator(Protocol):
-    """What the timeline runs."""
+class Stepped(Protocol):
+    """What runs through the log: the same steps from the same state give the same numbers."""
 
     def step(self, stamp: int, inputs: StepInputs) -> None:
         """Bring the state to `stamp` [ns], later than the one before, with all inputs of it."""
-
-    def estimates(self) -> EstimateSet:
-        """Return the estimates at the stamp of the last step."""
 
     def snapshot(self) -> Any:
         """Return the state in a form that later steps leave alone."""
@@ -51,6 +49,13 @@ class Estimator(Protocol):
 
     def begin_run(self, stamp: int, keep_soil: bool) -> None:
         """Start anew at `stamp` [ns]; soil and biases kept but widened, or forgotten."""
+
+
+class Estimator(Stepped, Protocol):
+    """What the core runs; `health` and `learned` are optional."""
+
+    def estimates(self) -> EstimateSet:
+        """Return the estimates at the stamp of the last step."""
 
 
 class _Walk(NamedTuple):
@@ -91,12 +96,12 @@ class Entry:
 
 
 class InputLog:
-    """Inputs of one run and the estimator that runs through them.
+    """Inputs of one run and what runs through them.
 
     Parameters
     ----------
-    estimator : Estimator
-        Must be deterministic: the same steps from the same state give the same numbers.
+    runners : sequence of Stepped
+        All make the same steps, side by side.
     grid : StepGrid
         When a step ends.
     reference_period : int
@@ -118,8 +123,8 @@ class InputLog:
         Steps that the next run will make again.
     """
 
-    def __init__(self, estimator: Estimator, grid: StepGrid, reference_period: int) -> None:
-        self.estimator = estimator
+    def __init__(self, runners: Sequence[Stepped], grid: StepGrid, reference_period: int) -> None:
+        self._runners = runners
         self.grid = grid
         self.entries: list[Entry] = []
         self.stamps: list[int] = []
@@ -128,7 +133,7 @@ class InputLog:
         self.contradicted = [0] * len(CHANNELS)
         self._reference_period = reference_period
         self._merger = StepMerger()
-        self._pristine = estimator.snapshot()
+        self._pristine = self._snapshot()
         self._charged: _Charged
         self._settled: bool  # since the last run
         self.clear(keep_soil=False)
@@ -136,7 +141,7 @@ class InputLog:
     def clear(self, *, keep_soil: bool) -> None:
         """Begin a new run; soil and biases kept but widened, or forgotten."""
         self._origin: tuple[Any, bool] | None = (
-            self.estimator.snapshot() if keep_soil else self._pristine,
+            self._snapshot() if keep_soil else self._pristine,
             keep_soil,
         )
         self.entries.clear()
@@ -145,21 +150,21 @@ class InputLog:
         self.dirty = 0
         self._ran = 0  # entries[:_ran] have been run, and not changed since
         self._position = -1  # entries[:_position] made the state of the last step; -1: none did
-        self._astray = False  # the estimator was taken beyond the last step
+        self._astray = False  # the runners were taken beyond the last step
         self._walk = _Walk(0, -1, 0, None, 0)
         self._account()
         self._last_kept = 0  # stamp of the newest kept state
         self._dense_until = 0
 
-    def retune(self, estimator: Estimator, grid: StepGrid, reference_period: int) -> None:
-        """Go on from the state after the last step with another estimator and another grid."""
-        state = self.estimator.snapshot()
-        self.estimator = estimator
-        self._pristine = estimator.snapshot()
+    def retune(self, runners: Sequence[Stepped], grid: StepGrid, reference_period: int) -> None:
+        """Go on from the state after the last step with other runners and another grid."""
+        state = self._snapshot()
+        self._runners = runners
+        self._pristine = self._snapshot()
         if self._astray or self._position != self._ran:
             for entry in self.entries[self._ran :]:
                 entry.kept = None  # run again by the new one
-        estimator.restore(state)
+        self._restore(state)
         self._reference_period = reference_period
         self.grid = grid
         self._walk = self._walk._replace(step_index=-1)
@@ -308,7 +313,8 @@ class InputLog:
         inputs = self._merger.merged(stamp, pending)
         self.counts['steps'] += 1
         self._walk = after._replace(end=stamp, heard=self._merger.heard, steps=after.steps + 1)
-        self.estimator.step(stamp, inputs)
+        for runner in self._runners:
+            runner.step(stamp, inputs)
 
     def _next_reference(self, stamp: int) -> int | None:
         """Return from which stamp on the next one is used; None where this one is left out."""
@@ -322,13 +328,20 @@ class InputLog:
 
     # -- Kept states ----------------------------------------------------------------------------
 
+    def _snapshot(self) -> tuple[Any, ...]:
+        return tuple([runner.snapshot() for runner in self._runners])
+
+    def _restore(self, states: tuple[Any, ...]) -> None:
+        for runner, state in zip(self._runners, states, strict=True):
+            runner.restore(state)
+
     def _keep(self, always: bool = False) -> None:
         """Keep the state after the last step, if it is worth it."""
         if self._position <= 0:
             return  # the start of the run is known anyway
         entry = self.entries[self._position - 1]
         if entry.kept is None and (always or entry.stamp - self._last_kept >= KEPT_STATE_SPACING):
-            entry.kept = _Kept(self.estimator.snapshot(), self._walk)
+            entry.kept = _Kept(self._snapshot(), self._walk)
             self._last_kept = entry.stamp
 
     def _go_back(self) -> None:
@@ -341,12 +354,13 @@ class InputLog:
             kept = self.entries[index].kept
             assert kept is not None
             self._walk = kept.walk
-            self.estimator.restore(kept.state)
+            self._restore(kept.state)
         else:
             assert self._origin is not None
             state, keep_soil = self._origin
-            self.estimator.restore(state)
-            self.estimator.begin_run(self.stamps[0], keep_soil)
+            self._restore(state)
+            for runner in self._runners:
+                runner.begin_run(self.stamps[0], keep_soil)
             self._walk = _Walk(0, -1, self.stamps[0], None, 0)
         if self._position >= 0:
             self.counts['reruns'] += self._position != self._ran

@@ -4,31 +4,25 @@
 
 An estimate for a stamp is by definition what the estimator gives when it runs through the log of
 inputs from the start of the run to that stamp. The timeline says when an input is released, when a
-set is due, and what becomes of inputs that come late; it is lazy, so that any number of late inputs
-between two sets costs one run.
+set is due, and what becomes of inputs that come late. It runs nothing: who asks it runs through the
+log when a set is due, so that any number of late inputs between two sets costs one run.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import Enum
+from typing import NamedTuple
 
-import numpy as np
-
-from wheel_terra_estimator.estimation.estimates import EstimateSet
 from wheel_terra_estimator.estimation.measurements import Measurement
 from wheel_terra_estimator.estimation.timing.input_checks import WHEEL_ODOMETRY
-from wheel_terra_estimator.estimation.timing.input_log import Estimator, InputLog
-from wheel_terra_estimator.estimation.timing.step_grid import StepGrid
+from wheel_terra_estimator.estimation.timing.input_log import InputLog
 
 GREATEST_LENGTH = 100_000
 """Inputs that the log holds at most, so that no publisher can fill the memory."""
 ALLOWANCE = 2.0  # [s] over which steps that are run again may be saved up
 
-_FAILURES = (ArithmeticError, ValueError, IndexError, np.linalg.LinAlgError)
-"""What a step of the estimator may end with."""
 _SECOND = 1_000_000_000
 
 
@@ -54,47 +48,43 @@ class TimeSettings:
     rerun_rate: float = 0.0  # steps run again per second of stamps [Hz], 0 = any number
 
 
+class Due(NamedTuple):
+    """A set that is due; whoever gets it runs the log up to it before asking for the next."""
+
+    entry: int  # of the log
+    stamp: int  # [ns]
+    silent: bool  # there was no wheel odometry for `TimeSettings.silence`
+
+
 class Timeline:
     """Log of one run after the other, and the sets that are due.
 
     Parameters
     ----------
-    estimator : Estimator
-        Must be deterministic: the same steps from the same state give the same numbers.
+    log : InputLog
+        Into which the inputs go.
     settings : TimeSettings
         Durations and rates.
-    finish : callable
-        Takes the stamp of a due set, the estimates (or the error instead of them) and whether
-        wheel odometry is silent; returns the set to be published, and whether the estimator has
-        failed and must start anew.
 
     Attributes
     ----------
     counts : dict
-        ``runs``, ``filter_restarts``, ``late_inputs_deferred``, ``late_inputs_dropped`` and those
-        of the log.
-    repeated : list of int
-        Per channel: inputs whose stamp the channel had given before.
+        ``runs``, ``filter_restarts``, ``late_inputs_deferred``, ``late_inputs_dropped``.
+    released : int
+        ``log.entries[:released]`` may be used.
     """
 
-    def __init__(
-        self,
-        estimator: Estimator,
-        settings: TimeSettings,
-        finish: Callable[[int, EstimateSet | Exception, bool], tuple[EstimateSet, bool]],
-    ) -> None:
+    def __init__(self, log: InputLog, settings: TimeSettings) -> None:
         self.settings = settings
-        self._grid = StepGrid(settings.output_rate)
-        self._log = InputLog(estimator, self._grid, settings.reference_period)
-        self._own_counts = {
+        self._log = log
+        self.counts = {
             'runs': 0,
             'filter_restarts': 0,
             'late_inputs_deferred': 0,
             'late_inputs_dropped': 0,
         }
-        self._finish = finish
         self._begins_run: bool  # the next input is the first of its run
-        self._released: int  # entries[:_released] may be used
+        self.released: int
         self._state: int | None  # newest released stamp
         self._last_set: int | None
         self._odometry: int | None  # newest released stamp of wheel odometry
@@ -105,60 +95,43 @@ class Timeline:
         self._allowance: float  # steps that may be run again now
         self._clear()
 
-    @property
-    def counts(self) -> dict[str, int]:
-        """Counters for diagnostics."""
-        return self._own_counts | self._log.counts
-
-    @property
-    def repeated(self) -> list[int]:
-        """Per channel: inputs whose stamp the channel had given before."""
-        return self._log.repeated
-
-    @property
-    def contradicted(self) -> list[int]:
-        """Per channel: inputs of a stamp given before, with other numbers."""
-        return self._log.contradicted
-
     def end_run(self, *, keep_soil: bool) -> None:
         """Let the next input begin a new run; soil and biases kept but widened, or forgotten."""
         self._log.clear(keep_soil=keep_soil)
         self._clear()
 
-    def retune(self, estimator: Estimator, settings: TimeSettings) -> None:
-        """Go on with another estimator of the same kind of state, and other times."""
+    def retune(self, settings: TimeSettings) -> None:
+        """Go on with other times."""
         self.settings = settings
-        self._grid = StepGrid(settings.output_rate)
-        self._log.retune(estimator, self._grid, settings.reference_period)
         self._allowance = min(self._allowance, settings.rerun_rate * ALLOWANCE)
 
-    def insert(self, channel: int, measurement: Measurement) -> tuple[Fate, list[EstimateSet]]:
+    def insert(self, channel: int, measurement: Measurement) -> tuple[Fate, Due | None]:
         """Put an input into the log.
 
         Returns
         -------
         fate : Fate
             What became of it.
-        sets : list of EstimateSet
-            A set that it made due at once: wheel odometry that comes after younger inputs of
+        due : Due or None
+            The set that it made due at once: wheel odometry that comes after younger inputs of
             other channels but is younger than the last set.
         """
         stamp, state = measurement.stamp, self._state
         if state is not None and stamp < state - self.settings.history:
-            return Fate.TOO_OLD, []
+            return Fate.TOO_OLD, None
         if len(self._log.entries) >= GREATEST_LENGTH:
-            return Fate.FULL, []
+            return Fate.FULL, None
         cost = self._log.steps_after(stamp) - self._log.dirty
         if cost > 0 and self.settings.rerun_rate > 0.0:
             if self._deferred or cost > self._allowance:
-                self._own_counts['late_inputs_deferred'] += 1
+                self.counts['late_inputs_deferred'] += 1
                 self._deferred.append((channel, measurement))
-                return Fate.DEFERRED, []
+                return Fate.DEFERRED, None
             self._allowance -= cost
         return self._insert(channel, measurement)
 
-    def advance(self, newest: int, hold: int = 0, overdue: int = 0) -> list[EstimateSet]:
-        """Release inputs and return the sets that became due.
+    def advance(self, newest: int, hold: int = 0, overdue: int = 0) -> Iterator[Due]:
+        """Release inputs and yield the sets that became due.
 
         Parameters
         ----------
@@ -176,28 +149,26 @@ class Timeline:
             self._allowance = min(self._allowance + rate * elapsed, rate * ALLOWANCE)
             self._newest = newest
         if self._deferred:
-            self._insert_deferred()
-        return self._release(newest - hold)
+            yield from self._insert_deferred()
+        yield from self._release(newest - hold)
 
-    def flush(self) -> list[EstimateSet]:
+    def flush(self) -> Iterator[Due]:
         """Release everything."""
-        self._insert_deferred(at_any_cost=True)
-        return self._release(self._log.stamps[-1]) if self._log.stamps else []
+        yield from self._insert_deferred(at_any_cost=True)
+        if self._log.stamps:
+            yield from self._release(self._log.stamps[-1])
 
-    def settle(self) -> None:
-        """Make the steps that the next set would have to make, while nobody waits for it.
-
-        Changes no number: a step that fails is made again, and told of, at the next set.
-        """
-        if self._released:
-            with suppress(*_FAILURES), np.errstate(all='ignore'):
-                self._log.settle(self._released - 1)
+    def begin_after(self, due: Due) -> None:
+        """Forget the state and all inputs up to a set: the estimator failed there."""
+        self.counts['filter_restarts'] += 1
+        self._log.begin_after(due.entry)
+        self.released -= due.entry + 1
 
     # -- The log --------------------------------------------------------------------------------
 
     def _clear(self) -> None:
         self._begins_run = True
-        self._released = 0
+        self.released = 0
         self._state = None
         self._last_set = None
         self._odometry = None
@@ -207,22 +178,22 @@ class Timeline:
         self._newest = None
         self._allowance = self.settings.rerun_rate * ALLOWANCE
 
-    def _insert(self, channel: int, measurement: Measurement) -> tuple[Fate, list[EstimateSet]]:
+    def _insert(self, channel: int, measurement: Measurement) -> tuple[Fate, Due | None]:
         stamp, state = measurement.stamp, self._state
         if not self._log.stamps:
-            self._own_counts['runs'] += self._begins_run
+            self.counts['runs'] += self._begins_run
             self._begins_run = False
         index, new = self._log.insert(channel, measurement)
-        if new and index < self._released:
-            self._released += 1
+        if new and index < self.released:
+            self.released += 1
         fate = Fate.LATE if state is not None and stamp < state else Fate.IN_ORDER
-        if channel == WHEEL_ODOMETRY and index < self._released:
+        if channel == WHEEL_ODOMETRY and index < self.released:
             self._hear_odometry(stamp)
             if self._set_is_due(stamp):
-                return fate, [self._publish(index)]
-        return fate, []
+                return fate, self._due(index)
+        return fate, None
 
-    def _insert_deferred(self, at_any_cost: bool = False) -> None:
+    def _insert_deferred(self, at_any_cost: bool = False) -> Iterator[Due]:
         """Fuse what waited, all at once, as soon as running again for the oldest is affordable."""
         if not self._deferred:
             return
@@ -235,31 +206,31 @@ class Timeline:
         for channel, measurement in deferred:
             state = self._state
             if state is not None and measurement.stamp < state - self.settings.history:
-                self._own_counts['late_inputs_dropped'] += 1
+                self.counts['late_inputs_dropped'] += 1
             else:
-                self._insert(channel, measurement)
+                _, due = self._insert(channel, measurement)
+                if due is not None:
+                    yield due
 
     # -- Release --------------------------------------------------------------------------------
 
-    def _release(self, limit: int) -> list[EstimateSet]:
-        sets = []
+    def _release(self, limit: int) -> Iterator[Due]:
         log = self._log
-        while self._released < len(log.stamps) and log.stamps[self._released] <= limit:
-            index = self._released
+        while self.released < len(log.stamps) and log.stamps[self.released] <= limit:
+            index = self.released
             entry = log.entries[index]
-            self._released = index + 1
+            self.released = index + 1
             self._state = entry.stamp
             if self._odometry is None:
                 self._hear_odometry(entry.stamp)  # silence counts from the start of the run
             if entry.parts[WHEEL_ODOMETRY] is not None:
                 self._hear_odometry(entry.stamp)
                 if self._set_is_due(entry.stamp):
-                    sets.append(self._publish(index))
+                    yield self._due(index)
             elif self._heartbeat_is_due(entry.stamp):
-                sets.append(self._publish(index))
+                yield self._due(index)
         if self._state is not None:
-            self._released -= log.forget(self._state - self.settings.history)
-        return sets
+            self.released -= log.forget(self._state - self.settings.history)
 
     def _set_is_due(self, stamp: int) -> bool:
         """Whether wheel odometry of this stamp is the first since a multiple of the period."""
@@ -268,11 +239,11 @@ class Timeline:
             return True
         if stamp <= last:
             return False
-        if self._grid.every_stamp:
+        if self._log.grid.every_stamp:
             return True
         first = self._log.first
         assert first is not None
-        return self._grid.set_index(stamp - first) > self._grid.set_index(last - first)
+        return self._log.grid.set_index(stamp - first) > self._log.grid.set_index(last - first)
 
     def _hear_odometry(self, stamp: int) -> None:
         if self._odometry is None or stamp > self._odometry:
@@ -294,22 +265,9 @@ class Timeline:
         self._heartbeats = beat
         return True
 
-    def _publish(self, index: int) -> EstimateSet:
-        """Bring the estimator to an entry and return the set of its stamp."""
+    def _due(self, index: int) -> Due:
         stamp = self._log.entries[index].stamp
         assert self._odometry is not None
-        silent = stamp - self._odometry >= self.settings.silence + self._overdue
-        outcome: EstimateSet | Exception
-        try:
-            with np.errstate(all='ignore'):  # the result is judged below, number by number
-                self._log.run_to(index)
-                outcome = self._log.estimator.estimates()
-        except _FAILURES as error:
-            outcome = error
         self._last_set = stamp
-        estimates, failed = self._finish(stamp, outcome, silent)
-        if failed:
-            self._own_counts['filter_restarts'] += 1
-            self._log.begin_after(index)
-            self._released -= index + 1
-        return estimates
+        silent = stamp - self._odometry >= self.settings.silence + self._overdue
+        return Due(index, stamp, silent)

@@ -1,13 +1,13 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""An estimator whose inputs are judged: no slip class and no stuck warning from what is wrong."""
+"""The judge of the inputs: no slip class and no stuck warning from what is wrong."""
 
 from __future__ import annotations
 
 import logging
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -20,7 +20,6 @@ from wheel_terra_estimator.estimation.estimates import (
     SlipClass,
 )
 from wheel_terra_estimator.estimation.measurements import StepInputs
-from wheel_terra_estimator.estimation.timing.input_log import Estimator
 
 _LOGGER = logging.getLogger(__name__)
 SUBJECT = 'check of '
@@ -40,32 +39,23 @@ _NOISE = 'noise_beyond_stated'
 """What the filter says of sensors much noisier than a file or a message states."""
 
 
-class _Warning(NamedTuple):
-    """The estimator's stuck warning: when it rose [ns], None = there is none; whether it waits."""
-
-    since: int | None = None
-    waits: bool = False
-
-
-class WatchedEstimator:
-    """Runs an estimator and the online checks over the same steps, kept states included.
+class InputJudge:
+    """The checks while driving as what runs beside an estimator, kept states included.
 
     Parameters
     ----------
     configuration : Configuration
         What the inputs are judged against.
-    estimator : Estimator
-        What estimates.
     """
 
-    def __init__(self, configuration: Configuration, estimator: Estimator) -> None:
-        self._estimator = estimator
+    def __init__(self, configuration: Configuration) -> None:
         self._checks = OnlineChecks(configuration)
-        self._warning = _Warning()
         self._failed = False  # the checks of this run
+        self._stuck_since: int | None = None  # [ns] of the warning; None = there is none
+        self._warning_waits = False
 
     def step(self, stamp: int, inputs: StepInputs) -> None:
-        """Bring both to `stamp` [ns], later than the one before."""
+        """Look at the inputs of a step; stamps [ns] increase."""
         if not self._failed:
             try:
                 self._checks.step(stamp, inputs)
@@ -73,74 +63,78 @@ class WatchedEstimator:
                 _LOGGER.debug('checks while driving', exc_info=True)
                 self._checks.reset()
                 self._failed = True
-        self._estimator.step(stamp, inputs)
-        self._warning = self._followed(stamp)
 
-    def _followed(self, stamp: int) -> _Warning:
-        """Return the warning after a step; one that has waited once is out until it falls."""
-        if not getattr(self._estimator, 'stuck', False):
-            return _Warning()
-        since, waited = self._warning
-        rises = since is None
-        begun = stamp if since is None else since
-        undecided = (
-            bool(self._checks.undecided) and not self._failed and stamp - begun < LONGEST_WAIT
-        )
-        return _Warning(begun, (rises or waited) and undecided)
+    def judged(self, estimates: EstimateSet, health: Mapping[str, Any]) -> EstimateSet:
+        """Return the estimates; slip is not judged while a finding stands.
 
-    def estimates(self) -> EstimateSet:
-        """Return the estimates; slip is not judged while a finding stands."""
-        estimates = self._with_misfits(self._estimator.estimates())
-        if self._checks.remarks:
-            estimates = replace(estimates, faults=_told(estimates.faults, self._checks.remarks))
+        Parameters
+        ----------
+        estimates : EstimateSet
+            Of the last step.
+        health : mapping
+            What the estimator says of itself.
+        """
+        self._follow(estimates)
+        faults = _told({**estimates.faults, **_misfits(health)}, self._checks.remarks)
         if self._failed:
-            estimates = replace(estimates, faults={**estimates.faults, **_NOT_CHECKED})
+            faults |= _NOT_CHECKED
+        estimates = replace(estimates, faults=faults)
         findings = self._checks.findings
         if findings:
             return without_judgement(estimates, findings)
-        if self._warning.waits:
+        if self._warning_waits:
             reason = f'stuck warning waits: {self._checks.undecided}'
             reasons = (reason,) * len(estimates.reasons)
             return replace(estimates, stuck=False, stuck_direction=0, reasons=reasons)
         return estimates
 
-    def _with_misfits(self, estimates: EstimateSet) -> EstimateSet:
-        """Say where torque, balance or noise are far from what the filter expects of them."""
-        health = self.health()
-        told = {
-            subject: f'{words} (NIS {health[key]:.0f}, usual below 1): sign or scale of the '
-            'torques, rover.mass or soil -> wheel-terra check'
-            for key, (subject, words) in _MISFITS.items()
-            if health.get(key, 0.0) > FAR_NIS
-        }
-        if _NOISE in health:
-            told['noise'] = f'{health[_NOISE]} -> state it so'
-        return replace(estimates, faults={**estimates.faults, **told}) if told else estimates
+    def _follow(self, estimates: EstimateSet) -> None:
+        """Follow the stuck warning; one that has waited once is out until it falls."""
+        if not estimates.stuck:
+            self._stuck_since, self._warning_waits = None, False
+            return
+        rises = self._stuck_since is None
+        begun = estimates.stamp if self._stuck_since is None else self._stuck_since
+        undecided = (
+            bool(self._checks.undecided)
+            and not self._failed
+            and estimates.stamp - begun < LONGEST_WAIT
+        )
+        self._stuck_since = begun
+        self._warning_waits = (rises or self._warning_waits) and undecided
 
     def snapshot(self) -> Any:
-        """Return all states."""
-        return self._estimator.snapshot(), self._checks.snapshot(), self._warning, self._failed
+        """Return the state of the checks."""
+        return self._checks.snapshot(), self._failed
 
     def restore(self, snapshot: Any) -> None:
         """Return to a kept state."""
-        estimator, checks, self._warning, self._failed = snapshot
-        self._estimator.restore(estimator)
+        checks, self._failed = snapshot
         self._checks.restore(checks)
 
     def begin_run(self, stamp: int, keep_soil: bool) -> None:
         """Start anew."""
         self._checks.reset()
-        self._warning = _Warning()
         self._failed = False
-        self._estimator.begin_run(stamp, keep_soil)
 
-    def health(self) -> dict[str, Any]:
-        """Return what the estimator says of itself."""
-        return dict(getattr(self._estimator, 'health', dict)())
+    def retune(self, configuration: Configuration) -> None:
+        """Go on with other tuning."""
+        state = self._checks.snapshot()
+        self._checks = OnlineChecks(configuration)
+        self._checks.restore(state)
 
-    def learned(self) -> dict[str, Any]:
-        """Return what the estimator learned of soil and sensors."""
-        return dict(getattr(self._estimator, 'learned', dict)())
+
+def _misfits(health: Mapping[str, Any]) -> dict[str, str]:
+    """Say where torque, balance or noise are far from what the filter expects of them."""
+    told = {
+        subject: f'{words} (NIS {health[key]:.0f}, usual below 1): sign or scale of the '
+        'torques, rover.mass or soil -> wheel-terra check'
+        for key, (subject, words) in _MISFITS.items()
+        if health.get(key, 0.0) > FAR_NIS
+    }
+    if _NOISE in health:
+        told['noise'] = f'{health[_NOISE]} -> state it so'
+    return told
 
 
 def without_judgement(estimates: EstimateSet, findings: tuple[Finding, ...]) -> EstimateSet:
