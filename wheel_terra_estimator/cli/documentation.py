@@ -9,16 +9,18 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from wheel_terra_estimator.cli.main import sub_parsers
+from wheel_terra_estimator.cli.parser import Parser
 
 _INTRODUCTION = """# Commands
 
 Written by `python -m wheel_terra_estimator.cli.documentation` from the help of the commands; do not
 edit.
 
-`wheel-terra COMMAND --help` says the same. After colcon the commands are `ros2 run
-wheel_terra_estimator wheel-terra COMMAND`. Every command takes `--debug` (traceback of an error);
-`wheel-terra --print-completion bash` prints what completes commands and options in a shell
-(`pip install shtab`). How a command ends: [exit status](exit_status.md).
+`wheel-terra COMMAND --help` says what most runs need, `--help-all` the same as this page. After
+colcon the commands are `ros2 run wheel_terra_estimator wheel-terra COMMAND`. Every command takes
+`--debug` (traceback of an error). Completion in bash and zsh comes with the package; in a virtual
+environment `eval "$(wheel-terra --print-completion bash)"` turns it on. How a command ends:
+[exit status](exit_status.md).
 """
 
 
@@ -30,15 +32,16 @@ def page() -> str:
     return '\n'.join(lines).rstrip() + '\n'
 
 
-def _section(parser: argparse.ArgumentParser, title: str, depth: int) -> Iterator[str]:
+def _section(parser: Parser, title: str, depth: int) -> Iterator[str]:
     yield f'{"#" * depth} `{title}`\n'
     yield f'{_sentence(parser.description or "")}\n'
     if parser.epilog:
         examples = [line.strip() for line in parser.epilog.splitlines()[1:]]
         yield '\n'.join(['```sh', *examples, '```\n'])
-    rows = [row for action in parser._actions if (row := _row(action))]
-    if rows:
-        yield '\n'.join(['| argument | meaning |', '|---|---|', *rows, ''])
+    for group, actions in parser.groups().items():
+        rows = [row for action in actions if (row := _row(action))]
+        if rows:
+            yield '\n'.join([f'| {group} | meaning |', '|---|---|', *rows, ''])
     for action in parser._actions:
         if isinstance(action, argparse._SubParsersAction):
             helps = {choice.dest: choice.help or '' for choice in action._choices_actions}

@@ -9,24 +9,22 @@ error of the program itself, 130 interrupted.
 from __future__ import annotations
 
 import argparse
-import difflib
 import importlib
 import logging
 import os
 import sys
 import warnings
 from collections.abc import Callable, Container, Sequence
-from contextlib import suppress
 from functools import partial
 from typing import Any, NoReturn
 
 from wheel_terra_estimator import __version__
 from wheel_terra_estimator.cli import outputs
+from wheel_terra_estimator.cli.parser import UNUSABLE_INPUT, Parser, complain, suggestion
 from wheel_terra_estimator.cli.terminal import (
     discard_output,
     harmless_output,
     is_utf8,
-    one_line,
     open_closed_streams,
     termination_as_interrupt,
 )
@@ -61,49 +59,28 @@ LABORATORY = frozenset({'trial', 'soilbin', 'evaluate', 'bench'})
 ENTRY_POINTS = 'wheel_terra_estimator.commands'
 """Group of entry points that names the modules of these."""
 
-UNUSABLE_INPUT = 2
 PROGRAM_ERROR = 3
 INTERRUPTED = 130
 DEBUG_HELP = 'show the traceback of an error'
 
 
-class Parser(argparse.ArgumentParser):
-    """A parser whose complaints are one line, with the nearest name that it knows."""
-
-    def error(self, message: str) -> NoReturn:
-        """Say what is wrong in one line and end with status 2."""
-        if 'invalid choice: ' in message:
-            message = self._nearest_choice(message)
-        _complain(f'{self.prog}: {message} (help: {self.prog} --help)')
-        self.exit(UNUSABLE_INPUT)
-
-    def _nearest_choice(self, message: str) -> str:
-        wrong = message.partition("invalid choice: '")[2].partition("'")[0]
-        for action in self._actions:
-            named = action.metavar or '/'.join(action.option_strings) or action.dest
-            if action.choices and message.startswith(f'argument {named}:'):
-                known = [str(choice) for choice in action.choices]
-                what = 'no command' if action.dest == 'command' else f'{named}: no choice'
-                return f"{what} '{wrong}'; {_suggestion(wrong, known)}"
-        return message
-
-
-def build_parser() -> argparse.ArgumentParser:
+def build_parser() -> Parser:
     """Return the parser of all sub-commands."""
     return _parsers(_commands_here())[0]
 
 
-def sub_parsers() -> dict[str, argparse.ArgumentParser]:
+def sub_parsers() -> dict[str, Parser]:
     """Return sub-command -> its parser."""
     return _parsers(_commands_here())[1]
 
 
-def _parsers(needed: Container[str]) -> tuple[Parser, dict[str, argparse.ArgumentParser]]:
+def _parsers(needed: Container[str]) -> tuple[Parser, dict[str, Parser]]:
     """Return the parser and those of the sub-commands; arguments of the `needed` ones alone."""
     parser = Parser(
         prog='wheel-terra',
         description='Slip, sinkage and drawbar pull of rover wheels in loose soil.',
-        epilog='Help of a command, with examples: wheel-terra COMMAND --help',
+        epilog='Help of a command, with examples: wheel-terra COMMAND --help; all of its options: '
+        '--help-all',
     )
     parser.add_argument('--version', action='version', version=__version__)
     parser.add_argument('--debug', action='store_true', help=DEBUG_HELP)
@@ -111,7 +88,7 @@ def _parsers(needed: Container[str]) -> tuple[Parser, dict[str, argparse.Argumen
         '--print-completion',
         action=_PrintCompletion,
         metavar='SHELL',
-        help='print what completes commands and options in bash, zsh or tcsh (needs shtab)',
+        help='print what completes commands and options in bash or zsh',
     )
     commands = parser.add_subparsers(
         dest='command', required=True, metavar='COMMAND', parser_class=Parser
@@ -173,16 +150,8 @@ def _add_arguments(parser: argparse.ArgumentParser, module: Any) -> None:
     parser.set_defaults(run=module.run)
 
 
-def _needed(words: Sequence[str]) -> Container[str]:
-    """Return the sub-commands whose arguments a command line needs."""
-    named = [word for word in words if word in COMMANDS][:1]
-    if not named and any(word.startswith('--p') for word in words):
-        return _commands_here()
-    return named
-
-
 class _PrintCompletion(argparse.Action):
-    """Print the completion script of a shell, as the library shtab writes it."""
+    """Print the shipped file that completes commands and options in a shell."""
 
     def __call__(
         self,
@@ -191,13 +160,11 @@ class _PrintCompletion(argparse.Action):
         values: Any,
         option_string: str | None = None,
     ) -> None:
-        try:
-            import shtab
-        except ImportError:
-            parser.error('--print-completion needs shtab: pip install shtab')
-        if values not in shtab.SUPPORTED_SHELLS:
-            parser.error(f'--print-completion: {_suggestion(values, shtab.SUPPORTED_SHELLS)}')
-        print(shtab.complete(parser, values))
+        from wheel_terra_estimator.cli import completion
+
+        if values not in completion.FILES:
+            parser.error(f'--print-completion: {suggestion(values, list(completion.FILES))}')
+        print(completion.path(values).read_text(encoding='utf-8'), end='')
         parser.exit()
 
 
@@ -211,16 +178,16 @@ def main(argv: Sequence[str] | None = None) -> int:
     words = sys.argv[1:] if argv is None else argv
     for word in words:
         if not is_utf8(word):
-            _complain(f'wheel-terra: {word}: not UTF-8, which reports and tables need; rename it')
+            complain(f'wheel-terra: {word}: not UTF-8, which reports and tables need; rename it')
             return UNUSABLE_INPUT
     try:
-        parser, subs = _parsers(_needed(words))
+        parser, subs = _parsers([word for word in words if word in COMMANDS][:1])
         arguments, unknown = parser.parse_known_args(words)
     except KeyboardInterrupt:
-        _complain('wheel-terra: interrupted')
+        complain('wheel-terra: interrupted')
         return INTERRUPTED
     except UserError as error:
-        _complain(f'wheel-terra {next(word for word in words if word in COMMANDS)}: {error}')
+        complain(f'wheel-terra {next(word for word in words if word in COMMANDS)}: {error}')
         return UNUSABLE_INPUT
     if unknown:
         _refuse(unknown[0], subs[arguments.command])
@@ -236,7 +203,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             sys.stdout.flush()
             return status
     except KeyboardInterrupt:
-        _complain(f'wheel-terra {arguments.command}: interrupted')
+        complain(f'wheel-terra {arguments.command}: interrupted')
         return INTERRUPTED
     except BrokenPipeError:
         # The reader of our output (head, less) has gone: not an error of ours.
@@ -254,7 +221,7 @@ def _show_warning(
 ) -> None:
     """Show what is doubtful in a configuration in one line, other warnings as Python does."""
     if issubclass(category, ConfigurationWarning):
-        _complain(f'wheel-terra {command}: warning: {message}')
+        complain(f'wheel-terra {command}: warning: {message}')
     else:
         others(message, category, *where)
 
@@ -263,9 +230,9 @@ def _ended_by(error: BaseException, command: str) -> int:
     """Say what ended a command; return the exit status."""
     outside = outside_cause(error)
     if outside is not None:
-        _complain(f'wheel-terra {command}: {outside}')
+        complain(f'wheel-terra {command}: {outside}')
         return UNUSABLE_INPUT
-    _complain(
+    complain(
         f'wheel-terra {command}: error of the program '
         f'({type(error).__name__}: {error}); add --debug for the traceback to report'
     )
@@ -278,21 +245,7 @@ def _refuse(word: str, parser: argparse.ArgumentParser) -> NoReturn:
         parser.error(f"one argument too many: '{word}'")
     options = [option for action in parser._actions for option in action.option_strings]
     name = word.partition('=')[0]
-    parser.error(f"no option '{name}'; {_suggestion(name, options)}")
-
-
-def _suggestion(wrong: str, known: Sequence[str]) -> str:
-    close = difflib.get_close_matches(wrong, known, n=1)
-    return f"did you mean '{close[0]}'?" if close else f'there are {", ".join(known)}'
-
-
-def _complain(line: str) -> None:
-    """Print a line on standard error, red on a terminal that wants colours (NO_COLOR: none)."""
-    line = one_line(line)
-    if sys.stderr.isatty() and not os.environ.get('NO_COLOR'):
-        line = f'\033[31m{line}\033[0m'
-    with suppress(OSError):  # nobody hears it
-        print(line, file=sys.stderr)
+    parser.error(f"no option '{name}'; {suggestion(name, options)}")
 
 
 if __name__ == '__main__':
