@@ -15,11 +15,13 @@ import pytest
 
 from wheel_terra_estimator.bags.bag_file import BagFile
 from wheel_terra_estimator.bags.history import EstimateHistory, read_estimates
+from wheel_terra_estimator.bags.message_types import topic_messages
 from wheel_terra_estimator.bags.storage import open_bag
 from wheel_terra_estimator.cli.main import main
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.configuration.soil_file import read_values
 from wheel_terra_estimator.estimation.estimates import SlipClass
+from wheel_terra_estimator.messages.convert import JOINT_STATE, stamp_of
 
 REAL = ('--remap', 'odom:=/wheel/odometry', '--remap', 'reference_odom:=/truth/odometry')
 THINNED = ('-p', 'reference_odom_max_rate:=1.0')
@@ -54,7 +56,7 @@ def test_drive_gives_a_bag_a_report_and_a_summary(
     assert_slip_follows_the_reference(history)
     assert (history.slip_class[-10:] == SlipClass.LOW).all()
     page = report.read_text()
-    assert len(re.findall('<path class="line', page)) == 2 + 2 * 3  # speeds; two wheels
+    assert len(re.findall('<path class="line', page)) == 2 + 2 * 3 + 2  # speeds; two wheels; slopes
     assert not re.search(r'(?:src|href)="(?!data:|#)', page)  # nothing is loaded from elsewhere
 
 
@@ -249,3 +251,21 @@ def test_measured_recording_with_odometry_in_place_of_joint_states(
     assert main([*command, '-o', str(out)]) == 0
     with open_bag(out) as opened:
         assert read_estimates(opened).stamp.size == 252
+
+
+def test_slip_on_slopes_is_in_the_table_as_it_was_published_last(
+    make_bag: Any, config: list[str], tmp_path: Path
+) -> None:
+    table, out = tmp_path / 'slopes.csv', tmp_path / 'out'
+    arguments = ['replay', str(make_bag()), *config, '-o', str(out), '--slip-on-slope', str(table)]
+    assert main(arguments) == 0
+    topic = '/wheel_terra_estimator/slip_on_slope'
+    with open_bag(out) as bag:
+        unpack = topic_messages(JOINT_STATE).unpack
+        told = [unpack(data) for _, _, data in bag.messages((topic,))]
+    stamps = [stamp_of(message) for message in told]
+    assert len(told) >= 3 and all(round(d * 1e-9) == 1 for d in np.diff(stamps))
+    found = np.genfromtxt(table, delimiter=',', skip_header=1)
+    assert tuple(told[-1].name) == tuple(f'slope_{slope:.0f}deg' for slope in found[:, 0])
+    columns = (told[-1].position, told[-1].effort, told[-1].velocity)
+    np.testing.assert_allclose(found[:, 1:], np.array(columns).T, rtol=1e-5, atol=1e-9)

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from estimate_sets import STAMP, some_estimates
 
+from wheel_terra_estimator.estimation.estimates import SlipOnSlope
 from wheel_terra_estimator.messages.convert import (
     InputConverter,
     input_layout,
@@ -316,6 +317,15 @@ def test_every_output_field_is_where_the_contract_wants_it() -> None:
     for topic, columns in table.items():
         assert found[topic].name == (names if topic != 'soil' else e.soil_names)
         assert [list(column) for column in found[topic][1:]] == [list(c) for c in columns]
+
+
+def test_slips_on_slopes_go_out_where_a_set_has_them() -> None:
+    slopes = SlipOnSlope(*np.arange(33.0).reshape(3, 11))
+    found = joint_fields(some_estimates(slip_on_slope=slopes), ('left', 'right'))
+    assert found['slip_on_slope'].name == tuple(f'slope_{d}deg' for d in range(-20, 31, 5))
+    assert found['slip_on_slope'].position == slopes.slip.tolist()
+    assert found['slip_on_slope'].effort == slopes.std.tolist()
+    assert found['slip_on_slope'].velocity == slopes.entrapment.tolist()
 
 
 def test_twist_covariance_is_row_major_and_positive() -> None:

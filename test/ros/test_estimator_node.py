@@ -71,6 +71,7 @@ class TestOneNode:
             'sinkage_stddev': 'sensor_msgs/msg/JointState',
             'mobility': 'sensor_msgs/msg/JointState',
             'soil': 'sensor_msgs/msg/JointState',
+            'slip_on_slope': 'sensor_msgs/msg/JointState',
             'slip_class': 'std_msgs/msg/UInt8MultiArray',
             'twist': 'geometry_msgs/msg/TwistWithCovarianceStamped',
             'stuck': 'std_msgs/msg/Bool',

@@ -21,7 +21,7 @@ from wheel_terra_estimator.bags.storage import Bag
 from wheel_terra_estimator.bags.thinning import ThinnedRows
 from wheel_terra_estimator.bags.writer import DIAGNOSTICS
 from wheel_terra_estimator.errors import UserError
-from wheel_terra_estimator.estimation.estimates import EstimateSet, SlipClass
+from wheel_terra_estimator.estimation.estimates import EstimateSet, SlipClass, SlipOnSlope
 from wheel_terra_estimator.messages.cdr import DamagedMessageError
 from wheel_terra_estimator.messages.convert import JOINT_STATE, OUTPUT_TYPES, stamp_of
 from wheel_terra_estimator.messages.diagnostics import NODE
@@ -147,6 +147,7 @@ class EstimateHistory:
     forward_velocity_std: FloatArray
     warnings: tuple[StuckWarning, ...]
     whole: DriveFigures | None = None  # None: the arrays are all there is
+    slip_on_slope: SlipOnSlope | None = None  # as the drive ended; None: not known
 
     @property
     def seconds(self) -> FloatArray:
@@ -181,10 +182,12 @@ class HistoryRecorder:
         self._figures = DriveFigures(len(self._names))
         self._rows = ThinnedRows(sys.maxsize if most is None else most)
         self._warnings: list[StuckWarning] = []
+        self._slopes: SlipOnSlope | None = None
 
     def add(self, estimates: EstimateSet) -> None:
         """Append a set."""
         e = estimates
+        self._slopes = e.slip_on_slope or self._slopes
         values = {name: getattr(e, name) for name in WHEEL_FIELDS}
         self._figures.add(e.stamp, e.slip_class, values)
         general = (e.forward_velocity, e.forward_velocity_variance)
@@ -213,6 +216,7 @@ class HistoryRecorder:
             values=dict(zip(WHEEL_FIELDS, fields, strict=True)),
             warnings=tuple(self._warnings),
             whole=self._figures,
+            slip_on_slope=self._slopes,
         )
 
 

@@ -89,6 +89,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--config for the next drive of this rover; of one recording',
     )
     parser.add_argument(
+        '--slip-on-slope',
+        action=Output,
+        type=Path,
+        metavar='F.csv',
+        help='slip expected on slopes of -20 to 30 degrees on this soil with this rover, with its '
+        'deviation and the probability of entrapment, as learned by the end; of one recording',
+    )
+    parser.add_argument(
         '--smooth',
         action='store_true',
         help='estimates of the fixed-interval smoother, which knows the whole drive at each of its '
@@ -169,13 +177,14 @@ def _run_one(arguments: argparse.Namespace) -> int:
 def _check_outputs(arguments: argparse.Namespace) -> None:
     """Refuse outputs that cannot be written, before hours of work."""
     from wheel_terra_estimator.output_folder import check_file, check_folder
-    from wheel_terra_estimator.reporting import estimates_table, track_table
+    from wheel_terra_estimator.reporting import estimates_table, slope_table, track_table
     from wheel_terra_estimator.reporting.html import check_page
 
     for path, check_kind in (
         (arguments.report, check_page),
         (arguments.table, estimates_table.check_table),
         (arguments.track, track_table.check_track),
+        (arguments.slip_on_slope, slope_table.check_slopes),
     ):
         if path:
             check_kind(path)
@@ -219,6 +228,8 @@ def _write_outputs(
         drive.write_table(arguments.table, arguments.overwrite)
     if arguments.track:
         drive.write_track(arguments.track, arguments.overwrite, origin)
+    if arguments.slip_on_slope:
+        drive.write_slopes(arguments.slip_on_slope, arguments.overwrite)
     if arguments.save_soil:
         if not drive.result.learned:
             raise UserError(
@@ -231,6 +242,7 @@ def _write_outputs(
         'table': arguments.table,
         'track': arguments.track,
         'soil': arguments.save_soil,
+        'slip on slope': arguments.slip_on_slope,
         'estimates': arguments.output,
         'report': arguments.report,
     }
@@ -247,8 +259,12 @@ def _run_several(arguments: argparse.Namespace) -> int:
         raise UserError('several recordings need a folder for their outputs: add -o DIR')
     if arguments.arrival:
         raise UserError('--arrival: belongs to one recording; replay that one by itself')
-    if arguments.save_soil:
-        raise UserError('--save-soil: belongs to one recording; replay that one by itself')
+    for option, path in (
+        ('--save-soil', arguments.save_soil),
+        ('--slip-on-slope', arguments.slip_on_slope),
+    ):
+        if path:
+            raise UserError(f'{option}: belongs to one recording; replay that one by itself')
     if arguments.report:
         check_page(arguments.report)
     if arguments.table:

@@ -22,6 +22,7 @@ import numpy as np
 from wheel_terra_estimator.configuration import Configuration
 from wheel_terra_estimator.estimation.estimates import EstimateSet, SlipClass
 from wheel_terra_estimator.estimation.judgement.classes import PublishedClasses
+from wheel_terra_estimator.estimation.judgement.slip_on_slope import OncePerSecond
 from wheel_terra_estimator.estimation.judgement.stuck.memory import StuckMemory
 from wheel_terra_estimator.estimation.measurements import Measurement
 from wheel_terra_estimator.estimation.output_guard import OutputGuard
@@ -87,6 +88,7 @@ class EstimatorCore:
         self._checks = InputChecks(configuration)
         self._guard = OutputGuard(configuration)
         self._classes = PublishedClasses(configuration)
+        self._slopes = OncePerSecond()
         self.warning = StuckMemory(configuration)
         grid = StepGrid(self._settings.output_rate)
         self._log = InputLog(self._runners(), grid, self._settings.reference_period)
@@ -232,6 +234,7 @@ ReferenceVelocity
     def _end_run(self, keep_soil: bool) -> None:
         self._timeline.end_run(keep_soil=keep_soil)
         self._classes.reset()
+        self._slopes.reset()
         self._lags.begin_run()
 
     def _insert(self, arrival: Arrival) -> list[EstimateSet]:
@@ -272,6 +275,8 @@ ReferenceVelocity
             unknown = np.full(len(estimates.slip_class), SlipClass.UNKNOWN, dtype=np.uint8)
             estimates = replace(estimates, slip_class=unknown)
         estimates = self.warning.follow(self._classes.follow(estimates))
+        if not self._slopes.due(stamp):
+            estimates = replace(estimates, slip_on_slope=None)
         if failed:
             self.warning.begin_anew()
             self._timeline.begin_after(due)

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from enum import IntEnum
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +25,19 @@ class SlipClass(IntEnum):
     HIGH = 2
     STUCK = 3
     UNKNOWN = 255
+
+
+SLOPES = np.arange(-20.0, 31.0, 5.0)
+"""Slopes of `SlipOnSlope` [deg], positive uphill."""
+SLOPE_NAMES = tuple(f'slope_{slope:.0f}deg' for slope in SLOPES)
+
+
+class SlipOnSlope(NamedTuple):
+    """What the `SLOPES` would cost a rover that drives forward on this soil, (11,) each."""
+
+    slip: FloatArray  # expected [-]
+    std: FloatArray
+    entrapment: FloatArray  # probability that the slip exceeds 0.9 there [-]
 
 
 @dataclass(frozen=True)
@@ -64,3 +78,4 @@ class EstimateSet:
     reasons: tuple[str, ...]  # (n,) why the wheel is called what it is called, in words
     faults: dict[str, str] = field(default_factory=dict)  # input or state -> words, for diagnostics
     stuck_direction: int = 0  # of the rims that led to `stuck`: 1, -1; 0 none, both or unknown
+    slip_on_slope: SlipOnSlope | None = None  # once a second; None = not in this set

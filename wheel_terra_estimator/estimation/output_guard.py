@@ -74,6 +74,9 @@ class OutputGuard:
         )
         changes['soil'] = estimates.soil[known]
         changes['soil_std'] = estimates.soil_std[known]
+        slopes = estimates.slip_on_slope
+        if slopes is not None and not np.isfinite(slopes).all():
+            changes['slip_on_slope'] = self._good.slip_on_slope
         return replace(estimates, **changes)
 
     def _held(self, stamp: int, estimates: EstimateSet, words: str) -> EstimateSet:
@@ -134,4 +137,6 @@ def _is_finite(estimates: EstimateSet) -> bool:
     numbers = np.concatenate(_ARRAYS(estimates))
     # A sum is cheap and never hides a nan; where it overflows, the long way decides.
     finite = math.isfinite(np.add.reduce(numbers)) or bool(np.isfinite(numbers).all())
+    if estimates.slip_on_slope is not None:
+        finite = finite and bool(np.isfinite(estimates.slip_on_slope).all())
     return finite and all(map(math.isfinite, _SCALARS(estimates)))

@@ -19,6 +19,7 @@ from wheel_terra_estimator.estimation.estimates import (
     NO_ENTRAPMENT_IN_SIGHT,
     EstimateSet,
     SlipClass,
+    SlipOnSlope,
 )
 from wheel_terra_estimator.estimation.filter.sinkage_process import SinkageState
 from wheel_terra_estimator.estimation.filter.state import (
@@ -72,6 +73,7 @@ class Sources(NamedTuple):
     sinkage: SinkageState
     margin: Floats  # [N]
     assessment: StuckAssessment
+    slip_on_slope: SlipOnSlope | None
 
 
 class MissingInputs(NamedTuple):
@@ -165,6 +167,7 @@ class Outputs:
             stuck_direction=given.assessment.direction,
             reasons=reasons_in_words(given),
             faults=faults_in_words(missing),
+            slip_on_slope=given.slip_on_slope,
             **dict(zip(per_wheel, rows, strict=True)),
         )
 

@@ -69,7 +69,9 @@ from wheel_terra_estimator.estimation.inputs.seen_noise import SeenNoise
 from wheel_terra_estimator.estimation.inputs.stated_noise import NOTHING_STATED, StatedNoise
 from wheel_terra_estimator.estimation.inputs.wheel_odometry import WheelOdometryInput
 from wheel_terra_estimator.estimation.judgement.pull_margin import PullMargin
-from wheel_terra_estimator.estimation.judgement.slip import BodyMotion, SlipJudge
+from wheel_terra_estimator.estimation.judgement.slip import BodyMotion, SlipJudge, WheelSlip
+from wheel_terra_estimator.estimation.judgement.slip_on_slope import Instant as SlopeInstant
+from wheel_terra_estimator.estimation.judgement.slip_on_slope import SlopeCurve
 from wheel_terra_estimator.estimation.judgement.stuck.monitor import (
     StuckAssessment,
     StuckMonitor,
@@ -84,7 +86,7 @@ from wheel_terra_estimator.estimation.learned import Learned
 from wheel_terra_estimator.estimation.measurements import ReferenceVelocity, StepInputs
 from wheel_terra_estimator.estimation.outputs import MissingInputs, Outputs, Sources
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
-from wheel_terra_estimator.estimation.scalars import NAN, known
+from wheel_terra_estimator.estimation.scalars import NAN, known, median
 from wheel_terra_estimator.estimation.smoothing.tape import Gaussian, Tape
 
 Floats = tuple[float, ...]
@@ -210,6 +212,7 @@ class WheelSoilEstimator:
         # What it means.
         self._slips = SlipJudge(rover, sensors)
         self._margin = PullMargin(sensors, layout, models)
+        self._slopes = SlopeCurve()
         self._stuck = StuckMonitor(StuckSettings.from_configuration(configuration))
         self._outputs = Outputs(configuration, rover, sensors, layout)
         self._learned = Learned(
@@ -243,6 +246,7 @@ class WheelSoilEstimator:
             self._whiteness,
             self._slips,
             self._margin,
+            self._slopes,
             self._stuck,
         )
         self._tape = tape
@@ -718,8 +722,36 @@ class WheelSoilEstimator:
         )
         self._clock = self._clock._replace(assessment=assessment, speed=(speed, variance))
         self._margin.update(time, ekf.mean, loads, self._contact_age.state.direction)
+        self._learn_slopes(time, slips, rims, motion.lateral_motion)
         if self._tape is not None:
             self._tape.mark(self._instant(time, body), Gaussian(ekf.mean, ekf.covariance))
+
+    def _learn_slopes(
+        self, time: float, slips: tuple[WheelSlip, ...], rims: Floats, lateral_motion: float
+    ) -> None:
+        """Learn what slopes cost, from the wheels that turn straight on settled contacts."""
+        before = self._slopes.state.time
+        since = time - before
+        if since < self._rover.period - _PERIOD_ROUNDING:
+            return
+        inertial = self._inertial.state
+        turning = [
+            (wheel, abs(rim))
+            for wheel, rim in zip(slips, rims, strict=True)
+            if wheel.judged and abs(rim) > self._rover.low_rim
+        ]
+        steady = self._contact_age.settled and lateral_motion <= _SHARP_TURN and bool(turning)
+        told = time - inertial.force_time <= self._rover.silence
+        self._slopes.update(
+            SlopeInstant(
+                time,
+                self._demand.state if told else NAN,
+                median([wheel.slip for wheel, _ in turning]) if steady else 0.0,
+                median([wheel.std for wheel, _ in turning]) if steady else 1.0,
+                median([rim for _, rim in turning]) * since if steady and since > 0.0 else 0.0,
+                self._contact_age.state.direction,
+            )
+        )
 
     def _instant(self, time: float, body: BodyMotion) -> Instant:
         """Return what a smoother judges anew."""
@@ -780,6 +812,7 @@ class WheelSoilEstimator:
             sinkage=self._sinkage_process.state,
             margin=self._margin.state.margin,
             assessment=self._clock.assessment,
+            slip_on_slope=self._slopes.state.told,
         )
 
     def learned(self) -> dict[str, Any]:

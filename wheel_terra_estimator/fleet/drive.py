@@ -16,8 +16,14 @@ from wheel_terra_estimator.bags.truth import Truth, read_truth
 from wheel_terra_estimator.checks.finding import CheckReport
 from wheel_terra_estimator.checks.run import check_recording, run_apart
 from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.output_folder import new_file
-from wheel_terra_estimator.reporting import estimates_table, track_table, truth_scores
+from wheel_terra_estimator.reporting import (
+    estimates_table,
+    slope_table,
+    track_table,
+    truth_scores,
+)
 from wheel_terra_estimator.reporting.drive_style import Border
 from wheel_terra_estimator.reporting.drive_summary import DriveSummary, summarise
 from wheel_terra_estimator.reporting.replay_report import write_replay_report
@@ -48,6 +54,14 @@ class Drive:
         """Write the track as CSV, or as GeoJSON from an origin (latitude, longitude) [deg]."""
         with new_file(path, overwrite) as fresh:
             track_table.write_track(self.result.track, fresh, origin)
+
+    def write_slopes(self, path: Path, overwrite: bool) -> None:
+        """Write what slopes would cost as a table."""
+        slopes = self.result.history.slip_on_slope
+        if slopes is None:
+            raise UserError(f'{self.summary.title}: no estimates, so nothing for {path}')
+        with new_file(path, overwrite) as fresh:
+            slope_table.write_slopes(slopes, fresh)
 
     def write_report(self, path: Path, overwrite: bool) -> None:
         """Write the page with pictures."""

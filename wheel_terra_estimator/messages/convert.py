@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wheel_terra_estimator.configuration.configuration import Configuration
-from wheel_terra_estimator.estimation.estimates import EstimateSet
+from wheel_terra_estimator.estimation.estimates import SLOPE_NAMES, EstimateSet
 from wheel_terra_estimator.estimation.measurements import (
     InertialReading,
     InertialVariance,
@@ -44,7 +44,15 @@ INPUT_TYPES = {
 }
 """Input topics of the estimator (relative names) and their message types."""
 
-JOINT_OUTPUTS = ('slip', 'sinkage', 'slip_stddev', 'sinkage_stddev', 'mobility', 'soil')
+JOINT_OUTPUTS = (
+    'slip',
+    'sinkage',
+    'slip_stddev',
+    'sinkage_stddev',
+    'mobility',
+    'soil',
+    'slip_on_slope',
+)
 OUTPUT_TYPES = {
     **dict.fromkeys(JOINT_OUTPUTS, JOINT_STATE),
     'slip_class': 'std_msgs/msg/UInt8MultiArray',
@@ -369,7 +377,7 @@ class JointFields(NamedTuple):
 
 
 def joint_fields(estimates: EstimateSet, names: tuple[str, ...]) -> dict[str, JointFields]:
-    """Return the per-wheel outputs and ``soil`` by topic, in the order they are published."""
+    """Return per-wheel outputs, ``soil`` and, where due, ``slip_on_slope``, as published."""
     e = estimates
     table = {
         'slip': (e.slip, e.slip_velocity, e.drawbar_pull),
@@ -383,6 +391,9 @@ def joint_fields(estimates: EstimateSet, names: tuple[str, ...]) -> dict[str, Jo
     }
     outputs['mobility'] = JointFields(names, e.rim_travel_left.tolist(), [], e.pull_margin.tolist())
     outputs['soil'] = JointFields(e.soil_names, e.soil.tolist(), [], e.soil_std.tolist())
+    if e.slip_on_slope is not None:
+        slip, std, entrapment = (column.tolist() for column in e.slip_on_slope)
+        outputs['slip_on_slope'] = JointFields(SLOPE_NAMES, slip, entrapment, std)
     return outputs
 
 

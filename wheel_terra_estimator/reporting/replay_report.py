@@ -19,6 +19,7 @@ from wheel_terra_estimator.reporting.drive_figure import drive_figure, way_figur
 from wheel_terra_estimator.reporting.drive_style import CLASS_COLOURS, Border
 from wheel_terra_estimator.reporting.drive_summary import DriveSummary, deepest, shown, spread
 from wheel_terra_estimator.reporting.html import render, write_page
+from wheel_terra_estimator.reporting.slope_table import slopes_figure
 from wheel_terra_estimator.reporting.truth_scores import QuantityError, TruthErrors
 
 
@@ -78,6 +79,7 @@ def write_replay_report(
         filter_errors=(
             [_error_row(error) for error in filter_errors.quantities] if filter_errors else []
         ),
+        slopes=slopes_figure(history.slip_on_slope) if history.slip_on_slope else None,
         map=_map(track) if track and track_picture.has_map(track) else None,
         smoothed=filtered is not None,
         truth_source=truth.source if truth else '',

@@ -1,0 +1,111 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Slip on slopes: the learned curve against the one that made the slips, and when it is told."""
+
+import math
+
+import numpy as np
+import pytest
+from fake_estimator import make_core, odometry, play
+
+from wheel_terra_estimator.estimation.estimates import SLOPE_NAMES, SLOPES, SlipOnSlope
+from wheel_terra_estimator.estimation.judgement.slip_on_slope import (
+    ENTRAPPED_SLIP,
+    Instant,
+    OncePerSecond,
+    SlopeCurve,
+    slips_at,
+)
+
+RIM, PERIOD = 0.05, 0.1  # [m/s], [s]
+
+
+def slip_of(demand, offset=0.03, scale=0.35, greatest=0.5):
+    """Janosi's law turned round, for driving uphill."""
+    return offset - scale * math.log(1.0 - demand / greatest)
+
+
+def learned(slopes_deg, seconds=200.0, std=0.03, noise=0.02, seed=1):
+    """A curve that saw a climb through some slopes."""
+    rng = np.random.default_rng(seed)
+    curve = SlopeCurve()
+    for i in range(int(seconds / PERIOD)):
+        demand = math.tan(
+            math.radians(np.interp(i * PERIOD / seconds, np.linspace(0, 1, 3), slopes_deg))
+        )
+        slip = slip_of(demand) + rng.normal(0.0, noise)
+        curve.update(Instant(i * PERIOD, demand, slip, std, RIM * PERIOD, 1.0))
+    return curve
+
+
+def at(found: SlipOnSlope, slope):
+    place = SLOPES.tolist().index(slope)
+    return tuple(float(column[place]) for column in found)
+
+
+def test_the_names_are_those_of_the_contract():
+    assert SLOPE_NAMES[0] == 'slope_-20deg' and SLOPE_NAMES[4] == 'slope_0deg'
+    assert SLOPE_NAMES[-1] == 'slope_30deg' and len(SLOPE_NAMES) == 11
+
+
+@pytest.mark.parametrize('seed', range(5))
+def test_a_climb_tells_what_steeper_ground_costs(seed):
+    found = learned((0.0, 6.0, 12.0), seed=seed).state.told
+    for slope in (5.0, 10.0, 15.0):
+        slip, std, entrapment = at(found, slope)
+        true = slip_of(math.tan(math.radians(slope)))
+        assert abs(slip - true) < 1.96 * std
+        assert entrapment < 0.05
+    assert abs(at(found, 10.0)[0] - slip_of(math.tan(math.radians(10.0)))) < 0.02
+    # At 30 degrees more is asked than this soil gives.
+    assert math.tan(math.radians(30.0)) > 0.5
+    assert at(found, 30.0)[2] > 0.5
+
+
+def test_it_is_less_sure_the_farther_it_looks():
+    std = learned((0.0, 5.0, 10.0)).state.told.std
+    assert (np.diff(std[SLOPES >= 10.0][:3]) > 0.0).all()
+
+
+def test_the_probability_is_that_of_drawn_curves():
+    mean, covariance = np.array([0.05, -0.8, -0.7]), np.diag([0.03, 0.2, 0.15]) ** 2
+    draws = np.random.default_rng(3).multivariate_normal(mean, covariance, 200_000)
+    told = slips_at(mean, covariance, 0.03)
+    for place in (5, 7, 8, 9):
+        demand = math.tan(math.radians(SLOPES[place]))
+        share = demand / np.exp(draws[:, 2])
+        slip = np.where(
+            share < 1.0, draws[:, 0] - np.exp(draws[:, 1]) * np.log1p(-np.minimum(share, 0.9999)), 1
+        )
+        slip = np.minimum(slip, 1.0)
+        assert told.slip[place] == pytest.approx(slip.mean(), abs=0.015)
+        assert told.std[place] == pytest.approx(math.hypot(slip.std(), 0.03), abs=0.025)
+        beyond = slip + np.random.default_rng(4).normal(0.0, 0.03, slip.size) > ENTRAPPED_SLIP
+        assert told.entrapment[place] == pytest.approx(beyond.mean(), abs=0.03)
+
+
+def test_what_is_not_known_teaches_nothing():
+    curve = SlopeCurve()
+    before = curve.state
+    curve.update(Instant(0.0, math.nan, 0.9, 0.05, 0.01, 1.0))  # demand not known
+    curve.update(Instant(0.1, 0.2, 0.9, 1.0, 0.01, 1.0))  # slip not known
+    curve.update(Instant(0.2, 0.2, 0.9, 0.05, 0.0, 1.0))  # no way made
+    np.testing.assert_array_equal(curve.state.mean, before.mean)
+    np.testing.assert_array_equal(curve.state.covariance, before.covariance)
+    assert np.isfinite(curve.state.told).all()
+
+
+def test_it_is_due_once_a_second_of_stamps():
+    once = OncePerSecond()
+    stamps = [7_300_000_000 + i * 50_000_000 for i in range(100)]
+    due = [stamp for stamp in stamps if once.due(stamp)]
+    assert due == [7_300_000_000 + i * 1_000_000_000 for i in range(5)]
+
+
+def test_sets_of_the_core_have_it_once_a_second():
+    core, fake = make_core()
+    told = SlipOnSlope(*np.zeros((3, 11)))
+    plain = fake.estimates
+    fake.estimates = lambda: plain().__class__(**{**vars(plain()), 'slip_on_slope': told})
+    sets = play(core, [odometry(0.1 * i) for i in range(35)])
+    assert [i for i, e in enumerate(sets) if e.slip_on_slope is not None] == [0, 10, 20, 30]

@@ -1,0 +1,187 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""What a slope would cost: the slip expected on slopes, from the curve that the drive teaches.
+
+With the demand p, the pull that the ground asks over the load (tan of the slope at constant speed),
+the shear law of Janosi and Hanamoto (1961) turned round gives the slip that it costs:
+
+    s = a - s_0 sign(p) ln(1 - |p| / p_max)
+
+a: what the curve does not know (rolling resistance, another soil, a wrong radius) [-]; s_0: slip
+that mobilises the soil [-]; p_max: the greatest pull over the load [-]. An extended Kalman filter
+of (a, ln s_0, ln p_max) is corrected by the published slip. It needs nothing else of the estimator.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtr, ndtri
+
+from wheel_terra_estimator.estimation.component import Component
+from wheel_terra_estimator.estimation.estimates import SLOPES, SlipOnSlope
+from wheel_terra_estimator.estimation.scalars import gain_of
+
+FloatArray = NDArray[np.float64]
+
+ENTRAPPED_SLIP = 0.9
+"""Slip above which a rover makes no way that matters: class *stuck*."""
+_DEMANDS = np.tan(np.radians(SLOPES))
+_DRAWS = 64
+_BASES = 2, 3, 5  # of the Halton sequence
+
+
+@dataclass(frozen=True)
+class CurveTuning:
+    """Prior, walks and noise of the curve; looked at on simulators A and B, seeds 1000 to 1003."""
+
+    mean: tuple[float, float, float] = (0.05, math.log(0.5), math.log(0.6))
+    std: tuple[float, float, float] = (0.1, 0.4, 0.3)
+    walk: float = 0.03  # of a, per root metre of rim travel
+    reversal_std: float = 0.2  # of a, at a change of direction
+    demand_time: float = 0.4  # low-pass of the demand [s]
+    most_share: float = 0.97  # of p_max in the gradient
+    freedom: float = 4.0  # of the heavy tail of a slip (Student t)
+    scatter: float = 0.03  # of the slip from place to place [-]
+    correlation: float = 0.3  # rim travel within which slips are one piece of information [m]
+    most_std: float = 0.4  # of a slip that teaches
+
+
+class Instant(NamedTuple):
+    """What a curve learns from at one time."""
+
+    time: float  # [s]
+    demand: float  # in the direction of driving [-]; nan = unknown
+    slip: float  # median of the wheels [-]
+    slip_std: float
+    travel: float  # of the rims since the last instant, 0 where slip is no steady one [m]
+    direction: float  # of the drive, 1 or -1
+
+
+class CurveState(NamedTuple):
+    """What was learned."""
+
+    mean: FloatArray  # (3,)
+    covariance: FloatArray  # (3, 3)
+    demand: float = math.nan  # low-passed
+    time: float = math.nan  # [s]
+    direction: float = 0.0
+    told: SlipOnSlope | None = None
+    told_second: int = -1
+
+
+class SlopeCurve(Component[CurveState]):
+    """Learns the curve of a drive and reads it at the slopes once a second."""
+
+    def __init__(self, tuning: CurveTuning = CurveTuning()) -> None:
+        mean, std = np.array(tuning.mean), np.array(tuning.std)
+        super().__init__(CurveState(mean, np.diag(std**2)))
+        self._tuning = tuning
+
+    def update(self, now: Instant) -> None:
+        """Learn from an instant."""
+        tuning, old = self._tuning, self.state
+        dt = 0.0 if math.isnan(old.time) else max(now.time - old.time, 0.0)
+        state = old._replace(time=now.time, direction=now.direction or old.direction)
+        if math.isnan(now.demand):
+            state = state._replace(demand=math.nan)
+        else:
+            gain = 1.0 if math.isnan(old.demand) else gain_of(dt, tuning.demand_time)
+            before = now.demand if math.isnan(old.demand) else old.demand
+            state = state._replace(demand=before + gain * (now.demand - before))
+            if now.travel > 0.0 and now.slip_std < tuning.most_std:
+                reversed_ = old.direction * state.direction < 0.0
+                state = self._corrected(state, now, reversed_)
+        second = int(now.time)
+        if second != state.told_second:
+            told = slips_at(state.mean, state.covariance, tuning.scatter)
+            state = state._replace(told=told, told_second=second)
+        self.state = state
+
+    def _corrected(self, state: CurveState, now: Instant, reversed_: bool) -> CurveState:
+        tuning, mean = self._tuning, state.mean
+        covariance = state.covariance.copy()
+        covariance[0, 0] += tuning.walk**2 * now.travel + (tuning.reversal_std * reversed_) ** 2
+        scale, greatest = math.exp(mean[1]), math.exp(mean[2])
+        share = min(abs(state.demand) / greatest, tuning.most_share)
+        mobilised = math.copysign(math.log1p(-share), state.demand)
+        by_greatest = -math.copysign(scale * share / (1.0 - share), state.demand)
+        gradient = np.array([1.0, scale * mobilised, by_greatest])
+        residual = now.slip - (mean[0] + scale * mobilised)
+        repeats = tuning.correlation / min(now.travel, tuning.correlation)
+        noise = (now.slip_std**2 + tuning.scatter**2) * repeats
+        column = covariance @ gradient
+        spread = float(gradient @ column)
+        tail = (tuning.freedom + residual**2 / (spread + noise)) / (tuning.freedom + 1.0)
+        gain = column / (spread + noise * max(tail, 1.0))
+        covariance -= np.outer(gain, column)
+        covariance = 0.5 * (covariance + covariance.T)
+        return state._replace(mean=mean + gain * residual, covariance=covariance)
+
+
+def _halton() -> FloatArray:
+    """Return evenly spread draws of three standard normal numbers, (draws, 3); Halton (1960)."""
+    columns = []
+    for base in _BASES:
+        column = np.zeros(_DRAWS)
+        for k in range(1, _DRAWS + 1):
+            rest, place = k, 1.0
+            while rest:
+                rest, digit = divmod(rest, base)
+                place /= base
+                column[k - 1] += digit * place
+        columns.append(ndtri(column))
+    draws = np.array(columns).T
+    return np.asarray((draws - draws.mean(axis=0)) / draws.std(axis=0))
+
+
+_STANDARD = _halton()
+
+
+def slips_at(mean: FloatArray, covariance: FloatArray, scatter: float) -> SlipOnSlope:
+    """Return the slips that a curve gives at the `SLOPES`, driving forward.
+
+    Parameters
+    ----------
+    mean, covariance : numpy.ndarray
+        (3,), (3, 3) of a, ln s_0, ln p_max.
+    scatter : float
+        Deviation of the slip from place to place on one slope [-].
+    """
+    lower = np.linalg.cholesky(covariance + 1e-12 * np.eye(3))
+    offset, scale, greatest = (mean + _STANDARD @ lower.T).T[:, :, None]
+    share = np.abs(_DEMANDS) / np.exp(greatest)
+    carried = share < 1.0
+    mobilised = -np.sign(_DEMANDS) * np.log1p(-np.where(carried, share, 0.0))
+    slip = np.where(carried, offset + np.exp(scale) * mobilised, np.sign(_DEMANDS))
+    slip = np.clip(slip, -1.0, 1.0)
+    beyond = (slip - ENTRAPPED_SLIP) / scatter
+    return SlipOnSlope(
+        slip.mean(axis=0), np.hypot(slip.std(axis=0), scatter), ndtr(beyond).mean(axis=0)
+    )
+
+
+class OncePerSecond:
+    """Leaves the slips on slopes to the first set at or after each second of a run."""
+
+    def __init__(self) -> None:
+        self.reset()
+
+    def reset(self) -> None:
+        """Begin a new run."""
+        self._first: int | None = None
+        self._second = -1
+
+    def due(self, stamp: int) -> bool:
+        """Return whether the set of a stamp [ns] states them."""
+        if self._first is None:
+            self._first = stamp
+        second = (stamp - self._first) // 1_000_000_000
+        if second == self._second:
+            return False
+        self._second = second
+        return True
