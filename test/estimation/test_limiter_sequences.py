@@ -33,7 +33,7 @@ from wheel_terra_estimator.estimation.traction_limiter import (
     LimiterState,
 )
 
-SEQUENCES = int(os.environ.get('LIMITER_SEQUENCES', '5000'))
+SEQUENCES = int(os.environ.get('LIMITER_SEQUENCES', '1000'))
 UNKNOWN = 255
 WHEELS = 4
 PERIOD = 0.2  # [s] of sets and commands
@@ -303,19 +303,23 @@ def run(sequences, **more):
     )
 
 
-def test_no_sequence_of_events_breaks_an_invariant():
-    run(SEQUENCES)
+@pytest.mark.parametrize(
+    'sequences', [SEQUENCES, pytest.param(10 * SEQUENCES, marks=pytest.mark.slow)]
+)
+def test_no_sequence_of_events_breaks_an_invariant(sequences):
+    run(sequences)
 
 
 @pytest.mark.parametrize(
     ('event', 'state', 'wrong'),
     [
         (Event.BEGUN, Interlock.STUCK, Interlock.FREE),  # a restart of the estimator opens
-        (Event.OUT, Interlock.STOPPED, Interlock.STOPPED),  # a stop never ends by motion out
+        # A stop never ends by motion out: rare, found behind a thousand sequences.
+        pytest.param(Event.OUT, Interlock.STOPPED, Interlock.STOPPED, marks=pytest.mark.slow),
         (Event.STOP, Interlock.FREE, Interlock.FREE),  # a stop is not latched
     ],
 )
 def test_a_wrong_entry_of_the_table_is_found(monkeypatch, event, state, wrong):
     monkeypatch.setitem(INTERLOCK[event], state, wrong)
     with pytest.raises(AssertionError):
-        run(SEQUENCES, phases=[Phase.generate], derandomize=True)
+        run(5 * SEQUENCES, phases=[Phase.generate], derandomize=True)
