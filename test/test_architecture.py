@@ -121,14 +121,15 @@ MAY_USE = {
     'configuration': ({'terramechanics'}, {'numpy', 'yaml'}),
     # filterpy brings scipy in any case; its Cholesky solver costs less than an inverse.
     'estimation': ({'configuration', 'terramechanics'}, {'numpy', 'filterpy', 'scipy'}),
-    'messages': ({'configuration', 'estimation', 'checks'}, {'numpy'}),
+    'messages': ({'configuration', 'estimation', 'checks'}, {'numpy', 'scipy'}),
     'checks': ({'configuration', 'estimation'}, {'numpy', 'scipy'}),
     # Sensors of the simulated rover give the estimator's typed measurements.
-    'simulation': ({'configuration', 'terramechanics', 'estimation'}, {'numpy'}),
+    'simulation': ({'configuration', 'terramechanics', 'estimation'}, {'numpy', 'scipy'}),
     'bags': (
         {'configuration', 'terramechanics', 'estimation', 'messages', 'simulation', 'checks'},
         {
             'numpy',
+            'scipy',
             'yaml',
             'rosbags',
             'lz4',

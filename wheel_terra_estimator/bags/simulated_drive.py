@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from wheel_terra_estimator.bags.bag_file import BagFile
 from wheel_terra_estimator.configuration.configuration import Configuration
@@ -24,8 +25,6 @@ from wheel_terra_estimator.messages.convert import (
     INPUT_TYPES,
     OUTPUT_TYPES,
     input_layout,
-    quaternion_product,
-    rotation_matrix,
 )
 from wheel_terra_estimator.simulation.drive import SimulatedDrive
 
@@ -71,10 +70,9 @@ class _Sender:
         self._make = bag.messages
         self._wheels = configuration.wheels
         self._figures = configuration.sensors
-        mounting = input_layout(configuration).imu_mounting
-        self._mounting = mounting
-        self._into_sensor = rotation_matrix(mounting).T
-        self._mounted = not np.allclose(mounting, (0.0, 0.0, 0.0, 1.0))
+        self._mounting = input_layout(configuration).imu_mounting
+        self._into_sensor = self._mounting.inv().as_matrix()
+        self._mounted = self._mounting.magnitude() > 0.0
 
     def write(self, measurement: Measurement, log_time: int) -> None:
         if isinstance(measurement, WheelOdometry):
@@ -132,7 +130,7 @@ class _Sender:
         if self._mounted:
             force, rate = self._into_sensor @ force, self._into_sensor @ rate
             if orientation is not None:
-                orientation = quaternion_product(orientation, self._mounting)
+                orientation = (Rotation.from_quat(orientation) * self._mounting).as_quat()
         return self._make.imu(
             self._make.header(reading.stamp, 'imu_link' if self._mounted else BASE_FRAME),
             force.tolist(),

@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.estimates import SLOPE_NAMES, EstimateSet
@@ -84,7 +85,7 @@ class InputLayout:
     directions: FloatArray  # +1, or -1 where the joint counts negative forward
     lateral_positions: FloatArray  # y of the wheels in base_link [m]
     slip_radius: FloatArray  # [m]
-    imu_mounting: FloatArray  # (4,) quaternion x, y, z, w that turns the sensor into base_link
+    imu_mounting: Rotation  # turns the sensor into base_link
     wheel_odometry: str  # 'joint_states' or 'odom'
 
     @property
@@ -107,8 +108,9 @@ def input_layout(configuration: Configuration) -> InputLayout:
         directions=wheels.direction,
         lateral_positions=wheels.y,
         slip_radius=wheels.slip_radius,
-        imu_mounting=quaternion_from_roll_pitch_yaw(
-            sensors.imu_mounting_roll, sensors.imu_mounting_pitch, sensors.imu_mounting_yaw
+        imu_mounting=Rotation.from_euler(  # about fixed x, then y, then z, as in URDF
+            'xyz',
+            [sensors.imu_mounting_roll, sensors.imu_mounting_pitch, sensors.imu_mounting_yaw],
         ),
         wheel_odometry=configuration.wheel_odometry,
     )
@@ -131,8 +133,8 @@ class InputConverter:
         self._index = {name: i for i, name in enumerate(layout.names)}
         self._all = list(range(len(layout.names)))
         self._reversed = bool(np.any(layout.directions != 1.0))
-        self._mounted = not np.allclose(layout.imu_mounting, (0.0, 0.0, 0.0, 1.0), atol=0.0)
-        self._rotation = rotation_matrix(layout.imu_mounting)
+        self._mounted = layout.imu_mounting.magnitude() > 0.0
+        self._rotation = layout.imu_mounting.as_matrix()
         squares = np.square(self._rotation)
         self._shares = squares[0].tolist(), squares[2].tolist()
         """Of the variances along the sensor's axes in those along x and z of ``base_link``."""
@@ -301,8 +303,7 @@ class InputConverter:
         sensor /= norm
         if not self._mounted:
             return sensor
-        x, y, z, w = self.layout.imu_mounting
-        return quaternion_product(sensor, np.array([-x, -y, -z, w]))
+        return (Rotation.from_quat(sensor) * self.layout.imu_mounting.inv()).as_quat()
 
 
 def stamp_of(message: Any) -> int:
@@ -329,42 +330,6 @@ def _diagonal(covariance: Sequence[float]) -> tuple[float, float, float]:
 
 def _weighted(shares: Sequence[float], variances: Sequence[float]) -> float:
     return sum(share * variance for share, variance in zip(shares, variances, strict=True))
-
-
-def rotation_matrix(quaternion: FloatArray) -> FloatArray:
-    """Return the (3, 3) rotation of a unit quaternion x, y, z, w."""
-    x, y, z, w = quaternion
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-        ]
-    )
-
-
-def quaternion_from_roll_pitch_yaw(roll: float, pitch: float, yaw: float) -> FloatArray:
-    """Return the quaternion x, y, z, w of rotations about fixed x, then y, then z (as in URDF)."""
-    half = [(math.sin(angle / 2), math.cos(angle / 2)) for angle in (roll, pitch, yaw)]
-    about_x, about_y, about_z = (
-        np.array([*(sine * unit for unit in axis), cosine])
-        for (sine, cosine), axis in zip(half, np.eye(3), strict=True)
-    )
-    return quaternion_product(quaternion_product(about_z, about_y), about_x)
-
-
-def quaternion_product(first: FloatArray, second: FloatArray) -> FloatArray:
-    """Return the Hamilton product of two quaternions x, y, z, w: ``second`` is applied first."""
-    ax, ay, az, aw = first
-    bx, by, bz, bw = second
-    return np.array(
-        [
-            aw * bx + ax * bw + ay * bz - az * by,
-            aw * by - ax * bz + ay * bw + az * bx,
-            aw * bz + ax * by - ay * bx + az * bw,
-            aw * bw - ax * bx - ay * by - az * bz,
-        ]
-    )
 
 
 class JointFields(NamedTuple):

@@ -15,11 +15,11 @@ import time
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from functools import partial
+from importlib import import_module
 from inspect import signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
-from nav_msgs.msg import Odometry
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.clock import Clock, ROSClock
 from rclpy.clock_type import ClockType
@@ -30,7 +30,6 @@ from rclpy.qos import qos_policy_name_from_kind
 from rclpy.serialization import deserialize_message
 from rclpy.subscription import Subscription
 from rclpy.timer import Timer
-from sensor_msgs.msg import Imu, JointState
 from std_srvs.srv import SetBool, Trigger
 
 from wheel_terra_estimator.configuration.configuration import Configuration
@@ -57,14 +56,14 @@ from wheel_terra_estimator.ros.qos import OVERRIDABLE, input_profile
 if TYPE_CHECKING:
     from wheel_terra_estimator.ros.live_views import LiveViews
 
-MESSAGE_TYPES = {
-    'joint_states': JointState,
-    'odom': Odometry,
-    'imu/data': Imu,
-    'sinkage': JointState,
-    'leaving_angle': JointState,
-    'reference_odom': Odometry,
-}
+
+def _message_class(name: str) -> Any:
+    """Return the class of a message, such as ``nav_msgs/msg/Odometry``."""
+    module, _, kind = name.replace('/', '.').rpartition('.')
+    return getattr(import_module(module), kind)
+
+
+MESSAGE_TYPES = {topic: _message_class(name) for topic, name in INPUT_TYPES.items()}
 
 FREQUENT = ('joint_states', 'odom', 'imu/data')
 """Topics that come many times between two sets; what else comes, often late, is run through at once

@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.measurements import (
@@ -179,7 +180,7 @@ class SensorSuite:
             roll = before.roll + part * (truth.roll - before.roll) + error[0]
             pitch = before.pitch + part * (truth.pitch - before.pitch) + error[1]
             heading = _between(before.position, truth.position, part)[2]
-            orientation = quaternion(roll, -pitch, float(heading))
+            orientation = Rotation.from_euler('xyz', [roll, -pitch, float(heading)]).as_quat()
         yield InertialReading(self._stamp(time), force, rate, orientation)
 
     def _sinkage(
@@ -256,21 +257,6 @@ class SensorSuite:
         else:
             self._last_stamp[name] = measurement.stamp
         return Arrival(arrival, measurement)
-
-
-def quaternion(roll: float, pitch: float, yaw: float) -> FloatArray:
-    """Return x, y, z, w of rotations about fixed x, then y, then z."""
-    (sr, sp, sy), (cr, cp, cy) = (
-        [f(0.5 * angle) for angle in (roll, pitch, yaw)] for f in (math.sin, math.cos)
-    )
-    return np.array(
-        [
-            sr * cp * cy - cr * sp * sy,
-            cr * sp * cy + sr * cp * sy,
-            cr * cp * sy - sr * sp * cy,
-            cr * cp * cy + sr * sp * sy,
-        ]
-    )
 
 
 def _between(before: FloatArray, after: FloatArray, part: float) -> FloatArray:

@@ -14,10 +14,8 @@ from wheel_terra_estimator.estimation.measurements import (
     FloatArray,
     InertialReading,
     InertialVariance,
-    LeavingAngleReading,
     Measurement,
     ReferenceVelocity,
-    SinkageReading,
     StepInputs,
     WheelOdometry,
 )
@@ -47,11 +45,14 @@ def merge_wheels(before: Any, after: Any) -> tuple[Any, bool]:
         torque, _ = _newer(before.torque, after.torque)
         steering = _newest([before.steering, after.steering])
         return WheelOdometry(stamp, rate, torque, steering), overlap
-    if isinstance(before, SinkageReading):
-        sinkage, overlap = _newer(before.sinkage, after.sinkage)
-        return SinkageReading(stamp, sinkage), overlap
-    angle, overlap = _newer(before.leaving_angle, after.leaving_angle)
-    return LeavingAngleReading(stamp, angle), overlap
+    values, overlap = _newer(_values(before), _values(after))
+    return type(before)(stamp, values), overlap
+
+
+def _values(reading: Any) -> FloatArray:
+    """Return the (n,) values of a reading that has nothing else beside its stamp."""
+    _, values = vars(reading).values()
+    return np.asarray(values)
 
 
 def _newer(before: FloatArray, after: FloatArray) -> tuple[FloatArray, bool]:
@@ -81,22 +82,18 @@ class StepMerger:
         parts : sequence of list
             Entries in the order of stamps, each with one measurement or None per channel.
         """
-        odometry, inertial, sinkage, leaving, references = (
+        odometry, inertial, *wheels, references = (
             [measurement for measurement in channel if measurement is not None]
             for channel in zip(*parts, strict=True)
         )
         reference: ReferenceVelocity | None = references[-1] if references else None
-        return StepInputs(
+        merged: list[Any] = [
             self._odometry(stamp, odometry),
             _single(inertial) if len(inertial) < 2 else _inertial(stamp, inertial),
-            _single(sinkage)
-            if len(sinkage) < 2
-            else SinkageReading(stamp, _mean([s.sinkage for s in sinkage])),
-            _single(leaving)
-            if len(leaving) < 2
-            else LeavingAngleReading(stamp, _mean([s.leaving_angle for s in leaving])),
+            *[_single(some) if len(some) < 2 else _mean_reading(stamp, some) for some in wheels],
             reference,
-        )
+        ]
+        return StepInputs(*merged)
 
     def _odometry(self, stamp: int, readings: list[WheelOdometry]) -> WheelOdometry | None:
         if not readings:
@@ -137,6 +134,10 @@ def _newest(rows: list[FloatArray | None]) -> FloatArray | None:
 
 def _single(measurements: list[_Some]) -> _Some | None:
     return measurements[0] if measurements else None
+
+
+def _mean_reading(stamp: int, readings: list[Any]) -> Any:
+    return type(readings[0])(stamp, _mean([_values(reading) for reading in readings]))
 
 
 def _inertial(stamp: int, readings: list[InertialReading]) -> InertialReading:
