@@ -1,15 +1,21 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""What MkDocs does beside its own: formulas to MathML, links to files outside ``docs/``."""
+"""What MkDocs does beside its own: notebooks run, formulas become MathML, links leave ``docs/``."""
 
 from __future__ import annotations
 
+import functools
 import html
 import re
+import sys
 from pathlib import Path, PurePosixPath
 from typing import Any
 
 from latex2mathml.converter import convert
+from mkdocs.structure.files import File
+
+sys.path.insert(0, str(Path(__file__).parent))
+from notebook_pages import page as notebook_page
 
 SHIM = 'https://unpkg.com/iframe-worker/shim'
 CONTRIBUTING = 'development/contributing.md'
@@ -28,12 +34,29 @@ def on_config(config: Any, **_: Any) -> Any:
     return config
 
 
+@functools.cache
+def _run(path: Path, _written: float) -> str:
+    return notebook_page(path)
+
+
+def on_files(files: Any, config: Any, **_: Any) -> Any:
+    """Put a page with output and pictures in the place of each notebook."""
+    for file in [file for file in files if file.src_uri.endswith('.ipynb')]:
+        path = Path(file.abs_src_path)
+        files.remove(file)
+        content = _run(path, path.stat().st_mtime)
+        address = file.src_uri.replace('.ipynb', '.md')
+        files.append(File.generated(config, address, content=content))
+    return files
+
+
 def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
     """Turn links that leave ``docs/`` into the path of the file in the repository."""
     if page.file.src_uri == CONTRIBUTING:
         root = Path(page.file.abs_src_path).parents[2]
         markdown = (root / 'CONTRIBUTING.md').read_text(encoding='utf-8')
         markdown = _OUTSIDE.sub(r'\1 (`\2`)', markdown).replace('](docs/', '](../')
+    markdown = markdown.replace('.ipynb)', '.md)')
     depth = len(PurePosixPath(page.file.src_uri).parts) - 1
 
     def plain(match: re.Match[str]) -> str:

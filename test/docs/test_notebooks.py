@@ -13,8 +13,8 @@ import pytest
 NOTEBOOKS = sorted((Path(__file__).resolve().parents[2] / 'docs' / 'notebooks').glob('*.ipynb'))
 
 
-def test_there_are_two():
-    assert len(NOTEBOOKS) >= 2
+def test_there_are_four():
+    assert len(NOTEBOOKS) == 4
 
 
 @pytest.mark.slow

@@ -17,6 +17,7 @@ DOCS = ROOT / 'docs'
 PAGES = sorted(DOCS.rglob('*.md'))
 SITE = yaml.safe_load((ROOT / 'mkdocs.yml').read_text(encoding='utf-8'))
 NAMES = [page.relative_to(DOCS).as_posix() for page in PAGES]
+NOTEBOOKS = [p.relative_to(DOCS).with_suffix('.md').as_posix() for p in DOCS.rglob('*.ipynb')]
 
 
 def entries(tree: Any, depth: int = 0) -> Iterator[tuple[str, int]]:
@@ -33,9 +34,9 @@ def entries(tree: Any, depth: int = 0) -> Iterator[tuple[str, int]]:
 
 def test_every_page_is_within_two_clicks():
     reached = dict(entries(SITE['nav']))
-    missing = set(NAMES) - set(reached)
+    missing = {*NAMES, *NOTEBOOKS} - set(reached)
     assert not missing, f'add to nav in mkdocs.yml: {sorted(missing)}'
-    assert set(reached) <= set(NAMES), 'nav names pages that are not there'
+    assert set(reached) <= {*NAMES, *NOTEBOOKS}, 'nav names pages that are not there'
     # A tab opens on a page of its own; its other pages and sub-sections stand beside it.
     assert max(reached.values()) <= 3
     assert len(SITE['nav']) <= 7

@@ -86,6 +86,13 @@ def test_formulas_are_mathematics(site: Path) -> None:
         assert 'class="arithmatex"' not in page, f'{path.name}: a formula is left as TeX'
 
 
+def test_notebooks_are_shown_with_what_they_print_and_draw(site: Path) -> None:
+    for source in (ROOT / 'docs' / 'notebooks').glob('*.ipynb'):
+        page = (site / 'notebooks' / f'{source.stem}.html').read_text(encoding='utf-8')
+        assert page.count('data:image/svg+xml') >= 1, source.stem
+        assert 'language-text' in page, source.stem
+
+
 def test_a_warning_fails_the_build(tmp_path: Path) -> None:
     for name in SOURCES:
         source = ROOT / name
