@@ -8,7 +8,7 @@ from estimate_sets import some_estimates
 
 from wheel_terra_estimator.checks.input_judge import InputJudge
 from wheel_terra_estimator.checks.online import OnlineChecks
-from wheel_terra_estimator.checks.online_delay import SpeedHistory
+from wheel_terra_estimator.checks.online_motion import MotionHistory
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.estimation.measurements import (
     ReferenceVelocity,
@@ -64,7 +64,7 @@ def test_late_stamps_are_told_with_the_delay(late):
     (remark,) = checks.remarks
     assert (remark.kind, remark.topic) == ('delay', 'reference_odom')
     assert remark.value == pytest.approx(late, abs=0.15)
-    assert remark.cure.startswith(f'sensors.reference_stamp_offset: {remark.value:.2f}')
+    assert remark.cure.startswith(f'sensors.reference_stamp_offset: {remark.value:.3f}')
     assert not checks.findings and not checks.undecided
 
 
@@ -101,8 +101,9 @@ def test_a_kept_state_gives_the_same_verdict():
 
 
 def test_a_pause_begins_anew():
-    history = SpeedHistory()
+    history = MotionHistory(rims=(0.1,))
     history.advance(0)
-    history.add_rim(0.1)
-    assert history.advance(10**12) is None
-    assert history.begin == 10**12 and history.rims == []
+    history.advance(10**9)
+    assert len(history.rows) == 10
+    assert not history.advance(10**12)
+    assert history.begin == 10**12 and history.rows == ()

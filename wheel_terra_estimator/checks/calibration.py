@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -70,39 +70,44 @@ def calibrate(
     report, evidence = examine(recording, configuration, remapped)
     if evidence is None:
         raise UserError(f'{recording.name}: no wheel rates in it to calibrate with')
-    changes = [
-        *_directions(report, configuration),
-        *_offsets(report, configuration),
-        *_mounting(evidence, report),
-        *_biases(evidence),
-        *_noises(report, configuration),
-        *_rates(report, configuration),
-    ]
-    radius, evidence = _radius(evidence, report)
-    changes += radius
-    changes += _torques(evidence, report)
-    changes += _friction(evidence, report)
-    changes += _track(evidence)
+    changes = _Changes(configuration.flat())
+    _directions(changes, report, configuration)
+    for told in _sure(report):
+        if told.fault.endswith('_offset') and told.parameter and told.value is not None:
+            changes.add(told.parameter, told.value, told.std, told.words)
+    _mounting(changes, evidence)
+    _biases(changes, evidence)
+    _noises_and_rates(changes, report)
+    evidence = _radius(changes, evidence, report)
+    if np.isfinite(evidence.torque).any(axis=0).all():
+        _torques(changes, evidence)
+        _friction(changes, evidence, report)
+    _track(changes, evidence)
     report.not_checked.append(NO_CENTRE_OF_GRAVITY)
-    mended = {change.key for change in changes}
+    mended = {change.key for change in changes.made}
     left = [f for f in report.findings if f.parameter not in mended and f.kind != 'mass']
-    return Calibration(tuple(changes), tuple(report.not_checked), tuple(left), report.figures)
+    return Calibration(tuple(changes.made), tuple(report.not_checked), tuple(left), report.figures)
 
 
-def _directions(report: CheckReport, configuration: Configuration) -> list[Change]:
-    told = next((f for f in _sure(report) if f.fault == 'backwards' and f.wheel), None)
-    if told is None:
-        return []
-    wrong = str(told.wheel).split(', ')
-    wheels = configuration.wheels
-    after = [
-        int(-d) if name in wrong else int(d)
-        for name, d in zip(wheels.names, wheels.direction, strict=True)
-    ]
-    source = f'{told.wheel}: {told.words}'
-    return [
-        Change('wheels.direction', _before(configuration, 'wheels.direction'), after, None, source)
-    ]
+class _Changes:
+    """The changes so far, and the values of the rover file."""
+
+    def __init__(self, before: Mapping[str, Value]) -> None:
+        self.before = before
+        self.made: list[Change] = []
+
+    def number(self, key: str) -> float:
+        """Return a number of the rover file."""
+        return float(self.before[key])  # type: ignore[arg-type]
+
+    def add(self, key: str, after: Value, std: float | None, source: str) -> None:
+        """Note a change."""
+        self.made.append(Change(key, self.before.get(key), after, std, source))
+
+    def add_with_deviation(self, key: str, after: Value, std: float, source: str) -> None:
+        """Note a change and that of its deviation, which the estimator goes by."""
+        self.add(key, after, std, source)
+        self.add(f'{key}_std', float(f'{std:.3g}'), None, f'deviation of {key}')
 
 
 def _sure(report: CheckReport) -> list[Finding]:
@@ -110,201 +115,130 @@ def _sure(report: CheckReport) -> list[Finding]:
     return [finding for finding in report.findings if finding.confidence > LEAST_SURE]
 
 
-def _offsets(report: CheckReport, configuration: Configuration) -> list[Change]:
-    return [
-        Change(f.parameter, _before(configuration, f.parameter), f.value, f.std, f.words)
-        for f in _sure(report)
-        if f.parameter is not None and f.value is not None and f.parameter.endswith('_stamp_offset')
+def _directions(changes: _Changes, report: CheckReport, configuration: Configuration) -> None:
+    told = next((f for f in _sure(report) if f.fault == 'backwards' and f.wheel), None)
+    if told is None:
+        return
+    wheels, wrong = configuration.wheels, str(told.wheel).split(', ')
+    after = [
+        int(-d) if name in wrong else int(d)
+        for name, d in zip(wheels.names, wheels.direction, strict=True)
     ]
+    changes.add('wheels.direction', after, None, f'{told.wheel}: {told.words}')
 
 
-def _before(configuration: Configuration, key: str) -> Value | None:
-    return configuration.flat().get(key)
-
-
-def _mounting(evidence: Evidence, report: CheckReport) -> list[Change]:
-    configuration = evidence.facts.configuration
-    assert configuration is not None
+def _mounting(changes: _Changes, evidence: Evidence) -> None:
     rotation, std, source = evidence.rotation, None, 'mean specific force'
     tilt = imu.small_tilt(evidence)
-    if tilt is not None and max(tilt.roll.std, tilt.pitch.std) < imu.EVEN_GROUND_STD:
-        seen = max(tilt.roll.sigmas_from(0.0), tilt.pitch.sigmas_from(0.0)) > 1.0
-        if seen:
-            rotation = imu.tilt_rotation(tilt.roll.value, tilt.pitch.value) @ rotation
-        std = math.degrees(max(tilt.roll.std, tilt.pitch.std))
+    if tilt is not None and tilt.std < imu.EVEN_GROUND_STD:
+        if tilt.sigmas > 1.0:
+            rotation = tilt.taken_off(rotation)
+        std = math.degrees(tilt.std)
         source = f'specific force over {tilt.turn:.0f} rad of turning, slope taken off'
-    before = [_before(configuration, f'sensors.imu_mounting_{a}_deg') for a in _AXES]
-    changes = []
-    for axis, old, new in zip(_AXES, before, imu.mounting_angles(rotation), strict=True):
-        assert isinstance(old, (int, float))
-        apart = abs((new - old + 180.0) % 360.0 - 180.0)
-        if apart > 0.01:
-            key = f'sensors.imu_mounting_{axis}_deg'
-            changes.append(Change(key, old, round(new, 3), std, source))
-    return changes
+    for key, new in zip(imu.MOUNTING, imu.mounting_angles(rotation), strict=True):
+        if abs(math.remainder(new - changes.number(key), 360.0)) > imu.LEAST_SHOWN:
+            changes.add(key, round(new, 3), std, source)
 
 
-_AXES = ('roll', 'pitch', 'yaw')
-
-
-def _biases(evidence: Evidence) -> list[Change]:
+def _biases(changes: _Changes, evidence: Evidence) -> None:
     configuration = evidence.facts.configuration
     if evidence.gyro is None or configuration is None:
-        return []
+        return
     bias, std, where = imu.gyro_bias(evidence)
-    if not np.isfinite(std).all():
-        return []
-    key = 'sensors.angular_rate_bias'
-    worst = float(np.max(std))
-    whole = bias + configuration.sensors.angular_rate_bias
-    after = [round(float(value), 6) for value in whole]
-    return [Change(key, _before(configuration, key), after, worst, f'mean of the gyro {where}')]
+    if np.isfinite(std).all():
+        whole = (bias + configuration.sensors.angular_rate_bias).round(6).tolist()
+        source = f'mean of the gyro {where}'
+        changes.add('sensors.angular_rate_bias', whole, float(np.max(std)), source)
 
 
-_NOISES = {
-    'sensors.specific_force_std': 'imu.specific_force_std_m/s^2',
-    'sensors.angular_rate_std': 'imu.angular_rate_std_rad/s',
+SEEN = {
+    'sensors.specific_force_std': 'imu.specific_force_std',
+    'sensors.angular_rate_std': 'imu.angular_rate_std',
     'sensors.wheel_rate_std': 'wheels.rate_noise_rad_s',
     'sensors.sinkage_std': 'sinkage.noise_m',
-}
-
-
-def _noises(report: CheckReport, configuration: Configuration) -> list[Change]:
-    source = 'changes from message to message on the move'
-    changes = [
-        Change(key, stated, float(f'{seen:.3g}'), NOISE_STD * seen, source)
-        for key, stated, seen in _worth_changing(_NOISES, report, configuration)
-    ]
-    if report.figures.get('reference.stated_std_m_s') == 0.0:
-        key, seen = 'sensors.reference_std', report.figures['reference.noise_m_s']
-        source = 'changes from message to message; the messages state none'
-        changes.append(Change(key, _before(configuration, key), seen, NOISE_STD * seen, source))
-    return changes
-
-
-_RATES = {
-    'sensors.wheel_odometry_rate': 'joint_states.rate_hz',
+    'sensors.wheel_odometry_rate': 'joints.rate_hz',
     'sensors.imu_rate': 'imu.rate_hz',
     'sensors.sinkage_rate': 'sinkage.rate_hz',
     'sensors.reference_rate': 'reference.rate_hz',
 }
+"""Noises and rates of the sensors -> the figure that a recording has of them."""
 
 
-def _rates(report: CheckReport, configuration: Configuration) -> list[Change]:
-    return [
-        Change(key, stated, round(seen, 2), None, 'median period of the stamps')
-        for key, stated, seen in _worth_changing(_RATES, report, configuration)
-    ]
+def _noises_and_rates(changes: _Changes, report: CheckReport) -> None:
+    for key, figure in SEEN.items():
+        seen, stated = report.figures.get(figure), changes.number(key)
+        if not seen or (stated and abs(math.log(seen / stated)) < WORTH_CHANGING):
+            continue
+        if key.endswith('_std'):
+            source = 'changes from message to message on the move'
+            changes.add(key, float(f'{seen:.3g}'), NOISE_STD * seen, source)
+        else:
+            changes.add(key, round(seen, 2), None, 'median period of the stamps')
+    if report.figures.get('reference.stated_std_m_s') == 0.0:
+        seen = report.figures['reference.noise_m_s']
+        source = 'changes from message to message; the messages state none'
+        changes.add('sensors.reference_std', seen, NOISE_STD * seen, source)
 
 
-def _worth_changing(
-    figures: Mapping[str, str], report: CheckReport, configuration: Configuration
-) -> Iterator[tuple[str, float, float]]:
-    """Yield key, stated and seen value of the parameters that are seen to be others."""
-    for key, figure in figures.items():
-        seen, stated = report.figures.get(figure), _before(configuration, key)
-        assert isinstance(stated, (int, float))
-        if seen and (not stated or abs(math.log(seen / stated)) > WORTH_CHANGING):
-            yield key, stated, seen
-
-
-def _radius(evidence: Evidence, report: CheckReport) -> tuple[list[Change], Evidence]:
+def _radius(changes: _Changes, evidence: Evidence, report: CheckReport) -> Evidence:
     configuration = evidence.facts.configuration
     assert configuration is not None
-    ratio = geometry.radius_ratio(evidence, report.figures)
-    told = {finding.fault for finding in report.findings}
-    rival = 'reference_scale' in told and 'radius' not in told
+    told, names = geometry.radius_ratio(evidence), {finding.fault for finding in report.findings}
+    rival = 'reference_scale' in names and 'radius' not in names
     found = not np.allclose(evidence.facts.radius, configuration.wheels.slip_radius)
-    if isinstance(ratio, NotChecked) or rival or (ratio.sigmas_from(1.0) < 1.0 and not found):
-        return [], evidence
+    if isinstance(told, NotChecked) or rival:
+        return evidence
+    ratio, radius = told.ratio, float(np.mean(evidence.facts.radius))
+    if ratio.sigmas_from(1.0) < 1.0 and not found:
+        return evidence
     rolling = evidence.facts.radius * ratio.value
     lugs = configuration.wheels.slip_radius - configuration.wheels.radius
-    after = [round(float(value), 5) for value in rolling - lugs]
-    std = float(np.mean(evidence.facts.radius)) * ratio.std
-    reference = evidence.reference()
-    assert reference is not None
-    source = f'straight, steady, firm stretches against {reference.topic}'
-    if 'reference_scale' in told:
+    assert evidence.recording.reference is not None
+    source = f'straight, steady, firm stretches against {evidence.recording.reference.topic}'
+    if 'reference_scale' in names:
         source += ' (or its scale is off: slip is the same)'
     bound = report.figures['rover.radius_bound_by_reference_m']
-    if bound > BLUNT_REFERENCE * float(np.mean(evidence.facts.radius)):
+    if bound > BLUNT_REFERENCE * radius:
         source += f' (its noise alone allows no better than +- {bound:.2g}: drive faster or longer)'
-    change = Change('wheels.radius', _before(configuration, 'wheels.radius'), after, std, source)
-    return [change], replace(evidence, facts=replace(evidence.facts, radius=rolling))
+    changes.add('wheels.radius', (rolling - lugs).round(5).tolist(), radius * ratio.std, source)
+    return replace(evidence, facts=replace(evidence.facts, radius=rolling))
 
 
-def _torques(evidence: Evidence, report: CheckReport) -> list[Change]:
-    configuration = evidence.facts.configuration
-    assert configuration is not None
-    if evidence.force is None or not np.isfinite(evidence.torque).any(axis=0).all():
-        return []
-    changes = []
-    gain = torque.torque_gain(evidence, report.figures)
-    if not isinstance(gain, NotChecked) and gain.value > 0.0 and gain.sigmas_from(1.0) > 1.0:
-        whole = torque.whole_gain(evidence, gain.value)
-        std = float(np.max(whole)) * gain.std / gain.value
+def _torques(changes: _Changes, evidence: Evidence) -> None:
+    if evidence.force is None:
+        return
+    told = torque.torque_gain(evidence)
+    if not isinstance(told, NotChecked) and told.useful:
+        whole = torque.whole_gain(evidence, told.gain.value)
+        std = float(np.max(whole)) * told.gain.std / told.gain.value
         source = 'sum of T/r against mass times specific force on slopes; the mass taken as stated'
-        after = [round(float(one), 4) for one in whole]
-        changes += _with_deviation(configuration, 'sensors.torque_gain', after, std, source)
+        changes.add_with_deviation('sensors.torque_gain', whole.round(4).tolist(), std, source)
     zeros = torque.torque_zeros(evidence)
     if zeros is not None:
         zeros = torque.whole_zeros(evidence, zeros)
-        after = [round(zero.value, 3) for zero in zeros]
-        std = max(zero.std for zero in zeros)
+        after, std = [round(zero.value, 3) for zero in zeros], max(zero.std for zero in zeros)
         source = 'straight stretches driven both ways'
-        changes += _with_deviation(configuration, 'sensors.torque_zero', after, std, source)
-    return changes
+        changes.add_with_deviation('sensors.torque_zero', after, std, source)
 
 
-def _friction(evidence: Evidence, report: CheckReport) -> list[Change]:
-    configuration = evidence.facts.configuration
-    assert configuration is not None
-    if not np.isfinite(evidence.torque).any(axis=0).all():
-        return []
+def _friction(changes: _Changes, evidence: Evidence, report: CheckReport) -> None:
     friction = torque.drive_friction(evidence)
     if isinstance(friction, NotChecked):
         report.not_checked.append(friction)
-        return []
-    report.figures['torque.friction_N_m'] = round(friction.value, 4)
-    if friction.value < 2.0 * friction.std:
-        return []
-    keys = {'enabled': True, 'torque': round(friction.value, 4)}
-    source = 'torque of the wheels in the air (the reference says that the rover stands)'
-    return [
-        Change(
-            f'effects.drivetrain_friction.{key}',
-            _before(configuration, f'effects.drivetrain_friction.{key}'),
-            after,
-            friction.std if key == 'torque' else None,
-            source,
-        )
-        for key, after in keys.items()
-    ]
+    elif friction.value > 2.0 * friction.std:
+        source = 'torque of the wheels in the air (the reference says that the rover stands)'
+        changes.add('effects.drivetrain_friction.enabled', True, None, source)
+        value = round(friction.value, 4)
+        changes.add('effects.drivetrain_friction.torque', value, friction.std, source)
 
 
-def _with_deviation(
-    configuration: Configuration, key: str, after: Value, std: float, source: str
-) -> list[Change]:
-    """Return a change and that of its deviation, which the estimator goes by."""
-    stated, told = f'{key}_std', float(f'{std:.3g}')
-    return [
-        Change(key, _before(configuration, key), after, std, source),
-        Change(stated, _before(configuration, stated), told, None, f'deviation of {key}'),
-    ]
-
-
-def _track(evidence: Evidence) -> list[Change]:
-    configuration = evidence.facts.configuration
-    assert configuration is not None
-    if geometry.skids(evidence):
-        return []
-    ratio = geometry.track_ratio(evidence)
-    if isinstance(ratio, NotChecked) or ratio.sigmas_from(1.0) < 1.0:
-        return []
-    after = [round(float(y) * ratio.value, 4) for y in evidence.facts.lateral]
-    std = float(np.abs(evidence.facts.lateral).max()) * ratio.std
-    source = 'gyro against the difference of the sides in turns'
-    return [Change('wheels.y', _before(configuration, 'wheels.y'), after, std, source)]
+def _track(changes: _Changes, evidence: Evidence) -> None:
+    told = None if geometry.skids(evidence) else geometry.track_ratio(evidence)
+    if isinstance(told, geometry.Told) and told.ratio.sigmas_from(1.0) > 1.0:
+        lateral = evidence.facts.lateral
+        std = float(np.abs(lateral).max()) * told.ratio.std
+        source = 'gyro against the difference of the sides in turns'
+        changes.add('wheels.y', (lateral * told.ratio.value).round(4).tolist(), std, source)
 
 
 def as_file(calibration: Calibration, configuration: Configuration, recording: str) -> str:

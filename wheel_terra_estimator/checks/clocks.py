@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wheel_terra_estimator.checks.evidence import Evidence
-from wheel_terra_estimator.checks.faults import found
+from wheel_terra_estimator.checks.faults import of_offset
 from wheel_terra_estimator.checks.finding import NotChecked, Outcome
 from wheel_terra_estimator.checks.series import Channel, Recording
 from wheel_terra_estimator.checks.statistics import (
@@ -26,8 +26,9 @@ from wheel_terra_estimator.checks.statistics import (
     even_times,
     lag,
     moving_mean,
+    without_drift,
 )
-from wheel_terra_estimator.checks.trial import Trial
+from wheel_terra_estimator.checks.trial import Trial, halves, worst
 from wheel_terra_estimator.configuration.configuration import Configuration
 
 FloatArray = NDArray[np.float64]
@@ -56,8 +57,6 @@ FUTURE = -0.1
 """Arrival less stamp that no message has [s]."""
 SMOOTHING = 0.4
 """Speeds and accelerations are averaged over this [s]."""
-DRIFT = 6.0
-"""Slopes change more slowly than this [s], speeds faster."""
 
 
 class Lag(NamedTuple):
@@ -76,27 +75,32 @@ class Lag(NamedTuple):
 
     def counts(self, least: float) -> bool:
         """Whether it is a lag and stood its trial."""
-        return (
-            abs(self.value) > max(least, SIGMAS * self.std)
-            and self.trial.after < FALLS[self.by] * self.trial.before
-        )
+        clear = abs(self.value) > max(least, SIGMAS * self.std)
+        return clear and self.trial.after < FALLS[self.by] * self.trial.before
+
+    def of_the_first(self) -> Lag:
+        """Return how late the first sensor's stamps are."""
+        return self._replace(value=-self.value, halves=(-self.halves[0], -self.halves[1]))
+
+
+CHANNELS = {
+    'joints': 'wheel_odometry',
+    'wheel_odometry': 'wheel_odometry',
+    'imu': 'imu',
+    'reference': 'reference',
+    'sinkage': 'sinkage',
+}
+"""Channel of a recording -> its name in ``sensors.*_stamp_offset``."""
 
 
 def corrected(recording: Recording, configuration: Configuration | None) -> Recording:
     """Return the recording with the stamp offsets of the rover file taken off."""
     if configuration is None:
         return recording
-    sensors = configuration.sensors
     changes: dict[str, Any] = {}
-    for name, key in (
-        ('joints', 'wheel_odometry'),
-        ('wheel_odometry', 'wheel_odometry'),
-        ('imu', 'imu'),
-        ('reference', 'reference'),
-        ('sinkage', 'sinkage'),
-    ):
+    for name, key in CHANNELS.items():
         channel = getattr(recording, name)
-        offset = round(float(getattr(sensors, f'{key}_stamp_offset')) * 1e9)
+        offset = round(float(getattr(configuration.sensors, f'{key}_stamp_offset')) * 1e9)
         if channel is not None and offset:
             changes[name] = shifted(channel, offset)
     return replace(recording, **changes) if changes else recording
@@ -107,68 +111,46 @@ def shifted(channel: Any, offset: int) -> Any:
     return replace(channel, stamp=np.where(channel.stamp > 0, channel.stamp - offset, 0))
 
 
-def check_clocks(evidence: Evidence, figures: dict[str, Any]) -> tuple[list[Outcome], Evidence]:
+def check_clocks(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     """Return which sensor's stamps are off, and the evidence with the reference on the wheels'."""
-    outcomes: list[Outcome] = []
-    told = _of_imu(evidence, figures), _of_reference(evidence, figures)
-    outcomes += [one for one in told if isinstance(one, NotChecked)]
-    imu, reference = (None if isinstance(one, NotChecked) else one for one in told)
-    late_imu = imu is not None and imu.counts(_least(evidence, 'imu'))
-    late_reference = reference is not None and reference.counts(_least(evidence, 'reference'))
-    blame = _blamed(evidence, imu, reference, late_imu, late_reference)
-    for name, offset in blame.items():
-        outcomes.append(_outcome(evidence, name, offset))
-    velocity = evidence.reference()
-    if late_reference and reference is not None and velocity is not None:
-        on_wheels = shifted(velocity, round(reference.value * 1e9))
-        evidence = replace(evidence, recording=replace(evidence.recording, reference=on_wheels))
+    told = {'imu': _of_imu(evidence), 'reference': _of_reference(evidence)}
+    outcomes: list[Outcome] = [one for one in told.values() if isinstance(one, NotChecked)]
+    lags = {name: one for name, one in told.items() if not isinstance(one, NotChecked)}
+    for name, off in _blamed(evidence, lags).items():
+        outcomes.append(_outcome(evidence, name, off))
+    reference, velocity = lags.get('reference'), evidence.recording.reference
+    if reference is not None and velocity is not None and _counts(evidence, 'reference', reference):
+        stamp = shifted(velocity, round(reference.value * 1e9)).stamp
+        evidence = evidence.with_channel('reference', stamp=stamp)
     return outcomes, evidence
 
 
-def _least(evidence: Evidence, name: str) -> float:
+def _counts(evidence: Evidence, name: str, told: Lag) -> bool:
     least = max(LEAST_OFFSET[name], 1.5 * evidence.period)
-    if name == 'reference' and (reference := evidence.reference()) is not None:
-        least = max(least, LEAST_PERIODS * _period(reference))
-    return least
+    if name == 'reference' and evidence.recording.reference is not None:
+        least = max(least, LEAST_PERIODS * _period(evidence.recording.reference))
+    return told.counts(least)
 
 
-def _blamed(
-    evidence: Evidence,
-    imu: Lag | None,
-    reference: Lag | None,
-    late_imu: bool,
-    late_reference: bool,
-) -> dict[str, Lag]:
+def _blamed(evidence: Evidence, lags: dict[str, Lag]) -> dict[str, Lag]:
     """Return the sensor whose stamps are off: the one that is off against both others."""
-    if late_imu and late_reference and imu is not None and reference is not None:
+    late = {name: told for name, told in lags.items() if _counts(evidence, name, told)}
+    if len(late) == 2:
+        imu, reference = late['imu'], late['reference']
         if abs(imu.value - reference.value) < max(APART, 3.0 * (imu.std + reference.std)):
-            return {'wheel_odometry': _against_wheels(imu)}
-        return {'imu': imu, 'reference': reference}
-    joints = evidence.recording.joints
-    wheels_ahead = joints is not None and arrival(joints) < FUTURE
-    blamed: dict[str, Lag] = {}
-    for name, told, late, other in (
-        ('imu', imu, late_imu, reference),
-        ('reference', reference, late_reference, imu),
-    ):
-        if not late or told is None:
-            continue
+            return {'wheel_odometry': imu.of_the_first()}
+        return late
+    wheels_ahead = arrival(evidence.joints) < FUTURE
+    for name, told in late.items():
+        other = next((lag for key, lag in lags.items() if key != name), None)
         both = other is not None and abs(other.value - told.value) < abs(other.value)
         if told.value < 0.0 and (both or (other is None and wheels_ahead)):
-            blamed['wheel_odometry'] = _against_wheels(told)
-        else:
-            blamed[name] = told
-    return blamed
-
-
-def _against_wheels(told: Lag) -> Lag:
-    first, second = told.halves
-    return told._replace(value=-told.value, halves=(-first, -second))
+            return {'wheel_odometry': told.of_the_first()}
+    return late
 
 
 def _outcome(evidence: Evidence, name: str, told: Lag) -> Outcome:
-    recording = evidence.recording
-    channel = getattr(recording, 'joints' if name == 'wheel_odometry' else name)
+    channel = getattr(evidence.recording, 'joints' if name == 'wheel_odometry' else name)
     if not told.steady:
         return NotChecked(
             'delay',
@@ -176,22 +158,11 @@ def _outcome(evidence: Evidence, name: str, told: Lag) -> Outcome:
             f'drive and {told.halves[1]:+.2f} s in the second: the clocks drift; synchronise them '
             '(chrony, PTP)',
         )
-    configuration = evidence.facts.configuration
-    stated = getattr(configuration.sensors, f'{name}_stamp_offset') if configuration else 0.0
-    value = told.value + float(stated)
     # Between two messages nothing is known of a change.
     std = math.hypot(told.std, BETWEEN * max(evidence.period, _period(channel)))
-    return found(
-        f'{name}_offset',
-        channel.topic,
-        0.97,
-        value=round(value, 3),
-        std=round(std, 3),
-        channel=name,
-        offset=value,
-        offset_left=told.value,
-        against=told.by + told.trial.words('unlike part', ''),
-    )
+    against = told.by + told.trial.words('unlike part', '')
+    told_of = of_offset(name, told.value, std, against, evidence.facts.configuration)
+    return evidence.found(f'{name}_offset', 0.97, **told_of)
 
 
 def arrival(channel: Channel) -> float:
@@ -206,34 +177,29 @@ def _period(channel: Channel) -> float:
 # Lags of pairs -----------------------------------------------------------------------------------
 
 
-def _of_imu(evidence: Evidence, figures: dict[str, Any]) -> Lag | NotChecked:
+def _of_imu(evidence: Evidence) -> Lag | NotChecked:
     """Return how late the IMU is after the wheels; turns and accelerations must not contradict."""
     imu, difference = evidence.recording.imu, evidence.side_difference
     if imu is None or evidence.gyro is None:
         return NotChecked('delay', 'IMU against wheels: no IMU')
-    time = even_times(evidence.time, STEP)
-    at = np.asarray((imu.stamp - evidence.origin) * 1e-9, dtype=np.float64)
-    turned = None
+    time, at = even_times(evidence.time, STEP), evidence.seconds(imu)
+    turned = started = None
     if np.isfinite(difference).any():
         yaw = averaged(at, (imu.rate @ evidence.rotation.T)[:, 2:3], time, 2 * STEP)[:, 0]
         wheels = _even(evidence, difference, time)
         wheels = wheels * np.sign(correlation(wheels, yaw) or 1.0)
-        turned = _lag_of(time, wheels, yaw, LONGEST['imu'], 'turns')
-    started = None
+        turned = lag_of(time, wheels, yaw, LONGEST['imu'], 'turns')
     if evidence.force is not None and time.size > 2:
         width = round(SMOOTHING / STEP)
         speed = moving_mean(_even(evidence, evidence.rim, time), width)
         forward = averaged(at, (imu.force @ evidence.rotation.T)[:, :1], time, 2 * STEP)[:, 0]
-        change = _without_drift(np.gradient(speed, STEP))
-        felt = _without_drift(moving_mean(forward, width))
-        started = _lag_of(time, change, felt, LONGEST['imu'], 'starts')
-    told = [one for one in (turned, started) if one is not None]
-    if not told:
+        change = without_drift(np.gradient(speed, STEP), STEP)
+        felt = without_drift(moving_mean(forward, width), STEP)
+        started = lag_of(time, change, felt, LONGEST['imu'], 'starts')
+    best = turned or started
+    if best is None:
         reason = 'IMU against wheels: no clear turns in it; drive a circle'
         return NotChecked('delay', reason)
-    best = told[0]
-    figures['imu.delay_s'] = round(best.value, 3)
-    figures['imu.delay_std_s'] = round(best.std, 3)
     if turned is not None and started is not None and started.steady:
         apart = abs(turned.value - started.value)
         if apart > max(APART, 3.0 * math.hypot(turned.std, started.std)):
@@ -242,45 +208,54 @@ def _of_imu(evidence: Evidence, figures: dict[str, Any]) -> Lag | NotChecked:
                 f'IMU against wheels: turns are {turned.value:+.2f} s apart, starts and stops '
                 f'{started.value:+.2f} s: no offset of stamps does that',
             )
+    evidence.figures['imu.delay_s'] = round(best.value, 3)
     return best
 
 
-def _of_reference(evidence: Evidence, figures: dict[str, Any]) -> Lag | NotChecked:
+def _of_reference(evidence: Evidence) -> Lag | NotChecked:
     """Return how late the reference is after the wheels, by starts and stops."""
-    reference = evidence.reference()
+    reference = evidence.recording.reference
     if reference is None or reference.stamp.size < 10:
         return NotChecked('delay', 'no reference velocity in it (visual odometry, GNSS)')
-    time = even_times(evidence.time, STEP)
-    at = (reference.stamp - evidence.origin) * 1e-9
+    time, at = even_times(evidence.time, STEP), evidence.seconds(reference)
+    if time.size < 2:
+        return NotChecked('delay', 'reference: the drive is too short')
     order = np.argsort(at, kind='stable')
     period = float(np.median(np.diff(at[order])))
-    rim = _even(evidence, evidence.rim, time)
-    forward = reference.velocity[order, 0].copy()
-    beside = np.stack([forward[:-2], forward[1:-1], forward[2:]])
-    forward[1:-1] = np.median(beside, axis=0)  # a single wild reading is none
-    speed = np.interp(time, at[order], forward)
-    # Between its stamps the reference is a straight line: the rims are smoothed as much.
-    for _ in range(2):
-        rim = moving_mean(rim, round(min(period, SLOWEST) / STEP))
+    forward = without_single_ones(reference.velocity[order, 0])
+    rim, speed = as_smooth(time, _even(evidence, evidence.rim, time), at[order], forward)
     if period > SLOWEST or float(np.std(rim)) < 0.1 * float(np.abs(rim).mean() + 1e-9):
         return NotChecked('delay', 'reference: hardly a change of speed in it; stop and go')
-    told = _lag_of(time, rim, speed, LONGEST['reference'], 'speeds')
+    told = lag_of(time, rim, speed, LONGEST['reference'], 'speeds')
     if told is None:
         return NotChecked('delay', 'reference: does not follow the wheels closely enough')
-    figures['reference.delay_s'] = round(told.value, 3)
-    figures['reference.delay_std_s'] = round(told.std, 3)
+    evidence.figures['reference.delay_s'] = round(told.value, 3)
     return told
+
+
+def as_smooth(
+    time: FloatArray, rim: FloatArray, at: FloatArray, forward: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return rim speeds at even times [s] and a reference, seen at other times, alike smooth.
+
+    Between its stamps the reference is a straight line: the rims are smoothed as much.
+    """
+    width = round(min(float(np.median(np.diff(at))), SLOWEST) / float(time[1] - time[0]))
+    return moving_mean(moving_mean(rim, width), width), np.interp(time, at, forward)
+
+
+def without_single_ones(values: FloatArray) -> FloatArray:
+    """Return (k,) values with single wild ones replaced by the median of three."""
+    calm = values.copy()
+    calm[1:-1] = np.median(np.stack([values[:-2], values[1:-1], values[2:]]), axis=0)
+    return calm
 
 
 def _even(evidence: Evidence, values: FloatArray, time: FloatArray) -> FloatArray:
     return averaged(evidence.time, np.nan_to_num(values)[:, None], time, 2 * STEP)[:, 0]
 
 
-def _without_drift(values: FloatArray) -> FloatArray:
-    return np.asarray(values - moving_mean(values, round(DRIFT / STEP)))
-
-
-def _lag_of(
+def lag_of(
     time: FloatArray, first: FloatArray, second: FloatArray, limit: float, by: str
 ) -> Lag | None:
     """Return by how much the second series lags the first; None where they are not alike.
@@ -290,27 +265,18 @@ def _lag_of(
     whole = lag(time, first, second, limit)
     if whole is None or whole.fit < LEAST_FIT[by]:
         return None
-    busy = np.cumsum((first - first.mean()) ** 2)
-    middle = int(np.searchsorted(busy, 0.5 * busy[-1]))
-    parts = slice(0, middle), slice(middle, time.size)
-    seen = [lag(time[part], first[part], second[part], limit) for part in parts]
-    if seen[0] is None or seen[1] is None:
+    parts = halves((first - first.mean()) ** 2)
+    a, b = (lag(time[part], first[part], second[part], limit) for part in parts)
+    if a is None or b is None:
         return None
-    a, b = seen[0], seen[1]
-    trials = [
-        _tried(time[part], first[part], second[part], other.value)
-        for part, other in zip(parts, (b, a), strict=True)
-    ]
-    worst = max(trials, key=lambda t: t.after / max(t.before, 1e-12))
+    trials = []
+    for part, other in zip(parts, (b, a), strict=True):
+        moved = np.interp(time[part] + other.value, time[part], second[part])
+        trials.append(Trial(unlike(first[part], second[part]), unlike(first[part], moved)))
     std = max(whole.std, 0.5 * abs(a.value - b.value))
-    return Lag(whole.value, std, by, worst, (a.value, b.value))
+    return Lag(whole.value, std, by, worst(trials), (a.value, b.value))
 
 
-def _tried(time: FloatArray, first: FloatArray, second: FloatArray, late: float) -> Trial:
-    """Return the unlike part without and with a lag taken off the second series."""
-    moved = np.interp(time + late, time, second)
-    return Trial(_unlike(first, second), _unlike(first, moved))
-
-
-def _unlike(first: FloatArray, second: FloatArray) -> float:
+def unlike(first: FloatArray, second: FloatArray) -> float:
+    """Return the unlike part of two series [-]."""
     return 1.0 - correlation(first - first.mean(), second - second.mean())

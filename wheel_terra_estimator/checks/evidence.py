@@ -11,10 +11,13 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter1d
 
+from wheel_terra_estimator.checks.faults import FAULTS, found
+from wheel_terra_estimator.checks.finding import Finding
 from wheel_terra_estimator.checks.rover_facts import RoverFacts
-from wheel_terra_estimator.checks.series import Recording, VelocitySeries
-from wheel_terra_estimator.checks.statistics import averaged, moving_mean, robust_std
+from wheel_terra_estimator.checks.series import Channel, JointSeries, Recording
+from wheel_terra_estimator.checks.statistics import averaged, bend_noise, moving_mean
 from wheel_terra_estimator.estimation.sensor_errors import SensorErrors
 
 FloatArray = NDArray[np.float64]
@@ -41,27 +44,68 @@ LEAST_MOVING_ROWS = 30
 
 
 @dataclass(frozen=True)
-class WheelRates:
-    """Rates of the wheels and what follows from them alone, worked out once.
+class Evidence:
+    """The recording, the rover and what follows from both.
 
     Attributes
     ----------
+    recording, facts : Recording, RoverFacts
+        As read.
     time : numpy.ndarray
         (k,) stamps of the wheel odometry since the first one [s], increasing.
-    rate : numpy.ndarray
-        (k, n) per wheel [rad/s], positive forward; nan where not there.
+    rate, torque : numpy.ndarray
+        (k, n) per wheel of ``facts.names`` [rad/s] and [N m], positive forward; nan where not
+        there. Torques, forces and angular rates are without the errors that the rover file states.
+    force, gyro : numpy.ndarray or None
+        (k, 3) specific force and angular rate in ``base_link`` as the rover file has it, averaged
+        over the period of the wheel odometry.
+    rotation : numpy.ndarray
+        (3, 3) from the IMU's frame into ``base_link``.
+    figures : dict
+        What the report shows beside findings; the checks write into it.
     """
 
+    recording: Recording
+    facts: RoverFacts
     time: FloatArray
     rate: FloatArray
+    torque: FloatArray
+    force: FloatArray | None
+    gyro: FloatArray | None
+    rotation: FloatArray
+    figures: dict[str, Any]
+
+    def found(self, key: str, confidence: float, **told: Any) -> Finding:
+        """Return a finding on the topic of its fault's channel; see `faults.found`."""
+        channel = getattr(self.recording, FAULTS[key].channel)
+        return found(key, channel.topic, confidence, **told)
+
+    @property
+    def joints(self) -> JointSeries:
+        """The wheel odometry."""
+        assert self.recording.joints is not None
+        return self.recording.joints
+
+    @property
+    def origin(self) -> int:
+        """Stamp of time 0 [ns]."""
+        return int(self.joints.stamp[self.joints.stamp > 0].min())
+
+    def seconds(self, channel: Channel) -> FloatArray:
+        """Return stamps of a channel since time 0 [s]."""
+        return np.asarray((channel.stamp - self.origin) * 1e-9, dtype=np.float64)
 
     @cached_property
     def period(self) -> float:
         """Median time between two rows [s]."""
         return float(np.median(np.diff(self.time))) if self.time.size > 1 else math.nan
 
+    def rows_in(self, duration: float) -> int:
+        """Return the number of rows in a time [s], one at least."""
+        return max(round(duration / max(self.period, 1e-3)), 1)
+
     @cached_property
-    def common(self) -> FloatArray:
+    def common_rate(self) -> FloatArray:
         """Median rate of the wheels (k,) [rad/s]."""
         return _shared(row_medians(self.rate))
 
@@ -71,99 +115,54 @@ class WheelRates:
         return _shared(row_medians(np.abs(self.rate)))
 
     @cached_property
-    def working(self) -> float:
-        """Typical size of the rates when moving [rad/s]; 0 if the rover never moves."""
+    def working_rate(self) -> float:
+        """Typical size of the wheel rates when moving [rad/s]; 0 if the rover never moves."""
         size = self.size[np.isfinite(self.size)]
         top = float(np.quantile(size, 0.95)) if size.size else 0.0
         moving = size[size > 0.2 * top]
         return float(np.median(moving)) if moving.size else 0.0
 
     @cached_property
-    def turning(self) -> Mask:
+    def wheels_turn(self) -> Mask:
         """Rows in which the wheels turn, on the ground or in the air."""
-        return _shared(self.size > 0.2 * max(self.working, 1e-9))
+        return _shared(self.size > 0.2 * max(self.working_rate, 1e-9))
 
     @cached_property
     def at_rest(self) -> Mask:
         """Rows in which every wheel has stood still for a while."""
         rate = np.nan_to_num(self.rate)
-        width = max(round(SHORTEST_REST / max(self.period, 1e-3)), 1)
+        width = self.rows_in(SHORTEST_REST)
         if rate.shape[0] < width:
             return np.zeros(rate.shape[0], dtype=bool)
-        total = np.vstack([np.zeros(rate.shape[1]), np.cumsum(rate, axis=0)])
-        mean = np.zeros_like(rate)
-        mean[width - 1 :] = (total[width:] - total[:-width]) / width
-        bend = np.diff(rate, 2, axis=0) / math.sqrt(6.0)
-        noise = robust_std(bend.ravel()) if bend.size else 0.0
-        limit = max(REST_RATE * self.working, 4.0 * noise / math.sqrt(width), 1e-9)
+        mean = uniform_filter1d(rate, width, axis=0, mode='nearest', origin=(width - 1) // 2)
+        noise = bend_noise(rate) if rate.shape[0] > 2 else 0.0
+        limit = max(REST_RATE * self.working_rate, 4.0 * noise / math.sqrt(width), 1e-9)
         still = (np.abs(mean) <= limit).all(axis=1)
         still &= np.abs(rate).max(axis=1) <= max(limit, 5.0 * noise)
         still[: width - 1] = False
-        return _shared(_after(still, self.period, SHORTEST_REST))
+        return _shared(self._after(still, SHORTEST_REST))
 
+    def _after(self, condition: Mask, duration: float) -> Mask:
+        """Return where a condition has held for some time [s]."""
+        width = max(math.ceil(duration / max(self.period, 1e-3)), 1)
+        held = np.zeros(condition.size, dtype=bool)
+        if condition.size >= width:
+            windows = np.lib.stride_tricks.sliding_window_view(condition, width)
+            held[width - 1 :] = windows.all(axis=1)
+        return held
 
-@dataclass(frozen=True)
-class Evidence:
-    """The recording, the rover and what follows from both.
-
-    Attributes
-    ----------
-    recording, facts : Recording, RoverFacts
-        As read.
-    wheels : WheelRates
-        What the wheels did, on the stamps of the wheel odometry.
-    torque : numpy.ndarray
-        (k, n) per wheel of ``facts.names`` [N m], positive forward; nan where not there. Torques,
-        forces and angular rates are without the errors that the rover file states.
-    force, gyro : numpy.ndarray or None
-        (k, 3) specific force and angular rate in ``base_link`` as the rover file has it, averaged
-        over the period of the wheel odometry.
-    rotation : numpy.ndarray
-        (3, 3) from the IMU's frame into ``base_link``.
-    """
-
-    recording: Recording
-    facts: RoverFacts
-    wheels: WheelRates
-    torque: FloatArray
-    force: FloatArray | None
-    gyro: FloatArray | None
-    rotation: FloatArray
-
-    @property
-    def time(self) -> FloatArray:
-        """(k,) stamps of the wheel odometry since the first one [s], increasing."""
-        return self.wheels.time
-
-    @property
-    def rate(self) -> FloatArray:
-        """(k, n) per wheel of ``facts.names`` [rad/s], positive forward; nan where not there."""
-        return self.wheels.rate
-
-    @property
-    def period(self) -> float:
-        """Median time between two rows [s]."""
-        return self.wheels.period
-
-    @property
-    def common_rate(self) -> FloatArray:
-        """Median rate of the wheels (k,) [rad/s]."""
-        return self.wheels.common
-
-    @property
-    def working_rate(self) -> float:
-        """Typical size of the wheel rates when moving [rad/s]; 0 if the rover never moves."""
-        return self.wheels.working
-
-    @property
-    def at_rest(self) -> Mask:
-        """Rows in which every wheel has stood still for a while."""
-        return self.wheels.at_rest
+    @cached_property
+    def yaw(self) -> FloatArray:
+        """Yaw rate (k,) less its bias at rest [rad/s]; zeros without a gyro."""
+        if self.gyro is None:
+            return _shared(np.zeros(self.time.size))
+        yaw, rest = self.gyro[:, 2], self.at_rest
+        return _shared(yaw - (np.median(yaw[rest]) if rest.sum() > 20 else 0.0))
 
     @cached_property
     def moving(self) -> Mask:
         """Rows in which the wheels turn on the ground."""
-        return _shared(self.wheels.turning & ~self.in_air)
+        return _shared(self.wheels_turn & ~self.in_air)
 
     @cached_property
     def in_air(self) -> Mask:
@@ -173,9 +172,9 @@ class Evidence:
             return np.zeros(self.time.size, dtype=bool)
         size = row_medians(np.abs(self.rate * facts.radius))
         taken = np.nansum(np.abs(self.torque) / facts.radius, axis=1)
-        free = _smooth(taken, SMOOTH_ROWS) < FREE_TRACTION * facts.mass * facts.gravity
-        turning = self.wheels.turning
-        rows = _after(turning & (speed < STANDING_SHARE * size) & free, self.period, SHORTEST_FREE)
+        free = moving_mean(taken, SMOOTH_ROWS) < FREE_TRACTION * facts.mass * facts.gravity
+        turning = self.wheels_turn
+        rows = self._after(turning & (speed < STANDING_SHARE * size) & free, SHORTEST_FREE)
         # A reference that always says 0 lifts no rover.
         return rows if 2 * rows.sum() < turning.sum() else np.zeros_like(rows)
 
@@ -183,33 +182,32 @@ class Evidence:
     def steady(self) -> Mask:
         """Rows in which the rover moves and its speed has not changed for a while."""
         rate = self.common_rate
-        width = max(round(SETTLING / max(self.period, 1e-3)), 1)
+        width = self.rows_in(SETTLING)
         change = np.zeros_like(rate)
         if rate.size > 2 * width:  # means over that time: noise is no change
-            total = np.concatenate([[0.0], np.cumsum(rate)])
-            mean = (total[width:] - total[:-width]) / width
+            mean = np.convolve(rate, np.ones(width) / width, mode='valid')
             change[2 * width - 1 :] = np.abs(mean[width:] - mean[:-width])
         calm = change < 0.15 * max(self.working_rate, 1e-9)
-        return _shared(self.moving & _after(calm, self.period, SETTLING))
+        return _shared(self.moving & self._after(calm, SETTLING))
+
+    @cached_property
+    def radius(self) -> FloatArray:
+        """Radii (n,) [m], 1 where they are not known."""
+        return np.where(np.isfinite(self.facts.radius), self.facts.radius, 1.0)
 
     @cached_property
     def rim(self) -> FloatArray:
         """Mean rim speed of the wheels (k,) [m/s]; with radius 1 where it is not known."""
-        radius = np.where(np.isfinite(self.facts.radius), self.facts.radius, 1.0)
-        speed = self.rate * radius
-        known = np.isfinite(speed)
-        total = np.where(known, speed, 0.0).sum(axis=1)
-        return _shared(total / np.maximum(known.sum(axis=1), 1))
+        return _shared(_row_means(self.rate * self.radius))
 
     @cached_property
     def side_difference(self) -> FloatArray:
         """Mean rim speed right minus left (k,) [m/s]; nan where the sides are not known."""
-        radius = np.where(np.isfinite(self.facts.radius), self.facts.radius, 1.0)
-        speed = self.rate * radius
+        speed = self.rate * self.radius
         right, left = self.facts.side < 0, self.facts.side > 0
         if not right.any() or not left.any():
             return _shared(np.full(self.time.size, np.nan))
-        return _shared(_nanmean(speed[:, right]) - _nanmean(speed[:, left]))
+        return _shared(_row_means(speed[:, right]) - _row_means(speed[:, left]))
 
     @cached_property
     def straight(self) -> Mask:
@@ -218,9 +216,7 @@ class Evidence:
         rows = self.steady.copy()
         difference = self.side_difference
         if np.isfinite(difference).any():
-            width = max(round(SETTLING / max(self.period, 1e-3)), 1)
-            smooth = moving_mean(difference, width)
-            rows &= np.abs(smooth) < STRAIGHT_SHARE * rim
+            rows &= np.abs(moving_mean(difference, self.rows_in(SETTLING))) < STRAIGHT_SHARE * rim
         if self.gyro is not None and self.facts.known:
             yaw = np.abs(self.gyro[:, 2] - np.median(self.gyro[:, 2]))
             rows &= yaw * float(np.abs(self.facts.lateral).max()) < STRAIGHT_SHARE * rim
@@ -234,19 +230,14 @@ class Evidence:
         rate = np.abs(self.gyro[:, 2])
         return _shared(self.moving & (rate > 0.3 * np.quantile(rate, 0.98)))
 
-    def reference(self) -> VelocitySeries | None:
-        """Return the slip-free velocity."""
-        return self.recording.reference
-
     @cached_property
     def reference_speed(self) -> FloatArray | None:
         """Size of the slip-free velocity, smoothed (k,) [m/s]; None without a reference."""
-        reference = self.reference()
+        reference = self.recording.reference
         if reference is None:
             return None
-        at = (reference.stamp - self.origin) * 1e-9
-        smooth = _smooth(reference.velocity[:, 0], SMOOTH_ROWS)
-        return _shared(np.abs(np.interp(self.time, at, smooth)))
+        smooth = moving_mean(np.nan_to_num(reference.velocity[:, 0]), SMOOTH_ROWS)
+        return _shared(np.abs(np.interp(self.time, self.seconds(reference), smooth)))
 
     def rim_at(self, stamp: NDArray[np.int64], values: FloatArray, half: float) -> FloatArray:
         """Return means of (k,) values within ``half`` [s] around stamps [ns]; nan for none."""
@@ -254,33 +245,36 @@ class Evidence:
         first = np.searchsorted(self.time, at - half)
         last = np.searchsorted(self.time, at + half, side='right')
         total = np.concatenate([[0.0], np.cumsum(values)])
-        count = last - first
-        mean = (total[last] - total[first]) / np.maximum(count, 1)
-        return np.where(count > 0, mean, np.nan)
-
-    @property
-    def origin(self) -> int:
-        """Stamp of time 0 [ns]."""
-        joints = self.recording.joints
-        assert joints is not None
-        return int(joints.stamp[joints.stamp > 0].min())
+        return np.where(
+            last > first, (total[last] - total[first]) / np.maximum(last - first, 1), np.nan
+        )
 
     def with_rate(self, rate: FloatArray, torque: FloatArray | None = None) -> Evidence:
         """Return the evidence with other wheel rates (after something was mended)."""
-        wheels = self.wheels if rate is self.rate else WheelRates(self.time, rate)
-        return replace(self, wheels=wheels, torque=self.torque if torque is None else torque)
+        return replace(self, rate=rate, torque=self.torque if torque is None else torque)
+
+    def with_channel(self, name: str, **values: Any) -> Evidence:
+        """Return the evidence with other values in a channel of the recording."""
+        channel = replace(getattr(self.recording, name), **values)
+        return replace(self, recording=replace(self.recording, **{name: channel}))
+
+    def turned(self, rotation: FloatArray) -> Evidence:
+        """Return the evidence with another mounting of the IMU."""
+        change = rotation @ self.rotation.T
+        force = None if self.force is None else self.force @ change.T
+        gyro = None if self.gyro is None else self.gyro @ change.T
+        return replace(self, rotation=rotation, force=force, gyro=gyro)
 
 
-def gather(recording: Recording, facts: RoverFacts, rotation: FloatArray) -> Evidence | None:
+def gather(
+    recording: Recording, facts: RoverFacts, rotation: FloatArray, figures: dict[str, Any]
+) -> Evidence | None:
     """Return the evidence of a recording; None where no wheel of the rover is in it."""
     joints = recording.joints
-    if joints is None or not joints.stamp.size:
+    if joints is None or not (joints.stamp > 0).any():
         return None
     usable = np.flatnonzero(joints.stamp > 0)
-    if not usable.size:
-        return None
-    _, first = np.unique(joints.stamp[usable], return_index=True)
-    rows = usable[first]
+    rows = usable[np.unique(joints.stamp[usable], return_index=True)[1]]
     time = (joints.stamp[rows] - joints.stamp[rows[0]]) * 1e-9
     rate = np.full((time.size, len(facts.names)), np.nan)
     torque = np.full_like(rate, np.nan)
@@ -302,30 +296,13 @@ def gather(recording: Recording, facts: RoverFacts, rotation: FloatArray) -> Evi
         if errors is not None:
             force = force - errors.specific_force_bias
             gyro = gyro - errors.angular_rate_bias
-    wheels = WheelRates(time, rate)
-    return Evidence(recording, facts, wheels, torque, force, gyro, rotation)
+    return Evidence(recording, facts, time, rate, torque, force, gyro, rotation, figures)
 
 
 def _shared(values: NDArray[Any]) -> NDArray[Any]:
     """Return values that every check sees, so that none may change them."""
     values.flags.writeable = False
     return values
-
-
-def _after(condition: Mask, period: float, duration: float) -> Mask:
-    """Return where a condition has held for some time [s]."""
-    width = max(math.ceil(duration / max(period, 1e-3)), 1)
-    total = np.concatenate([[0], np.cumsum(condition)])
-    held = np.zeros(condition.size, dtype=bool)
-    if condition.size >= width:
-        held[width - 1 :] = total[width:] - total[:-width] == width
-    return held
-
-
-def _smooth(values: FloatArray, width: int) -> FloatArray:
-    if values.size < width:
-        return np.full(values.shape, np.nanmean(values)) if values.size else values
-    return moving_mean(np.nan_to_num(values), width)
 
 
 def row_medians(values: FloatArray) -> FloatArray:
@@ -341,6 +318,6 @@ def row_medians(values: FloatArray) -> FloatArray:
     return result
 
 
-def _nanmean(values: FloatArray) -> FloatArray:
+def _row_means(values: FloatArray) -> FloatArray:
     known = np.isfinite(values)
     return np.where(known, values, 0.0).sum(axis=1) / np.maximum(known.sum(axis=1), 1)

@@ -1,10 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""All faults that the checks know, worst first: one entry each, for recordings and while driving.
-
-``prior`` is how likely a fault is beside its rivals, those that the same evidence could come from;
-``trial`` says whether its cure can be tried on the other half of a recording.
-"""
+"""All faults that the checks know, worst first: one for recordings and while driving."""
 
 from __future__ import annotations
 
@@ -13,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from wheel_terra_estimator.checks.finding import Finding
+from wheel_terra_estimator.configuration.configuration import Configuration
 
 RATE_UNITS = {
     'revolutions per minute': 2.0 * math.pi / 60.0,
@@ -40,38 +37,28 @@ class Fault:
         Format strings of what was seen and what mends it.
     parameter : str or None
         Key of the rover file that mends it.
-    evidence : str
-        What it touches: faults that touch the same compete.
-    prior : float
-        Relative probability among these.
-    trial : bool
-        Whether its cure is tried on the other half of the recording before it is named.
+    channel : str
+        Channel of the recording that it is told of.
     """
 
     kind: str
     words: str
     cure: str
     parameter: str | None = None
-    evidence: str = 'itself'
-    prior: float = 1.0
-    trial: bool = False
+    channel: str = 'joints'
 
 
 _DIRECTIONS = 'wheels.direction: [{directions}]'
-_OFFSET = 'sensors.{channel}_stamp_offset: {offset:.3f}, or synchronise the clocks'
+_OFFSET = 'sensors.{name}_stamp_offset: {value:.3f}, or synchronise the clocks'
 _LATE = 'its stamps are {size:.2f} +- {std:.2f} s too {side}, by {against}'
 
 FAULTS: dict[str, Fault] = {
     # Names and missing inputs
     'missing_input': Fault(
-        'drop_outs',
-        'no {what} in the recording, which the estimator needs: {effect}',
-        '{how}',
+        'drop_outs', 'no {what} in the recording, which the estimator needs: {effect}', '{how}'
     ),
     'topic_name': Fault(
-        'unknown_name',
-        'the estimator listens to {own}, the recording has {topic}',
-        '{remap}',
+        'unknown_name', 'the estimator listens to {own}, the recording has {topic}', '{remap}'
     ),
     'missing_wheel': Fault(
         'missing_wheel',
@@ -116,40 +103,46 @@ FAULTS: dict[str, Fault] = {
         'off',
         'publish the specific force with gravity (+g on z at rest, REP 145), such as '
         'imu/data_raw in place of a linear acceleration',
+        channel='imu',
     ),
     'force_unit': Fault(
         'unit',
         'mean specific force {size:.3g} where gravity is {gravity:.4g}: linear_acceleration is '
         'in {unit}',
         'multiply linear_acceleration by {value:.5g} in the driver (m/s^2, REP 103)',
+        channel='imu',
     ),
     'planet': Fault(
         'gravity',
         'mean specific force {size:.3g} m/s^2 where gravity is {gravity:.4g}: this is {place}',
         'rover.gravity: {value:.4g}',
         'rover.gravity',
+        channel='imu',
     ),
     'force_scale': Fault(
         'gain',
         'mean specific force {size:.3g} m/s^2 where gravity is {gravity:.4g}: the accelerometer '
         'has another scale',
         'multiply linear_acceleration by {value:.4g} in the driver, or state rover.gravity',
+        channel='imu',
     ),
     'gyro_degrees': Fault(
         'unit',
         'angular_velocity is {times:.0f} times what the {how} allows: degrees per second',
         'multiply angular_velocity by 0.0174533 in the driver (rad/s, REP 103)',
-        evidence='turns',
+        channel='imu',
     ),
     'force_zero': Fault(
         'placeholder',
         '{field} is 0 in every message',
         'fill {field}, or say that there is none: {field}_covariance[0] = -1',
+        channel='imu',
     ),
     'orientation_placeholder': Fault(
         'placeholder',
         'orientation is ({shown}) in every message',
         'say that there is none: orientation_covariance[0] = -1 (REP 145)',
+        channel='imu',
     ),
     'torque_placeholder': Fault(
         'placeholder',
@@ -161,15 +154,13 @@ FAULTS: dict[str, Fault] = {
         'mounting',
         '{force}: the IMU is mounted upside down or on its side',
         '{angles}',
-        evidence='gravity',
+        channel='imu',
     ),
     'backwards': Fault(
         'sign',
         'counts backwards when the rover drives forward{trial}',
         _DIRECTIONS + '{torque}',
         'wheels.direction',
-        evidence='turns',
-        trial=True,
     ),
     'one_side_backwards': Fault(
         'sign',
@@ -177,47 +168,37 @@ FAULTS: dict[str, Fault] = {
         'counts backwards',
         'wheels.direction: [{left}] if the left side is the one, [{right}] if the right',
         'wheels.direction',
-        evidence='turns',
     ),
     'all_backwards': Fault(
         'sign',
         'all wheels may count backwards: they run against the reference',
         _DIRECTIONS,
         'wheels.direction',
-        evidence='direction',
-        prior=0.4,
     ),
     'reference_reversed': Fault(
         'sign',
         'linear.x runs against the wheels',
         'negate twist.linear.x in its driver, or turn its frame into base_link{or_wheels}',
-        evidence='direction',
-        prior=0.6,
+        channel='reference',
     ),
     'swapped_sides': Fault(
         'swapped_sides',
         'left and right wheels turn against the gyro: the sides are swapped{rival}{trial}',
         'exchange left and right in wheels.names: [{names}]{mirrored}',
         'wheels.names',
-        evidence='turns',
-        prior=0.5,
-        trial=True,
     ),
     'gyro_reversed': Fault(
         'sign',
         'angular_velocity.{axis} turns against {against}',
         'negate angular_velocity.{axis} in the driver (REP 103: positive to the left; no '
         'mounting angle does that)',
-        evidence='turns',
-        prior=0.5,
+        channel='imu',
     ),
     'exchanged': Fault(
         'exchanged_wheels',
         'each turns like a wheel of the other side{trial}',
         'wheels.names: [{names}]',
         'wheels.names',
-        evidence='turns',
-        trial=True,
     ),
     'rate_frozen': Fault(
         'frozen',
@@ -225,12 +206,12 @@ FAULTS: dict[str, Fault] = {
         'look at encoder and cable of {wheels}; publish nan, or leave it out of the message, '
         'while it is dead',
         'wheels.names',
-        evidence='turns',
     ),
     'sensor_frozen': Fault(
         'frozen',
         '{how}',
         'publish a message when the sensor has measured, not on a timer; nothing while it is dead',
+        channel='imu',
     ),
     # Stamps
     'order': Fault(
@@ -245,42 +226,40 @@ FAULTS: dict[str, Fault] = {
         'look at the load of bus and network, and record with a larger cache '
         '(ros2 bag record --max-cache-size)',
     ),
-    'imu_offset': Fault(
-        'delay', _LATE, _OFFSET, 'sensors.imu_stamp_offset', 'lags', 0.35, trial=True
-    ),
+    'imu_offset': Fault('delay', _LATE, _OFFSET, 'sensors.imu_stamp_offset', channel='imu'),
     'reference_offset': Fault(
-        'delay', _LATE, _OFFSET, 'sensors.reference_stamp_offset', 'lags', 0.45, trial=True
+        'delay', _LATE, _OFFSET, 'sensors.reference_stamp_offset', channel='reference'
     ),
-    'wheel_odometry_offset': Fault(
-        'delay', _LATE, _OFFSET, 'sensors.wheel_odometry_stamp_offset', 'lags', 0.2, trial=True
+    'wheel_odometry_offset': Fault('delay', _LATE, _OFFSET, 'sensors.wheel_odometry_stamp_offset'),
+    'sinkage_offset': Fault(
+        'delay', _LATE, _OFFSET, 'sensors.sinkage_stamp_offset', channel='sinkage'
     ),
-    'sinkage_offset': Fault('delay', _LATE, _OFFSET, 'sensors.sinkage_stamp_offset', 'lags', 0.2),
     # IMU
     'imu_yaw': Fault(
         'mounting',
         'forward acceleration, curves and slopes show {angle:.0f} +- {off:.0f} degrees off its x '
         'axis{trial}',
         '{angles}',
-        evidence='acceleration',
-        trial=True,
+        channel='imu',
     ),
     'imu_tilt': Fault(
         'mounting',
         'its axes lie {size:.2f} degrees off the chassis, seen in full turns',
         '{angles}',
-        evidence='gravity',
-        trial=True,
+        channel='imu',
     ),
     'gyro_bias': Fault(
         'zero',
         'angular_velocity.{axis} reads {bias:.3g} rad/s {where}',
         'sensors.angular_rate_bias: [{biases}]',
         'sensors.angular_rate_bias',
+        channel='imu',
     ),
     'imu_noise': Fault(
         'noise',
         'noise {noise:.2g} {unit} where the rover file has {stated:g} {unit}',
         '{parameter}: {noise:.2g}',
+        channel='imu',
     ),
     # Reference
     'reference_world': Fault(
@@ -288,17 +267,19 @@ FAULTS: dict[str, Fault] = {
         'the direction of its velocity turns with the heading: it is given in the world frame',
         'publish twist in child_frame_id base_link (nav_msgs/Odometry), or turn it by the heading '
         'first',
+        channel='reference',
     ),
     'reference_axis': Fault(
         'mounting',
         'the rover moves along y of its frame, not along x',
         'turn twist.linear by {turn:.0f} degrees about z into base_link (x forward)',
+        channel='reference',
     ),
     'reference_unit': Fault(
         'unit',
         'linear.x is {ratio:.3g} times the rim speed: it is in {unit}',
         'multiply twist.linear by {value:.5g} in its driver (m/s, REP 103)',
-        evidence='speed',
+        channel='reference',
     ),
     'radius': Fault(
         'radius',
@@ -306,9 +287,6 @@ FAULTS: dict[str, Fault] = {
         '{trial}',
         'wheels.radius: [{radii}]{separate}',
         'wheels.radius',
-        'speed',
-        0.85,
-        trial=True,
     ),
     'reference_scale': Fault(
         'gain',
@@ -316,17 +294,13 @@ FAULTS: dict[str, Fault] = {
         '{trial}',
         'multiply twist.linear by {value:.4f} in its driver{separate}',
         None,
-        'speed',
-        0.15,
-        trial=True,
+        channel='reference',
     ),
     'track': Fault(
         'track',
         'turns need a track of {ratio:.3f} +- {off:.3f} of the stated {stated:.3f} m{trial}',
         'wheels.y: [{lateral}]',
         'wheels.y',
-        'turns',
-        trial=True,
     ),
     # Torque
     'torque_unit': Fault(
@@ -353,7 +327,6 @@ FAULTS: dict[str, Fault] = {
         'sensors.torque_gain: [{gains}], or turn current into torque at the wheel (motor constant '
         'times gear ratio times efficiency)',
         'sensors.torque_gain',
-        'slopes',
     ),
     'torque_gain': Fault(
         'gain',
@@ -361,9 +334,6 @@ FAULTS: dict[str, Fault] = {
         'another scale, or the mass is another{trial}',
         'sensors.torque_gain: [{gains}] (or rover.mass: {mass:.1f}: weigh the rover)',
         'sensors.torque_gain',
-        'slopes',
-        0.5,
-        trial=True,
     ),
     'mass': Fault(
         'mass',
@@ -371,9 +341,6 @@ FAULTS: dict[str, Fault] = {
         'or the torque has another scale{trial}',
         'rover.mass: {mass:.1f} (or sensors.torque_gain: [{gains}]: weigh the rover)',
         'rover.mass',
-        'slopes',
-        0.5,
-        trial=True,
     ),
     'torque_zero': Fault(
         'zero',
@@ -386,17 +353,20 @@ FAULTS: dict[str, Fault] = {
         'missing_wheel',
         'has no sinkage',
         'publish the sinkage of {wheels}, nan while there is none',
+        channel='sinkage',
     ),
     'sinkage_unit': Fault(
         'unit',
         'median sinkage {level:.3g} with noise {noise:.2g} at a wheel radius of {radius:.3g} m: it '
         'is in {unit}',
         'multiply position by {value:g} in the driver (m, REP 103)',
+        channel='sinkage',
     ),
     'sinkage_sign': Fault(
         'sign',
         'median sinkage {reading:.0f} mm{others}: counted upwards',
         'negate position{of} in the driver (positive down)',
+        channel='sinkage',
     ),
     'sinkage_above': Fault(
         'sign',
@@ -404,18 +374,21 @@ FAULTS: dict[str, Fault] = {
         'is off',
         'negate position in the driver (positive down), or state sensors.sinkage_zero [m]',
         'sensors.sinkage_zero',
+        channel='sinkage',
     ),
     'sinkage_zero': Fault(
         'zero',
         '{how}',
         'sensors.sinkage_zero: [{zeros}]',
         'sensors.sinkage_zero',
+        channel='sinkage',
     ),
     'sinkage_order': Fault(
         'exchanged_wheels',
         'the sinkage of each goes with the torque of the other (correlation of the differences '
         '{fit:.2f})',
         'exchange {both} in the names of the sinkage message',
+        channel='sinkage',
     ),
     # What the estimator lives with
     'jumps': Fault(
@@ -423,6 +396,7 @@ FAULTS: dict[str, Fault] = {
         '{count} velocities ({share:.1f} %) leave their neighbours by up to {most:.2g} m/s',
         'use the filtered velocity of the receiver in place of differences of raw positions, and '
         'leave out what has no solution',
+        channel='reference',
     ),
     'rate_noise': Fault(
         'noise',
@@ -444,6 +418,7 @@ FAULTS: dict[str, Fault] = {
         'readings scatter by {noise_mm:.2g} mm where the rover file has {stated:.2g} mm',
         'sensors.sinkage_std: {noise:.2g}',
         'sensors.sinkage_std',
+        channel='sinkage',
     ),
     'reference_noise': Fault(
         'noise',
@@ -451,6 +426,7 @@ FAULTS: dict[str, Fault] = {
         'state the variance {variance:.2g} in twist.covariance[0] (sensors.reference_std: '
         '{noise:.2g} where it states none)',
         'sensors.reference_std',
+        channel='reference',
     ),
     'covariance': Fault(
         'covariance',
@@ -458,6 +434,7 @@ FAULTS: dict[str, Fault] = {
         'sensors.reference_std: {noise:.2g} and twist.covariance[0] = 0, or the true variance '
         '({variance:.2g}) there',
         'sensors.reference_std',
+        channel='reference',
     ),
 }
 
@@ -495,9 +472,6 @@ def found(
     fault = FAULTS[key]
     figures = {'trial': '', 'rival': '', 'separate': '', 'wheels': wheel, 'topic': topic} | figures
     figures.setdefault('value', value)
-    if 'offset_left' in figures:
-        left = figures['offset_left']
-        figures |= {'size': abs(left), 'side': 'late' if left > 0.0 else 'early'}
     figures.setdefault('std', std)
     return Finding(
         kind=fault.kind,
@@ -511,6 +485,22 @@ def found(
         cure=fault.cure.format(**figures),
         fault=key,
     )
+
+
+def of_offset(
+    name: str, left: float, std: float, against: str, configuration: Configuration | None
+) -> dict[str, Any]:
+    """Return what a finding says of stamps that are ``left`` [s] off beyond what is stated."""
+    key = f'{name}_stamp_offset'
+    stated = 0.0 if configuration is None else float(getattr(configuration.sensors, key))
+    return {
+        'value': round(left + stated, 3),
+        'std': round(std, 3),
+        'name': name,
+        'size': abs(left),
+        'side': 'late' if left > 0.0 else 'early',
+        'against': against,
+    }
 
 
 def listed(values: Any, form: str = '.4f') -> str:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wheel_terra_estimator.checks.evidence import Evidence
-from wheel_terra_estimator.checks.statistics import Estimate, moving_mean
+from wheel_terra_estimator.checks.statistics import Estimate, moving_mean, without_drift
 
 FloatArray = NDArray[np.float64]
 
@@ -38,9 +38,9 @@ def felt(
     width = max(round(0.4 / period), 1)
     speed = moving_mean(rim, width)
     curve = speed * moving_mean(yaw_rate, width)
-    motion = _without_drift(np.gradient(speed, period) + 1j * curve, period)
+    motion = without_drift(np.gradient(speed, period) + 1j * curve, period)
     along, across = (moving_mean(column, width) for column in force.T)
-    return felt_blocks(motion, _without_drift(along + 1j * across, period))
+    return felt_blocks(motion, without_drift(along + 1j * across, period))
 
 
 def felt_blocks(
@@ -62,9 +62,3 @@ def yaw_of_motion(parts: NDArray[np.complex128], energy: float) -> Estimate | No
     if energy <= 0.0 or not 0.5 < abs(total) / energy < 2.0 or abs(total) < 3.0 * spread:
         return None
     return Estimate(float(np.angle(total)), spread / abs(total))
-
-
-def _without_drift(values: NDArray[np.complex128], period: float) -> NDArray[np.complex128]:
-    """Return values less their mean over 6 s: slopes change more slowly than speeds."""
-    width = max(round(6.0 / period), 3)
-    return np.asarray(values - moving_mean(values, width))

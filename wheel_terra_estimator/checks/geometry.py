@@ -11,16 +11,16 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wheel_terra_estimator.checks.evidence import Evidence
-from wheel_terra_estimator.checks.faults import FAULTS, LEAST_TURN_RATE, found, listed
+from wheel_terra_estimator.checks.evidence import Evidence, Mask
+from wheel_terra_estimator.checks.faults import LEAST_TURN_RATE, listed
 from wheel_terra_estimator.checks.finding import NotChecked, Outcome
 from wheel_terra_estimator.checks.sinkage import without_stated_errors
 from wheel_terra_estimator.checks.statistics import (
     Estimate,
+    bend_noise,
     block_fit,
     confidence,
     correlation,
-    robust_std,
 )
 from wheel_terra_estimator.checks.torque import MOST_TRACTION, thrust
 from wheel_terra_estimator.checks.trial import Trial, tried
@@ -34,6 +34,10 @@ LEAST_RATIO = 0.3
 """Speed over rim speed below which a rover is stuck, or its reference dead [-]."""
 OUTRUN_STD = 0.01
 """Slip that is left open where a rover outruns its wheels [-]."""
+AROUND = 0.25
+"""Half of the time around a velocity that rim speeds are averaged over [s]."""
+PRIOR_OF_RADIUS = 0.85
+"""Probability that a ratio of speeds is the radius and not the scale of the reference [-]."""
 SURE = 0.97
 """Probability beside its rival from which a fault is named alone [-]."""
 TRACK_STD = 0.02
@@ -66,62 +70,64 @@ SKID_TRACK = 0.9
 makes it larger, never smaller."""
 
 
-def radius_ratio(evidence: Evidence, figures: dict[str, Any]) -> Estimate | NotChecked:
+class Told(NamedTuple):
+    """A ratio, and what it left when it was found on one half and tried on the other."""
+
+    ratio: Estimate
+    trial: Trial
+
+
+class _Speeds(NamedTuple):
+    """Speeds at the stamps of the reference on the straight (k,) [m/s], and the rows (m,)."""
+
+    rim: FloatArray
+    forward: FloatArray
+    rows: Mask
+
+    def at(self, evidence: Evidence, values: FloatArray) -> FloatArray:
+        """Return values of the wheel odometry there, positive along the drive."""
+        reference = evidence.recording.reference
+        assert reference is not None
+        means = evidence.rim_at(reference.stamp, np.nan_to_num(values), AROUND)
+        return means[self.rows] * np.sign(self.rim)
+
+
+def radius_ratio(evidence: Evidence) -> Told | NotChecked:
     """Return true over configured radius from straight, steady, firm stretches.
 
     The reference's velocity is ``v = q (1 - k m) rim`` with the traction m = sum of T/r over the
     weight: q is the ratio of the radii, k the slope of slip over traction. Without torque a ratio
     below 1 cannot be told from slip.
     """
-    reference, facts = evidence.reference(), evidence.facts
+    reference, facts, figures = evidence.recording.reference, evidence.facts, evidence.figures
     if reference is None:
         return NotChecked('radius', 'no reference velocity in it')
     if not facts.known:
         return NotChecked('radius', 'no rover file')
     if 'wheels.rad_per_count' in figures:
         return NotChecked('radius', 'rates in counts: a radius looks like other counts per turn')
-    half = 0.25
-    rim = evidence.rim_at(reference.stamp, evidence.rim, half)
-    straight = evidence.rim_at(reference.stamp, evidence.straight.astype(float), half)
+    rim = evidence.rim_at(reference.stamp, evidence.rim, AROUND)
+    straight = evidence.rim_at(reference.stamp, evidence.straight.astype(float), AROUND)
     forward = reference.velocity[:, 0]
     rows = np.isfinite(rim) & (straight > 0.99) & np.isfinite(forward)
     if rows.sum() < LEAST_REFERENCES:
         return NotChecked('radius', 'no straight, steady stretch with a reference in it')
-    rim, forward = rim[rows], forward[rows]
-    plain = block_fit(rim[:, None], forward)[0]
+    speeds = _Speeds(rim[rows], forward[rows], rows)
+    plain = block_fit(speeds.rim[:, None], speeds.forward)[0]
     # No estimator is better than the mean of independent readings of the reference.
-    noise = robust_std(np.diff(forward, 2)) / math.sqrt(6.0)
-    bound = noise / math.sqrt(max(float(rim @ rim), 1e-12))
+    bound = bend_noise(speeds.forward) / max(float(np.linalg.norm(speeds.rim)), 1e-6)
     figures['rover.radius_bound_by_reference_m'] = round(bound * float(np.mean(facts.radius)), 5)
     figures['rover.speed_over_rim_speed'] = round(plain.value, 4)
     if plain.value < LEAST_RATIO:
         return NotChecked('radius', 'the rover hardly moves beside its wheels')
-    sense, weight = np.sign(rim), facts.mass * facts.gravity
-    demand = np.zeros(rim.size)
-    if evidence.force is not None:
-        along = evidence.rim_at(reference.stamp, evidence.force[:, 0], half)[rows]
-        demand = along * sense / facts.gravity
-    resistance = UNKNOWN_RESISTANCE
-    traction = demand + resistance.value
-    if np.isfinite(evidence.torque).any(axis=0).all():
-        traction = evidence.rim_at(reference.stamp, np.nan_to_num(thrust(evidence)), half)[rows]
-        traction = traction * sense / weight
-        told = _resistance(evidence, float(np.median(traction - demand)))
-        if isinstance(told, NotChecked):
-            return told
-        resistance = told
-    elif plain.value > 1.0:
-        # Nothing but a larger radius makes a rover outrun its rolling wheels.
-        return _tried(evidence, Estimate(plain.value, math.hypot(plain.std, OUTRUN_STD)))
-    elif _depth(evidence).value > SOFT_DEPTH:
-        return NotChecked('radius', 'no torque, and soft ground: a ratio of speeds may be slip')
-    ratio = _without_slip(_Speeds(rim, forward, traction, demand), plain, resistance, figures)
-    return ratio if isinstance(ratio, NotChecked) else _tried(evidence, ratio)
-
-
-def _tried(evidence: Evidence, ratio: Estimate) -> Estimate | NotChecked:
-    """Return a ratio that both halves of the drive agree on, referred to the slip radius."""
-    trial = _ratio_trial(evidence)
+    ratio = _without_slip(evidence, speeds, plain)
+    if isinstance(ratio, NotChecked):
+        return ratio
+    trial = tried(
+        lambda part: block_fit(speeds.rim[part, None], speeds.forward[part])[0].value,
+        1.0,
+        speeds.rim**2,
+    )
     large = abs(ratio.value - 1.0) > LEAST_RADIUS_ERROR
     if large and not trial.falls and trial.after > 4.0 * ratio.std:
         return NotChecked(
@@ -129,7 +135,50 @@ def _tried(evidence: Evidence, ratio: Estimate) -> Estimate | NotChecked:
             'speed over rim speed is another in each half of the drive: slip; drive ten metres '
             'over firm ground',
         )
-    return _referred_to_slip_radius(evidence, ratio)
+    return Told(_referred_to_slip_radius(evidence, ratio), trial)
+
+
+def _without_slip(evidence: Evidence, speeds: _Speeds, plain: Estimate) -> Estimate | NotChecked:
+    """Take the slip off the ratio of the speeds.
+
+    A driven wheel rolls without slip somewhere between no torque (the soil drags it back: it
+    skids a little) and no pull (its torque overcomes the resistance: it slips a little). The ratio
+    is taken in the middle, half of the way between both is its uncertainty.
+    """
+    rim, facts = speeds.rim, evidence.facts
+    demand = np.zeros(rim.size)
+    if evidence.force is not None:
+        demand = speeds.at(evidence, evidence.force[:, 0]) / facts.gravity
+    resistance = UNKNOWN_RESISTANCE
+    traction = demand + resistance.value
+    if np.isfinite(evidence.torque).any(axis=0).all():
+        traction = speeds.at(evidence, thrust(evidence)) / (facts.mass * facts.gravity)
+        told = _resistance(evidence, float(np.median(traction - demand)))
+        if isinstance(told, NotChecked):
+            return told
+        resistance = told
+    elif plain.value > 1.0:
+        # Nothing but a larger radius makes a rover outrun its rolling wheels.
+        return Estimate(plain.value, math.hypot(plain.std, OUTRUN_STD))
+    elif _depth(evidence).value > SOFT_DEPTH:
+        return NotChecked('radius', 'no torque, and soft ground: a ratio of speeds may be slip')
+    both = block_fit(np.column_stack([rim, rim * traction]), speeds.forward)
+    # What firm ground does elsewhere is one more observation of the slope.
+    seen = Estimate(-both[1].value / both[0].value, both[1].std)
+    weight = SLOPE_OF_SLIP.std**2 / (SLOPE_OF_SLIP.std**2 + seen.std**2)
+    slope = max(weight * seen.value + (1.0 - weight) * SLOPE_OF_SLIP.value, 0.0)
+    middle = float(np.median(demand)) + resistance.value
+    slip, skid = slope * middle, slope * resistance.value
+    if slip > FIRM_SLIP:
+        return NotChecked(
+            'radius', f'soft ground (slip about {slip:.2f}); drive ten metres over firm ground'
+        )
+    value = plain.value / (1.0 - slip) * (1.0 - 0.5 * skid)
+    slope_std = math.sqrt(weight) * seen.std
+    std = math.hypot(plain.std, slope_std * middle, slope * resistance.std, UNIFORM_STD * skid)
+    if std > CREDIBLE_STD:
+        return NotChecked('radius', 'slip not told from radius; drive up and down a firm slope')
+    return Estimate(value, std)
 
 
 def _resistance(evidence: Evidence, seen: float) -> Estimate | NotChecked:
@@ -165,8 +214,7 @@ def _referred_to_slip_radius(evidence: Evidence, ratio: Estimate) -> Estimate:
     """
     configuration = evidence.facts.configuration
     assert configuration is not None
-    wheels = configuration.wheels
-    lugs = float(np.mean(wheels.lug_height / evidence.facts.radius))
+    lugs = float(np.mean(configuration.wheels.lug_height / evidence.facts.radius))
     stated = configuration.effects.get('lug_shear_radius', {}).get('lam')
     shear = Estimate(0.5, UNIFORM_STD) if stated is None else Estimate(float(stated), 0.0)
     depth = _depth(evidence)
@@ -180,140 +228,82 @@ def _depth(evidence: Evidence) -> Estimate:
     """Return sinkage over radius on the straight."""
     series, configuration = evidence.recording.sinkage, evidence.facts.configuration
     assert configuration is not None
-    radius = float(np.mean(configuration.wheels.radius))
-    if series is not None and series.stamp.size:
-        straight = evidence.rim_at(series.stamp, evidence.straight.astype(float), 0.25) > 0.99
-        names = [name for name in series.names if name in configuration.wheels.names]
-        columns = [series.names.index(name) for name in names]
-        rows = without_stated_errors(configuration, names, series.sinkage[straight][:, columns])
-        if np.isfinite(rows).sum() >= LEAST_DEPTHS:
-            sensors = configuration.sensors
-            depth = float(np.nanmedian(rows)) / radius
-            std = max(float(sensors.sinkage_zero_std), float(sensors.sinkage_std) / 2.0) / radius
-            if depth < DEEPEST:
-                return Estimate(max(depth, 0.0), std)
-    return FIRM_DEPTH
+    if series is None or not series.stamp.size:
+        return FIRM_DEPTH
+    straight = evidence.rim_at(series.stamp, evidence.straight.astype(float), AROUND) > 0.99
+    _, rows = without_stated_errors(configuration, series)
+    if np.isfinite(rows[straight]).sum() < LEAST_DEPTHS:
+        return FIRM_DEPTH
+    sensors, radius = configuration.sensors, float(np.mean(configuration.wheels.radius))
+    depth = float(np.nanmedian(rows[straight])) / radius
+    std = max(float(sensors.sinkage_zero_std), float(sensors.sinkage_std) / 2.0) / radius
+    return Estimate(max(depth, 0.0), std) if depth < DEEPEST else FIRM_DEPTH
 
 
-class _Speeds(NamedTuple):
-    """Speeds at the stamps of the reference (k,) [m/s]; traction and demand over the weight [-]."""
-
-    rim: FloatArray
-    forward: FloatArray
-    traction: FloatArray
-    demand: FloatArray
-
-
-def _without_slip(
-    speeds: _Speeds, plain: Estimate, resistance: Estimate, figures: dict[str, Any]
-) -> Estimate | NotChecked:
-    """Take the slip off the ratio of the speeds.
-
-    A driven wheel rolls without slip somewhere between no torque (the soil drags it back: it
-    skids a little) and no pull (its torque overcomes the resistance: it slips a little). The ratio
-    is taken in the middle, half of the way between both is its uncertainty.
-    """
-    rim, forward, traction = speeds.rim, speeds.forward, speeds.traction
-    both = block_fit(np.column_stack([rim, rim * traction]), forward)
-    # What firm ground does elsewhere is one more observation of the slope.
-    told = Estimate(-both[1].value / both[0].value, both[1].std)
-    weight = SLOPE_OF_SLIP.std**2 / (SLOPE_OF_SLIP.std**2 + told.std**2)
-    slope = max(weight * told.value + (1.0 - weight) * SLOPE_OF_SLIP.value, 0.0)
-    middle = float(np.median(speeds.demand)) + resistance.value
-    slip = slope * middle
-    figures['rover.slip_of_ground'] = round(slip, 4)
-    if slip > FIRM_SLIP:
-        return NotChecked(
-            'radius', f'soft ground (slip about {slip:.2f}); drive ten metres over firm ground'
-        )
-    skid = slope * resistance.value
-    value = plain.value / (1.0 - slip) * (1.0 - 0.5 * skid)
-    slope_std = math.sqrt(weight) * told.std
-    std = math.hypot(plain.std, slope_std * middle, slope * resistance.std, UNIFORM_STD * skid)
-    if std > CREDIBLE_STD:
-        return NotChecked('radius', 'slip not told from radius; drive up and down a firm slope')
-    return Estimate(value, std)
-
-
-def check_radius(evidence: Evidence, figures: dict[str, Any]) -> tuple[list[Outcome], Evidence]:
+def check_radius(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     """Return a radius or a reference of another scale, and the evidence with that mended."""
-    ratio = radius_ratio(evidence, figures)
-    if isinstance(ratio, NotChecked):
-        return [ratio], evidence
-    facts, joints, reference = evidence.facts, evidence.recording.joints, evidence.reference()
-    assert joints is not None and facts.configuration is not None and reference is not None
-    rolling = float(np.mean(facts.radius)) * ratio.value
-    figures['rover.rolling_radius_m'] = round(rolling, 5)
-    figures['rover.rolling_radius_std_m'] = round(float(np.mean(facts.radius)) * ratio.std, 5)
+    told = radius_ratio(evidence)
+    if isinstance(told, NotChecked):
+        return [told], evidence
+    (ratio, trial), facts = told, evidence.facts
+    assert facts.configuration is not None
+    radius = float(np.mean(facts.radius))
+    evidence.figures['rover.rolling_radius_m'] = round(radius * ratio.value, 5)
+    evidence.figures['rover.rolling_radius_std_m'] = round(radius * ratio.std, 5)
     sigmas = ratio.sigmas_from(1.0)
     if abs(ratio.value - 1.0) < LEAST_RADIUS_ERROR or sigmas < RADIUS_SIGMAS:
         return [], evidence
-    trial = _ratio_trial(evidence)
     if not trial.falls:
         reason = 'its halves of the drive say another: drive longer, over firm ground'
         return [NotChecked('radius', reason)], evidence
     rims = facts.radius * ratio.value - (facts.radius - facts.configuration.wheels.radius)
-    share = _share_of_radius(evidence, ratio, figures)
+    share, sure = _share_of_radius(evidence, ratio), confidence(sigmas)
     alone = max(share, 1.0 - share) > SURE
-    told: dict[str, Any] = {
+    words: dict[str, Any] = {
         'ratio': ratio.value,
         'off': ratio.std,
         'trial': trial.words('off by', 'of the speed'),
+        'rival': '' if alone else ': the radius of the wheels, or the scale of the reference',
         'separate': ''
         if alone
         else '; measure ten metres with a tape: the rims or the reference must say ten',
     }
-    radius = found(
-        'radius',
-        joints.topic,
-        share * confidence(sigmas),
-        value=round(float(np.mean(rims)), 5),
-        std=round(float(np.mean(facts.radius)) * ratio.std, 5),
-        radii=listed(rims),
-        rival='' if alone else ': the radius, or the scale of the reference',
-        **told,
-    )
-    scale = found(
-        'reference_scale',
-        reference.topic,
-        (1.0 - share) * confidence(sigmas),
-        value=1.0 / ratio.value,
-        std=ratio.std,
-        rival='' if alone else ': the scale of the reference, or the radius',
-        **told,
-    )
+    found: list[Outcome] = [
+        evidence.found(
+            'radius',
+            share * sure,
+            value=round(float(np.mean(rims)), 5),
+            std=round(radius * ratio.std, 5),
+            radii=listed(rims),
+            **words,
+        ),
+        evidence.found(
+            'reference_scale',
+            (1.0 - share) * sure,
+            value=round(1.0 / ratio.value, 4),
+            std=round(ratio.std / ratio.value**2, 4),
+            **words,
+        ),
+    ]
     if not alone:
-        return [radius, scale], evidence
+        return found, evidence
     if share < 0.5:
-        return [scale], evidence
-    return [radius], replace(evidence, facts=replace(facts, radius=facts.radius * ratio.value))
+        return found[1:], evidence
+    return found[:1], replace(evidence, facts=replace(facts, radius=facts.radius * ratio.value))
 
 
-def _ratio_trial(evidence: Evidence) -> Trial:
-    """Try the ratio of the speeds by one half of the straight stretches on the other."""
-    reference = evidence.reference()
-    assert reference is not None
-    rim = evidence.rim_at(reference.stamp, evidence.rim, 0.25)
-    straight = evidence.rim_at(reference.stamp, evidence.straight.astype(float), 0.25)
-    forward = reference.velocity[:, 0]
-    rows = np.isfinite(rim) & (straight > 0.99) & np.isfinite(forward)
-    rim, forward = rim[rows], forward[rows]
-    return tried(lambda part: block_fit(rim[part, None], forward[part])[0].value, 1.0, rim**2)
-
-
-def _share_of_radius(evidence: Evidence, ratio: Estimate, figures: dict[str, Any]) -> float:
+def _share_of_radius(evidence: Evidence, ratio: Estimate) -> float:
     """Return the probability that a ratio of speeds is the radius, not the scale of the reference.
 
     Where the rover need not skid to turn, the gyro knows the scale of the rims.
     """
-    radius, scale = FAULTS['radius'].prior, FAULTS['reference_scale'].prior
-    odds = math.log(radius / scale)
-    turns = NotChecked('track', 'skids') if skids(evidence) else track_ratio(evidence)
-    if not isinstance(turns, NotChecked):
-        std = math.hypot(turns.std, TRACK_STD, ratio.std)
-        rolling = 1.0 / figures['rover.speed_over_rim_speed']
-        of_scale = abs(turns.value - 1.0) / std
-        of_radius = abs(turns.value - rolling) / std
+    odds = math.log(PRIOR_OF_RADIUS / (1.0 - PRIOR_OF_RADIUS))
+    turns = None if skids(evidence) else track_ratio(evidence)
+    if isinstance(turns, Told):
+        std = math.hypot(turns.ratio.std, TRACK_STD, ratio.std)
+        rolling = 1.0 / evidence.figures['rover.speed_over_rim_speed']
+        of_scale = abs(turns.ratio.value - 1.0) / std
+        of_radius = abs(turns.ratio.value - rolling) / std
         if min(of_scale, of_radius) < 1.0:  # else the track is another as well
             odds += 0.5 * (of_scale**2 - of_radius**2)
     return 1.0 / (1.0 + math.exp(-min(max(odds, -50.0), 50.0)))
@@ -326,8 +316,7 @@ def skids(evidence: Evidence) -> bool:
         return True
     wheels = configuration.wheels
     steered = any(getattr(wheels, 'steering_joints', ()) or ())
-    track = float(np.ptp(wheels.y))
-    return not steered and float(np.ptp(wheels.x)) > 0.3 * track
+    return not steered and float(np.ptp(wheels.x)) > 0.3 * float(np.ptp(wheels.y))
 
 
 def stated_track(evidence: Evidence) -> float:
@@ -336,58 +325,41 @@ def stated_track(evidence: Evidence) -> float:
     return float(lateral[side > 0].mean() - lateral[side < 0].mean())
 
 
-def _track_trial(evidence: Evidence) -> Trial:
-    turns = _turns(evidence)
-    assert not isinstance(turns, NotChecked)
-    yaw, difference = turns
-    track = stated_track(evidence)
-    return tried(
-        lambda rows: block_fit(yaw[rows, None], difference[rows])[0].value / track, 1.0, yaw**2
-    )
-
-
-def track_ratio(evidence: Evidence) -> Estimate | NotChecked:
+def track_ratio(evidence: Evidence) -> Told | NotChecked:
     """Return effective over configured track from the gyro and the difference of the sides."""
-    turns = _turns(evidence)
-    if isinstance(turns, NotChecked):
-        return turns
-    track = stated_track(evidence)
-    slope = block_fit(turns[0][:, None], turns[1])[0]
-    ratio = Estimate(float(slope.value / track), float(slope.std / abs(track)))
-    if abs(ratio.value - 1.0) > LEAST_TRACK_ERROR and not _track_trial(evidence).falls:
-        return NotChecked('track', 'the turns of both halves of the drive need different tracks')
-    return ratio
-
-
-def _turns(evidence: Evidence) -> tuple[FloatArray, FloatArray] | NotChecked:
-    """Return yaw rate [rad/s] and difference of the sides [m/s] in turns."""
     facts, difference = evidence.facts, evidence.side_difference
     if evidence.gyro is None or not facts.known or not facts.has_sides():
         return NotChecked('track', 'no IMU, or sides not known')
-    yaw = evidence.gyro[:, 2]
     rows = evidence.turning & np.isfinite(difference)
-    bias = np.median(yaw[evidence.at_rest]) if evidence.at_rest.sum() > 20 else 0.0
-    clear = rows.sum() > 60 and correlation((yaw - bias)[rows], difference[rows]) > CLEAR_TURN
-    if not clear or float(np.quantile(np.abs(yaw), 0.95)) < LEAST_TURN_RATE:
+    yaw, difference = evidence.yaw[rows], difference[rows]
+    clear = rows.sum() > 60 and correlation(yaw, difference) > CLEAR_TURN
+    if not clear or float(np.quantile(np.abs(evidence.gyro[:, 2]), 0.95)) < LEAST_TURN_RATE:
         return NotChecked('track', 'no clear turn in it; drive a circle both ways')
-    return (yaw - bias)[rows], difference[rows]
+    track = stated_track(evidence)
+
+    def fitted(part: slice) -> Estimate:
+        slope = block_fit(yaw[part, None], difference[part])[0]
+        return Estimate(slope.value / track, slope.std / abs(track))
+
+    ratio = fitted(slice(None))
+    trial = tried(lambda part: fitted(part).value, 1.0, yaw**2)
+    if abs(ratio.value - 1.0) > LEAST_TRACK_ERROR and not trial.falls:
+        return NotChecked('track', 'the turns of both halves of the drive need different tracks')
+    return Told(ratio, trial)
 
 
-def check_track(evidence: Evidence, figures: dict[str, Any]) -> list[Outcome]:
+def check_track(evidence: Evidence) -> list[Outcome]:
     """Return a track that the turns contradict."""
+    figures = evidence.figures
     if 'wheels.rad_per_count' in figures:
         return [NotChecked('track', 'rates in counts: a track looks like other counts per turn')]
-    ratio = track_ratio(evidence)
-    if isinstance(ratio, NotChecked):
-        return [ratio]
-    figures['rover.effective_over_stated_track'] = round(float(ratio.value), 3)
-    figures['rover.effective_over_stated_track_std'] = round(float(ratio.std), 3)
-    stated = stated_track(evidence)
-    figures['rover.effective_track_m'] = round(float(ratio.value) * stated, 4)
-    skidding = skids(evidence)
-    reference = evidence.reference()
-    slip_free = reference is not None and 'rover.speed_over_rim_speed' in figures
-    if skidding and ratio.value > SKID_TRACK:
+    told = track_ratio(evidence)
+    if isinstance(told, NotChecked):
+        return [told]
+    (ratio, trial), stated = told, stated_track(evidence)
+    figures['rover.effective_over_stated_track'] = round(ratio.value, 3)
+    figures['rover.effective_track_m'] = round(ratio.value * stated, 4)
+    if skids(evidence) and ratio.value > SKID_TRACK:
         return [
             NotChecked(
                 'track',
@@ -398,15 +370,11 @@ def check_track(evidence: Evidence, figures: dict[str, Any]) -> list[Outcome]:
         ]
     if ratio.sigmas_from(1.0) < 4.0 or abs(ratio.value - 1.0) < LEAST_TRACK_ERROR:
         return []
-    trial = _track_trial(evidence)
-    if not slip_free and not skidding:
+    if not skids(evidence) and 'rover.speed_over_rim_speed' not in figures:
         ratio = Estimate(ratio.value, math.hypot(ratio.std, 0.03))
-    joints = evidence.recording.joints
-    assert joints is not None
     return [
-        found(
+        evidence.found(
             'track',
-            joints.topic,
             confidence(ratio.sigmas_from(1.0)),
             value=round(stated * ratio.value, 4),
             std=round(stated * ratio.std, 4),

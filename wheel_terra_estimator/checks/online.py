@@ -16,10 +16,15 @@ from math import isnan
 from statistics import median
 from typing import Any, NamedTuple
 
-from wheel_terra_estimator.checks.faults import LEAST_TURN_RATE, RATE_UNITS, STANDARD_GRAVITY, found
+from wheel_terra_estimator.checks.faults import (
+    LEAST_TURN_RATE,
+    RATE_UNITS,
+    STANDARD_GRAVITY,
+    found,
+    of_offset,
+)
 from wheel_terra_estimator.checks.felt_motion import LEAST_YAW, YAW_SIGMAS
 from wheel_terra_estimator.checks.finding import Finding
-from wheel_terra_estimator.checks.online_delay import SpeedHistory
 from wheel_terra_estimator.checks.online_motion import MotionHistory
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.measurements import (
@@ -245,13 +250,12 @@ class OnlineChecks:
         self._gravity = float(rover.gravity)
         self._weight = float(rover.mass) * self._gravity
         self._reference_std = float(configuration.sensors.reference_std)
-        self._reference_offset = float(configuration.sensors.reference_stamp_offset)
+        self._configuration = configuration
         sensors = configuration.sensors
         self._above_ground = max(
             ABOVE_GROUND, 2.0 * float(sensors.sinkage_zero_std), float(sensors.sinkage_std)
         )
         self._sums = self._empty()
-        self._speeds = SpeedHistory()
         self._motion = MotionHistory()
         self._force = (math.nan,) * 3
         self._verdicts = _Verdicts({}, {}, ())
@@ -279,29 +283,24 @@ class OnlineChecks:
     def reset(self) -> None:
         """Forget everything."""
         self._sums = self._empty()
-        self._speeds = SpeedHistory()
         self._motion = MotionHistory()
         self._force = (math.nan,) * 3
         self._verdicts = _Verdicts({}, {}, ())
 
     def snapshot(self) -> tuple[Any, ...]:
         """Return the state in a form that later steps leave alone."""
-        kept = self._sums.copy(), self._speeds.copy(), self._motion.copy()
-        return (*kept, self._force, self._verdicts)
+        return self._sums.copy(), self._motion.copy(), self._force, self._verdicts
 
     def restore(self, snapshot: tuple[Any, ...]) -> None:
         """Return to a kept state."""
-        sums, speeds, motion, self._force, self._verdicts = snapshot
-        self._sums, self._speeds, self._motion = sums.copy(), speeds.copy(), motion.copy()
+        sums, motion, self._force, self._verdicts = snapshot
+        self._sums, self._motion = sums.copy(), motion.copy()
 
     def step(self, stamp: int, inputs: StepInputs) -> None:
         """Take all inputs of a stamp [ns], later than the one before."""
         sums = self._sums
         if sums.begin is None:
             sums.begin = stamp
-        delay = self._speeds.advance(stamp)
-        if delay is not None:
-            self._weigh([('reference_delay', -1, delay.late, delay.lag)])
         if self._motion.advance(stamp):
             self._weigh(self._of_motion())
         if inputs.wheel_odometry is not None:
@@ -310,7 +309,7 @@ class OnlineChecks:
             self._add_inertial(inputs.inertial)
         if inputs.reference is not None:
             self._add_reference(inputs.reference)
-            self._speeds.add_reference(stamp, inputs.reference.forward)
+            self._motion.reference = inputs.reference.forward
         if inputs.sinkage is not None:
             self._add_sinkage(inputs.sinkage)
         if stamp - sums.begin >= WINDOW:
@@ -340,10 +339,9 @@ class OnlineChecks:
             torques[i] += torque
         sums.odometry += 1
         sums.last = tuple(heard)
-        self._motion.add_rims(sums.last)
+        self._motion.rims = sums.last
         if not sizes:
             return
-        self._speeds.add_rim(sum(rim for rim in heard if not isnan(rim)) / len(sizes))
         sizes.sort()
         size = sizes[len(sizes) // 2]
         sums.slowest = min(sums.slowest, size)
@@ -432,8 +430,12 @@ class OnlineChecks:
         yaw = self._motion.yaw_of_imu()
         if yaw is not None:
             yield 'imu_yaw', -1, yaw != 0.0, yaw
-        for (a, b), wrong in self._motion.exchanged(self._lateral):
-            yield 'exchanged', -1, wrong, float(a * len(self._names) + b)
+        pair = self._motion.exchanged(self._lateral)
+        if pair is not None:
+            yield 'exchanged', -1, pair[0] >= 0, float(pair[0] * len(self._names) + pair[1])
+        late = self._motion.late_reference()
+        if late is not None:
+            yield 'reference_delay', -1, late > 0.0, late
 
     def _evidence(self, window: _Window) -> Iterator[Evidence]:
         if window.force is not None:
@@ -679,18 +681,9 @@ class OnlineChecks:
             every = self._directions(range(len(self._names)))
             wheels_too = f'; if all wheels count backwards, wheels.direction: [{every}]'
             return found('reference_reversed', reference, sure, value=-1.0, or_wheels=wheels_too)
-        offset = figure + self._reference_offset
-        return found(
-            'reference_offset',
-            reference,
-            sure,
-            value=round(offset, 2),
-            std=ONLINE_DELAY_STD,
-            channel='reference',
-            offset=offset,
-            offset_left=figure,
-            against='starts and stops of the wheels; wheel-terra check has the exact figure',
-        )
+        against = 'starts and stops of the wheels; wheel-terra check has the exact figure'
+        told = of_offset('reference', figure, ONLINE_DELAY_STD, against, self._configuration)
+        return found('reference_offset', reference, sure, **told)
 
     def _of_size(self, size: float, sure: float) -> Finding:
         """Return what a specific force of another size than gravity is."""

@@ -12,7 +12,7 @@ import logging
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import fields, replace
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,18 +34,14 @@ from wheel_terra_estimator.checks import (
 )
 from wheel_terra_estimator.checks.evidence import LEAST_MOVING_ROWS, Evidence, gather
 from wheel_terra_estimator.checks.faults import RANK
-from wheel_terra_estimator.checks.finding import (
-    INTERNAL_ERROR,
-    CheckReport,
-    NotChecked,
-    Outcome,
-)
+from wheel_terra_estimator.checks.finding import INTERNAL_ERROR, CheckReport, NotChecked, Outcome
 from wheel_terra_estimator.checks.rover_facts import RoverFacts
 from wheel_terra_estimator.checks.series import ImuSeries, Recording, VelocitySeries
 from wheel_terra_estimator.configuration.configuration import Configuration
 
 _LOGGER = logging.getLogger(__name__)
 Result = TypeVar('Result')
+Given = TypeVar('Given')
 Series = TypeVar('Series', ImuSeries, VelocitySeries)
 
 
@@ -80,7 +76,7 @@ def examine(
         evidence = run_apart(
             report, 'sign', None, lambda: _examined(recording, configuration, remapped, report)
         )
-    report.findings.sort(key=lambda finding: RANK[finding.fault])
+    report.findings.sort(key=lambda finding: RANK.get(finding.fault, 0))
     return report, evidence
 
 
@@ -103,82 +99,64 @@ def _examined(
     report: CheckReport,
 ) -> Evidence | None:
     recording = clocks.corrected(recording, configuration)
-    figures = report.figures
-    joints = recording.joints.names if recording.joints is not None else ()
-    facts = (
-        rover_facts.from_configuration(configuration)
-        if configuration is not None
-        else rover_facts.from_names(joints)
-    )
+    if configuration is not None:
+        facts = rover_facts.from_configuration(configuration)
+    else:
+        facts = rover_facts.from_names(recording.joints.names if recording.joints else ())
 
-    def take(kind: str, check: Callable[[], list[Outcome]]) -> None:
-        report.take(run_apart(report, kind, [], check))
+    def mended(
+        kind: str, given: Given, check: Callable[[], list[Outcome] | tuple[list[Outcome], Given]]
+    ) -> Given:
+        """Take what a check finds; return what it was given, with that mended."""
+        nothing: list[Outcome] | tuple[list[Outcome], Given] = []
+        told = run_apart(report, kind, nothing, check)
+        outcomes, given = told if isinstance(told, tuple) else (told, given)
+        report.take(outcomes)
+        return given
 
-    take('drop_outs', lambda: names.check_required(recording, configuration))
-    take('unknown_name', lambda: names.check_topics(recording, remapped))
-    take('missing_wheel', lambda: names.check_wheel_names(recording, facts))
+    mended('drop_outs', None, lambda: names.check_required(recording, configuration))
+    mended('unknown_name', None, lambda: names.check_topics(recording, remapped))
+    mended('missing_wheel', None, lambda: names.check_wheel_names(recording, facts))
     facts = _with_names_in(facts, report)
-    unread: tuple[list[Outcome], float] = [], 0.0
-    told, offset = run_apart(
-        report,
-        'order',
-        unread,
-        lambda: transport.check_transport(recording, configuration, figures),
+    offset = mended(
+        'order', 0.0, lambda: transport.check_transport(recording, configuration, report.figures)
     )
-    report.take(told)
     recording = _whole_rows(recording)
     if offset and recording.imu is not None:
         recording = replace(recording, imu=clocks.shifted(recording.imu, round(offset * 1e9)))
-    rotation = configured_mounting(configuration)
-    unjudged: tuple[list[Outcome], imu.ImuState] = [], imu.ImuState(recording, rotation)
-    outcomes, state = run_apart(
-        report,
-        'gravity',
-        unjudged,
-        lambda: imu.check_imu(recording, facts, rotation, figures),
-    )
-    report.take(outcomes)
-    evidence = gather(state.recording, facts, state.rotation)
+    state = imu.ImuState(recording, configured_mounting(configuration))
+    state = mended('gravity', state, lambda: imu.check_imu(state, facts))
+    evidence = gather(state.recording, facts, state.rotation, report.figures)
     if evidence is None or evidence.time.size < LEAST_MOVING_ROWS:
         report.not_checked.append(NotChecked('sign', 'no wheel rates to compare with'))
         return None
-    if not state.usable_force:
-        evidence = replace(evidence, force=None)
-    if not state.usable_gyro:
-        evidence = replace(evidence, gyro=None)
-    return _against_each_other(evidence, report)
-
-
-def _against_each_other(evidence: Evidence, report: CheckReport) -> Evidence:
-    """Run the checks that hold one channel against another; return the evidence mended."""
-    figures = report.figures
-
-    def mend(kind: str, check: Callable[[Evidence], tuple[list[Outcome], Evidence]]) -> None:
-        nonlocal evidence
-        unchanged: tuple[list[Outcome], Evidence] = [], evidence
-        outcomes, evidence = run_apart(report, kind, unchanged, lambda: check(evidence))
-        report.take(outcomes)
-
-    def look(kind: str, check: Callable[..., list[Outcome]]) -> None:
-        report.take(run_apart(report, kind, [], lambda: check(evidence, figures)))
-
-    mend('mounting', lambda e: _tilt(e, figures))
-    mend('missing_wheel', wheel_rates.check_dead_wheels)
-    mend('sign', turning.check_signs)
-    mend('unit', turning.check_gyro_unit)
-    mend('unit', lambda e: wheel_rates.check_unit(e, figures))
-    look('noise', wheel_rates.check_noise)
-    mend('mounting', reference.check_frame)
-    mend('gain', lambda e: torque.check_torque(e, figures))
-    mend('mounting', lambda e: _yaw(e, figures))
-    mend('delay', lambda e: clocks.check_clocks(e, figures))
-    look('covariance', reference.check_quality)
-    look('zero', imu.check_noise_and_zero)
-    look('zero', sinkage.check_sinkage)
-    look('exchanged_wheels', sinkage_order.check_order)
-    mend('radius', lambda e: geometry.check_radius(e, figures))
-    look('track', geometry.check_track)
+    force = evidence.force if state.usable_force else None
+    evidence = replace(evidence, force=force, gyro=evidence.gyro if state.usable_gyro else None)
+    for kind, module, check in AGAINST_EACH_OTHER:
+        given = evidence
+        evidence = mended(kind, given, lambda: getattr(module, check)(given))  # noqa: B023
     return evidence
+
+
+AGAINST_EACH_OTHER = (
+    ('mounting', imu, 'check_mounting'),
+    ('missing_wheel', wheel_rates, 'check_dead_wheels'),
+    ('sign', turning, 'check_signs'),
+    ('unit', turning, 'check_gyro_unit'),
+    ('unit', wheel_rates, 'check_unit'),
+    ('noise', wheel_rates, 'check_noise'),
+    ('mounting', reference, 'check_frame'),
+    ('gain', torque, 'check_torque'),
+    ('mounting', imu, 'check_yaw'),
+    ('delay', clocks, 'check_clocks'),
+    ('covariance', reference, 'check_quality'),
+    ('zero', imu, 'check_noise_and_zero'),
+    ('zero', sinkage, 'check_sinkage'),
+    ('exchanged_wheels', sinkage_order, 'check_order'),
+    ('radius', geometry, 'check_radius'),
+    ('track', geometry, 'check_track'),
+)
+"""Checks that hold one channel against another, in order: kind, module, function."""
 
 
 def _whole_rows(recording: Recording) -> Recording:
@@ -201,15 +179,13 @@ def _rows(series: Series, known: NDArray[np.bool_]) -> Series | None:
     return replace(series, **rows) if kept.any() else None
 
 
-def configured_mounting(configuration: Configuration | None) -> np.ndarray:
+def configured_mounting(configuration: Configuration | None) -> NDArray[np.float64]:
     """Return the (3, 3) rotation that the rover file states for the IMU."""
     if configuration is None:
         return np.eye(3)
     sensors = configuration.sensors
-    roll, pitch, yaw = (
-        getattr(sensors, f'imu_mounting_{axis}') for axis in ('roll', 'pitch', 'yaw')
-    )
-    return np.asarray(Rotation.from_euler('xyz', [roll, pitch, yaw]).as_matrix())
+    angles = [getattr(sensors, f'imu_mounting_{axis}') for axis in ('roll', 'pitch', 'yaw')]
+    return np.asarray(Rotation.from_euler('xyz', angles).as_matrix())
 
 
 def _with_names_in(facts: RoverFacts, report: CheckReport) -> RoverFacts:
@@ -219,24 +195,3 @@ def _with_names_in(facts: RoverFacts, report: CheckReport) -> RoverFacts:
         return facts
     listed = renamed[0].cure.partition('[')[2].rstrip(']')
     return replace(facts, names=tuple(name.strip() for name in listed.split(',')))
-
-
-def _tilt(evidence: Evidence, figures: dict[str, Any]) -> tuple[list[Outcome], Evidence]:
-    outcomes, rotation = imu.check_mounting(evidence, figures)
-    return outcomes, turned(evidence, rotation)
-
-
-def _yaw(evidence: Evidence, figures: dict[str, Any]) -> tuple[list[Outcome], Evidence]:
-    outcomes, rotation = imu.check_yaw(evidence, figures)
-    return outcomes, turned(evidence, rotation)
-
-
-def turned(evidence: Evidence, rotation: np.ndarray) -> Evidence:
-    """Return the evidence with another mounting of the IMU."""
-    change = rotation @ evidence.rotation.T
-    return replace(
-        evidence,
-        rotation=rotation,
-        force=None if evidence.force is None else evidence.force @ change.T,
-        gyro=None if evidence.gyro is None else evidence.gyro @ change.T,
-    )

@@ -14,13 +14,12 @@ from __future__ import annotations
 
 import itertools
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wheel_terra_estimator.checks.evidence import Evidence
-from wheel_terra_estimator.checks.faults import found
 from wheel_terra_estimator.checks.finding import NotChecked, Outcome
 from wheel_terra_estimator.checks.series import SinkageSeries
 from wheel_terra_estimator.checks.statistics import (
@@ -56,8 +55,14 @@ class Pair(NamedTuple):
     correlation: float
     sigmas: float
 
+    @property
+    def told(self) -> bool:
+        """Whether it is clear which way they go together."""
+        sense = math.copysign(1.0, self.correlation)
+        return abs(self.correlation) > ALIKE and sense * self.sigmas > CLEAR
 
-def check_order(evidence: Evidence, figures: dict[str, Any]) -> list[Outcome]:
+
+def check_order(evidence: Evidence) -> list[Outcome]:
     """Return sinkage sensors that go by each other's wheel."""
     sinkage = evidence.recording.sinkage
     if sinkage is None or not evidence.facts.known:
@@ -67,32 +72,24 @@ def check_order(evidence: Evidence, figures: dict[str, Any]) -> list[Outcome]:
     if evidence.reference_speed is None:
         return [_not_told('without a reference velocity high slip is not seen')]
     compared = pairs(evidence, sinkage)
-    wrong = [p for p in compared if p.sigmas < -CLEAR and p.correlation < -ALIKE]
-    right = [p for p in compared if p.sigmas > CLEAR and p.correlation > ALIKE]
+    told = [p for p in compared if p.told]
     outcomes: list[Outcome] = []
     exchanged: set[str] = set()
-    for pair in sorted(wrong, key=lambda p: p.correlation):
-        if exchanged & {pair.first, pair.second}:
+    for pair in sorted(told, key=lambda p: p.correlation):
+        both = {pair.first, pair.second}
+        if pair.correlation > 0.0 or exchanged & both:
             continue
-        exchanged |= {pair.first, pair.second}
-        outcomes.append(
-            found(
-                'sinkage_order',
-                sinkage.topic,
-                confidence(abs(pair.sigmas)),
-                wheel=f'{pair.first}, {pair.second}',
-                fit=pair.correlation,
-                both=f'{pair.first} and {pair.second}',
-            )
-        )
-    figures['sinkage.pairs_in_order'] = f'{len(right)} of {len(compared)}'
-    open_pairs = [p for p in compared if p not in right and p not in wrong]
-    if open_pairs or not compared:
-        shown = ', '.join(f'{p.first} / {p.second}' for p in open_pairs[:SHOWN])
-        listed = f' ({shown}{", ..." if len(open_pairs) > SHOWN else ""})' if shown else ''
+        exchanged |= both
+        words = {'fit': pair.correlation, 'both': f'{pair.first} and {pair.second}'}
+        wheel, sure = f'{pair.first}, {pair.second}', confidence(pair.sigmas)
+        outcomes.append(evidence.found('sinkage_order', sure, wheel=wheel, **words))
+    left = [p for p in compared if p not in told]
+    if left or not compared:
+        shown = ', '.join(f'{p.first} / {p.second}' for p in left[:SHOWN])
+        listed = f' ({shown}{", ..." if len(left) > SHOWN else ""})' if shown else ''
         outcomes.append(
             _not_told(
-                f'{len(open_pairs) or "all"} pairs of wheels do not show theirs{listed}; drive '
+                f'{len(left) or "all"} pairs of wheels do not show theirs{listed}; drive '
                 'straight over soft, patchy ground, up and down, or along a side slope'
             )
         )
@@ -113,7 +110,7 @@ def pairs(evidence: Evidence, sinkage: SinkageSeries) -> list[Pair]:
     rows = (straight[:, 0] > 0.99) & (_slip(evidence, time) < HIGH_SLIP)
     if rows.sum() < LEAST_ROWS:
         return []
-    at = np.asarray((sinkage.stamp - evidence.origin) * 1e-9, dtype=np.float64)
+    at = evidence.seconds(sinkage)
     depth, thrust = {}, {}
     sense = np.sign(evidence.rim)
     for name in names:

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter1d
 
 FloatArray = NDArray[np.float64]
 
@@ -21,12 +22,14 @@ ROUNDS = 8
 BLOCKS = 12
 """Number of blocks of time that a standard deviation is estimated from: residuals of a drive are
 correlated over seconds, rows are not independent."""
-
-
 MOST_TIMES = 2_000_000
 """Even steps over a drive: 28 hours at 20 Hz."""
 LONGEST_PAUSE = 3600.0
 """Between stamps of one drive [s]."""
+DRIFT = 6.0
+"""Slopes change more slowly than this [s], speeds faster."""
+ALIKE = 0.05
+"""Parts of a record that fit this much worse than the whole say nothing of the lag."""
 
 
 class Estimate(NamedTuple):
@@ -108,7 +111,23 @@ def moving_mean(values: NDArray[Any], width: int) -> NDArray[Any]:
     Of a record that is shorter, over as many rows as there are.
     """
     width = max(min(width, values.size), 1)
-    return np.asarray(np.convolve(values, np.ones(width) / width, mode='same'))
+    return np.asarray(uniform_filter1d(values, width, mode='constant'))
+
+
+def without_drift(values: NDArray[Any], period: float) -> NDArray[Any]:
+    """Return values less their mean over 6 s: slopes change more slowly than speeds."""
+    return np.asarray(values - moving_mean(values, max(round(DRIFT / period), 3)))
+
+
+def bend_noise(values: FloatArray) -> float:
+    """Return the noise of (k,) even readings of something smooth, by their second differences."""
+    return robust_std(np.diff(values, 2, axis=0).ravel()) / math.sqrt(6.0)
+
+
+def runs(same: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """Return (first, last) row of each stretch in which none of (k - 1,) steps is a change."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], same, [False]]).astype(int)))
+    return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
 
 
 def correlation(first: FloatArray, second: FloatArray) -> float:
@@ -140,21 +159,12 @@ def averaged(time: FloatArray, values: FloatArray, at: FloatArray, width: float)
     return np.where(count > 0, mean, middle)
 
 
-ALIKE = 0.05
-"""Parts of a record that fit this much worse than the whole say nothing of the lag."""
-
-
 class Lag(NamedTuple):
-    """How much later a series is than another [s], and how well they fit then and at no lag."""
+    """How much later a series is than another [s], its deviation, and how well they fit then."""
 
     value: float
     std: float
     fit: float
-    fit_at_zero: float
-
-    def clear(self, least: float) -> bool:
-        """Whether what is unlike without the lag is so many times what is unlike with it."""
-        return 1.0 - self.fit_at_zero > least * (1.0 - self.fit)
 
 
 def lag(time: FloatArray, first: FloatArray, second: FloatArray, limit: float) -> Lag | None:
@@ -168,30 +178,26 @@ def lag(time: FloatArray, first: FloatArray, second: FloatArray, limit: float) -
     reach = max(round(limit / step), 1)
     if time.size < 6 * reach or not first.std() or not second.std():
         return None
+    value, fit = _best_shift(first, second, reach)
+    parts = []
+    if time.size // 3 > 3 * reach:
+        thirds = zip(np.array_split(first, 3), np.array_split(second, 3), strict=True)
+        parts = [_best_shift(a, b, reach) for a, b in thirds]
+    good = [shift for shift, fits in parts if fits > fit - ALIKE]
+    std = float(np.std(good, ddof=1) / math.sqrt(len(good))) if len(good) > 1 else 1.0
+    return Lag(step * value, step * max(std, 0.2), fit)
 
-    def best(a: FloatArray, b: FloatArray) -> tuple[float, float, float]:
-        a, b = a - a.mean(), b - b.mean()
-        fits = np.empty(2 * reach + 1)
-        inner = a[reach : a.size - reach]
-        for shift in range(-reach, reach + 1):
-            shifted = b[reach + shift : b.size - reach + shift]
-            size = math.sqrt(float(inner @ inner) * float(shifted @ shifted))
-            fits[shift + reach] = float(inner @ shifted) / size if size else 0.0
-        peak = int(np.argmax(fits))
-        offset = 0.0
-        if 0 < peak < fits.size - 1:  # top of a parabola through three points
-            left, middle, right = fits[peak - 1 : peak + 2]
-            bend = left - 2.0 * middle + right
-            offset = 0.5 * (left - right) / bend if bend else 0.0
-        return step * (peak - reach + offset), float(fits[peak]), float(fits[reach])
 
-    value, fit, fit_at_zero = best(first, second)
-    third = time.size // 3
-    parts = [
-        best(first[i * third : (i + 1) * third], second[i * third : (i + 1) * third])
-        for i in range(3)
-        if third > 3 * reach
-    ]
-    good = [part[0] for part in parts if part[1] > fit - ALIKE]
-    std = float(np.std(good, ddof=1) / math.sqrt(len(good))) if len(good) > 1 else step
-    return Lag(value, max(std, 0.2 * step), fit, fit_at_zero)
+def _best_shift(first: FloatArray, second: FloatArray, reach: int) -> tuple[float, float]:
+    """Return the shift [rows] at which the inner part of a series fits another, and how well."""
+    first, second = first - first.mean(), second - second.mean()
+    inner = first[reach : first.size - reach]
+    energy = np.cumsum(np.concatenate([[0.0], second**2]))
+    energy = (energy[inner.size :] - energy[: -inner.size]) * float(inner @ inner)
+    fits = np.correlate(second, inner, mode='valid') / np.sqrt(np.maximum(energy, 1e-300))
+    peak, offset = int(np.argmax(fits)), 0.0
+    if 0 < peak < fits.size - 1:  # top of a parabola through three points
+        left, middle, right = fits[peak - 1 : peak + 2]
+        bend = left - 2.0 * middle + right
+        offset = 0.5 * (left - right) / bend if bend else 0.0
+    return float(peak - reach + offset), float(fits[peak])

@@ -5,13 +5,14 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from wheel_terra_estimator.checks.evidence import LEAST_MOVING_ROWS, Evidence, row_medians
-from wheel_terra_estimator.checks.faults import found, listed
+from wheel_terra_estimator.checks.faults import listed
 from wheel_terra_estimator.checks.finding import Finding, NotChecked, Outcome
 from wheel_terra_estimator.checks.statistics import (
     Estimate,
@@ -52,43 +53,40 @@ LEAST_GAIN_ERROR = 0.15
 ZERO_FACTOR = 6.0
 
 
-def check_torque(evidence: Evidence, figures: dict[str, Any]) -> tuple[list[Outcome], Evidence]:
+def check_torque(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     """Return what is wrong with the torques."""
-    facts, joints = evidence.facts, evidence.recording.joints
-    assert joints is not None
-    kinds = ('gain', 'mass')
-    if not np.isfinite(evidence.torque).any():
-        return [NotChecked(kind, 'no torque in it (effort is empty or nan)') for kind in kinds], (
-            evidence
-        )
+    known = np.isfinite(evidence.torque).any(axis=0)
+    if not known.any():
+        return _not_told('no torque in it (effort is empty or nan)'), evidence
     if not np.nan_to_num(evidence.torque).any():
         blank = evidence.with_rate(evidence.rate, np.full_like(evidence.torque, np.nan))
-        return [found('torque_placeholder', joints.topic, 0.99)], blank
+        return [evidence.found('torque_placeholder', 0.99)], blank
     outcomes, evidence = _signs(evidence)
-    if not facts.known or evidence.force is None:
+    if not evidence.facts.known or evidence.force is None:
         return outcomes, evidence
-    if not np.isfinite(evidence.torque).any(axis=0).all():
-        reason = 'a wheel without torque: the sum is not known'
-        return [*outcomes, *(NotChecked(kind, reason) for kind in kinds)], evidence
+    if not known.all():
+        return [*outcomes, *_not_told('a wheel without torque: the sum is not known')], evidence
     zeros = torque_zeros(evidence)
     without = evidence
     if zeros is not None:  # a zero looks like a resistance that no soil has, not the other way
         table = evidence.torque - np.array([zero.value for zero in zeros])
         without = evidence.with_rate(evidence.rate, table)
-    scale, without = _scale(without, figures)
-    if any(isinstance(o, Finding) for o in scale):
-        return [*outcomes, *scale], without
+    scale, without = _scale(without)
     outcomes += scale
-    wrong = _zeros(evidence, zeros, figures)
+    if any(isinstance(o, Finding) for o in scale):
+        return outcomes, without
+    wrong = _zeros(evidence, zeros)
     if any(isinstance(o, Finding) for o in wrong) and zeros is not None:
         evidence = without
-    return [*outcomes, *_gain(evidence, figures), *wrong], evidence
+    return [*outcomes, *_gain(evidence), *wrong], evidence
+
+
+def _not_told(reason: str) -> list[Outcome]:
+    return [NotChecked(kind, reason) for kind in ('gain', 'mass')]
 
 
 def _signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
-    joints, facts = evidence.recording.joints, evidence.facts
-    assert joints is not None
-    rows = evidence.moving.copy()
+    facts, rows = evidence.facts, evidence.moving.copy()
     if evidence.force is not None:
         along = evidence.force[:, 0] * np.sign(evidence.common_rate) / facts.gravity
         rows &= along > UPHILL_ENOUGH
@@ -99,13 +97,13 @@ def _signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     wrong = [(i, fit) for i, (fit, _) in enumerate(fits) if fit < WRONG_SIGN]
     if len(wrong) < len(fits):  # one way only: what goes with the other wheels is a zero
         wrong = [(i, fit) for i, fit in wrong if not fits[i][1] > ALIKE]
-    torque = evidence.torque.copy()
-    torque[:, [i for i, _ in wrong]] *= -1.0
     if not wrong:
         return [], evidence
+    torque = evidence.torque.copy()
+    torque[:, [i for i, _ in wrong]] *= -1.0
     sure = confidence(4.0 * min(abs(fit) for _, fit in wrong))
     names = ', '.join(facts.names[i] for i, _ in wrong)
-    finding = found('torque_sign', joints.topic, sure, wheel=names, value=-1.0)
+    finding = evidence.found('torque_sign', sure, wheel=names, value=-1.0)
     return [finding], evidence.with_rate(evidence.rate, torque)
 
 
@@ -126,53 +124,48 @@ def thrust(evidence: Evidence) -> FloatArray:
     return np.asarray(np.nansum(evidence.torque / evidence.facts.radius, axis=1))
 
 
-def _scale(evidence: Evidence, figures: dict[str, Any]) -> tuple[list[Outcome], Evidence]:
+def _scale(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     """Judge the level of the torques: units and currents."""
-    facts, joints = evidence.facts, evidence.recording.joints
-    assert joints is not None and evidence.force is not None
-    rows = evidence.straight
+    facts, rows = evidence.facts, evidence.straight
+    assert evidence.force is not None
     if rows.sum() < LEAST_MOVING_ROWS:
         reason = (
             'torque: no straight, steady stretch in it: wheels push against each other in turns'
         )
         return [NotChecked('gain', reason)], evidence
-    weight = facts.mass * facts.gravity
-    forward = np.sign(evidence.rim[rows])
-    level = (thrust(evidence)[rows] - facts.mass * evidence.force[rows, 0]) * forward
-    traction = float(np.median(level)) / weight
-    figures['torque.level_traction'] = round(traction, 4)
+    level = (thrust(evidence) - facts.mass * evidence.force[:, 0]) * np.sign(evidence.rim)
+    traction = float(np.median(level[rows])) / (facts.mass * facts.gravity)
+    evidence.figures['torque.level_traction'] = round(traction, 4)
     if traction > UNIT_TRACTION:
-        outcome = found('torque_unit', joints.topic, 0.97, value=1e-3, traction=traction)
-        return [outcome], evidence.with_rate(evidence.rate, evidence.torque * 1e-3)
-    if traction > MOST_TRACTION or traction < LEAST_TRACTION:
-        return [
-            _off_scale(evidence, traction),
-            NotChecked('mass', 'torques have no credible scale'),
-        ], evidence
-    return [], evidence
-
-
-def _off_scale(evidence: Evidence, traction: float) -> Finding:
-    joints = evidence.recording.joints
-    assert joints is not None
+        finding = evidence.found('torque_unit', 0.97, value=1e-3, traction=traction)
+        return [finding], evidence.with_rate(evidence.rate, evidence.torque * 1e-3)
+    if LEAST_TRACTION <= traction <= MOST_TRACTION:
+        return [], evidence
     fit = _slope_fit(evidence)
-    gain, value, std = '...', None, None
-    if fit is not None and fit.value > 0.0:
-        whole = whole_gain(evidence, fit.value)
-        gain = ', '.join(f'{one:.3g}' for one in whole)
-        value, std = float(np.mean(whole)), float(np.mean(whole)) * fit.std / fit.value
-    figures: dict[str, Any] = {'value': value, 'std': std, 'traction': traction, 'gains': gain}
-    return found('torque_scale', joints.topic, 0.8, **figures)
+    told: dict[str, Any] = {'gains': '...'}
+    if fit is not None and fit.gain.value > 0.0:
+        whole = whole_gain(evidence, fit.gain.value)
+        mean = float(np.mean(whole))
+        told = {'value': mean, 'std': mean * fit.gain.std / fit.gain.value}
+        told['gains'] = listed(whole, '.3g')
+    finding = evidence.found('torque_scale', 0.8, traction=traction, **told)
+    return [finding, NotChecked('mass', 'torques have no credible scale')], evidence
 
 
-def _slope_fit(evidence: Evidence) -> Estimate | None:
-    """Return thrust over mass times specific force: torque gain times true over stated mass."""
-    fitted = _slope_rows(evidence)
-    return None if fitted is None else block_fit(*fitted)[0]
+class _Slopes(NamedTuple):
+    """Thrust over mass times specific force: torque gain times true over stated mass; its trial."""
+
+    gain: Estimate
+    trial: Trial
+
+    @property
+    def useful(self) -> bool:
+        """Whether it tells more than that nothing is off."""
+        return self.gain.value > 0.0 and self.gain.sigmas_from(1.0) > 1.0
 
 
-def _slope_rows(evidence: Evidence) -> tuple[FloatArray, FloatArray] | None:
-    """Return columns of a fit of the thrust [N], and the thrust; None without slopes."""
+def _slope_fit(evidence: Evidence) -> _Slopes | None:
+    """Return the scale of the torques by slopes, and its trial on halves; None without slopes."""
     assert evidence.force is not None
     rows = evidence.straight
     if rows.sum() < 3 * LEAST_MOVING_ROWS:
@@ -186,25 +179,13 @@ def _slope_rows(evidence: Evidence) -> tuple[FloatArray, FloatArray] | None:
     columns = [evidence.facts.mass * along, sense]
     if (sense > 0).any() and (sense < 0).any():
         columns.append(np.ones(along.size))
-    return np.column_stack(columns), pushed
-
-
-def _gain_trial(evidence: Evidence) -> Trial | None:
-    """Try a scale of the torques, found on one half of the slopes, on the other."""
-    fitted = _slope_rows(evidence)
-    if fitted is None:
-        return None
-    design, pushed = fitted
-    return tried(
-        lambda rows: block_fit(design[rows], pushed[rows])[0].value,
+    design = np.column_stack(columns)
+    trial = tried(
+        lambda part: block_fit(design[part], pushed[part])[0].value,
         1.0,
-        (design[:, 0] - design[:, 0].mean()) ** 2,
+        (along - along.mean()) ** 2,
     )
-
-
-def _smooth(values: FloatArray) -> FloatArray:
-    width = min(SMOOTH_ROWS, values.size)
-    return np.asarray(np.convolve(values, np.ones(width) / width, mode='valid'))
+    return _Slopes(block_fit(design, pushed)[0], trial)
 
 
 def whole_gain(evidence: Evidence, left: float) -> FloatArray:
@@ -217,8 +198,7 @@ def whole_gain(evidence: Evidence, left: float) -> FloatArray:
 def whole_zeros(evidence: Evidence, left: list[Estimate]) -> list[Estimate]:
     """Return the zeros [N m] of which ``left`` remains behind those stated."""
     configuration = evidence.facts.configuration
-    if configuration is None:
-        return left
+    assert configuration is not None
     errors = SensorErrors(configuration).torque
     return [
         Estimate(float(zero + gain * one.value), float(gain) * one.std)
@@ -226,71 +206,49 @@ def whole_zeros(evidence: Evidence, left: list[Estimate]) -> list[Estimate]:
     ]
 
 
-def torque_gain(evidence: Evidence, figures: dict[str, Any]) -> Estimate | NotChecked:
+def torque_gain(evidence: Evidence) -> _Slopes | NotChecked:
     """Return the scale of the torques against mass times specific force, model error included."""
     fit = _slope_fit(evidence)
     if fit is None:
         return NotChecked('gain', 'torque: no slopes in it; drive up and down 5 to 10 degrees')
-    traction = figures.get('torque.level_traction', 1.0)
+    traction = evidence.figures.get('torque.level_traction', 1.0)
     if traction > SOFT_TRACTION:
         return NotChecked(
             'gain', f'torque: soft ground (it costs {traction:.2f} of the weight); drive on firm'
         )
-    trial = _gain_trial(evidence)
-    if abs(fit.value - 1.0) > LEAST_GAIN_ERROR and not (trial and trial.falls):
+    if abs(fit.gain.value - 1.0) > LEAST_GAIN_ERROR and not fit.trial.falls:
         return NotChecked(
             'gain',
             'torque: its scale by one half of the drive does not fit the slopes of the other',
         )
-    return Estimate(fit.value, math.hypot(fit.std, GAIN_MODEL_STD))
+    return _Slopes(Estimate(fit.gain.value, math.hypot(fit.gain.std, GAIN_MODEL_STD)), fit.trial)
 
 
-def _gain(evidence: Evidence, figures: dict[str, Any]) -> list[Outcome]:
-    joints, facts = evidence.recording.joints, evidence.facts
-    assert joints is not None and facts.configuration is not None
-    gain = torque_gain(evidence, figures)
-    if isinstance(gain, NotChecked):
-        return [gain, NotChecked('mass', gain.reason)]
-    figures['torque.gain'] = round(gain.value, 4)
-    figures['torque.gain_std'] = round(gain.std, 4)
-    stated = facts.configuration.sensors.torque_gain_std
-    sigmas = abs(gain.value - 1.0) / math.hypot(gain.std, stated)
-    if abs(gain.value - 1.0) < LEAST_GAIN_ERROR or gain.value <= 0.0:
+def _gain(evidence: Evidence) -> list[Outcome]:
+    facts, fit = evidence.facts, torque_gain(evidence)
+    assert facts.configuration is not None
+    if isinstance(fit, NotChecked):
+        return _not_told(fit.reason)
+    gain, std = fit.gain
+    evidence.figures['torque.gain'] = round(gain, 4)
+    evidence.figures['torque.gain_std'] = round(std, 4)
+    if abs(gain - 1.0) < LEAST_GAIN_ERROR or gain <= 0.0:
         return []
+    stated = facts.configuration.sensors.torque_gain_std
+    sigmas = abs(gain - 1.0) / math.hypot(std, stated)
     if sigmas < 3.0:
-        reason = f'torque: {gain.value:.2f} is within what the rover file leaves open ({stated:g})'
-        return [NotChecked('gain', reason), NotChecked('mass', reason)]
-    trial = _gain_trial(evidence)
-    assert trial is not None
-    whole = whole_gain(evidence, gain.value)
-    middle = float(np.mean(whole))
-    mass = facts.mass * gain.value
-    sure = 0.5 * confidence(sigmas)
-    told: dict[str, Any] = {
-        'gain': gain.value,
-        'off': gain.std,
-        'mass': mass,
-        'gains': listed(whole, '.3f'),
-        'trial': trial.words('gain left', ''),
-    }
-    told_std = round(middle * gain.std / gain.value, 4)
+        return _not_told(
+            f'torque: {gain:.2f} is within what the rover file leaves open ({stated:g})'
+        )
+    whole = whole_gain(evidence, gain)
+    middle, mass = float(np.mean(whole)), facts.mass * gain
+    words = {'gain': gain, 'off': std, 'mass': mass, 'gains': listed(whole, '.3f')}
+    words['trial'] = fit.trial.words('gain left', '')
     return [
-        found(
-            'torque_gain',
-            joints.topic,
-            sure,
-            value=round(middle, 4),
-            std=told_std,
-            **told,
-        ),
-        found(
-            'mass',
-            joints.topic,
-            sure,
-            value=round(mass, 2),
-            std=round(facts.mass * gain.std, 2),
-            **told,
-        ),
+        evidence.found(
+            key, 0.5 * confidence(sigmas), value=value, std=round(value * std / gain, 4), **words
+        )
+        for key, value in (('torque_gain', round(middle, 4)), ('mass', round(mass, 2)))
     ]
 
 
@@ -302,7 +260,7 @@ def torque_zeros(evidence: Evidence) -> list[Estimate] | None:
     if min((sense > 0).sum(), (sense < 0).sum()) < 2 * LEAST_MOVING_ROWS:
         return None
     design = np.column_stack([np.ones(sense.size), sense, evidence.force[rows, 0]])
-    if float(np.std(_smooth(evidence.force[rows, 0]))) < LEAST_SLOPE_STD:
+    if float(np.std(_smooth(evidence.force[rows, :1]))) < LEAST_SLOPE_STD:
         design = design[:, :2]
     return [
         block_fit(design, np.nan_to_num(evidence.torque[rows, i]))[0]
@@ -335,49 +293,40 @@ def drive_friction(evidence: Evidence) -> Estimate | NotChecked:
     return Estimate(mean, math.hypot(scatter, zero / math.sqrt(len(wheels)), noise))
 
 
-def _zeros(
-    evidence: Evidence, zeros: list[Estimate] | None, figures: dict[str, Any]
-) -> list[Outcome]:
-    joints, facts = evidence.recording.joints, evidence.facts
-    assert joints is not None and facts.configuration is not None
+def _zeros(evidence: Evidence, zeros: list[Estimate] | None) -> list[Outcome]:
+    facts, rest, where = evidence.facts, evidence.at_rest, 'driving both ways'
+    assert facts.configuration is not None
     stated = max(float(facts.configuration.sensors.torque_zero_std), 1e-3)
     driving = float(np.nanmedian(np.abs(evidence.torque[evidence.moving])))
-    rest = evidence.at_rest
-    where = 'driving both ways'
     if zeros is None:
         if rest.sum() < LEAST_MOVING_ROWS:
             reason = 'torque: neither standstill nor both ways in it; stand still, drive back'
             return [NotChecked('zero', reason)]
         # Standing wheels are wound up against each other; only an odd one out is told.
         level = np.nanmedian(evidence.torque[rest], axis=0)
-        middle = float(np.nanmedian(level))
-        spread = 1.5 * float(np.nanmedian(np.abs(level - middle)))
-        zeros = [Estimate(float(value - middle), max(spread, stated)) for value in level]
+        level = level - float(np.nanmedian(level))
+        spread = 1.5 * float(np.nanmedian(np.abs(level)))
+        zeros = [Estimate(float(value), max(spread, stated)) for value in level]
         where = 'standing'
-    figures['torque.zero_N_m'] = [round(zero.value, 3) for zero in zeros]
-    wrong = []
-    for name, zero in zip(facts.names, zeros, strict=True):
-        limit = max(ZERO_FACTOR * stated, 0.5 * driving, 5.0 * zero.std)
-        if abs(zero.value) > limit:
-            wrong.append((name, zero))
-    whole = dict(zip(facts.names, whole_zeros(evidence, zeros), strict=True))
+    least = max(ZERO_FACTOR * stated, 0.5 * driving)
+    wrong = [i for i, z in enumerate(zeros) if abs(z.value) > max(least, 5.0 * z.std)]
     if not wrong:
         return []
-    first = whole[wrong[0][0]]
-    level = figures.get('torque.level_traction', 0.0)
-    doubt = level > SOFT_TRACTION  # with another scale every zero is another
+    whole = whole_zeros(evidence, zeros)
+    # With another scale every zero is another.
+    doubt = evidence.figures.get('torque.level_traction', 0.0) > SOFT_TRACTION
+    sure = confidence(min(zeros[i].sigmas_from(0.0) for i in wrong)) * (0.5 if doubt else 1.0)
     return [
-        found(
+        evidence.found(
             'torque_zero',
-            joints.topic,
-            confidence(min(zero.sigmas_from(0.0) for _, zero in wrong)) * (0.5 if doubt else 1.0),
-            wheel=', '.join(name for name, _ in wrong),
-            value=round(first.value, 3),
-            std=round(first.std, 3),
-            left=', '.join(f'{zero.value:.2f}' for _, zero in wrong),
+            sure,
+            wheel=', '.join(facts.names[i] for i in wrong),
+            value=round(whole[wrong[0]].value, 3),
+            std=round(whole[wrong[0]].std, 3),
+            left=', '.join(f'{zeros[i].value:.2f}' for i in wrong),
             where=where,
             rival=', or the torques have another scale' if doubt else '',
-            zeros=listed((zero.value for zero in whole.values()), '.2f'),
+            zeros=listed((zero.value for zero in whole), '.2f'),
         )
     ]
 
@@ -393,7 +342,8 @@ def heading_of_torque(evidence: Evidence) -> Estimate | None:
     if rows.sum() < 3 * LEAST_MOVING_ROWS:
         return None
     horizontal = evidence.force[rows, :2]
-    if max(float(np.std(_smooth(column))) for column in horizontal.T) < LEAST_SLOPE_STD:
+    smooth = _smooth(horizontal)
+    if float(np.std(smooth, axis=0).max()) < LEAST_SLOPE_STD:
         return None
     sense = np.sign(evidence.rim[rows])
     along, across = block_fit(np.column_stack([horizontal, sense]), thrust(evidence)[rows])[:2]
@@ -403,12 +353,17 @@ def heading_of_torque(evidence: Evidence) -> Estimate | None:
     if not 0.5 < size / evidence.facts.mass < 2.0:
         return None  # the soil's own resistance is at work, not the slope
     heading = Estimate(math.atan2(across.value, along.value), max(along.std, across.std) / size)
-    apart = abs((heading.value - _axis_of(horizontal) + 0.5 * math.pi) % math.pi - 0.5 * math.pi)
+    apart = abs((heading.value - _axis_of(smooth) + 0.5 * math.pi) % math.pi - 0.5 * math.pi)
     return heading if apart < AXES_APART else None
 
 
 def _axis_of(horizontal: FloatArray) -> float:
     """Return the direction in which the slope (k, 2) varies most [rad], either way round."""
-    along, across = (_smooth(column) for column in horizontal.T)
-    (xx, xy), (_, yy) = np.cov(along, across)
+    (xx, xy), (_, yy) = np.cov(horizontal.T)
     return 0.5 * math.atan2(2.0 * xy, xx - yy)
+
+
+def _smooth(rows: FloatArray) -> FloatArray:
+    """Return means of (k, p) rows over ``SMOOTH_ROWS`` of them."""
+    width = min(SMOOTH_ROWS, rows.shape[0])
+    return np.asarray(sliding_window_view(rows, width, axis=0).mean(axis=-1))

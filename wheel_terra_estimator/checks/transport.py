@@ -4,11 +4,12 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
 
-from wheel_terra_estimator.checks.faults import found
+from wheel_terra_estimator.checks.faults import found, of_offset
 from wheel_terra_estimator.checks.finding import Outcome
 from wheel_terra_estimator.checks.series import Channel, Recording
 from wheel_terra_estimator.checks.statistics import robust_std
@@ -33,51 +34,27 @@ def check_transport(
 ) -> tuple[list[Outcome], float]:
     """Return what is wrong with the stamps, and how late those of the IMU are by log time [s]."""
     outcomes: list[Outcome] = []
-    offset_left = 0.0
     delays = {}
-    channels = (recording.joints, recording.imu, recording.sinkage, recording.reference)
-    for name, channel in zip(
-        ('joint_states', 'imu', 'sinkage', 'reference'), channels, strict=True
-    ):
+    for name in ('joints', 'imu', 'sinkage', 'reference'):
+        channel = getattr(recording, name)
         if channel is None or channel.stamp.size < 3:
             continue
-        disorder = _order(channel)
-        gaps = _drop_outs(name, channel, figures)
-        outcomes += disorder or gaps
+        outcomes += _order(channel) or _drop_outs(name, channel, figures)
         delays[name] = float(np.median(channel.log_time - channel.stamp)) * 1e-9
-        figures[f'{name}.log_minus_stamp_s'] = round(delays[name], 4)
-    if 'joint_states' in delays and 'imu' in delays and recording.imu is not None:
-        difference = delays['imu'] - delays['joint_states']
-        if abs(difference) > CLOCK_DIFFERENCE:
-            stated = 0.0
-            if configuration is not None:
-                stated = float(configuration.sensors.imu_stamp_offset)
-            offset = stated - difference
-            outcomes.append(
-                found(
-                    'imu_offset',
-                    recording.imu.topic,
-                    0.999,
-                    value=round(offset, 3),
-                    std=_jitter(recording.imu, recording.joints),
-                    channel='imu',
-                    offset=offset,
-                    offset_left=-difference,
-                    against='log time: two clocks',
-                )
-            )
-            offset_left = -difference
-    return outcomes, offset_left
+    imu, joints = recording.imu, recording.joints
+    if imu is None or joints is None or not {'imu', 'joints'} <= set(delays):
+        return outcomes, 0.0
+    left = delays['joints'] - delays['imu']
+    if abs(left) < CLOCK_DIFFERENCE:
+        return outcomes, 0.0
+    std, against = math.hypot(_jitter(imu), _jitter(joints)), 'log time: two clocks'
+    told = of_offset('imu', left, std, against, configuration)
+    return [*outcomes, found('imu_offset', imu.topic, 0.999, **told)], left
 
 
-def _jitter(*channels: Channel | None) -> float:
-    """Return the deviation of the usual time from stamp to log time of some channels [s]."""
-    parts = [
-        robust_std(np.asarray((c.log_time - c.stamp) * 1e-9, dtype=np.float64))
-        for c in channels
-        if c is not None
-    ]
-    return round(float(np.hypot.reduce(parts)), 4)
+def _jitter(channel: Channel) -> float:
+    """Return the deviation of the usual time from stamp to log time [s]."""
+    return robust_std(np.asarray((channel.log_time - channel.stamp) * 1e-9, dtype=np.float64))
 
 
 def _order(channel: Channel) -> list[Outcome]:
@@ -112,20 +89,8 @@ def _drop_outs(name: str, channel: Channel, figures: dict[str, Any]) -> list[Out
     figures[f'{name}.rate_hz'] = round(1.0 / period, 3) if period > 0.0 else None
     gaps = step[step > max(LONGEST_GAP, GAP_PERIODS * period)]
     missing = float(np.sum(step[step > 1.7 * period] / period - 1.0) / stamps.size)
-    figures[f'{name}.longest_gap_s'] = round(float(step.max()), 3)
-    figures[f'{name}.missing_share'] = round(missing, 4)
     # Cameras lose single readings as a matter of course; the estimator needs neither all the time.
-    needed = name in ('joint_states', 'imu')
-    if not gaps.size and not (needed and missing > GAP_SHARE):
+    if not gaps.size and not (name in ('joints', 'imu') and missing > GAP_SHARE):
         return []
-    return [
-        found(
-            'drop_outs',
-            channel.topic,
-            0.99,
-            gaps=gaps.size,
-            longest=float(step.max()),
-            period=period,
-            missing=100.0 * missing,
-        )
-    ]
+    told: dict[str, Any] = {'gaps': gaps.size, 'longest': float(step.max()), 'period': period}
+    return [found('drop_outs', channel.topic, 0.99, missing=100.0 * missing, **told)]

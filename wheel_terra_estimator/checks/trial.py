@@ -7,7 +7,7 @@ The residual of the evidence has to fall there, and no rival's cure may do as we
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -69,8 +69,10 @@ def tried(fit: Callable[[slice], float], nothing: float, energy: FloatArray) -> 
     if min(part.stop - part.start for part in parts) < LEAST_ROWS:
         return Trial(0.0, np.inf)
     first, second = (fit(part) for part in parts)
-    return max(
-        Trial(abs(second - nothing), abs(second - first)),
-        Trial(abs(first - nothing), abs(first - second)),
-        key=lambda trial: trial.after / max(trial.before, 1e-12),
-    )
+    apart = abs(second - first)
+    return worst([Trial(abs(second - nothing), apart), Trial(abs(first - nothing), apart)])
+
+
+def worst(trials: Sequence[Trial]) -> Trial:
+    """Return the trial, of those on the halves, in which the cure did least."""
+    return max(trials, key=lambda t: t.after / max(min(t.before, t.rival), 1e-12))

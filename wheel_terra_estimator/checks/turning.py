@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wheel_terra_estimator.checks.evidence import LEAST_MOVING_ROWS, Evidence, row_medians
-from wheel_terra_estimator.checks.faults import FAULTS, LEAST_TURN_RATE, SKID_TRACKS, found
+from wheel_terra_estimator.checks.faults import LEAST_TURN_RATE, SKID_TRACKS
 from wheel_terra_estimator.checks.felt_motion import felt_motion, yaw_of_motion
 from wheel_terra_estimator.checks.finding import Finding, NotChecked, Outcome
 from wheel_terra_estimator.checks.statistics import (
@@ -29,7 +29,7 @@ from wheel_terra_estimator.checks.statistics import (
     moving_mean,
     robust_std,
 )
-from wheel_terra_estimator.checks.trial import Trial, halves
+from wheel_terra_estimator.checks.trial import Trial, halves, worst
 
 FloatArray = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -109,6 +109,11 @@ class Fit(NamedTuple):
     track: float
     correlation: float
 
+    @property
+    def clear_track(self) -> float:
+        """The track where gyro and wheels see the same turns, else 0."""
+        return self.track if abs(self.correlation) > LEAST_CORRELATION else 0.0
+
 
 class Comparison(NamedTuple):
     """The best hypothesis, its fit, its trial on the halves, and the best other one."""
@@ -122,22 +127,18 @@ class Comparison(NamedTuple):
 def fit_of(fix: Fix, stretch: Turning) -> Fit:
     """Return how well a hypothesis accounts for wheels and gyro."""
     speed, yaw, lateral = fix.applied(stretch.speed), stretch.yaw, stretch.lateral
-    size = np.maximum(np.abs(speed).mean(axis=1), 1e-9)
-    track = alike = 0.0
-    turns = stretch.turns()
-    rolling = speed
-    if turns.sum() >= LEAST_TURNING_ROWS:
+    track, alike, cost, rolling = 0.0, 0.0, 0.0, speed
+    if stretch.turns().sum() >= LEAST_TURNING_ROWS:
         left, right = lateral > 0.0, lateral < 0.0
         stated = float(lateral[left].mean() - lateral[right].mean())
         difference = speed[:, right].mean(axis=1) - speed[:, left].mean(axis=1)
         alike = correlation(yaw, difference)
         track = float(yaw @ difference) / max(float(yaw @ yaw), 1e-12) / stated
         rolling = speed + track * yaw[:, None] * lateral
+        cost = UNTURNED * (1.0 - alike**2)
     spread = np.abs(rolling - np.median(rolling, axis=1)[:, None]).mean(axis=1)
-    cost = float(np.mean(spread / size))
-    if turns.sum() >= LEAST_TURNING_ROWS:
-        cost += UNTURNED * (1.0 - alike**2)
-    return Fit(cost, track, alike)
+    size = np.maximum(np.abs(speed).mean(axis=1), 1e-9)
+    return Fit(cost + float(np.mean(spread / size)), track, alike)
 
 
 def compare(stretch: Turning, fixes: Sequence[Fix]) -> Comparison:
@@ -167,23 +168,28 @@ def compare(stretch: Turning, fixes: Sequence[Fix]) -> Comparison:
         )
         for part in parts
     ]
-    worst = max(trials, key=lambda t: t.after / max(min(t.before, t.rival), 1e-12))
-    return Comparison(fixes[best], whole[best], worst, None if rival is None else fixes[rival])
+    told = None if rival is None else fixes[rival]
+    return Comparison(fixes[best], whole[best], worst(trials), told)
 
 
-def sign_fixes(count: int, lateral: FloatArray, *, exchanges: bool = True) -> list[Fix]:
-    """Return nothing, every combination of signs, and every left wheel exchanged with a right."""
+def sign_fixes(count: int) -> list[Fix]:
+    """Return nothing, and every other combination of signs."""
+    return [Fix((1, *signs)) for signs in itertools.product((1, -1), repeat=count - 1)]
+
+
+def exchanges(count: int, lateral: FloatArray) -> list[Fix]:
+    """Return nothing, and every left wheel exchanged with a right one; two wheels are the sides."""
     plain = (1,) * count
-    fixes = [Fix((1, *signs)) for signs in itertools.product((1, -1), repeat=count - 1)]
-    if exchanges and count > 2:
-        fixes += [Fix(plain, pair) for pair in pairs_of(lateral)]
-    return fixes
+    pairs = itertools.product(np.flatnonzero(lateral > 0.0), np.flatnonzero(lateral < 0.0))
+    return [Fix(plain), *(Fix(plain, (int(a), int(b))) for a, b in pairs if count > 2)]
 
 
-def pairs_of(lateral: FloatArray) -> list[tuple[int, int]]:
-    """Return every left wheel with every right one."""
-    left, right = np.flatnonzero(lateral > 0.0), np.flatnonzero(lateral < 0.0)
-    return [(int(a), int(b)) for a in left for b in right]
+def compare_exchanges(stretch: Turning) -> Comparison | None:
+    """Compare exchanged wheels in the turns alone, where they show; None for too few of them."""
+    turns, count = stretch.turns(), stretch.speed.shape[1]
+    if count < 3 or turns.sum() < 2 * LEAST_TURNING_ROWS:
+        return None
+    return compare(stretch.rows(turns), exchanges(count, stretch.lateral))
 
 
 # In a recording ----------------------------------------------------------------------------------
@@ -191,22 +197,20 @@ def pairs_of(lateral: FloatArray) -> list[tuple[int, int]]:
 
 def stretch_of(evidence: Evidence, there: NDArray[np.intp], rows: Mask) -> Turning:
     """Return the turning of some wheels in some rows."""
-    facts = evidence.facts
-    radius = np.where(np.isfinite(facts.radius), facts.radius, 1.0)[there]
-    speed = (evidence.rate[:, there] * radius)[rows]
+    facts, keep = evidence.facts, np.flatnonzero(rows)
+    if keep.size > TRIAL_ROWS:
+        keep = keep[np.linspace(0, keep.size - 1, TRIAL_ROWS).astype(int)]
     lateral = (facts.lateral if facts.known else facts.side)[there]
     sides = (lateral > 0.0).any() and (lateral < 0.0).any() and np.isfinite(lateral).all()
-    yaw = np.zeros(speed.shape[0])
-    if evidence.gyro is not None and sides:
-        rest = evidence.at_rest
-        bias = float(np.median(evidence.gyro[rest, 2])) if rest.sum() > 20 else 0.0
-        yaw = evidence.gyro[rows, 2] - bias
-    else:
+    if evidence.gyro is None or not sides:
         lateral = np.zeros(there.size)
-    if speed.shape[0] > TRIAL_ROWS:
-        keep = np.linspace(0, speed.shape[0] - 1, TRIAL_ROWS).astype(int)
-        speed, yaw = speed[keep], yaw[keep]
-    return Turning(speed, yaw, lateral)
+    return Turning((evidence.rate * evidence.radius)[keep][:, there], evidence.yaw[keep], lateral)
+
+
+def _known(evidence: Evidence) -> tuple[NDArray[np.intp], Mask]:
+    """Return the wheels that are there, and the moving rows in which all of them are."""
+    there = np.flatnonzero(np.isfinite(evidence.rate).any(axis=0))
+    return there, evidence.moving & np.isfinite(evidence.rate[:, there]).all(axis=1)
 
 
 class _Chosen(NamedTuple):
@@ -221,17 +225,15 @@ class _Chosen(NamedTuple):
 
 def check_signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     """Return wheels that count backwards or are exchanged, sides or a reference that are."""
-    facts, joints = evidence.facts, evidence.recording.joints
-    assert joints is not None
-    there = np.flatnonzero(np.isfinite(evidence.rate).any(axis=0))
-    rows = evidence.moving & np.isfinite(evidence.rate[:, there]).all(axis=1)
+    facts = evidence.facts
+    there, rows = _known(evidence)
     if rows.sum() < LEAST_MOVING_ROWS or not there.size:
         return [NotChecked('sign', 'the rover hardly moves in it; drive straight')], evidence
     outcomes: list[Outcome] = []
     chosen = _chosen(evidence, there, rows)
     signs, turn, mended = chosen.signs, chosen.track, evidence
     if chosen.exchanged is not None:
-        finding, mended = _exchanged(evidence, chosen.exchanged, chosen.trial, chosen.sure)
+        finding, mended = _exchanged(evidence, chosen.exchanged, chosen)
         outcomes.append(finding)
     if not turn:
         reason = 'no turn in it, or no IMU: left and right not checked; drive a circle both ways'
@@ -240,41 +242,43 @@ def check_signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         outcomes += [NotChecked(kind, reason) for kind in ('swapped_sides', 'exchanged_wheels')]
     told = _told_direction(mended, signs)
     blame = _blame(told, 2 * int(np.sum(signs[there] < 0.0)) >= there.size, turn)
-    if blame.unsure:
+    if blame == 'unsure':
         cure = _directions(evidence, -np.ones(signs.size))
-        outcomes.append(found('all_backwards', joints.topic, 0.4, value=-1.0, directions=cure))
-    if blame.wheels:
+        outcomes.append(evidence.found('all_backwards', 0.4, value=-1.0, directions=cure))
+    if blame == 'wheels':
         signs, turn = -signs, -turn
     if (signs < 0.0).any():
-        outcomes.append(_backwards(evidence, signs, chosen.trial, chosen.sure))
-        kept = _right_torques(evidence, signs)  # the cure flips the torques as well
-        mended = mended.with_rate(mended.rate * signs, mended.torque * np.where(kept, 1.0, signs))
+        finding, mended = _backwards(evidence, mended, signs, chosen)
+        outcomes.append(finding)
     if turn < 0.0:
         outcomes += _swapped(evidence)
         mended = replace(mended, facts=replace(facts, side=-facts.side, lateral=-facts.lateral))
-    if blame.reference:
-        certain = confidence(3.0) if turn or told.force is not None else 0.5
-        finding, mended = _reversed_reference(mended, certain)
-        outcomes.append(finding)
+    if blame in ('reference', 'unsure') and evidence.recording.reference is not None:
+        sure = confidence(3.0) if turn or told.force is not None else 0.5
+        outcomes.append(evidence.found('reference_reversed', sure, value=-1.0, or_wheels=''))
+        velocity = -evidence.recording.reference.velocity
+        mended = mended.with_channel('reference', velocity=velocity)
     return outcomes, mended
 
 
 def _chosen(evidence: Evidence, there: NDArray[np.intp], rows: Mask) -> _Chosen:
     """Return the hypothesis that stood its trial, or that nothing is wrong."""
-    signs = np.ones(len(evidence.facts.names))
-    if not 2 <= there.size <= MOST_WHEELS:
+    signs, count = np.ones(len(evidence.facts.names)), there.size
+    if not 2 <= count <= MOST_WHEELS:
         return _Chosen(signs)
     stretch = stretch_of(evidence, there, rows)
-    best = _best(stretch, there.size)
+    best = compare(stretch, [*sign_fixes(count), *exchanges(count, stretch.lateral)[1:]])
+    if not best.trial.falls:
+        again = compare_exchanges(stretch)
+        best = again if again is not None and again.trial.falls else best
     if not best.trial.falls:  # nothing is clearly better than what the rover file says
-        fit = fit_of(Fix((1,) * there.size), stretch)
-        return _Chosen(signs, fit.track if abs(fit.correlation) > LEAST_CORRELATION else 0.0)
-    turn = best.fit.track if abs(best.fit.correlation) > LEAST_CORRELATION else 0.0
+        return _Chosen(signs, fit_of(Fix((1,) * count), stretch).clear_track)
+    turn = best.fit.clear_track
     signs[there] = best.fix.signs
     if evidence.gyro is None and _like_a_spin(evidence, signs):
         return _Chosen(np.ones(signs.size))
     doubled = 2 * int(np.sum(signs < 0.0))
-    if doubled > there.size or (doubled == there.size and turn < 0.0):
+    if doubled > count or (doubled == count and turn < 0.0):
         signs, turn = -signs, -turn  # the pair with fewer reversed wheels is meant
     trial = best.trial.words('wheels apart', 'of their speed')
     if not best.trial.passes and best.rival is not None:
@@ -286,17 +290,6 @@ def _chosen(evidence: Evidence, there: NDArray[np.intp], rows: Mask) -> _Chosen:
     return _Chosen(signs, turn, exchanged, trial, 0.99 if best.trial.passes else 0.5)
 
 
-def _best(stretch: Turning, count: int) -> Comparison:
-    """Compare all hypotheses; exchanged wheels show in the turns alone."""
-    best = compare(stretch, sign_fixes(count, stretch.lateral))
-    turns = stretch.turns()
-    if best.trial.falls or count < 3 or turns.sum() < 2 * LEAST_TURNING_ROWS:
-        return best
-    fixes = [Fix((1,) * count), *(Fix((1,) * count, pair) for pair in pairs_of(stretch.lateral))]
-    again = compare(stretch.rows(turns), fixes)
-    return again if again.trial.falls else best
-
-
 def _told(fix: Fix, names: Sequence[str]) -> str:
     if fix.exchanged is not None:
         return f'{names[fix.exchanged[0]]} and {names[fix.exchanged[1]]} exchanged'
@@ -306,11 +299,9 @@ def _told(fix: Fix, names: Sequence[str]) -> str:
 
 def _like_a_spin(evidence: Evidence, signs: FloatArray) -> bool:
     """Whether a whole side is reversed and no reference says that this is no turn on the spot."""
-    side = evidence.facts.side
-    if not evidence.facts.has_sides() or np.ptp(signs * side) > 0.0:
+    if not evidence.facts.has_sides() or np.ptp(signs * evidence.facts.side) > 0.0:
         return False
-    told = _told_direction(evidence, signs).reference
-    return told is None
+    return _told_direction(evidence, signs).reference is None
 
 
 class _Told(NamedTuple):
@@ -320,16 +311,8 @@ class _Told(NamedTuple):
     force: float | None
 
 
-class _Blame(NamedTuple):
-    """What runs backwards, where wheels, turns, reference and specific force do not agree."""
-
-    wheels: bool = False  # all of them, beyond the signs that were found
-    reference: bool = False
-    unsure: bool = False
-
-
-def _blame(told: _Told, half_reversed: bool, turn: float) -> _Blame:
-    """Return what runs backwards.
+def _blame(told: _Told, half_reversed: bool, turn: float) -> str:
+    """Return what runs backwards: all wheels beyond the signs that were found, the reference, ''.
 
     Parameters
     ----------
@@ -340,40 +323,33 @@ def _blame(told: _Told, half_reversed: bool, turn: float) -> _Blame:
     turn : float
         Track that the turns tell, negative where they run against the gyro, 0 without turns.
     """
+    against_force = told.force is not None and told.force < 0.0
     if told.reference is None:
-        return _Blame(wheels=turn < 0.0 and told.force is not None and told.force < 0.0)
+        return 'wheels' if turn < 0.0 and against_force else ''
     if told.reference >= 0.0:
-        return _Blame()
+        return ''
     # Wheels or reference are backwards: with the turns on their side it is not the wheels.
     if half_reversed and turn <= 0.0:
-        return _Blame(wheels=True)  # the other half counts backwards
-    if turn:
-        return _Blame(wheels=turn < 0.0, reference=turn > 0.0)
-    if told.force is not None:
-        return _Blame(wheels=told.force < 0.0, reference=told.force >= 0.0)
-    return _Blame(reference=True, unsure=True)
+        return 'wheels'  # the other half counts backwards
+    if turn or told.force is not None:
+        return 'wheels' if turn < 0.0 or (not turn and against_force) else 'reference'
+    return 'unsure'
 
 
 def _told_direction(evidence: Evidence, signs: FloatArray) -> _Told:
     speed = row_medians(np.nan_to_num(evidence.rate) * signs)
-    reference = evidence.reference()
-    by_reference = by_force = None
+    reference, by_reference, by_force = evidence.recording.reference, None, None
     if reference is not None:
         at = evidence.rim_at(reference.stamp, speed, 0.3)
         fit = correlation(np.nan_to_num(at), reference.velocity[:, 0])
         by_reference = fit if abs(fit) > 0.5 else None
     if evidence.force is not None and evidence.time.size > 100:
-        width = max(round(0.4 / evidence.period), 1)
+        width = evidence.rows_in(0.4)
         change = np.gradient(moving_mean(speed, width), evidence.period)
         force = moving_mean(evidence.force[:, 0], width)
         force = force - moving_mean(force, 10 * width)
-        parts = np.array(
-            [
-                float(a @ b)
-                for a, b in zip(np.array_split(change, 10), np.array_split(force, 10), strict=True)
-            ]
-        )
-        spread = float(np.sqrt(np.sum((parts - parts.mean()) ** 2)))
+        parts = np.array([part.sum() for part in np.array_split(change * force, 10)])
+        spread = float(np.linalg.norm(parts - parts.mean()))
         fit = correlation(change, force)
         if abs(parts.sum()) > 3.0 * spread and abs(fit) > 0.15:
             by_force = fit
@@ -389,45 +365,40 @@ def _directions(evidence: Evidence, signs: FloatArray) -> str:
     return ', '.join(f'{int(d * s)}' for d, s in pairs)
 
 
-def _backwards(evidence: Evidence, signs: FloatArray, trial: str, sure: float) -> Finding:
-    facts, joints = evidence.facts, evidence.recording.joints
-    assert joints is not None
-    wrong = [i for i in range(signs.size) if signs[i] < 0.0]
-    right = [facts.names[i] for i in np.flatnonzero(_right_torques(evidence, signs))]
-    negate = f' and negate effort of {", ".join(right)} in the driver (it is right as it is)'
-    return found(
+def _backwards(
+    evidence: Evidence, mended: Evidence, signs: FloatArray, chosen: _Chosen
+) -> tuple[Finding, Evidence]:
+    facts, rows = evidence.facts, evidence.moving
+    kept = [  # wheels that count backwards and whose torque does not: the cure flips both
+        sign < 0.0 and correlation(torque[rows], rate[rows]) < OPPOSED
+        for sign, torque, rate in zip(signs, evidence.torque.T, evidence.rate.T, strict=True)
+    ]
+    right = ', '.join(name for name, keep in zip(facts.names, kept, strict=True) if keep)
+    wrong = np.flatnonzero(signs < 0.0)
+    finding = evidence.found(
         'backwards',
-        joints.topic,
-        sure,
+        chosen.sure,
         wheel=', '.join(facts.names[i] for i in wrong),
         value=float(-facts.direction[wrong[0]]),
-        trial=trial,
+        trial=chosen.trial,
         directions=_directions(evidence, signs),
-        torque=negate if right else '',
+        torque=f' and negate effort of {right} in the driver (it is right as it is)'
+        if right
+        else '',
     )
-
-
-def _right_torques(evidence: Evidence, signs: FloatArray) -> NDArray[np.bool_]:
-    """Return the wheels that count backwards and whose torque does not (n,)."""
-    moving = evidence.moving
-    return np.array(
-        [
-            sign < 0.0 and correlation(torque[moving], rate[moving]) < OPPOSED
-            for sign, torque, rate in zip(signs, evidence.torque.T, evidence.rate.T, strict=True)
-        ]
-    )
+    torque = mended.torque * np.where(kept, 1.0, signs)
+    return finding, mended.with_rate(mended.rate * signs, torque)
 
 
 def _swapped(evidence: Evidence) -> list[Outcome]:
     """Return what makes the wheels turn against the gyro: swapped sides or a reversed gyro."""
-    joints, imu, facts = evidence.recording.joints, evidence.recording.imu, evidence.facts
-    assert joints is not None and imu is not None
+    imu, facts = evidence.recording.imu, evidence.facts
+    assert imu is not None
     orientation_told = bool(np.isfinite(imu.orientation).all(axis=1).mean() > 0.9)
     mirrored = ', '.join(f'{-y:g}' for y in facts.lateral)
-    sides = found(
+    sides = evidence.found(
         'swapped_sides',
-        joints.topic,
-        0.97 if orientation_told else FAULTS['swapped_sides'].prior,
+        0.97 if orientation_told else 0.5,
         rival='' if orientation_told else ', or the gyro counts yaw to the right',
         names=', '.join(facts.names),
         mirrored=f', or wheels.y: [{mirrored}]' if facts.known else '',
@@ -435,38 +406,19 @@ def _swapped(evidence: Evidence) -> list[Outcome]:
     if orientation_told:
         return [sides]
     against = 'the wheels, or left and right wheels are swapped'
-    return [
-        sides,
-        found('gyro_reversed', imu.topic, 0.5, value=-1.0, axis='z', against=against),
-    ]
-
-
-def _reversed_reference(evidence: Evidence, sure: float) -> tuple[Finding, Evidence]:
-    reference = evidence.reference()
-    assert reference is not None
-    finding = found('reference_reversed', reference.topic, sure, value=-1.0, or_wheels='')
-    turned = replace(reference, velocity=-reference.velocity)
-    return finding, replace(evidence, recording=replace(evidence.recording, reference=turned))
+    return [sides, evidence.found('gyro_reversed', 0.5, value=-1.0, axis='z', against=against)]
 
 
 def _exchanged(
-    evidence: Evidence, pair: tuple[int, int], trial: str, sure: float
+    evidence: Evidence, pair: tuple[int, int], chosen: _Chosen
 ) -> tuple[Finding, Evidence]:
-    facts, joints = evidence.facts, evidence.recording.joints
-    assert joints is not None
-    (a, b), names = pair, list(facts.names)
-    names[a], names[b] = names[b], names[a]
-    rate, torque = evidence.rate.copy(), evidence.torque.copy()
-    rate[:, [a, b]], torque[:, [a, b]] = rate[:, [b, a]], torque[:, [b, a]]
-    finding = found(
-        'exchanged',
-        joints.topic,
-        min(sure, 0.95),
-        wheel=f'{facts.names[a]}, {facts.names[b]}',
-        trial=trial,
-        names=', '.join(names),
-    )
-    return finding, evidence.with_rate(rate, torque)
+    names = evidence.facts.names
+    order = list(range(len(names)))
+    order[pair[0]], order[pair[1]] = pair[1], pair[0]
+    listed = ', '.join(names[i] for i in order)
+    wheel, sure = ', '.join(names[i] for i in pair), min(chosen.sure, 0.95)
+    told = evidence.found('exchanged', sure, wheel=wheel, trial=chosen.trial, names=listed)
+    return told, evidence.with_rate(evidence.rate[:, order], evidence.torque[:, order])
 
 
 def check_gyro_unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
@@ -479,27 +431,18 @@ def check_gyro_unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         return [NotChecked('unit', 'gyro: no clear turn in it; drive a circle')], evidence
     if not GYRO_DEGREES[0] < abs(ratio) < GYRO_DEGREES[1]:
         return [], evidence
-    finding = found(
-        'gyro_degrees',
-        imu.topic,
-        0.95,
-        value=math.pi / 180.0,
-        times=1.0 / abs(ratio),
-        how='turning of the wheels',
-    )
-    recording = replace(evidence.recording, imu=replace(imu, rate=np.radians(imu.rate)))
-    return [finding], replace(evidence, recording=recording, gyro=np.radians(evidence.gyro))
+    told = {'times': 1.0 / abs(ratio), 'how': 'turning of the wheels'}
+    finding = evidence.found('gyro_degrees', 0.95, value=math.radians(1.0), **told)
+    mended = evidence.with_channel('imu', rate=np.radians(imu.rate))
+    return [finding], replace(mended, gyro=np.radians(evidence.gyro))
 
 
 def track_ratio(evidence: Evidence) -> float | None:
     """Return effective over stated track from the turns; None without turns."""
-    facts = evidence.facts
-    there = np.flatnonzero(np.isfinite(evidence.rate).any(axis=0))
-    rows = evidence.moving & np.isfinite(evidence.rate[:, there]).all(axis=1)
-    if evidence.gyro is None or not facts.has_sides() or rows.sum() < LEAST_TURNING_ROWS:
+    there, rows = _known(evidence)
+    if evidence.gyro is None or not evidence.facts.has_sides() or rows.sum() < LEAST_TURNING_ROWS:
         return None
-    fit = fit_of(Fix((1,) * there.size), stretch_of(evidence, there, rows))
-    return fit.track if abs(fit.correlation) > LEAST_CORRELATION and fit.track else None
+    return fit_of(Fix((1,) * there.size), stretch_of(evidence, there, rows)).clear_track or None
 
 
 def ordinary_track(ratio: float) -> bool:

@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 
 from wheel_terra_estimator.checks import turning
 from wheel_terra_estimator.checks.evidence import LEAST_MOVING_ROWS, Evidence, row_medians
-from wheel_terra_estimator.checks.faults import RATE_UNITS, found
+from wheel_terra_estimator.checks.faults import RATE_UNITS
 from wheel_terra_estimator.checks.finding import NotChecked, Outcome
-from wheel_terra_estimator.checks.statistics import correlation, robust_std
+from wheel_terra_estimator.checks.reference import LEAST_ROWS, ahead
+from wheel_terra_estimator.checks.statistics import bend_noise, correlation, robust_std, runs
 
 FloatArray = NDArray[np.float64]
 
@@ -26,8 +27,6 @@ USUAL_TRACK = 2.0
 """The same, of rovers that turn by skidding [-]."""
 ONLY_BY_SPEED = ('thousandths of rad/s',)
 """Units that a skidding rover's turns do not tell from counts of an encoder."""
-AHEAD = 0.5
-"""Mean of the rims over the usual size of one, above which the rover goes ahead [-]."""
 UNIT_TOLERANCE = 0.35
 """Share by which a speed ratio may lie off a unit's factor (slip makes it smaller)."""
 FASTEST_RIM = 15.0
@@ -67,8 +66,7 @@ OFF_A_STEP = 0.05
 
 def check_dead_wheels(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     """Return wheels whose rate is frozen; they are left out of what follows."""
-    joints, rate, moving = evidence.recording.joints, evidence.rate, evidence.moving
-    assert joints is not None
+    rate, moving = evidence.rate, evidence.moving
     if moving.sum() < LEAST_MOVING_ROWS or rate.shape[1] < 2:
         return [], evidence
     step = common_step(rate[moving], evidence.time[moving])
@@ -86,7 +84,7 @@ def check_dead_wheels(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
             how = f'repeats its last value in {100 * repeats:.0f} % of the messages'
         else:
             continue
-        outcomes.append(found('rate_frozen', joints.topic, 0.97, wheel=name, how=how))
+        outcomes.append(evidence.found('rate_frozen', 0.97, wheel=name, how=how))
         mended[:, index] = np.nan
     return outcomes, evidence.with_rate(mended) if outcomes else evidence
 
@@ -96,7 +94,7 @@ def _longest_frozen(evidence: Evidence, index: int, change: float) -> float:
     own, time = evidence.rate[:, index], evidence.time
     others = np.delete(evidence.rate, index, axis=1)
     longest = 0.0
-    for start, end in runs(own):
+    for start, end in runs(np.diff(own) == 0.0):
         lasts = float(time[end] - time[start])
         if lasts < FROZEN_TIME:
             continue
@@ -124,115 +122,75 @@ def _held(evidence: Evidence, index: int, rows: Any) -> bool:
     return bool(np.nanmedian(own) > HELD_TORQUE * max(float(np.nanmedian(others)), 1e-9))
 
 
-def runs(values: FloatArray) -> list[tuple[int, int]]:
-    """Return (first, last) row of each stretch in which (k,) values do not change."""
-    same = np.concatenate([[False], np.diff(values) == 0.0, [False]])
-    edges = np.flatnonzero(np.diff(same.astype(int)))
-    return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
-
-
 # Units -------------------------------------------------------------------------------------------
 
 
-def check_unit(evidence: Evidence, figures: dict[str, Any]) -> tuple[list[Outcome], Evidence]:
+def check_unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     """Return the unit of the rates where speeds or turns tell it is not rad/s."""
-    facts, joints = evidence.facts, evidence.recording.joints
-    assert joints is not None
+    facts, odometry = evidence.facts, evidence.recording.wheel_odometry
     if not facts.known:
         return [NotChecked('unit', 'wheel rates: no radius without a rover file')], evidence
     ratio, how = _speed_ratio(evidence), 'speed of the reference'
-    if ratio is None and evidence.recording.wheel_odometry is not None:
-        ratio = _odometry_ratio(evidence)
-        how = f'speed of {evidence.recording.wheel_odometry.topic}'
+    if ratio is None and odometry is not None:
+        rim, rows = ahead(evidence, odometry, 0.3)
+        how = f'speed of {odometry.topic}'
+        if rows.sum() > LEAST_ROWS:
+            ratio = float(np.median(np.abs(odometry.velocity[rows, 0]) / rim[rows]))
     track = turning.track_ratio(evidence)
-    if ratio is not None:
-        figures['wheels.speed_over_rim_speed'] = round(ratio, 4)
     if ratio is None and track is None:
-        if evidence.working_rate * float(np.nanmean(facts.radius)) > FASTEST_RIM:
-            ratio, how = math.pi / 30.0, f'rim speed above {FASTEST_RIM:.0f} m/s'
-        else:
+        if evidence.working_rate * float(np.nanmean(facts.radius)) < FASTEST_RIM:
             reason = 'wheel rates: neither reference nor turn in it; drive a circle'
             return [NotChecked('unit', reason)], evidence
+        ratio, how = math.pi / 30.0, f'rim speed above {FASTEST_RIM:.0f} m/s'
+    usual = track is not None and turning.ordinary_track(track)
     for unit, factor in RATE_UNITS.items():
-        by_speed = ratio is not None and abs(math.log(ratio / factor)) < UNIT_TOLERANCE
         by_turn = track is not None and turning.ordinary_track(track * factor)
         by_turn &= unit not in ONLY_BY_SPEED
-        usual = track is not None and turning.ordinary_track(track)
-        if (by_speed and (track is None or by_turn or not usual)) or (
-            ratio is None and by_turn and not usual
-        ):
-            told = how if ratio else 'turns seen by the gyro'
-            finding = found('rate_unit', joints.topic, 0.97, value=factor, unit=unit, how=told)
+        told = by_turn and not usual
+        if ratio is not None:
+            told = abs(math.log(ratio / factor)) < UNIT_TOLERANCE
+            told &= track is None or by_turn or not usual
+        if told:
+            words = {'unit': unit, 'how': how if ratio else 'turns seen by the gyro'}
+            finding = evidence.found('rate_unit', 0.97, value=factor, **words)
             return [finding], evidence.with_rate(evidence.rate * factor)
-    if ratio is not None and 0.0 < ratio < MOST_COUNT:
-        figures['wheels.rad_per_count'] = float(f'{ratio:.4g}')
-        return _counts(evidence, ratio, how)
     if ratio is None and track is not None and abs(track) > MOST_TRACK:
-        usual_ratio = USUAL_TRACK / abs(track)  # told to a factor of two: turns skid
-        figures['wheels.rad_per_count'] = float(f'{usual_ratio:.1g}')
-        return _counts(evidence, usual_ratio, 'gyro in turns')
-    return [], evidence
-
-
-def _counts(evidence: Evidence, ratio: float, how: str) -> tuple[list[Outcome], Evidence]:
-    joints = evidence.recording.joints
-    assert joints is not None
-    finding = found(
-        'rate_counts',
-        joints.topic,
-        0.9,
-        value=float(f'{ratio:.3g}'),
-        times=1.0 / ratio,
-        counts=2.0 * math.pi / ratio,
-        how=how,
-    )
+        ratio, how = float(f'{USUAL_TRACK / abs(track):.1g}'), 'gyro in turns'
+    if ratio is None or not 0.0 < ratio < MOST_COUNT:
+        return [], evidence
+    evidence.figures['wheels.rad_per_count'] = value = float(f'{ratio:.4g}')
+    told_of = {'times': 1.0 / ratio, 'counts': 2.0 * math.pi / ratio, 'how': how}
+    finding = evidence.found('rate_counts', 0.9, value=value, **told_of)
     return [finding], evidence.with_rate(evidence.rate * ratio)
 
 
 def _speed_ratio(evidence: Evidence) -> float | None:
     """Return the upper end of reference speed over rim speed: that of the least slip."""
-    reference = evidence.reference()
+    reference = evidence.recording.reference
     if reference is None:
         return None
-    rim = evidence.rim_at(reference.stamp, np.abs(evidence.rim), 0.3)
+    rim, rows = ahead(evidence, reference, 0.4)
     speed = np.linalg.norm(reference.velocity[:, :2], axis=1)
-    working = np.nanquantile(rim, 0.9) if np.isfinite(rim).any() else 0.0
-    least = AHEAD * evidence.working_rate * float(np.nanmean(evidence.facts.radius))
-    rows = (rim > max(0.4 * working, least)) & np.isfinite(speed)
-    if working <= 0.0 or rows.sum() < 8:
+    if rows.sum() < LEAST_ROWS:
         return None
-    noise = robust_std(np.diff(reference.velocity[:, 0], 2)) / math.sqrt(6.0)
-    if float(np.quantile(speed[rows], 0.8)) < CLEAR_SPEED * noise:
+    if float(np.quantile(speed[rows], 0.8)) < CLEAR_SPEED * bend_noise(reference.velocity[:, 0]):
         return None  # hardly moves: stuck, not another unit
     if correlation(np.nan_to_num(rim), np.nan_to_num(speed)) < 0.8:
         return None
     return float(np.quantile(speed[rows] / rim[rows], 0.8))
 
 
-def _odometry_ratio(evidence: Evidence) -> float | None:
-    odometry = evidence.recording.wheel_odometry
-    assert odometry is not None
-    rim = evidence.rim_at(odometry.stamp, np.abs(evidence.rim), 0.2)
-    speed = np.abs(odometry.velocity[:, 0])
-    # In turns on the spot the mean of the rims is next to nothing.
-    least = AHEAD * evidence.working_rate * float(np.nanmean(evidence.facts.radius))
-    rows = np.isfinite(rim) & (rim > max(0.3 * float(np.nanquantile(rim, 0.9)), least, 1e-9))
-    return float(np.median(speed[rows] / rim[rows])) if rows.sum() > 8 else None
-
-
 # Noise -------------------------------------------------------------------------------------------
 
 
-def check_noise(evidence: Evidence, figures: dict[str, Any]) -> list[Outcome]:
+def check_noise(evidence: Evidence) -> list[Outcome]:
     """Compare the noise and the steps of the rates with what the rover file states."""
-    configuration, joints = evidence.facts.configuration, evidence.recording.joints
-    rows = evidence.moving
-    if configuration is None or joints is None or rows.sum() < 60:
+    configuration, rows = evidence.facts.configuration, evidence.moving
+    if configuration is None or rows.sum() < 60:
         return []
     stated = float(configuration.sensors.wheel_rate_std)
     noises, steps = {}, {}
-    for index, name in enumerate(evidence.facts.names):
-        rate = evidence.rate[:, index]
+    for name, rate in zip(evidence.facts.names, evidence.rate.T, strict=True):
         bend = np.diff(rate, 2)[rows[1:-1]] / math.sqrt(6.0)
         bend = bend[np.isfinite(bend)]
         if bend.size > 50:
@@ -241,41 +199,31 @@ def check_noise(evidence: Evidence, figures: dict[str, Any]) -> list[Outcome]:
     if not noises:
         return []
     typical = float(np.median(list(noises.values())))
-    figures['wheels.rate_noise_rad_s'] = float(f'{typical:.3g}')
     typical_step = float(np.median(list(steps.values())))
+    evidence.figures['wheels.rate_noise_rad_s'] = float(f'{typical:.3g}')
     if typical_step:
-        figures['wheels.rate_step_rad_s'] = float(f'{typical_step:.3g}')
+        evidence.figures['wheels.rate_step_rad_s'] = float(f'{typical_step:.3g}')
     working = evidence.working_rate
     limit = max(NOISE_FACTOR * stated, LEAST_NOISE_SHARE * working)
     coarse = max(STEP_FACTOR * stated, LEAST_STEP_SHARE * working)
     outcomes: list[Outcome] = []
     for name, noise in noises.items():
         step = steps[name]
+        by_steps = step * COUNTING_STD
         alone = noise > 4.0 * typical or step > 4.0 * typical_step
-        if not (alone or name == next(iter(noises))):
+        if not (alone or name == next(iter(noises))) or (by_steps <= coarse and noise <= limit):
             continue
-        key, seen = ('rate_steps', step * COUNTING_STD), noise
-        if key[1] > coarse:
-            seen = key[1]
-        elif noise > limit:
-            key = ('rate_noise', noise)
-        else:
-            continue
-        outcomes.append(
-            found(
-                key[0],
-                joints.topic,
-                0.95,
-                wheel=name if alone else None,
-                value=float(f'{seen:.2g}'),
-                noise=seen,
-                stated=stated,
-                step=step,
-                share=100.0 * step / max(working, 1e-9),
-                counts=2.0 * math.pi / (step * evidence.period) if step else math.inf,
-                period=evidence.period,
-            )
-        )
+        key, seen = ('rate_steps', by_steps) if by_steps > coarse else ('rate_noise', noise)
+        told = {
+            'noise': seen,
+            'stated': stated,
+            'step': step,
+            'share': 100.0 * step / max(working, 1e-9),
+            'counts': 2.0 * math.pi / (step * evidence.period) if step else math.inf,
+            'period': evidence.period,
+        }
+        wheel, value = name if alone else None, float(f'{seen:.2g}')
+        outcomes.append(evidence.found(key, 0.95, wheel=wheel, value=value, **told))
     return outcomes
 
 
