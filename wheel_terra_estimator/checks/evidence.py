@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import uniform_filter1d
 
 from wheel_terra_estimator.checks.faults import FAULTS, found
 from wheel_terra_estimator.checks.finding import Finding
@@ -134,7 +133,9 @@ class Evidence:
         width = self.rows_in(SHORTEST_REST)
         if rate.shape[0] < width:
             return np.zeros(rate.shape[0], dtype=bool)
-        mean = uniform_filter1d(rate, width, axis=0, mode='nearest', origin=(width - 1) // 2)
+        total = np.vstack([np.zeros(rate.shape[1]), np.cumsum(rate, axis=0)])
+        mean = np.zeros_like(rate)
+        mean[width - 1 :] = (total[width:] - total[:-width]) / width
         noise = bend_noise(rate) if rate.shape[0] > 2 else 0.0
         limit = max(REST_RATE * self.working_rate, 4.0 * noise / math.sqrt(width), 1e-9)
         still = (np.abs(mean) <= limit).all(axis=1)

@@ -9,7 +9,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import uniform_filter1d
 
 FloatArray = NDArray[np.float64]
 
@@ -110,6 +109,8 @@ def moving_mean(values: NDArray[Any], width: int) -> NDArray[Any]:
 
     Of a record that is shorter, over as many rows as there are.
     """
+    from scipy.ndimage import uniform_filter1d  # heavy
+
     width = max(min(width, values.size), 1)
     return np.asarray(uniform_filter1d(values, width, mode='constant'))
 
