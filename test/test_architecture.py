@@ -109,6 +109,7 @@ COMMON = {
     'errors',
     'csv_file',
     'frames',
+    'glossary',
     'input_file',
     'output_folder',
     'scheduler',

@@ -48,7 +48,7 @@ def test_drive_gives_a_bag_a_report_and_a_summary(
     arguments = ['replay', str(make_bag()), *config, '-o', str(out), '--report', str(report)]
     assert main(arguments) == 0
     said = capsys.readouterr().out
-    assert '40 estimate sets' in said
+    assert '40 estimates' in said
     assert re.search(r'joint_states +40 +none', said)
     assert 'not in the bag: sinkage, leaving_angle' in said
     with open_bag(out) as bag:

@@ -253,9 +253,9 @@ def _tell(diagnosis: Diagnosis, output: Path) -> None:
         scale, unit = (1e3, 'mm') if quantity == 'sinkage' else (1.0, UNITS[quantity])
         noise = '' if gap.noise is None else f', noise {number(scale * gap.noise)}'
         print(
-            f'  {quantity} [{unit}]: held-out error {number(scale * gap.before)} as configured, '
-            f'{number(scale * gap.refit)} soil refitted, {number(scale * gap.after)} in the end'
-            f'{noise}'
+            f'  {quantity} [{unit}]: error on unseen rows {number(scale * gap.before)} '
+            f'as configured, {number(scale * gap.refit)} soil refitted, '
+            f'{number(scale * gap.after)} in the end{noise}'
         )
     if diagnosis.proposal:
         print(f'  proposed law (proposal.yaml): {diagnosis.proposal.words}')

@@ -90,6 +90,14 @@ def _parsers(needed: Container[str]) -> tuple[Parser, dict[str, Parser]]:
         metavar='SHELL',
         help='print what completes commands and options in bash or zsh',
     )
+    parser.add_argument(
+        '--glossary',
+        action=_PrintGlossary,
+        nargs='?',
+        const='',
+        metavar='WORD',
+        help='what the words of terminal and reports mean',
+    )
     commands = parser.add_subparsers(
         dest='command', required=True, metavar='COMMAND', parser_class=Parser
     )
@@ -148,6 +156,26 @@ def _add_arguments(parser: argparse.ArgumentParser, module: Any) -> None:
     module.add_arguments(parser)
     parser.add_argument('--debug', action='store_true', default=argparse.SUPPRESS, help=DEBUG_HELP)
     parser.set_defaults(run=module.run)
+
+
+class _PrintGlossary(argparse.Action):
+    """Print what a word means, or all of them."""
+
+    def __call__(
+        self,
+        parser: argparse.ArgumentParser,
+        namespace: argparse.Namespace,
+        values: Any,
+        option_string: str | None = None,
+    ) -> None:
+        from wheel_terra_estimator import glossary
+
+        found = glossary.as_text(values or '')
+        if not found:
+            names = [term.term for term in glossary.terms()]
+            parser.error(f"--glossary: no word '{values}'; {suggestion(values, names)}")
+        print(found)
+        parser.exit()
 
 
 class _PrintCompletion(argparse.Action):

@@ -26,3 +26,10 @@ def number(value: float, digits: int = 3) -> str:
 def amount(quantity: str, value: float | None, digits: int = 3) -> str:
     """Return a value of a quantity as it is shown, without its unit."""
     return '-' if value is None else number(SHOWN[quantity][0] * value, digits)
+
+
+def percent(probability: float) -> str:
+    """Return a probability; one next to 0 or 1 is never said to be certain."""
+    if probability > 0.99:
+        return 'over 99 %'
+    return 'below 1 %' if probability < 0.01 else f'{100.0 * probability:.0f} %'

@@ -160,8 +160,8 @@ def as_text(comparison: Comparison) -> str:
     """Return what the terminal shows."""
     c = comparison
     lines = [
-        f'A: {c.names[0]} ({c.sets[0]} sets)',
-        f'B: {c.names[1]} ({c.sets[1]} sets), {c.common} in common',
+        f'A: {c.names[0]} ({c.sets[0]} estimates)',
+        f'B: {c.names[1]} ({c.sets[1]} estimates), {c.common} in common',
         f'same slip class in {100 * c.same_class:.1f} % of the wheel time',
     ]
     for letter, starts in zip('AB', c.warnings, strict=True):

@@ -226,7 +226,7 @@ def as_text(summary: DriveSummary) -> str:
     """Return the summary for a terminal."""
     lines = [
         f'{summary.title}: {summary.duration:.1f} s, {len(summary.wheels)} wheels, '
-        f'{summary.sets} estimate sets',
+        f'{summary.sets} estimates',
         '',
         f'  {summary.verdict}',
     ]

@@ -17,12 +17,14 @@ from typing import TYPE_CHECKING, Any
 
 from wheel_terra_estimator import __version__
 from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.glossary import used_in
 
 if TYPE_CHECKING:
     from jinja2 import Environment
     from matplotlib.figure import Figure
 
 TEMPLATES = Path(__file__).parent / 'templates'
+_MARKUP = re.compile(r'<(script|style)\b.*?</\1>|<[^>]*>', re.DOTALL)
 
 
 def render(template: str, folder: Path = TEMPLATES, **context: Any) -> str:
@@ -35,9 +37,13 @@ def render(template: str, folder: Path = TEMPLATES, **context: Any) -> str:
     folder : Path
         Where it lies; templates of this package are found as well.
     **context
-        Values for the template; ``version`` is added.
+        Values for the template; ``version`` is added, and what the words on the page mean.
     """
-    return _environment(folder).get_template(template).render(version=__version__, **context)
+    environment = _environment(folder)
+    page = environment.get_template(template).render(version=__version__, **context)
+    words = used_in(_MARKUP.sub(' ', page))
+    explained = environment.get_template('words.html').render(words=words)
+    return page.replace('<footer>', explained + '<footer>')
 
 
 @functools.cache

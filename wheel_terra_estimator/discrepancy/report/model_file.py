@@ -12,6 +12,7 @@ import numpy as np
 
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.discrepancy.effect_keys import effect_of
+from wheel_terra_estimator.discrepancy.numbers import percent
 from wheel_terra_estimator.discrepancy.report.sensor_keys import sensor_keys
 from wheel_terra_estimator.discrepancy.result import (
     Diagnosis,
@@ -113,7 +114,9 @@ def provenance(diagnosis: Diagnosis, proposal: Proposal | None = None) -> str:
     if proposal is not None:
         done = 'a law proposed (learned_closure) and soil refitted'
     elif diagnosis.effects:
-        effects = ', '.join(f'{e.name} (confidence {e.confidence:.2f})' for e in diagnosis.effects)
+        effects = ', '.join(
+            f'{e.name} (confidence {percent(e.confidence)})' for e in diagnosis.effects
+        )
         done = f'{effects} added and soil refitted'
     else:
         done = f'soil refitted (verdict: {diagnosis.verdict})'

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from wheel_terra_estimator.discrepancy.numbers import SHOWN, amount, number
+from wheel_terra_estimator.discrepancy.numbers import SHOWN, amount, number, percent
 from wheel_terra_estimator.discrepancy.report import pictures as pictures
 from wheel_terra_estimator.discrepancy.report.model_file import corrected
 from wheel_terra_estimator.discrepancy.report.words import (
@@ -130,13 +130,13 @@ def _cards(diagnosis: Diagnosis) -> list[dict[str, str]]:
     cards = []
     if diagnosis.effects:
         first = diagnosis.effects[0]
-        shares = ', '.join(f'{100 * effect.confidence:.0f} %' for effect in diagnosis.effects)
+        shares = ', '.join(percent(effect.confidence) for effect in diagnosis.effects)
         names = 'names, in their order' if len(diagnosis.effects) > 1 else 'name'
         cards.append({'value': shares, 'label': f'confidence of the {names}'})
         if first.confounded_with:
             cards.append(
                 {
-                    'value': f'{100 * first.confidence_of_set:.0f} %',
+                    'value': percent(first.confidence_of_set),
                     'label': 'that it is the name or one it is confounded with',
                 }
             )

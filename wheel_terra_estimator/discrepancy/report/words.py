@@ -13,7 +13,7 @@ from wheel_terra_estimator.discrepancy.assessment.along import Stretch
 from wheel_terra_estimator.discrepancy.assessment.gaps import channels_off
 from wheel_terra_estimator.discrepancy.effect_keys import effect_of
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
-from wheel_terra_estimator.discrepancy.numbers import SHOWN, amount, number
+from wheel_terra_estimator.discrepancy.numbers import SHOWN, amount, number, percent
 from wheel_terra_estimator.discrepancy.result import (
     OPEN,
     Diagnosis,
@@ -109,13 +109,12 @@ def _to_settle(diagnosis: Diagnosis) -> list[str]:
 
 def worth(item: NextMeasurement) -> str:
     """Return a measurement with what it is worth."""
-    rivals = ' from '.join(name.replace('_', ' ') for name in item.separates)
+    names = ['no effect' if name == 'nothing' else _plain(name) for name in item.separates]
+    rivals = ' from '.join(names)
     if not np.isfinite(item.distance_then):
-        return f'{item.what} (settles {rivals})'
-    distances = (
-        f'{number(item.distance_now, 2)} noise deviations now, {number(item.distance_then, 2)}'
-    )
-    return f'{item.what} (parts {rivals}: {distances} with it)'
+        return f'{item.what} (tells {rivals})'
+    now, then = number(item.distance_now, 2), number(item.distance_then, 2)
+    return f'{item.what} (tells {rivals}: {now} times the noise apart now, {then} with it)'
 
 
 def moved(shift: SoilShift) -> str:
@@ -123,15 +122,18 @@ def moved(shift: SoilShift) -> str:
     name = _SOIL_KEYS.get(shift.name, f'soil.{shift.name}')
     return (
         f'{name} from {number(shift.before)} to {number(shift.after)}, '
-        f'{shift.pull:+.1f} of its deviations ({shift.source})'
+        f'{shift.pull:+.1f} of its standard deviations ({shift.source})'
     )
+
+
+_CLASS = 'class of source: '
 
 
 def soil_line(diagnosis: Diagnosis) -> str:
     """Return which soil number the fit pulls farthest, and how well the numbers were known."""
     shift = max(diagnosis.soil, key=lambda shift: abs(shift.pull))
-    sources = ', '.join(dict.fromkeys(s.source for s in diagnosis.soil))
-    return f'Soil, farthest: {moved(shift)}; deviations of all: {sources}.'
+    sources = ', '.join(dict.fromkeys(s.source.removeprefix(_CLASS) for s in diagnosis.soil))
+    return f'Soil number that moved most: {moved(shift)}; deviations of all from: {sources}.'
 
 
 def far_soil(soil: Iterable[SoilShift]) -> list[str]:
@@ -274,11 +276,11 @@ def sentence(
             f'{"" if p.unit == "-" else " " + p.unit}'
             for name, p in effect.parameters.items()
         )
-        form = f' in the form {effect.form}' if effect.form else ''
-        text = f'{effect.name}{form} ({values}; confidence {effect.confidence:.2f})'
+        form = f' in the form {_plain(effect.form)}' if effect.form else ''
+        text = f'{effect.name}{form} ({values}; confidence {percent(effect.confidence)})'
         if effect.confounded_with:
             rivals = ' or '.join(effect.confounded_with)
-            text += f' or {rivals} (one of them: {effect.confidence_of_set:.2f})'
+            text += f' or {rivals} (one of them: {percent(effect.confidence_of_set)})'
         parts.append(text)
     result = 'Missing in the model: ' + ', and '.join(parts)
     if any(effect.remainder for effect in effects):

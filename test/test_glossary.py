@@ -1,0 +1,57 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""One glossary for terminal, reports and site."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from wheel_terra_estimator import glossary
+from wheel_terra_estimator.cli.main import main
+from wheel_terra_estimator.discrepancy.numbers import percent
+from wheel_terra_estimator.reporting.html import render
+
+PAGE = Path(__file__).resolve().parents[1] / 'docs' / 'glossary.md'
+
+
+def test_the_page_of_the_site_is_the_glossary() -> None:
+    table = glossary.as_markdown(glossary.terms())
+    assert table in PAGE.read_text(encoding='utf-8'), table
+    assert all(term.meaning.endswith('.') for term in glossary.terms())
+
+
+def test_a_word_on_the_terminal(capsys: pytest.CaptureFixture[str]) -> None:
+    for words, status, said in (
+        (['--glossary', 'margin'], 0, 'pull margin: Greatest pull'),
+        (['--glossary'], 0, 'not known (unknown): '),
+        (['--glossary', 'sinkag'], 0, 'sinkage: Depth'),
+        (['--glossary', 'findng'], 2, "did you mean 'finding'?"),
+    ):
+        with pytest.raises(SystemExit) as end:
+            main(words)
+        assert end.value.code == status
+        assert said in ''.join(capsys.readouterr())
+
+
+def test_a_report_explains_its_words_and_no_others(tmp_path: Path) -> None:
+    text = '<p title="sinkage">pull_margin</p><script>confidence</script><style>slip</style>'
+    (tmp_path / 'a.html').write_text(
+        '{% extends "base.html" %}{% block content %}' + text + '{% endblock %}'
+    )
+    page = render('a.html', tmp_path)
+    explained = page.partition('Words on this page')[2]
+    assert '<dt>pull margin</dt>' in explained
+    assert explained.count('<dt>') == 2  # and drawbar pull, "pull" for short
+    assert 'confidence' not in explained
+
+
+def test_no_probability_is_said_to_be_certain() -> None:
+    assert [percent(p) for p in (1.0, 0.995, 0.99, 0.5, 0.004)] == [
+        'over 99 %',
+        'over 99 %',
+        '99 %',
+        '50 %',
+        'below 1 %',
+    ]
