@@ -42,6 +42,7 @@ from wheel_terra_estimator.discrepancy.selection import significance as gap_test
 from wheel_terra_estimator.discrepancy.selection.verdict import _rivals
 from wheel_terra_estimator.discrepancy.selection.weights import default_floors
 from wheel_terra_estimator.discrepancy.tables.checks import check_table
+from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES
 from wheel_terra_estimator.terramechanics.effects import catalogue
 from wheel_terra_estimator.terramechanics.model import WheelSoilModel
 from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
@@ -50,7 +51,7 @@ from wheel_terra_estimator.terramechanics.wheel import Wheel
 
 SOIL = Soil(15600.0, 2.4e6, 1.1, 250.0, np.radians(31.9), 0.011, 0.4, -0.2)
 WHEEL = Wheel(0.157, 0.165, 0.01, 30.0, 0.002)
-NO_FLOOR = (Floor((0.0, 0.0, 0.0), 0.0, False),)
+NO_FLOOR = (Floor((0.0,) * 4, 0.0, False),)
 KNOWN = np.full(3, np.inf)
 
 
@@ -68,7 +69,8 @@ def setting(forward):
     """Truth, inputs and noise of a table on these points."""
     soil = soil_coordinates(SOIL, deviations(SOIL, {}))
     truth = forward.solve([soil], [np.zeros(len(soil))], jacobian=False).outputs[0]
-    std = np.broadcast_to([4e-4, 1.0, 0.1], truth.shape)
+    truth[:, 3] = np.nan  # no lateral force measured
+    std = np.broadcast_to([4e-4, 1.0, 0.1, np.nan], truth.shape)
     points = forward.points
     inputs = np.column_stack([points.slip / 0.8, (points.normal_load - 60.0) / 50.0])
     return soil, truth, std, inputs, np.ptp(truth, axis=0)
@@ -89,11 +91,13 @@ def test_batched_model_is_the_package_model(forward):
         keys = ['soil.cohesion', *(f'effects.{name}.{c.name}' for c in own)]
         expected, jacobian = WheelSoilModel(SOIL, {name: values}).jacobian(forward.points, keys)
         scale = np.abs(expected.outputs()).max(axis=0)
-        np.testing.assert_allclose(state.outputs[b] / scale, expected.outputs() / scale, atol=3e-4)
+        np.testing.assert_allclose(
+            state.outputs[b][:, :3] / scale, expected.outputs() / scale, atol=3e-4
+        )
         columns = [4, *range(len(soil), len(soil) + len(own))]
         scales = [soil[4].scale, *(c.scale for c in own)]
         for column, unit, k in zip(columns, scales, range(len(keys)), strict=True):
-            mine = state.jacobian[b][:, :, column] / scale
+            mine = state.jacobian[b][:, :3, column] / scale
             theirs = jacobian[:, :, k] * unit / scale
             np.testing.assert_allclose(mine, theirs, atol=2e-3 + 0.02 * np.abs(theirs).max())
 
@@ -102,7 +106,7 @@ def linear_fit(rng, problem, columns, coordinates, at=0.0):
     """A linear model, linearised where all parameters are `at`."""
     sensitivity = rng.standard_normal((problem.size, columns)) * problem.std[:, None]
     rotated = problem.rotate(sensitivity)
-    u, outputs = np.full(columns, at), np.zeros((problem.size // 3, 3))
+    u, outputs = np.full(columns, at), np.zeros((problem.size // 3, 4))
     outputs[problem.row, problem.quantity] = sensitivity @ u
     return Fit(
         ('e',),
@@ -131,7 +135,7 @@ def test_evidence_is_the_integral_over_parameters(setting):
     )
     model = linear_fit(rng, problem, 2, coordinates)
     amplitude = 0.02
-    floor = Floor((amplitude,) * 3, 0.0, False)
+    floor = Floor((amplitude,) * 4, 0.0, False)
     got = evidence(problem, model, (floor,), KNOWN).log_evidence[0]
 
     row, quantity = problem.row, problem.quantity
@@ -282,7 +286,7 @@ def test_noise_is_estimated_beside_an_effect(forward, setting):
         )[0]
         before = Noise(guess, origin, dict.fromkeys(origin, 0.0))
         after = noise.estimate_noise(before, nothing, problem, problem.observed)
-        ratios.append(after.std[0] / std[0])
+        ratios.append((after.std[0] / std[0])[:3])
     assert np.all(np.exp(np.mean(np.log(ratios), axis=0)) == pytest.approx(1.0, rel=0.3))
 
 
@@ -355,7 +359,7 @@ def test_where_the_misfit_sits_is_told_only_beyond_chance(forward, setting):
         nothing = fit(
             forward, problem, problem.observed, [((), soil)], [np.zeros(len(soil))], [one]
         )[0]
-        named = dict(zip(('sinkage', 'drawbar_pull', 'torque'), measured.T, strict=True))
+        named = dict(zip(QUANTITIES, measured.T, strict=True))
         table = check_table('t', {**columns, **named})
         found.append(locate(table, problem, nothing, problem.observed, len(table)))
         if number == 0:
@@ -405,7 +409,7 @@ def test_soil_that_changes_along_the_way_is_told_when_the_choice_of_the_stretch_
     def told(stiffness, rows=half):
         measured = truth + std * rng.standard_normal(truth.shape)
         other = WheelSoilModel(replace(SOIL, frictional_modulus=2.4e6 * stiffness), {})
-        measured[rows] += (other.steady_state(forward.points).outputs() - truth)[rows]
+        measured[rows, :3] += (other.steady_state(forward.points).outputs() - truth[:, :3])[rows]
         problem = build_problem(measured, std, inputs, scale)
         one = np.ones(problem.size)
         nothing = fit(

@@ -393,7 +393,8 @@ def test_model_file_is_a_configuration_that_predicts_the_table(tmp_path):
     assert 'slip_sinkage_exponent' in both.provenance
     points = operating_points(diagnosis.table, both)
     state = WheelSoilModel(both.soil, both.effects).steady_state(points)
-    error = (state.outputs() - diagnosis.curves.after) / np.ptp(diagnosis.curves.after, axis=0)
+    after = diagnosis.curves.after[:, :3]
+    error = (state.outputs() - after) / np.ptp(after, axis=0)
     assert np.abs(error).max() < 2e-3
     # A model that has the effect is no longer told that it lacks it.
     again = diagnose(check_table('t.csv', table), both)

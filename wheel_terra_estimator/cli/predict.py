@@ -45,6 +45,7 @@ MOST_POINTS = 100_000
 # Columns of the result, in the layout of the tables of steady measurements.
 INPUTS = (*INPUT_UNITS, 'leaving_angle')
 OUTPUTS = ('sinkage', 'drawbar_pull', 'torque')
+SIDEWAYS = 'lateral_force'  # beside them where a wheel slides sideways
 ANGLES = ('entrance_angle', 'peak_stress_angle', 'leaving_angle')
 PICTURES = ('.png', '.svg', '.pdf')
 
@@ -67,6 +68,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--slope',
         metavar='A[,A]',
         help='slopes, positive uphill [rad], as a list or A:B:N (default 0)',
+    )
+    parser.add_argument(
+        '--slip-angle',
+        metavar='A[,A]',
+        help='slip angles, positive where the wheel slides left [rad], as a list or A:B:N (default '
+        '0); adds the lateral force',
     )
     parser.add_argument(
         '--climb',
@@ -95,9 +102,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         '--noise',
-        metavar='Z,F,T',
+        metavar='Z,F,T[,L]',
         help='make virtual measurements: standard deviations of sinkage [m], drawbar pull [N] and '
-        'torque [N m], added as normal noise and stated in columns of their own',
+        'torque [N m], with slip angles lateral force [N], added as normal noise and stated in '
+        'columns of their own',
     )
     parser.add_argument(
         '--seed', type=int, default=1, metavar='N', help='draws the noise (default 1)'
@@ -147,6 +155,7 @@ def run(arguments: argparse.Namespace) -> int:
             angular_velocity=columns['angular_velocity'],
             pass_number=columns['pass_number'],
             leaving_angle=columns['leaving_angle'],
+            slip_angle=columns['slip_angle'],
         )
         state = model.steady_state(points)
     except ValueError as error:
@@ -168,12 +177,17 @@ def run(arguments: argparse.Namespace) -> int:
         for name, values in columns.items()
         if name in INPUTS[:3] or (arguments.points and np.isfinite(values).any())
     }
+    sideways = bool(columns['slip_angle'].any())
+    result.pop('slip_angle', None)
+    if sideways:
+        result['slip_angle'] = columns['slip_angle']
     if arguments.angles:
         result.pop('leaving_angle', None)
     # As the sensors of the wheel would read them, like the tables of measurements.
     readings = Readings.of(configuration, _wheel_index(arguments, configuration))
     read = readings.read(np.column_stack([getattr(state, name) for name in OUTPUTS]))
     answers = dict(zip(OUTPUTS, read.T, strict=True))
+    answers |= {SIDEWAYS: state.lateral_force} if sideways else {}
     answers |= {name: getattr(state, name) for name in ANGLES if arguments.angles}
     result |= {name: np.where(overloaded, np.nan, values) for name, values in answers.items()}
     if arguments.noise is not None:
@@ -184,9 +198,11 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _climb(arguments: argparse.Namespace, configuration: Configuration) -> dict[str, FloatArray]:
     """Return the rows of free travel; say which slopes are too steep."""
-    if arguments.slip or arguments.points or arguments.angles or arguments.noise is not None:
+    aside = arguments.slip_angle or arguments.angles or arguments.noise is not None
+    if arguments.slip or arguments.points or aside:
         raise UserError(
-            '--climb finds the slip of each slope; leave --slip, --points, --angles, --noise'
+            '--climb finds the slip of each slope; leave --slip, --slip-angle, --points, --angles, '
+            '--noise'
         )
     if arguments.load and arguments.climb == 'rover':
         raise UserError('--climb rover takes the loads from rover.mass; leave --load')
@@ -234,16 +250,17 @@ def _write(
 def _measured(columns: dict[str, FloatArray], text: str, seed: int) -> dict[str, FloatArray]:
     """Return the columns with noise, and the standard deviation of each reading."""
     deviations = _numbers('--noise', text)
-    if deviations.size != len(OUTPUTS) or (deviations < 0.0).any():
+    names = [name for name in (*OUTPUTS, SIDEWAYS) if name in columns][: deviations.size]
+    if len(names) not in (3, 4) or len(names) != deviations.size or (deviations < 0.0).any():
         raise UserError(
             f'--noise {text}: give three standard deviations, none below 0: sinkage [m], drawbar '
-            'pull [N], torque [N m]'
+            'pull [N], torque [N m]; with slip angles also lateral force [N]'
         )
     if seed < 0:
         raise UserError(f'--seed {seed}: must be 0 or more')
     random = np.random.default_rng(seed)
     result = dict(columns)
-    for name, deviation in zip(OUTPUTS, deviations.tolist(), strict=True):
+    for name, deviation in zip(names, deviations.tolist(), strict=True):
         values = columns[name]
         result[name] = values + random.normal(0.0, deviation, values.shape)
         if deviation > 0.0:
@@ -268,6 +285,7 @@ def _points(arguments: argparse.Namespace, configuration: Configuration) -> dict
     rover = configuration.rover
     defaults = {
         'slope': 0.0,
+        'slip_angle': 0.0,
         'wheel_radius': float(wheels.radius[wheel]),
         'wheel_width': float(wheels.width[wheel]),
         'lug_height': float(wheels.lug_height[wheel]),
@@ -280,8 +298,11 @@ def _points(arguments: argparse.Namespace, configuration: Configuration) -> dict
     if arguments.angular_velocity is not None:
         defaults['angular_velocity'] = arguments.angular_velocity
     if arguments.points is not None:
-        if arguments.slip or arguments.load or arguments.slope:
-            raise UserError('--points brings slip, load and slope; leave --slip, --load, --slope')
+        if arguments.slip or arguments.load or arguments.slope or arguments.slip_angle:
+            raise UserError(
+                '--points brings slip, load, slope and slip angle; leave --slip, --load, --slope, '
+                '--slip-angle'
+            )
         columns = _read_points(arguments.points)
         count = columns['slip'].size
     else:
@@ -292,10 +313,12 @@ def _points(arguments: argparse.Namespace, configuration: Configuration) -> dict
             else _share_of_weight(configuration)
         )
         slopes = _numbers('--slope', arguments.slope) if arguments.slope else np.array([0.0])
-        if (asked := slips.size * loads.size * slopes.size) > MOST_POINTS:
+        angles = _numbers('--slip-angle', arguments.slip_angle or '0')
+        if (asked := slips.size * loads.size * slopes.size * angles.size) > MOST_POINTS:
             raise UserError(f'{asked} points asked for; at most {MOST_POINTS} are computed')
-        rows = np.array(list(product(loads, slopes, slips)))
-        columns = {'normal_load': rows[:, 0], 'slope': rows[:, 1], 'slip': rows[:, 2]}
+        rows = np.array(list(product(loads, slopes, angles, slips)))
+        names = ('normal_load', 'slope', 'slip_angle', 'slip')
+        columns = dict(zip(names, rows.T, strict=True))
         count = len(rows)
     full = {name: np.full(count, value) for name, value in defaults.items()}
     for name, values in columns.items():
@@ -368,9 +391,9 @@ def _write_csv(columns: Mapping[str, FloatArray], stream: Any) -> None:
 
 
 def _write_text(columns: Mapping[str, FloatArray], stream: Any) -> None:
-    units = {'slip': '-', 'normal_load': 'N', 'drawbar_pull': 'N', 'torque': 'N m'}
+    units = {'slip': '-', 'normal_load': 'N', 'drawbar_pull': 'N', 'torque': 'N m', SIDEWAYS: 'N'}
     units |= dict.fromkeys(('sinkage', 'wheel_radius', 'wheel_width', 'lug_height'), 'm')
-    units |= dict.fromkeys(('slope', *ANGLES), 'rad')
+    units |= dict.fromkeys(('slope', 'slip_angle', *ANGLES), 'rad')
     heads = [f'{name} [{units[name]}]' if name in units else name for name in columns]
     stream.write('  '.join(heads) + '\n')
     for row in zip(*columns.values(), strict=True):
@@ -389,14 +412,18 @@ def _draw(columns: Mapping[str, FloatArray], path: Path, title: str) -> None:
 
     from wheel_terra_estimator.reporting.style import LINE_COLOURS, picture_style
 
-    labels = (('sinkage [mm]', 1e3), ('drawbar pull [N]', 1.0), ('torque [N m]', 1.0))
+    labels = [('sinkage [mm]', 1e3), ('drawbar pull [N]', 1.0), ('torque [N m]', 1.0)]
+    names = [*OUTPUTS]
+    if SIDEWAYS in columns:
+        labels.append(('lateral force [N]', 1.0))
+        names.append(SIDEWAYS)
     with picture_style():
-        figure = Figure(figsize=(9.5, 3.4))
-        axes = figure.subplots(1, 3)
+        figure = Figure(figsize=(3.2 * len(names), 3.4))
+        axes = figure.subplots(1, len(names))
         for index, (label, rows) in enumerate(_groups(columns)):
             order = np.argsort(rows['slip'], kind='stable')
             colour = LINE_COLOURS[index % len(LINE_COLOURS)]
-            for axis, name, (_, scale) in zip(axes, OUTPUTS, labels, strict=True):
+            for axis, name, (_, scale) in zip(axes, names, labels, strict=True):
                 axis.plot(rows['slip'][order], scale * rows[name][order], color=colour, label=label)
         for axis, (text, _) in zip(axes, labels, strict=True):
             axis.set_xlabel('slip [-]')
@@ -435,11 +462,13 @@ def _draw_climb(columns: Mapping[str, FloatArray], path: Path, title: str) -> No
 
 
 def _groups(columns: Mapping[str, FloatArray]) -> Sequence[tuple[str, Mapping[str, FloatArray]]]:
-    """Split the rows into one curve per combination of load and slope."""
-    keys = np.stack([columns['normal_load'], columns['slope']], axis=1)
+    """Split the rows into one curve per combination of load, slope and slip angle."""
+    aside = columns.get('slip_angle', np.zeros_like(columns['slip']))
+    keys = np.stack([columns['normal_load'], columns['slope'], aside], axis=1)
     found = []
-    for load, slope in np.unique(keys, axis=0):
-        rows = (keys[:, 0] == load) & (keys[:, 1] == slope)
+    for load, slope, angle in np.unique(keys, axis=0):
+        rows = (keys == (load, slope, angle)).all(axis=1)
         label = f'{load:g} N' + (f', slope {slope:g} rad' if np.ptp(keys[:, 1]) else '')
+        label += f', slip angle {angle:.3g} rad' if aside.any() else ''
         found.append((label, {name: values[rows] for name, values in columns.items()}))
     return found

@@ -347,7 +347,7 @@ def _curves(
 
 
 def _shared_error(findings: Findings, fitted: Fit, floor: float) -> FloatArray:
-    """(N, 3) structural error known from a reference; zero without one."""
+    """(N, 4) structural error known from a reference; zero without one."""
     setting = findings.setting
     active = setting.forward.active
     if active is None or floor == 0.0:

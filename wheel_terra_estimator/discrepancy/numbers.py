@@ -7,7 +7,12 @@ from __future__ import annotations
 import math
 
 # How quantities are shown: factor and unit.
-SHOWN = {'sinkage': (1e3, 'mm'), 'drawbar_pull': (1.0, 'N'), 'torque': (1.0, 'N m')}
+SHOWN = {
+    'sinkage': (1e3, 'mm'),
+    'drawbar_pull': (1.0, 'N'),
+    'torque': (1.0, 'N m'),
+    'lateral_force': (1.0, 'N'),
+}
 
 
 def number(value: float, digits: int = 3) -> str:

@@ -292,7 +292,7 @@ def _next(decision: Decision) -> tuple[NextMeasurement, ...]:
             float(np.nanmedian(findings.noise.std[:, q]))
             if np.isfinite(findings.noise.std[:, q]).any()
             else np.inf
-            for q in range(3)
+            for q in range(len(QUANTITIES))
         ]
     )
     return next_measurement.propose(findings.setting, after, rivals, noise)

@@ -206,7 +206,7 @@ class NextMeasurement:
     distance_then: float
     # Column -> values of the proposed rows (SI); None for a zero check of an instrument
     rows: Mapping[str, FloatArray] | None = None
-    # Rival -> (n, 3) predicted sinkage, drawbar pull, torque of these rows
+    # Rival -> (n, 4) predicted sinkage, drawbar pull, torque of these rows
     predictions: Mapping[str, FloatArray] = field(default_factory=dict, metadata=_ASIDE)
 
 
@@ -230,7 +230,7 @@ class SoilShift:
 
 @dataclass(frozen=True)
 class Curves:
-    """(N, 3) model values of the table's rows: sinkage, drawbar pull, torque.
+    """(N, 4) model values of the table's rows: sinkage, drawbar pull, torque.
 
     ``before`` = as configured, ``refit`` = soil refitted, ``after`` = effects added; the
     ``held_out`` pair was computed row by row from fits that did not see the row. ``band`` is one
@@ -249,7 +249,7 @@ class Curves:
 class Noise:
     """Standard deviation of each cell and how it was found.
 
-    ``std`` (N, 3) [m, N, N m]; ``origin`` quantity -> ``given``, ``repeats`` or ``estimated``;
+    ``std`` (N, 4) [m, N, N m]; ``origin`` quantity -> ``given``, ``repeats`` or ``estimated``;
     ``degrees_of_freedom`` quantity -> how well it is known (infinite where given).
     """
 

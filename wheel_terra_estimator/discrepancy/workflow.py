@@ -170,6 +170,7 @@ def operating_points(table: SteadyTable, configuration: Configuration) -> Operat
             column('angular_velocity', np.nan),
             column('pass_number', 1.0),
             column('leaving_angle', np.nan),
+            column('slip_angle', 0.0),
         )
     except ValueError as error:
         raise UserError(f'{table.name}: {error}') from None
@@ -227,7 +228,7 @@ def _effects_to_try(
 def _check_soil_carries(
     table: SteadyTable, forward: Forward, configuration: Configuration
 ) -> FloatArray:
-    """Return (N, 3) values as configured; raise where the soil lets the wheel sink to its hub."""
+    """Return (N, 4) values as configured; raise where the soil lets the wheel sink to its hub."""
     nothing = soil_coordinates(configuration.soil, deviations(configuration.soil, {}))
     state = forward.solve([nothing], [np.zeros(len(nothing))], jacobian=False)
     sunk = state.angle[0] > 1.45

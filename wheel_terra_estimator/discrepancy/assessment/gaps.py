@@ -80,7 +80,7 @@ def gaps(
 
 
 def _cell_noise(findings: Findings) -> FloatArray:
-    """(N, 3) noise of the cells, with what uncertain slips and leaving angles add."""
+    """(N, 4) noise of the cells, with what uncertain slips and leaving angles add."""
     problem = findings.setting.problem
     std = findings.noise.std.copy()
     cells = problem.std

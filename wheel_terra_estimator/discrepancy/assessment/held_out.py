@@ -60,7 +60,7 @@ def log_scores(
 def hold_out(
     setting: Setting, fits: Sequence[Fit], variance: FloatArray, groups: IndexArray
 ) -> list[FloatArray]:
-    """Return the (N, 3) predictions of every fit, each row by parameters found without its group.
+    """Return the (N, 4) predictions of every fit, each row by parameters found without its group.
 
     Rows of a negative group (a reference) always stay in. The parameters without a group come from
     one linear step off the full fit (exact but for the curvature of the model in that step); the

@@ -45,7 +45,7 @@ def propose(
     chosen, rivals : Fit
         The best explanation, and those that the rows cannot exclude, most probable first.
     std : numpy.ndarray
-        (3,) noise of a new row.
+        (4,) noise of a new row.
     """
     found: list[NextMeasurement] = []
     rivals = rivals[:2]
@@ -139,7 +139,7 @@ def _menu(setting: Setting) -> list[tuple[str, OperatingPoints]]:
 def _predicted(
     setting: Setting, fits: Sequence[Fit], blocks: Sequence[OperatingPoints]
 ) -> list[tuple[FloatArray, list[FloatArray]]]:
-    """Return outputs (B, n, 3) and Jacobians of every block of rows, all solved at once."""
+    """Return outputs (B, n, 4) and Jacobians of every block of rows, all solved at once."""
     if not blocks:
         return []
     state = setting.forward.at(_joined(blocks), other_rows=True).solve(
@@ -175,7 +175,7 @@ def _with_rows(
     sensitivity: FloatArray,
     std: FloatArray,
 ) -> float:
-    """Distance d' of chosen and rival with new rows: (2, n, 3) outputs, Jacobian of the rival."""
+    """Distance d' of chosen and rival with new rows: (2, n, 4) outputs, Jacobian of the rival."""
     difference = ((outputs[0] - outputs[1]) / std).reshape(-1)
     jacobian = (sensitivity / std[None, :, None]).reshape(len(difference), -1)
     keep = np.isfinite(difference)

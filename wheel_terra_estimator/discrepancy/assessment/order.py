@@ -60,7 +60,7 @@ def changes_along_rows(table: SteadyTable, predicted: FloatArray, band: FloatArr
     Parameters
     ----------
     predicted, band : numpy.ndarray
-        (N, 3) model values and standard deviations of the cells [m, N, N m].
+        (N, 4) model values and standard deviations of the cells [m, N, N m].
     """
     columns = [name for name in ORDER_COLUMNS if name in table.columns]
     columns = [name for name in columns if _apart_from_inputs(table, name)]

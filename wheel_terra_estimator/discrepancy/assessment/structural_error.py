@@ -31,8 +31,8 @@ class StructuralError:
     """Smooth misfit of the fitted model at the rows of the table."""
 
     # Its most probable standard deviation as a share of the range of each quantity [-]
-    amplitude: tuple[float, float, float]
-    # (N, 3) sinkage [m], drawbar pull [N], torque [N m]: measured minus model, the structural
+    amplitude: tuple[float, ...]
+    # (N, 4) sinkage [m], drawbar pull [N], torque [N m]: measured minus model, the structural
     # error in it and its standard deviation, the parameters taken as fitted. nan = not measured.
     residual: FloatArray
     mean: FloatArray
@@ -97,7 +97,7 @@ def structural_error(
     back = np.asarray(np.linalg.inv(own.rotation), dtype=float)
     smooth = back @ (share * own.rotate(cells))
     std = np.sqrt(back**2 @ (share * noise))
-    shape = (max(rows, int(problem.row.max()) + 1), len(QUANTITIES))
+    shape = (max(rows, int(problem.row.max()) + 1), len(amplitude))
     values = []
     for flat in (cells, smooth, std):
         values.append(np.full(shape, np.nan))
@@ -108,7 +108,7 @@ def structural_error(
 
 def _most_probable(
     problem: Problem, residual: FloatArray, floors: Sequence[Floor]
-) -> tuple[float, tuple[float, float, float]]:
+) -> tuple[float, tuple[float, ...]]:
     """Return the amplitudes under which a residual is most probable, and that probability (log)."""
     variance = problem.variance(np.array([floor.amplitude for floor in floors]))
     fits = -0.5 * (np.log(variance) + residual**2 / variance).sum(axis=1)

@@ -40,9 +40,9 @@ def locate(
     """
     cells = (observed - problem.flat(nothing.outputs)) / problem.std
     cells = np.where(problem.outlier | (problem.row >= rows), 0.0, cells)
-    residual = np.full((len(table), 3), np.nan)
+    residual = np.full((len(table), len(QUANTITIES)), np.nan)
     residual[problem.row, problem.quantity] = cells
-    present = [q for q in range(3) if (problem.quantity == q).any()]
+    present = [q for q in range(len(QUANTITIES)) if (problem.quantity == q).any()]
     excess = {q: max(float((cells[problem.quantity == q] ** 2 - 1.0).sum()), 1e-9) for q in present}
     total = sum(excess.values())
     shares = {QUANTITIES[q]: excess[q] / total for q in present}

@@ -34,7 +34,7 @@ class Floor:
     ``unexplained`` marks amplitudes beyond a model-error floor: a smooth misfit that wants a name.
     """
 
-    amplitude: tuple[float, float, float]
+    amplitude: tuple[float, ...]
     log_prior: float
     unexplained: bool
 
@@ -51,7 +51,7 @@ class Posterior:
     log_evidence: FloatArray  # (F,) without the prior of the floor
     mean: FloatArray  # (F, P) of u
     covariance: FloatArray  # (F, P, P)
-    noise_factor: FloatArray  # (F, 3) most probable factor on the noise
+    noise_factor: FloatArray  # (F, 4) most probable factor on the noise
 
 
 def log_sum(values: FloatArray, axis: int | None = None) -> FloatArray:
@@ -77,13 +77,13 @@ def evidence(
     Parameters
     ----------
     noise_freedom : numpy.ndarray
-        (3,) degrees of freedom with which the noise of each quantity is known (inf = given).
+        (4,) degrees of freedom with which the noise of each quantity is known (inf = given).
     soil_widths : sequence of (width, share)
         Widths of the soil's prior in units of its coordinates, with their probabilities.
     """
     jacobian = fitted.jacobian
     target = fitted.residual + jacobian @ fitted.u
-    factor = np.ones((len(floors), 3))
+    factor = np.ones((len(floors), len(noise_freedom)))
     unknown = np.isfinite(noise_freedom)
     for _ in range(3 if unknown.any() else 0):
         variance = _variances(problem, floors, factor)
@@ -157,7 +157,7 @@ def _noise_factor(
     left = target[None] - mean @ jacobian.T
     spread = ((jacobian[None] @ covariance) * jacobian[None]).sum(axis=2)
     new = factor.copy()
-    for q in range(3):
+    for q in range(len(noise_freedom)):
         mine = problem.block == q
         if not np.isfinite(noise_freedom[q]) or not mine.any():
             continue

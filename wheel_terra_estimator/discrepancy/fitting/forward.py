@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from wheel_terra_estimator.configuration.readings import Readings
 from wheel_terra_estimator.discrepancy.fitting.coordinates import Coordinate
+from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES
 from wheel_terra_estimator.terramechanics import quadrature
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects import by_variant
@@ -44,8 +45,8 @@ _TOLERANCE, _ITERATIONS = 1e-6, 60  # relative to the load
 class State:
     """Solutions of B hypotheses at N rows.
 
-    ``u`` are their coordinates, ``angle`` (B, N) entrance angles, ``outputs`` (B, N, 3), `jacobian`
-    one (N, 3, P_b) array per hypothesis (derivative by u).
+    ``u`` are their coordinates, ``angle`` (B, N) entrance angles, ``outputs`` (B, N, 4), `jacobian`
+    one (N, 4, P_b) array per hypothesis (derivative by u).
     """
 
     u: list[FloatArray]
@@ -132,19 +133,21 @@ class Forward:
     def _response(
         self, contact: Contact, terms: Terms, angle: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Return the load balance (C, N) [N] and the outputs (C, N, 3) at given angles."""
+        """Return the load balance (C, N) [N] and the outputs (C, N, 4) at given angles."""
         set_angles(contact, angle, self._leaving_angle, terms)
         load, pull, torque = quadrature.forces(contact, terms, self.nodes)
         contact.sinkage = contact.radius * (1.0 - np.cos(angle))
         contact.drawbar_pull = contact.direction * pull
         contact.torque = contact.direction * torque
+        contact.lateral_force = quadrature.lateral_force(contact, terms, self.nodes)
         terms.apply('on_outputs', contact)
-        outputs = np.empty((*angle.shape, 3))
+        outputs = np.empty((*angle.shape, len(QUANTITIES)))
         outputs[..., 0] = contact.sinkage
         outputs[..., 1] = contact.drawbar_pull
         outputs[..., 2] = contact.torque
+        outputs[..., 3] = contact.lateral_force
         if self.readings is not None:
-            outputs = self.readings.read(outputs)
+            outputs[..., :3] = self.readings.read(outputs[..., :3])
         return load - contact.normal_load, outputs
 
     def _where_active(self, name: str, parameter: str, values: FloatArray) -> FloatArray:
@@ -182,7 +185,7 @@ class Forward:
         by : sequence, optional
             Coordinates of each hypothesis by which to differentiate (default: all).
         known : numpy.ndarray, optional
-            (N, 3) outputs of all hypotheses where ``start`` is the solution: nothing is solved.
+            (N, 4) outputs of all hypotheses where ``start`` is the solution: nothing is solved.
         """
         if by is None:
             by = [range(len(h)) for h in hypotheses]
@@ -200,7 +203,7 @@ class Forward:
         if known is None or start is None:
             angle, outputs = self._balance(hypotheses, columns, start)
         else:
-            angle, outputs = start, np.broadcast_to(known, (*start.shape, 3))
+            angle, outputs = start, np.broadcast_to(known, (*start.shape, len(QUANTITIES)))
         if not jacobian:
             return State([np.asarray(x) for x in u], angle, outputs, [], [])
         return self._differences(hypotheses, u, by, columns, angle, outputs)
@@ -222,7 +225,7 @@ class Forward:
     ) -> State:
         """Solve groups of hypotheses apart, so that none pays for the dear terms of others."""
         angle = np.empty((len(u), len(self.points)))
-        outputs = np.empty((*angle.shape, 3))
+        outputs = np.empty((*angle.shape, len(QUANTITIES)))
         jacobians: list[FloatArray] = [np.empty(0)] * (len(u) if jacobian else 0)
         slopes = list(jacobians)
         for group in groups:
@@ -287,14 +290,14 @@ class Forward:
     def by_slip(
         self, hypothesis: Sequence[Coordinate], u: FloatArray, angle: FloatArray
     ) -> FloatArray:
-        """Return (N, 3) derivative of the outputs by the recorded slip."""
+        """Return (N, 4) derivative of the outputs by the recorded slip."""
         step = np.where(self.points.slip > 0.99, -1e-4, 1e-4)
         return self._by_input('slip', step, hypothesis, u, angle)
 
     def by_leaving_angle(
         self, hypothesis: Sequence[Coordinate], u: FloatArray, angle: FloatArray
     ) -> FloatArray:
-        """Return (N, 3) derivative of the outputs by the measured leaving angle; 0 without one."""
+        """Return (N, 4) derivative of the outputs by the measured leaving angle; 0 without one."""
         step = np.full(len(self.points), -1e-4)
         return np.nan_to_num(self._by_input('leaving_angle', step, hypothesis, u, angle))
 
@@ -327,7 +330,7 @@ class Forward:
         bracket; hypotheses that have converged leave the batch.
         """
         shape = (len(columns), len(self.points))
-        angles, solved = np.empty(shape), np.empty((*shape, 3))
+        angles, solved = np.empty(shape), np.empty((*shape, len(QUANTITIES)))
         live = np.arange(len(columns))
         contact, terms = self._contact(hypotheses, columns)
         first = explicit_entrance_angle(contact) if start is None else start

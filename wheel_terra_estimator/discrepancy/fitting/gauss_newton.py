@@ -31,7 +31,7 @@ class Fit:
     names: tuple[str, ...]  # the effects in it
     coordinates: tuple[Coordinate, ...]
     u: FloatArray  # (P,) fitted coordinates
-    outputs: FloatArray  # (N, 3) fitted values
+    outputs: FloatArray  # (N, 4) fitted values
     angle: FloatArray  # (N,) entrance angles [rad]
     sensitivity: FloatArray  # (m, P) derivative of the cells by u
     # (m,) and (m, P), whitened and rotated, at u

@@ -90,7 +90,7 @@ def estimate_noise(noise: Noise, fitted: Fit, problem: Problem, observed: FloatA
     observed : numpy.ndarray
         (m,) cells.
     """
-    unknown = [q for q in range(3) if noise.origin.get(QUANTITIES[q]) == 'estimated']
+    unknown = [q for q in range(len(QUANTITIES)) if noise.origin.get(QUANTITIES[q]) == 'estimated']
     if not unknown:
         return noise
     here = fitted.within(problem, observed)

@@ -84,7 +84,7 @@ def _scattered(
     signs, and of all of them among the outermost cells are independent.
     """
     kept = []
-    for quantity in range(3):
+    for quantity in sorted({cell[1] for cell in found}):
         mine = [cell for cell in found if cell[1] == quantity]
         here = problem.quantity == quantity
         count, total = len(mine), int(here.sum())

@@ -51,7 +51,7 @@ class Problem:
         return len(self.observed)
 
     def flat(self, values: FloatArray) -> FloatArray:
-        """Take the measured cells of an (N, 3, ...) array: (m, ...)."""
+        """Take the measured cells of an (N, 4, ...) array: (m, ...)."""
         return values[self.row, self.quantity]
 
     def rotate(self, cells: FloatArray) -> FloatArray:
@@ -75,24 +75,24 @@ class Problem:
         Parameters
         ----------
         amplitude : float or numpy.ndarray
-            Share of the range; (3,) per quantity, or (F, 3) for (F, m) variances.
+            Share of the range; (4,) per quantity, or (F, 4) for (F, m) variances.
         noise : float or numpy.ndarray
-            Factor on the noise standard deviation; (3,) or (F, 3) per quantity.
+            Factor on the noise standard deviation; (4,) or (F, 4) per quantity.
         """
-        a, k = np.broadcast_arrays(
-            *(np.atleast_1d(np.asarray(x, dtype=float)) for x in (amplitude, noise)), np.ones(3)
-        )[:2]
+        a, k = (np.atleast_1d(np.asarray(x, dtype=float)) for x in (amplitude, noise))
         if (self.block < 0).any():
-            k, a = k.mean(axis=-1, keepdims=True), a.max(axis=-1, keepdims=True)
-            return np.asarray(k**2 + a**2 * self.roughness)
-        return np.asarray(k[..., self.block] ** 2 + a[..., self.block] ** 2 * self.roughness)
+            measured = np.unique(self.quantity) if k.shape[-1] > 1 else [0]
+            k, a = k[..., measured].mean(axis=-1, keepdims=True), a.max(axis=-1, keepdims=True)
+        else:
+            k, a = (x[..., self.block] if x.shape[-1] > 1 else x for x in (k, a))
+        return np.asarray(k**2 + a**2 * self.roughness)
 
 
 @dataclass(frozen=True)
 class CommonError:
     """Error of an input, felt by all quantities of the rows that share the reading."""
 
-    slope: FloatArray  # (N, 3) derivative of the quantities by the input
+    slope: FloatArray  # (N, 4) derivative of the quantities by the input
     std: FloatArray  # (N,) standard deviation of the input
     group: IndexArray  # (N,) rows of the same number share one reading
 
@@ -149,16 +149,16 @@ def build_problem(
     outliers: Sequence[tuple[int, int]] = (),
     common: Sequence[CommonError] = (),
 ) -> Problem:
-    """Return the problem of an (N, 3) table.
+    """Return the problem of an (N, 4) table.
 
     Parameters
     ----------
     measured, std : numpy.ndarray
-        (N, 3); nan = not measured.
+        (N, 4); nan = not measured.
     inputs : numpy.ndarray
         (N, d) inputs for the floor, scaled to a range of 1.
     scale : numpy.ndarray
-        (3,) range of each quantity.
+        (4,) range of each quantity.
     outliers : sequence of (row, quantity)
         Cells set apart.
     common : sequence of CommonError
@@ -176,7 +176,7 @@ def build_problem(
         rotation, roughness = np.zeros((m, m)), np.empty(m)
         block = np.empty(m, dtype=np.intp)
         at = 0
-        for q in range(3):
+        for q in range(len(scale)):
             mine = np.flatnonzero(quantity == q)
             if not mine.size:
                 continue

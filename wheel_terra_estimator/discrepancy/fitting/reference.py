@@ -62,7 +62,7 @@ def shared_error(
     Returns
     -------
     numpy.ndarray
-        (N, 3), zero where nothing was measured and on the rows of the reference.
+        (N, 4), zero where nothing was measured and on the rows of the reference.
     """
     unrotate = np.linalg.inv(problem.rotation)
     noise = problem.variance(0.0)

@@ -296,7 +296,7 @@ def _measured(table: SteadyTable, findings: Findings) -> FloatArray:
     measured = table.measured.copy()
     problem = findings.setting.problem
     # Where slips are latent the model stands at the most probable one.
-    shift = np.zeros((int(problem.row.max()) + 1, 3))
+    shift = np.zeros((int(problem.row.max()) + 1, len(QUANTITIES)))
     shift[problem.row, problem.quantity] = findings.setting.observed - problem.observed
     measured += shift[: len(table)]
     for row, column, _ in findings.outliers:

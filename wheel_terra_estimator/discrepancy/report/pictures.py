@@ -314,9 +314,11 @@ def rivals(item: NextMeasurement, narrow: bool = False) -> Figure | None:
     order = np.argsort(x, kind='stable')
     with _style():
         names = [words(rival) for rival in item.predictions]
-        lines = _legend_lines(names, QUANTITIES, narrow)
-        figure, axes = _panels(1, QUANTITIES, height=2.2, legend=lines, narrow=narrow)
-        for axis, name in zip(axes[0], QUANTITIES, strict=True):
+        aside = any(np.asarray(values)[:, -1].any() for values in item.predictions.values())
+        shown = QUANTITIES if aside else QUANTITIES[:-1]
+        lines = _legend_lines(names, shown, narrow)
+        figure, axes = _panels(1, shown, height=2.2, legend=lines, narrow=narrow)
+        for axis, name in zip(axes[0], shown, strict=True):
             q, (scale, quantity_unit) = QUANTITIES.index(name), SHOWN[name]
             for (rival, values), colour, marker in zip(
                 item.predictions.items(), (BLUE, RED, GREEN, PURPLE), 'oDs^', strict=False

@@ -164,7 +164,7 @@ Trial = tuple[str, tuple[Coordinate, ...], FloatArray]
 def _strength_responses(
     setting: Setting, base: Fit, trials: Sequence[Trial]
 ) -> list[tuple[FloatArray, FloatArray, FloatArray]]:
-    """Return outputs (N, 3), entrance angle (N,) and derivative (N, 3, 1) by strength of each.
+    """Return outputs (N, 4), entrance angle (N,) and derivative (N, 4, 1) by strength of each.
 
     At neutral strength everything but the strength has the derivatives of the base. Terms of a
     sparse law have nothing but a strength, so that all of them stand in one model side by side.

@@ -164,9 +164,9 @@ def _not_visible(
 
 
 def _ranges(table: SteadyTable) -> FloatArray:
-    """(3,) range of each measured quantity, the unit of the floor; robust to single outliers."""
-    scale = np.ones(3)
-    for q in range(3):
+    """(4,) range of each measured quantity, the unit of the floor; robust to single outliers."""
+    scale = np.ones(len(QUANTITIES))
+    for q in range(len(QUANTITIES)):
         values = np.sort(table.measured[np.isfinite(table.measured[:, q]), q])
         if values.size:
             cut = max(1, values.size // 20) if values.size > 8 else 0

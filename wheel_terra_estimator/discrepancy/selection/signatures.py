@@ -77,7 +77,7 @@ def unavailable(effect: Effect, table: SteadyTable, lug_height: FloatArray) -> s
             return f'needs the column {column}'
         elif column not in varying:
             values = table.columns[column]
-            if column == 'slope' and np.abs(np.nan_to_num(values)).max() > 0.0:
+            if column in ('slope', 'slip_angle') and np.abs(np.nan_to_num(values)).max() > 0.0:
                 continue
             return f'needs a {column} that varies'
     return ''

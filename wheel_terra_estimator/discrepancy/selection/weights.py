@@ -26,6 +26,7 @@ from wheel_terra_estimator.discrepancy.selection.candidates import (
     Setting,
     linear_starts,
 )
+from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES
 
 FloatArray = NDArray[np.float64]
 
@@ -41,7 +42,7 @@ _FLOORS = ((0.0, 0.60), (0.007, 0.10), (0.015, 0.12), (0.025, 0.10), (0.04, 0.04
 _UNEXPLAINED_PRIOR = 0.094
 _UNEXPLAINED = (0.08, 0.16, 0.35)
 _UNEXPLAINED_SOME = (0.015, 0.03, 0.06, 0.15, 0.4)
-_SOME = ((1, 0, 0), (0, 1, 0), (0, 0, 1), (0, 1, 1))
+_SOME = ((1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 1, 1, 1))
 
 _FURTHER = 8  # sets with one effect more that are fitted, at most
 _RIVALS = 2  # other effects that are put in the place of each effect of a set
@@ -50,6 +51,10 @@ _PROMISE = 1.5
 
 Start: TypeAlias = tuple[tuple[str, ...], FloatArray, FloatArray]
 """Effects of a set, coordinates and entrance angles from which it is fitted."""
+
+
+def _everywhere(amplitude: float) -> tuple[float, ...]:
+    return (amplitude,) * len(QUANTITIES)
 
 
 def default_floors(greatest: float | None = None) -> tuple[Floor, ...]:
@@ -63,10 +68,11 @@ def default_floors(greatest: float | None = None) -> tuple[Floor, ...]:
     most = math.inf if greatest is None else greatest
     kept = [(a, p) for a, p in _FLOORS if a <= most] or [_FLOORS[0]]
     share = (1.0 - _UNEXPLAINED_PRIOR) / sum(p for _, p in kept)
-    floors = [Floor((a, a, a), math.log(p * share), False) for a, p in kept]
-    patterns = [(a, a, a) for a in _UNEXPLAINED]
+    floors = [Floor(_everywhere(a), math.log(p * share), False) for a, p in kept]
+    patterns = [_everywhere(a) for a in _UNEXPLAINED]
     patterns += [
-        (a * z, a * f, a * t) for (z, f, t), a in itertools.product(_SOME, _UNEXPLAINED_SOME)
+        tuple(a * there for there in some)
+        for some, a in itertools.product(_SOME, _UNEXPLAINED_SOME)
     ]
     each = math.log(_UNEXPLAINED_PRIOR / len(patterns))
     floors.extend(Floor(pattern, each, True) for pattern in patterns)
@@ -80,7 +86,7 @@ def shared_floors() -> tuple[Floor, ...]:
     """
     amplitudes = (0.0, 0.015, 0.03, 0.06, 0.12, 0.25)
     each = -math.log(len(amplitudes))
-    return tuple(Floor((a, a, a), each, False) for a in amplitudes)
+    return tuple(Floor(_everywhere(a), each, False) for a in amplitudes)
 
 
 @dataclass(frozen=True)

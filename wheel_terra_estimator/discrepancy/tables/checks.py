@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from wheel_terra_estimator.discrepancy.tables.averaging import MOST_ROWS, averaged
 from wheel_terra_estimator.discrepancy.tables.steady_table import (
     INPUT_UNITS,
+    ONE_OF,
     ORDER_COLUMNS,
     QUANTITIES,
     STD_COLUMNS,
@@ -33,6 +34,9 @@ MINIMUM_LOAD_RATIO = 1.5
 SAME_SLIP = 1e-3
 FLIPPED = 0.5  # a sign is wrong where the other one halves the misfit of the whole column
 CLEAR_SLIP = 0.2  # beyond it a wheel's torque has the sign of its slip
+_TIMES_LOAD = {'three': 3.0, 'five': 5.0}  # a sunken flank gives more than a thrust
+_NO_FORCE = 2e-3  # share of the load
+CLEAR_SLIP_ANGLE = 0.1  # beyond it the lateral force has the sign against it [rad]
 LIKE_WHEEL = 1.4  # factor within which a row's wheel may differ from that of the model file
 
 
@@ -54,7 +58,7 @@ def check_table(
     for key in ('slip', 'normal_load'):
         if key not in arrays:
             raise UserError(f'{name}: no column {key!r}; it is required')
-    if not any(quantity in arrays for quantity in QUANTITIES):
+    if not any(quantity in arrays for quantity in ONE_OF):
         raise UserError(
             f'{name}: none of the columns sinkage, drawbar_pull, torque; add at least one'
         )
@@ -64,7 +68,7 @@ def check_table(
     _check_ranges(name, arrays, where)
     _check_signs(name, arrays, where)
     measured = _columns(arrays, QUANTITIES, count)
-    empty = ~np.isfinite(measured).any(axis=1)
+    empty = ~np.isfinite(measured[:, : len(ONE_OF)]).any(axis=1)
     if empty.any():
         row = where[empty][0]
         raise UserError(
@@ -142,6 +146,7 @@ _RANGES: tuple[tuple[str, _Test, str], ...] = (
     ('normal_load', _not_positive, 'is not positive; state the load in N'),
     ('normal_load', _all_below(0.5), _KILONEWTON),
     ('slope', _beyond(0.9), _DEGREES),
+    ('slip_angle', _beyond(3.15), _DEGREES),
     ('leaving_angle', _beyond(1.7), _DEGREES),
     ('wheel_radius', _above(5.0), _MILLIMETRES),
     ('wheel_radius', _not_positive, _NO_LENGTH),
@@ -184,23 +189,27 @@ def _check_ranges(name: str, arrays: Mapping[str, FloatArray], lines: NDArray[np
     if 'wheel_radius' in arrays and 'lug_height' in arrays:
         high = arrays['lug_height'] > arrays['wheel_radius']
         refuse(high, 'lug_height', 'is more than the wheel radius; check both, in m')
-    if 'drawbar_pull' in arrays:
-        _check_size_of_pull(refuse, arrays['drawbar_pull'], arrays['normal_load'])
+    for column, most in (('drawbar_pull', 'three'), ('lateral_force', 'five')):
+        if column in arrays:
+            _check_size_of_force(refuse, column, arrays, most)
     for column in STD_COLUMNS:
         if column in arrays:
             _check_size_of_deviation(refuse, arrays, column)
 
 
-def _check_size_of_pull(refuse: _Refuse, pull: FloatArray, load: FloatArray) -> None:
-    """Refuse pulls that are far more than the load, or nothing beside it."""
+def _check_size_of_force(
+    refuse: _Refuse, column: str, arrays: Mapping[str, FloatArray], most: str
+) -> None:
+    """Refuse forces that are far more than the load, or nothing beside it."""
+    force, load = arrays[column], arrays['normal_load']
     refuse(
-        abs(pull) > 3.0 * load,
-        'drawbar_pull',
-        'is over three times the normal load; check both units (N, not kg or kN)',
+        abs(force) > _TIMES_LOAD[most] * load,
+        column,
+        f'is over {most} times the normal load; check both units (N, not kg or kN)',
     )
-    measured = np.isfinite(pull)
-    if measured.sum() > 2 and 0.0 < abs(pull[measured]).max() < 2e-3 * load.max():
-        refuse(measured, 'drawbar_pull', _KILONEWTON)
+    measured = np.isfinite(force)
+    if measured.sum() > 2 and 0.0 < abs(force[measured]).max() < _NO_FORCE * load.max():
+        refuse(measured, column, _KILONEWTON)
 
 
 def _check_size_of_deviation(
@@ -234,6 +243,18 @@ def _check_signs(name: str, arrays: Mapping[str, FloatArray], lines: NDArray[np.
                 f'{slip[row]:g} has the wrong sign, as in most rows; torque that drives the wheel '
                 'forward and the slip of a driven wheel are positive (angular_velocity < 0: '
                 'reverse)'
+            )
+    if 'lateral_force' in arrays and 'slip_angle' in arrays:
+        aside, force = np.sin(arrays['slip_angle']), arrays['lateral_force']
+        clear = (np.abs(aside) > CLEAR_SLIP_ANGLE) & np.isfinite(force)
+        wrong = clear & (aside * force > 0.0)
+        if wrong.sum() >= 3 and wrong.sum() > 0.8 * clear.sum():
+            row = int(np.flatnonzero(wrong)[0])
+            raise UserError(
+                f'{name}, line {lines[row]}, column lateral_force: {force[row]:g} N at a slip '
+                f'angle of {arrays["slip_angle"][row]:g} rad has the wrong sign, as in most rows; '
+                'both are positive to the left, and the soil pushes against the sliding: multiply '
+                'the column by -1'
             )
     angle = arrays.get('leaving_angle', np.full(1, np.nan))
     angle = angle[np.isfinite(angle)]

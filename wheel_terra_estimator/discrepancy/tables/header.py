@@ -44,6 +44,8 @@ _WORDS: dict[str, tuple[str, ...]] = {
     'drawbar_pull': ('drawbar', 'drawbar force', 'pull', 'net traction', 'zugkraft'),
     'torque': ('drive torque', 'driving torque', 'wheel torque', 'drehmoment'),
     'slope': ('slope angle', 'inclination', 'incline'),
+    'slip_angle': ('sideslip angle', 'side slip angle'),
+    'lateral_force': ('side force', 'cornering force', 'seitenkraft'),
     'wheel_radius': ('rim radius',),
     'wheel_width': ('rim width',),
     'lug_height': ('grouser height',),
@@ -79,7 +81,12 @@ _ASKED: dict[str, tuple[tuple[str, ...], str]] = {
         'the load perpendicular to the slope, positive',
     ),
     'slip': (('slippage', 'skid', 'slide'), 'the slip ratio, positive when driving'),
-    'slope': (('alpha', 'theta', 'beta', 'angle', 'tilt', 'pitch'), 'positive uphill'),
+    'slope': (('alpha', 'theta', 'angle', 'tilt', 'pitch'), 'positive uphill'),
+    'slip_angle': (('beta', 'sideslip'), 'positive where the wheel slides left'),
+    'lateral_force': (
+        ('fy', 'force y', 'lateral'),
+        'the force of the soil on the wheel, positive left',
+    ),
     'wheel_radius': (('radius',), 'that of the rim, lugs not counted'),
     'wheel_width': (('width',), 'that of the rim'),
 }

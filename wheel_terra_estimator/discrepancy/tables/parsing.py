@@ -21,8 +21,8 @@ from wheel_terra_estimator.discrepancy.tables.checks import check_table
 from wheel_terra_estimator.discrepancy.tables.header import Choice, Header, meaning_of, with_unit
 from wheel_terra_estimator.discrepancy.tables.steady_table import (
     COLUMNS,
+    ONE_OF,
     ORDER_COLUMNS,
-    QUANTITIES,
     SteadyTable,
 )
 from wheel_terra_estimator.errors import UserError
@@ -56,7 +56,7 @@ def read_table(path: str | Path, choice: Choice | None = None) -> SteadyTable:
     UserError
         One line with file, row and cure for everything that makes the table unusable.
     """
-    lines, values, notes = read_columns(Path(path), choice or Choice(), one_of=QUANTITIES)
+    lines, values, notes = read_columns(Path(path), choice or Choice(), one_of=ONE_OF)
     return check_table(str(path), values, lines, notes)
 
 
@@ -129,7 +129,7 @@ def table_of(data: Any, name: str, choice: Choice | None = None) -> SteadyTable:
         lengths = sorted({len(column) for column in columns.values()})
         raise UserError(f'{name}: columns are of different lengths {lengths}')
     header = Header(name, list(columns), choice or Choice())
-    header.check(REQUIRED, QUANTITIES)
+    header.check(REQUIRED, ONE_OF)
     rows = enumerate(zip(*columns.values(), strict=True), start=2)
     lines, values = _read_rows(name, header, rows, decimal_comma=True)
     return check_table(name, values, lines, header.notes)

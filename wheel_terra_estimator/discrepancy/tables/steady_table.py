@@ -13,12 +13,14 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 
-QUANTITIES = ('sinkage', 'drawbar_pull', 'torque')
-UNITS = {'sinkage': 'm', 'drawbar_pull': 'N', 'torque': 'N m'}
+QUANTITIES = ('sinkage', 'drawbar_pull', 'torque', 'lateral_force')
+UNITS = {'sinkage': 'm', 'drawbar_pull': 'N', 'torque': 'N m', 'lateral_force': 'N'}
+ONE_OF = QUANTITIES[:3]  # of which each row has at least one
 INPUT_UNITS = {
     'slip': '-',
     'normal_load': 'N',
     'slope': 'rad',
+    'slip_angle': 'rad',
     'wheel_radius': 'm',
     'wheel_width': 'm',
     'lug_height': 'm',
@@ -41,8 +43,8 @@ class SteadyTable:
     lines: NDArray[np.intp]  # (N,) line of each row in the file, the header being line 1
     # Input column -> (N,) values [SI], only those that the table has; nan = not stated
     columns: Mapping[str, FloatArray]
-    measured: FloatArray  # (N, 3) sinkage [m], drawbar pull [N], torque [N m]; nan = not measured
-    stated_std: FloatArray  # (N, 3) stated standard deviations; nan = not stated
+    measured: FloatArray  # (N, 4) sinkage [m], drawbar pull [N], torque [N m]; nan = not measured
+    stated_std: FloatArray  # (N, 4) stated standard deviations; nan = not stated
     slip_std: FloatArray  # (N,) standard deviation of the recorded slip; 0 = exact
     # (N,) standard deviation of the measured leaving angle [rad]; 0 = exact
     leaving_angle_std: FloatArray
