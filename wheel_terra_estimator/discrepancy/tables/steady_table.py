@@ -43,7 +43,7 @@ class SteadyTable:
     lines: NDArray[np.intp]  # (N,) line of each row in the file, the header being line 1
     # Input column -> (N,) values [SI], only those that the table has; nan = not stated
     columns: Mapping[str, FloatArray]
-    measured: FloatArray  # (N, 4) sinkage [m], drawbar pull [N], torque [N m]; nan = not measured
+    measured: FloatArray  # (N, 4) of `QUANTITIES` [m, N, N m, N]; nan = not measured
     stated_std: FloatArray  # (N, 4) stated standard deviations; nan = not stated
     slip_std: FloatArray  # (N,) standard deviation of the recorded slip; 0 = exact
     # (N,) standard deviation of the measured leaving angle [rad]; 0 = exact
