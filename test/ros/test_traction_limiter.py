@@ -177,6 +177,8 @@ def test_plain_twist(start, listener):
     command = Twist()
     command.linear.x = 0.1
     reached = pytest.approx(0.03)
-    until(lambda: commands.publish(command) or (heard and heard[-1].linear.x == reached))
+    timer = node.create_timer(0.02, lambda: commands.publish(command))
+    until(lambda: heard and heard[-1].linear.x == reached)
+    node.destroy_timer(timer)
     status, words = process.stop(signal.SIGTERM)
     assert status == 0, words

@@ -243,14 +243,23 @@ def firm():
     return simulator.simulate('firm', 1)
 
 
-def test_a_drive_is_the_same_for_the_same_seed_and_another_for_the_next(firm):
-    again, other = simulator.simulate('firm', 1), simulator.simulate('firm', 2, 20.0)
+def test_a_drive_is_the_same_for_the_same_seed(firm, monkeypatch):
+    driven = simulator._driven('firm', simulator.KINDS['firm'], 1)
+    assert np.array_equal(firm.course.rate, driven[2].rate)
+    monkeypatch.setattr(simulator, '_driven', lambda *arguments: driven)
+    again = simulator.simulate('firm', 1)
     assert np.array_equal(firm.truth.slip, again.truth.slip, equal_nan=True)
     assert [a.arrival for a in firm.arrivals] == [a.arrival for a in again.arrivals]
     assert firm.configuration.flat() == again.configuration.flat()
-    assert firm.rover.mass != other.rover.mass
     assert firm.configuration.rover.mass == pytest.approx(firm.rover.mass, rel=0.1)
-    assert other.course.time[-1] == pytest.approx(20.0, abs=0.02)
+    shorter = simulator.simulate('firm', 1, 20.0)
+    assert shorter.course.time[-1] == pytest.approx(20.0, abs=0.02)
+
+
+def test_another_seed_is_another_drive(firm, trap):
+    assert firm.rover.mass != trap.rover.mass
+    draws = [simulator._generator('firm', seed, 'land').random() for seed in (1, 2)]
+    assert draws[0] != draws[1]
 
 
 def check(found):
