@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import importlib
+import json
 import re
 import subprocess
 import sys
@@ -12,6 +13,7 @@ import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
 import pytest
+import yaml
 
 import wheel_terra_estimator
 from wheel_terra_estimator.configuration import reader, shipped
@@ -166,3 +168,32 @@ def test_no_path_of_a_machine_is_committed() -> None:
         text = path.read_text(encoding='utf-8')
         for word in words:
             assert word not in text, f'{path}: {word}'
+
+
+def test_the_image_has_the_oldest_versions_and_what_rosdep_does_not() -> None:
+    text = (ROOT / 'Dockerfile').read_text(encoding='utf-8')
+    pinned = (ROOT / 'requirements' / 'oldest.txt').read_text(encoding='utf-8')
+    pins = re.findall(r'([\w.-]+)==([\w.]+)', text)
+    assert len(pins) == 7
+    for name, number in pins:
+        assert f'{re.sub("[._]", "-", name)}=={number} ' in pinned, name
+    manifest = (ROOT / 'package.xml').read_text(encoding='utf-8')
+    (skipped,) = re.findall(r"--skip-keys '([^']+)'", text)
+    assert set(skipped.split()) == set(re.findall(r'>(python3-\w+-pip)<', manifest))
+    container = json.loads((ROOT / '.devcontainer' / 'devcontainer.json').read_text())
+    assert f'AS {container["build"]["target"]}\n' in text
+    for line in re.findall(r'^COPY (\S+)', text, re.M):
+        assert (ROOT / line).exists()
+
+
+def test_the_conda_recipe_asks_for_what_setup_asks_for() -> None:
+    recipe = yaml.safe_load((ROOT / 'packaging' / 'conda' / 'recipe.yaml').read_text())
+    assert recipe['context']['version'] == wheel_terra_estimator.__version__
+    wanted = re.findall(r"'([\w-]+>=[\d.]+)'", setup_text().split('extras_require')[0])
+    names = {'PyYAML': 'pyyaml', 'matplotlib': 'matplotlib-base'}
+    asked = {
+        f'{names.get(name, name)} >={number}' for name, number in (w.split('>=') for w in wanted)
+    }
+    assert set(recipe['requirements']['run']) == {*asked, 'python >=${{ python_min }}'}
+    for file in recipe['about']['license_file']:
+        assert (ROOT / file).is_file()
