@@ -24,15 +24,20 @@ from wheel_terra_estimator.discrepancy.assessment.held_out import hold_out, slip
 from wheel_terra_estimator.discrepancy.effect_keys import effect_of
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
 from wheel_terra_estimator.discrepancy.fitting.reference import shared_error
-from wheel_terra_estimator.discrepancy.proposal.find import closed_by, promise_on_top, propose
+from wheel_terra_estimator.discrepancy.proposal.find import (
+    closed_by,
+    effects_said,
+    promise_on_top,
+    propose,
+)
 from wheel_terra_estimator.discrepancy.result import OPEN, Curves, Proposal, QuantityGap
 from wheel_terra_estimator.discrepancy.selection import confidence as confidences
 from wheel_terra_estimator.discrepancy.selection import significance
 from wheel_terra_estimator.discrepancy.selection.candidates import FIT_FLOOR
 from wheel_terra_estimator.discrepancy.selection.confidence import Confidence
-from wheel_terra_estimator.discrepancy.selection.remainder import Remainder
+from wheel_terra_estimator.discrepancy.selection.remainder import Remainder, remainder
 from wheel_terra_estimator.discrepancy.selection.search import Findings
-from wheel_terra_estimator.discrepancy.selection.verdict import Verdict, choose
+from wheel_terra_estimator.discrepancy.selection.verdict import Verdict, as_named, choose
 from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES, SteadyTable
 from wheel_terra_estimator.terramechanics.effects import catalogue
 from wheel_terra_estimator.terramechanics.effects.base import Effect
@@ -43,7 +48,7 @@ IndexArray = NDArray[np.intp]
 
 _USUAL_PULL = 2.5  # stated deviations: a right name leaves no soil number pulled farther
 _AT_NOISE = 1.2  # times the noise: a quantity that was never off
-_MOST_BARRED = 3  # names that worsen a quantity, or are doubtful, after which none is given
+_MOST_TRIED = 3  # names that worsen a quantity, or are doubtful, after which the law alone speaks
 # A name is given where it, or one of those that the rows cannot tell from it, is more likely right
 # than not; below the second figure a law has to do worse than the name.
 _LIKELY = 0.5
@@ -109,29 +114,34 @@ def decide(
     allowed_error : float
         Model error that is no reason for doubt [share of the range].
     """
-    off, barred, doubtful = False, frozenset[int](), tuple[Naming, ...]()
+    off, tried, doubtful = False, list[int](), tuple[Naming, ...]()
     everything = frozenset(range(len(findings.selection.explanations)))
     variance_of = findings.setting.problem.variance
     laws = _Laws(table)
     while True:
+        barred = everything if len(tried) >= _MOST_TRIED else frozenset(tried)
         verdict = choose(findings.selection, variance_of, off=off, excluded=barred)
         decision = _judged(table, both, findings, verdict, allowed_error)
         if verdict.word == 'agrees' and not off and channels_off(decision.gap):
             off = True
-        elif verdict.word != 'named':
-            decision = replace(decision, doubtful=doubtful)
-            return _left_open(table, both, decision, allowed_error, laws)
-        else:
-            names = _names(table, decision)
-            worsens = bool(channels_worsened(decision.gap, verdict.left))
-            if not worsens:
-                names, likely = laws.against(decision, names)
-                if likely:
-                    return replace(decision, names=names)
-            doubtful = doubtful or (() if worsens else names)
-            barred |= {verdict.index}
-            if len(barred) >= _MOST_BARRED:
-                barred = everything
+            continue
+        if verdict.word != 'named':
+            said = laws.says(decision) if verdict.word in OPEN else None
+            if said is None or said in tried:
+                return _left_open(
+                    table, both, replace(decision, doubtful=doubtful), allowed_error, laws
+                )
+            left = remainder(findings.selection, said, variance_of)
+            verdict = as_named(findings.selection, said, left)
+            decision = _judged(table, both, findings, verdict, allowed_error)
+        tried.append(verdict.index)
+        names = _names(table, decision)
+        worsens = bool(channels_worsened(decision.gap, verdict.left))
+        if not worsens:
+            names, likely = laws.against(decision, names)
+            if likely:
+                return replace(decision, names=names)
+        doubtful = doubtful or (() if worsens else names)
 
 
 class _Laws:
@@ -144,10 +154,21 @@ class _Laws:
     def beside(self, decision: Decision, hold_soil: bool = False) -> Proposal | None:
         """Return the law for what a decision's refit of the soil leaves."""
         key = decision.floor, hold_soil
+        if LAW in decision.findings.setting.forward.base_effects:
+            return None  # not on top of another law
         if key not in self._found:
             where = (self._table, decision.findings, decision.gap, decision.variance)
             self._found[key] = propose(*where, hold_soil=hold_soil)
         return self._found[key]
+
+    def says(self, decision: Decision) -> int | None:
+        """Return the explanation that says what the law says, if it is one of known effects."""
+        law = self.beside(decision, decision.left.only_soil)
+        effects = effects_said(law) if law else frozenset()
+        sets = (
+            {effect_of(key) for key in e.names} for e in decision.findings.selection.explanations
+        )
+        return next((h for h, mine in enumerate(sets) if effects and mine == effects), None)
 
     def against(
         self, decision: Decision, names: tuple[Naming, ...]
@@ -158,9 +179,11 @@ class _Laws:
         law = self.beside(decision)
         where = (self._table, decision.findings, decision.gap, decision.variance)
         ahead = closed_by(*where, decision.after) - (law.closed if law else 0.0)
-        if law is not None and ahead < -_CLEARLY:
+        same = law is not None and effects_said(law) == {effect_of(n.key) for n in names}
+        if law is not None and ahead < -_CLEARLY and not same:
             return names, False
-        odds = _BEATS_LAW if ahead >= _CLEARLY and not decision.left.significant else 1.0
+        ahead_of_all = (same or ahead >= _CLEARLY) and not decision.left.significant
+        odds = _BEATS_LAW if ahead_of_all else 1.0
         surer = [confidences.confidence(n.features, int(n.features['alike']), odds) for n in names]
         names = tuple(replace(n, confidence=c) for n, c in zip(names, surer, strict=True))
         return names, _least(names, odds) >= _LIKELY
@@ -185,9 +208,7 @@ def _left_open(
     findings = decision.findings
     if decision.verdict.word not in OPEN:
         return decision
-    law = None
-    if LAW not in findings.setting.forward.base_effects:  # not on top of another law
-        law = laws.beside(decision, decision.left.only_soil)
+    law = laws.beside(decision, decision.left.only_soil)
     # Estimated noise may be next to nothing beside a few smooth rows.
     exact = 'estimated' not in findings.noise.origin.values()
     variance = findings.setting.problem.variance(0.0 if exact else FIT_FLOOR)

@@ -59,19 +59,24 @@ _PAYS = 5.0  # ... or so many times as much (in squared noise deviations) goes f
 _HOLDS = (2.5, 5.0, 10.0, 20.0, 40.0)  # times narrower: until the refitted soil can be believed
 _ALIKE = 0.8  # cosine of two signatures from which one resembles the other
 _RESEMBLING = 3
-# Terms that are the law of a named effect.
+# Terms that say what a named effect says, in one of its forms or in another one.
 _SAME = {
     'exponent_by_slip': 'slip_sinkage_exponent',
-    'exponent_by_load': 'slip_sinkage_exponent',
+    'exponent_by_slip_squared': 'slip_sinkage_exponent',
     'peak_angle_by_slip': 'stress_peak_shift',
+    'peak_angle_by_slip_squared': 'stress_peak_shift',
     'torque_by_one': 'drivetrain_friction',
     'drawbar_pull_by_one': 'pull_zero',
-    'drawbar_pull_by_load': 'pull_zero',
-    'torque_by_torque_squared': 'torque_gain',
     'sinkage_by_one': 'sinkage_offset',
     'shear_modulus_by_load': 'shear_deformation',
     'bearing_pressure_by_pass': 'multipass',
     'bearing_pressure_by_rim_speed': 'rate_dependence',
+}
+# Terms that are near one.
+_LIKE = _SAME | {
+    'exponent_by_load': 'slip_sinkage_exponent',
+    'drawbar_pull_by_load': 'pull_zero',
+    'torque_by_torque_squared': 'torque_gain',
 }
 _LEVEL_INPUTS = (
     'normal_load',
@@ -162,6 +167,12 @@ def closed_by(
         for name, groups in groupings.items()
     }
     return _closed(judged, gap)
+
+
+def effects_said(law: Proposal) -> frozenset[str]:
+    """Return the effects that a law says, term by term; none where a term is none of them."""
+    terms = [f'{t}_by_{f}' for t, f in zip(law.targets, law.features, strict=True)]
+    return frozenset(_SAME[term] for term in terms) if set(terms) <= set(_SAME) else frozenset()
 
 
 def _soil_is_believed(fitted: Fit, findings: Findings) -> bool:
@@ -381,6 +392,6 @@ def _resembling(findings: Findings, fits: Sequence[Fit]) -> tuple[str, ...]:
         cosine = float(signature.change @ weighted) / far if far > 0.0 else 0.0
         alike[effect_of(key)] = max(abs(cosine), alike.get(effect_of(key), 0.0))
     order = sorted(alike, key=lambda name: -alike[name])
-    same = [_SAME[c.name] for c in fits[1].coordinates if c.name in _SAME]
+    same = [_LIKE[c.name] for c in fits[1].coordinates if c.name in _LIKE]
     found = [*same, *(name for name in order if alike[name] > _ALIKE)]
     return tuple(dict.fromkeys(found))[:_RESEMBLING]

@@ -105,9 +105,15 @@ def choose(
     after = remainder(selection, best, variance_of)
     if after.significant and _explained(selection, nothing, best) < MOST:
         return Verdict('unexplained', nothing, (), left)
-    names = selection.explanations[best].names
+    return as_named(selection, best, after)
+
+
+def as_named(selection: Selection, index: int, left: Remainder) -> Verdict:
+    """Return the verdict that names explanation number ``index``."""
+    names = selection.explanations[index].names
+    total = np.asarray(log_sum(selection.log_joint, axis=1))
     open_sets = tuple(_rivals(selection, total, names, name) for name in names)
-    return Verdict('named', best, open_sets, after)
+    return Verdict('named', index, open_sets, left)
 
 
 def _best_set(selection: Selection, weight: FloatArray, named: list[int]) -> int:
