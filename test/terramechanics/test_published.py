@@ -12,7 +12,7 @@ import yaml
 
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.configuration.shipped import configuration_folder
-from wheel_terra_estimator.discrepancy.report.files import write_files
+from wheel_terra_estimator.discrepancy.report.model_file import write_files
 from wheel_terra_estimator.discrepancy.workflow import diagnose
 from wheel_terra_lab.studies.discrepancy_demonstrations import cmu_fitted
 from wheel_terra_lab.studies.model_validation import (

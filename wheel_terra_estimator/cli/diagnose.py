@@ -135,7 +135,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the command."""
-    from wheel_terra_estimator.discrepancy.report.files import write_files
+    from wheel_terra_estimator.discrepancy.report.model_file import write_files
 
     output: Path = arguments.output
     check_folder(output, arguments.overwrite)
@@ -198,7 +198,7 @@ def _diagnosed(arguments: argparse.Namespace) -> Diagnosis:
 
 def _each_with_its_soil(arguments: argparse.Namespace) -> int:
     """Diagnose each table with a soil of its own, side by side, and sum up what they favour."""
-    from wheel_terra_estimator.discrepancy.report.files import write_files
+    from wheel_terra_estimator.discrepancy.report.model_file import write_files
     from wheel_terra_estimator.discrepancy.report.several import (
         over_all,
         write_shared_effect,

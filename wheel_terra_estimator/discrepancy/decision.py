@@ -17,11 +17,9 @@ from numpy.typing import NDArray
 
 from wheel_terra_estimator.discrepancy.assessment.gaps import (
     channels_off,
-    channels_worsened,
     gaps,
 )
 from wheel_terra_estimator.discrepancy.assessment.held_out import hold_out, slip_groups
-from wheel_terra_estimator.discrepancy.effect_keys import effect_of
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
 from wheel_terra_estimator.discrepancy.fitting.reference import shared_error
 from wheel_terra_estimator.discrepancy.proposal.find import (
@@ -35,12 +33,12 @@ from wheel_terra_estimator.discrepancy.selection import confidence as confidence
 from wheel_terra_estimator.discrepancy.selection import significance
 from wheel_terra_estimator.discrepancy.selection.candidates import FIT_FLOOR
 from wheel_terra_estimator.discrepancy.selection.confidence import Confidence
-from wheel_terra_estimator.discrepancy.selection.remainder import Remainder, remainder
+from wheel_terra_estimator.discrepancy.selection.remainder import Remainder
 from wheel_terra_estimator.discrepancy.selection.search import Findings
-from wheel_terra_estimator.discrepancy.selection.verdict import Verdict, as_named, choose
+from wheel_terra_estimator.discrepancy.selection.verdict import Verdict, choose
 from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES, SteadyTable
 from wheel_terra_estimator.terramechanics.effects import catalogue
-from wheel_terra_estimator.terramechanics.effects.base import Effect
+from wheel_terra_estimator.terramechanics.effects.base import Effect, effect_of
 from wheel_terra_estimator.terramechanics.effects.learned_closure import NAME as LAW
 
 FloatArray = NDArray[np.float64]
@@ -48,7 +46,7 @@ IndexArray = NDArray[np.intp]
 
 _USUAL_PULL = 2.5  # stated deviations: a right name leaves no soil number pulled farther
 _AT_NOISE = 1.2  # times the noise: a quantity that was never off
-_MOST_TRIED = 3  # names that worsen a quantity, or are doubtful, after which the law alone speaks
+_MOST_TRIED = 3  # doubtful names, after which none is given
 # A name is given where it, or one of those that the rows cannot tell from it, is more likely right
 # than not; below the second figure a law has to do worse than the name.
 _LIKELY = 0.5
@@ -126,22 +124,13 @@ def decide(
             off = True
             continue
         if verdict.word != 'named':
-            said = laws.says(decision) if verdict.word in OPEN else None
-            if said is None or said in tried:
-                return _left_open(
-                    table, both, replace(decision, doubtful=doubtful), allowed_error, laws
-                )
-            left = remainder(findings.selection, said, variance_of)
-            verdict = as_named(findings.selection, said, left)
-            decision = _judged(table, both, findings, verdict, allowed_error)
+            decision = replace(decision, doubtful=doubtful)
+            return _left_open(table, both, decision, allowed_error, laws)
         tried.append(verdict.index)
-        names = _names(table, decision)
-        worsens = bool(channels_worsened(decision.gap, verdict.left))
-        if not worsens:
-            names, likely = laws.against(decision, names)
-            if likely:
-                return replace(decision, names=names)
-        doubtful = doubtful or (() if worsens else names)
+        names, likely = laws.against(decision, _names(table, decision))
+        if likely:
+            return replace(decision, names=names)
+        doubtful = doubtful or names
 
 
 class _Laws:
@@ -160,15 +149,6 @@ class _Laws:
             where = (self._table, decision.findings, decision.gap, decision.variance)
             self._found[key] = propose(*where, hold_soil=hold_soil)
         return self._found[key]
-
-    def says(self, decision: Decision) -> int | None:
-        """Return the explanation that says what the law says, if it is one of known effects."""
-        law = self.beside(decision, decision.left.only_soil)
-        effects = effects_said(law) if law else frozenset()
-        sets = (
-            {effect_of(key) for key in e.names} for e in decision.findings.selection.explanations
-        )
-        return next((h for h, mine in enumerate(sets) if effects and mine == effects), None)
 
     def against(
         self, decision: Decision, names: tuple[Naming, ...]

@@ -14,9 +14,8 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from wheel_terra_estimator.discrepancy.effect_keys import effect_of
 from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES, UNITS, SteadyTable
-from wheel_terra_estimator.terramechanics.effects.base import FORM_MARK
+from wheel_terra_estimator.terramechanics.effects.base import FORM_MARK, effect_of
 
 if TYPE_CHECKING:
     from wheel_terra_estimator.configuration.reader import Configuration

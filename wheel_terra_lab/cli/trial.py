@@ -114,7 +114,7 @@ def _print_gap(outcome: Outcome) -> None:
 
 
 def _write(diagnosis: Diagnosis, folder: Path, *, pictures: bool) -> None:
-    from wheel_terra_estimator.discrepancy.report.files import write_files
+    from wheel_terra_estimator.discrepancy.report.model_file import write_files
 
     folder.mkdir()
     write_files(diagnosis, folder, pictures=pictures)

@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 from scipy.special import ndtr
 
-from wheel_terra_estimator.discrepancy.effect_keys import effect_of
+from wheel_terra_estimator.terramechanics.effects.base import effect_of
 from wheel_terra_lab.jobs import ResultFile
 from wheel_terra_lab.studies.campaigns import make_campaign, scoring
 from wheel_terra_lab.studies.campaigns.groups import GROUPS

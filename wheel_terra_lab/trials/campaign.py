@@ -12,7 +12,6 @@ from pathlib import Path
 
 import numpy as np
 
-from wheel_terra_estimator.discrepancy.effect_keys import effect_of
 from wheel_terra_estimator.discrepancy.tables.steady_table import INPUT_UNITS
 from wheel_terra_lab.trials.designs import random_rows, random_soil
 from wheel_terra_lab.trials.detectability import Ruler, listed_kinds, size_for
@@ -354,7 +353,12 @@ def _hide(
         sizes.append(size)
         effects.append(effect)
         spices.append(spice)
-    return tuple(effect_of(name) for name in names), tuple(sizes), tuple(effects), tuple(spices)
+    return (
+        tuple(name.partition(':')[0] for name in names),
+        tuple(sizes),
+        tuple(effects),
+        tuple(spices),
+    )
 
 
 def _sizes_seen(

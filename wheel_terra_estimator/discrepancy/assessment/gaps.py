@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wheel_terra_estimator.discrepancy.result import Curves, QuantityGap
-from wheel_terra_estimator.discrepancy.selection.remainder import Remainder
 from wheel_terra_estimator.discrepancy.selection.search import Findings
 from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES, SteadyTable
 
@@ -18,8 +17,6 @@ FloatArray = NDArray[np.float64]
 
 _DRAWS = 1000
 _SEED = 5
-WORSE = 1.25  # times soil refit and noise: a quantity that a name has made worse
-WORTH = 5.0  # squared noise deviations that a name must take off the rest for each one it adds
 TOO_FAR = 2.0  # times noise and allowed model error: a channel that is off
 
 
@@ -93,28 +90,6 @@ def _cell_noise(findings: Findings) -> FloatArray:
 def channels_off(gap: Mapping[str, QuantityGap]) -> tuple[str, ...]:
     """Return the quantities that unseen rows show to be off by more than is allowed."""
     return tuple(name for name, item in gap.items() if item.after > item.limit)
-
-
-def channels_worsened(gap: Mapping[str, QuantityGap], left: Remainder) -> tuple[str, ...]:
-    """Return the quantities that an effect predicts worse on unseen rows than the soil alone.
-
-    None where it leaves noise alone and takes far more from the others: `WORTH` times as many
-    squared noise deviations.
-    """
-    change = {
-        name: (item.after**2 - item.refit**2) / item.noise**2
-        for name, item in gap.items()
-        if item.noise
-    }
-    lost = sum(value for value in change.values() if value > 0.0)
-    gained = -sum(value for value in change.values() if value < 0.0)
-    if not left.significant and gained > WORTH * lost:
-        return ()
-    return tuple(
-        name
-        for name, item in gap.items()
-        if item.after > WORSE * item.refit and item.after > WORSE * (item.noise or 0.0)
-    )
 
 
 def _shrink(refit: float, after: float, known: float) -> float | None:

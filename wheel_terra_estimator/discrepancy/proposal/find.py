@@ -18,7 +18,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wheel_terra_estimator.discrepancy.assessment.held_out import hold_out, slip_groups
-from wheel_terra_estimator.discrepancy.effect_keys import effect_of
 from wheel_terra_estimator.discrepancy.fitting.coordinates import AS_THEY_ARE, narrowed
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
 from wheel_terra_estimator.discrepancy.proposal.words import law_in_words, limits_of_trust
@@ -32,8 +31,9 @@ from wheel_terra_estimator.discrepancy.selection.remainder import IMPROBABLE_SOI
 from wheel_terra_estimator.discrepancy.selection.search import Findings
 from wheel_terra_estimator.discrepancy.selection.signatures import against_soil
 from wheel_terra_estimator.discrepancy.selection.significance import soil_p_value
+from wheel_terra_estimator.discrepancy.selection.weights import explain_fewer
 from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES, SteadyTable
-from wheel_terra_estimator.terramechanics.effects.base import Effect
+from wheel_terra_estimator.terramechanics.effects.base import Effect, effect_of
 from wheel_terra_estimator.terramechanics.effects.learned_closure import (
     BANDS,
     BENT_READING,
@@ -248,21 +248,10 @@ def _search(setting: Setting, nothing: Explanation, begun: Sequence[str] = ()) -
         best, score = top, top.log_evidence
         found.append(best)
     if len(best.names) > 2:
-        found.append(_without_idle_terms(setting, best, price))
+        fewer = max(explain_fewer(setting, best), key=lambda e: e.log_evidence)
+        if fewer.log_evidence > best.log_evidence - price:  # later terms have made one idle
+            found.append(fewer)
     return found
-
-
-def _without_idle_terms(setting: Setting, best: Explanation, price: float) -> Explanation:
-    """Leave out terms that later ones have made idle."""
-    fitted = best.fitted
-    sets = [tuple(n for n in best.names if n != name) for name in best.names]
-    starts = [
-        np.array([u for c, u in zip(fitted.coordinates, fitted.u, strict=True) if c.name != name])
-        for name in best.names
-    ]
-    fewer = [setting.explain(f) for f in setting.fit(sets, starts, fitted.angle)]
-    top = max(fewer, key=lambda e: e.log_evidence)
-    return top if top.log_evidence > best.log_evidence - price else best
 
 
 def _groupings(table: SteadyTable, count: int) -> dict[str, IndexArray]:

@@ -1,6 +1,11 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""The corrected model: a parameter file with the effects on, soil refitted, and its provenance."""
+"""All files of a diagnosis; the corrected model with its provenance.
+
+A sensor reads ``gain * true + zero``: zeros and gains of readings that were found as effects are
+written as keys ``sensors.*``, from which estimator, drive rows, diagnosis and ``predict`` start,
+and the effect stays off, so that nothing corrects the same error twice.
+"""
 
 from __future__ import annotations
 
@@ -11,17 +16,32 @@ from pathlib import Path
 import numpy as np
 
 from wheel_terra_estimator.configuration.configuration import Configuration
-from wheel_terra_estimator.discrepancy.effect_keys import effect_of
 from wheel_terra_estimator.discrepancy.numbers import percent
-from wheel_terra_estimator.discrepancy.report.sensor_keys import sensor_keys
 from wheel_terra_estimator.discrepancy.result import (
     Diagnosis,
     FittedParameter,
     Proposal,
     SoilShift,
 )
+from wheel_terra_estimator.terramechanics.effects.base import effect_of
 from wheel_terra_estimator.terramechanics.effects.learned_closure import NAME
 from wheel_terra_estimator.terramechanics.soil import Soil
+
+# Effects that are an error of a reading and nothing else: name -> its parameter.
+_GAINS = {'torque': 'torque_gain', 'sinkage': 'sinkage_gain'}
+_SINKAGE_ZERO, _TORQUE_ZERO = 'sinkage_offset', 'drivetrain_friction'
+
+
+def write_files(diagnosis: Diagnosis, folder: Path, *, pictures: bool) -> None:
+    """Write ``report.json``, ``model.yaml``, ``proposal.yaml`` and, with pictures, the page."""
+    diagnosis.write_json(folder / 'report.json')
+    write_model(diagnosis, folder / 'model.yaml')
+    if diagnosis.proposal:
+        write_proposal(diagnosis, diagnosis.proposal, folder / 'proposal.yaml')
+    if pictures:
+        from wheel_terra_estimator.discrepancy.report.page import write_report
+
+        write_report(diagnosis, folder)
 
 
 def corrected(diagnosis: Diagnosis) -> tuple[Configuration, list[str]]:
@@ -74,7 +94,7 @@ def _with(diagnosis: Diagnosis, changes: dict[str, object]) -> tuple[Configurati
     if stated.get('effect_file'):
         changes.setdefault('effect_file', stated['effect_file'])
     fitted = diagnosis.configuration.replace(changes)  # type: ignore[arg-type]
-    errors, moved = sensor_keys(fitted, _turning(diagnosis))
+    errors, moved = _sensor_keys(fitted, _turning(diagnosis))
     off = {f'effects.{name}.enabled': False for name in moved if name in diagnosis.base_effects}
     kept = [
         key
@@ -85,6 +105,49 @@ def _with(diagnosis: Diagnosis, changes: dict[str, object]) -> tuple[Configurati
     replaced = {**changes, **{f'effects.{name}.enabled': False for name in moved}, **errors}
     whole = diagnosis.configuration.replace(replaced)  # type: ignore[arg-type]
     return whole, [*dict.fromkeys(kept), *off, *errors]
+
+
+def _sensor_keys(
+    configuration: Configuration, turning: float
+) -> tuple[dict[str, object], tuple[str, ...]]:
+    """Return the keys that say the same as the instrument effects of a model, and those effects.
+
+    Parameters
+    ----------
+    configuration : Configuration
+        With the effects on.
+    turning : float
+        +1 or -1: which way the wheel turned in all rows. 0: both ways; a constant friction, which
+        turns with the wheel, is then no zero of the reading and stays an effect.
+    """
+    effects, stds, sensors = configuration.effects, configuration.effects_std, configuration.sensors
+    keys: dict[str, object] = {}
+    moved: list[str] = []
+    for quantity, name in _GAINS.items():
+        gains, zeros = getattr(sensors, name), getattr(sensors, f'{quantity}_zero')
+        factor = 1.0
+        if name in effects:
+            factor += effects[name]['gain']
+            keys[f'sensors.{name}'] = [float(gain * factor) for gain in gains]
+            if quantity == 'torque' and 'gain' in stds.get(name, {}):
+                keys['sensors.torque_gain_std'] = float(stds[name]['gain'] * gains.mean())
+            moved.append(name)
+        owner = _SINKAGE_ZERO if quantity == 'sinkage' else _TORQUE_ZERO
+        found = effects.get(owner)
+        if found is None or (owner == _TORQUE_ZERO and (not turning or 'torque' not in found)):
+            continue
+        # The gain acts on the friction as well: what the motor gives is what is read.
+        parameter, scale = ('offset', 1.0)
+        if owner == _TORQUE_ZERO:
+            parameter, scale = 'torque', turning * factor
+        size = scale * found[parameter]
+        keys[f'sensors.{quantity}_zero'] = [
+            float(zero + gain * size) for zero, gain in zip(zeros, gains, strict=True)
+        ]
+        if parameter in stds.get(owner, {}):
+            keys[f'sensors.{quantity}_zero_std'] = float(stds[owner][parameter] * gains.mean())
+        moved.append(owner)
+    return keys, tuple(moved)
 
 
 def _turning(diagnosis: Diagnosis) -> float:

@@ -67,8 +67,7 @@ def measured_against_model(diagnosis: Diagnosis, narrow: bool = False) -> Figure
         names = ['as configured', _last(diagnosis)]
         lines = _legend_lines(names, table.quantities, narrow)
         figure, axes = _panels(1, table.quantities, height=2.7, legend=lines, narrow=narrow)
-        for axis, name in zip(axes[0], table.quantities, strict=True):
-            q, (scale, unit) = QUANTITIES.index(name), SHOWN[name]
+        for axis, q, scale in _each(axes, table.quantities, 'model [{}]', 'measured [{}]'):
             measured = scale * table.measured[:, q]
             good = np.isfinite(measured) & ~_set_apart(diagnosis, q)
             after = scale * curves.after[:, q]
@@ -85,8 +84,6 @@ def measured_against_model(diagnosis: Diagnosis, narrow: bool = False) -> Figure
             values = np.concatenate([measured[good], after[good], scale * curves.before[good, q]])
             ends = np.array([values.min(), values.max()])
             axis.plot(ends, ends, color=INK, lw=0.8)
-            axis.set(xlabel=f'model [{unit}]', title=words(name))
-            axis.set_ylabel(f'measured [{unit}]')
         handles, labels = axes[0][0].get_legend_handles_labels()
         _legend(figure, handles, labels, lines=lines)
     return figure
@@ -110,8 +107,7 @@ def curves_over_slip(diagnosis: Diagnosis, narrow: bool = False) -> Figure | Non
         lines_of_groups = _legend_lines(texts, table.quantities, narrow)
         legend = below + lines_of_groups
         figure, axes = _panels(1, table.quantities, height=3.0, legend=legend, narrow=narrow)
-        for axis, name in zip(axes[0], table.quantities, strict=True):
-            q, (scale, unit) = QUANTITIES.index(name), SHOWN[name]
+        for axis, q, scale in _each(axes, table.quantities):
             kept = np.isfinite(table.measured[:, q]) & ~_set_apart(diagnosis, q)
             for (_, rows), colour, shape in zip(groups, _DISCRETE, _SHAPES, strict=False):
                 for values, style in ((curves.before, ':'), (curves.after, '-')):
@@ -126,8 +122,6 @@ def curves_over_slip(diagnosis: Diagnosis, narrow: bool = False) -> Figure | Non
                     color=colour,
                     elinewidth=0.9,
                 )
-            axis.set(xlabel='slip', title=words(name))
-            axis.set_ylabel(f'[{unit}]')
         from matplotlib.lines import Line2D
 
         marks = [
@@ -282,8 +276,7 @@ def structural_error(diagnosis: Diagnosis, narrow: bool = False) -> Figure | Non
         names = ['measured minus model', 'smooth part, with two standard deviations']
         lines = _legend_lines(names, table.quantities, narrow)
         figure, axes = _panels(1, table.quantities, height=2.5, legend=lines, narrow=narrow)
-        for axis, name in zip(axes[0], table.quantities, strict=True):
-            q, (scale, unit) = QUANTITIES.index(name), SHOWN[name]
+        for axis, q, scale in _each(axes, table.quantities):
             inside = ~_set_apart(diagnosis, q)
             dots = axis.plot(
                 slip[inside], scale * left.residual[inside, q], 'o', ms=3.5, color=GREY
@@ -298,8 +291,6 @@ def structural_error(diagnosis: Diagnosis, narrow: bool = False) -> Figure | Non
                 elinewidth=0.9,
             )
             axis.axhline(0.0, color=INK, lw=0.8)
-            axis.set(xlabel='slip', title=words(name))
-            axis.set_ylabel(f'[{unit}]')
         _legend(figure, [dots[0], bars], names, lines=lines)
     return figure
 
@@ -318,8 +309,7 @@ def rivals(item: NextMeasurement, narrow: bool = False) -> Figure | None:
         shown = QUANTITIES if aside else QUANTITIES[:-1]
         lines = _legend_lines(names, shown, narrow)
         figure, axes = _panels(1, shown, height=2.2, legend=lines, narrow=narrow)
-        for axis, name in zip(axes[0], shown, strict=True):
-            q, (scale, quantity_unit) = QUANTITIES.index(name), SHOWN[name]
+        for axis, q, scale in _each(axes, shown, label(x_name, unit), 'predicted [{}]'):
             for (rival, values), colour, marker in zip(
                 item.predictions.items(), (BLUE, RED, GREEN, PURPLE), 'oDs^', strict=False
             ):
@@ -332,8 +322,6 @@ def rivals(item: NextMeasurement, narrow: bool = False) -> Figure | None:
                     mfc='none' if marker != 'o' else colour,
                     label=words(rival),
                 )
-            axis.set(title=words(name), xlabel=label(x_name, unit))
-            axis.set_ylabel(f'predicted [{quantity_unit}]')
         handles, labels = axes[0][0].get_legend_handles_labels()
         _legend(figure, handles, labels, lines=lines)
     return figure
@@ -345,6 +333,17 @@ def colour_inputs(diagnosis: Diagnosis) -> list[str]:
     box = [side.input for side in diagnosis.where.box]
     wanted = dict.fromkeys((*box, 'normal_load', 'slope', *varying))
     return [name for name in wanted if name in varying and name != 'slip'][:2] or ['normal_load']
+
+
+def _each(
+    axes: Any, quantities: Sequence[str], x: str = 'slip', y: str = '[{}]'
+) -> Iterator[tuple[Axes, int, float]]:
+    """Yield panel, column and scale of each quantity; then title and labels with its unit."""
+    for axis, name in zip(axes[0], quantities, strict=True):
+        scale, unit = SHOWN[name]
+        yield axis, QUANTITIES.index(name), scale
+        axis.set(xlabel=x.format(unit), title=words(name))
+        axis.set_ylabel(y.format(unit))
 
 
 @contextmanager

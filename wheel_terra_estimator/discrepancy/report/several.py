@@ -15,7 +15,6 @@ from scipy.special import chdtrc
 
 from wheel_terra_estimator.configuration.reader import from_parameters
 from wheel_terra_estimator.configuration.ros_yaml import Value
-from wheel_terra_estimator.discrepancy.effect_keys import effect_of
 from wheel_terra_estimator.discrepancy.fitting.coordinates import (
     EFFECT_SCALES,
     EFFECT_SHARES,
@@ -24,6 +23,7 @@ from wheel_terra_estimator.discrepancy.fitting.coordinates import (
 )
 from wheel_terra_estimator.discrepancy.result import Diagnosis, FittedParameter
 from wheel_terra_estimator.terramechanics.effects import catalogue
+from wheel_terra_estimator.terramechanics.effects.base import effect_of
 
 _CLEAR = 3.0  # nats over the soil alone from which a table favours an effect
 _APART = 0.01  # chance below which sizes of several tables are not one

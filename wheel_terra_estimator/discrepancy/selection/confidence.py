@@ -18,10 +18,10 @@ from importlib.resources import files
 import numpy as np
 from scipy.special import expit
 
-from wheel_terra_estimator.discrepancy.effect_keys import effect_of
 from wheel_terra_estimator.discrepancy.fitting.evidence import log_sum
 from wheel_terra_estimator.discrepancy.selection.verdict import Verdict
 from wheel_terra_estimator.discrepancy.selection.weights import Selection
+from wheel_terra_estimator.terramechanics.effects.base import effect_of
 
 FEATURES = (
     'one',

@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from wheel_terra_estimator.discrepancy.effect_keys import effect_of
 from wheel_terra_estimator.discrepancy.fitting import noise as noises
 from wheel_terra_estimator.discrepancy.fitting.coordinates import Coordinate
 from wheel_terra_estimator.discrepancy.fitting.evidence import Floor
@@ -41,7 +40,7 @@ from wheel_terra_estimator.discrepancy.selection.weights import (
     weigh,
 )
 from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES, SteadyTable
-from wheel_terra_estimator.terramechanics.effects.base import Effect
+from wheel_terra_estimator.terramechanics.effects.base import Effect, effect_of
 
 FloatArray = NDArray[np.float64]
 
@@ -54,7 +53,6 @@ _FIRST_SEEDS = 4  # best single effects to which a second one is added
 _SEEDS = 3  # sets of each size to which one effect more is added
 _BEHIND = 3.0  # nats behind the best of all, up to which that is done
 _ROUNDS = 2  # of adding and swapping
-_SWAPS = 3  # sets in which others are put in the place of each effect, at most
 _NEAR = 2.0  # nats behind the best one, up to which that is done
 _FARTHEST = 2.0  # a slip is moved by at most so many of its deviations
 
@@ -237,24 +235,14 @@ def _seeds(selection: Selection, size: int) -> list[Explanation]:
 
 
 def _with_swaps(setting: Setting, selection: Selection, done: set[frozenset[str]]) -> Selection:
-    """Put others in the place of each effect of the best sets."""
-    for _ in range(_SWAPS):
-        leaders = selection.without_misfit(_SEEDS)
-        best = next(
-            (
-                explanation
-                for weight, explanation in leaders
-                if weight > leaders[0][0] - _NEAR
-                and len(explanation.names) > 1
-                and _effects(explanation) not in done
-            ),
-            None,
-        )
-        if best is None:
-            break
-        done.add(_effects(best))
-        selection = _joined_by(setting, selection, explain_swaps(setting, best))
-    return selection
+    """Put others in the place of each effect of the best set, or of one near it."""
+    leaders = selection.without_misfit(_SEEDS)
+    near = [e for weight, e in leaders if weight > leaders[0][0] - _NEAR and len(e.names) > 1]
+    best = next((e for e in near if _effects(e) not in done), None)
+    if best is None:
+        return selection
+    done.add(_effects(best))
+    return _joined_by(setting, selection, explain_swaps(setting, best))
 
 
 def _effects(explanation: Explanation) -> frozenset[str]:

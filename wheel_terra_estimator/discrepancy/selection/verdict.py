@@ -13,7 +13,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from wheel_terra_estimator.discrepancy.effect_keys import effect_of
 from wheel_terra_estimator.discrepancy.fitting.evidence import log_sum
 from wheel_terra_estimator.discrepancy.selection.remainder import (
     Remainder,
@@ -21,6 +20,7 @@ from wheel_terra_estimator.discrepancy.selection.remainder import (
     remainder,
 )
 from wheel_terra_estimator.discrepancy.selection.weights import Selection
+from wheel_terra_estimator.terramechanics.effects.base import effect_of
 
 FloatArray = NDArray[np.float64]
 
@@ -73,7 +73,7 @@ def choose(
         Unseen rows are off by more than noise and the allowed model error: then a floor is no
         reason to ask a name for higher odds, and nothing "agrees".
     excluded : collection of int
-        Explanations that may not be named: they worsen a quantity on unseen rows.
+        Explanations that may not be named: they are too doubtful.
     """
     joint, unexplained = selection.log_joint, selection.unexplained
     total = np.asarray(log_sum(joint, axis=1))
@@ -105,15 +105,9 @@ def choose(
     after = remainder(selection, best, variance_of)
     if after.significant and _explained(selection, nothing, best) < MOST:
         return Verdict('unexplained', nothing, (), left)
-    return as_named(selection, best, after)
-
-
-def as_named(selection: Selection, index: int, left: Remainder) -> Verdict:
-    """Return the verdict that names explanation number ``index``."""
-    names = selection.explanations[index].names
-    total = np.asarray(log_sum(selection.log_joint, axis=1))
+    names = selection.explanations[best].names
     open_sets = tuple(_rivals(selection, total, names, name) for name in names)
-    return Verdict('named', index, open_sets, left)
+    return Verdict('named', best, open_sets, after)
 
 
 def _best_set(selection: Selection, weight: FloatArray, named: list[int]) -> int:

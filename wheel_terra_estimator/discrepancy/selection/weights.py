@@ -18,7 +18,6 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from wheel_terra_estimator.discrepancy.effect_keys import effect_of
 from wheel_terra_estimator.discrepancy.fitting.evidence import Floor, log_sum
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
 from wheel_terra_estimator.discrepancy.selection.candidates import (
@@ -27,6 +26,7 @@ from wheel_terra_estimator.discrepancy.selection.candidates import (
     linear_starts,
 )
 from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES
+from wheel_terra_estimator.terramechanics.effects.base import effect_of
 
 FloatArray = NDArray[np.float64]
 

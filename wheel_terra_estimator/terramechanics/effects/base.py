@@ -26,6 +26,11 @@ EffectSettings: TypeAlias = Mapping[str, Mapping[str, Any]]
 FORM_MARK = ':'  # between the name of an effect and that of its form in the key of a variant
 
 
+def effect_of(key: str) -> str:
+    """Return the name of the effect, whichever its form: ``multipass`` for ``multipass:rut``."""
+    return key.partition(FORM_MARK)[0]
+
+
 @dataclass(frozen=True)
 class EffectParameter:
     """One number of an effect.
@@ -195,7 +200,7 @@ class Effect:
     @property
     def base_name(self) -> str:
         """Name of the effect, whichever its form."""
-        return self.name.partition(FORM_MARK)[0]
+        return effect_of(self.name)
 
     @cached_property
     def forms(self) -> tuple[Effect, ...]:
