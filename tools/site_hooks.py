@@ -15,13 +15,27 @@ from latex2mathml.converter import convert
 from mkdocs.structure.files import File
 
 sys.path.insert(0, str(Path(__file__).parent))
+from formulas import as_tex
 from notebook_pages import page as notebook_page
 
 SHIM = 'https://unpkg.com/iframe-worker/shim'
+EFFECTS = 'effects.md'
+"""Page whose formulas are written as the terminal shows them, in indented lines."""
 CONTRIBUTING = 'development/contributing.md'
 """Page that shows ``CONTRIBUTING.md`` of the repository."""
 
+BOOSTS = {
+    'laboratory/': 0.2,
+    'development/': 0.2,
+    'estimation/design': 0.3,
+    'models/validation': 0.2,
+}
+"""Beginning of a page's address -> its weight in the search: tasks come before studies."""
+
 _FORMULA = re.compile(r'<(span|div) class="arithmatex">\\[(\[](.*?)\\[)\]]</\1>', re.DOTALL)
+_EFFECT = re.compile(r'^    (\S.*)$', re.MULTILINE)
+_ASSIGN = re.compile(r'<mo>(&#x0002B;|&#x02212;|&#x000D7;)</mo><mo>&#x0003D;</mo>')
+"""An operator like +=, which is one."""
 _OUTSIDE = re.compile(r'\[([^\]]+)\]\((?!docs/|https?:)([^)\s]+)\)')
 _LINK = re.compile(r'(?<!!)\[([^\]]+)\]\(((?:\.\./)+[^)#\s]+)(#[^)\s]*)?\)')
 
@@ -56,7 +70,14 @@ def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
         root = Path(page.file.abs_src_path).parents[2]
         markdown = (root / 'CONTRIBUTING.md').read_text(encoding='utf-8')
         markdown = _OUTSIDE.sub(r'\1 (`\2`)', markdown).replace('](docs/', '](../')
+    for start, boost in BOOSTS.items():
+        if page.file.src_uri.startswith(start):
+            page.meta.setdefault('search', {'boost': boost})
     markdown = markdown.replace('.ipynb)', '.md)')
+    if page.file.src_uri == EFFECTS:
+        markdown = _EFFECT.sub(
+            lambda found: '\n\n'.join(f'$$\n{tex}\n$$' for tex in as_tex(found[1])), markdown
+        )
     depth = len(PurePosixPath(page.file.src_uri).parts) - 1
 
     def plain(match: re.Match[str]) -> str:
@@ -75,7 +96,8 @@ def on_page_content(content: str, **_: Any) -> str:
 
     def drawn(match: re.Match[str]) -> str:
         display = 'block' if match[1] == 'div' else 'inline'
-        return str(convert(html.unescape(match[2]), display=display))
+        drawing = str(convert(html.unescape(match[2]), display=display))
+        return _ASSIGN.sub(r'<mo>\1&#x0003D;</mo>', drawing)
 
     return _FORMULA.sub(drawn, content)
 

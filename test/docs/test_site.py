@@ -1,10 +1,12 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""The built site: two clicks to every page, nothing from elsewhere, a warning is an error."""
+"""The built site: two clicks to every page, nothing cut or from elsewhere, a search that leads."""
 
 from __future__ import annotations
 
+import html
 import importlib.util
+import json
 import re
 import shutil
 import subprocess
@@ -16,7 +18,9 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 NEEDED = ('mkdocs', 'material', 'mkdocstrings', 'latex2mathml')
-SOURCES = ('docs', 'tools', 'wheel_terra_estimator', 'mkdocs.yml', 'CONTRIBUTING.md')
+SOURCES = (
+    'docs', 'tools', 'wheel_terra_estimator', 'config', 'data', 'mkdocs.yml', 'CONTRIBUTING.md',
+)  # fmt: skip
 
 pytestmark = [
     pytest.mark.slow,
@@ -25,6 +29,46 @@ pytestmark = [
         reason='no MkDocs here (requirements/docs.txt)',
     ),
 ]
+
+BROWSER = next((p for name in ('chromium', 'chromium-browser') if (p := shutil.which(name))), None)
+with_a_browser = pytest.mark.skipif(BROWSER is None, reason='no Chromium')
+
+WIDTH = 1280  # [px]
+STUDIES = 'laboratory/soilbin/'
+"""Pages with tables of measurements that scroll sideways."""
+VISIT = """<!DOCTYPE html><body><iframe style="width:%(width)dpx;height:900px"></iframe><pre></pre>
+<script>
+const frame = document.querySelector('iframe');
+const pages = %(pages)s;
+const found = {};
+function next() {
+  if (!pages.length) {
+    document.querySelector('pre').textContent = 'RESULT' + JSON.stringify(found) + 'END';
+    return;
+  }
+  const page = pages.shift();
+  frame.onload = () => {
+    const inside = frame.contentDocument;
+    const column = inside.querySelector('.md-content__inner').getBoundingClientRect().right + 2;
+    const cut = [...inside.querySelectorAll('.md-content pre > code')]
+      .filter((e) => e.scrollWidth > e.clientWidth + 2);
+    const all = '.md-content math, .md-content img, .md-content table';
+    const wide = [...inside.querySelectorAll(all)]
+      .filter((e) => e.getBoundingClientRect().right > column);
+    found[page] = [...cut, ...wide].map((e) => e.tagName + ': ' + e.textContent.slice(0, 60));
+    next();
+  };
+  frame.src = page;
+}
+next();
+</script></body>"""
+
+
+def dumped(address: str) -> str:
+    """Return what a page has become after its scripts."""
+    options = ('--headless', '--no-sandbox', '--disable-gpu', '--allow-file-access-from-files')
+    command = [str(BROWSER), *options, '--virtual-time-budget=60000', '--dump-dom', address]
+    return subprocess.run(command, capture_output=True, text=True, check=True, timeout=300).stdout
 
 
 def build(root: Path, site: Path) -> subprocess.CompletedProcess[str]:
@@ -90,7 +134,37 @@ def test_notebooks_are_shown_with_what_they_print_and_draw(site: Path) -> None:
     for source in (ROOT / 'docs' / 'notebooks').glob('*.ipynb'):
         page = (site / 'notebooks' / f'{source.stem}.html').read_text(encoding='utf-8')
         assert page.count('data:image/svg+xml') >= 1, source.stem
-        assert 'language-text' in page, source.stem
+        assert 'run while the site was built' in page, source.stem
+
+
+@with_a_browser
+def test_nothing_is_cut_on_a_wide_screen(site: Path) -> None:
+    pages = sorted(path.relative_to(site).as_posix() for path in site.rglob('*.html'))
+    pages = [page for page in pages if page != '404.html']
+    visit = site / 'visit_all.html'
+    visit.write_text(VISIT % {'width': WIDTH, 'pages': json.dumps(pages)}, encoding='utf-8')
+    text = dumped(visit.as_uri())
+    visit.unlink()
+    found = json.loads(html.unescape(re.search(r'RESULT(\{.*?\})END', text, re.S)[1]))
+    assert set(found) == set(pages)
+    cut = {page: what for page, what in found.items() if what and not page.startswith(STUDIES)}
+    assert not cut
+
+
+@with_a_browser
+@pytest.mark.parametrize(
+    ('words', 'page'),
+    [
+        ('fit soil', 'tutorials/diagnose_table.html'),
+        ('stuck warning', 'topics.html'),
+        ('how to tune', 'own_rover.html'),
+        ('install', 'install.html'),
+    ],
+)
+def test_a_search_leads_to_the_page_of_the_task(site: Path, words: str, page: str) -> None:
+    text = dumped(f'{(site / "index.html").as_uri()}?q={words.replace(" ", "+")}')
+    first = re.search(r'<a href="([^"]*)" class="md-search-result__link', text)
+    assert first[1].partition('?')[0] == (site / page).as_uri()
 
 
 def test_a_warning_fails_the_build(tmp_path: Path) -> None:

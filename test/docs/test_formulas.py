@@ -1,0 +1,47 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Formulas of the catalogue become mathematics: nothing is lost, brackets close."""
+
+from __future__ import annotations
+
+import importlib.util
+import re
+from pathlib import Path
+
+import pytest
+
+from wheel_terra_estimator.terramechanics.effects import catalogue
+
+SOURCE = Path(__file__).resolve().parents[2] / 'tools' / 'formulas.py'
+SPECIFICATION = importlib.util.spec_from_file_location('formulas', SOURCE)
+formulas = importlib.util.module_from_spec(SPECIFICATION)
+SPECIFICATION.loader.exec_module(formulas)
+
+SYMBOLS = [form.symbol for effect in catalogue().values() for form in effect.forms]
+
+
+@pytest.mark.parametrize(
+    ('formula', 'tex'),
+    [
+        ('F -= kb b D1 z^2, D1 = cot X', ['F -= k_{b} b D_{1} z ^2', 'D_{1} = \\cot X']),
+        ('c, tan(phi) *= (v_rim/0.05)^shear', [
+            'c , \\tan (\\varphi ) \\times= (v_{\\mathrm{rim}} /0.05)^{\\text{shear}}']),
+        ('z = (3 W)^(2/(2N+1));  T += 2 sgn(w)',
+         ['z = (3 W )^{2/(2 N +1)}', 'T += 2 \\mathrm{sgn}(w )']),
+    ],
+)  # fmt: skip
+def test_statements_symbols_and_powers(formula: str, tex: list[str]) -> None:
+    def bare(text: str) -> str:
+        return re.sub(r'\s', '', text)
+
+    assert [bare(line) for line in formulas.as_tex(formula)] == [bare(line) for line in tex]
+
+
+@pytest.mark.parametrize('formula', SYMBOLS)
+def test_every_formula_of_the_catalogue_is_whole(formula: str) -> None:
+    tex = ' '.join(formulas.as_tex(formula))
+    assert tex.count('{') == tex.count('}')
+    numbers = r'\d+(?:\.\d+)?'
+    assert sorted(re.findall(numbers, tex)) == sorted(re.findall(numbers, formula))
+    convert = pytest.importorskip('latex2mathml.converter').convert
+    assert '\\' not in convert(tex) and 'merror' not in convert(tex)
