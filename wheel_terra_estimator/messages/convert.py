@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -45,15 +45,50 @@ INPUT_TYPES = {
 }
 """Input topics of the estimator (relative names) and their message types."""
 
-JOINT_OUTPUTS = (
-    'slip',
-    'sinkage',
-    'slip_stddev',
-    'sinkage_stddev',
-    'mobility',
-    'soil',
-    'slip_on_slope',
-)
+
+class JointFields(NamedTuple):
+    """Fields of an output JointState; an empty list is an empty field."""
+
+    name: tuple[str, ...]
+    position: list[float]
+    velocity: list[float]
+    effort: list[float]
+
+
+def _per_wheel(*columns: str) -> Callable[[EstimateSet, tuple[str, ...]], JointFields]:
+    """Return what takes these fields of a set as position, velocity and effort; '' = none."""
+
+    def fields(estimates: EstimateSet, names: tuple[str, ...]) -> JointFields:
+        return JointFields(
+            names, *[getattr(estimates, column).tolist() if column else [] for column in columns]
+        )
+
+    return fields
+
+
+def _soil(estimates: EstimateSet, names: tuple[str, ...]) -> JointFields:
+    return JointFields(
+        estimates.soil_names, estimates.soil.tolist(), [], estimates.soil_std.tolist()
+    )
+
+
+def _slip_on_slope(estimates: EstimateSet, names: tuple[str, ...]) -> JointFields | None:
+    if estimates.slip_on_slope is None:
+        return None  # once a second
+    slip, std, entrapment = (column.tolist() for column in estimates.slip_on_slope)
+    return JointFields(SLOPE_NAMES, slip, entrapment, std)
+
+
+JOINT_OUTPUTS: dict[str, Callable[[EstimateSet, tuple[str, ...]], JointFields | None]] = {
+    'slip': _per_wheel('slip', 'slip_velocity', 'drawbar_pull'),
+    'sinkage': _per_wheel('sinkage', 'sinkage_rate', 'normal_load'),
+    'slip_stddev': _per_wheel('slip_std', 'slip_velocity_std', 'drawbar_pull_std'),
+    'sinkage_stddev': _per_wheel('sinkage_std', 'sinkage_rate_std', 'normal_load_std'),
+    'mobility': _per_wheel('rim_travel_left', '', 'pull_margin'),
+    'soil': _soil,
+    'slip_on_slope': _slip_on_slope,
+}
+"""Outputs that are a JointState: topic -> its fields; node, replay and recordings publish these."""
 OUTPUT_TYPES = {
     **dict.fromkeys(JOINT_OUTPUTS, JOINT_STATE),
     'slip_class': 'std_msgs/msg/UInt8MultiArray',
@@ -332,34 +367,10 @@ def _weighted(shares: Sequence[float], variances: Sequence[float]) -> float:
     return sum(share * variance for share, variance in zip(shares, variances, strict=True))
 
 
-class JointFields(NamedTuple):
-    """Fields of an output JointState; an empty list is an empty field."""
-
-    name: tuple[str, ...]
-    position: list[float]
-    velocity: list[float]
-    effort: list[float]
-
-
 def joint_fields(estimates: EstimateSet, names: tuple[str, ...]) -> dict[str, JointFields]:
-    """Return per-wheel outputs, ``soil`` and, where due, ``slip_on_slope``, as published."""
-    e = estimates
-    table = {
-        'slip': (e.slip, e.slip_velocity, e.drawbar_pull),
-        'sinkage': (e.sinkage, e.sinkage_rate, e.normal_load),
-        'slip_stddev': (e.slip_std, e.slip_velocity_std, e.drawbar_pull_std),
-        'sinkage_stddev': (e.sinkage_std, e.sinkage_rate_std, e.normal_load_std),
-    }
-    outputs = {
-        topic: JointFields(names, *(column.tolist() for column in columns))
-        for topic, columns in table.items()
-    }
-    outputs['mobility'] = JointFields(names, e.rim_travel_left.tolist(), [], e.pull_margin.tolist())
-    outputs['soil'] = JointFields(e.soil_names, e.soil.tolist(), [], e.soil_std.tolist())
-    if e.slip_on_slope is not None:
-        slip, std, entrapment = (column.tolist() for column in e.slip_on_slope)
-        outputs['slip_on_slope'] = JointFields(SLOPE_NAMES, slip, entrapment, std)
-    return outputs
+    """Return the fields of `JOINT_OUTPUTS` by topic, as published; without those not due."""
+    made = {topic: fields(estimates, names) for topic, fields in JOINT_OUTPUTS.items()}
+    return {topic: fields for topic, fields in made.items() if fields is not None}
 
 
 def twist_covariance(estimates: EstimateSet) -> list[float]:
