@@ -153,7 +153,7 @@ def _client(address: str) -> Any:
         from distributed.comm import connect
     except ImportError as error:
         raise UserError(
-            f"--scheduler: Dask is missing; pip install 'wheel_terra_estimator[cluster]' ({error})"
+            f"--scheduler: Dask is missing; pip install 'dask[distributed]' ({error})"
         ) from None
     for name in ('distributed', 'distributed.client'):
         logging.getLogger(name).setLevel(logging.CRITICAL)  # what is lost is told here

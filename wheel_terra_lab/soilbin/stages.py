@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from wheel_terra_lab.soilbin import geometry, snapshots
-from wheel_terra_lab.soilbin.bookkeeping import SERIES, sums
+from wheel_terra_lab.soilbin.bookkeeping import SERIES, STATE, sums
 from wheel_terra_lab.soilbin.case import Case
 from wheel_terra_lab.soilbin.engine import BinEngine
 
@@ -271,7 +271,7 @@ class Run:
                 f'the checkpoint in {self.folder} could not be written: is the disk full?'
             )
         np.save(new / 'series.npy', np.asarray(series))
-        (new / 'facts.json').write_text(json.dumps({'facts': self.facts}))
+        (new / STATE).write_text(json.dumps({'facts': self.facts}))
         shutil.rmtree(old, ignore_errors=True)
         new.replace(old)
 
@@ -279,10 +279,10 @@ class Run:
         """Load the checkpoint, if there is a whole one."""
         for name in ('checkpoint', 'checkpoint.new'):
             kept = self.folder / name
-            if (kept / 'facts.json').exists():
+            if (kept / STATE).exists():
                 self.engine.load_bed(kept / 'state')
                 self.engine.tilt(self.case.operation.slope, self.case.operation.slope, 1)
                 self.engine.resume_wheel(kept / 'state.rigid', self.case)
-                resumed = json.loads((kept / 'facts.json').read_text())
+                resumed = json.loads((kept / STATE).read_text())
                 return resumed, np.load(kept / 'series.npy').tolist()
         return None
