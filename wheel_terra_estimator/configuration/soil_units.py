@@ -11,8 +11,7 @@ from wheel_terra_estimator.terramechanics.soil import Soil
 # Of 38 soils of the literature (config/soils): c from 50 to 6100 Pa, kphi from 1.8e5 to 8e6
 # N/m^(n+2), K from 0.5 to 200 mm, density from 1200 to 2000 kg/m^3; fits may leave that.
 LEAST_COHESION = 10.0  # [Pa]
-LEAST_MODULUS = 1e4  # [N/m^(n+2)] of kphi + kc/b
-NARROW_WHEEL = 0.1  # [m]
+LEAST_MODULUS = 1e4  # [N/m^(n+2)] of kphi
 GREATEST_SHEAR_MODULUS = 0.3  # [m]
 LEAST_DENSITY = 20.0  # [kg/m^3]
 LEAST_FRICTION_ANGLE = 0.02  # [rad]; 34 degrees stated in radians are 0.6 degrees
@@ -28,13 +27,12 @@ def doubtful_units(soil: Soil, stated: Collection[str]) -> Iterator[tuple[str, s
     stated : collection of str
         Keys that a file states; of the others nothing is said.
     """
-    modulus = soil.frictional_modulus + max(soil.cohesive_modulus, 0.0) / NARROW_WHEEL
     bekker = soil.pressure_law == 'bekker'
     for field, wrong, words in (
         ('cohesion', 0.0 < soil.cohesion < LEAST_COHESION, 'Pa; in kPa? then times 1000'),
         (
             'frictional_modulus',
-            bekker and 0.0 < modulus < LEAST_MODULUS,
+            bekker and 0.0 < soil.frictional_modulus < LEAST_MODULUS,
             'N/m^(n+2); in kN? then kc and kphi times 1000',
         ),
         (

@@ -333,7 +333,7 @@ def test_dask_absent_gives_one_line(tmp_path, monkeypatch):
     import sys
 
     monkeypatch.setitem(sys.modules, 'dask.distributed', None)
-    with pytest.raises(UserError, match=r"pip install 'wheel_terra_estimator\[cluster\]'"):
+    with pytest.raises(UserError, match=r"pip install 'dask\[distributed\]'"):
         study.run_study(jobs(1), tmp_path / 'a.csv', tmp_path, None, 1, 'here:8786')
 
 
