@@ -163,7 +163,7 @@ class InputConverter:
     def __init__(self, layout: InputLayout) -> None:
         self.layout = layout
         self.rejected: Counter[tuple[str, str]] = Counter()
-        self._strangers: dict[str, Sequence[str]] = {}  # topic -> names of a message without wheels
+        self._unknown_names: dict[str, Sequence[str]] = {}  # topic -> names in a message
         self._columns: dict[tuple[str, ...], tuple[list[int], list[int]]] = {}
         self._index = {name: i for i, name in enumerate(layout.names)}
         self._all = list(range(len(layout.names)))
@@ -190,7 +190,7 @@ class InputConverter:
         """Return a reason for a rejection, with the names where these are the reason."""
         if reason != _NO_WHEEL:
             return reason
-        there = ', '.join(self._strangers[topic]) or 'no name'
+        there = ', '.join(self._unknown_names[topic]) or 'no name'
         return f'{reason} but {there}; wheels.names: {", ".join(self.layout.names)}'
 
     def joint_states(self, message: Any) -> WheelOdometry | None:
@@ -304,7 +304,7 @@ class InputConverter:
             return None
         if not self._columns_of(names)[0]:
             self.rejected[topic, _NO_WHEEL] += 1
-            self._strangers[topic] = names
+            self._unknown_names[topic] = names
             return None
         return self._sorted(names, values)
 
