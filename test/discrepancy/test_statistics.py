@@ -36,6 +36,7 @@ from wheel_terra_estimator.discrepancy.fitting.problem import (
     slip_features,
 )
 from wheel_terra_estimator.discrepancy.fitting.soil_deviations import deviations
+from wheel_terra_estimator.discrepancy.report.words import _repeatability
 from wheel_terra_estimator.discrepancy.result import Noise
 from wheel_terra_estimator.discrepancy.selection import confidence
 from wheel_terra_estimator.discrepancy.selection import significance as gap_test
@@ -304,6 +305,12 @@ def test_repeats_give_the_noise():
     std, freedom = noise.repeats(table, 2)
     assert freedom == 32
     assert std == pytest.approx(0.05, rel=0.3)
+    found = noise.stated_noise(table, np.ones(len(QUANTITIES)))
+    assert found.origin == {'torque': 'repeats'} and found.repeatability == {'torque': (std, 32)}
+    for stated, notes in ((0.02, 1), (0.05, 0), (0.2, 1)):
+        given = replace(table, stated_std=np.full_like(table.stated_std, stated))
+        said = _repeatability(noise.stated_noise(given, np.ones(len(QUANTITIES))))
+        assert len(said) == notes and all('scatter by' in text for text in said)
 
 
 def test_confidence_follows_what_speaks_for_a_name():

@@ -255,6 +255,8 @@ class Noise:
     std: FloatArray
     origin: Mapping[str, str]
     degrees_of_freedom: Mapping[str, float]
+    # Quantity -> pooled deviation of rows that repeat one another, its degrees of freedom
+    repeatability: Mapping[str, tuple[float, int]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -326,6 +328,7 @@ class Diagnosis:
                 quantity: {
                     'std': float(np.nanmedian(self.noise.std[:, column])),
                     'origin': self.noise.origin[quantity],
+                    'repeatability': self.noise.repeatability.get(quantity, (None, 0))[0],
                 }
                 for column, quantity in enumerate(QUANTITIES)
                 if quantity in self.noise.origin

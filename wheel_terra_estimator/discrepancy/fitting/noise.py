@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -32,24 +34,27 @@ def stated_noise(table: SteadyTable, scale: FloatArray) -> Noise:
     std = table.stated_std.copy()
     origin: dict[str, str] = {}
     freedom: dict[str, float] = {}
+    repeatability: dict[str, tuple[float, int]] = {}
     for q, quantity in enumerate(QUANTITIES):
         here = np.isfinite(table.measured[:, q])
         if not here.any():
             continue
+        pooled, count = repeats(table, q)
+        if count:
+            repeatability[quantity] = pooled, count
         stated = here & np.isfinite(std[:, q])
         if stated.any():
             # Cells without a stated deviation take the median of the stated ones.
             std[here & ~stated, q] = np.median(std[stated, q])
             origin[quantity], freedom[quantity] = 'given', np.inf
             continue
-        pooled, count = repeats(table, q)
         if count >= ENOUGH_REPEATS:
             std[here, q] = max(pooled, _LEAST * scale[q])
             origin[quantity], freedom[quantity] = 'repeats', float(count)
         else:
             std[here, q] = _FIRST_GUESS * scale[q]
             origin[quantity], freedom[quantity] = 'estimated', 0.0
-    return Noise(std, origin, freedom)
+    return Noise(std, origin, freedom, repeatability)
 
 
 def repeats(table: SteadyTable, quantity: int) -> tuple[float, int]:
@@ -105,7 +110,7 @@ def estimate_noise(noise: Noise, fitted: Fit, problem: Problem, observed: FloatA
         )
         std[:, q] *= value
         freedom[QUANTITIES[q]] = count
-    return Noise(std, noise.origin, freedom)
+    return replace(noise, std=std, degrees_of_freedom=freedom)
 
 
 def _white_part(

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import chdtrc
 
 from wheel_terra_estimator.discrepancy.assessment.along import Stretch
 from wheel_terra_estimator.discrepancy.assessment.gaps import channels_off
@@ -18,13 +19,14 @@ from wheel_terra_estimator.discrepancy.result import (
     Diagnosis,
     NamedEffect,
     NextMeasurement,
+    Noise,
     QuantityGap,
     SoilShift,
 )
 from wheel_terra_estimator.discrepancy.selection.remainder import Remainder
 from wheel_terra_estimator.discrepancy.selection.search import Findings
 from wheel_terra_estimator.discrepancy.selection.verdict import Verdict
-from wheel_terra_estimator.discrepancy.tables.steady_table import SteadyTable
+from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES, SteadyTable
 from wheel_terra_estimator.terramechanics.effects import catalogue
 from wheel_terra_estimator.terramechanics.effects.base import effect_of
 from wheel_terra_estimator.terramechanics.effects.learned_closure import FEATURES
@@ -38,6 +40,7 @@ _SOIL_KEYS = {
 }
 # Inputs that tell effects apart, in the order of how easily a rig varies them.
 _WORTH_VARYING = ('normal_load', 'lug_height')
+_CHANCE = 1e-3  # of a scatter of repeated rows, beside the stated noise
 _COARSE = 0.05  # model-error floor above which agreement says little
 
 
@@ -205,6 +208,7 @@ def notes(
             f'noise of {", ".join(guessed)} was not stated and was estimated from the scatter; '
             'repeats or *_std columns make every figure sharper'
         )
+    found += _repeatability(findings.noise)
     if findings.outliers:
         count = len(findings.outliers)
         found.append(f'{count} {"cell was" if count == 1 else "cells were"} set apart as outliers')
@@ -213,6 +217,21 @@ def notes(
         if c.owner != 'soil' and (u - c.lower < 1e-3 or c.upper - u < 1e-3):
             found.append(f'{c.key} stands at the end of its range ({number(float(c.value(u)))})')
     return tuple(found)
+
+
+def _repeatability(noise: Noise) -> list[str]:
+    """Return where rows that repeat one another scatter by another amount than was stated."""
+    found = []
+    for name, (pooled, count) in noise.repeatability.items():
+        stated = float(np.nanmedian(noise.std[:, QUANTITIES.index(name)]))
+        chance = float(chdtrc(count, count * (pooled / stated) ** 2))
+        if noise.origin[name] == 'given' and not _CHANCE < chance < 1.0 - _CHANCE:
+            found.append(
+                f'{_plain(name)}: rows that repeat one another scatter by '
+                f'{amount(name, pooled, 2)} {SHOWN[name][1]}, its stated noise is '
+                f'{amount(name, stated, 2)}; one of them is wrong'
+            )
+    return found
 
 
 def untried(alike: Mapping[str, tuple[str, ...]]) -> tuple[str, ...]:
