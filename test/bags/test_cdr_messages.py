@@ -146,7 +146,7 @@ def test_packed_messages_are_the_bytes_of_rosbags(
         theirs = factory.store.serialize_cdr(
             factory.twist_stamped(header, 0.3, -0.2, covariance), TWIST
         )
-        assert twists.packed(stamp, 0.3, -0.2, covariance) == bytes(theirs)
+        assert twists.packed(stamp, (0.3, 0.0), -0.2, covariance) == bytes(theirs)
 
 
 def assert_same(found: Any, message: Any) -> None:

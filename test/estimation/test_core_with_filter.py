@@ -14,6 +14,7 @@ from wheel_terra_estimator.estimation.measurements import (
     SinkageReading,
     WheelOdometry,
 )
+from wheel_terra_estimator.estimation.sideways import Sideways
 
 START = 100 * SECOND
 
@@ -53,7 +54,7 @@ def tail(duration=4.0):
 
 def bits(estimates):
     return {
-        name: value.tobytes() if isinstance(value, np.ndarray) else value
+        name: value if isinstance(value, (str, dict, Sideways)) else np.asarray(value).tobytes()
         for name, value in vars(estimates).items()
     }
 

@@ -15,10 +15,12 @@ from estimate_sets import STAMP, some_estimates
 from scipy.spatial.transform import Rotation
 
 from wheel_terra_estimator.estimation.estimates import SlipOnSlope
+from wheel_terra_estimator.estimation.sideways import Sideways
 from wheel_terra_estimator.messages.convert import (
     InputConverter,
     input_layout,
     joint_fields,
+    planar_velocity,
     stamp_of,
     twist_covariance,
 )
@@ -305,7 +307,8 @@ def test_messages_of_rclpy_and_of_rosbags_are_the_same_measurements(
 
 
 def test_every_output_field_is_where_the_contract_wants_it() -> None:
-    e = some_estimates()
+    aside = Sideways(*((k, k + 0.5) for k in range(4)), 0.02, 1e-4)
+    e = some_estimates(sideways=aside)
     names = ('left', 'right')
     found = joint_fields(e, names)
     table = {
@@ -315,6 +318,8 @@ def test_every_output_field_is_where_the_contract_wants_it() -> None:
         'sinkage_stddev': (e.sinkage_std, e.sinkage_rate_std, e.normal_load_std),
         'mobility': (e.rim_travel_left, [], e.pull_margin),
         'soil': (e.soil, [], e.soil_std),
+        'slip_angle': (e.sideways.angle, [], e.sideways.force),
+        'slip_angle_stddev': (e.sideways.angle_std, [], e.sideways.force_std),
     }
     assert list(found) == list(table)
     for topic, columns in table.items():
@@ -333,7 +338,13 @@ def test_slips_on_slopes_go_out_where_a_set_has_them() -> None:
 
 def test_twist_covariance_is_row_major_and_positive() -> None:
     e = some_estimates()
+    assert planar_velocity(e) == (e.forward_velocity, 0.0)
+    unknown = np.array(twist_covariance(e)).reshape(6, 6)
+    assert unknown[1, 1] == 1.0
+    e = some_estimates(sideways=Sideways(*((0.0, 0.0),) * 4, 0.02, 1e-4))
+    assert planar_velocity(e) == (e.forward_velocity, 0.02)
     matrix = np.array(twist_covariance(e)).reshape(6, 6)
+    assert matrix[1, 1] == 1e-4
     assert matrix[0, 0] == e.forward_velocity_variance
     assert matrix[5, 5] == e.yaw_rate_variance
     assert (np.diag(matrix) > 0.0).all()

@@ -39,6 +39,9 @@ WHEEL_FIELDS = (
     'normal_load',
     'rim_travel_left',
     'pull_margin',
+    'slip_angle',
+    'slip_angle_std',
+    'lateral_force',
 )
 
 LONGEST_STEP = 1.0
@@ -50,7 +53,11 @@ _TOPIC_FIELDS = {
     'sinkage': ('sinkage', None, 'normal_load'),
     'sinkage_stddev': ('sinkage_std', None, None),
     'mobility': ('rim_travel_left', None, 'pull_margin'),
+    'slip_angle': ('slip_angle', None, 'lateral_force'),
+    'slip_angle_stddev': ('slip_angle_std', None, None),
 }
+_SIDEWAYS = {'slip_angle': 'angle', 'slip_angle_std': 'angle_std', 'lateral_force': 'force'}
+"""Quantities of `WHEEL_FIELDS` -> fields of `Sideways`; recordings of old have none of them."""
 
 
 _ROW = np.full(256, list(SlipClass).index(SlipClass.UNKNOWN), dtype=np.intp)
@@ -82,6 +89,8 @@ class DriveFigures:
         Greatest sinkage and its standard deviation [m].
     least_margin : (n,) array
         Least pull margin [N].
+    max_lateral_force : (n,) array
+        Greatest size of the lateral force outside of class unknown [N].
     """
 
     def __init__(self, wheels: int) -> None:
@@ -93,6 +102,7 @@ class DriveFigures:
         self.max_sinkage = np.full(wheels, -np.inf)
         self.max_sinkage_std = np.zeros(wheels)
         self.least_margin = np.full(wheels, np.inf)
+        self.max_lateral_force = np.zeros(wheels)
         self._pull = np.zeros(wheels)
         self._known = np.zeros(wheels)
         self._first = self._stamp = 0
@@ -129,6 +139,8 @@ class DriveFigures:
         self.max_sinkage = np.where(deeper, values['sinkage'], self.max_sinkage)
         self.max_sinkage_std = np.where(deeper, values['sinkage_std'], self.max_sinkage_std)
         self.least_margin = np.minimum(self.least_margin, values['pull_margin'])
+        aside = np.where(known, np.abs(values['lateral_force']), 0.0)
+        self.max_lateral_force = np.maximum(self.max_lateral_force, aside)
 
 
 @dataclass(frozen=True)
@@ -188,7 +200,11 @@ class HistoryRecorder:
         """Append a set."""
         e = estimates
         self._slopes = e.slip_on_slope or self._slopes
-        values = {name: getattr(e, name) for name in WHEEL_FIELDS}
+        aside = e.sideways_known()
+        values = {
+            name: getattr(aside, _SIDEWAYS[name]) if name in _SIDEWAYS else getattr(e, name)
+            for name in WHEEL_FIELDS
+        }
         self._figures.add(e.stamp, e.slip_class, values)
         general = (e.forward_velocity, e.forward_velocity_variance)
         row = np.concatenate([general, e.slip_class, *values.values()])
@@ -306,11 +322,14 @@ class _EstimateMessages:
 
     def history(self) -> EstimateHistory:
         """Return the sets that are whole."""
-        wanted = {*WHEEL_FIELDS, 'slip_class', 'forward_velocity'}
+        wanted = {*WHEEL_FIELDS, 'slip_class', 'forward_velocity'} - set(_SIDEWAYS)
         whole = {stamp: row for stamp, row in self._sets.items() if wanted <= row.keys()}
         shape = len(whole), len(self._names)
+        nothing = [0.0] * len(self._names)
 
         def column(name: str) -> NDArray[Any]:
+            if name in _SIDEWAYS:
+                return np.array([row.get(name, nothing) for row in whole.values()])
             return np.array([row[name] for row in whole.values()])
 
         return EstimateHistory(

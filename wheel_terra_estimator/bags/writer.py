@@ -21,6 +21,7 @@ from wheel_terra_estimator.messages.convert import (
     BASE_FRAME,
     OUTPUT_TYPES,
     joint_fields,
+    planar_velocity,
     twist_covariance,
 )
 
@@ -142,7 +143,10 @@ class EstimateBagWriter(BagFile):
                 classes = self.messages.slip_class(estimates.slip_class)
                 self.write(f'{NAMESPACE}/slip_class', classes, log_time)
         twist = self._twists.packed(
-            stamp, estimates.forward_velocity, estimates.yaw_rate, twist_covariance(estimates)
+            stamp,
+            planar_velocity(estimates),
+            estimates.yaw_rate,
+            twist_covariance(estimates),
         )
         self.write_raw(f'{NAMESPACE}/twist', twist, log_time)
         self._write_stuck(estimates.stuck, estimates.stuck_direction, log_time)

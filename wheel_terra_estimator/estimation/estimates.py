@@ -11,6 +11,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from wheel_terra_estimator.estimation.sideways import Sideways
+
 FloatArray = NDArray[np.float64]
 
 NO_ENTRAPMENT_IN_SIGHT = 10.0
@@ -79,3 +81,8 @@ class EstimateSet:
     faults: dict[str, str] = field(default_factory=dict)  # input or state -> words, for diagnostics
     stuck_direction: int = 0  # of the rims that led to `stuck`: 1, -1; 0 none, both or unknown
     slip_on_slope: SlipOnSlope | None = None  # once a second; None = not in this set
+    sideways: Sideways | None = None  # slip angles, lateral force and speed; None = unknown
+
+    def sideways_known(self) -> Sideways:
+        """Return slip angles, lateral forces and speed, with what is unknown said so."""
+        return Sideways.unknown(self.normal_load) if self.sideways is None else self.sideways

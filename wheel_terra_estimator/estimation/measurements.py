@@ -8,6 +8,7 @@ z up) in SI units. ``nan`` marks a wheel that the message did not hold or could 
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import NamedTuple, TypeAlias
 
@@ -105,11 +106,17 @@ class ReferenceVelocity:
         Velocity of ``base_link`` along its x axis [m/s].
     variance : float
         Variance of ``forward`` [(m/s)^2]; 0 or less = not stated.
+    lateral : float
+        Velocity along its y axis [m/s]; nan = not told.
+    lateral_variance : float
+        Variance of ``lateral`` [(m/s)^2]; 0 or less = not stated.
     """
 
     stamp: int
     forward: float
     variance: float
+    lateral: float = math.nan
+    lateral_variance: float = 0.0
 
 
 Measurement: TypeAlias = (

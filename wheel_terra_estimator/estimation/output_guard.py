@@ -77,6 +77,8 @@ class OutputGuard:
         slopes = estimates.slip_on_slope
         if slopes is not None and not np.isfinite(slopes).all():
             changes['slip_on_slope'] = self._good.slip_on_slope
+        if not _sideways_is_finite(estimates):
+            changes['sideways'] = self._good.sideways
         return replace(estimates, **changes)
 
     def _held(self, stamp: int, estimates: EstimateSet, words: str) -> EstimateSet:
@@ -90,6 +92,7 @@ class OutputGuard:
             reasons=blank.reasons,
             forward_velocity_variance=blank.forward_velocity_variance,
             yaw_rate_variance=blank.yaw_rate_variance,
+            sideways=estimates.sideways_known().doubted(blank.normal_load),
             **{name: getattr(blank, name) for name in _WHEEL_FIELDS if name.endswith('_std')},
         )
         self._good = held
@@ -139,4 +142,10 @@ def _is_finite(estimates: EstimateSet) -> bool:
     finite = math.isfinite(np.add.reduce(numbers)) or bool(np.isfinite(numbers).all())
     if estimates.slip_on_slope is not None:
         finite = finite and bool(np.isfinite(estimates.slip_on_slope).all())
-    return finite and all(map(math.isfinite, _SCALARS(estimates)))
+    return (
+        finite and _sideways_is_finite(estimates) and all(map(math.isfinite, _SCALARS(estimates)))
+    )
+
+
+def _sideways_is_finite(estimates: EstimateSet) -> bool:
+    return estimates.sideways is None or estimates.sideways.finite

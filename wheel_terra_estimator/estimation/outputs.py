@@ -31,6 +31,7 @@ from wheel_terra_estimator.estimation.judgement.slip import WheelSlip
 from wheel_terra_estimator.estimation.judgement.stuck.forecast import LONGEST_TIME, WheelForecast
 from wheel_terra_estimator.estimation.judgement.stuck.monitor import StuckAssessment
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
+from wheel_terra_estimator.estimation.sideways import Sideways
 
 FloatArray = NDArray[np.float64]
 Floats = tuple[float, ...]
@@ -74,6 +75,7 @@ class Sources(NamedTuple):
     margin: Floats  # [N]
     assessment: StuckAssessment
     slip_on_slope: SlipOnSlope | None
+    sideways: Sideways | None = None
 
 
 class MissingInputs(NamedTuple):
@@ -168,6 +170,7 @@ class Outputs:
             reasons=reasons_in_words(given),
             faults=faults_in_words(missing),
             slip_on_slope=given.slip_on_slope,
+            sideways=given.sideways,
             **dict(zip(per_wheel, rows, strict=True)),
         )
 

@@ -56,7 +56,12 @@ from wheel_terra_estimator.estimation.filter.sinkage import SinkageUpdate
 from wheel_terra_estimator.estimation.filter.sinkage_process import SinkageProcess
 from wheel_terra_estimator.estimation.filter.soil_process import SoilProcess
 from wheel_terra_estimator.estimation.filter.speed_process import RimSpeeds, SpeedProcess
-from wheel_terra_estimator.estimation.filter.state import GRAVITY_BIAS, SPEED
+from wheel_terra_estimator.estimation.filter.state import (
+    GRAVITY_BIAS,
+    SHEAR_MODULUS,
+    SHEAR_STRENGTH,
+    SPEED,
+)
 from wheel_terra_estimator.estimation.filter.torque import TorqueUpdate
 from wheel_terra_estimator.estimation.filter.whiteness import Whiteness
 from wheel_terra_estimator.estimation.filter.zero_velocity import ZeroVelocityUpdate
@@ -87,6 +92,11 @@ from wheel_terra_estimator.estimation.measurements import ReferenceVelocity, Ste
 from wheel_terra_estimator.estimation.outputs import MissingInputs, Outputs, Sources
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
 from wheel_terra_estimator.estimation.scalars import NAN, known, median
+from wheel_terra_estimator.estimation.sideways import (
+    SidewaysInputs,
+    SidewaysMotion,
+    SidewaysRover,
+)
 from wheel_terra_estimator.estimation.smoothing.tape import Gaussian, Tape
 
 Floats = tuple[float, ...]
@@ -213,6 +223,7 @@ class WheelSoilEstimator:
         self._slips = SlipJudge(rover, sensors)
         self._margin = PullMargin(sensors, layout, models)
         self._slopes = SlopeCurve()
+        self._sideways = SidewaysMotion(SidewaysRover.of(configuration))
         self._stuck = StuckMonitor(StuckSettings.from_configuration(configuration))
         self._outputs = Outputs(configuration, rover, sensors, layout)
         self._learned = Learned(
@@ -247,6 +258,7 @@ class WheelSoilEstimator:
             self._slips,
             self._margin,
             self._slopes,
+            self._sideways,
             self._stuck,
         )
         self._tape = tape
@@ -298,6 +310,10 @@ class WheelSoilEstimator:
         self._take(time, inputs)
         rolled = inputs.wheel_odometry is not None
         silent = self._wheels.silent(time)
+        if inputs.reference is not None and not isnan(inputs.reference.lateral):
+            stated = inputs.reference.lateral_variance or self._sensors.reference_std**2
+            floor = self._sensors.reference_std_floor**2
+            self._sideways.correct(inputs.reference.lateral, max(stated, floor))
         if inputs.reference is not None or (self._cycle_is_due(time) and (rolled or silent)):
             self._run_cycle(time, inputs.reference)
         if rolled or silent:
@@ -723,6 +739,7 @@ class WheelSoilEstimator:
         self._clock = self._clock._replace(assessment=assessment, speed=(speed, variance))
         self._margin.update(time, ekf.mean, loads, self._contact_age.state.direction)
         self._learn_slopes(time, slips, rims, motion.lateral_motion)
+        self._follow_sideways(time, body, rims)
         if self._tape is not None:
             self._tape.mark(self._instant(time, body), Gaussian(ekf.mean, ekf.covariance))
 
@@ -751,6 +768,33 @@ class WheelSoilEstimator:
                 median([rim for _, rim in turning]) * since if steady and since > 0.0 else 0.0,
                 self._contact_age.state.direction,
             )
+        )
+
+    def _follow_sideways(self, time: float, body: BodyMotion, rims: Floats) -> None:
+        """Follow how the rover slides sideways, once a cycle."""
+        before = self._sideways.state.time
+        if time - before < self._rover.period - _PERIOD_ROUNDING:
+            return
+        loads, ekf, soil = self._loads.state, self._ekf, self._configuration.soil
+        strength = math.exp(float(ekf.mean[SHEAR_STRENGTH]))
+        self._sideways.update(
+            time,
+            SidewaysInputs(
+                speed=body.speed,
+                speed_std=body.speed_std,
+                yaw_rate=body.yaw_rate,
+                yaw_rate_std=body.yaw_rate_std,
+                rims=rims,
+                steering=self._steering.state.angles,
+                loads=loads.load,
+                pulls=tuple(self._pulls.state.pull),
+                sinkage=tuple(ekf.mean[self._layout.sinkage].tolist()),
+                lateral_force=loads.force[1] if loads.force_known else NAN,
+                lateral_force_std=self._sensors.specific_force_bias_std,
+                cohesion=float(soil.cohesion) * strength,
+                tan_friction=math.tan(float(soil.friction_angle)) * strength,
+                shear_modulus=float(soil.shear_modulus) * math.exp(float(ekf.mean[SHEAR_MODULUS])),
+            ),
         )
 
     def _instant(self, time: float, body: BodyMotion) -> Instant:
@@ -813,6 +857,7 @@ class WheelSoilEstimator:
             margin=self._margin.state.margin,
             assessment=self._clock.assessment,
             slip_on_slope=self._slopes.state.told,
+            sideways=self._sideways.state.told,
         )
 
     def learned(self) -> dict[str, Any]:

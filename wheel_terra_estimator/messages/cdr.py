@@ -333,12 +333,16 @@ class TwistPacker:
         self._form = struct.Struct(f'<4siI{len(self._beginning)}s42d')
 
     def packed(
-        self, stamp: int, forward: float, yaw_rate: float, covariance: Sequence[float]
+        self,
+        stamp: int,
+        velocity: tuple[float, float],
+        yaw_rate: float,
+        covariance: Sequence[float],
     ) -> bytes:
-        """Return the CDR bytes of a message; the stamp in ns, 36 covariances."""
+        """Return the CDR bytes of a message: stamp [ns], velocity x and y, 36 covariances."""
         seconds, nanoseconds = divmod(stamp, 1_000_000_000)
-        velocity = (forward, 0.0, 0.0, 0.0, 0.0, yaw_rate)
-        return self._form.pack(_HEAD, seconds, nanoseconds, self._beginning, *velocity, *covariance)
+        twist = (*velocity, 0.0, 0.0, 0.0, yaw_rate)
+        return self._form.pack(_HEAD, seconds, nanoseconds, self._beginning, *twist, *covariance)
 
 
 def _string(text: str) -> bytes:

@@ -79,6 +79,16 @@ def _slip_on_slope(estimates: EstimateSet, names: tuple[str, ...]) -> JointField
     return JointFields(SLOPE_NAMES, slip, entrapment, std)
 
 
+def _slip_angle(estimates: EstimateSet, names: tuple[str, ...]) -> JointFields:
+    told = estimates.sideways_known()
+    return JointFields(names, list(told.angle), [], list(told.force))
+
+
+def _slip_angle_std(estimates: EstimateSet, names: tuple[str, ...]) -> JointFields:
+    told = estimates.sideways_known()
+    return JointFields(names, list(told.angle_std), [], list(told.force_std))
+
+
 JOINT_OUTPUTS: dict[str, Callable[[EstimateSet, tuple[str, ...]], JointFields | None]] = {
     'slip': _per_wheel('slip', 'slip_velocity', 'drawbar_pull'),
     'sinkage': _per_wheel('sinkage', 'sinkage_rate', 'normal_load'),
@@ -87,6 +97,8 @@ JOINT_OUTPUTS: dict[str, Callable[[EstimateSet, tuple[str, ...]], JointFields | 
     'mobility': _per_wheel('rim_travel_left', '', 'pull_margin'),
     'soil': _soil,
     'slip_on_slope': _slip_on_slope,
+    'slip_angle': _slip_angle,
+    'slip_angle_stddev': _slip_angle_std,
 }
 """Outputs that are a JointState: topic -> its fields; node, replay and recordings publish these."""
 OUTPUT_TYPES = {
@@ -99,6 +111,7 @@ OUTPUT_TYPES = {
 """Private output topics of the estimator and their message types."""
 
 BASE_FRAME = 'base_link'
+_FASTEST = 30.0  # lateral speed that no rover has [m/s]
 UNKNOWN_VARIANCE = 1e6
 """Variance of the twist components that are not estimated (finite, so that no filter chokes)."""
 
@@ -291,8 +304,15 @@ class InputConverter:
     def reference_odom(self, message: Any) -> ReferenceVelocity:
         """Body velocity from a slip-free source."""
         twist = message.twist
+        lateral, variance = float(twist.twist.linear.y), float(twist.covariance[7])
+        # Zero is what a source that tells no lateral speed sends; 1e6 what it says of it.
+        told = lateral != 0.0 and abs(lateral) < _FASTEST and not variance >= _FASTEST**2
         return ReferenceVelocity(
-            stamp_of(message), float(twist.twist.linear.x), float(twist.covariance[0])
+            stamp_of(message),
+            float(twist.twist.linear.x),
+            float(twist.covariance[0]),
+            lateral if told else math.nan,
+            variance if variance > 0.0 else 0.0,
         )
 
     def _wheel_values(
@@ -373,10 +393,16 @@ def joint_fields(estimates: EstimateSet, names: tuple[str, ...]) -> dict[str, Jo
     return {topic: fields for topic, fields in made.items() if fields is not None}
 
 
+def planar_velocity(estimates: EstimateSet) -> tuple[float, float]:
+    """Return the velocity of ``base_link`` along x and y [m/s]."""
+    return estimates.forward_velocity, estimates.sideways_known().velocity
+
+
 def twist_covariance(estimates: EstimateSet) -> list[float]:
     """Return the 6 x 6 covariance of ``twist``, row by row (x, y, z, then rotations; REP 103)."""
     diagonal = [UNKNOWN_VARIANCE] * 6
     diagonal[0] = estimates.forward_velocity_variance
+    diagonal[1] = estimates.sideways_known().velocity_variance
     diagonal[5] = estimates.yaw_rate_variance
     covariance = [0.0] * 36
     covariance[::7] = diagonal

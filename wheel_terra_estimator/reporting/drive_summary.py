@@ -49,6 +49,7 @@ class WheelSummary:
     max_sinkage_std: float | None
     mean_pull: float
     least_margin: float
+    max_lateral_force: float
     slip: tuple[float, float] | None = field(default=None, compare=False)
     sinkage: tuple[float, float] | None = field(default=None, compare=False)
 
@@ -182,6 +183,7 @@ def _wheels(history: EstimateHistory, border: Border) -> tuple[WheelSummary, ...
                 max_sinkage_std=std if sinkage else None,
                 mean_pull=float(figures.mean_pull[i]),
                 least_margin=float(figures.least_margin[i]),
+                max_lateral_force=float(figures.max_lateral_force[i]),
                 slip=slip,
                 sinkage=sinkage,
             )

@@ -25,6 +25,9 @@ UNITS = {
     'normal_load': 'N',
     'rim_travel_left': 'm',
     'pull_margin': 'N',
+    'slip_angle': 'rad',
+    'slip_angle_std': 'rad',
+    'lateral_force': 'N',
 }
 SUFFIXES = ('.csv', '.parquet')
 

@@ -140,6 +140,7 @@ def _wheel_row(wheel: Any) -> dict[str, Any]:
             ('max', deepest(wheel)),
             ('mean pull [N]', f'{wheel.mean_pull:.1f}'),
             ('least margin [N]', f'{wheel.least_margin:.1f}'),
+            ('max lateral force [N]', f'{wheel.max_lateral_force:.0f}'),
         ],
     }
 

@@ -21,6 +21,7 @@ from wheel_terra_estimator.messages.convert import (
     BASE_FRAME,
     JOINT_OUTPUTS,
     joint_fields,
+    planar_velocity,
     twist_covariance,
 )
 from wheel_terra_estimator.messages.diagnostics import Status
@@ -98,7 +99,10 @@ class EstimatePublisher:
                 self._publish_classes(estimates)
         if self._twist_publisher.get_subscription_count():
             data = self._twists.packed(
-                stamp, estimates.forward_velocity, estimates.yaw_rate, twist_covariance(estimates)
+                stamp,
+                planar_velocity(estimates),
+                estimates.yaw_rate,
+                twist_covariance(estimates),
             )
             self._twist_publisher.publish(data)
         self.publish_stuck(estimates.stuck, estimates.stuck_direction)

@@ -1,0 +1,299 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""How the body and its wheels slide sideways: on cross slopes, in turns, with steered wheels.
+
+The accelerometer feels the sum of the lateral forces of the soil (specific force along y times
+mass, gravity across the slope and the centripetal force with it). Each wheel resists being pushed
+sideways as its soil is sheared, along and across on one friction circle (Janosi and Hanamoto, with
+the displacement at one place of the contact; Ishigami et al. 2007, doi 10.1002/rob.20187). The
+lateral speed at which these forces add up to the felt one is that of the body; a reference that
+tells it corrects the model. Without one the deviation is that of the model: wide.
+
+Everything here is plain numbers: any estimator that knows speed, turning, loads and soil can ask.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import isnan
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+
+from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.estimation.component import Component
+
+FloatArray = NDArray[np.float64]
+Floats = tuple[float, ...]
+
+_NO_LOAD = 1e-3  # of all wheels [N]
+UNKNOWN_ANGLE_STD = math.pi / math.sqrt(3.0)
+"""Deviation of a slip angle of which nothing is known: even over the whole turn [rad]."""
+
+
+@dataclass(frozen=True)
+class SidewaysTuning:
+    """What the model is worth; none of it was fitted to a drive."""
+
+    contact_share: float = 0.6
+    """Place in the contact, as a share of the entrance angle behind the entry, whose shear
+    displacement stands for all of it."""
+    soil_share: float = (
+        0.4  # of a lateral speed that the soil allows: shear modulus, contact length
+    )
+    strength_share: float = 0.25  # of the lateral force that the soil gives: strength, flank
+    force_share: float = 0.3  # of the lateral force of one wheel: how the sum is shared out
+    load_share: float = 0.03  # of the weight: forces of ruts, stones and toe
+    speed_share: float = 0.02  # of the speed: lateral speed that nothing here tells
+    memory: float = 5.0  # travel over which what a reference told of the model fades [m]
+    smoothing: float = 0.5  # time constant of the felt force: vibration slides no wheel [s]
+    blind_force: float = 2.0  # lateral specific force without an accelerometer [m/s^2]
+
+
+class SidewaysRover(NamedTuple):
+    """Constants of a rover; one entry per wheel."""
+
+    longitudinal: Floats  # x [m]
+    lateral: Floats  # y [m]
+    radius: Floats  # of the rim [m]
+    width: Floats  # [m]
+    mass: float  # [kg]
+    rest_speed: float  # [m/s]
+
+    @classmethod
+    def of(cls, configuration: Configuration) -> SidewaysRover:
+        """Return the constants of a configuration."""
+        wheels = configuration.wheels
+        per_wheel = (wheels.x, wheels.y, wheels.radius, wheels.width)
+        x, y, radius, width = (tuple(map(float, values)) for values in per_wheel)
+        mass = float(configuration.rover.mass)
+        return cls(x, y, radius, width, mass, float(configuration.rest_speed))
+
+
+class SidewaysInputs(NamedTuple):
+    """What is known of the rover at a stamp; one entry per wheel where there are several."""
+
+    speed: float  # of the body along x [m/s]
+    speed_std: float
+    yaw_rate: float  # [rad/s]
+    yaw_rate_std: float
+    rims: Floats  # [m/s], nan = unknown
+    steering: Floats  # positive left [rad]
+    loads: Floats  # [N]
+    pulls: Floats  # along the wheels [N]
+    sinkage: Floats  # [m]
+    lateral_force: float  # mean specific force along y of the body [m/s^2], nan = unknown
+    lateral_force_std: float
+    cohesion: float  # [Pa]
+    tan_friction: float
+    shear_modulus: float  # [m]
+
+
+@dataclass(frozen=True)
+class Sideways:
+    """Slip angles, lateral forces and lateral speed; tuples have one entry per wheel."""
+
+    angle: Floats  # [rad]
+    angle_std: Floats
+    force: Floats  # of the soil on the wheel, positive left [N]
+    force_std: Floats
+    velocity: float  # of the body along y [m/s]
+    velocity_variance: float
+
+    @classmethod
+    def unknown(cls, loads: Sequence[float] | FloatArray) -> Sideways:
+        """Return what is known of wheels under these loads [N] before anything moved."""
+        zero = (0.0,) * len(loads)
+        angle_std = (UNKNOWN_ANGLE_STD,) * len(loads)
+        return cls(zero, angle_std, zero, _floats(np.maximum(loads, 1.0)), 0.0, 1.0)
+
+    @property
+    def finite(self) -> bool:
+        """Whether every number is one."""
+        wheels = self.angle, self.angle_std, self.force, self.force_std
+        return all(map(math.isfinite, (*map(sum, wheels), self.velocity, self.velocity_variance)))
+
+    def doubted(self, loads: Sequence[float] | FloatArray) -> Sideways:
+        """Return the values held, with the deviations of nothing known."""
+        return replace(
+            Sideways.unknown(loads), angle=self.angle, force=self.force, velocity=self.velocity
+        )
+
+
+class SidewaysState(NamedTuple):
+    """Memory: what a reference told of the model, and the last answer."""
+
+    time: float = math.nan  # [s]
+    error: float = 0.0  # of the model's lateral speed over the rover's speed [-]
+    doubt: float = 1.0  # share of the model's variance that is left of it [-]
+    pace: float = 0.0  # fastest of rims and hubs [m/s]
+    felt: float = math.nan  # smoothed specific force along y [m/s^2]
+    model_variance: float = 0.0  # of the model's lateral speed alone [(m/s)^2]
+    told: Sideways | None = None
+
+
+class SidewaysMotion(Component[SidewaysState]):
+    """Follows how the rover slides sideways."""
+
+    def __init__(self, rover: SidewaysRover, tuning: SidewaysTuning = SidewaysTuning()) -> None:
+        super().__init__(SidewaysState())
+        self._rover, self._tuning = rover, tuning
+
+    def update(self, time: float, given: SidewaysInputs) -> Sideways:
+        """Return slip angles, lateral forces and lateral speed at a time [s]."""
+        state, tuning = self.state, self._tuning
+        pace = _pace(self._rover, given)
+        since = 0.0 if isnan(state.time) else max(time - state.time, 0.0)
+        travel = pace * since
+        felt = given.lateral_force
+        if not isnan(state.felt) and not isnan(felt):
+            felt = state.felt + (felt - state.felt) * since / (tuning.smoothing + since)
+        given = given._replace(lateral_force=felt)
+        fading = math.exp(-travel / tuning.memory)
+        error, doubt = state.error * fading, 1.0 + (state.doubt - 1.0) * fading * fading
+        if pace < self._rover.rest_speed or sum(given.loads) <= _NO_LOAD:
+            told = self._at_rest(given)
+            self.state = SidewaysState(time, error, doubt, pace, felt, 0.0, told)
+            return told
+        model, model_variance = model_speed(self._rover, given, tuning)
+        told = self._told(given, model + error * pace, doubt * model_variance)
+        self.state = SidewaysState(time, error, doubt, pace, felt, model_variance, told)
+        return told
+
+    def correct(self, lateral: float, variance: float) -> None:
+        """Take the lateral speed of the body from a slip-free reference [m/s], [(m/s)^2]."""
+        state = self.state
+        if state.told is None or state.pace < self._rover.rest_speed or not state.model_variance:
+            return
+        prior = state.doubt * state.model_variance
+        gain = prior / (prior + variance)
+        error = state.error + gain * (lateral - state.told.velocity) / state.pace
+        self.state = state._replace(error=error, doubt=(1.0 - gain) * state.doubt)
+
+    def _at_rest(self, given: SidewaysInputs) -> Sideways:
+        """Return the answer of wheels that stand: angles held, the felt force shared by load."""
+        loads = np.array(given.loads)
+        last = self.state.told or Sideways.unknown(given.loads)
+        total, std = _felt_force(self._rover, given, self._tuning)
+        share = loads / max(float(loads.sum()), 1e-9)
+        force_std = np.hypot(np.abs(total * share), std * share) + self._tuning.load_share * loads
+        return Sideways(
+            last.angle,
+            (UNKNOWN_ANGLE_STD,) * len(loads),
+            _floats(total * share),
+            _floats(np.maximum(force_std, 1e-3)),
+            0.0,
+            (0.5 * self._rover.rest_speed) ** 2,
+        )
+
+    def _told(self, given: SidewaysInputs, velocity: float, variance: float) -> Sideways:
+        tuning, rover = self._tuning, self._rover
+        x, y = np.array(rover.longitudinal), np.array(rover.lateral)
+        sine, cosine = np.sin(given.steering), np.cos(given.steering)
+        forward = given.speed - given.yaw_rate * y
+        aside = velocity + given.yaw_rate * x
+        along, across = forward * cosine + aside * sine, aside * cosine - forward * sine
+        # How far speed, turning and lateral speed are known, turned into the wheel.
+        turning = given.yaw_rate_std**2
+        var_forward = given.speed_std**2 + turning * y * y
+        var_aside = variance + turning * x * x
+        var_along = var_forward * cosine**2 + var_aside * sine**2
+        var_across = var_forward * sine**2 + var_aside * cosine**2
+        square = np.maximum(along**2 + across**2, rover.rest_speed**2)
+        angle_std = np.sqrt(along**2 * var_across + across**2 * var_along) / square
+        forces = np.array(wheel_forces(rover, given, velocity, tuning))
+        _, std = _felt_force(rover, given, tuning)
+        loads = np.array(given.loads)
+        shared = std * loads / max(float(loads.sum()), 1e-9)
+        force_std = np.hypot(tuning.force_share * np.abs(forces), shared)
+        return Sideways(
+            _floats(np.arctan2(across, along)),
+            _floats(np.minimum(angle_std, UNKNOWN_ANGLE_STD)),
+            _floats(forces),
+            _floats(np.maximum(force_std, 1e-3)),
+            float(velocity),
+            max(variance, 1e-12),
+        )
+
+
+def _floats(values: FloatArray) -> Floats:
+    return tuple(values.tolist())
+
+
+def wheel_forces(
+    rover: SidewaysRover, given: SidewaysInputs, lateral: float, tuning: SidewaysTuning
+) -> list[float]:
+    """Return the lateral force of each wheel, positive left [N], at a lateral speed [m/s]."""
+    found = []
+    for i, (rim, angle, load) in enumerate(
+        zip(given.rims, given.steering, given.loads, strict=True)
+    ):
+        sine, cosine = math.sin(angle), math.cos(angle)
+        forward = given.speed - given.yaw_rate * rover.lateral[i]
+        aside = lateral + given.yaw_rate * rover.longitudinal[i]
+        along, across = forward * cosine + aside * sine, aside * cosine - forward * sine
+        turned = along if isnan(rim) else rim
+        fastest = max(abs(turned), math.hypot(along, across), rover.rest_speed)
+        depth = min(max(given.sinkage[i], 1e-4) / rover.radius[i], 1.0)
+        entry = math.acos(1.0 - depth)
+        swept = tuning.contact_share * entry  # by the rim since the soil met it
+        covered = math.sin(entry) - math.sin(entry - swept)  # by the hub, over the radius
+        scale = rover.radius[i] / fastest
+        back, aside = scale * (turned * swept - along * covered), scale * across * swept
+        displacement = max(math.hypot(back, aside), 1e-12)
+        strength = given.tan_friction * load
+        strength += given.cohesion * rover.width[i] * rover.radius[i] * entry
+        share = -math.expm1(-displacement / given.shear_modulus)
+        found.append(-strength * share * aside / displacement)
+    return found
+
+
+def model_speed(
+    rover: SidewaysRover, given: SidewaysInputs, tuning: SidewaysTuning
+) -> tuple[float, float]:
+    """Return the lateral speed of the body by forces alone [m/s], and its variance."""
+    cosine = [math.cos(angle) for angle in given.steering]
+
+    def total(lateral: float) -> float:
+        forces = wheel_forces(rover, given, lateral, tuning)
+        return sum(f * c for f, c in zip(forces, cosine, strict=True))
+
+    pace = _pace(rover, given)
+    felt, felt_std = _felt_force(rover, given, tuning)
+    reach = 2.0 * pace + abs(given.yaw_rate) * max(abs(x) for x in rover.longitudinal)
+    tolerance = 1e-4 * pace
+    free = float(brentq(total, -reach, reach, xtol=tolerance))
+    ends = total(reach), total(-reach)  # the greatest forces to the right and to the left
+    if not ends[0] < felt < ends[1]:
+        lateral = reach if felt <= ends[0] else -reach
+        return lateral, reach**2  # more than this soil gives: sliding without bound
+    lateral = float(brentq(lambda v: total(v) - felt, -reach, reach, xtol=tolerance))
+    step = 0.02 * pace
+    stiffness = (total(lateral - step) - total(lateral + step)) / (2.0 * step)
+    # Softer towards the limit of the strength: there little is known of a speed.
+    doubt = math.hypot(felt_std, tuning.strength_share * felt)
+    std = min(doubt / max(stiffness, 1e-9), reach)
+    variance = std**2 + (tuning.soil_share * (lateral - free)) ** 2
+    return lateral, variance + (tuning.speed_share * pace) ** 2
+
+
+def _pace(rover: SidewaysRover, given: SidewaysInputs) -> float:
+    turning = abs(given.yaw_rate) * max(abs(y) for y in rover.lateral)
+    rims = [abs(rim) for rim in given.rims if not isnan(rim)]
+    return max(abs(given.speed) + turning, *rims) if rims else abs(given.speed) + turning
+
+
+def _felt_force(
+    rover: SidewaysRover, given: SidewaysInputs, tuning: SidewaysTuning
+) -> tuple[float, float]:
+    """Return the sum of lateral forces along y of the body that is felt, and its deviation [N]."""
+    weight = sum(given.loads)
+    pulled = sum(f * math.sin(d) for f, d in zip(given.pulls, given.steering, strict=True))
+    if isnan(given.lateral_force):
+        return -pulled, rover.mass * tuning.blind_force
+    felt = rover.mass * given.lateral_force - pulled
+    return felt, math.hypot(rover.mass * given.lateral_force_std, tuning.load_share * weight)
