@@ -22,7 +22,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.component import Component
@@ -256,6 +255,8 @@ def model_speed(
     rover: SidewaysRover, given: SidewaysInputs, tuning: SidewaysTuning
 ) -> tuple[float, float]:
     """Return the lateral speed of the body by forces alone [m/s], and its variance."""
+    from scipy.optimize import brentq  # late: messages and help ask only for the types above
+
     cosine = [math.cos(angle) for angle in given.steering]
 
     def total(lateral: float) -> float:
