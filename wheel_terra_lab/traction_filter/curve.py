@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wheel_terra_lab.traction_filter.steady_wheel import SteadyWheel
+from wheel_terra_lab.traction_filter.steady_wheel import TorqueCurves
 
 FloatArray = NDArray[np.float64]
 
@@ -44,20 +44,18 @@ class Coefficients(NamedTuple):
 
 
 def coefficients(
-    steady: SteadyWheel, state: FloatArray, speeds: WheelSpeeds, stiffness: FloatArray
+    curves: TorqueCurves, state: FloatArray, speeds: WheelSpeeds
 ) -> Coefficients:
     """Return what the torque of each wheel should be.
 
     Parameters
     ----------
-    steady : SteadyWheel
-        Curve of the soil file.
+    curves : TorqueCurves
+        Of the soil file, for the stiffness under each wheel.
     state : numpy.ndarray
         (3 + n,) shift of the curve and ln strength of each wheel.
     speeds : WheelSpeeds
         Of the wheels.
-    stiffness : numpy.ndarray
-        (n,) ln of stiffness over load, see `SteadyWheel.torque`.
 
     Notes
     -----
@@ -76,8 +74,8 @@ def coefficients(
     b_by_ground = np.where(np.abs(rim) >= np.abs(ground), 0.0, -b * np.sign(ground) / larger)
     total = np.sqrt(e * e + b * b + _LEAST_SLIP**2)
     along = np.abs(e) / total
-    torque, slope = steady.torque(np.where(e >= 0.0, total, -total), stiffness)
-    at_rest = steady.at_zero(stiffness)
+    torque, slope = curves.at(np.where(e >= 0.0, total, -total))
+    at_rest = curves.at_zero
     sheared = torque - at_rest
     strength = np.exp(state[LOG_STRENGTH] + state[WHEELS:])
     by_e = strength * (slope * along**2 + np.abs(sheared) * b * b / total**3)

@@ -49,7 +49,7 @@ from wheel_terra_estimator.estimation.scalars import NAN, gain_of, known
 from wheel_terra_lab.traction_filter.curve import OFFSET, WHEELS
 from wheel_terra_lab.traction_filter.pulls import Contact, PullModel, SumOfPulls, WheelPulls
 from wheel_terra_lab.traction_filter.sinkage import SinkageFilter
-from wheel_terra_lab.traction_filter.speed import BodySlip, Rims, rims_at, solved
+from wheel_terra_lab.traction_filter.speed import BodySlip, Rims, TorqueBalance, rims_at
 from wheel_terra_lab.traction_filter.steady_wheel import SteadyWheel
 
 FloatArray = NDArray[np.float64]
@@ -68,7 +68,7 @@ class TractionTuning:
     log_scale_walk: float = 0.05
     log_strength_walk: float = 0.05
     wheel_walk: float = 0.15
-    reversal_std: float = 0.03  # of the offset, at a change of direction
+    reversal_std: float = 0.1  # of the offset, at a change of direction
     torque_time: float = 0.25  # low-pass of the torques [s]
     torque_std: float = 0.02  # of a torque coefficient, what the sensor's noise leaves
     wheel_noise: float = 0.07  # of a wheel's torque coefficient against the curve
@@ -80,6 +80,12 @@ class TractionTuning:
     most_yaw_rate: float = 0.05  # [rad/s] of a rover that stands
     most_cycles: float = 200.0  # in the mean of the gyro's zero
     blind_std: float = 0.3  # of the slip where nothing tells
+    pull_soil_std: float = 0.05  # ln strength of one wheel's soil, as pulls take it
+    grade_std: float = 0.03  # of a torque coefficient that the slope tells
+    wild_share: float = 0.1  # of the references
+    jump_share: float = 0.1  # of the references that two in a row tell a slip nothing else does
+    wild_range: float = 2.0  # of their slips, evenly
+    slip_walk: float = 0.15  # of the slip that references alone tell [1/sqrt(s)]
     speed_std: float = 5e-4  # [m/s]
     weight_std: float = 0.005  # of the weight that acts along: attitude, small bumps
     limits: tuple[float, float, float, float] = (0.6, 2.5, 1.5, 0.8)
@@ -94,8 +100,12 @@ class Memory(NamedTuple):
     time: float = 0.0  # [s]
     cycle_time: float = NAN
     demand: FloatArray | None = None  # (n,) low-passed torque coefficients; None = not yet
+    torque_told: bool = True
     solution: BodySlip | None = None
     slip: float = 0.1  # of the body, last known
+    slip_variance: float = 1.0
+    last: tuple[float, float] = (-math.inf, 0.0)  # time and slip of the last reference
+    held: tuple[float, float] = (0.0, math.inf)  # slip by references alone, and its variance
     travel: float = 0.0  # of the rims since a start or reversal [m]
     direction: float = 1.0
     still_since: float = NAN
@@ -153,6 +163,7 @@ class TractionEstimator:
         self._start_covariance = self._prior(priors)
         self._ekf = ExtendedKalmanFilter(dim_x=3 + n, dim_z=1)
         self._memory = Memory()
+        self._balance: TorqueBalance | None = None
         self._begin()
 
     def _prior(self, priors: SoilPriors) -> FloatArray:
@@ -266,9 +277,9 @@ class TractionEstimator:
         travel = float(np.abs(rims.speed).max(initial=0.0)) * dt
         self._walk(travel, rims, still)
         self._note_demand(dt, torque, load, loads.slope_share, rims, still=still)
-        self._solve(rims, headings, turning.yaw_rate, load)
+        self._solve(dt, rims, headings, turning.yaw_rate, load)
         if reference is not None:
-            self._fuse_reference(time, reference, rims, headings, turning.yaw_rate, load)
+            self._fuse_reference(time, reference, rims)
         self._follow_wheels(torque, load)
         self._sink(dt, rims, load)
         self._pull(time, rims, load, loads.slope_share, self._total(window, memory.speed[0], load))
@@ -326,8 +337,12 @@ class TractionEstimator:
         if still or not rims.turning.any():
             self._memory = self._memory._replace(demand=None, solution=None)
             return
+        load = np.maximum(load, 0.0)
         before = self._memory.demand
         carried = load > 0.05 * load.mean()
+        torque_told = bool((~np.isnan(torque)).any()) or self._wheels.torque_known(self._memory.time)
+        if not torque_told:
+            torque = self._torque_of_grade(slope_share, load, rims)
         now = torque / (self._radius * np.where(carried, load, np.inf))
         if before is None:
             demand = now
@@ -336,70 +351,122 @@ class TractionEstimator:
             there = ~np.isnan(now)
             demand = np.where(there, before + gain * (now - before), before)
             demand = np.where(np.isnan(before), now, demand)
-        self._memory = self._memory._replace(demand=demand)
+        self._memory = self._memory._replace(demand=demand, torque_told=torque_told)
 
-    def _solve(self, rims: Rims, headings: Headings, yaw_rate: float, load: FloatArray) -> None:
-        """Find the slip of the body."""
+    def _torque_of_grade(self, slope_share: float, load: FloatArray, rims: Rims) -> FloatArray:
+        """Return the torques (n,) [N m] that the nominal soil asks for the pull of this slope."""
+        direction = 1.0 if rims.scale >= 0.0 else -1.0
+        stiffness = self._sinkage.relative_stiffness(np.maximum(load, 1e-3))
+        share = self._steady.torque_for_pull(slope_share * direction, float(np.mean(stiffness)))
+        return np.where(rims.turning, share * direction * load * self._radius, NAN)
+
+    def _solve(self, dt: float, rims: Rims, headings: Headings, yaw_rate: float, load: FloatArray) -> None:
+        """Find the slip of the body that the torques tell."""
         memory = self._memory
         demand = memory.demand
+        self._balance = None
+        held = memory.held[0], memory.held[1] + self._tuning.slip_walk**2 * dt
+        self._memory = memory = memory._replace(held=held)
         if demand is None:
             return
         told = ~np.isnan(demand) & rims.turning
         if not told.any():
             self._memory = memory._replace(solution=None)
             return
-        found = solved(
+        self._balance = TorqueBalance(
             self._steady,
-            self._ekf.x,
             rims._replace(turning=told),
             headings,
             yaw_rate,
             demand=np.nan_to_num(demand),
             load=np.maximum(load, 0.0) + 1e-9,
             stiffness=self._sinkage.relative_stiffness(np.maximum(load, 1e-3)),
-            start=memory.slip,
         )
-        self._memory = memory._replace(solution=found, slip=found.slip)
+        self._settle()
+
+    def _settle(self) -> None:
+        """Solve the balance of torques, and join its slip with that of the references."""
+        memory, tuning, ekf = self._memory, self._tuning, self._ekf
+        start = memory.solution.slip if memory.solution else memory.slip
+        found = self._balance.solved(ekf.x, start, self._torque_variance(), ekf.P)
+        slip, variance = self._joined(found, memory.held)
+        self._memory = memory._replace(solution=found, slip=slip, slip_variance=variance)
+
+    def _joined(self, found: BodySlip, other: tuple[float, float]) -> tuple[float, float]:
+        """Return slip and variance of what the torques and another source tell."""
+        ahead = other[0] - found.slip
+        side = found.above if ahead > 0.0 else found.below
+        own = side**2 + self._tuning.slip_std**2
+        share = own / (own + other[1])
+        both = found.std**2 + self._tuning.slip_std**2
+        return found.slip + share * ahead, (1.0 - share) * both
 
     def _torque_variance(self) -> float:
         """Return the variance of the mean torque coefficient [-]."""
         tuning, contact = self._tuning, self._rover.contact_length
         fresh = math.exp(-self._memory.travel / (tuning.start_share * contact))
-        return tuning.torque_std**2 / self._n + (tuning.start_std * fresh) ** 2
+        told = tuning.torque_std**2 / self._n if self._memory.torque_told else tuning.grade_std**2
+        return told + (tuning.start_std * fresh) ** 2
 
     def _fuse_reference(
         self,
         time: float,
         reference: ReferenceVelocity,
         rims: Rims,
-        headings: Headings,
-        yaw_rate: float,
-        load: FloatArray,
     ) -> None:
         """Correct the curve by a reference velocity, with a heavy-tailed error (Student t)."""
         memory, tuning, ekf, sensors = self._memory, self._tuning, self._ekf, self._sensors
-        found = memory.solution
         self._memory = memory = memory._replace(reference_time=time)
-        if found is None:
+        if abs(rims.scale) < self._rover.low_rim:
             return
         stated = reference.variance if reference.variance > 0.0 else sensors.reference_std**2
-        R = max(stated, sensors.reference_std_floor**2)
-        R += rims.scale**2 * self._torque_variance() / found.slope**2
-        H = -rims.scale * found.gradient
-        expected = rims.body - found.slip * rims.scale
-        residual = reference.forward - expected
-        weight = (tuning.freedom + 1.0) / (tuning.freedom + residual**2 / (H @ ekf.P @ H + R))
-        if weight < 0.3:
-            self._memory = memory._replace(rejected=memory.rejected + 1)
-        ekf.update(
-            np.array([reference.forward]),
-            lambda x: H[None, :],
-            lambda x: np.array([expected]),
-            R=np.array([[R / min(weight, 1.0)]]),
-        )
-        limits = np.array([*tuning.limits[:3], *[tuning.limits[3]] * self._n])
-        ekf.x = np.clip(ekf.x, -limits, limits)
-        self._solve(rims, headings, yaw_rate, load)
+        R = max(stated, sensors.reference_std_floor**2) / rims.scale**2
+        seen = (rims.body - reference.forward) / rims.scale
+        found, balance = memory.solution, self._balance
+        weight = self._trust(seen, R)
+        if found is not None and balance is not None:
+            # Linear about the slip that was known before: on its plateau the torque tells none, but
+            # a slip that is known tells the strength.
+            about = memory.slip
+            curve = balance.mean(balance.at(ekf.x, about), found.weight)
+            residual = curve.lacking - curve.slope * (seen - about)
+            variance = self._torque_variance() + curve.slope**2 * R
+            H = curve.gradient
+            tail = residual**2 / (H @ ekf.P @ H + variance)
+            weight *= min((tuning.freedom + 1.0) / (tuning.freedom + tail), 1.0)
+            ekf.update(
+                np.array([residual]),
+                lambda x: H[None, :],
+                lambda x: np.zeros(1),
+                R=np.array([[variance / weight]]),
+            )
+            limits = np.array([*tuning.limits[:3], *[tuning.limits[3]] * self._n])
+            ekf.x = np.clip(ekf.x, -limits, limits)
+        if weight < 0.5:
+            self._memory = memory = memory._replace(rejected=memory.rejected + 1)
+        R /= weight
+        held, P = memory.held
+        share = P / (P + R) if P < math.inf else 1.0
+        held = held + share * (seen - held) if P < math.inf else seen
+        self._memory = memory._replace(held=(held, share * R), last=(time, seen))
+        if balance is not None:
+            self._settle()
+
+    def _trust(self, seen: float, variance: float) -> float:
+        """Return the probability that a slip told by a reference is no wild one.
+
+        A sound one is near the slip known before, or near the reference before: the slip may jump.
+        """
+        memory, tuning = self._memory, self._tuning
+        spread = memory.slip_variance + variance
+        sound = math.exp(-0.5 * (seen - memory.slip) ** 2 / spread) / math.sqrt(spread)
+        time, before = memory.last
+        spread = 2.0 * variance + tuning.slip_walk**2 * (memory.time - time)
+        if spread < 1.0:
+            again = math.exp(-0.5 * (seen - before) ** 2 / spread) / math.sqrt(spread)
+            sound = max(sound, tuning.jump_share * again)
+        sound *= (1.0 - tuning.wild_share) / math.sqrt(2.0 * math.pi)
+        return max(sound / (sound + tuning.wild_share / tuning.wild_range), 1e-6)
 
     def _follow_wheels(self, torque: FloatArray, load: FloatArray) -> None:
         """Learn the strength under each wheel from its torque against that of the curve."""
@@ -472,6 +539,8 @@ class TractionEstimator:
         ratio = np.where(slip >= 0.0, 1.0 - slip, 1.0 / np.maximum(1.0 + slip, 0.3))
         rolling = np.where(rims.turning, np.sign(rims.speed), 0.0)
         demand = memory.demand if memory.demand is not None else np.full(n, NAN)
+        if memory.solution is not None:
+            demand = self._believed(demand, memory.solution.expected, load)
         headings, turning = self._steering.state.headings, self._turning.state
         side = np.abs(np.array(headings.side_speeds(memory.speed[0], turning.yaw_rate)))
         contact = Contact(
@@ -490,6 +559,19 @@ class TractionEstimator:
         pulls = self._pull_model.pulls(contact, before, slope_share, total, along)
         self._memory = memory._replace(pulls=pulls)
 
+    def _believed(self, demand: FloatArray, expected: FloatArray, load: FloatArray) -> FloatArray:
+        """Return the torque coefficients, between what is measured and what the curve expects.
+
+        A torque that differs from that of the other wheels tells another soil, or an error of its
+        zero or gain: the shares follow from their deviations.
+        """
+        sensors, tuning = self._sensors, self._tuning
+        common = expected / np.exp(self._ekf.x[WHEELS:])
+        zero = sensors.torque_zero_std / (self._radius * np.maximum(load, 1.0))
+        error = zero**2 + (sensors.torque_gain_std * common) ** 2
+        own = (tuning.pull_soil_std * common) ** 2
+        return common + own / (own + error) * (demand - common)
+
     # -- What it means ---------------------------------------------------------------------------
 
     def _body_speed(self, rims: Rims) -> tuple[float, float]:
@@ -501,9 +583,10 @@ class TractionEstimator:
         if found is None:
             speed = rims.body - memory.slip * rims.scale
             return speed, least + (tuning.blind_std * rims.scale) ** 2
-        spread = float(found.gradient @ self._ekf.P @ found.gradient)
-        spread += self._torque_variance() / found.slope**2 + tuning.slip_std**2
-        return rims.body - found.slip * rims.scale, least + rims.scale**2 * min(spread, 1.0)
+        return (
+            rims.body - memory.slip * rims.scale,
+            least + rims.scale**2 * min(memory.slip_variance, 1.0),
+        )
 
     def _judge(self, time: float) -> None:
         """Judge slip and class of each wheel and the stuck warning at a time [s]."""

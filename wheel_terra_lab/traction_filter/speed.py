@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -31,8 +32,7 @@ class SolverTuning:
     """Numbers of the solution."""
 
     most_slip: float = 0.97  # of the body [-]
-    least_slope: float = 0.1
-    """Of the torque coefficient over the slip [-]: on the plateau torque tells little."""
+    least_slope: float = 0.1  # of the torque coefficient over the slip, in a step [-]
     agreement: float = 0.1
     """Torque coefficient within which wheels agree [-]; what is far beyond loses its weight."""
     agreement_share: float = 0.15  # of the median coefficient, besides
@@ -40,6 +40,7 @@ class SolverTuning:
     scale_share: float = 0.5  # of the fastest rim, where wheels turn against one another
     tolerance: float = 1e-4  # of the slip
     iterations: int = 8
+    reweighted: int = 2
 
 
 class Rims(NamedTuple):
@@ -51,14 +52,28 @@ class Rims(NamedTuple):
     scale: float  # signed speed that the body's slip is a share of [m/s]
 
 
+class MeanTorque(NamedTuple):
+    """Mean torque coefficient of the wheels at a slip of the body, in the direction of driving."""
+
+    lacking: float  # measured less that of the curve [-]
+    slope: float  # of the curve's over the slip [-]
+    gradient: FloatArray  # (3 + n,) of the curve's by the state
+
+
 class BodySlip(NamedTuple):
     """Solution: the body moves at ``rims.body - slip * rims.scale``."""
 
     slip: float
-    gradient: FloatArray  # (3 + n,) by the state
-    slope: float  # of the mean torque coefficient over the slip [-]
+    mean: MeanTorque  # there
     expected: FloatArray  # (n,) torque coefficients there
     weight: FloatArray  # (n,) of the wheels in it
+    above: float  # slip that a torque higher by one deviation would tell, over this one
+    below: float  # the same for a lower torque
+
+    @property
+    def std(self) -> float:
+        """Mean of both sides, as far as slips go [-]."""
+        return 0.5 * (min(self.above, 1.0 - self.slip) + min(self.below, 1.0 + self.slip))
 
 
 def rims_at(
@@ -78,77 +93,125 @@ def rims_at(
     return Rims(rim, np.abs(rim) > low_rim, body, size if body >= 0.0 else -size)
 
 
-def solved(
-    steady: SteadyWheel,
-    state: FloatArray,
-    rims: Rims,
-    headings: Headings,
-    yaw_rate: float,
-    *,
-    demand: FloatArray,
-    load: FloatArray,
-    stiffness: FloatArray,
-    start: float,
-    tuning: SolverTuning = SolverTuning(),
-) -> BodySlip:
-    """Return the slip at which the curve gives the demand, and its gradient by the state.
-
-    Newton's method with bisection on sum(W weight (demand - u)) = 0, three times: each time wheels
-    that disagree with the others lose weight. The gradient follows from the
-    implicit function theorem.
+class TorqueBalance:
+    """Torques that are measured against those of the curve, over the slip of the body.
 
     Parameters
     ----------
+    steady : SteadyWheel
+        Curve of the soil file.
+    rims, headings, yaw_rate
+        Motion of the wheels.
     demand : numpy.ndarray
         (n,) measured torque over load and radius [-].
     load : numpy.ndarray
         (n,) [N].
     stiffness : numpy.ndarray
-        (n,) see `coefficients`.
-    start : float
-        A slip near the solution.
+        (n,) ln of stiffness over load, see `SteadyWheel.torques`.
     """
-    by_speed, by_yaw = np.array(headings.by_speed), np.array(headings.by_yaw_rate)
-    side_by_speed, side_by_yaw = (
-        np.array(headings.side_by_speed),
-        np.array(headings.side_by_yaw_rate),
-    )
-    direction = 1.0 if rims.scale >= 0.0 else -1.0
-    size = abs(rims.scale)
-    carried = load * rims.turning
 
-    def at(slip: float) -> Coefficients:
-        body = rims.body - slip * rims.scale
-        ground = by_speed * body + by_yaw * yaw_rate
-        sideways = side_by_speed * body + side_by_yaw * yaw_rate
-        return coefficients(steady, state, WheelSpeeds(rims.speed, ground, sideways), stiffness)
+    def __init__(
+        self,
+        steady: SteadyWheel,
+        rims: Rims,
+        headings: Headings,
+        yaw_rate: float,
+        *,
+        demand: FloatArray,
+        load: FloatArray,
+        stiffness: FloatArray,
+        tuning: SolverTuning = SolverTuning(),
+    ) -> None:
+        self._steady, self._stiffness, self._tuning = steady, stiffness, tuning
+        self._curves = steady.torques(stiffness)
+        self.rims, self.demand = rims, demand
+        self._by_speed = np.array(headings.by_speed)
+        self._ground = np.array(headings.by_yaw_rate) * yaw_rate
+        self._side_by_speed = np.array(headings.side_by_speed)
+        self._side = np.array(headings.side_by_yaw_rate) * yaw_rate
+        self._direction = 1.0 if rims.scale >= 0.0 else -1.0
+        self._carried = load * rims.turning
+        usual = np.median(np.abs(demand[rims.turning])) if rims.turning.any() else 0.0
+        self._usual = tuning.agreement + tuning.agreement_share * float(usual)
 
-    slip, weight = start, carried / carried.sum()
-    for last in (False, False, True):
+    def at(self, state: FloatArray, slip: float) -> Coefficients:
+        """Return the torque coefficients of the curve at a slip of the body."""
+        body = self.rims.body - slip * self.rims.scale
+        speeds = WheelSpeeds(
+            self.rims.speed,
+            self._by_speed * body + self._ground,
+            self._side_by_speed * body + self._side,
+        )
+        return coefficients(self._curves, state, speeds)
+
+    def mean(self, u: Coefficients, weight: FloatArray) -> MeanTorque:
+        """Return the weighted mean of coefficients of `at`."""
+        gradient = np.empty(WHEELS + len(weight))
+        gradient[OFFSET] = weight @ u.by_offset
+        gradient[LOG_SCALE] = weight @ u.by_log_scale
+        gradient[LOG_STRENGTH] = weight @ u.value
+        gradient[WHEELS:] = weight * u.value
+        return MeanTorque(
+            float(weight @ (self.demand - u.value)) * self._direction,
+            -float(weight @ (u.by_ground_speed * self._by_speed)) * abs(self.rims.scale),
+            gradient * self._direction,
+        )
+
+    def solved(self, state: FloatArray, start: float, variance: float, P: FloatArray) -> BodySlip:
+        """Return the slip at which the curve gives the demand.
+
+        Newton's method with bisection on sum(W weight (demand - u)) = 0, three times: each time
+        wheels that disagree with the others lose weight.
+
+        Parameters
+        ----------
+        state, P : numpy.ndarray
+            (3 + n,) and its covariance.
+        start : float
+            A slip near the solution.
+        variance : float
+            Of the mean of the measured torque coefficients [-].
+        """
+        tuning = self._tuning
+        slip, weight = start, self._carried / self._carried.sum()
+        for _ in range(tuning.reweighted):
+            slip, u = self._root(state, slip, weight)
+            residual = (self.demand - u.value) / self._usual
+            weight = self._carried / (1.0 + residual**2 / tuning.freedom) ** 2
+            weight = weight / weight.sum()
+        slip, u = self._root(state, slip, weight)
+        mean = self.mean(u, weight)
+        std = math.sqrt(variance + float(mean.gradient @ P @ mean.gradient))
+        scale = math.exp(state[LOG_SCALE])
+        below, above = self._steady.reach(
+            (slip - state[OFFSET]) / scale,
+            float(weight @ self._stiffness),
+            std / math.exp(state[LOG_STRENGTH] + float(weight @ state[WHEELS:])),
+        )
+        return BodySlip(
+            slip,
+            mean,
+            u.value,
+            weight,
+            above=max(min(above * scale, 1.0), 0.0),
+            below=max(min(below * scale, 1.0), 0.0),
+        )
+
+    def _root(
+        self, state: FloatArray, slip: float, weight: FloatArray
+    ) -> tuple[float, Coefficients]:
+        tuning = self._tuning
         low, high = -tuning.most_slip, tuning.most_slip
+        size = abs(self.rims.scale)
         for _ in range(tuning.iterations):
-            u = at(slip)
-            lacking = float(weight @ (demand - u.value)) * direction
+            u = self.at(state, slip)
+            lacking = float(weight @ (self.demand - u.value)) * self._direction
             low, high = (slip, high) if lacking > 0.0 else (low, slip)
-            slope = -float(weight @ (u.by_ground_speed * by_speed)) * size
+            slope = -float(weight @ (u.by_ground_speed * self._by_speed)) * size
             ahead = slip + lacking / max(slope, tuning.least_slope)
             ahead = ahead if low <= ahead <= high else 0.5 * (low + high)
             done = abs(ahead - slip) < tuning.tolerance
             slip = ahead
             if done:
                 break
-        u = at(slip)
-        if not last:
-            residual = demand - u.value
-            usual = tuning.agreement + tuning.agreement_share * float(
-                np.median(np.abs(demand[rims.turning]))
-            )
-            weight = carried / (1.0 + (residual / usual) ** 2 / tuning.freedom) ** 2
-            weight = weight / weight.sum()
-    slope = max(-float(weight @ (u.by_ground_speed * by_speed)) * size, tuning.least_slope)
-    gradient = np.empty(len(state))
-    gradient[OFFSET] = weight @ u.by_offset
-    gradient[LOG_SCALE] = weight @ u.by_log_scale
-    gradient[LOG_STRENGTH] = weight @ u.value
-    gradient[WHEELS:] = weight * u.value
-    return BodySlip(slip, -direction * gradient / slope, slope, u.value, weight)
+        return slip, u

@@ -31,6 +31,7 @@ _SLIPS = np.array((*_SKIDDING, *_DRIVING))
 _STIFFNESS = np.linspace(-2.4, 2.4, 9)
 """Logarithms of the factor on the bearing moduli [-]."""
 _STEPS = 400  # of the even grid over slips -1 to 1, read linearly
+_EVEN = np.linspace(-1.0, 1.0, _STEPS + 1)
 _LARGEST_RATIO = 3.0  # v/(r w) of a wheel that is dragged
 _SINKAGE_RANGE = (1e-5, 0.9)  # of the radius, within which the load is carried
 _FITTED = _SLIPS >= -0.15  # slips over which a curve of another soil is fitted
@@ -49,6 +50,30 @@ class CurveShift:
     offset: float = 0.0  # [-]
     log_scale: float = 0.0
     log_strength: float = 0.0
+
+
+class TorqueCurves:
+    """Torque over load and radius of each wheel over its slip, (n, m) on an even grid.
+
+    Attributes
+    ----------
+    at_zero : numpy.ndarray
+        (n,) of wheels that roll without slip [-].
+    """
+
+    def __init__(self, torque: FloatArray, slope: FloatArray) -> None:
+        self._torque, self._slope = torque, slope
+        self._wheels = np.arange(len(torque))
+        self.at_zero = torque[:, _STEPS // 2]
+
+    def at(self, slip: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return torque coefficient and its slope over the slip, (n,) each; held beyond -1 and 1."""
+        column = np.clip((slip + 1.0) * (_STEPS / 2), 0.0, _STEPS - 1e-9)
+        j = column.astype(np.intp)
+        b, wheels = column - j, self._wheels
+        torque = self._torque[wheels, j] * (1.0 - b) + self._torque[wheels, j + 1] * b
+        slope = self._slope[wheels, j] * (1.0 - b) + self._slope[wheels, j + 1] * b
+        return torque, np.where(np.abs(slip) < 1.0, slope, _LEAST_SLOPE)
 
 
 class SteadyWheel:
@@ -72,42 +97,60 @@ class SteadyWheel:
         self._rover = rover
         self.load = rover.mass * rover.gravity / rover.wheel_count
         rows = [self._row(float(k)) for k in _STIFFNESS]
-        even = np.linspace(-1.0, 1.0, _STEPS + 1)
         torque, pull, sinkage = (np.array(columns) for columns in zip(*rows, strict=True))
         curves = [PchipInterpolator(_SLIPS, _increasing(row)) for row in torque]
-        self._torque = np.array([curve(even) for curve in curves])
+        self._torque = np.array([curve(_EVEN) for curve in curves])
         self._slope = np.array(
-            [np.maximum(curve.derivative()(even), _LEAST_SLOPE) for curve in curves]
+            [np.maximum(curve.derivative()(_EVEN), _LEAST_SLOPE) for curve in curves]
         )
-        self._pull = np.array([PchipInterpolator(_SLIPS, row)(even) for row in pull])
+        self._pull = np.array([PchipInterpolator(_SLIPS, row)(_EVEN) for row in pull])
         self._log_sinkage = np.array(
-            [PchipInterpolator(_SLIPS, np.log(row))(even) for row in sinkage]
+            [PchipInterpolator(_SLIPS, np.log(row))(_EVEN) for row in sinkage]
         )
 
-    def torque(self, slip: FloatArray, stiffness: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return torque / (load x radius) and its slope over the slip, (n,) each [-].
+    def torques(self, stiffness: FloatArray) -> TorqueCurves:
+        """Return the torque curves of wheels on soils of some stiffness.
 
         Parameters
         ----------
-        slip : numpy.ndarray
-            (n,) slip ratios; held at -1 and 1 beyond.
         stiffness : numpy.ndarray
             (n,) logarithm of stiffness over load, against soil file and mean load.
         """
-        place = _place(slip, stiffness)
-        slope = np.where(np.abs(slip) < 1.0, _read(self._slope, place), _LEAST_SLOPE)
-        return _read(self._torque, place), slope
+        i, _, a, _ = _place(np.zeros(len(stiffness)), stiffness)
+        a = a[:, None]
+        torque, slope = (t[i] * (1.0 - a) + t[i + 1] * a for t in (self._torque, self._slope))
+        return TorqueCurves(torque, slope)
 
-    def at_zero(self, stiffness: FloatArray) -> FloatArray:
-        """Return the torque coefficient of a wheel that rolls without slip (n,) [-]."""
-        return self.torque(np.zeros_like(stiffness), stiffness)[0]
+    def reach(self, slip: float, stiffness: float, change: float) -> tuple[float, float]:
+        """Return by how much the slip falls and rises as the torque coefficient does by `change`.
+
+        Infinite where the curve ends before: on its plateau the torque tells little.
+        """
+        i, j, a, b = _place(np.array([slip]), np.array([stiffness]))
+        row = self._torque[i[0]] * (1.0 - a[0]) + self._torque[i[0] + 1] * a[0]
+        here = row[j[0]] * (1.0 - b[0]) + row[j[0] + 1] * b[0]
+        low, high = np.interp(
+            [here - change, here + change], row, _EVEN, left=-math.inf, right=math.inf
+        )
+        at = min(max(slip, -1.0), 1.0)
+        return at - float(low), float(high) - at
+
+    def torque_for_pull(self, share: float, stiffness: float) -> float:
+        """Return torque / (load x radius) at the slip that gives a pull, a share of the load."""
+        i, _, a, _ = _place(np.zeros(1), np.array([stiffness]))
+        rows = [
+            table[i[0]] * (1.0 - a[0]) + table[i[0] + 1] * a[0]
+            for table in (self._torque, self._pull)
+        ]
+        slip = np.interp(share, np.maximum.accumulate(rows[1]), _EVEN)
+        return float(np.interp(slip, _EVEN, rows[0]))
 
     def pull(self, slip: FloatArray, stiffness: FloatArray) -> FloatArray:
-        """Return the drawbar pull over the load (n,) [-]; arguments as of `torque`."""
+        """Return the drawbar pull over the load (n,) [-]; (n,) arrays, stiffness as of `torques`."""
         return _read(self._pull, _place(slip, stiffness))
 
     def sinkage(self, slip: FloatArray, stiffness: FloatArray) -> FloatArray:
-        """Return the steady sinkage (n,) [m]; arguments as of `torque`."""
+        """Return the steady sinkage (n,) [m]; (n,) arrays, stiffness as of `torques`."""
         return np.exp(_read(self._log_sinkage, _place(slip, stiffness)))
 
     def shift_to(self, *, strength: float = 0.0, shear_modulus: float = 0.0) -> CurveShift:
@@ -119,10 +162,10 @@ class SteadyWheel:
             Logarithms of the factors on c and tan(phi), and on K.
         """
         wanted = np.array(self._row(0.0, strength, shear_modulus)[0])[_FITTED]
-        level = np.zeros(np.count_nonzero(_FITTED))
+        curves = self.torques(np.zeros(np.count_nonzero(_FITTED)))
 
         def misfit(x: FloatArray) -> FloatArray:
-            torque, _ = self.torque((_SLIPS[_FITTED] - x[0]) * math.exp(-x[1]), level)
+            torque, _ = curves.at((_SLIPS[_FITTED] - x[0]) * math.exp(-x[1]))
             return math.exp(x[2]) * torque - wanted
 
         found = least_squares(misfit, np.zeros(3), bounds=([-0.5, -3.0, -3.0], [0.5, 3.0, 3.0]))
