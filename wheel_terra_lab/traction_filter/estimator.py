@@ -64,7 +64,7 @@ class TractionTuning:
     log_scale_std: float = 0.2
     log_strength_std: float = 0.1
     wheel_std: float = 0.15  # ln strength of one wheel against the others
-    offset_walk: float = 0.03  # [1/sqrt(m)] of rim travel, as all walks
+    offset_walk: float = 0.015  # [1/sqrt(m)] of rim travel, as all walks
     log_scale_walk: float = 0.05
     log_strength_walk: float = 0.05
     wheel_walk: float = 0.15
