@@ -43,9 +43,7 @@ class Coefficients(NamedTuple):
     by_log_scale: FloatArray
 
 
-def coefficients(
-    curves: TorqueCurves, state: FloatArray, speeds: WheelSpeeds
-) -> Coefficients:
+def coefficients(curves: TorqueCurves, state: FloatArray, speeds: WheelSpeeds) -> Coefficients:
     """Return what the torque of each wheel should be.
 
     Parameters

@@ -48,6 +48,7 @@ from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
 from wheel_terra_estimator.estimation.scalars import NAN, gain_of, known
 from wheel_terra_lab.traction_filter.curve import OFFSET, WHEELS
 from wheel_terra_lab.traction_filter.pulls import Contact, PullModel, SumOfPulls, WheelPulls
+from wheel_terra_lab.traction_filter.references import HeldSlip, ReferenceTuning, joined, trust
 from wheel_terra_lab.traction_filter.sinkage import SinkageFilter
 from wheel_terra_lab.traction_filter.speed import BodySlip, Rims, TorqueBalance, rims_at
 from wheel_terra_lab.traction_filter.steady_wheel import SteadyWheel
@@ -73,7 +74,6 @@ class TractionTuning:
     torque_std: float = 0.02  # of a torque coefficient, what the sensor's noise leaves
     wheel_noise: float = 0.07  # of a wheel's torque coefficient against the curve
     freedom: float = 4.0  # of the heavy tail of references and torques
-    slip_std: float = 0.005  # floor
     start_std: float = 0.1  # of a torque coefficient, contact fresh after a start
     start_share: float = 0.5  # of the contact length, after which it is not
     rest_time: float = 0.5  # [s] of standing wheels after which the gyro's zero is learned
@@ -82,10 +82,6 @@ class TractionTuning:
     blind_std: float = 0.3  # of the slip where nothing tells
     pull_soil_std: float = 0.05  # ln strength of one wheel's soil, as pulls take it
     grade_std: float = 0.03  # of a torque coefficient that the slope tells
-    wild_share: float = 0.1  # of the references
-    jump_share: float = 0.1  # of the references that two in a row tell a slip nothing else does
-    wild_range: float = 2.0  # of their slips, evenly
-    slip_walk: float = 0.15  # of the slip that references alone tell [1/sqrt(s)]
     speed_std: float = 5e-4  # [m/s]
     weight_std: float = 0.005  # of the weight that acts along: attitude, small bumps
     limits: tuple[float, float, float, float] = (0.6, 2.5, 1.5, 0.8)
@@ -104,8 +100,7 @@ class Memory(NamedTuple):
     solution: BodySlip | None = None
     slip: float = 0.1  # of the body, last known
     slip_variance: float = 1.0
-    last: tuple[float, float] = (-math.inf, 0.0)  # time and slip of the last reference
-    held: tuple[float, float] = (0.0, math.inf)  # slip by references alone, and its variance
+    held: HeldSlip = HeldSlip()
     travel: float = 0.0  # of the rims since a start or reversal [m]
     direction: float = 1.0
     still_since: float = NAN
@@ -130,7 +125,7 @@ class TractionEstimator:
     def __init__(
         self, configuration: Configuration, tuning: TractionTuning = TractionTuning()
     ) -> None:
-        self._tuning = tuning
+        self._tuning, self._references = tuning, ReferenceTuning()
         self._rover = rover = Rover.from_configuration(configuration)
         self._sensors = sensors = SensorFigures.from_configuration(configuration)
         self._steady = SteadyWheel(configuration, rover)
@@ -340,7 +335,9 @@ class TractionEstimator:
         load = np.maximum(load, 0.0)
         before = self._memory.demand
         carried = load > 0.05 * load.mean()
-        torque_told = bool((~np.isnan(torque)).any()) or self._wheels.torque_known(self._memory.time)
+        torque_told = bool((~np.isnan(torque)).any()) or self._wheels.torque_known(
+            self._memory.time
+        )
         if not torque_told:
             torque = self._torque_of_grade(slope_share, load, rims)
         now = torque / (self._radius * np.where(carried, load, np.inf))
@@ -360,12 +357,14 @@ class TractionEstimator:
         share = self._steady.torque_for_pull(slope_share * direction, float(np.mean(stiffness)))
         return np.where(rims.turning, share * direction * load * self._radius, NAN)
 
-    def _solve(self, dt: float, rims: Rims, headings: Headings, yaw_rate: float, load: FloatArray) -> None:
+    def _solve(
+        self, dt: float, rims: Rims, headings: Headings, yaw_rate: float, load: FloatArray
+    ) -> None:
         """Find the slip of the body that the torques tell."""
         memory = self._memory
         demand = memory.demand
         self._balance = None
-        held = memory.held[0], memory.held[1] + self._tuning.slip_walk**2 * dt
+        held = memory.held.later(dt, self._references)
         self._memory = memory = memory._replace(held=held)
         if demand is None:
             return
@@ -386,20 +385,13 @@ class TractionEstimator:
 
     def _settle(self) -> None:
         """Solve the balance of torques, and join its slip with that of the references."""
-        memory, tuning, ekf = self._memory, self._tuning, self._ekf
+        memory, ekf = self._memory, self._ekf
+        if self._balance is None:
+            return
         start = memory.solution.slip if memory.solution else memory.slip
         found = self._balance.solved(ekf.x, start, self._torque_variance(), ekf.P)
-        slip, variance = self._joined(found, memory.held)
+        slip, variance = joined(found, memory.held, self._references)
         self._memory = memory._replace(solution=found, slip=slip, slip_variance=variance)
-
-    def _joined(self, found: BodySlip, other: tuple[float, float]) -> tuple[float, float]:
-        """Return slip and variance of what the torques and another source tell."""
-        ahead = other[0] - found.slip
-        side = found.above if ahead > 0.0 else found.below
-        own = side**2 + self._tuning.slip_std**2
-        share = own / (own + other[1])
-        both = found.std**2 + self._tuning.slip_std**2
-        return found.slip + share * ahead, (1.0 - share) * both
 
     def _torque_variance(self) -> float:
         """Return the variance of the mean torque coefficient [-]."""
@@ -423,13 +415,13 @@ class TractionEstimator:
         R = max(stated, sensors.reference_std_floor**2) / rims.scale**2
         seen = (rims.body - reference.forward) / rims.scale
         found, balance = memory.solution, self._balance
-        weight = self._trust(seen, R)
+        known = memory.slip, memory.slip_variance
+        weight = trust(seen, R, known, memory.held, self._references)
         if found is not None and balance is not None:
             # Linear about the slip that was known before: on its plateau the torque tells none, but
             # a slip that is known tells the strength.
-            about = memory.slip
-            curve = balance.mean(balance.at(ekf.x, about), found.weight)
-            residual = curve.lacking - curve.slope * (seen - about)
+            curve = balance.mean(balance.at(ekf.x, memory.slip), found.weight)
+            residual = curve.lacking - curve.slope * (seen - memory.slip)
             variance = self._torque_variance() + curve.slope**2 * R
             H = curve.gradient
             tail = residual**2 / (H @ ekf.P @ H + variance)
@@ -444,29 +436,8 @@ class TractionEstimator:
             ekf.x = np.clip(ekf.x, -limits, limits)
         if weight < 0.5:
             self._memory = memory = memory._replace(rejected=memory.rejected + 1)
-        R /= weight
-        held, P = memory.held
-        share = P / (P + R) if P < math.inf else 1.0
-        held = held + share * (seen - held) if P < math.inf else seen
-        self._memory = memory._replace(held=(held, share * R), last=(time, seen))
-        if balance is not None:
-            self._settle()
-
-    def _trust(self, seen: float, variance: float) -> float:
-        """Return the probability that a slip told by a reference is no wild one.
-
-        A sound one is near the slip known before, or near the reference before: the slip may jump.
-        """
-        memory, tuning = self._memory, self._tuning
-        spread = memory.slip_variance + variance
-        sound = math.exp(-0.5 * (seen - memory.slip) ** 2 / spread) / math.sqrt(spread)
-        time, before = memory.last
-        spread = 2.0 * variance + tuning.slip_walk**2 * (memory.time - time)
-        if spread < 1.0:
-            again = math.exp(-0.5 * (seen - before) ** 2 / spread) / math.sqrt(spread)
-            sound = max(sound, tuning.jump_share * again)
-        sound *= (1.0 - tuning.wild_share) / math.sqrt(2.0 * math.pi)
-        return max(sound / (sound + tuning.wild_share / tuning.wild_range), 1e-6)
+        self._memory = memory._replace(held=memory.held.corrected(seen, R / weight))
+        self._settle()
 
     def _follow_wheels(self, torque: FloatArray, load: FloatArray) -> None:
         """Learn the strength under each wheel from its torque against that of the curve."""
@@ -540,7 +511,7 @@ class TractionEstimator:
         rolling = np.where(rims.turning, np.sign(rims.speed), 0.0)
         demand = memory.demand if memory.demand is not None else np.full(n, NAN)
         if memory.solution is not None:
-            demand = self._believed(demand, memory.solution.expected, load)
+            demand = self._believed(demand, memory.solution, load)
         headings, turning = self._steering.state.headings, self._turning.state
         side = np.abs(np.array(headings.side_speeds(memory.speed[0], turning.yaw_rate)))
         contact = Contact(
@@ -556,21 +527,30 @@ class TractionEstimator:
         )
         before = memory.pulls.strength if memory.pulls else np.zeros(n)
         along = np.array(headings.along)
-        pulls = self._pull_model.pulls(contact, before, slope_share, total, along)
+        # A wheel that is held while the rover moves is dragged as one that skids at slip -1.
+        speeds = np.array(headings.by_speed) * memory.speed[0]
+        held = np.abs(np.array(self._wheels.rim_speeds(time))) <= self._rover.rest_speed
+        dragged = held & (np.abs(speeds) > self._rover.low_rim)
+        skidding = self._steady.pull(
+            -np.ones(n), self._sinkage.relative_stiffness(np.maximum(load, 1e-3))
+        )
+        guess = np.where(dragged, np.sign(speeds) * skidding, slope_share)
+        pulls = self._pull_model.pulls(contact, before, guess, total, along)
         self._memory = memory._replace(pulls=pulls)
 
-    def _believed(self, demand: FloatArray, expected: FloatArray, load: FloatArray) -> FloatArray:
+    def _believed(self, demand: FloatArray, found: BodySlip, load: FloatArray) -> FloatArray:
         """Return the torque coefficients, between what is measured and what the curve expects.
 
         A torque that differs from that of the other wheels tells another soil, or an error of its
-        zero or gain: the shares follow from their deviations.
+        zero or gain: the shares follow from their deviations. One that is far off is no such error.
         """
         sensors, tuning = self._sensors, self._tuning
-        common = expected / np.exp(self._ekf.x[WHEELS:])
+        common = found.expected / np.exp(self._ekf.x[WHEELS:])
         zero = sensors.torque_zero_std / (self._radius * np.maximum(load, 1.0))
         error = zero**2 + (sensors.torque_gain_std * common) ** 2
         own = (tuning.pull_soil_std * common) ** 2
-        return common + own / (own + error) * (demand - common)
+        share = np.maximum(own / (own + error), 1.0 - found.agreement)
+        return common + share * (demand - common)
 
     # -- What it means ---------------------------------------------------------------------------
 

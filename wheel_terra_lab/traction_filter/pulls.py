@@ -96,7 +96,7 @@ class PullModel:
         self,
         contact: Contact,
         before: FloatArray,
-        slope_share: float,
+        guess: FloatArray,
         total: SumOfPulls | None,
         along: FloatArray,
     ) -> WheelPulls:
@@ -108,15 +108,15 @@ class PullModel:
             Of all wheels.
         before : numpy.ndarray
             (n,) strengths of the last cycle.
-        slope_share : float
-            What the ground asks of each wheel as a share of its load: the pull without a torque.
+        guess : numpy.ndarray
+            (n,) pull over load of wheels that do not turn or have no torque [-].
         total : SumOfPulls or None
             Of all wheels; None = not known.
         along : numpy.ndarray
             (n,) cosine of the steering angles: share of a pull that counts in the sum.
         """
         tuning = self._tuning
-        pull = slope_share * contact.load
+        pull = guess * contact.load
         std = tuning.guess_std * contact.load
         strength = before.copy()
         for i in range(len(pull)):

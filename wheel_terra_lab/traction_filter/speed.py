@@ -67,6 +67,7 @@ class BodySlip(NamedTuple):
     mean: MeanTorque  # there
     expected: FloatArray  # (n,) torque coefficients there
     weight: FloatArray  # (n,) of the wheels in it
+    agreement: FloatArray  # (n,) of each wheel with the others: 1, towards 0 far off
     above: float  # slip that a torque higher by one deviation would tell, over this one
     below: float  # the same for a lower torque
 
@@ -177,7 +178,8 @@ class TorqueBalance:
         for _ in range(tuning.reweighted):
             slip, u = self._root(state, slip, weight)
             residual = (self.demand - u.value) / self._usual
-            weight = self._carried / (1.0 + residual**2 / tuning.freedom) ** 2
+            agreement = (1.0 + residual**2 / tuning.freedom) ** -2
+            weight = self._carried * agreement
             weight = weight / weight.sum()
         slip, u = self._root(state, slip, weight)
         mean = self.mean(u, weight)
@@ -193,6 +195,7 @@ class TorqueBalance:
             mean,
             u.value,
             weight,
+            agreement,
             above=max(min(above * scale, 1.0), 0.0),
             below=max(min(below * scale, 1.0), 0.0),
         )

@@ -67,7 +67,7 @@ class TorqueCurves:
         self.at_zero = torque[:, _STEPS // 2]
 
     def at(self, slip: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return torque coefficient and its slope over the slip, (n,) each; held beyond -1 and 1."""
+        """Return torque coefficient and its slope over the slip, (n,) each; held beyond +-1."""
         column = np.clip((slip + 1.0) * (_STEPS / 2), 0.0, _STEPS - 1e-9)
         j = column.astype(np.intp)
         b, wheels = column - j, self._wheels
@@ -146,7 +146,7 @@ class SteadyWheel:
         return float(np.interp(slip, _EVEN, rows[0]))
 
     def pull(self, slip: FloatArray, stiffness: FloatArray) -> FloatArray:
-        """Return the drawbar pull over the load (n,) [-]; (n,) arrays, stiffness as of `torques`."""
+        """Return the drawbar pull over the load (n,) [-]; stiffness as of `torques`."""
         return _read(self._pull, _place(slip, stiffness))
 
     def sinkage(self, slip: FloatArray, stiffness: FloatArray) -> FloatArray:
