@@ -13,6 +13,7 @@ import pytest
 from wheel_terra_estimator.bags.replay import replay
 from wheel_terra_estimator.bags.storage import open_bag
 from wheel_terra_estimator.cli.main import main
+from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.estimation.wheel_soil_estimator import WheelSoilEstimator
 
 
@@ -51,6 +52,17 @@ def test_a_failing_filter_is_said_in_summary_and_diagnostics(
     assert result.counters['filter_restarts'] == 1
     assert any('filter failed and was started anew 1 times' in note for note in result.notes)
     assert b'filter_restarts' in next((tmp_path / 'out').glob('*.mcap')).read_bytes()
+
+
+def test_odometry_that_might_be_the_reference_is_named() -> None:
+    pathfinder = Path(__file__).resolve().parents[2] / 'data' / 'demo' / 'pathfinder'
+    with open_bag(pathfinder) as bag:
+        notes = replay(bag, reader.load(['pathfinder']), {}).notes
+        (said,) = [note for note in notes if 'reference_odom:=' in note]
+        assert '/wheel/odometry: one that does not come from the wheels' in said
+        used = {'reference_odom': '/wheel/odometry'}
+        notes = replay(bag, reader.load(['pathfinder']), used).notes
+    assert not [note for note in notes if 'reference_odom:=' in note]
 
 
 def test_a_measured_drive_never_restarts_the_filter() -> None:

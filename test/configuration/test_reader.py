@@ -214,7 +214,7 @@ def test_a_configuration_is_read_only_and_can_be_copied():
         ({'qwertz': 1}, 'the nearest known one is'),
         ({'wheels.radius': [0.1]}, 'has 1 entries instead of 2 (as many as wheels.names)'),
         ({'wheels.radius': [0.1] * 3}, 'has 3 entries instead of 2'),
-        ({'wheels.radius': 0.1}, '0.1 is not a list; allowed: list of numbers, one per wheel'),
+        ({'wheels.radius': 0.1}, '0.1 is not a list, write [0.1]; allowed: list of'),
         ({'rover.centre_of_gravity': [0.0, 1.0]}, 'has 2 entries instead of 3'),
         ({'rover.mass': [1.0]}, 'is a list; allowed: number'),
         ({'rover.mass': '12'}, "'12' is not a number"),

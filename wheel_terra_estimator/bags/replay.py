@@ -27,7 +27,7 @@ from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.estimation.smoothing.smoother import DriveSmoother
 from wheel_terra_estimator.input_file import read_text
-from wheel_terra_estimator.messages.convert import stamp_of
+from wheel_terra_estimator.messages.convert import ODOMETRY, stamp_of
 from wheel_terra_estimator.messages.pipeline import Pipeline
 
 LONG_DRIVE = 20_000
@@ -196,6 +196,12 @@ def _notes(
         for t in bag.topics.values()
         if t.message_count and t.name not in used and not t.name.startswith(TRUTH_TOPICS)
     ]
+    odometry = [t.name for t in unknown if t.type == ODOMETRY]
+    if 'reference_odom' in reader.absent and odometry:
+        yield (
+            f'no reference velocity; odometry there is {", ".join(odometry)}: one that does not '
+            'come from the wheels is named by --remap reference_odom:=TOPIC'
+        )
     if unknown:
         count = sum(topic.message_count for topic in unknown)
         yield f'{count} messages not used, on {", ".join(topic.name for topic in unknown)}'

@@ -32,6 +32,8 @@ KINDS = (
     'jumps',
 )
 """All kinds of findings."""
+SUREST = 0.99
+"""Confidence that is said at most: nothing is certain."""
 INTERNAL_ERROR = 'internal error, see --debug'
 """Why a check that failed has nothing to say."""
 
@@ -75,10 +77,8 @@ class Finding:
 
     def __str__(self) -> str:
         wheel = f' {self.wheel}:' if self.wheel else ''
-        return (
-            f'{self.kind} ({100 * self.confidence:.0f} %), {self.topic}:{wheel} {self.words}'
-            f' -> {self.cure}'
-        )
+        sure = f'{100 * min(self.confidence, SUREST):.0f} %'
+        return f'{self.kind} ({sure}), {self.topic}:{wheel} {self.words} -> {self.cure}'
 
 
 @dataclass(frozen=True)

@@ -64,4 +64,7 @@ def run(arguments: argparse.Namespace) -> int:
     for note in recording.notes:
         print(f'note: {note}')
     print(f'rover file: {arguments.output}')
+    print(
+        f'next: wheel-terra replay {arguments.bag} --config {arguments.output} --report report.html'
+    )
     return 0

@@ -252,7 +252,7 @@ def checked_value(parameter: Parameter, stated: _Sourced, wheels: int) -> Any:
             raise refuse(f'has {len(items)} entries instead of {wanted or "at least 1"}{of}')
         return items
     if parameter.size is not None:
-        raise refuse(f'{value!r} is not a list')
+        raise refuse(f'{value!r} is not a list, write [{value}]')
     return _scalar(parameter, value, refuse)
 
 

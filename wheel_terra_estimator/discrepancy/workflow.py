@@ -148,7 +148,7 @@ def operating_points(table: SteadyTable, configuration: Configuration) -> Operat
             if field in ('radius', 'width') and f'wheels.{field}' not in stated:
                 raise UserError(
                     f'{table.name}: no column {name}, and no wheel in the configuration; '
-                    f'add the column, or --config with wheels.{field}'
+                    f'add the column, or -p wheels.{field}:=[0.15] with your number [m]'
                 )
             values[field] = np.full(len(table), default)
     thickness = float(wheels.lug_thickness[0]) if len(wheels.lug_thickness) else 0.0
