@@ -43,9 +43,11 @@ LEAST_PERIODS = 0.5
 """The same in periods of the reference: between its stamps nothing is known."""
 LEAST_FIT = {'turns': 0.75, 'starts': 0.3, 'speeds': 0.9}
 """Correlation with the lag taken off, from which it is told [-]."""
-FALLS = {'turns': 0.75, 'starts': 0.97, 'speeds': 0.9}
+FALLS = {'turns': 0.75, 'starts': 0.9, 'speeds': 0.9}
 """Unlike part on the other half with the lag taken off over that without, at most [-]: an
 accelerometer is noisy, a slow reference ragged."""
+LEAST_STD = {'turns': 0.0, 'starts': 0.1, 'speeds': 0.0}
+"""Deviation of a lag, at least [s]: chassis and filters delay what is felt."""
 APART = 0.2
 """Lags of two halves or of two kinds of motion that differ by less agree [s]; also 3 deviations."""
 SIGMAS = 4.0
@@ -140,13 +142,21 @@ def _blamed(evidence: Evidence, lags: dict[str, Lag]) -> dict[str, Lag]:
         if abs(imu.value - reference.value) < max(APART, 3.0 * (imu.std + reference.std)):
             return {'wheel_odometry': imu.of_the_first()}
         return late
-    wheels_ahead = arrival(evidence.joints) < FUTURE
     for name, told in late.items():
         other = next((lag for key, lag in lags.items() if key != name), None)
         both = other is not None and abs(other.value - told.value) < abs(other.value)
-        if told.value < 0.0 and (both or (other is None and wheels_ahead)):
+        if both or _by_arrival(evidence, name, told.value):
             return {'wheel_odometry': told.of_the_first()}
     return late
+
+
+def _by_arrival(evidence: Evidence, name: str, late: float) -> bool:
+    """Whether the wheels' stamps lie off their arrival by what another sensor seems late [s]."""
+    own, others = arrival(evidence.joints), arrival(getattr(evidence.recording, name))
+    if name == 'reference':  # its age is honest, the future is not
+        return own < FUTURE and others > FUTURE
+    by_wheels = abs(others) + abs(own - late)
+    return by_wheels < abs(own) + abs(others + late) - 0.5 * abs(late)
 
 
 def _outcome(evidence: Evidence, name: str, told: Lag) -> Outcome:
@@ -273,7 +283,7 @@ def lag_of(
     for part, other in zip(parts, (b, a), strict=True):
         moved = np.interp(time[part] + other.value, time[part], second[part])
         trials.append(Trial(unlike(first[part], second[part]), unlike(first[part], moved)))
-    std = max(whole.std, 0.5 * abs(a.value - b.value))
+    std = max(whole.std, 0.5 * abs(a.value - b.value), LEAST_STD[by])
     return Lag(whole.value, std, by, worst(trials), (a.value, b.value))
 
 

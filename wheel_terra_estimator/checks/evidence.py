@@ -24,6 +24,8 @@ Mask = NDArray[np.bool_]
 
 REST_RATE = 0.02
 """Wheel rate below which a wheel stands, as a share of its working rate [-]."""
+NOISY_REST = 0.15
+"""Noise of a mean rate, as a share of the working rate, in which no standstill is seen [-]."""
 SHORTEST_REST = 1.0
 """A standstill counts as rest after this time [s]."""
 SETTLING = 0.5
@@ -137,7 +139,10 @@ class Evidence:
         mean = np.zeros_like(rate)
         mean[width - 1 :] = (total[width:] - total[:-width]) / width
         noise = bend_noise(rate) if rate.shape[0] > 2 else 0.0
-        limit = max(REST_RATE * self.working_rate, 4.0 * noise / math.sqrt(width), 1e-9)
+        noisy = 4.0 * noise / math.sqrt(width)
+        if noisy > NOISY_REST * self.working_rate:
+            return np.zeros(rate.shape[0], dtype=bool)
+        limit = max(REST_RATE * self.working_rate, noisy, 1e-9)
         still = (np.abs(mean) <= limit).all(axis=1)
         still &= np.abs(rate).max(axis=1) <= max(limit, 5.0 * noise)
         still[: width - 1] = False

@@ -255,6 +255,14 @@ FAULTS: dict[str, Fault] = {
         'sensors.angular_rate_bias',
         channel='imu',
     ),
+    'imu_wild': Fault(
+        'noise',
+        '{count} samples ({share:.1f} %) leave their neighbours by up to {most:.3g} m/s^2, what no '
+        'body does: they are left out',
+        'look at bus, cable and driver of the IMU; the node leaves such samples out and counts '
+        'them',
+        channel='imu',
+    ),
     'imu_noise': Fault(
         'noise',
         'noise {noise:.2g} {unit} where the rover file has {stated:g} {unit}',

@@ -21,6 +21,7 @@ from wheel_terra_estimator.checks.statistics import (
     block_fit,
     confidence,
     correlation,
+    robust_std,
 )
 from wheel_terra_estimator.checks.torque import MOST_TRACTION, thrust
 from wheel_terra_estimator.checks.trial import Trial, tried
@@ -46,8 +47,10 @@ RESISTANCE = Estimate(0.08, 0.05)
 """Rolling resistance of firm ground over the weight: mean, deviation [-]."""
 UNKNOWN_RESISTANCE = Estimate(0.1, 0.08)
 """The same where no torque tells how firm the ground is [-]."""
-SOFT_DEPTH = 0.06
-"""Sinkage over radius above which ground without torques is not taken for firm [-]."""
+PARTS = 8
+"""Parts of a drive in which a radius is the same."""
+EVEN_SHARE = 0.25
+"""Scatter of the ratio of speeds between them over its distance from 1, beyond which it is slip."""
 UNIFORM_STD = 1.0 / math.sqrt(12.0)
 """Standard deviation of what lies anywhere in an interval, as a share of its length [-]."""
 CREDIBLE_STD = 0.05
@@ -129,13 +132,22 @@ def radius_ratio(evidence: Evidence) -> Told | NotChecked:
         speeds.rim**2,
     )
     large = abs(ratio.value - 1.0) > LEAST_RADIUS_ERROR
-    if large and not trial.falls and trial.after > 4.0 * ratio.std:
+    uneven = _spread(speeds) > EVEN_SHARE * abs(ratio.value - 1.0) and ratio.value < 1.0
+    if large and (uneven or (not trial.falls and trial.after > 4.0 * ratio.std)):
         return NotChecked(
             'radius',
-            'speed over rim speed is another in each half of the drive: slip; drive ten metres '
+            'speed over rim speed is another in each part of the drive: slip; drive ten metres '
             'over firm ground',
         )
     return Told(_referred_to_slip_radius(evidence, ratio), trial)
+
+
+def _spread(speeds: _Speeds) -> float:
+    """Return the scatter of speed over rim speed between parts of the drive; a radius has none."""
+    parts = zip(
+        np.array_split(speeds.rim, PARTS), np.array_split(speeds.forward, PARTS), strict=True
+    )
+    return robust_std(np.array([float(r @ v) / max(float(r @ r), 1e-12) for r, v in parts]))
 
 
 def _without_slip(evidence: Evidence, speeds: _Speeds, plain: Estimate) -> Estimate | NotChecked:
@@ -160,8 +172,8 @@ def _without_slip(evidence: Evidence, speeds: _Speeds, plain: Estimate) -> Estim
     elif plain.value > 1.0:
         # Nothing but a larger radius makes a rover outrun its rolling wheels.
         return Estimate(plain.value, math.hypot(plain.std, OUTRUN_STD))
-    elif _depth(evidence).value > SOFT_DEPTH:
-        return NotChecked('radius', 'no torque, and soft ground: a ratio of speeds may be slip')
+    else:
+        return NotChecked('radius', 'no torque: a ratio of speeds may be slip')
     both = block_fit(np.column_stack([rim, rim * traction]), speeds.forward)
     # What firm ground does elsewhere is one more observation of the slope.
     seen = Estimate(-both[1].value / both[0].value, both[1].std)
@@ -310,13 +322,13 @@ def _share_of_radius(evidence: Evidence, ratio: Estimate) -> float:
 
 
 def skids(evidence: Evidence) -> bool:
-    """Return whether the rover has to skid to turn: wheels in several rows that do not steer."""
+    """Return whether wheels do not roll as the track says in turns: several rows, or steered."""
     configuration = evidence.facts.configuration
     if configuration is None:
         return True
     wheels = configuration.wheels
     steered = any(getattr(wheels, 'steering_joints', ()) or ())
-    return not steered and float(np.ptp(wheels.x)) > 0.3 * float(np.ptp(wheels.y))
+    return steered or float(np.ptp(wheels.x)) > 0.3 * float(np.ptp(wheels.y))
 
 
 def stated_track(evidence: Evidence) -> float:

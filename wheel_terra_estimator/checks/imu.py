@@ -38,11 +38,15 @@ from wheel_terra_estimator.checks.statistics import (
 )
 from wheel_terra_estimator.checks.torque import heading_of_torque
 from wheel_terra_estimator.checks.trial import Trial, halves
+from wheel_terra_estimator.checks.turning import ordinary_track, track_ratio
+from wheel_terra_estimator.estimation.timing.input_checks import WILD_FORCE, WILD_RATE
 
 FloatArray = NDArray[np.float64]
 
 GRAVITY_TOLERANCE = 0.1
 """Share by which the mean specific force may differ from gravity (slopes, bias, vibration)."""
+GRAVITY_BIAS = 0.3
+"""The same as an acceleration: biases [m/s^2]."""
 GRAVITIES = {'the Moon': 1.62, 'Mars': 3.71, 'the Earth': 9.81}  # [m/s^2]
 UPRIGHT_SHARE = 0.5
 """Share of the mean specific force along z that gravity has on a rover [-]."""
@@ -56,6 +60,8 @@ LEAST_TURN = 4.5
 """Heading that a drive has to cover for the mounting to be told from a slope [rad]."""
 FLAT_TURN_STD = math.radians(0.1)
 """Part of the mounting that unevenness of the ground leaves open [rad]."""
+SLOPES_STD = math.radians(5.0)
+"""Deviation that soil leaves in a direction by torques on slopes [rad]."""
 EVEN = 0.6
 """Length of the mean direction of the headings in turns, 0 where all occur alike, at most [-]."""
 EVEN_GROUND_STD = math.radians(0.8)
@@ -67,6 +73,9 @@ DEGREES = (0.4, 4.0)
 BIAS_FACTOR = 6.0
 """A bias above so many stated deviations is a finding."""
 LEAST_GYRO_BIAS = 0.004  # [rad/s]
+LEAST_WILD = 3
+MOST_WILD = 0.2
+"""Share of wild samples beyond which it is not single ones: vibration, or another unit [-]."""
 LEAST_MESSAGES = 20
 UNIT_TOLERANCE = 0.12
 """Share by which the mean specific force may lie off gravity in another unit."""
@@ -118,8 +127,9 @@ def check_imu(state: ImuState, facts: RoverFacts) -> Judged:
         return none, replace(state, usable_force=False, usable_gyro=False)
     outcomes, state = _placeholders(state)
     if state.usable_force and state.usable_gyro:
-        told, state = _frozen(state)
-        outcomes += told
+        for check in (_frozen, _wild):
+            told, state = check(state)
+            outcomes += told
     if state.usable_force:
         told, state = _gravity(facts, state)
         outcomes += told
@@ -166,18 +176,31 @@ def _frozen(state: ImuState) -> Judged:
     return [state.found('sensor_frozen', 0.99, how=how)], state
 
 
+def _wild(state: ImuState) -> Judged:
+    """Leave out single samples that no body can make; the node does so by the same limits."""
+    force, rate = np.abs(np.diff(state.imu.force, axis=0)), np.abs(np.diff(state.imu.rate, axis=0))
+    far = (force > WILD_FORCE).any(axis=1) | (rate > WILD_RATE).any(axis=1)
+    wild = np.concatenate([[False], far]) & np.concatenate([far, [False]])
+    if wild.sum() < LEAST_WILD or np.mean(wild) > MOST_WILD:
+        return [], state
+    kept = {name: getattr(state.imu, name)[~wild] for name in IMU_ARRAYS}
+    told = {'count': int(wild.sum()), 'share': 100.0 * np.mean(wild), 'most': float(force.max())}
+    return [state.found('imu_wild', 0.97, **told)], state.with_values(**kept)
+
+
 def _gravity(facts: RoverFacts, state: ImuState) -> Judged:
     imu, gravity = state.imu, facts.gravity
     middle = np.median(imu.force, axis=0)
     size = float(np.linalg.norm(middle))
-    if abs(size / gravity - 1.0) <= GRAVITY_TOLERANCE:
+    if abs(size - gravity) <= max(GRAVITY_TOLERANCE * gravity, GRAVITY_BIAS):
         return [], state
 
     def told(key: str, value: float, **figures: Any) -> list[Outcome]:
         return [state.found(key, 0.98, value=value, size=size, gravity=gravity, **figures)]
 
     upright = abs(float((state.rotation @ middle)[2])) > UPRIGHT_SHARE * size
-    in_g = abs(size - 1.0) <= UNIT_TOLERANCE and upright  # a slope may leave the same size
+    # What a slope leaves may have the size of gravity in g.
+    in_g = abs(size * STANDARD_GRAVITY / gravity - 1.0) <= UNIT_TOLERANCE and upright
     if size < 0.3 * min(gravity, STANDARD_GRAVITY) and not in_g:
         return told('gravity_off', gravity), replace(state, usable_force=False)
     for unit, factor in (('g', STANDARD_GRAVITY), ('mg', STANDARD_GRAVITY / 1000.0)):
@@ -293,6 +316,9 @@ def small_tilt(evidence: Evidence) -> Mounting | None:
     """
     if evidence.force is None or evidence.gyro is None:
         return None
+    track = track_ratio(evidence)
+    if track is None or (evidence.facts.known and not ordinary_track(track)):
+        return None  # the wheels see no such turns: a bias, or another unit
     yaw = evidence.gyro[:, 2] - gyro_bias(evidence)[0][2]
     turned = yaw * np.minimum(np.diff(evidence.time, prepend=evidence.time[0]), 1.0)
     smooth = np.abs(moving_mean(yaw, evidence.rows_in(2.0)))
@@ -332,6 +358,12 @@ def yaw_of_imu(evidence: Evidence) -> tuple[Estimate, Trial] | None:
     elif felt is not None and by_motion is not None:
         parts = (felt[0][half].sum() for half in halves(np.ones(felt[0].size)))
         first, second = (float(np.angle(part)) for part in parts)
+    else:
+        both = [heading_of_torque(evidence, half) for half in (0, 1)]
+        if both[0] is None or both[1] is None:
+            return None
+        first, second = both[0].value, both[1].value
+        told = [Estimate(told[0].value, math.hypot(told[0].std, SLOPES_STD, first - second))]
     apart = abs(math.remainder(first - second, 2.0 * math.pi))
     return told[0], Trial(abs(math.remainder(second, 2.0 * math.pi)), apart)
 
@@ -367,15 +399,20 @@ def without_yaw(seen: Estimate) -> FloatArray:
     return np.asarray(Rotation.from_rotvec([0.0, 0.0, angle]).as_matrix())
 
 
-def check_mounting(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
-    """Return wrong mounting angles, and the evidence with the IMU turned as it should be."""
+def check_upside(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
+    """Return an IMU that lies on its back or side, and the evidence with it turned upright."""
+    fix = gross_tilt(evidence)
+    if fix is None or evidence.force is None:
+        return [], evidence
+    mended, up = evidence.turned(fix @ evidence.rotation), np.median(evidence.force, axis=0)
+    force = f'mean specific force ({up[0]:.2f}, {up[1]:.2f}, {up[2]:.2f}) m/s^2'
+    return [mounting_finding('imu_upside', evidence, mended, 0.3, 0.999, force=force)], mended
+
+
+def check_tilt(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
+    """Return small wrong mounting angles, and the evidence with the IMU turned as it should be."""
     if evidence.force is None:
         return [], evidence
-    fix = gross_tilt(evidence)
-    if fix is not None:
-        mended, up = evidence.turned(fix @ evidence.rotation), np.median(evidence.force, axis=0)
-        force = f'mean specific force ({up[0]:.2f}, {up[1]:.2f}, {up[2]:.2f}) m/s^2'
-        return [mounting_finding('imu_upside', evidence, mended, 0.3, 0.999, force=force)], mended
     tilt = small_tilt(evidence)
     if tilt is None:
         reason = 'no full circle in it: mounting not told from slope; drive a circle both ways'

@@ -101,7 +101,8 @@ def ahead(evidence: Evidence, series: VelocitySeries, share: float) -> tuple[Flo
 
     In turns on the spot the mean of the rims is next to nothing.
     """
-    rim = np.abs(evidence.rim_at(series.stamp, evidence.rim, AROUND))
+    typical = evidence.common_rate * float(np.nanmean(evidence.radius))
+    rim = np.abs(evidence.rim_at(series.stamp, typical, AROUND))
     usual = float(np.nanquantile(rim, 0.9)) if np.isfinite(rim).any() else 0.0
     least = AHEAD * evidence.working_rate * float(np.nanmean(evidence.facts.radius))
     speed = np.linalg.norm(series.velocity[:, :2], axis=1)

@@ -118,12 +118,14 @@ def _examined(
     mended('unknown_name', None, lambda: names.check_topics(recording, remapped))
     mended('missing_wheel', None, lambda: names.check_wheel_names(recording, facts))
     facts = _with_names_in(facts, report)
-    offset = mended(
-        'order', 0.0, lambda: transport.check_transport(recording, configuration, report.figures)
+    late: dict[str, float] = {}
+    late = mended(
+        'order', late, lambda: transport.check_transport(recording, configuration, report.figures)
     )
+    for name, offset in late.items():
+        on_time = clocks.shifted(getattr(recording, name), round(offset * 1e9))
+        recording = replace(recording, **{name: on_time})
     recording = _whole_rows(recording)
-    if offset and recording.imu is not None:
-        recording = replace(recording, imu=clocks.shifted(recording.imu, round(offset * 1e9)))
     state = imu.ImuState(recording, configured_mounting(configuration))
     state = mended('gravity', state, lambda: imu.check_imu(state, facts))
     evidence = gather(state.recording, facts, state.rotation, report.figures)
@@ -139,12 +141,13 @@ def _examined(
 
 
 AGAINST_EACH_OTHER = (
-    ('mounting', imu, 'check_mounting'),
+    ('mounting', imu, 'check_upside'),
     ('missing_wheel', wheel_rates, 'check_dead_wheels'),
     ('sign', turning, 'check_signs'),
     ('unit', turning, 'check_gyro_unit'),
     ('unit', wheel_rates, 'check_unit'),
     ('noise', wheel_rates, 'check_noise'),
+    ('mounting', imu, 'check_tilt'),
     ('mounting', reference, 'check_frame'),
     ('gain', torque, 'check_torque'),
     ('mounting', imu, 'check_yaw'),

@@ -29,15 +29,17 @@ BELOW_ZERO = 0.006
 """A median sinkage further above the ground than this [m] is no sinkage (lugs carry less)."""
 ALIKE_SHARE = 0.4
 """Share by which the offset of a wheel may change over a drive to count as its zero [-]."""
+DEEP_STD = 0.02
+"""Deviation of a zero of all wheels: their true sinkage [m]."""
 ODD_ZERO = 0.015
 """A wheel that reads this much less or more than every other of its side [m] is odd."""
 
 
-def check_sinkage(evidence: Evidence) -> list[Outcome]:
-    """Return what is wrong with the sinkage readings."""
+def check_sinkage(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
+    """Return what is wrong with the sinkage readings, and the evidence with their signs mended."""
     sinkage, configuration = evidence.recording.sinkage, evidence.facts.configuration
     if sinkage is None:
-        return [NotChecked('zero', 'no sinkage in the recording')]
+        return [NotChecked('zero', 'no sinkage in the recording')], evidence
     outcomes: list[Outcome] = []
     stated = configuration.wheels.names if configuration else ()
     mute = [name for name in stated if name not in sinkage.names]
@@ -45,20 +47,28 @@ def check_sinkage(evidence: Evidence) -> list[Outcome]:
         outcomes.append(evidence.found('sinkage_missing', 0.9, wheel=', '.join(mute)))
     names, table = without_stated_errors(configuration, sinkage)
     if not names or np.isfinite(table).sum(axis=0).max() < LEAST_READINGS:
-        return [*outcomes, NotChecked('zero', 'hardly any sinkage readings')]
+        return [*outcomes, NotChecked('zero', 'hardly any sinkage readings')], evidence
     unit, table = _unit(evidence, table)
     middle = np.array([_median(column) for column in table.T])
     evidence.figures['sinkage.median_m'] = [round(float(m), 4) for m in middle]
-    outcomes += [*unit, *_sign_and_zero(evidence, names, table, middle)]
+    told = _sign_and_zero(evidence, names, table, middle)
+    outcomes += [*unit, *told]
+    mended = evidence
+    for finding in told:
+        if isinstance(finding, Finding) and finding.fault == 'sinkage_sign':
+            wrong = [finding.wheel in (None, name) for name in sinkage.names]
+            mended = mended.with_channel(
+                'sinkage', sinkage=sinkage.sinkage * np.where(wrong, -1.0, 1.0)
+            )
     if configuration is None:
-        return outcomes
+        return outcomes, mended
     noise, usual = _reading_noise(table), float(configuration.sensors.sinkage_std)
     evidence.figures['sinkage.noise_m'] = float(f'{noise:.3g}')
     if noise > NOISE_FACTOR * usual:
-        told = {'noise': noise, 'noise_mm': 1000.0 * noise, 'stated': 1000.0 * usual}
+        words = {'noise': noise, 'noise_mm': 1000.0 * noise, 'stated': 1000.0 * usual}
         value = float(f'{noise:.2g}')
-        outcomes.append(evidence.found('sinkage_noise', 0.95, value=value, **told))
-    return outcomes
+        outcomes.append(evidence.found('sinkage_noise', 0.95, value=value, **words))
+    return outcomes, mended
 
 
 def without_stated_errors(
@@ -111,7 +121,7 @@ def _sign_and_zero(
             told: dict[str, Any] = {'reading': 1000 * usual, 'others': '', 'of': ''}
             return [evidence.found('sinkage_sign', 0.9, value=-1.0, **told)]
         how = f'median sinkage {1000 * usual:.0f} mm: the wheels would float'
-        return [_zero(evidence, names, usual, 0.8, how)]
+        return [_zero(evidence, names, usual, DEEP_STD, how)]
     outcomes: list[Outcome] = []
     if np.nanmedian(np.abs(middle)) < limit:
         outcomes.append(NotChecked('sign', 'sinkage: hardly any in it; drive where it is soft'))
@@ -121,6 +131,7 @@ def _sign_and_zero(
             continue
         typical = float(np.nanmedian(others))
         far = own - typical
+        spread = max(float(np.nanmax(others) - np.nanmin(others)), 0.1 * abs(far))
         how = f'reads {1000 * far:+.0f} mm off the other wheels all the time'
         if own < -limit < float(np.nanmin(others)):
             if abs(-own - typical) < 0.6 * typical and _skew(table[:, index]) <= 0.0:
@@ -128,11 +139,11 @@ def _sign_and_zero(
                 told = {'reading': 1000 * own, 'others': beside, 'of': f' of {name}'}
                 outcomes.append(evidence.found('sinkage_sign', 0.9, wheel=name, value=-1.0, **told))
             elif abs(far) > ODD_ZERO:
-                outcomes.append(_zero(evidence, [name], far, 0.9, how))
+                outcomes.append(_zero(evidence, [name], far, spread, how))
             continue
         odd = max(ODD_ZERO, 3.0 * float(np.nanmax(others) - np.nanmin(others)))
         if abs(far) > odd and _lasting(table, index, far):
-            outcomes.append(_zero(evidence, [name], far, 0.9, how))
+            outcomes.append(_zero(evidence, [name], far, spread, how))
     return outcomes
 
 
@@ -148,7 +159,7 @@ def _lasting(table: FloatArray, index: int, far: float) -> bool:
     return all(abs(one - far) < ALIKE_SHARE * abs(far) for one in apart)
 
 
-def _zero(evidence: Evidence, names: list[str], left: float, sure: float, how: str) -> Finding:
+def _zero(evidence: Evidence, names: list[str], left: float, std: float, how: str) -> Finding:
     """Return the finding of a zero [m] that is left in the readings of some wheels."""
     facts = evidence.facts
     zeros, gain = np.zeros(len(facts.names)), np.ones(len(facts.names))
@@ -159,8 +170,8 @@ def _zero(evidence: Evidence, names: list[str], left: float, sure: float, how: s
     zeros[rows] += gain[rows] * left
     value = round(float(np.mean(zeros[rows])), 4) if rows else round(left, 4)
     wheel = names[0] if len(names) == 1 else None
-    told = {'wheel': wheel, 'value': value, 'how': how, 'zeros': listed(zeros)}
-    return evidence.found('sinkage_zero', sure, **told)
+    told = {'wheel': wheel, 'value': value, 'std': round(std, 4), 'zeros': listed(zeros)}
+    return evidence.found('sinkage_zero', 0.9 if wheel else 0.8, how=how, **told)
 
 
 def _skew(column: FloatArray) -> float:

@@ -29,6 +29,7 @@ from wheel_terra_estimator.checks.statistics import (
     correlation,
     even_times,
 )
+from wheel_terra_estimator.checks.trial import halves
 
 FloatArray = NDArray[np.float64]
 
@@ -120,6 +121,8 @@ def pairs(evidence: Evidence, sinkage: SinkageSeries) -> list[Pair]:
         torque = evidence.torque[:, index] * sense
         if known.sum() < LEAST_ROWS or not np.isfinite(torque).all():
             continue
+        if float(np.median(torque)) < 0.0:
+            continue  # its sign or zero is wrong
         depth[name] = averaged(at[known], column[known, None], time, WINDOW)[rows, 0]
         thrust[name] = averaged(evidence.time, torque[:, None], time, WINDOW)[rows, 0]
     compared = []
@@ -129,7 +132,8 @@ def pairs(evidence: Evidence, sinkage: SinkageSeries) -> list[Pair]:
         deeper, harder = deeper - deeper.mean(), harder - harder.mean()
         slope = block_fit(deeper[:, None], harder)[0]
         sigmas = math.copysign(slope.sigmas_from(0.0), slope.value)
-        compared.append(Pair(first, second, correlation(deeper, harder), sigmas))
+        parts = [correlation(deeper[half], harder[half]) for half in halves(deeper**2)]
+        compared.append(Pair(first, second, min(parts, key=abs), sigmas))
     return compared
 
 

@@ -95,10 +95,13 @@ def _signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     driven, rates = evidence.torque[rows], evidence.rate[rows]
     fits = [_sign_fit(driven, rates[:, i], i) for i in range(len(facts.names))]
     wrong = [(i, fit) for i, (fit, _) in enumerate(fits) if fit < WRONG_SIGN]
-    if len(wrong) < len(fits):  # one way only: what goes with the other wheels is a zero
-        wrong = [(i, fit) for i, fit in wrong if not fits[i][1] > ALIKE]
+    unsure = []
+    if len(wrong) < len(fits):  # one way only: it may be a zero unless the changes are opposed
+        unsure = [facts.names[i] for i, _ in wrong if fits[i][1] > -ALIKE]
+        wrong = [(i, fit) for i, fit in wrong if facts.names[i] not in unsure]
     if not wrong:
-        return [], evidence
+        reason = f'torque of {", ".join(unsure)}: its sign or its zero is wrong; drive both ways'
+        return [NotChecked(kind, reason) for kind in ('sign', 'zero') if unsure], evidence
     torque = evidence.torque.copy()
     torque[:, [i for i, _ in wrong]] *= -1.0
     sure = confidence(4.0 * min(abs(fit) for _, fit in wrong))
@@ -139,6 +142,10 @@ def _scale(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     if traction > UNIT_TRACTION:
         finding = evidence.found('torque_unit', 0.97, value=1e-3, traction=traction)
         return [finding], evidence.with_rate(evidence.rate, evidence.torque * 1e-3)
+    size = float(np.median(np.abs(thrust(evidence)[rows]))) / (facts.mass * facts.gravity)
+    if traction < LEAST_TRACTION < size:
+        reason = 'torque: does not fit the slopes: mounting of the IMU, or zeros of the torques'
+        return _not_told(reason), evidence
     if LEAST_TRACTION <= traction <= MOST_TRACTION:
         return [], evidence
     fit = _slope_fit(evidence)
@@ -315,7 +322,8 @@ def _zeros(evidence: Evidence, zeros: list[Estimate] | None) -> list[Outcome]:
     whole = whole_zeros(evidence, zeros)
     # With another scale every zero is another.
     doubt = evidence.figures.get('torque.level_traction', 0.0) > SOFT_TRACTION
-    sure = confidence(min(zeros[i].sigmas_from(0.0) for i in wrong)) * (0.5 if doubt else 1.0)
+    sure = confidence(min(zeros[i].sigmas_from(0.0) for i in wrong))
+    sure *= 0.5 if doubt or where == 'standing' else 1.0
     return [
         evidence.found(
             'torque_zero',
@@ -331,15 +339,18 @@ def _zeros(evidence: Evidence, zeros: list[Estimate] | None) -> list[Outcome]:
     ]
 
 
-def heading_of_torque(evidence: Evidence) -> Estimate | None:
+def heading_of_torque(evidence: Evidence, part: int | None = None) -> Estimate | None:
     """Return the direction in the IMU's horizontal plane in which slopes cost torque [rad].
 
-    Zero where the IMU's x axis points forward. None without slopes.
+    Zero where the IMU's x axis points forward. None without slopes; by one half of the drive if
+    a ``part`` (0 or 1) is asked for.
     """
     if evidence.force is None or not np.isfinite(evidence.torque).any():
         return None
-    rows = evidence.straight
-    if rows.sum() < 3 * LEAST_MOVING_ROWS:
+    rows = np.flatnonzero(evidence.straight)
+    if part is not None:
+        rows = np.array_split(rows, 2)[part]
+    if rows.size < 3 * LEAST_MOVING_ROWS:
         return None
     horizontal = evidence.force[rows, :2]
     smooth = _smooth(horizontal)

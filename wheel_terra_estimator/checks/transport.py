@@ -31,8 +31,8 @@ CLOCK_DIFFERENCE = 1.0
 
 def check_transport(
     recording: Recording, configuration: Configuration | None, figures: dict[str, Any]
-) -> tuple[list[Outcome], float]:
-    """Return what is wrong with the stamps, and how late those of the IMU are by log time [s]."""
+) -> tuple[list[Outcome], dict[str, float]]:
+    """Return what is wrong with the stamps, and how late those of a channel are by log time [s]."""
     outcomes: list[Outcome] = []
     delays = {}
     for name in ('joints', 'imu', 'sinkage', 'reference'):
@@ -43,13 +43,18 @@ def check_transport(
         delays[name] = float(np.median(channel.log_time - channel.stamp)) * 1e-9
     imu, joints = recording.imu, recording.joints
     if imu is None or joints is None or not {'imu', 'joints'} <= set(delays):
-        return outcomes, 0.0
+        return outcomes, {}
     left = delays['joints'] - delays['imu']
     if abs(left) < CLOCK_DIFFERENCE:
-        return outcomes, 0.0
+        return outcomes, {}
     std, against = math.hypot(_jitter(imu), _jitter(joints)), 'log time: two clocks'
-    told = of_offset('imu', left, std, against, configuration)
-    return [*outcomes, found('imu_offset', imu.topic, 0.999, **told)], left
+    # Stamps lie near their arrival: those that are farther off are wrong.
+    key, name, late = 'imu', 'imu', left
+    if abs(delays['joints']) > abs(delays['imu']):
+        key, name, late = 'joints', 'wheel_odometry', -left
+    told = of_offset(name, late, std, against, configuration)
+    topic = getattr(recording, key).topic
+    return [*outcomes, found(f'{name}_offset', topic, 0.999, **told)], {key: late}
 
 
 def _jitter(channel: Channel) -> float:

@@ -65,10 +65,11 @@ class Turning(NamedTuple):
     speed: FloatArray
     yaw: FloatArray
     lateral: FloatArray
+    unbiased: bool = True  # else a constant yaw rate may be the gyro's
 
     def rows(self, part: slice | Mask) -> Turning:
         """Return a part of the stretch."""
-        return Turning(self.speed[part], self.yaw[part], self.lateral)
+        return self._replace(speed=self.speed[part], yaw=self.yaw[part])
 
     def turns(self) -> Mask:
         """Return the rows in which the gyro sees a turn."""
@@ -132,8 +133,11 @@ def fit_of(fix: Fix, stretch: Turning) -> Fit:
         left, right = lateral > 0.0, lateral < 0.0
         stated = float(lateral[left].mean() - lateral[right].mean())
         difference = speed[:, right].mean(axis=1) - speed[:, left].mean(axis=1)
-        alike = correlation(yaw, difference)
-        track = float(yaw @ difference) / max(float(yaw @ yaw), 1e-12) / stated
+        turned, apart = yaw, difference
+        if not stretch.unbiased:
+            turned, apart = yaw - yaw.mean(), difference - difference.mean()
+        alike = correlation(turned, apart)
+        track = float(turned @ apart) / max(float(turned @ turned), 1e-12) / stated
         rolling = speed + track * yaw[:, None] * lateral
         cost = UNTURNED * (1.0 - alike**2)
     spread = np.abs(rolling - np.median(rolling, axis=1)[:, None]).mean(axis=1)
@@ -204,7 +208,8 @@ def stretch_of(evidence: Evidence, there: NDArray[np.intp], rows: Mask) -> Turni
     sides = (lateral > 0.0).any() and (lateral < 0.0).any() and np.isfinite(lateral).all()
     if evidence.gyro is None or not sides:
         lateral = np.zeros(there.size)
-    return Turning((evidence.rate * evidence.radius)[keep][:, there], evidence.yaw[keep], lateral)
+    speed = (evidence.rate * evidence.radius)[keep][:, there]
+    return Turning(speed, evidence.yaw[keep], lateral, evidence.at_rest.sum() > 20)
 
 
 def _known(evidence: Evidence) -> tuple[NDArray[np.intp], Mask]:

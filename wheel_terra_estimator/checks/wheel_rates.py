@@ -27,8 +27,8 @@ USUAL_TRACK = 2.0
 """The same, of rovers that turn by skidding [-]."""
 ONLY_BY_SPEED = ('thousandths of rad/s',)
 """Units that a skidding rover's turns do not tell from counts of an encoder."""
-UNIT_TOLERANCE = 0.35
-"""Share by which a speed ratio may lie off a unit's factor (slip makes it smaller)."""
+UNIT_BAND = (0.7, 1.25)
+"""Ratio of speeds over the factor of its unit; slip makes it smaller, nothing larger [-]."""
 FASTEST_RIM = 15.0
 """Rim speed that no rover of this kind drives [m/s]."""
 FROZEN_TIME = 5.0
@@ -148,7 +148,7 @@ def check_unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         by_turn &= unit not in ONLY_BY_SPEED
         told = by_turn and not usual
         if ratio is not None:
-            told = abs(math.log(ratio / factor)) < UNIT_TOLERANCE
+            told = UNIT_BAND[0] < ratio / factor < UNIT_BAND[1]
             told &= track is None or by_turn or not usual
         if told:
             words = {'unit': unit, 'how': how if ratio else 'turns seen by the gyro'}

@@ -20,6 +20,8 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from wheel_terra_estimator.bags.series_reader import read_series
 from wheel_terra_estimator.bags.storage import open_bag
 from wheel_terra_estimator.checks.run import check_recording
@@ -149,15 +151,15 @@ def main() -> None:
         false += not math.isnan(as_it_is.told)
         print(f'{recording.name}: as it is: {as_it_is}', flush=True)
         for fault in faults:
-            faulty = fault.put(case)
+            faulty = fault.put(case, np.random.default_rng(0))
             if faulty is None:
                 continue
             runs += 1
-            found = course(faulty, arguments.seconds)
+            found = course(faulty.case, arguments.seconds)
             times[fault.name].append(found.told)
             if not math.isnan(found.warned) and math.isnan(as_it_is.warned):
                 late = not math.isnan(found.told)
-                before = late or outcome(fault, case, report) == 'found'
+                before = late or outcome(fault, faulty, report)[0] == 'found'
                 early += late
                 by_check += before and not late
                 untold += not before
