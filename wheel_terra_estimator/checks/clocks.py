@@ -46,7 +46,7 @@ LEAST_FIT = {'turns': 0.75, 'starts': 0.3, 'speeds': 0.9}
 FALLS = {'turns': 0.75, 'starts': 0.9, 'speeds': 0.9}
 """Unlike part on the other half with the lag taken off over that without, at most [-]: an
 accelerometer is noisy, a slow reference ragged."""
-LEAST_STD = {'turns': 0.0, 'starts': 0.1, 'speeds': 0.0}
+LEAST_STD = {'turns': 0.03, 'starts': 0.15, 'speeds': 0.05}
 """Deviation of a lag, at least [s]: chassis and filters delay what is felt."""
 APART = 0.2
 """Lags of two halves or of two kinds of motion that differ by less agree [s]; also 3 deviations."""
@@ -169,7 +169,8 @@ def _outcome(evidence: Evidence, name: str, told: Lag) -> Outcome:
             '(chrony, PTP)',
         )
     # Between two messages nothing is known of a change.
-    std = math.hypot(told.std, BETWEEN * max(evidence.period, _period(channel)))
+    between = BETWEEN * max(evidence.period, _period(channel))
+    std = math.hypot(told.std, between, LEAST_STD[told.by])
     against = told.by + told.trial.words('unlike part', '')
     told_of = of_offset(name, told.value, std, against, evidence.facts.configuration)
     return evidence.found(f'{name}_offset', 0.97, **told_of)
@@ -283,7 +284,7 @@ def lag_of(
     for part, other in zip(parts, (b, a), strict=True):
         moved = np.interp(time[part] + other.value, time[part], second[part])
         trials.append(Trial(unlike(first[part], second[part]), unlike(first[part], moved)))
-    std = max(whole.std, 0.5 * abs(a.value - b.value), LEAST_STD[by])
+    std = max(whole.std, 0.5 * abs(a.value - b.value))
     return Lag(whole.value, std, by, worst(trials), (a.value, b.value))
 
 

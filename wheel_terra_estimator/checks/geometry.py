@@ -23,7 +23,7 @@ from wheel_terra_estimator.checks.statistics import (
     correlation,
     robust_std,
 )
-from wheel_terra_estimator.checks.torque import MOST_TRACTION, thrust
+from wheel_terra_estimator.checks.torque import SOFT_TRACTION, thrust
 from wheel_terra_estimator.checks.trial import Trial, tried
 
 FloatArray = NDArray[np.float64]
@@ -47,6 +47,8 @@ RESISTANCE = Estimate(0.08, 0.05)
 """Rolling resistance of firm ground over the weight: mean, deviation [-]."""
 UNKNOWN_RESISTANCE = Estimate(0.1, 0.08)
 """The same where no torque tells how firm the ground is [-]."""
+SOFT_DEPTH = 0.06
+"""Sinkage over radius above which ground is not taken for firm [-]."""
 PARTS = 8
 """Parts of a drive in which a radius is the same."""
 EVEN_SHARE = 0.25
@@ -174,6 +176,13 @@ def _without_slip(evidence: Evidence, speeds: _Speeds, plain: Estimate) -> Estim
         return Estimate(plain.value, math.hypot(plain.std, OUTRUN_STD))
     else:
         return NotChecked('radius', 'no torque: a ratio of speeds may be slip')
+    depth = _depth(evidence).value
+    if plain.value < 1.0 and depth > SOFT_DEPTH:
+        return NotChecked(
+            'radius',
+            f'soft ground (sinkage {depth:.2f} of the radius): a ratio of speeds may be slip; '
+            'drive ten metres over firm ground',
+        )
     both = block_fit(np.column_stack([rim, rim * traction]), speeds.forward)
     # What firm ground does elsewhere is one more observation of the slope.
     seen = Estimate(-both[1].value / both[0].value, both[1].std)
@@ -200,8 +209,9 @@ def _resistance(evidence: Evidence, seen: float) -> Estimate | NotChecked:
     """
     facts = evidence.facts
     assert facts.configuration is not None
-    if seen > MOST_TRACTION:
-        return NotChecked('radius', 'torques have no credible scale')
+    if seen > SOFT_TRACTION:
+        reason = f'the torques ask for {seen:.2f} of the weight on the level: soft, or their scale'
+        return NotChecked('radius', reason)
     sensors = facts.configuration.sensors
     arm = len(facts.names) / float(np.mean(facts.radius)) / (facts.mass * facts.gravity)
     std = math.hypot(float(sensors.torque_zero_std) * arm, float(sensors.torque_gain_std) * seen)

@@ -39,7 +39,7 @@ from wheel_terra_estimator.checks.statistics import (
 from wheel_terra_estimator.checks.torque import heading_of_torque
 from wheel_terra_estimator.checks.trial import Trial, halves
 from wheel_terra_estimator.checks.turning import ordinary_track, track_ratio
-from wheel_terra_estimator.estimation.timing.input_checks import WILD_FORCE, WILD_RATE
+from wheel_terra_estimator.estimation.timing.input_checks import WILD_FORCE
 
 FloatArray = NDArray[np.float64]
 
@@ -169,17 +169,18 @@ def _frozen(state: ImuState) -> Judged:
         how = f'{100 * np.mean(same):.0f} % of the messages repeat the one before'
     elif longest > FROZEN_TIME:
         how = f'all six numbers stay the same for up to {longest:.1f} s'
-        alive = ~np.concatenate([[False], same])
-        state = state.with_values(**{name: getattr(imu, name)[alive] for name in IMU_ARRAYS})
     else:
         return [], state
+    alive = ~np.concatenate([[False], same])
+    if alive.sum() >= LEAST_MESSAGES:
+        state = state.with_values(**{name: getattr(imu, name)[alive] for name in IMU_ARRAYS})
     return [state.found('sensor_frozen', 0.99, how=how)], state
 
 
 def _wild(state: ImuState) -> Judged:
     """Leave out single samples that no body can make; the node does so by the same limits."""
-    force, rate = np.abs(np.diff(state.imu.force, axis=0)), np.abs(np.diff(state.imu.rate, axis=0))
-    far = (force > WILD_FORCE).any(axis=1) | (rate > WILD_RATE).any(axis=1)
+    force = np.abs(np.diff(state.imu.force, axis=0))
+    far = (force > WILD_FORCE).any(axis=1)  # a gyro may yet turn out to be in degrees
     wild = np.concatenate([[False], far]) & np.concatenate([far, [False]])
     if wild.sum() < LEAST_WILD or np.mean(wild) > MOST_WILD:
         return [], state
@@ -319,7 +320,11 @@ def small_tilt(evidence: Evidence) -> Mounting | None:
     track = track_ratio(evidence)
     if track is None or (evidence.facts.known and not ordinary_track(track)):
         return None  # the wheels see no such turns: a bias, or another unit
-    yaw = evidence.gyro[:, 2] - gyro_bias(evidence)[0][2]
+    bias, std, _ = gyro_bias(evidence)
+    if not np.isfinite(std).all():  # by the wheels, which see no turn where there is none
+        turns = np.column_stack([evidence.side_difference, np.ones(evidence.time.size)])
+        bias = np.array([0.0, 0.0, block_fit(turns, evidence.gyro[:, 2])[1].value])
+    yaw = evidence.gyro[:, 2] - bias[2]
     turned = yaw * np.minimum(np.diff(evidence.time, prepend=evidence.time[0]), 1.0)
     smooth = np.abs(moving_mean(yaw, evidence.rows_in(2.0)))
     turning = smooth > 0.5 * float(np.quantile(smooth, 0.97))

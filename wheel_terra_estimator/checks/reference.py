@@ -33,6 +33,8 @@ AHEAD = 0.5
 """Mean of the rims over the usual size of one, above which the rover goes ahead [-]."""
 LEAST_UNIT_RATIO = 1.3
 """Speed over rim speed below which it may be the radius, not the unit [-]."""
+MOSTLY = 0.4
+"""Mean over median rim speed of wheels most of which turn one way [-]."""
 AROUND = 0.3
 """Half of the time around a velocity that rim speeds are averaged over [s]."""
 LEAST_ROWS = 8
@@ -105,8 +107,9 @@ def ahead(evidence: Evidence, series: VelocitySeries, share: float) -> tuple[Flo
     rim = np.abs(evidence.rim_at(series.stamp, typical, AROUND))
     usual = float(np.nanquantile(rim, 0.9)) if np.isfinite(rim).any() else 0.0
     least = AHEAD * evidence.working_rate * float(np.nanmean(evidence.facts.radius))
-    speed = np.linalg.norm(series.velocity[:, :2], axis=1)
-    return rim, (rim > max(share * usual, least, 1e-9)) & np.isfinite(speed)
+    mean = np.abs(evidence.rim_at(series.stamp, evidence.rim, AROUND))
+    rows = (rim > max(share * usual, least, 1e-9)) & (mean > MOSTLY * rim)
+    return rim, rows & np.isfinite(series.velocity[:, :2]).all(axis=1)
 
 
 def _unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:

@@ -11,7 +11,12 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from wheel_terra_estimator.checks.evidence import LEAST_MOVING_ROWS, Evidence, row_medians
+from wheel_terra_estimator.checks.evidence import (
+    LEAST_MOVING_ROWS,
+    SETTLING,
+    Evidence,
+    row_medians,
+)
 from wheel_terra_estimator.checks.faults import listed
 from wheel_terra_estimator.checks.finding import Finding, NotChecked, Outcome
 from wheel_terra_estimator.checks.statistics import (
@@ -86,7 +91,10 @@ def _not_told(reason: str) -> list[Outcome]:
 
 
 def _signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
-    facts, rows = evidence.facts, evidence.moving.copy()
+    facts = evidence.facts
+    # In turns wheels push against each other: there one that brakes is no wonder.
+    straight = evidence.straight.sum() > LEAST_MOVING_ROWS
+    rows = evidence.straight.copy() if straight else evidence.moving.copy()
     if evidence.force is not None:
         along = evidence.force[:, 0] * np.sign(evidence.common_rate) / facts.gravity
         rows &= along > UPHILL_ENOUGH
@@ -97,7 +105,7 @@ def _signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     wrong = [(i, fit) for i, (fit, _) in enumerate(fits) if fit < WRONG_SIGN]
     unsure = []
     if len(wrong) < len(fits):  # one way only: it may be a zero unless the changes are opposed
-        unsure = [facts.names[i] for i, _ in wrong if fits[i][1] > -ALIKE]
+        unsure = [facts.names[i] for i, _ in wrong if not straight or fits[i][1] > -ALIKE]
         wrong = [(i, fit) for i, fit in wrong if facts.names[i] not in unsure]
     if not wrong:
         reason = f'torque of {", ".join(unsure)}: its sign or its zero is wrong; drive both ways'
@@ -262,8 +270,9 @@ def _gain(evidence: Evidence) -> list[Outcome]:
 def torque_zeros(evidence: Evidence) -> list[Estimate] | None:
     """Return the zero of each torque from driving both ways on a straight; None without both."""
     assert evidence.force is not None
-    rows = evidence.straight
-    sense = np.sign(evidence.common_rate[rows])
+    smooth = moving_mean(evidence.common_rate, evidence.rows_in(SETTLING))
+    rows = evidence.straight & (np.abs(smooth) > 0.5 * evidence.working_rate)
+    sense = np.sign(smooth[rows])
     if min((sense > 0).sum(), (sense < 0).sum()) < 2 * LEAST_MOVING_ROWS:
         return None
     design = np.column_stack([np.ones(sense.size), sense, evidence.force[rows, 0]])

@@ -40,6 +40,8 @@ MOST_WHEELS = 10
 """Wheels for which all combinations of signs are tried."""
 LEAST_TURNING_ROWS = 40
 """Rows with a turn by the gyro that the wheels must account for."""
+MOST_LEFT = 0.4
+"""Residual that a cure may leave [-]."""
 UNTURNED = 0.5
 """What the residual of turns without an answer of the wheels weighs beside wheels unlike [-]."""
 CLEAR_DIRECTION = 0.8
@@ -276,7 +278,8 @@ def _chosen(evidence: Evidence, there: NDArray[np.intp], rows: Mask) -> _Chosen:
     if not best.trial.falls:
         again = compare_exchanges(stretch)
         best = again if again is not None and again.trial.falls else best
-    if not best.trial.falls:  # nothing is clearly better than what the rover file says
+    # Nothing is clearly better than what the rover file says, or good enough.
+    if not best.trial.falls or best.trial.after > MOST_LEFT:
         return _Chosen(signs, fit_of(Fix((1,) * count), stretch).clear_track)
     turn = best.fit.clear_track
     signs[there] = best.fix.signs

@@ -81,12 +81,16 @@ class Case:
 
 @dataclass(frozen=True)
 class Faulty:
-    """A case with a fault; the wheels that it concerns and the value that cures it, if any."""
+    """A case with a fault; the wheels that it concerns and the value that cures it, if any.
+
+    ``parameter`` is that of the value, ``own`` the error that the sensor may have without it.
+    """
 
     case: Case
     wheels: tuple[int, ...] = ()
     value: float | None = None
-    parameter: str | None = None  # that the value belongs to
+    parameter: str | None = None
+    own: float = 0.0
 
 
 Random = np.random.Generator
@@ -312,7 +316,8 @@ def _torque_zero(case: Case, random: Random) -> Faulty | None:
     torque[:, case.column(wheel)] += zero
     value = zero * float(wheels.direction[wheel])
     faulty = case.having('joints', torque=torque)
-    return Faulty(faulty, (wheel,), value, 'sensors.torque_zero')
+    own = 2.0 * float(case.rover.sensors.torque_zero_std)
+    return Faulty(faulty, (wheel,), value, 'sensors.torque_zero', own)
 
 
 def _torque_sign(case: Case, random: Random) -> Faulty | None:
@@ -331,7 +336,9 @@ def _sinkage_zero(case: Case, random: Random) -> Faulty | None:
         return None
     table, zero = series.sinkage.copy(), _drawn(random, 0.04, 0.07)
     table[:, series.names.index(case.names[wheel])] += zero
-    return Faulty(case.having('sinkage', sinkage=table), (wheel,), zero, 'sensors.sinkage_zero')
+    own = 2.0 * float(case.rover.sensors.sinkage_zero_std)
+    faulty = case.having('sinkage', sinkage=table)
+    return Faulty(faulty, (wheel,), zero, 'sensors.sinkage_zero', own)
 
 
 def _renamed(case: Case, random: Random) -> Faulty | None:
@@ -467,6 +474,8 @@ def outcome(fault: Fault, faulty: Faulty, before: CheckReport) -> tuple[str, lis
     for finding in fresh:
         if finding.kind in fault.kinds and _fits(finding, faulty):
             right.append(finding)
+        elif (finding.fault, finding.wheel) in old:
+            continue
         elif finding.kind not in fault.beside and finding.confidence > SURE:
             wrong.append(f'{finding} (true: {faulty.value})')
     if right:
@@ -488,7 +497,8 @@ def _fits(finding: Finding, faulty: Faulty) -> bool:
     off = abs(finding.value - faulty.value)
     if (finding.parameter or '').endswith('_deg'):
         off = abs(math.remainder(off, 360.0))
-    return off <= max(2.0 * (finding.std or 0.0), NEAR * abs(faulty.value))
+    near = max(2.0 * (finding.std or 0.0), NEAR * abs(faulty.value))
+    return off <= near + faulty.own
 
 
 def recording_of(drive: BenchDrive, name: str) -> Recording:
@@ -560,9 +570,8 @@ def scored(case: Case, seed: int, table: dict[str, Counter[str]]) -> None:
         table[fault.name][result] += 1
         table[fault.name]['wrong'] += bool(wrong)
         if result == 'missed' or wrong:
-            print(
-                f'{result}: {case.recording.name}: {fault.name} {faulty.value} {wrong}', flush=True
-            )
+            which = [case.names[wheel] for wheel in faulty.wheels] or faulty.value
+            print(f'{result}: {case.recording.name}: {fault.name} {which} {wrong}', flush=True)
 
 
 def main() -> None:
