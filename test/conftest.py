@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import hypothesis
 import pytest
 import yaml
 from rosbags.rosbag2 import writer as bag_writer
@@ -21,6 +22,11 @@ from wheel_terra_estimator.bags.message_factory import MessageFactory
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.messages.convert import INPUT_TYPES
+
+# The quick tests draw the same in each run; `.ci/slow` draws anew (--hypothesis-profile random).
+hypothesis.settings.register_profile('random', deadline=None, print_blob=True)
+hypothesis.settings.register_profile('same', deadline=None, derandomize=True, database=None)
+hypothesis.settings.load_profile('same')
 
 LONGEST = (
     'ros/test_parity.py',

@@ -5,7 +5,8 @@
 The world of the test is an operator, an estimator that may or may not keep its warning over a
 restart, a clock that may be wrong, and a limiter that keeps a stop over a restart. What must be
 closed is worked out from the words of the invariants, not from the limiter's table. A long run:
-``LIMITER_SEQUENCES=200000 python -m pytest -n 0 test/estimation/test_limiter_sequences.py``.
+``LIMITER_SEQUENCES=200000 python -m pytest -n 0 -m 'not slow' -k no_sequence --timeout 0
+--hypothesis-profile random test/estimation/test_limiter_sequences.py``.
 """
 
 import os
@@ -295,14 +296,13 @@ def run(sequences, **more):
         settings=settings(
             max_examples=sequences,
             stateful_step_count=10,
-            deadline=None,
-            database=None,
             suppress_health_check=list(HealthCheck),
             **more,
         ),
     )
 
 
+@pytest.mark.hypothesis
 @pytest.mark.parametrize(
     'sequences', [SEQUENCES, pytest.param(10 * SEQUENCES, marks=pytest.mark.slow)]
 )
