@@ -111,7 +111,7 @@ def _cards(summary: DriveSummary) -> list[tuple[str, str]]:
     if not summary.wheels:
         return []
     slipping = max(summary.wheels, key=lambda w: w.slip[1] if w.slip else 0.0)
-    deep = max(summary.wheels, key=lambda w: w.max_sinkage or 0.0)
+    deep = max(summary.wheels, key=lambda w: w.sinkage[1] if w.sinkage else 0.0)
     stuck = max(wheel.seconds['stuck'] for wheel in summary.wheels)
     unknown = sum(wheel.shares[SlipClass.UNKNOWN.name.lower()] for wheel in summary.wheels)
     unit = '' if deep.max_sinkage is None else ' mm'
@@ -123,7 +123,10 @@ def _cards(summary: DriveSummary) -> list[tuple[str, str]]:
             f'at most {shown(slipping.max_slip, ".2f")}',
         ),
         (f'{stuck:.1f} s', 'longest time of a wheel in class stuck'),
-        (f'{deepest(deep)}{unit}', f'greatest sinkage ({deep.name})'),
+        (
+            f'{spread(deep.sinkage, ".0f", 1e3)}{unit}',
+            f'sinkage of {deep.name}, 5 to 95 % of the time; at most {deepest(deep)}',
+        ),
         (f'{100 * unknown / len(summary.wheels):.0f} %', 'of the time at rest or unknown'),
     ]
 

@@ -24,13 +24,13 @@ STRAIGHT = 0.15
 MOST_DRAWN = 600  # points of a map
 ROOM = 0.06  # around the way, as a share of its extent
 STRENGTHS = (
-    ('below 0.7', -math.inf, 0.7, '#a6501a'),
-    ('0.7 to 0.9', 0.7, 0.9, '#d99a4e'),
+    ('below 0.7', -math.inf, 0.7, '#9b59b6'),
+    ('0.7 to 0.9', 0.7, 0.9, '#c9a3d9'),
     ('0.9 to 1.1, as stated', 0.9, 1.1, RIM_COLOUR),
-    ('1.1 to 1.3', 1.1, 1.3, '#6aa6d6'),
-    ('above 1.3', 1.3, math.inf, '#2b6cb0'),
+    ('1.1 to 1.3', 1.1, 1.3, '#8cc9a1'),
+    ('above 1.3', 1.3, math.inf, '#2e8b57'),
 )
-"""Words, bounds and colour of the learned shear strength over the stated one: brown is weaker."""
+"""Words, bounds and colour of the learned shear strength over the stated one: purple is weaker."""
 
 
 @dataclass(frozen=True)
