@@ -34,10 +34,10 @@ NEAREST_MARKS = 0.08
 
 @dataclass(frozen=True)
 class Panel:
-    """One panel: title with unit, share of the height, fixed range or None, names of strips."""
+    """One panel: title with unit, height over 800 px, fixed range or None, names of strips."""
 
     title: str
-    share: float = 1.0
+    share: float = 0.2
     limits: tuple[float, float] | None = None
     strips: tuple[str, ...] = ()
 
