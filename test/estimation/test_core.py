@@ -148,8 +148,10 @@ def test_a_warning_and_its_direction_stand_over_a_new_beginning(how):
 def test_a_reset_clears_the_warning():
     config = configuration(output_rate=0.0, max_lag=0.0)
     core = EstimatorCore(config, Digging(config, 'raise'))
-    assert play(core, [odometry(0.1 * i, rate=5.0) for i in range(5)])[-1].stuck
+    play(core, [odometry(10.0 + 0.1 * i, rate=5.0) for i in range(5)], flush=False)
+    assert play(core, [odometry(0.1 * i) for i in range(5)])[-1].stuck, 'held over the clock step'
     core.reset()
+    assert not core.warning.state.stuck
     assert not play(core, [odometry(1.0 + 0.1 * i) for i in range(5)])[-1].stuck
 
 

@@ -29,6 +29,7 @@ from wheel_terra_estimator.estimation.timing.input_checks import (
     REFERENCE,
     WHEEL_ODOMETRY,
 )
+from wheel_terra_estimator.estimation.timing.lag import LONGEST_HOLD, LagLearner
 
 
 def times(sets):
@@ -74,6 +75,19 @@ def test_equal_stamps_are_merged_whatever_came_first():
     one = play(first, [odometry(0.0), imu(0.0, 5.0), sinkage(0.0), odometry(0.1)])
     other = play(second, [sinkage(0.0), imu(0.0, 5.0), odometry(0.0), odometry(0.1)])
     assert essence(one) == essence(other)
+
+
+def test_a_stamp_that_comes_again_with_other_numbers_is_said():
+    core, _ = make_core(max_lag=0.0)
+    play(core, [odometry(0.0), odometry(0.1), odometry(0.1), odometry(0.1, 2.0)])
+    assert core.repeated == {'joint_states': 2}
+    said = {reason: n for (_, reason), n in core.rejected.items()}
+    assert said == {'stamp repeated with other numbers (the newer ones count)': 1}
+
+
+def test_no_lag_is_no_wait_of_any_length():
+    assert LagLearner(0).longest == 0
+    assert LagLearner(-1).longest == LONGEST_HOLD
 
 
 def test_an_input_of_the_stamp_of_the_last_set_makes_no_second_set_but_counts_from_then_on():

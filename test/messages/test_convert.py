@@ -223,7 +223,15 @@ def test_imu_states_its_variances_along_the_axes_of_the_rover(rover: Any, factor
 
 @pytest.mark.parametrize(
     'diagonal',
-    [(0.0,) * 3, (1.0,) * 3, (-1.0, 0.0, 0.0), (math.nan,) * 3, (0.1, -0.1, 0.1), (math.inf,) * 3],
+    [
+        (0.0,) * 3,
+        (1.0,) * 3,
+        (-1.0, 0.0, 0.0),
+        (math.nan,) * 3,
+        (0.1, -0.1, 0.1),
+        (0.1, 0.0, 0.1),
+        (math.inf,) * 3,
+    ],
 )
 def test_placeholders_in_an_imu_state_nothing(
     converter: InputConverter, factory: Any, diagonal: tuple[float, float, float]
