@@ -52,7 +52,8 @@ _MOST_TRIED = 3  # doubtful names, after which none is given
 _LIKELY = 0.5
 _BEYOND_DOUBT = 0.85
 _CLEARLY = 0.05  # of the gap: so much more a law must close than a doubtful name, or the name
-# Odds for names that close more than any law and leave noise alone (chosen on seeds 3200 to 3209).
+# Odds for several names that close more than any law and leave noise alone, or for those that a law
+# says as well (chosen on seeds 3200 to 3209).
 _BEATS_LAW = 4.0
 
 
@@ -162,8 +163,8 @@ class _Laws:
         same = law is not None and effects_said(law) == {effect_of(n.key) for n in names}
         if law is not None and ahead < -_CLEARLY and not same:
             return names, False
-        ahead_of_all = (same or ahead >= _CLEARLY) and not decision.left.significant
-        odds = _BEATS_LAW if ahead_of_all else 1.0
+        ahead_of_all = same or (ahead >= _CLEARLY and len(names) > 1)
+        odds = _BEATS_LAW if ahead_of_all and not decision.left.significant else 1.0
         surer = [confidences.confidence(n.features, int(n.features['alike']), odds) for n in names]
         names = tuple(replace(n, confidence=c) for n, c in zip(names, surer, strict=True))
         return names, _least(names, odds) >= _LIKELY
