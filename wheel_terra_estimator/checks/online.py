@@ -83,6 +83,8 @@ LEVEL = -0.01
 """Specific force along the drive over gravity above which wheels must drive."""
 LEAST_TRACTION = 0.02
 """Sum of T/r over the weight that tells its sign."""
+AS_MUCH = 3.0
+"""Torque of a wheel over that of the others, and the reverse, that is alike [-]."""
 ORDINARY_TRACTION = 1.5
 """The same, that wheels may give on any ground."""
 ABSURD_TRACTION = 3.0
@@ -568,7 +570,8 @@ class OnlineChecks:
         least = LEAST_TRACTION * self._weight / len(thrusts)
         for i, thrust in enumerate(thrusts):
             beside = median(t for j, t in enumerate(thrusts) if j != i)
-            if beside > least and abs(thrust) > 0.3 * beside:
+            # On firm ground wheels push against each other; what is flipped takes as much.
+            if beside > least and 1.0 < AS_MUCH * abs(thrust) / beside < AS_MUCH**2:
                 yield 'torque_of_wheel', i, thrust < 0.0, thrust / beside
 
     # -- Findings -------------------------------------------------------------------------------

@@ -33,6 +33,8 @@ FloatArray = NDArray[np.float64]
 
 UPHILL_ENOUGH = -0.02
 """Specific force along the drive, in g, above which a driven wheel takes power."""
+AS_MUCH = 3.0
+"""Torque of a wheel over that of the others, and the reverse, that is alike [-]."""
 ALIKE = 0.3
 """Correlation of the changes of two torques that have the same sign [-]."""
 WRONG_SIGN = -0.4
@@ -104,11 +106,21 @@ def _signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     fits = [_sign_fit(driven, rates[:, i], i) for i in range(len(facts.names))]
     wrong = [(i, fit) for i, (fit, _) in enumerate(fits) if fit < WRONG_SIGN]
     unsure = []
-    if len(wrong) < len(fits):  # one way only: it may be a zero unless the changes are opposed
-        unsure = [facts.names[i] for i, _ in wrong if not straight or fits[i][1] > -ALIKE]
+    if len(wrong) < len(fits):
+        taken = np.nanmean(driven * np.sign(rates), axis=0)
+        for i, _ in wrong:
+            beside = float(np.median(np.delete(taken, i)))
+            # One way only it may be a zero, unless the changes are opposed; on firm ground wheels
+            # push against each other: what is reversed takes as much as the others.
+            opposed = straight and not fits[i][1] > -ALIKE
+            if not opposed or not 1.0 < -taken[i] / beside * AS_MUCH < AS_MUCH**2:
+                unsure.append(facts.names[i])
         wrong = [(i, fit) for i, fit in wrong if facts.names[i] not in unsure]
     if not wrong:
-        reason = f'torque of {", ".join(unsure)}: its sign or its zero is wrong; drive both ways'
+        reason = (
+            f'torque of {", ".join(unsure)}: sign or zero, or wheels push against each other; '
+            'drive both ways'
+        )
         return [NotChecked(kind, reason) for kind in ('sign', 'zero') if unsure], evidence
     torque = evidence.torque.copy()
     torque[:, [i for i, _ in wrong]] *= -1.0
