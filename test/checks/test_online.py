@@ -170,6 +170,16 @@ def test_a_fault_is_told_with_its_cure_and_nothing_is_judged(drives, name):
     assert found[-1] is sets[-1], 'it stands'
 
 
+@pytest.mark.parametrize('confirmed', [False, True])
+def test_a_warning_that_is_confirmed_does_not_wait(drives, confirmed):
+    drive = drives[SIX]
+    judge = InputJudge(drive.configuration)
+    for second in range(3):
+        stamp = 10**12 + second * 10**9
+        said = some_estimates(6, stamp=stamp, stuck=True, stuck_confirmed=confirmed)
+        assert judge.judged(said, {}).stuck == confirmed
+
+
 @pytest.mark.parametrize('rover', [SIX, FOUR])
 def test_a_drive_without_fault_is_silent(drives, rover):
     sets = sets_of(drives[rover], lambda m: m)

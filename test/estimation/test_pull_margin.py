@@ -24,7 +24,6 @@ def parts():
 def margin(parts, slope, direction=1.0):
     found = PullMargin(parts.sensors, parts.layout, parts.models)
     loads = LoadState(LOADS, (9.8 * math.tan(slope), 0.0, 9.8), force_known=True)
-    assert math.isnan(found.share(loads, torque_known=True))  # nothing was worked out yet
     found.update(0.0, parts.filter().mean, loads, direction)
     return found, loads
 
@@ -45,11 +44,3 @@ def test_the_margin_is_the_greatest_pull_less_what_the_slope_asks(parts):
     assert level[0] - uphill[0] == pytest.approx(250.0 * math.tan(0.2))
     # Backwards up the same ground is downhill.
     assert margin(parts, 0.2, direction=-1.0)[0].state.margin[0] > level[0]
-
-
-def test_the_share_is_that_of_the_rover_and_needs_a_torque(parts):
-    found, loads = margin(parts, 0.1)
-    assert found.share(loads, torque_known=True) == pytest.approx(
-        sum(found.state.margin) / sum(LOADS)
-    )
-    assert math.isnan(found.share(loads, torque_known=False))

@@ -98,6 +98,7 @@ class InputJudge:
         undecided = (
             bool(self._checks.undecided)
             and not self._failed
+            and not estimates.stuck_confirmed
             and estimates.stamp - begun < LONGEST_WAIT
         )
         self._stuck_since = begun

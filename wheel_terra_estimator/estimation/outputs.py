@@ -167,6 +167,7 @@ class Outputs:
             yaw_rate_variance=given.yaw_rate_std**2,
             stuck=given.assessment.stuck,
             stuck_direction=given.assessment.direction,
+            stuck_confirmed=given.assessment.confirmed,
             reasons=reasons_in_words(given),
             faults=faults_in_words(missing),
             slip_on_slope=given.slip_on_slope,

@@ -550,12 +550,12 @@ class WheelSoilEstimator:
         return window if told else InertialWindow()
 
     def _fuse_reference(self, cycle: _Cycle, reference: ReferenceVelocity) -> None:
-        """Fuse a reference velocity; a speed that was wrong is no growth of the slip."""
+        """Fuse a reference velocity."""
         time, ekf = cycle.time, self._ekf
         innovation, variance = self._reference.innovation(ekf, reference)
         noise = self._noise.variance('reference', self._reference.variance(reference))
         self._noise.compare_reference(time, innovation, noise, variance, reference.variance)
-        opened = self._reference.update(
+        self._reference.update(
             self._ekf,
             time,
             reference,
@@ -567,8 +567,6 @@ class WheelSoilEstimator:
             reading_variance=noise,
         )
         self._whiteness.follow(time, ekf.innovations, reference=1)
-        if opened:
-            self._stuck.forget_trend()
 
     def _compare_wheels(self, cycle: _Cycle) -> None:
         """Find wheels without load, and sudden changes of what the wheels must give."""
@@ -733,7 +731,6 @@ class WheelSoilEstimator:
                 or len(self._sinkage.unread(time)) < rover.wheel_count,
                 turning=motion.lateral_motion > _SHARP_TURN
                 or sides_oppose(rims, body.headings.by_yaw_rate),
-                margin=self._margin.share(loads, torque_known=wheels.torque_known(time)),
             ),
         )
         self._clock = self._clock._replace(assessment=assessment, speed=(speed, variance))

@@ -44,10 +44,10 @@ def test_tuning_is_changed_where_components_take_it_and_comes_back():
 
 def test_sign_is_gone_for_the_monitor_and_comes_back():
     signs, monitor = module('judgement.stuck.signs'), module('judgement.stuck.monitor')
-    with without_sign('stall')():
-        assert 'stall' not in {sign.name for sign in monitor.SIGNS}
+    with without_sign('standing')():
+        assert 'standing' not in {sign.name for sign in monitor.SIGNS}
         taken = inspect.signature(monitor.StuckMonitor).parameters['signs'].default
-        assert 'stall' not in {sign.name for sign in taken}
+        assert 'standing' not in {sign.name for sign in taken}
     assert monitor.SIGNS is signs.SIGNS
     with pytest.raises(LookupError), without_sign('no_such')():
         pass
@@ -169,7 +169,7 @@ def test_treatment_is_tried_where_it_can_act():
     assert usual.acts_in(blind)
     assert not usual.acts_in(seeing)
     whole = next(simulated(WHOLE_PLANS, 1000, whole=True))
-    assert by_name['sign stall'].acts_in(whole)
+    assert by_name['sign standing'].acts_in(whole)
     assert not by_name['own stiffness of each wheel'].acts_in(whole)
     # Each has drives of the study on which it is tried, if only recorded ones.
     drives = [*simulated(PLANS, 1000), *simulated(WHOLE_PLANS, 1000, whole=True)]

@@ -21,7 +21,6 @@ from wheel_terra_estimator.estimation.filter.state import (
     StateLayout,
 )
 from wheel_terra_estimator.estimation.rover import SensorFigures
-from wheel_terra_estimator.estimation.scalars import NAN
 
 FloatArray = NDArray[np.float64]
 Floats = tuple[float, ...]
@@ -35,8 +34,6 @@ class MarginTuning:
     """Slips at which the pull is tried: traction curves are flat around their top."""
     period: float = 1.0  # [s]
     least_load: float = 1e-3  # [N]: less is in the air
-    telling_gain: float = 0.3
-    """Gain error of the torques above which they do not tell the strength of the soil."""
 
 
 class MarginState(NamedTuple):
@@ -57,14 +54,7 @@ class PullMargin(Component[MarginState]):
         tuning: MarginTuning = MarginTuning(),
     ) -> None:
         super().__init__(MarginState((0.0,) * layout.wheel_count))
-        self._telling = sensors.torque_gain_std <= tuning.telling_gain
         self._layout, self._models, self._tuning = layout, models, tuning
-
-    def share(self, loads: LoadState, *, torque_known: bool) -> float:
-        """Return the margin of the rover over its load [-]; nan where torque does not tell."""
-        if not (torque_known and self._telling) or self.state.time < 0.0:
-            return NAN
-        return sum(self.state.margin) / max(sum(loads.load), self._tuning.least_load)
 
     def update(self, time: float, x: FloatArray, loads: LoadState, direction: float) -> None:
         """Work out the margins at a time [s] where they are due.

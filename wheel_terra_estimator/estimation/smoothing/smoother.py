@@ -49,6 +49,7 @@ FloatArray = NDArray[np.float64]
 _OF_THE_FILTER = (
     'stuck',
     'stuck_direction',
+    'stuck_confirmed',
     'slip_on_slope',
     'stuck_probability',
     'time_to_stuck',

@@ -165,20 +165,11 @@ def _sign(**values: Any) -> Switch:
     return tuned('judgement.stuck.signs:SignTuning', **values)
 
 
-def _forecast(**values: Any) -> Switch:
-    return tuned('judgement.stuck.forecast:ForecastTuning', **values)
+def _process(**values: Any) -> Switch:
+    return tuned('judgement.stuck.passage:SlipProcess', **values)
 
 
-SIGNS = (
-    'likely',
-    'within_horizon',
-    'digging',
-    'deepening',
-    'held',
-    'bogging',
-    'stall',
-    'labour',
-)
+SIGNS = ('likely', 'digging', 'standing')
 _OPENING, _GATE, _HOLD = 'process noise', 'gate rule', 'hold'
 _AFTER, _MODEL, _INPUT = 'correction after the update', 'model of a special case', 'input'
 _CLASS, _SIGN, _GUARD = 'class', 'stuck sign', 'guard of a sign'
@@ -463,7 +454,7 @@ _FILTER = (
 _GUARDS: dict[str, Switch] = {
     'others settle anew where a wheel is held': _situation(standing_ratio=0.0),
     'sinkage grows where that of more than half does': patched(
-        'judgement.stuck.forecast:_growth_of_most', _median_of
+        'judgement.stuck.forecast:growth_of_most', _median_of
     ),
     'pulling away is no stall': _situation(pull_away_time=0.0),
     'a sharp turn begins pulling away anew': patched(
@@ -474,17 +465,8 @@ _GUARDS: dict[str, Switch] = {
     ),
     'no warning while wheels are stopped': _situation(stopping_share=0.0),
     'slip settles after a start': _situation(settling_travel=0.0),
-    'a speed that was wrong is no growth': patched(
-        'judgement.stuck.monitor:StuckMonitor.forget_trend', _nothing
-    ),
-    'no trend of a guess while pull is left': _sign(spare_margin=NEVER),
-    'no trend of a doubtful slip': _sign(ahead_std=NEVER),
-    'trend less its doubt': _sign(trend_doubt=0.0),
-    'trend followed far at high slip alone': _sign(ahead_slip=0.0),
-    'loss of speed less its doubt': _sign(bog_doubt=0.0),
     'digging only by a slip that is sure': _sign(sure_std=NEVER),
-    'forecast by the growth of the slip': _forecast(growth_scatter=1e-6),
-    'forecast by the growth of the sinkage': _forecast(digging_gain=0.0),
+    'forecast by the growth of the sinkage': _process(digging=0.0),
 }
 
 TREATMENTS: tuple[Treatment, ...] = (

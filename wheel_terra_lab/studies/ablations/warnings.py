@@ -72,7 +72,7 @@ def listening() -> Iterator[Told]:
     """Keep what the monitor of the estimator that runs meanwhile is told."""
     told = Told()
     with contextlib.ExitStack() as stack:
-        for name in ('update', 'forget_trend', 'reset'):
+        for name in ('update', 'reset'):
             stack.enter_context(patched(f'{_MONITOR}{name}', _noted(told, name))())
         restore, estimates = StuckMonitor.restore, WheelSoilEstimator.estimates
 

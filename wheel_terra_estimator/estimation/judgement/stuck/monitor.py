@@ -16,7 +16,6 @@ from wheel_terra_estimator.estimation.judgement.stuck.signs import (
     Sign,
     SignTuning,
     in_words,
-    needs_met,
 )
 from wheel_terra_estimator.estimation.judgement.stuck.situation import (
     Observed,
@@ -38,6 +37,8 @@ class StuckAssessment(NamedTuple):
     wheels: tuple[WheelForecast, ...] = ()
     stalled: tuple[bool, ...] = ()
     direction: int = 0  # of the rims that led to it: 1, -1; 0 none, both or unknown
+    confirmed: bool = False
+    """Whether something says so that no wrong sign or unit of the wheels' readings makes up."""
 
 
 class StuckState(NamedTuple):
@@ -71,13 +72,6 @@ class StuckMonitor(Component[StuckState]):
         self._observer = SituationObserver(settings)
         super().__init__(StuckState(self._observer.state, (NAN,) * len(signs)))
         self._settings, self._signs, self._tuning = settings, tuple(signs), tuning
-        self._needs = tuple([sign.needs.value for sign in self._signs])
-
-    def forget_trend(self) -> None:
-        """Begin the trend anew: the level of the slip was wrong, which is no growth."""
-        self._observer.restore(self.state.observed)
-        self._observer.forget_trend()
-        self.state = self.state._replace(observed=self._observer.state)
 
     def update(self, time: float, motion: RoverMotion) -> StuckAssessment:
         """Judge the motion of the rover at a time [s]."""
@@ -96,14 +90,15 @@ class StuckMonitor(Component[StuckState]):
                 stuck, reason, direction, clear_since = False, '', 0, NAN
         self.state = StuckState(situation.observed, since, stuck, reason, clear_since, direction)
         wheels = situation.outlook.wheels
-        return StuckAssessment(stuck, reason, wheels, situation.stalled, direction)
+        return StuckAssessment(
+            stuck, reason, wheels, situation.stalled, direction, stuck and situation.confirmed
+        )
 
     def _signs_at(self, time: float, situation: Situation) -> tuple[tuple[float, ...], list[Sign]]:
         """Return since when each sign is there, and the signs that have been for long enough."""
-        lacking = ~needs_met(situation)
         since, raised = [], []
-        for sign, needs, before in zip(self._signs, self._needs, self.state.since, strict=True):
-            if needs & lacking or not sign.present(situation, self._tuning):
+        for sign, before in zip(self._signs, self.state.since, strict=True):
+            if not sign.present(situation, self._tuning):
                 since.append(NAN)
                 continue
             begun = time if isnan(before) else before

@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""What the stuck warning observes of the rover: typical slip, its trend, torques, lost speed."""
+"""What the stuck warning observes of the rover: typical slip, its trend, digging, torques."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.judgement.stuck.forecast import Outlook, outlook
+from wheel_terra_estimator.estimation.judgement.stuck.passage import FirstPassage
 from wheel_terra_estimator.estimation.judgement.stuck.settings import StuckSettings
 from wheel_terra_estimator.estimation.judgement.stuck.windows import (
     Window,
@@ -48,12 +49,12 @@ class SituationTuning:
     stall_ratio: float = 0.6  # of the fastest rim speed: a wheel below it is held
     standing_ratio: float = 0.1  # of it: a wheel below it stands among wheels that turn
     stall_torque: float = 0.7  # of the torque limit
-    loss_window: float = 1.5  # over which the loss of speed is taken [s]
-    loss_window_rounding: float = 1e-6
     stopping_window: float = 1.0  # [s]
     stopping_share: float = 0.8  # of the fastest rim speed in it
     strained_torque: float = 0.5  # of the limit: two such wheels are held by the soil
     cruise_window: float = 5.0  # [s]
+    standing_std: float = 2.0  # deviations of a speed that a rover is said to stand within
+    limit_tolerance: float = 0.2  # of a torque that is at its limit, over the limit
     direction_memory: float = 0.5  # of the rims' direction [s] of turning: half a sign's hold time
     direction_share: float = 0.75  # of the rim travel that must be one way
     least_deepening: float = 0.02  # sinkage per rim travel that counts as digging
@@ -99,8 +100,6 @@ class RoverMotion(NamedTuple):
     """Whether a reference, a torque or a sinkage tells of the slip, not an accelerometer alone."""
     turning: bool = False
     """Sharply: slip that comes from turning says nothing of what is ahead."""
-    margin: float = NAN
-    """Greatest pull that the soil can give beyond what is asked, over the load; nan = unknown."""
 
 
 class Deepening(NamedTuple):
@@ -120,7 +119,6 @@ class Observed(NamedTuple):
     rim_travel: float = 0.0  # since the wheels last stood [m]
     slips: Window = ()  # typical slip over time
     trend: float = 0.0  # its growth [1/s]
-    speeds: Window = ()  # body speed over time
     fastest: Window = ()  # fastest rim speed over time
     typical: Window = ()  # typical rim speed over time
     deepening: tuple[Deepening, ...] = ()
@@ -148,6 +146,7 @@ class Situation:
     rolling_time: float  # [s] since the rover pulled away, nan = it did not
     settings: StuckSettings
     tuning: SituationTuning
+    passage: FirstPassage
 
     @cached_property
     def climbing_room(self) -> tuple[float, ...]:
@@ -172,7 +171,7 @@ class Situation:
     @cached_property
     def outlook(self) -> Outlook:
         """What lies ahead: probability, time and travel to an entrapment."""
-        return outlook(self)
+        return outlook(self, self.passage)
 
     @property
     def led_by(self) -> int:
@@ -182,29 +181,9 @@ class Situation:
         return (forward > least) - (backward > least)
 
     @property
-    def speed_known(self) -> bool:
-        """Whether the speed rests on more than a guess."""
-        return self.motion.speed_known
-
-    @property
-    def slips_known(self) -> bool:
-        """Whether any wheel tells a slip."""
-        return bool(self.moving) or any(self.stalled)
-
-    @property
     def trend(self) -> float:
         """Growth of the typical slip [1/s]."""
         return self.observed.trend
-
-    @cached_property
-    def speed_ahead(self) -> float:
-        """Body speed in the direction in which the fastest wheel turns [m/s]."""
-        return self._direction * self.motion.speed
-
-    @property
-    def speed_loss(self) -> float:
-        """Deceleration over the last second and a half [m/s^2]."""
-        return -self._direction * slope(self.observed.speeds)
 
     @cached_property
     def second_strongest(self) -> float:
@@ -214,8 +193,8 @@ class Situation:
 
     @cached_property
     def typical_rim(self) -> float:
-        """Typical rim speed [m/s]."""
-        return median([abs(w.rim_speed) for w in self.moving]) if self.moving else 0.0
+        """Typical rim speed, that of standing wheels included [m/s]."""
+        return typical_rim(self.motion)
 
     @cached_property
     def cruise_rim(self) -> float:
@@ -227,9 +206,22 @@ class Situation:
         """Median of |s|, braking included; nan where no wheel tells."""
         return median([abs(w.slip) for w in self.moving]) if self.moving else NAN
 
+    @property
+    def confirmed(self) -> bool:
+        """Whether the rover stands by a reference, or two wheels are at their torque limit.
+
+        In a wrong unit rim speeds make a slip near 1 of any speed, but no speed of zero; torques
+        are then far beyond their limit.
+        """
+        spread = self.tuning.standing_std * self.typical_std * self.fastest
+        stands = self.motion.speed_known and self.fastest > 0.0 and abs(self.motion.speed) < spread
+        return stands or abs(self.second_strongest - 1.0) < self.tuning.limit_tolerance
+
     @cached_property
-    def _direction(self) -> float:
-        return 1.0 if max(self.moving, key=_magnitude).rim_speed > 0.0 else -1.0
+    def sinking(self) -> int:
+        """Number of wheels that sink as they turn."""
+        least = self.tuning.least_deepening
+        return sum(d.growth > least for d in self.observed.deepening)
 
 
 class SituationObserver(Component[Observed]):
@@ -240,10 +232,7 @@ class SituationObserver(Component[Observed]):
     ) -> None:
         super().__init__(Observed())
         self._settings, self._tuning = settings, tuning
-
-    def forget_trend(self) -> None:
-        """Begin the trend anew: the level of the slip was wrong, which is no growth."""
-        self.state = self.state._replace(slips=())
+        self._passage = FirstPassage()
 
     def update(self, time: float, motion: RoverMotion) -> Situation:
         """Observe the motion at a time [s]."""
@@ -272,10 +261,9 @@ class SituationObserver(Component[Observed]):
             rim_travel=rim_travel,
             slips=slips,
             trend=trend,
-            speeds=self._speeds(time, motion),
             fastest=rims,
             standing=standing,
-            typical=self._typical_rims(time, motion, moving),
+            typical=self._typical_rims(time, motion),
             travels=self._travels(dt, moving),
             deepening=self._deepened(
                 motion.wheels,
@@ -298,6 +286,7 @@ class SituationObserver(Component[Observed]):
             rolling_time=time - rolling_since,
             settings=self._settings,
             tuning=tuning,
+            passage=self._passage,
         )
 
     def _rolling_since(self, time: float, fastest: float, cruise: float, *, anew: bool) -> float:
@@ -357,20 +346,10 @@ class SituationObserver(Component[Observed]):
             return slips, 0.0
         return slips, self.state.trend if slips is self.state.slips else slope(slips)
 
-    def _speeds(self, time: float, motion: RoverMotion) -> Window:
-        if motion.turning:
-            # A spin in place has turning wheels and no speed, by command.
-            return ()
-        span = self._tuning.loss_window + self._tuning.loss_window_rounding
-        return appended(self.state.speeds, time, motion.speed, span)
-
-    def _typical_rims(
-        self, time: float, motion: RoverMotion, moving: Sequence[WheelMotion]
-    ) -> Window:
+    def _typical_rims(self, time: float, motion: RoverMotion) -> Window:
         if motion.turning:
             return self.state.typical
-        typical = median([abs(w.rim_speed) for w in moving]) if moving else 0.0
-        return appended(self.state.typical, time, typical, self._tuning.cruise_window)
+        return appended(self.state.typical, time, typical_rim(motion), self._tuning.cruise_window)
 
     def _travels(self, dt: float, moving: Sequence[WheelMotion]) -> tuple[float, float]:
         if not moving:
@@ -412,5 +391,7 @@ class SituationObserver(Component[Observed]):
         return Deepening(travel, samples, growth)
 
 
-def _magnitude(wheel: WheelMotion) -> float:
-    return abs(wheel.rim_speed)
+def typical_rim(motion: RoverMotion) -> float:
+    """Return the median rim speed of the wheels that tell one [m/s]."""
+    told = [abs(w.rim_speed) for w in motion.wheels if w.rate_told]
+    return median(told) if told else 0.0

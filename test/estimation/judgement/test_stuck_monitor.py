@@ -54,7 +54,7 @@ def test_gradual_entrapment_is_announced_seconds_before():
     when = first(course([[wheel(s)] * 6 for s in slips]))
     entrapped = next(i for i, s in enumerate(slips) if s > 0.9) * 0.1 + 1.0
     assert when is not None
-    assert entrapped - when >= 3.0
+    assert entrapped - when >= 2.5
 
 
 def test_sudden_entrapment_is_announced_before_it_lasts_a_second():
@@ -206,7 +206,7 @@ def test_wheels_that_are_being_stopped_raise_nothing_by_an_early_reference():
 def test_drives_that_give_way_near_their_limit_raise_it_without_any_speed():
     monitor = StuckMonitor()
     cruise = [wheel(0.2, rim=1.8, torque=0.4)] * 4
-    hard = [wheel(0.2, rim=1.1, torque=0.75)] * 2 + [wheel(0.2, rim=1.75, torque=0.4)] * 2
+    hard = [wheel(0.2, rim=0.8, torque=0.95)] * 2 + [wheel(0.2, rim=1.75, torque=0.4)] * 2
     steep = [wheel(0.2, rim=1.75, torque=0.75)] * 4
     found = [judge(monitor, 0.1 * i, 0.0, False, cruise) for i in range(50)]
     assert not found[-1].stuck
@@ -214,97 +214,8 @@ def test_drives_that_give_way_near_their_limit_raise_it_without_any_speed():
     found = [judge(monitor, 5.0 + 0.1 * i, 0.0, False, steep) for i in range(50)]
     assert not found[-1].stuck
     found = [judge(monitor, 10.0 + 0.1 * i, 0.0, False, hard) for i in range(10)]
-    assert 0.3 <= first(found) <= 0.6
+    assert 0.1 <= first(found) <= 0.4
     assert 'torque limit' in found[-1].reason
-
-
-def test_without_a_speed_the_margin_of_the_soil_decides():
-    slips = [min(0.3 + 0.004 * i, 0.78) for i in range(300)]
-    answers = []
-    for margin in (0.1, 0.005):
-        monitor = StuckMonitor()
-        found = [
-            judge(monitor, 0.1 * i, 0.01, False, [wheel(s)] * 6, margin=margin)
-            for i, s in enumerate(slips)
-        ]
-        answers.append(found[-1].stuck)
-    assert answers == [False, True]
-
-
-def test_spin_in_place_raises_nothing():
-    """The rover is steered into a spin: its speed goes, its wheels turn on against each other."""
-
-    def raised(turning):
-        monitor = StuckMonitor()
-        found = []
-        for i in range(300):
-            time = 0.1 * i
-            speed = 0.05 * min(max(1.0 - (time - 10.0) / 2.0, 0.0), 1.0)
-            rims = [0.05 + (0.03 if time > 10.0 else 0.0), speed - (0.03 if time > 10.0 else 0.0)]
-            wheels = [wheel(0.4, rim=rim, torque=0.6) for rim in rims * 3]
-            found.append(judge(monitor, time, speed, True, wheels, turning=turning and time > 10))
-        return first(found)
-
-    assert raised(turning=False) is not None  # without the turning it would be a rover that bogs
-    assert raised(turning=True) is None
-
-
-def test_a_level_found_to_be_wrong_is_no_growth():
-    """After wild references the speed is opened to them: the jump of the slip is not a trend."""
-
-    def warned(forget):
-        monitor = StuckMonitor()
-        before = course([[wheel(0.3)] * 6] * 100, monitor=monitor)
-        if forget:
-            monitor.forget_trend()
-        after = course([[wheel(0.68)] * 6] * 60, monitor=monitor, start=10.0)
-        return first(before + after) is not None
-
-    assert warned(forget=False)
-    assert not warned(forget=True)
-
-
-def test_fixes_that_disagree_by_chance_are_no_bogging_down():
-    """Slip 0.66 +- 0.07 near the torque limit: each second another reference moves the speed."""
-    monitor = StuckMonitor()
-    found = []
-    for i in range(300):
-        # 4 mm/s between references is what 3 mm/s of noise make of a speed of 17 mm/s.
-        slip = 0.66 + (0.04 if i // 10 % 2 else -0.04)
-        wheels = [wheel(slip, torque=0.6)._replace(slip_std=0.07)] * 6
-        found.append(judge(monitor, 0.1 * i, 0.05 * (1.0 - slip), True, wheels))
-    assert first(found) is None
-
-
-def test_a_fast_loss_of_speed_near_the_torque_limit_is_bogging_down_where_drives_slow_down():
-    def run(slowing):
-        """Slip grows by 0.2 a second from 5 s on; rim speeds fall by so much a second."""
-        monitor, found = StuckMonitor(), []
-        for i in range(75):
-            since = 0.1 * max(i - 50, 0)
-            slip, rim = 0.3 + 0.2 * since, 1.0 - slowing * since
-            # The first wheel is the fastest: it holds its speed.
-            wheels = [wheel(slip, torque=0.6, rim=r) for r in (1.0, rim, rim, rim)]
-            found.append(judge(monitor, 0.1 * i, rim * (1.0 - slip), True, wheels))
-        return found
-
-    assert 5.0 < first(run(0.2)) < 6.5
-    assert 'bogging down' in next(a.reason for a in run(0.2) if a.stuck)
-    # Drives that hold their rim speed lose way by slip alone, which other signs judge.
-    assert not any('bogging down' in a.reason for a in run(0.0))
-
-
-@pytest.mark.parametrize('held', [True, False])
-def test_a_wheel_that_is_held_changes_the_slip_of_the_others_and_is_no_entrapment(held):
-    """The others take over its share: slip grows to 0.6 within a second, wheels sink by 3 mm."""
-
-    def row(i):
-        share = min(max(0.1 * (i - 100), 0.0), 1.0)
-        others = wheel(0.2 + 0.4 * share)._replace(sinkage=0.02 + 0.003 * share)
-        stands = wheel(-1.0, rim=0.0, known=False, torque=-0.9)
-        return [others] * 5 + [stands if held and share > 0.0 else others]
-
-    assert (first(course([row(i) for i in range(200)])) is None) == held
 
 
 def test_a_wheel_that_sends_nothing_for_a_while_changes_nothing():
@@ -362,17 +273,11 @@ def deepening(settings, slip=0.4, per_metre=0.03, seconds=40.0):
 def test_a_steady_deepening_warns_before_the_lugs_cannot_climb_out():
     found = deepening(StuckSettings())
     warned = next(i for i, a in enumerate(found) if a.stuck)
-    assert 0.05 < found[warned].wheels[0].travel < 0.3
+    assert 0.3 < found[warned].wheels[0].travel < 2.0
     assert 'rim travel' in found[warned].reason
     assert min(a.wheels[0].travel for a in found) == pytest.approx(0.05)
     # Ground on which wheels sink no further than into their ruts raises nothing.
     assert first(deepening(StuckSettings(), per_metre=0.01)) is None
-
-
-def test_the_travel_parameter_says_how_early():
-    when = [first(deepening(StuckSettings(travel=travel))) for travel in (0.01, 0.3, 1.0)]
-    assert when[0] > when[1] + 3.0
-    assert when[1] > when[2]
 
 
 def test_two_wheels_of_six_that_dig_are_no_entrapment():
@@ -383,30 +288,12 @@ def test_two_wheels_of_six_that_dig_are_no_entrapment():
     assert first(found) is None
 
 
-def growing(settings, rate=0.004):
-    slips = [min(0.5 + rate * 0.1 * i, 0.79) for i in range(720)]
-    return first(
-        course(
-            [[wheel(s)._replace(slip_std=0.005)] * 6 for s in slips], monitor=StuckMonitor(settings)
-        )
-    )
-
-
-def test_the_horizon_parameter_says_how_far_the_trend_is_followed():
-    assert growing(StuckSettings(horizon=0.1)) is None
-    assert growing(StuckSettings(horizon=15.0)) is None
-    far = growing(StuckSettings(horizon=1e4))
-    assert far is not None
-    assert growing(StuckSettings(horizon=100.0)) >= far
-    quick = [growing(StuckSettings(horizon=h), rate=0.02) for h in (0.1, 15.0)]
-    assert quick[0] is None
-    assert quick[1] is not None
-
-
 def test_the_parameters_of_the_configuration_reach_the_warning():
     keys = ['filter.stuck_horizon:=7.0', 'filter.stuck_travel:=0.1', 'filter.stuck_clear_slip:=0.4']
+    keys.append('filter.stuck_threshold:=0.7')
     given = StuckSettings.from_configuration(reader.load(['frostyboy'], keys))
     assert (given.horizon, given.travel, given.clear_slip, given.clear_time) == (7.0, 0.1, 0.4, 3.0)
+    assert given.threshold == 0.7
 
 
 def test_a_sign_that_is_there_keeps_the_warning():
@@ -422,24 +309,6 @@ def test_a_sign_that_is_there_keeps_the_warning():
     free = [judge(monitor, 15.0 + 0.1 * i, 0.0, False, cruise) for i in range(60)]
     cleared = next(i for i, a in enumerate(free) if not a.stuck)
     assert 30 <= cleared <= 32
-
-
-def test_held_wheels_beside_one_that_stands_are_an_entrapment():
-    """One wheel stalls, two slip: no other sign sees it."""
-
-    def raised(speed):
-        monitor = StuckMonitor()
-        rolling = [wheel(0.2, rim=0.5, torque=0.2)] * 4
-        stands = wheel(0.0, rim=0.0, known=False, torque=0.95)
-        held = [stands, wheel(0.7, rim=0.5, torque=0.1), wheel(0.7, rim=0.5, torque=0.1)]
-        held.append(wheel(0.1, rim=0.17, torque=0.1))
-        found = [judge(monitor, 0.1 * i, 0.4, True, rolling) for i in range(30)]
-        found += [judge(monitor, 3.0 + 0.1 * i, speed, True, held) for i in range(20)]
-        return found[-1]
-
-    assert raised(0.15).stuck
-    assert 'others held' in raised(0.15).reason
-    assert 'others held' not in raised(0.3).reason  # the rover makes way
 
 
 def test_every_sign_has_its_own_name_and_words():
@@ -465,50 +334,19 @@ def test_a_wheel_whose_slip_is_not_known_or_brakes_has_no_entrapment_in_sight():
     assert chances[1] == chances[2] == 0.0
 
 
-def test_held_wheels_count_while_the_drive_is_being_stopped_too():
-    """A driver who takes the speed back because the rover is held is still held."""
-    rolling = [wheel(0.2, rim=0.5, torque=0.2)] * 4
-    monitor = StuckMonitor()
-    for i in range(30):
-        judge(monitor, 0.1 * i, 0.4, True, rolling)
-    found = []
-    for i in range(8):
-        rim = 0.5 * 0.88 ** (i + 1)
-        stands = wheel(0.0, rim=0.0, known=False, torque=0.95)
-        held = [stands, *[wheel(0.75, rim=rim, torque=0.1)] * 2, wheel(0.1, rim=0.3 * rim)]
-        found.append(judge(monitor, 3.0 + 0.1 * i, 0.2 * rim, True, held))
-    assert found[-1].stuck
-    assert 'others held' in found[-1].reason
-
-
-def test_a_growth_right_after_a_start_says_nothing_though_the_rover_drove_before():
-    """Slip settles over the first travel after each start, not after the first one only."""
-
-    def warned(pause):
-        slips = [0.2] * 100 + [min(0.2 + 0.1 * 0.1 * i, 0.68) for i in range(60)]
-        rows = [[wheel(s)] * 6 for s in slips]
-        standing = [[wheel(0.0, rim=0.0, known=False)] * 6] * pause
-        return any(a.stuck for a in course([*rows[:100], *standing, *rows[100:]]))
-
-    assert warned(pause=0)
-    assert not warned(pause=30)
-
-
 def test_the_words_say_what_is_seen_and_what_to_do():
     monitor, found = StuckMonitor(), []
     for i in range(400):
         slip = min(0.2 + 0.004 * i, 0.85)
         wheels = [wheel(slip)._replace(sinkage=0.01 + 0.04 * 0.05 * 0.1 * i)] * 6
         speed = 0.05 * (1.0 - slip)
-        found.append(judge(monitor, 0.1 * i, speed, True, wheels, margin=0.031))
+        found.append(judge(monitor, 0.1 * i, speed, True, wheels))
     reason = next(a.reason for a in found if a.stuck)
-    assert reason.endswith(
-        ', 6 wheels sink 4 cm per metre of rim travel, pull left 3% of the load; stop, back out'
-    )
+    assert reason.endswith(', 6 wheels sink 4 cm per metre of rim travel; stop, back out')
     # Nothing is said of what is not known, and no number of nothing.
     plain = next(a.reason for a in course([[wheel(0.95)] * 6] * 100) if a.stuck)
     assert plain.endswith('; stop, back out')
-    assert 'sink' not in plain and 'pull left' not in plain and '0.000' not in plain
+    assert 'sink' not in plain and '0.000' not in plain
 
 
 def test_the_growth_of_the_slip_is_known_from_the_first_sample_that_spans_enough():
@@ -520,3 +358,56 @@ def test_the_growth_of_the_slip_is_known_from_the_first_sample_that_spans_enough
         observer.state = observer.state._replace(slips=slips, trend=trend)
         found.append(trend)
     assert found == pytest.approx([0.0, 0.0, 0.0, 0.0, 0.1])
+
+
+@pytest.mark.parametrize(('speed', 'confirmed'), [(0.0, True), (0.002, True), (0.05, False)])
+def test_a_rover_that_stands_by_a_reference_confirms_the_warning(speed, confirmed):
+    """Rim speeds in a wrong unit make slip 0.98 of 5 cm/s, but no speed of zero."""
+    monitor = StuckMonitor()
+    spinning = [wheel(0.98, rim=2.5)._replace(slip_std=0.003 / 2.5)] * 6
+    found = [judge(monitor, 0.1 * i, speed, True, spinning) for i in range(30)]
+    assert found[-1].stuck and found[-1].confirmed is confirmed
+    assert not any(a.confirmed for a in found if not a.stuck)
+    blind = StuckMonitor()
+    assert not any(judge(blind, 0.1 * i, speed, False, spinning).confirmed for i in range(30))
+
+
+def test_wheels_at_their_torque_limit_confirm_it_and_torques_far_beyond_do_not():
+    """Torques in a wrong unit are a thousand times too great."""
+    for torque, confirmed in ((0.95, True), (950.0, False)):
+        monitor = StuckMonitor()
+        for i in range(30):
+            judge(monitor, 0.1 * i, 0.0, False, [wheel(0.2, rim=1.0, torque=0.4)] * 4)
+        held = [wheel(0.0, rim=0.0, known=False, torque=torque)] * 4
+        held[0] = wheel(0.2, rim=1.0, torque=torque)
+        found = [judge(monitor, 3.0 + 0.1 * i, 0.0, False, held) for i in range(10)]
+        assert found[-1].stuck and found[-1].confirmed is confirmed
+
+
+def test_a_median_above_0_9_for_a_second_is_an_entrapment_also_right_after_a_start():
+    found = course([[wheel(0.97)] * 6] * 30)
+    assert first(found) == pytest.approx(1.0, abs=0.11)
+    assert 'stop, back out' in found[-1].reason
+
+
+@pytest.mark.parametrize('threshold', [0.2, 0.5, 0.8])
+def test_the_threshold_is_the_probability_that_raises_it(threshold):
+    monitor, before, sunk = StuckMonitor(StuckSettings(threshold=threshold)), [], 0.01
+    for i in range(600):
+        sunk += 0.0002 * i * 0.05 * 0.1  # more and more per rim travel
+        wheels = [wheel(0.4)._replace(sinkage=sunk)] * 6
+        found = judge(monitor, 0.1 * i, 0.03, True, wheels)
+        if found.stuck:
+            break
+        before.append(found.wheels[0].probability)
+    assert found.stuck and found.wheels[0].probability > threshold
+    assert max(before[:-11]) <= threshold
+
+
+def test_braking_near_minus_one_is_never_an_entrapment():
+    """Class 3, but a wheel that is dragged digs nobody in."""
+    for rim, torque in ((0.0005, math.nan), (0.003, -0.95), (0.003, 0.0)):
+        rows = [[wheel(-0.97, rim=rim, torque=torque)] * 6 for _ in range(300)]
+        found = course(rows)
+        assert first(found) is None
+        assert all(w.probability < 0.05 for w in found[-1].wheels)
