@@ -21,10 +21,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from wheel_terra_estimator.bags.bag_file import BagFile
 from wheel_terra_estimator.bags.message_factory import MessageFactory
-from wheel_terra_estimator.messages.convert import quaternion_from_roll_pitch_yaw
 
 WHEELS = {
     'fl': 'front_left_wheel_joint',
@@ -67,9 +67,7 @@ def messages(
             make.joint_state(make.header(stamp, ''), WHEELS.values(), velocity=rate, effort=torque),
             stamp,
         )
-        attitude = quaternion_from_roll_pitch_yaw(
-            math.radians(row['roll']), math.radians(row['pitch']), 0.0
-        )
+        attitude = Rotation.from_euler('xy', [row['roll'], row['pitch']], degrees=True).as_quat()
         yield (
             '/imu/data',
             make.imu(

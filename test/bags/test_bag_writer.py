@@ -73,6 +73,8 @@ def test_topics_have_full_names_and_their_types(bag: Path) -> None:
         f'{own}/mobility': (joint_state, 25),
         f'{own}/soil': (joint_state, 25),
         f'{own}/slip_on_slope': (joint_state, 0),
+        f'{own}/slip_angle': (joint_state, 25),
+        f'{own}/slip_angle_stddev': (joint_state, 25),
         f'{own}/slip_class': ('std_msgs/msg/UInt8MultiArray', 25),
         f'{own}/twist': ('geometry_msgs/msg/TwistWithCovarianceStamped', 25),
         f'{own}/stuck': ('std_msgs/msg/Bool', 3),

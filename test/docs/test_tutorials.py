@@ -86,14 +86,14 @@ def test_blocks_of_a_tutorial_run(page, command, tmp_path, monkeypatch, capsys, 
             assert not (work / 'out' / 'report.json').read_text().count('"verdict": "named"')
 
 
-def test_configuration_of_robot_localization_takes_speed_and_turn_only():
+def test_configuration_of_robot_localization_takes_speeds_and_turn_only():
     text = (FOLDER / 'nav2.md').read_text(encoding='utf-8')
     block = re.search(r'^```yaml\n(.*?)^```', text, re.M | re.S)[1]
     values = yaml.safe_load(block)['ekf_filter_node']['ros__parameters']
     assert values['twist0'] == '/wheel_terra_estimator/twist'
     flags = values['twist0_config']
     assert len(flags) == len(values['imu0_config']) == 15
-    assert [i for i, flag in enumerate(flags) if flag] == [6, 11]  # vx, vyaw
+    assert [i for i, flag in enumerate(flags) if flag] == [6, 7, 11]  # vx, vy, vyaw
 
 
 SKELETON = """<robot name="cart"><link name="base_link"><inertial><origin xyz="0 0 0.1"/>

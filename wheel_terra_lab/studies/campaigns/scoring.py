@@ -137,24 +137,28 @@ def _held_out(campaign: Campaign, diagnosis: Any) -> Record:
     nothing = np.full(len(campaign.rows['slip']), np.nan)
     measured = np.stack([campaign.table.get(key, nothing) for key in OUTPUTS], 1)[kept]
     curves = diagnosis.curves
+    n = len(OUTPUTS)  # the lateral force is not drawn
+    band, refit, added = (
+        values[:, :n] for values in (curves.band, curves.held_out_refit, curves.held_out_after)
+    )
     inside = np.isfinite(std) & np.isfinite(measured)
 
     def beyond(predicted: np.ndarray) -> float:
-        squares = (((predicted - measured) / np.maximum(curves.band, std))[inside]) ** 2
+        squares = (((predicted - measured) / np.maximum(band, std))[inside]) ** 2
         return float(np.sqrt(max(np.mean(squares) - 1.0, 0.0)))
 
     def excess(predicted: np.ndarray) -> float:
         return float(np.sqrt(np.mean((((predicted - truth) / std)[inside]) ** 2)))
 
-    before = ((curves.held_out_refit - measured) / std)[inside] ** 2
-    after = ((curves.held_out_after - measured) / std)[inside] ** 2
+    before = ((refit - measured) / std)[inside] ** 2
+    after = ((added - measured) / std)[inside] ** 2
     # Far-off cells (outliers) must not decide: compare robustly.
     gain = np.minimum(before, 16.0) - np.minimum(after, 16.0)
     spread = np.std(gain) / np.sqrt(gain.size)
     return {
-        'excess_refit': excess(curves.held_out_refit),
-        'excess_after': excess(curves.held_out_after),
-        'measured_refit': beyond(curves.held_out_refit),
-        'measured_after': beyond(curves.held_out_after),
+        'excess_refit': excess(refit),
+        'excess_after': excess(added),
+        'measured_refit': beyond(refit),
+        'measured_after': beyond(added),
         'worse_z': float(np.mean(gain) / spread) if spread > 0 else 0.0,
     }
