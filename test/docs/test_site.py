@@ -19,8 +19,15 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 NEEDED = ('mkdocs', 'material', 'mkdocstrings', 'latex2mathml')
 SOURCES = (
-    'docs', 'tools', 'wheel_terra_estimator', 'config', 'data', 'mkdocs.yml', 'CONTRIBUTING.md',
-)  # fmt: skip
+    'docs',
+    'tools',
+    'wheel_terra_estimator',
+    'config',
+    'data',
+    'mkdocs.yml',
+    'package.xml',
+    'CONTRIBUTING.md',
+)
 
 pytestmark = [
     pytest.mark.slow,
