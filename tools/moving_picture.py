@@ -30,6 +30,7 @@ FRAMES, POINTS = 75, 240  # moments of the rover, points of a curve
 WIDTH, HEIGHT = 760, 430
 GROUND, SCALE, START = 112, 155.0, 60.0  # soil surface [px], px per metre, first hub [px]
 PLOT = (46, 205, 690, 185)  # left, top, width, height of the curve [px]
+LABEL = 150.0  # width of a label and its room [px]
 CLASSES = (SlipClass.LOW, SlipClass.MODERATE, SlipClass.HIGH, SlipClass.STUCK)
 
 
@@ -200,14 +201,20 @@ def _warnings(drive: Drive, clock: Clock) -> list[str]:
     left, top, width, height = PLOT
     end = float(history.seconds[-1])
     parts = []
+    labelled = -LABEL
     for warning in drive.summary.warnings:
         last = end if warning.end is None else warning.end
         x, w = left + width * warning.start / end, width * (last - warning.start) / end
+        words = ''
+        if x - labelled >= LABEL:  # of warnings that crowd, the first is labelled
+            labelled = x
+            words = (
+                f'<text class="bad" x="{x:.0f}" y="{top - 6}" text-anchor="middle">'
+                f'stuck warning, {warning.start:.0f} s</text>'
+            )
         parts.append(
             f'<g visibility="hidden">{clock.appear(warning.start)}<rect class="bad" opacity="0.16" '
-            f'x="{x:.1f}" y="{top}" width="{w:.1f}" height="{height}"/>'
-            f'<text class="bad" x="{x:.0f}" y="{top - 6}" text-anchor="middle">'
-            f'stuck warning, {warning.start:.0f} s</text></g>'
+            f'x="{x:.1f}" y="{top}" width="{w:.1f}" height="{height}"/>{words}</g>'
         )
     if truth is not None and truth.slip is not None:
         stuck = entrapped(truth.slip.stamp, truth.slip.value)
