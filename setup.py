@@ -77,7 +77,7 @@ setup(
             'cli/completion/*wheel-terra',
             *(f'**/*.{end}' for end in PACKAGE_DATA),
         ],
-        LABORATORY: ['py.typed', '**/*.html', '**/*.csv', '**/*.yaml'],
+        LABORATORY: ['py.typed', '**/*.html', '**/*.csv', '**/*.yaml', '**/*_LICENSE.txt'],
     },
     data_files=shared_files(),
     zip_safe=False,
@@ -142,7 +142,7 @@ setup(
         ],
         'wheel_terra_estimator.commands': [
             f'{name} = {LABORATORY}.cli.{name}'
-            for name in ('trial', 'soilbin', 'evaluate', 'bench')
+            for name in ('trial', 'soilbin', 'reproduce', 'evaluate', 'bench')
         ],
     },
 )

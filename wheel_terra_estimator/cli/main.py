@@ -44,6 +44,7 @@ COMMANDS = {
     'trial': 'hide an effect in a drawn table, diagnose it blind, open the seal',
     'effects': 'list the physical and instrument effects that can be named',
     'soilbin': 'run the virtual soil bin (discrete elements)',
+    'reproduce': 'every figure, table and number of three papers beside ours, with a verdict',
     'evaluate': 'score the estimator against ground truth and baselines',
     'bench': 'speed beside floors and peers, in processor time',
     'demo': 'run the estimator over two shipped drives, and a blind trial of the diagnosis',
@@ -54,7 +55,7 @@ The module of that name, here or in the laboratory, has add_arguments(parser) an
 exit status, and may have EXAMPLES (command lines for its help). Only that of the command that is
 asked for is imported, and it imports heavy libraries inside run.
 """
-LABORATORY = frozenset({'trial', 'soilbin', 'evaluate', 'bench'})
+LABORATORY = frozenset({'trial', 'soilbin', 'reproduce', 'evaluate', 'bench'})
 """Sub-commands of the package wheel_terra_lab, which a robot does without."""
 ENTRY_POINTS = 'wheel_terra_estimator.commands'
 """Group of entry points that names the modules of these."""

@@ -215,7 +215,7 @@ def test_rows_at_the_papers_speed_are_in_order_and_tell_the_largest_miss():
 
 def test_statements_of_the_papers_figures_hold_and_can_fail():
     """The published rows do what the paper's text says; with two wheels exchanged they do not."""
-    table = Path(__file__).parents[3] / 'docs' / 'laboratory' / 'soilbin' / 'reproduction.csv'
+    table = reproduction.metrics.DATA / 'reproduction.csv'
     with table.open(newline='') as stream:
         rows = list(csv.DictReader(stream))
     said = {figure.name: figure.holds(figure, rows) for figure in reproduced_figures.FIGURES}

@@ -100,15 +100,22 @@ def draw(model: Model, path: Path) -> None:
         save(figure, path)
 
 
-def section(shared: Path, figures: Path) -> str:
-    """Return the section and draw its picture."""
-    fitted = hit_wheels.fitted_soil(shared)
-    printed_start = fitted.with_values(
-        {
-            'soil.sinkage_exponent': PRINTED['Wh3'][0],
-            'effects.slip_sinkage_exponent.n1': PRINTED['Wh3'][1],
-            'effects.rim_friction.ring_height': 0.003,
-        }
+def with_printed_exponents(model: Model, wheel: str) -> Model:
+    """Return the model with the exponents that the paper prints for a wheel, where it does."""
+    if wheel not in PRINTED:
+        return model
+    n0, n1 = PRINTED[wheel]
+    return model.with_values({'soil.sinkage_exponent': n0, 'effects.slip_sinkage_exponent.n1': n1})
+
+
+def printed_model(fitted: Model) -> Model:
+    """Return the printed exponents, with stiffness and angles free for the stated sinkages."""
+    return _compromise(fitted)[0]
+
+
+def _compromise(fitted: Model) -> tuple[Model, dict[str, float]]:
+    printed_start = with_printed_exponents(fitted, 'Wh3').with_values(
+        {'effects.rim_friction.ring_height': 0.003}
     )
     points = OperatingPoints(
         np.array([0.0, 0.6]), LOAD, Wheel(*WHEELS['Wh3'], 0.010, 30), slip_radius='shear'
@@ -118,10 +125,14 @@ def section(shared: Path, figures: Path) -> str:
     compromise, values = fit(
         lugged(printed_start, 0.010), [(points, stated)], (0.001, 1.0, 1.0), FREE
     )
-    compromise = Model(
-        compromise.soil,
-        {k: v for k, v in compromise.effects.items() if not k.startswith('lug_')},
-    )
+    effects = {k: v for k, v in compromise.effects.items() if not k.startswith('lug_')}
+    return Model(compromise.soil, effects), values
+
+
+def section(shared: Path, figures: Path) -> str:
+    """Return the section and draw its picture."""
+    fitted = hit_wheels.fitted_soil(shared)
+    compromise, values = _compromise(fitted)
     models = {'printed n0, n1': compromise, 'fitted to the 2011 rows': fitted}
     draw(compromise, figures / 'ding.svg')
     rows: list[tuple[str, str, list[str], str]] = []
@@ -135,19 +146,7 @@ def section(shared: Path, figures: Path) -> str:
     for h in SUPPORT:
         ratio = [f'{at[n][h][-1] / at[n][h][0]:.1f}' for n in models]
         add(f'z(0.6)/z(0), Wh3, h = {1e3 * h:.0f} mm', '3 to 7', ratio)
-    second = [
-        sinkage(
-            m.with_values(
-                {
-                    'soil.sinkage_exponent': PRINTED['Wh2'][0],
-                    'effects.slip_sinkage_exponent.n1': PRINTED['Wh2'][1],
-                }
-            ),
-            'Wh2',
-            0.01,
-        )
-        for m in models.values()
-    ]
+    second = [sinkage(with_printed_exponents(m, 'Wh2'), 'Wh2', 0.01) for m in models.values()]
     add(
         'z(0.6)/z(0), Wh2 with n0 = 0.93, n1 = 0.54, h = 10 mm',
         '3 to 7',

@@ -1,0 +1,63 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""A statement of a paper beside ours, with a verdict."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Statement:
+    """One row of the page.
+
+    Attributes
+    ----------
+    place : str
+        Where the paper has it: ``figure 3``, ``table 7``, ``text``, ``equation 12``.
+    what, paper, ours : str
+        The quantity with its unit, what the paper states, what we compute.
+    holds : bool or None
+        None: not computed, or an input that cannot fail.
+    why : str
+        Within what it is reproduced, or why it is not.
+    """
+
+    place: str
+    what: str
+    paper: str
+    ours: str
+    holds: bool | None
+    why: str = ''
+
+    @property
+    def verdict(self) -> str:
+        """The verdict in words."""
+        words = {True: 'reproduced', False: '**not**', None: 'no test'}[self.holds]
+        return f'{words}: {self.why}' if self.why else words
+
+
+def belongs_to(statement: Statement, figure: str) -> bool:
+    """Return whether a statement is one of a figure, ``12`` including ``12(a)``."""
+    name = statement.place.removeprefix('figures ').removeprefix('figure ')
+    plain = figure.removeprefix('figure ')
+    return statement.place.startswith('figure') and (
+        name == plain or name.partition('(')[0] == plain or plain in name.split(', ')
+    )
+
+
+def within(paper: float, ours: float, share: float, unit: str = '') -> tuple[bool, str]:
+    """Return whether two numbers agree to a share of the paper's, and how far they are apart."""
+    off = abs(ours - paper) / abs(paper)
+    return off <= share, f'{100 * off:.0f} % apart, {100 * share:.0f} % allowed{unit}'
+
+
+def page(title: str, statements: Sequence[Statement]) -> list[str]:
+    """Return the lines of one paper's table."""
+    held = sum(row.holds is True for row in statements)
+    judged = sum(row.holds is not None for row in statements)
+    lines = [f'## {title}', '', f'{held} of {judged} statements that can fail are reproduced.', '']
+    lines += ['| where | what | paper | ours | verdict |', '|---|---|---|---|---|']
+    lines += [f'| {s.place} | {s.what} | {s.paper} | {s.ours} | {s.verdict} |' for s in statements]
+    return [*lines, '']
