@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -39,21 +40,22 @@ def unpack(codec: str, packed: bytes | memoryview, size: int, limits: Limits = L
         Unpacked size that the file states [byte]; 0: none. It may be damaged: how much there is
         decides, not what is stated.
     limits : Limits
-        Nothing above ``limits.chunk`` is unpacked.
+        Nothing above `Limits.unpacked` is unpacked.
     """
-    too_large = f'a chunk is above {in_words(limits.chunk)}'
+    most = limits.unpacked(len(packed)) if codec else limits.chunk
+    too_large = f'a chunk is above {in_words(most)}'
     if codec not in CODECS:
         return Unpacked(b'', f'the compression {codec!r} is not known')
     if not codec:
-        if len(packed) > limits.chunk:
+        if len(packed) > most:
             return Unpacked(b'', too_large)
         return Unpacked(bytes(packed), '' if len(packed) == size else 'a chunk is cut off')
-    whole = _all_at_once(codec, packed, size) if 0 < size <= limits.chunk else None
+    whole = _all_at_once(codec, packed, size) if 0 < size <= most else None
     if whole is not None and len(whole) == size:
         return Unpacked(whole, '')
     decompressor = _decompressor(codec)
-    pieces = list(_piecewise(decompressor, packed, limits.chunk + 1))
-    if sum(map(len, pieces)) > limits.chunk:  # known before they are joined, which doubles them
+    pieces = list(_piecewise(decompressor, packed, most + 1))
+    if sum(map(len, pieces)) > most:  # known before they are joined, which doubles them
         return Unpacked(b'', too_large)
     content = b''.join(pieces)
     del pieces
@@ -82,7 +84,7 @@ def unpack_file(path: Path, target: Path, limits: Limits = LIMITS) -> str:
         It cannot be read or written, or unpacks to far more than recordings do.
     """
     written = 0
-    allowed = max(limits.held, limits.packed_share * path.stat().st_size)
+    allowed = limits.work(path.stat().st_size)
     try:
         with path.open('rb') as packed, target.open('wb') as out:
             decompressor = _decompressor('zstd')
@@ -94,10 +96,7 @@ def unpack_file(path: Path, target: Path, limits: Limits = LIMITS) -> str:
                     content = decompressor.decompress(piece, MEGABYTE)
                     written += len(content)
                     if written > allowed:
-                        raise UserError(
-                            f'{path}: unpacks to more than {limits.packed_share} times its size; '
-                            'no recording does, so it is not read'
-                        )
+                        raise bomb(path, limits)
                     out.write(content)
             except (OSError, UserError):
                 raise
@@ -106,6 +105,14 @@ def unpack_file(path: Path, target: Path, limits: Limits = LIMITS) -> str:
     except OSError as error:
         raise UserError(f'{path}: cannot be unpacked ({error.strerror})') from None
     return ''
+
+
+def bomb(path: Path, limits: Limits) -> UserError:
+    """Return the error of a file that unpacks to far more than recordings do."""
+    return UserError(
+        f'{path}: unpacks to more than {limits.packed_share} times its size; no recording does, '
+        'so it is not read'
+    )
 
 
 def _all_at_once(codec: str, packed: bytes | memoryview, size: int) -> bytes | None:
@@ -138,8 +145,13 @@ def _decompressor(codec: str) -> Any:
         from lz4.frame import LZ4FrameDecompressor
 
         return LZ4FrameDecompressor()
+    return _zstd().ZstdDecompressor()
+
+
+@cache
+def _zstd() -> Any:
     try:  # the library came with rosbags
         from compression import zstd  # type: ignore[import-not-found,unused-ignore]
     except ImportError:
         from backports import zstd
-    return zstd.ZstdDecompressor()
+    return zstd

@@ -30,14 +30,22 @@ class Limits:
         One message that is unpacked into its fields, which take several times its size. The
         largest that the estimator hears have a few kB.
     packed_share : int
-        Greatest ratio of unpacked to packed size of a whole file (sensor data: 2 to 20), asked
-        beyond `held`.
+        Greatest ratio of unpacked to packed size (sensor data: 2 to 20): of a chunk above
+        `message`, of a whole file above `held`.
     """
 
     chunk: int = 256 * MEGABYTE
     held: int = 1024 * MEGABYTE
     message: int = 16 * MEGABYTE
-    packed_share: int = 200
+    packed_share: int = 100
+
+    def unpacked(self, packed: int) -> int:
+        """Return the most that a chunk of so many packed bytes may unpack to [byte]."""
+        return min(self.chunk, max(self.message, self.packed_share * packed))
+
+    def work(self, packed: int) -> int:
+        """Return the most that is unpacked in one pass over a file of some size [byte]."""
+        return max(self.held, self.packed_share * packed)
 
 
 LIMITS = Limits()

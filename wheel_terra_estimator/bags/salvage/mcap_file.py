@@ -19,13 +19,13 @@ from collections import Counter, defaultdict
 from collections.abc import Collection, Iterator
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field
-from itertools import accumulate, pairwise
+from itertools import accumulate, islice, pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 from zlib import crc32
 
 from wheel_terra_estimator.bags.salvage import mcap_records as mcap
-from wheel_terra_estimator.bags.salvage.compression import MAGICS, unpack
+from wheel_terra_estimator.bags.salvage.compression import MAGICS, bomb, unpack
 from wheel_terra_estimator.bags.salvage.limits import LIMITS, MEGABYTE, Limits, in_words
 from wheel_terra_estimator.bags.salvage.losses import Losses
 from wheel_terra_estimator.bags.salvage.raw_messages import RawMessage, Topic
@@ -34,6 +34,8 @@ from wheel_terra_estimator.errors import UserError
 _FOOTER = mcap.HEAD + 20 + len(mcap.MAGIC)  # [byte], with the closing magic
 _IN_CHUNK = (mcap.SCHEMA, mcap.CHANNEL, mcap.MESSAGE)
 _LONGEST_STRETCH = 4 * MEGABYTE  # of messages outside of chunks that are read at once
+_MOST_HEADLESS = 1000  # packed chunks without their heads that are tried
+_GAP_WORK = 2**14  # what the search behind a gap costs, in bytes unpacked
 _FORGET_AFTER = 32 * MEGABYTE  # of the file that was looked at
 # Votes of a copy of a definition, by where it stands:
 _SOUND = 100  # in a chunk whose checksum is right: no number of others outvotes it
@@ -118,6 +120,7 @@ class McapFile:
         self._counts: Counter[int] = Counter()
         self._statistics: dict[int, int] | None = None  # messages by channel, as the file states
         self._touched = 0
+        self._work = 0  # [byte] unpacked and looked at in this pass
         self._size = path.stat().st_size
         self._map = self._open(stack)
         if self._map is None:
@@ -139,6 +142,7 @@ class McapFile:
 
     def messages(self, topics: Collection[str]) -> Iterator[RawMessage]:
         """Yield the messages of some topics in the order of their log times."""
+        self._work = 0
         wanted = {number: topic for number, (topic, _) in self.channels.items() if topic in topics}
         counts = Counter(dict.fromkeys(wanted.values(), 0))
         for log_time, _, channel, data in self._merged(frozenset(wanted)):
@@ -248,6 +252,7 @@ class McapFile:
         for item in mcap.records(content, begin, end, possible):
             self._forget(item.end - item.begin)
             if isinstance(item, mcap.Gap):
+                self._add_work(_GAP_WORK)
                 gaps.append(item)
             elif item.opcode == mcap.CHUNK:
                 self._add_chunk(item)
@@ -266,12 +271,18 @@ class McapFile:
     def _take_headless_chunks(self, gaps: list[mcap.Gap]) -> None:
         """Note packed chunks in gaps: they say themselves where they begin and end."""
         assert self._map is not None
+        left = _MOST_HEADLESS
         for gap in gaps:
             found = _PACKED.finditer(self._map, gap.begin, gap.end)
-            begins = [(match.start(), MAGICS[match[0]]) for match in found]
+            begins = [(match.start(), MAGICS[match[0]]) for match in islice(found, left)]
+            left -= len(begins)
             for (at, codec), (end, _) in pairwise([*begins, (gap.end, '')]):
                 head = mcap.ChunkHead(0, mcap.LATEST, 0, 0, codec, at, end - at)
                 self._pieces.append(Piece(at, end, head, head.start, head.end))
+        if not left:
+            self.losses.left_out.append(
+                f'packed data behind the first {_MOST_HEADLESS} pieces without a head left out'
+            )
 
     def _look_inside(self, piece: Piece, gaps: list[mcap.Gap]) -> None:
         """Find what a packed chunk seems to hold that reaches too far, as it lost bytes."""
@@ -412,6 +423,7 @@ class McapFile:
             return Content(self._map[piece.begin : piece.end], '', False, False)
         packed = self._map[head.begin : min(head.begin + head.packed, piece.end)]
         data, damage = unpack(head.codec, packed, head.size, self._limits)
+        self._add_work(len(packed) + len(data))
         right = bool(head.checksum) and not damage and crc32(data) == head.checksum
         return Content(data, damage, right, bool(head.checksum) and not damage and not right)
 
@@ -439,11 +451,13 @@ class McapFile:
             possible.append(mcap.Possible(_IN_CHUNK, known))
         whole = self._whole_pass(piece.begin, content.data, possible[0], wanted, allowed)
         if whole is not None:
+            self._add_work(_ROW_SIZE * whole.counts.total())
             return whole
         found = [self._pass(piece.begin, content.data, possible[0], wanted, allowed)]
         for each in possible[1:]:
             if found[-1].lost_bytes:
                 found.append(self._pass(piece.begin, content.data, each, wanted, allowed))
+        self._add_work(_ROW_SIZE * sum(reading.counts.total() for reading in found))
         best = min(found, key=lambda reading: reading.lost_bytes)
         if best is not found[0] and 2 * found[0].counts.total() > best.counts.total():
             # Few messages lie outside of the times of the head: these are damaged, not the head.
@@ -522,6 +536,7 @@ class McapFile:
         for item in mcap.records(data, 0, len(data), possible):
             if isinstance(item, mcap.Gap):
                 found.lost_bytes += item.end - item.begin
+                self._add_work(_GAP_WORK)
                 gap_after = gap_after or (time,)
             elif item.opcode == mcap.MESSAGE:
                 channel, time, begin, end = mcap.message(data, item)
@@ -553,6 +568,11 @@ class McapFile:
             between.append((reading.last if reading.counts else None, None))
         for number, times in enumerate(between):
             losses.spans[piece.begin + number] = _span(piece, *times)
+
+    def _add_work(self, count: int) -> None:
+        self._work += count
+        if self._work > self._limits.work(self._size):
+            raise bomb(self.path, self._limits)
 
     def _forget(self, count: int) -> None:
         """Let go of the pages of the file that were looked at: they count as memory of ours."""
