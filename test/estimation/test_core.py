@@ -23,6 +23,7 @@ from fake_estimator import (
 from wheel_terra_estimator.configuration.soil_file import StuckState
 from wheel_terra_estimator.estimation.core import EstimatorCore
 from wheel_terra_estimator.estimation.estimates import SlipClass
+from wheel_terra_estimator.estimation.judgement.stuck.memory import StuckMemory
 from wheel_terra_estimator.estimation.measurements import WheelOdometry
 
 
@@ -162,6 +163,25 @@ def test_a_gap_between_two_sets_is_no_time_driven_free():
     apart = play(core, [odometry(2.0 * i) for i in range(10)])
     assert all(s.stuck and s.stuck_direction == -1 for s in apart)
     assert 'warned 10 s ago' in apart[0].reasons[0]
+
+
+def test_a_late_input_does_not_take_a_published_warning_back():
+    """The steps run again know nothing of the warning; it clears by its own rule."""
+    config = configuration()
+    memory = StuckMemory(config)
+    blank = EstimatorCore(config, Digging(config, 'raise')).add(odometry(0.0))[0]
+    free = replace(blank, slip_class=np.zeros_like(blank.slip_class))
+
+    def at(seconds, stuck, **how):
+        return memory.follow(replace(free, stamp=stamp_at(seconds), stuck=stuck), **how)
+
+    assert at(0.0, True).stuck
+    held = at(0.1, False, run_again=True)
+    assert held.stuck and 'before a late input' in held.reasons[0]
+    times = np.arange(0.2, 5.0, 0.1)
+    stuck = [at(time, False).stuck for time in times]
+    assert times[stuck.index(False)] == pytest.approx(0.1 + 3.0, abs=0.06)
+    assert at(6.0, True).stuck and not at(6.1, False).stuck, 'else the estimator clears'
 
 
 def test_sets_that_come_seldom_are_no_gap():

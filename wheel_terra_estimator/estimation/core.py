@@ -97,6 +97,7 @@ class EstimatorCore:
         self._received = [0] * len(CHANNELS)
         self._late = [0] * len(CHANNELS)
         self._deferred = False  # since the last set
+        self._reruns = 0  # until the last set
         self._latest: EstimateSet | None = None
         self._clock_steps = 0
         self._resets = 0
@@ -274,7 +275,10 @@ ReferenceVelocity
         if silent:
             unknown = np.full(len(estimates.slip_class), SlipClass.UNKNOWN, dtype=np.uint8)
             estimates = replace(estimates, slip_class=unknown)
-        estimates = self.warning.follow(self._classes.follow(estimates))
+        reruns, self._reruns = self._reruns, self._log.counts['reruns']
+        estimates = self.warning.follow(
+            self._classes.follow(estimates), run_again=self._reruns != reruns
+        )
         if not self._slopes.due(stamp):
             estimates = replace(estimates, slip_on_slope=None)
         if failed:

@@ -36,7 +36,7 @@ UNKNOWN_ANGLE_STD = math.pi / math.sqrt(3.0)
 
 @dataclass(frozen=True)
 class SidewaysTuning:
-    """What the model is worth; none of it was fitted to a drive."""
+    """What the model is worth; the law was chosen on cross slopes of simulator A."""
 
     contact_share: float = 0.6
     """Place in the contact, as a share of the entrance angle behind the entry, whose shear

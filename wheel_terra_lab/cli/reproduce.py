@@ -91,9 +91,9 @@ def _statements(
         ding.draw(folder / PICTURES[paper])
         return ding.TITLE, ding.statements(0 if arguments.figure else arguments.points), note
     source = nakashima.KEPT if rows is None else 'computed now'
-    rows = nakashima.kept() if rows is None else rows
-    nakashima.draw(rows, folder / PICTURES[paper])
-    return f'{nakashima.TITLE} ({source})', nakashima.statements(rows), note
+    runs = nakashima.kept() if rows is None else rows
+    nakashima.draw(runs, folder / PICTURES[paper])
+    return f'{nakashima.TITLE} ({source})', nakashima.statements(runs), note
 
 
 def _computed(output: Path) -> list[dict[str, str]]:

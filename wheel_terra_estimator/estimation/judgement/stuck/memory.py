@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The stuck warning over a new beginning: it stands until the rover has driven free of it.
 
-A new beginning is a restart of the node, a clock that stepped back, or a filter that failed: the
-rover stands where it stood, and the estimator knows nothing of it any more.
+A new beginning is a restart of the node, a clock that stepped back, a filter that failed, or a late
+input that changed what the estimator remembers: it knows nothing of the warning any more, which
+was published and stands.
 """
 
 from __future__ import annotations
@@ -37,6 +38,7 @@ class StuckMemory:
     def __init__(self, configuration: Configuration) -> None:
         self.state = StuckState()
         self._restored = False
+        self._before = 'a restart'
         self._free: tuple[int, int] | None = None  # stamps: since when, last seen
         self.retune(configuration)
 
@@ -55,18 +57,30 @@ class StuckMemory:
     def begin_anew(self) -> None:
         """Hold the warning: the estimator starts without it."""
         self._restored = self.state.stuck
+        self._before = 'a restart'
         self._free = None
 
     def clear(self) -> None:
         """Forget the warning."""
         self.restore(StuckState())
 
-    def follow(self, estimates: EstimateSet) -> EstimateSet:
-        """Return the set with the warning that stands; take it over."""
+    def follow(self, estimates: EstimateSet, *, run_again: bool = False) -> EstimateSet:
+        """Return the set with the warning that stands; take it over.
+
+        Parameters
+        ----------
+        estimates : EstimateSet
+            As the estimator gives it.
+        run_again : bool
+            Whether a late input was fused at its own stamp since the set before.
+        """
+        if run_again and self.state.stuck and not estimates.stuck and not self._restored:
+            self.begin_anew()
+            self._before = 'a late input'
         if self._restored and self._is_clear(estimates):
             self._restored = False
         if self._restored:
-            words = f'rover: warned{self._age(estimates.stamp)} before a restart: '
+            words = f'rover: warned{self._age(estimates.stamp)} before {self._before}: '
             held = f'; {words}{self.state.reason}'
             reasons = tuple(
                 reason if estimates.stuck else reason + held for reason in estimates.reasons
