@@ -56,11 +56,11 @@ def test_demo_drive_with_a_lost_sector_keeps_every_intact_chunk(tmp_path: Path) 
     """The sector lies in the first of four chunks, which alone holds schemas and channels."""
     found, notes = read(damaged(tmp_path, DEMO, 100_000))
     whole, _ = read(DEMO)
-    assert len(whole) == 10_192
+    assert len(whole) == 10_190
     assert len(found) >= 7_205
     assert not Counter(found) - Counter(whole)
     lost = Counter(message.topic for message in whole) - Counter(m.topic for m in found)
-    assert f'{len(found)} of 10192 whole messages recovered' in notes[0]
+    assert f'{len(found)} of 10190 whole messages recovered' in notes[0]
     said = {topic: int(n) for n, topic in re.findall(r'(\d+) of \d+ on (/[\w/]+)', notes[0])}
     assert said
     assert all(lost[topic] == count for topic, count in said.items())
@@ -76,7 +76,7 @@ def test_a_refusal_says_what_is_missing(tmp_path: Path, capsys: Any) -> None:
     assert main(['replay', str(bag), '--config', 'frostyboy']) == 2
     said = capsys.readouterr().err
     assert 'no wheel of wheels.names' in said
-    assert 'of 10192 whole messages recovered; lost: ' in said
+    assert 'of 10190 whole messages recovered; lost: ' in said
     assert said.count('\n') == 1
 
 

@@ -146,7 +146,7 @@ def test_the_shipped_completion_is_that_of_the_parsers(shell, text, capsys):
 @pytest.mark.parametrize(
     ('line', 'wanted'),
     [
-        ('rep', ['replay']),
+        ('repl', ['replay']),
         ('replay --rem', ['--remap']),
         ('replay bag --config fros', ['frostyboy']),
         ('diagnose rows.csv --soil ', ['shared', 'own']),
