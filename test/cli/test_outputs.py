@@ -68,7 +68,7 @@ def test_the_walk_finds_what_it_is_for() -> None:
     assert len(PAIRS) > 30
     assert {words[0] for words, parser in COMMANDS.items() if outputs(parser)} == {
         'simulate', 'calibrate', 'init', 'compare', 'convert', 'replay', 'predict', 'diagnose',
-        'trial', 'soilbin', 'evaluate', 'demo', 'check', 'bench', 'config',
+        'trial', 'soilbin', 'evaluate', 'demo', 'check', 'bench', 'config', 'reproduce',
     }  # fmt: skip
 
 

@@ -391,13 +391,6 @@ FAULTS: dict[str, Fault] = {
         'sensors.sinkage_zero',
         channel='sinkage',
     ),
-    'sinkage_order': Fault(
-        'exchanged_wheels',
-        'the sinkage of each goes with the torque of the other (correlation of the differences '
-        '{fit:.2f})',
-        'exchange {both} in the names of the sinkage message',
-        channel='sinkage',
-    ),
     # What the estimator lives with
     'jumps': Fault(
         'jumps',

@@ -26,7 +26,6 @@ from wheel_terra_estimator.checks import (
     reference,
     rover_facts,
     sinkage,
-    sinkage_order,
     torque,
     transport,
     turning,
@@ -155,7 +154,6 @@ AGAINST_EACH_OTHER = (
     ('covariance', reference, 'check_quality'),
     ('zero', imu, 'check_noise_and_zero'),
     ('zero', sinkage, 'check_sinkage'),
-    ('exchanged_wheels', sinkage_order, 'check_order'),
     ('radius', geometry, 'check_radius'),
     ('track', geometry, 'check_track'),
 )

@@ -34,13 +34,19 @@ DEEP_STD = 0.02
 ODD_ZERO = 0.015
 """A wheel that reads this much less or more than every other of its side [m] is odd."""
 
+ORDER = NotChecked(
+    'exchanged_wheels',
+    'order of the sinkage sensors: a drive does not tell it; lift one wheel after the other and '
+    'see which reading changes',
+)
+
 
 def check_sinkage(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     """Return what is wrong with the sinkage readings, and the evidence with their signs mended."""
     sinkage, configuration = evidence.recording.sinkage, evidence.facts.configuration
     if sinkage is None:
         return [NotChecked('zero', 'no sinkage in the recording')], evidence
-    outcomes: list[Outcome] = []
+    outcomes: list[Outcome] = [ORDER]
     stated = configuration.wheels.names if configuration else ()
     mute = [name for name in stated if name not in sinkage.names]
     if mute:
