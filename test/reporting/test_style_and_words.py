@@ -84,12 +84,16 @@ def test_a_picture_is_compact_and_every_point_stays_where_it_was() -> None:
         plain = StringIO()
         figure.savefig(plain, format='svg', metadata={'Date': None})
     made = base64.b64decode(picture(figure).partition(',')[2]).decode()
-    assert len(made) < 0.9 * len(plain.getvalue())  # older matplotlib rounds more by itself
+
+    def coordinates(svg: str) -> str:
+        return ' '.join(re.findall(r' (?:d|x|y)="([^"]*)"', svg))
 
     def places(svg: str) -> list[float]:
-        inside = ' '.join(re.findall(r' (?:d|x|y)="([^"]*)"', svg))
-        return [float(number) for number in re.findall(r'-?\d+\.?\d*', inside)]
+        return [float(number) for number in re.findall(r'-?\d+\.?\d*', coordinates(svg))]
 
+    assert len(made) < len(plain.getvalue())
+    assert not re.search(r'\.\d{3}', coordinates(made))  # hundredths of a point are enough
+    assert not re.search(r'\n +<', made)
     assert places(made) == pytest.approx(places(plain.getvalue()), abs=0.011)
     assert 'metadata' not in made
 
