@@ -200,7 +200,7 @@ class HistoryRecorder:
         """Append a set."""
         e = estimates
         self._slopes = e.slip_on_slope or self._slopes
-        aside = e.sideways_known()
+        aside = e.sideways_known
         values = {
             name: getattr(aside, _SIDEWAYS[name]) if name in _SIDEWAYS else getattr(e, name)
             for name in WHEEL_FIELDS

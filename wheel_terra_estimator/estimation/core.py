@@ -33,7 +33,11 @@ from wheel_terra_estimator.estimation.timing.clock_watch import (
     Judgement,
     Suspicion,
 )
-from wheel_terra_estimator.estimation.timing.input_checks import CHANNELS, InputChecks
+from wheel_terra_estimator.estimation.timing.input_checks import (
+    CHANNELS,
+    WHEEL_ODOMETRY,
+    InputChecks,
+)
 from wheel_terra_estimator.estimation.timing.input_log import Estimator, InputLog, Stepped
 from wheel_terra_estimator.estimation.timing.lag import LagLearner
 from wheel_terra_estimator.estimation.timing.step_grid import StepGrid
@@ -195,16 +199,13 @@ ReferenceVelocity
         result['held_back_s'] = hold * 1e-9
         result['clock_steps_back'] = self._clock_steps
         result['resets'] = self._resets
-        own = self._estimator_health()
+        own = self._estimator.health()
         # The filter starts itself anew, or the core does it: both count.
         own['filter_restarts'] = own.get('filter_restarts', 0) + result['filter_restarts']
         return result | own
 
     def _runners(self) -> list[Stepped]:
         return [self._estimator] if self._judge is None else [self._judge, self._estimator]
-
-    def _estimator_health(self) -> dict[str, Any]:
-        return dict(getattr(self._estimator, 'health', dict)())
 
     def _new_watch(self) -> ClockWatch:
         settings = self._settings
@@ -228,8 +229,8 @@ ReferenceVelocity
         newest = self._watch.newest
         if judgement.accepted and newest is not None:
             hold = self._lags.hold(newest)
-            beyond = self._lags.beyond(hold)
-            sets += [self._published(due) for due in self._timeline.advance(newest, hold, beyond)]
+            overdue = max(self._lags.learned[WHEEL_ODOMETRY] - hold, 0)
+            sets += [self._published(due) for due in self._timeline.advance(newest, hold, overdue)]
         return sets
 
     def _end_run(self, keep_soil: bool) -> None:
@@ -261,7 +262,7 @@ ReferenceVelocity
                 estimates = self._estimator.estimates()
                 if self._judge is None:
                     return estimates
-                return self._judge.judged(estimates, self._estimator_health())
+                return self._judge.judged(estimates, self._estimator.health())
         except _FAILURES as error:
             return error
 

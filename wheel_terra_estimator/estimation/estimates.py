@@ -84,6 +84,7 @@ class EstimateSet:
     slip_on_slope: SlipOnSlope | None = None  # once a second; None = not in this set
     sideways: Sideways | None = None  # slip angles, lateral force and speed; None = unknown
 
+    @property
     def sideways_known(self) -> Sideways:
-        """Return slip angles, lateral forces and speed, with what is unknown said so."""
+        """Slip angles, lateral forces and speed, with what is unknown said so."""
         return Sideways.unknown(self.normal_load) if self.sideways is None else self.sideways

@@ -77,7 +77,7 @@ class OutputGuard:
         slopes = estimates.slip_on_slope
         if slopes is not None and not np.isfinite(slopes).all():
             changes['slip_on_slope'] = self._good.slip_on_slope
-        if not _sideways_is_finite(estimates):
+        if not estimates.sideways_known.finite:
             changes['sideways'] = self._good.sideways
         return replace(estimates, **changes)
 
@@ -92,7 +92,7 @@ class OutputGuard:
             reasons=blank.reasons,
             forward_velocity_variance=blank.forward_velocity_variance,
             yaw_rate_variance=blank.yaw_rate_variance,
-            sideways=estimates.sideways_known().doubted(blank.normal_load),
+            sideways=estimates.sideways_known.doubted(blank.normal_load),
             **{name: getattr(blank, name) for name in _WHEEL_FIELDS if name.endswith('_std')},
         )
         self._good = held
@@ -143,9 +143,5 @@ def _is_finite(estimates: EstimateSet) -> bool:
     if estimates.slip_on_slope is not None:
         finite = finite and bool(np.isfinite(estimates.slip_on_slope).all())
     return (
-        finite and _sideways_is_finite(estimates) and all(map(math.isfinite, _SCALARS(estimates)))
+        finite and estimates.sideways_known.finite and all(map(math.isfinite, _SCALARS(estimates)))
     )
-
-
-def _sideways_is_finite(estimates: EstimateSet) -> bool:
-    return estimates.sideways is None or estimates.sideways.finite

@@ -11,8 +11,9 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -55,52 +56,23 @@ class JointFields(NamedTuple):
     effort: list[float]
 
 
-def _per_wheel(*columns: str) -> Callable[[EstimateSet, tuple[str, ...]], JointFields]:
-    """Return what takes these fields of a set as position, velocity and effort; '' = none."""
-
-    def fields(estimates: EstimateSet, names: tuple[str, ...]) -> JointFields:
-        return JointFields(
-            names, *[getattr(estimates, column).tolist() if column else [] for column in columns]
-        )
-
-    return fields
-
-
-def _soil(estimates: EstimateSet, names: tuple[str, ...]) -> JointFields:
-    return JointFields(
-        estimates.soil_names, estimates.soil.tolist(), [], estimates.soil_std.tolist()
-    )
-
-
-def _slip_on_slope(estimates: EstimateSet, names: tuple[str, ...]) -> JointFields | None:
-    if estimates.slip_on_slope is None:
-        return None  # once a second
-    slip, std, entrapment = (column.tolist() for column in estimates.slip_on_slope)
-    return JointFields(SLOPE_NAMES, slip, entrapment, std)
-
-
-def _slip_angle(estimates: EstimateSet, names: tuple[str, ...]) -> JointFields:
-    told = estimates.sideways_known()
-    return JointFields(names, list(told.angle), [], list(told.force))
-
-
-def _slip_angle_std(estimates: EstimateSet, names: tuple[str, ...]) -> JointFields:
-    told = estimates.sideways_known()
-    return JointFields(names, list(told.angle_std), [], list(told.force_std))
-
-
-JOINT_OUTPUTS: dict[str, Callable[[EstimateSet, tuple[str, ...]], JointFields | None]] = {
-    'slip': _per_wheel('slip', 'slip_velocity', 'drawbar_pull'),
-    'sinkage': _per_wheel('sinkage', 'sinkage_rate', 'normal_load'),
-    'slip_stddev': _per_wheel('slip_std', 'slip_velocity_std', 'drawbar_pull_std'),
-    'sinkage_stddev': _per_wheel('sinkage_std', 'sinkage_rate_std', 'normal_load_std'),
-    'mobility': _per_wheel('rim_travel_left', '', 'pull_margin'),
-    'soil': _soil,
-    'slip_on_slope': _slip_on_slope,
-    'slip_angle': _slip_angle,
-    'slip_angle_stddev': _slip_angle_std,
+JOINT_OUTPUTS = {
+    'slip': ('slip', 'slip_velocity', 'drawbar_pull'),
+    'sinkage': ('sinkage', 'sinkage_rate', 'normal_load'),
+    'slip_stddev': ('slip_std', 'slip_velocity_std', 'drawbar_pull_std'),
+    'sinkage_stddev': ('sinkage_std', 'sinkage_rate_std', 'normal_load_std'),
+    'mobility': ('rim_travel_left', '', 'pull_margin'),
+    'soil': ('soil', '', 'soil_std'),
+    'slip_on_slope': ('slip_on_slope.slip', 'slip_on_slope.entrapment', 'slip_on_slope.std'),
+    'slip_angle': ('sideways_known.angle', '', 'sideways_known.force'),
+    'slip_angle_stddev': ('sideways_known.angle_std', '', 'sideways_known.force_std'),
 }
-"""Outputs that are a JointState: topic -> its fields; node, replay and recordings publish these."""
+"""Outputs that are a JointState: topic -> fields of a set that are its position, velocity and
+effort, '' for none; node, replay and recordings publish these."""
+_COLUMNS = {
+    topic: tuple(attrgetter(field) if field else None for field in fields)
+    for topic, fields in JOINT_OUTPUTS.items()
+}
 OUTPUT_TYPES = {
     **dict.fromkeys(JOINT_OUTPUTS, JOINT_STATE),
     'slip_class': 'std_msgs/msg/UInt8MultiArray',
@@ -389,20 +361,26 @@ def _weighted(shares: Sequence[float], variances: Sequence[float]) -> float:
 
 def joint_fields(estimates: EstimateSet, names: tuple[str, ...]) -> dict[str, JointFields]:
     """Return the fields of `JOINT_OUTPUTS` by topic, as published; without those not due."""
-    made = {topic: fields(estimates, names) for topic, fields in JOINT_OUTPUTS.items()}
-    return {topic: fields for topic, fields in made.items() if fields is not None}
+    made = {}
+    others = {'soil': estimates.soil_names, 'slip_on_slope': SLOPE_NAMES}
+    for topic, columns in _COLUMNS.items():
+        if topic == 'slip_on_slope' and estimates.slip_on_slope is None:
+            continue  # once a second
+        values = [np.asarray(column(estimates)).tolist() if column else [] for column in columns]
+        made[topic] = JointFields(others.get(topic, names), *values)
+    return made
 
 
 def planar_velocity(estimates: EstimateSet) -> tuple[float, float]:
     """Return the velocity of ``base_link`` along x and y [m/s]."""
-    return estimates.forward_velocity, estimates.sideways_known().velocity
+    return estimates.forward_velocity, estimates.sideways_known.velocity
 
 
 def twist_covariance(estimates: EstimateSet) -> list[float]:
     """Return the 6 x 6 covariance of ``twist``, row by row (x, y, z, then rotations; REP 103)."""
     diagonal = [UNKNOWN_VARIANCE] * 6
     diagonal[0] = estimates.forward_velocity_variance
-    diagonal[1] = estimates.sideways_known().velocity_variance
+    diagonal[1] = estimates.sideways_known.velocity_variance
     diagonal[5] = estimates.yaw_rate_variance
     covariance = [0.0] * 36
     covariance[::7] = diagonal

@@ -74,7 +74,9 @@ class Pipeline:
             return []
         if self.on_measurement is not None:
             self.on_measurement(measurement)
-        return self._out(self.core.add(measurement))
+        sets = self.core.add(measurement)
+        self._published += len(sets)
+        return sets
 
     def settle(self) -> None:
         """Do beforehand what the next set would wait for; changes no number."""
@@ -87,7 +89,9 @@ class Pipeline:
 
     def flush(self) -> list[EstimateSet]:
         """Return the sets that were held back for late inputs; the recording is over."""
-        return self._out(self.core.flush())
+        sets = self.core.flush()
+        self._published += len(sets)
+        return sets
 
     def reset(self) -> None:
         """Forget the state, keep the parameters."""
@@ -114,10 +118,6 @@ class Pipeline:
         result.update(self.transport_values())
         result.update(self.core.health())
         return result
-
-    def _out(self, sets: list[EstimateSet]) -> list[EstimateSet]:
-        self._published += len(sets)
-        return sets
 
     def _faults(self) -> list[tuple[str, str]]:
         """Return what was lost and left out of the inputs since this was last asked, in words."""

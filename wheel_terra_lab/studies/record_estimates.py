@@ -56,6 +56,8 @@ ABSOLUTE, RELATIVE = 1e-9, 1e-6
 """Above both of these a difference is no rounding."""
 NUDGE = 1e-12
 """Relative change of the wheel rates that shows where a drive is chaotic."""
+IN_WORDS = 'faults', 'soil_names', 'slip_on_slope', 'sideways'
+"""Fields that are not there in every set, or not of one length."""
 STEADY = '|steady'
 """Key of the number of sets up to which it is not."""
 
@@ -254,9 +256,9 @@ def estimates_of(recording: Recording) -> dict[str, np.ndarray]:
     found = {
         f.name: np.array([getattr(s, f.name) for s in chosen])
         for f in fields(EstimateSet)
-        if f.name not in ('faults', 'soil_names')
+        if f.name not in IN_WORDS
     }
-    for name in ('faults', 'soil_names'):
+    for name in IN_WORDS:
         found[name] = np.array([str(getattr(s, name)) for s in chosen])
     found['health'] = np.array([str(core.health().get('filter_restarts'))])
     return found

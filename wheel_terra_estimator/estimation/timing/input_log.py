@@ -52,7 +52,10 @@ class Stepped(Protocol):
 
 
 class Estimator(Stepped, Protocol):
-    """What the core runs; `health` and `learned` are optional."""
+    """What the core runs; may have `learned`, too (see `EstimatorCore.learned`)."""
+
+    def health(self) -> dict[str, Any]:
+        """Return what the filter says of itself; a dictionary of its own each time."""
 
     def estimates(self) -> EstimateSet:
         """Return the estimates at the stamp of the last step."""

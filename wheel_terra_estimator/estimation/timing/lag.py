@@ -86,7 +86,3 @@ class LagLearner:
         ):
             return LONGEST_HOLD  # it may be on its way
         return min(max(self.learned.values()), LONGEST_HOLD)
-
-    def beyond(self, hold: int) -> int:
-        """Return how far wheel odometry lags behind what is held back for it [ns]."""
-        return max(self.learned[WHEEL_ODOMETRY] - hold, 0)

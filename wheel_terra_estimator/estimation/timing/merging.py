@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import isnan, nan
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
@@ -22,8 +22,6 @@ from wheel_terra_estimator.estimation.measurements import (
 
 LONGEST_INTERVAL = 120_000_000
 """A wheel rate stands for the time since the reading before it, at most for this long [ns]."""
-
-_Some = TypeVar('_Some')
 
 
 def same(one: Measurement, other: Measurement) -> bool:
@@ -89,8 +87,8 @@ class StepMerger:
         reference: ReferenceVelocity | None = references[-1] if references else None
         merged: list[Any] = [
             self._odometry(stamp, odometry),
-            _single(inertial) if len(inertial) < 2 else _inertial(stamp, inertial),
-            *[_single(some) if len(some) < 2 else _mean_reading(stamp, some) for some in wheels],
+            inertial[0] if len(inertial) == 1 else _inertial(stamp, inertial),
+            *[some[0] if len(some) == 1 else _mean_reading(stamp, some) for some in wheels],
             reference,
         ]
         return StepInputs(*merged)
@@ -132,16 +130,16 @@ def _newest(rows: list[FloatArray | None]) -> FloatArray | None:
     return newest
 
 
-def _single(measurements: list[_Some]) -> _Some | None:
-    return measurements[0] if measurements else None
-
-
 def _mean_reading(stamp: int, readings: list[Any]) -> Any:
+    if not readings:
+        return None
     return type(readings[0])(stamp, _mean([_values(reading) for reading in readings]))
 
 
-def _inertial(stamp: int, readings: list[InertialReading]) -> InertialReading:
+def _inertial(stamp: int, readings: list[InertialReading]) -> InertialReading | None:
     """Return mean specific force and rate, the newest attitude, and the first variances stated."""
+    if not readings:
+        return None
     orientations = [r.orientation for r in readings if r.orientation is not None]
     return InertialReading(
         stamp,
