@@ -300,8 +300,8 @@ def page_lines(rows: Sequence[Row]) -> list[str]:
         'Left what the paper states in numbers (tables 6 and 7, text; on 25 degrees the power '
         'number is (H/W)/(1 - s) of table 7), joined by lines: its curves are pictures and are not '
         'read off. Empty where it states none. Right ours, mean over the beds, at eight times the '
-        "paper's rim speed. Figure 8 (path) stands in [reproduction](reproduction.md); figures 10, "
-        '19 and 20 (soil) are what `wheel-terra soilbin run` draws as `film.gif` and `bed.png`. '
+        "paper's rim speed. Figures 10, 19 and 20 (soil) are what `wheel-terra soilbin run` draws "
+        'as `film.gif` and `bed.png`. '
         'Written by `wheel-terra soilbin reproduce`.',
         '',
         f'![paper and ours]({PICTURE})',

@@ -5,7 +5,7 @@
     python -m wheel_terra_lab.studies.discrepancy_demonstrations -o demonstrations \
         [--only hit kls1 ...]
     python -m wheel_terra_lab.studies.discrepancy_demonstrations -o demonstrations --no-pictures \
-        --page docs/discrepancy/cases.md
+        --page cases.md
     python -m wheel_terra_lab.studies.discrepancy_demonstrations -o demonstrations --only \
         --table bin=bed.csv --config bin=bed.yaml
 
@@ -420,7 +420,7 @@ Root-mean-square error on rows that the fit did not see: as configured → soil 
 _PAGE_HEAD = """# Every real case: was the gap halved?
 
 Written by `python -m wheel_terra_lab.studies.discrepancy_demonstrations -o demonstrations
---no-pictures --page docs/discrepancy/cases.md`; do not edit.
+--no-pictures --page cases.md`; do not edit.
 What the cases mean: [demonstrations](demonstrations.md).
 
 Root-mean-square error on rows that the fit did not see. *In the end* is the named effect, or the

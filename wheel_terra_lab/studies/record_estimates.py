@@ -36,7 +36,7 @@ from wheel_terra_estimator.bags.reader import read
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.core import EstimatorCore
-from wheel_terra_estimator.estimation.estimates import EstimateSet
+from wheel_terra_estimator.estimation.estimates import SLOPES, EstimateSet
 from wheel_terra_estimator.estimation.measurements import (
     LeavingAngleReading,
     Measurement,
@@ -56,8 +56,7 @@ ABSOLUTE, RELATIVE = 1e-9, 1e-6
 """Above both of these a difference is no rounding."""
 NUDGE = 1e-12
 """Relative change of the wheel rates that shows where a drive is chaotic."""
-IN_WORDS = 'faults', 'soil_names', 'slip_on_slope', 'sideways'
-"""Fields that are not there in every set, or not of one length."""
+IN_WORDS = 'faults', 'soil_names'
 STEADY = '|steady'
 """Key of the number of sets up to which it is not."""
 
@@ -256,8 +255,12 @@ def estimates_of(recording: Recording) -> dict[str, np.ndarray]:
     found = {
         f.name: np.array([getattr(s, f.name) for s in chosen])
         for f in fields(EstimateSet)
-        if f.name not in IN_WORDS
+        if f.name not in (*IN_WORDS, 'slip_on_slope', 'sideways')
     }
+    found['slip_on_slope'] = np.array(
+        [np.zeros((3, len(SLOPES))) if s.slip_on_slope is None else s.slip_on_slope for s in chosen]
+    )
+    found['sideways'] = np.array([np.hstack([*vars(s.sideways_known).values()]) for s in chosen])
     for name in IN_WORDS:
         found[name] = np.array([str(getattr(s, name)) for s in chosen])
     found['health'] = np.array([str(core.health().get('filter_restarts'))])

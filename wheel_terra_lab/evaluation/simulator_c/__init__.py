@@ -4,5 +4,5 @@
 
 It shares no physics with the estimator: bearing by capacity factors, shear by an elastoplastic
 state that travels through the contact, sinkage by excavation over time. See
-docs/laboratory/simulator_c.md.
+docs/laboratory/simulators.md.
 """
