@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Write a page with pictures: the wheel-soil models against truth and measurement.
 
-    python -m wheel_terra_lab.studies.validate_models -o DIR [--shared ../shared] [--only SECTION ...]
+    python -m wheel_terra_lab.studies.validate_models -o DIR [--shared ../shared] [--only ...]
 
 Needs the folder with measured data; takes about two minutes. What follows from it is said in
 ``docs/models/validation.md``, which shows some of the pictures.
