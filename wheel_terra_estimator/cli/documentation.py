@@ -8,7 +8,7 @@ import argparse
 from collections.abc import Iterator
 from pathlib import Path
 
-from wheel_terra_estimator.cli.main import sub_parsers
+from wheel_terra_estimator.cli.main import LABORATORY, sub_parsers
 from wheel_terra_estimator.cli.parser import Parser
 
 _INTRODUCTION = """# Commands
@@ -22,13 +22,24 @@ colcon the commands are `ros2 run wheel_terra_estimator wheel-terra COMMAND`. Ev
 environment `eval "$(wheel-terra --print-completion bash)"` turns it on. How a command ends:
 [exit status](exit_status.md).
 """
+_LABORATORY = """## Of the laboratory
+
+Options: `wheel-terra COMMAND --help-all`.
+
+| command | does |
+|---|---|"""
 
 
 def page() -> str:
     """Return the page as Markdown."""
     lines = [_INTRODUCTION]
+    others = []
     for name, parser in sub_parsers().items():
-        lines += _section(parser, f'wheel-terra {name}', 2)
+        if name in LABORATORY:
+            others.append(f'| `wheel-terra {name}` | {parser.description} |')
+        else:
+            lines += _section(parser, f'wheel-terra {name}', 2)
+    lines += [_LABORATORY, *others]
     return '\n'.join(lines).rstrip() + '\n'
 
 

@@ -38,12 +38,13 @@ _SECTIONS = {
     'soil': 'Soil',
     'sensors': 'Sensors',
     'filter': 'Filter',
-    'effects': 'Effects',
 }
-_EFFECTS = """
-For each effect of the catalogue (`wheel-terra effects`); all are off by default. The default of a
-parameter is its value where the effect is switched on and no other is given. Each parameter has a
-companion `..._std`, the standard deviation that a fit found (0 = not stated).
+_EFFECTS = """## Effects
+
+`effects.NAME.enabled: true` switches an effect on, `effects.NAME.form` chooses one of its forms and
+`effects.NAME.PARAMETER` sets a parameter, whose default is its value where none is given;
+`effects.NAME.PARAMETER_std` is the standard deviation that a fit found (0 = not stated). Names,
+forms, parameters, units and ranges: [effects](effects.md).
 """
 
 
@@ -52,14 +53,14 @@ def page() -> str:
     lines = [_INTRODUCTION]
     table = list(declared().values())
     for section, title in _SECTIONS.items():
-        lines += [f'## {title}', _EFFECTS if section == 'effects' else '']
+        lines += [f'## {title}', '']
         lines += ['| key | default | unit | allowed | meaning |', '|---|---|---|---|---|']
         for parameter in table:
             head = parameter.key.split('.')[0] if '.' in parameter.key else ''
-            if head == section and not (section == 'effects' and parameter.key.endswith('_std')):
+            if head == section:
                 lines.append(_row(parameter))
         lines.append('')
-    return '\n'.join(lines).rstrip() + '\n'
+    return '\n'.join(lines) + f'\n{_EFFECTS}'
 
 
 def _row(parameter: Parameter) -> str:
