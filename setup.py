@@ -118,15 +118,8 @@ setup(
     },
     author='wheel_terra_estimator developers',
     maintainer='wheel_terra_estimator developers',
-    maintainer_email='maintainers@example.org',
-    # Placeholders in a reserved domain, until the owner states where the repository lives.
-    url='https://example.org/wheel_terra_estimator',
-    project_urls={
-        'Documentation': 'https://example.org/wheel_terra_estimator/docs',
-        'Source': 'https://example.org/wheel_terra_estimator',
-        'Issues': 'https://example.org/wheel_terra_estimator/issues',
-        'Changelog': 'https://example.org/wheel_terra_estimator/CHANGELOG.rst',
-    },
+    # No address is published yet; .invalid reaches nobody (RFC 2606). package.xml has the same.
+    maintainer_email='maintainers@wheel-terra-estimator.invalid',
     description='Slip, sinkage and drawbar pull of rover wheels in loose soil',
     long_description=(HERE / 'README.md').read_text(encoding='utf-8'),
     long_description_content_type='text/markdown',

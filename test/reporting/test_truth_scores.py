@@ -63,7 +63,7 @@ def test_lead_of_a_warning_and_one_that_was_wrong():
     calm = truth_errors(history(true, warnings=(right,)), truth(0.0 * true), THRESHOLDS)
     assert not calm.warnings[0].right and calm.first_stuck is None
     assert 'did not pass' in as_lines(calm)[-1]
-    assert 'passed 0.75 2.0 s after it' in as_lines(errors)[-1]
+    assert '2.0 s before the median slip passed 0.75' in as_lines(errors)[-1]
 
 
 def test_comparison():

@@ -78,6 +78,13 @@ FAULTS: dict[str, Fault] = {
         'add {wheels} to wheels.names, with radius, width, x and y',
         'wheels.names',
     ),
+    'steering': Fault(
+        'unknown_name',
+        '{listed} look like joints that steer, and no wheel is said to be steered: its slip '
+        'would be that of a wheel that points straight ahead',
+        'wheels.steering_joints: [{joints}]',
+        'wheels.steering_joints',
+    ),
     # Units and gravity
     'rate_unit': Fault(
         'unit',

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Sequence
 from typing import Any
 
@@ -13,7 +14,7 @@ import numpy as np
 from wheel_terra_estimator.checks.faults import found
 from wheel_terra_estimator.checks.finding import Finding, NotChecked, Outcome
 from wheel_terra_estimator.checks.rover_facts import RoverFacts, side_of, wheel_names
-from wheel_terra_estimator.checks.series import Recording
+from wheel_terra_estimator.checks.series import JointSeries, Recording
 from wheel_terra_estimator.configuration.configuration import Configuration
 
 DEFAULT_TOPICS = {
@@ -91,7 +92,24 @@ def check_wheel_names(recording: Recording, facts: RoverFacts) -> list[Outcome]:
     for name in spare:
         if name not in renamed.values() and 'wheel' in name.lower() and name not in silent:
             outcomes.append(found('spare_joint', joints.topic, 0.7, wheel=name))
-    return outcomes
+    return [*outcomes, *_steering(joints, facts)]
+
+
+def _steering(joints: JointSeries, facts: RoverFacts) -> list[Outcome]:
+    """Return joints that steer, where the rover file has none."""
+    assert facts.configuration is not None
+    steering = [name for name in joints.names if 'steer' in name.lower()]
+    if not steering or any(facts.configuration.wheels.steering_joints):
+        return []
+    of_wheels = [_at_place_of(wheel, steering) for wheel in facts.names]
+    cure = ', '.join(joint or "''" for joint in of_wheels) if any(of_wheels) else 'ONE PER WHEEL'
+    return [found('steering', joints.topic, 0.9, listed=', '.join(steering), joints=cure)]
+
+
+def _at_place_of(wheel: str, steering: Sequence[str]) -> str:
+    """Return the steering joint whose name begins like that of a wheel, '' for none."""
+    place = re.sub(r'_?(wheel|drive|joint)', '', wheel.lower())
+    return next((name for name in steering if name.lower().startswith(place)), '')
 
 
 def proposal(recording: Recording) -> dict[str, Any]:

@@ -88,7 +88,7 @@ def run(arguments: argparse.Namespace) -> int:
     else:
         why = '' if arguments.no_node else 'There is no rclpy here (no sourced Jazzy): '
         print(f'{why}the drives go through `wheel-terra replay`; the numbers are the same.')
-    reports = []
+    reports, shown = [], []
     for drive in DRIVES:
         print(f'\n=== {drive.name}: {drive.title}\n', flush=True)
         status = subprocess.run(
@@ -96,21 +96,25 @@ def run(arguments: argparse.Namespace) -> int:
         ).returncode
         if status:
             return status
-        _key_numbers(drive, output)
+        shown.append(f'{drive.name}: {_outcome(drive, output)}')
         reports.append(output / f'{drive.name}.html')
     print('\n=== trial: what is missing in the model of a wheel?\n', flush=True)
-    status = _trial(output / 'trial')
+    status, outcome = _trial(output / 'trial')
     if status:
         return status
+    shown.append(f'trial: {outcome}')
     reports.append(output / 'trial' / 'diagnosis' / 'report.html')
     print('\nReports with pictures, to be opened in a browser:')
     for report in reports:
         print(f'  {report.resolve()}')
+    print('\nWhat was shown:')
+    for line in shown:
+        print(f'  {line}')
     return 0
 
 
-def _trial(folder: Path) -> int:
-    """Diagnose the shipped table blind, then open its seal."""
+def _trial(folder: Path) -> tuple[int, str]:
+    """Diagnose the shipped table blind, open its seal; return the status and what came of it."""
     from wheel_terra_estimator.configuration.shipped import demo_recording
 
     shipped = demo_recording('trial')
@@ -122,13 +126,13 @@ def _trial(folder: Path) -> int:
     command += [str(shipped / 'blind.csv'), '--config', str(shipped / 'rig.yaml')]
     command += ['-o', str(folder / 'diagnosis')]
     status = subprocess.run(command, env=_environment(), check=False).returncode
-    if status == 0:
-        report = json.loads((folder / 'diagnosis' / 'report.json').read_text(encoding='utf-8'))
-        hidden = ' + '.join(json.loads(sealed)['hidden'])
-        said = ' + '.join(effect['name'] for effect in report['effects']) or report['verdict']
-        judged = 'right' if said == hidden else 'wrong'
-        print(f'seal opened: {hidden} was hidden; said: {said}: {judged}')
-    return status
+    if status:
+        return status, ''
+    report = json.loads((folder / 'diagnosis' / 'report.json').read_text(encoding='utf-8'))
+    hidden = ' + '.join(json.loads(sealed)['hidden'])
+    said = ' + '.join(effect['name'] for effect in report['effects']) or report['verdict']
+    judged = 'right' if said == hidden else 'wrong'
+    return 0, f'seal opened: {hidden} was hidden; said: {said}: {judged}'
 
 
 def _command(drive: DemoDrive, output: Path, live: bool) -> list[str]:
@@ -157,8 +161,8 @@ def _environment() -> dict[str, str]:
     return {**own, **os.environ}
 
 
-def _key_numbers(drive: DemoDrive, output: Path) -> None:
-    """Say whether the warning came before the true entrapment."""
+def _outcome(drive: DemoDrive, output: Path) -> str:
+    """Return whether the warning came before the true entrapment."""
     from wheel_terra_estimator.bags.history import read_estimates
     from wheel_terra_estimator.bags.storage import open_bag
     from wheel_terra_estimator.bags.truth import read_truth
@@ -172,16 +176,15 @@ def _key_numbers(drive: DemoDrive, output: Path) -> None:
     with open_bag(output / drive.name) as bag:
         history = read_estimates(bag)
     if truth is None or truth.slip is None:
-        return
+        return f'{len(history.warnings)} stuck warnings'
     stuck = entrapped(truth.slip.stamp, truth.slip.value)
     warnings = [_seconds(truth, np.array([w.start]))[0] for w in history.warnings]
     if stuck.any():
         at = float(_seconds(truth, truth.slip.stamp[stuck][:1])[0])
         before = [w for w in warnings if w <= at]
         words = f'warned {at - before[-1]:.1f} s before' if before else 'no warning before'
-        print(f'  entrapped at {at:.1f} s (median slip above 0.9 for 1 s): {words}')
-    elif not warnings:
-        print('  never entrapped, never warned')
+        return f'entrapped at {at:.1f} s (median slip above 0.9 for 1 s), {words}'
+    return f'never entrapped, {f"{len(warnings)} false warnings" if warnings else "never warned"}'
 
 
 def _seconds(truth: Truth, stamp: np.ndarray) -> np.ndarray:

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import argparse
+import shlex
 import sys
 from pathlib import Path
 
@@ -94,7 +95,10 @@ def run(arguments: argparse.Namespace) -> int:
     stuck = truth.first_stuck()
     print('  not entrapped' if stuck is None else f'  entrapped after {stuck:.1f} s')
     print(f'bag: {arguments.output} ({sum(bag.counts.values())} messages)')
-    words = [f'--config {name}' for name in scenario.files]
-    words += [f"-p '{parameter}'" for parameter in scenario.parameters]
-    print(f'estimates: wheel-terra replay {arguments.output} {" ".join(words)}')
+    command = ['wheel-terra', 'replay', str(arguments.output)]
+    for name in scenario.files:
+        command += ['--config', name]
+    for parameter in scenario.parameters:
+        command += ['-p', parameter]
+    print(f'estimates: {shlex.join(command)}')
     return 0

@@ -114,7 +114,7 @@ def replay_drive(
         Input that cannot be used, an output path that is taken.
     """
     with open_bag(path, limits) as bag:
-        checked = _checked(bag, configuration, remaps)
+        checked = check_before(bag, configuration, remaps)
         on_checked(checked)
         result = replay(
             bag,
@@ -148,7 +148,7 @@ def replay_drive(
     return Drive(configuration, checked, result, truth, errors, summary, filter_errors)
 
 
-def _checked(bag: Bag, configuration: Configuration, remaps: Mapping[str, str]) -> CheckReport:
+def check_before(bag: Bag, configuration: Configuration, remaps: Mapping[str, str]) -> CheckReport:
     """Return what the checks found; nothing that fails there keeps the replay from its work."""
     report = CheckReport()
     recording = run_apart(

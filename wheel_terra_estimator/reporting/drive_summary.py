@@ -38,7 +38,8 @@ class WheelSummary:
     """Figures of one wheel; ``seconds`` and ``shares`` by name of the slip class.
 
     ``slip`` (of |slip|) and ``sinkage`` [m] are percentiles 5 and 95, of a long drive over the sets
-    that were kept. They and the extremes are None where slip or sinkage was never known.
+    that were kept; ``sinkage_std`` is its median deviation. They and the extremes are None where
+    slip or sinkage was never known.
     """
 
     name: str
@@ -52,6 +53,7 @@ class WheelSummary:
     max_lateral_force: float
     slip: tuple[float, float] | None = field(default=None, compare=False)
     sinkage: tuple[float, float] | None = field(default=None, compare=False)
+    sinkage_std: float | None = field(default=None, compare=False)
 
 
 @dataclass(frozen=True)
@@ -186,9 +188,14 @@ def _wheels(history: EstimateHistory, border: Border) -> tuple[WheelSummary, ...
                 max_lateral_force=float(figures.max_lateral_force[i]),
                 slip=slip,
                 sinkage=sinkage,
+                sinkage_std=_median_std(history, sinkages[:, i], i) if sinkage else None,
             )
         )
     return tuple(result)
+
+
+def _median_std(history: EstimateHistory, sinkage: NDArray[np.float64], wheel: int) -> float:
+    return float(np.median(history.values['sinkage_std'][np.isfinite(sinkage), wheel]))
 
 
 def _percentiles(values: NDArray[np.float64]) -> tuple[float, float] | None:
@@ -212,6 +219,14 @@ def spread(ends: tuple[float, float] | None, spec: str, scale: float = 1.0) -> s
     return low if low == high else f'{low} to {high}'
 
 
+def sinkages(wheel: WheelSummary, plus_minus: str = '±') -> str:
+    """Return the percentiles of the sinkage of a wheel with its median deviation [mm]."""
+    ends = spread(wheel.sinkage, '.0f', 1e3)
+    if wheel.sinkage_std is None:
+        return ends
+    return f'{ends} {plus_minus} {1e3 * wheel.sinkage_std:.0f}'
+
+
 def deepest(wheel: WheelSummary, plus_minus: str = '±') -> str:
     """Return the greatest sinkage of a wheel with its standard deviation [mm]."""
     if wheel.max_sinkage is None or wheel.max_sinkage_std is None:
@@ -232,9 +247,10 @@ def as_text(summary: DriveSummary) -> str:
         '',
         f'  {summary.verdict}',
     ]
-    for warning in summary.warnings:
+    for number, warning in enumerate(summary.warnings):
         end = 'the end' if warning.end is None else f'{warning.end:.1f} s'
-        lines.append(f'  STUCK from {warning.start:.1f} s to {end}: {warning.reason or "-"}')
+        reason = f': {warning.reason or "-"}' if number else ''  # the first's stands above
+        lines.append(f'  STUCK from {warning.start:.1f} s to {end}{reason}')
         lines += [f'    {warning.later}'] if warning.later else []
     if summary.wheels:
         width = max(len('time in class [s]'), *(len(wheel.name) for wheel in summary.wheels))
@@ -243,14 +259,14 @@ def as_text(summary: DriveSummary) -> str:
             '',
             f'  {"time in class [s]":{width}}'
             + ''.join(f'{c:>10}' for c in classes)
-            + '  |slip| 5 to 95 %       max  sinkage [mm]        max',
+            + '  |slip| 5 to 95 %       max    sinkage [mm]        max',
         ]
         for wheel in summary.wheels:
             lines.append(
                 f'  {wheel.name:{width}}'
                 + ''.join(f'{wheel.seconds[c]:10.1f}' for c in classes)
                 + f'{spread(wheel.slip, ".2f"):>17}{shown(wheel.max_slip, ".2f"):>10}'
-                + f'{spread(wheel.sinkage, ".0f", 1e3):>14}{deepest(wheel, "+-"):>11}'
+                + f'{sinkages(wheel, "+-"):>16}{deepest(wheel, "+-"):>11}'
             )
     heard = [
         row.name if row.topic == f'/{row.name}' else f'{row.name} ({row.topic})'

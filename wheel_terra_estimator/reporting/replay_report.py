@@ -17,7 +17,13 @@ from wheel_terra_estimator.output_folder import new_file
 from wheel_terra_estimator.reporting import track_picture, truth_scores
 from wheel_terra_estimator.reporting.drive_figure import drive_figure, way_figure
 from wheel_terra_estimator.reporting.drive_style import CLASS_COLOURS, Border
-from wheel_terra_estimator.reporting.drive_summary import DriveSummary, deepest, shown, spread
+from wheel_terra_estimator.reporting.drive_summary import (
+    DriveSummary,
+    deepest,
+    shown,
+    sinkages,
+    spread,
+)
 from wheel_terra_estimator.reporting.html import render, write_page
 from wheel_terra_estimator.reporting.slope_table import slopes_figure
 from wheel_terra_estimator.reporting.truth_scores import QuantityError, TruthErrors
@@ -116,7 +122,7 @@ def _cards(summary: DriveSummary) -> list[tuple[str, str]]:
     unknown = sum(wheel.shares[SlipClass.UNKNOWN.name.lower()] for wheel in summary.wheels)
     unit = '' if deep.max_sinkage is None else ' mm'
     return [
-        (str(len(summary.warnings)), 'stuck warnings'),
+        (str(len(summary.warnings)), f'stuck warning{"s" * (len(summary.warnings) != 1)}'),
         (
             spread(slipping.slip, '.2f'),
             f'|slip| of {slipping.name}, 5 to 95 % of the time; '
@@ -124,7 +130,7 @@ def _cards(summary: DriveSummary) -> list[tuple[str, str]]:
         ),
         (f'{stuck:.1f} s', 'longest time of a wheel in class stuck'),
         (
-            f'{spread(deep.sinkage, ".0f", 1e3)}{unit}',
+            f'{sinkages(deep)}{unit}',
             f'sinkage of {deep.name}, 5 to 95 % of the time; at most {deepest(deep)}',
         ),
         (f'{100 * unknown / len(summary.wheels):.0f} %', 'of the time at rest or unknown'),
@@ -139,7 +145,7 @@ def _wheel_row(wheel: Any) -> dict[str, Any]:
         'figures': [
             ('|slip|', spread(wheel.slip, '.2f')),
             ('max', shown(wheel.max_slip, '.2f')),
-            ('sinkage [mm]', spread(wheel.sinkage, '.0f', 1e3)),
+            ('sinkage [mm]', sinkages(wheel)),
             ('max', deepest(wheel)),
             ('mean pull [N]', f'{wheel.mean_pull:.1f}'),
             ('least margin [N]', f'{wheel.least_margin:.1f}'),

@@ -192,8 +192,8 @@ def in_words(score: WarningScore) -> str:
             f'within {WARNING_HORIZON:g} s'
         )
     if score.lead < 0.0:
-        return f'late, the median slip had passed {WARNED_SLIP:g} {-score.lead:.1f} s before it'
-    return f'borne out, the median slip passed {WARNED_SLIP:g} {score.lead:.1f} s after it'
+        return f'late, {-score.lead:.1f} s after the median slip had passed {WARNED_SLIP:g}'
+    return f'borne out, {score.lead:.1f} s before the median slip passed {WARNED_SLIP:g}'
 
 
 def as_lines(errors: TruthErrors) -> list[str]:

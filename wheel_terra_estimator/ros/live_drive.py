@@ -50,9 +50,11 @@ from wheel_terra_estimator.bags.writer import (
     STUCK_DIRECTION,
     TOPICS,
 )
+from wheel_terra_estimator.checks.finding import shown
 from wheel_terra_estimator.configuration import reader as configuration_reader
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.fleet.drive import check_before
 from wheel_terra_estimator.messages.convert import JOINT_OUTPUTS, stamp_of
 from wheel_terra_estimator.output_folder import check_file, check_folder
 from wheel_terra_estimator.reporting import truth_scores
@@ -117,7 +119,10 @@ def drive(
         parameters = Path(folder) / 'parameters.yaml'
         configuration.write(parameters)
         arrival = arrival or Path(folder) / 'arrival.txt'
-        with _running_node(_node_arguments(parameters, topics, arrival)) as process:
+        node = _node_arguments(parameters, topics, arrival)
+        if rate <= 0.0:  # above its pace a clock on the wall sees silence that is none
+            node += ['--log-level', 'wheel_terra_estimator:=ERROR']
+        with _running_node(node) as process:
             player = _Player(topics)
             try:
                 player.wait_for_partners(process)
@@ -354,6 +359,9 @@ def _run(arguments: argparse.Namespace) -> None:
     check_folder(arguments.output, arguments.overwrite, inputs)
     with open_bag(arguments.bag) as bag:
         reader = MeasurementReader(bag, remaps, configuration)
+        findings = check_before(bag, configuration, remaps).findings
+        for line in shown(findings):
+            print(f'finding: {line}', flush=True)
         heard = drive(bag, configuration, remaps, arguments.rate, arguments.arrival)
         start = next(bag.messages(tuple(reader.topics.values()))).log_time
         record(heard, arguments.output, start, arguments.overwrite)
@@ -379,6 +387,7 @@ def _run(arguments: argparse.Namespace) -> None:
             configuration,
             overwrite=arguments.overwrite,
             errors=errors,
+            findings=findings,
         )
         print(f'report: {arguments.report}')
 

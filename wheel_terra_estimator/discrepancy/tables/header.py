@@ -376,11 +376,15 @@ class Header:
             repr(title) + (f' ({hint})' if hint else '')
             for title, (_, hint) in zip(titles, hints, strict=True)
         )
-        example = shlex.quote(f'{hints[0][0] or "NAME"}={titles[0]}')
+        answers: dict[str, str] = {}
+        for title, (name, _) in zip(titles, hints, strict=True):
+            answers.setdefault(name or 'NAME', title)
+        options = (f'--columns {shlex.quote(f"{name}={title}")}' for name, title in answers.items())
+        left_out = shlex.quote(titles[0]) if len(titles) == 1 else ALL
         return (
-            f'not used: {listed}; say what they are, --columns {example} (a minus '
-            'before the title turns the sign), or leave them out, --ignore-columns '
-            f'{shlex.quote(titles[0])} (in Python: columns, ignore_columns)'
+            f'not used: {listed}; say what they are, {" ".join(options)} (a minus before the '
+            f'title turns the sign), or leave them out, --ignore-columns {left_out} '
+            '(in Python: columns, ignore_columns)'
         )
 
 
