@@ -132,18 +132,15 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _run_one(arguments: argparse.Namespace) -> int:
+    from wheel_terra_estimator.bags import check_before
     from wheel_terra_estimator.bags.reader import parse_remaps
-    from wheel_terra_estimator.checks.finding import INTERNAL_ERROR, CheckReport, shown
+    from wheel_terra_estimator.checks.finding import CheckReport
     from wheel_terra_estimator.fleet.drive import replay_drive
     from wheel_terra_estimator.reporting import track_table
 
     def print_findings(checked: CheckReport) -> None:
-        if not arguments.json:
-            for line in shown(checked.findings):
-                print(f'finding: {line}')
-            for entry in checked.not_checked:
-                if entry.reason == INTERNAL_ERROR:
-                    print(f'not checked: {entry.kind}: {entry.reason}')
+        for line in () if arguments.json else check_before.as_lines(checked):
+            print(line)
 
     (bag,) = arguments.bags
     configuration = configuration_reader.from_arguments(arguments)

@@ -8,13 +8,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from wheel_terra_estimator.bags.check_before import check_before
 from wheel_terra_estimator.bags.replay import Replay, replay
 from wheel_terra_estimator.bags.salvage.limits import LIMITS, Limits
-from wheel_terra_estimator.bags.series_reader import read_series
-from wheel_terra_estimator.bags.storage import Bag, open_bag
+from wheel_terra_estimator.bags.storage import open_bag
 from wheel_terra_estimator.bags.truth import Truth, read_truth
 from wheel_terra_estimator.checks.finding import CheckReport
-from wheel_terra_estimator.checks.run import check_recording, run_apart
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.output_folder import new_file
@@ -28,8 +27,6 @@ from wheel_terra_estimator.reporting.drive_style import Border
 from wheel_terra_estimator.reporting.drive_summary import DriveSummary, summarise
 from wheel_terra_estimator.reporting.replay_report import write_replay_report
 
-QUICK_MESSAGES = 60_000
-"""Messages of a topic that the checks before a replay look at."""
 NO_SOIL = 'no soil was stated (--config): the default sand was the first guess, learned from there'
 
 
@@ -146,15 +143,3 @@ def replay_drive(
         Border.of(configuration),
     )  # fmt: skip
     return Drive(configuration, checked, result, truth, errors, summary, filter_errors)
-
-
-def check_before(bag: Bag, configuration: Configuration, remaps: Mapping[str, str]) -> CheckReport:
-    """Return what the checks found; nothing that fails there keeps the replay from its work."""
-    report = CheckReport()
-    recording = run_apart(
-        report,
-        'order',
-        None,
-        lambda: read_series(bag, remaps, bag.path.resolve().name, QUICK_MESSAGES),
-    )
-    return report if recording is None else check_recording(recording, configuration, tuple(remaps))

@@ -36,6 +36,7 @@ from rclpy.utilities import try_shutdown
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Int8, UInt8MultiArray
 
+from wheel_terra_estimator.bags import check_before
 from wheel_terra_estimator.bags.bag_file import BagFile
 from wheel_terra_estimator.bags.history import read_estimates
 from wheel_terra_estimator.bags.reader import MeasurementReader, parse_remaps
@@ -50,11 +51,9 @@ from wheel_terra_estimator.bags.writer import (
     STUCK_DIRECTION,
     TOPICS,
 )
-from wheel_terra_estimator.checks.finding import shown
 from wheel_terra_estimator.configuration import reader as configuration_reader
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.errors import UserError
-from wheel_terra_estimator.fleet.drive import check_before
 from wheel_terra_estimator.messages.convert import JOINT_OUTPUTS, stamp_of
 from wheel_terra_estimator.output_folder import check_file, check_folder
 from wheel_terra_estimator.reporting import truth_scores
@@ -359,9 +358,9 @@ def _run(arguments: argparse.Namespace) -> None:
     check_folder(arguments.output, arguments.overwrite, inputs)
     with open_bag(arguments.bag) as bag:
         reader = MeasurementReader(bag, remaps, configuration)
-        findings = check_before(bag, configuration, remaps).findings
-        for line in shown(findings):
-            print(f'finding: {line}', flush=True)
+        checked = check_before.check_before(bag, configuration, remaps)
+        for line in check_before.as_lines(checked):
+            print(line, flush=True)
         heard = drive(bag, configuration, remaps, arguments.rate, arguments.arrival)
         start = next(bag.messages(tuple(reader.topics.values()))).log_time
         record(heard, arguments.output, start, arguments.overwrite)
@@ -387,7 +386,7 @@ def _run(arguments: argparse.Namespace) -> None:
             configuration,
             overwrite=arguments.overwrite,
             errors=errors,
-            findings=findings,
+            findings=checked.findings,
         )
         print(f'report: {arguments.report}')
 
