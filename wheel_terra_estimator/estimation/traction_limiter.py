@@ -81,7 +81,7 @@ class Estimates(NamedTuple):
 
 
 class Wheel(NamedTuple):
-    """What was last known of a wheel; `at` is when [s], minus infinity = never since it stood."""
+    """What was last known of a wheel; `at` is when by its stamp [s], minus infinity: never."""
 
     slip: float = 0.0
     travel: float = NO_ENTRAPMENT_IN_SIGHT
@@ -187,30 +187,31 @@ def after_estimates(
 ) -> LimiterState:
     """Return the state after a set of estimates.
 
-    One whose parts do not fit is not used; one that is too old counts only where it lowers the
-    scale or stops.
+    One whose parts do not fit is not used. One that is too old only lowers the scale or stops, but
+    is remembered: the rim travel left of a wheel is what was received last.
     """
     count = len(estimates.slip_class)
     if not count == len(estimates.slip) == len(estimates.rim_travel_left):
         return state
     known = [_is_known(estimates, i) for i in range(count)]
-    before = state.wheels if len(state.wheels) == count else (Wheel(),) * count
-    wheels = tuple(
-        [
-            Wheel(estimates.slip[i], estimates.rim_travel_left[i], now) if known[i] else wheel
-            for i, wheel in enumerate(before)
-        ]
-    )
     offset = _clock_offset(state, now, estimates.delay, tuning)
-    state = replace(state, wheels=before, judged_at=now, delay=estimates.delay, clock_offset=offset)
+    state = replace(state, judged_at=now, delay=estimates.delay, clock_offset=offset)
+    at = now - _late(state)
+    before = state.wheels if len(state.wheels) == count else (Wheel(),) * count
+    wheels = [
+        Wheel(estimates.slip[i], estimates.rim_travel_left[i], at) if known[i] else wheel
+        for i, wheel in enumerate(before)
+    ]
+    state = replace(state, wheels=tuple(wheels))
     fresh = is_fresh(state, now, tuning)
     if not any(known):
         return _after_unknown(state, now, estimates, tuning) if fresh else state
-    counted = _counted(replace(state, wheels=wheels), now, tuning)
-    scale, reason = traction_scale([w.slip for w in counted], [w.travel for w in counted], tuning)
+    slips = _counted_slips(state, known, now, tuning)
+    travels = [wheel.travel for wheel in wheels if wheel.at > -math.inf]
+    scale, reason = traction_scale(slips, travels, tuning)
     judgement = Decision(scale or tuning.creep_scale, reason.partition(':')[0], reason)
     if fresh:
-        state = replace(state, wheels=wheels, known_since_start=True, judgement=judgement)
+        state = replace(state, known_since_start=True, judgement=judgement)
     elif judgement.scale < state.judgement.scale:
         state = replace(state, judgement=judgement)
     if scale > 0.0:
@@ -306,17 +307,19 @@ def _is_known(estimates: Estimates, wheel: int) -> bool:
     )
 
 
-def _counted(state: LimiterState, now: float, tuning: LimiterTuning) -> list[Wheel]:
-    """Return what counts of each wheel: what is or was last known, then with the critical slip.
+def _counted_slips(
+    state: LimiterState, known: Sequence[bool], now: float, tuning: LimiterTuning
+) -> list[float]:
+    """Return the slip that counts of each wheel: what is or was last known, then the critical one.
 
     A wheel of which nothing was known since it stood counts only after the start.
     """
     counted = []
-    for wheel in state.wheels:
-        if now - wheel.at <= tuning.stale_after:
-            counted.append(wheel)
+    for wheel, is_known in zip(state.wheels, known, strict=True):
+        if is_known or now - wheel.at <= tuning.stale_after:
+            counted.append(wheel.slip)
         elif wheel.at > -math.inf or not _is_starting(state, now, tuning):
-            counted.append(wheel._replace(slip=max(wheel.slip, tuning.critical_slip)))
+            counted.append(max(wheel.slip, tuning.critical_slip))
     return counted
 
 

@@ -54,7 +54,7 @@ class Process:
     def end(self, number: int) -> int:
         """Send a signal and return the exit status."""
         self.signal(number)
-        return self._popen.wait(20.0)
+        return self._popen.wait(60.0)
 
 
 class Rover(Node):
