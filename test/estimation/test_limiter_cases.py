@@ -293,6 +293,30 @@ def test_some_wheels_in_doubt_never_raise_the_scale():
     assert all(b <= a for a, b in pairwise(later))
 
 
+def some_known(rover, classes, travel, age=0.0):
+    sets = Estimates(age, [0.2] * 4, [0.02] * 4, classes, [travel] * 4)
+    rover.state = after_estimates(rover.state, rover.now, sets, rover.tuning)
+    return rover.state.interlock
+
+
+def test_wheels_of_which_nothing_is_known_do_not_outvote_those_that_are():
+    """A limiter that was restarted, and one wheel that is not in doubt."""
+    rover = Rover()
+    rover.command(0.1)
+    assert some_known(rover, [UNKNOWN] * 3 + [0], 0.3) is Interlock.STOPPED
+
+
+def test_rim_travel_that_came_late_is_the_last_known_one():
+    rover = Rover()
+    some_known(rover, [0] * 4, 0.3)
+    rover.stuck(False)
+    some_known(rover, [0] * 4, 1.0, age=2.8)
+    assert some_known(rover, [0, UNKNOWN, UNKNOWN, 0], 1.0, age=2.8) is Interlock.FREE
+    some_known(rover, [0] * 4, 0.3, age=2.8)
+    rover.stuck(False)
+    assert some_known(rover, [0, UNKNOWN, UNKNOWN, UNKNOWN], 1.0) is Interlock.STOPPED
+
+
 @pytest.mark.parametrize('age', [1.2, 2.8, 59.0])
 def test_estimates_are_fresh_by_their_stamp(age):
     rover = Rover()

@@ -47,7 +47,7 @@ STEP = 0.2 * 0.5  # [m/s] that may be added by one message
 SETTLED = 1.0  # [s] after which limiter and monitor know the same
 ON_TIME = 0.2  # [s] between two looks of the monitor at most
 REACHED = 10  # messages of one command after which the ramp is behind
-PATIENCE = 120.0  # [s] for what must happen sooner or later, however few processors there are
+PATIENCE = 600.0  # [s] for what must come sooner or later, however little processor time there is
 FAULTS = (
     'none',
     'estimator restarted',

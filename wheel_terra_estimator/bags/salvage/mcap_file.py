@@ -35,7 +35,8 @@ _FOOTER = mcap.HEAD + 20 + len(mcap.MAGIC)  # [byte], with the closing magic
 _IN_CHUNK = (mcap.SCHEMA, mcap.CHANNEL, mcap.MESSAGE)
 _LONGEST_STRETCH = 4 * MEGABYTE  # of messages outside of chunks that are read at once
 _MOST_HEADLESS = 1000  # packed chunks without their heads that are tried
-_GAP_WORK = 2**14  # what the search behind a gap costs, in bytes unpacked
+_GAP_WORK = 2**14  # what the search in or behind damage costs, in bytes unpacked
+_LONGEST_LIST = 4 * MEGABYTE  # of topics and types by the recorder that is read
 _FORGET_AFTER = 32 * MEGABYTE  # of the file that was looked at
 # Votes of a copy of a definition, by where it stands:
 _SOUND = 100  # in a chunk whose checksum is right: no number of others outvotes it
@@ -299,6 +300,8 @@ class McapFile:
         at = record.begin - mcap.HEAD
         head = mcap.chunk_head(self._map, at, self._size)
         assert head is not None
+        if head.begin + head.packed > record.end:
+            self._add_work(_GAP_WORK)
         self._pieces.append(Piece(at, record.end, head, head.start, head.end))
 
     def _add_message_index(self, record: mcap.Record, gaps: list[mcap.Gap]) -> None:
@@ -615,7 +618,8 @@ class _Definitions:
     def __init__(self) -> None:
         self._schemas: dict[int, Counter[str]] = defaultdict(Counter)
         self._channels: dict[int, Counter[tuple[int, str]]] = defaultdict(Counter)
-        self._text = ''
+        self._listed: set[str] = set()  # topics and types in the recorder's own list
+        self._list_left = _LONGEST_LIST
 
     def add(self, content: Any, record: mcap.Record, votes: int = _PLAIN) -> None:
         """Count a definition; ``ValueError`` if it is damaged."""
@@ -627,9 +631,11 @@ class _Definitions:
             number, schema, topic = mcap.channel(content, record)
             if _TOPIC.fullmatch(topic):
                 self._channels[number][schema, topic] += votes
-        elif record.opcode == mcap.METADATA and record.end - record.begin < MEGABYTE:
+        elif record.opcode == mcap.METADATA and record.end - record.begin < self._list_left:
             # The recorder's own list of topics: it decides where two copies differ.
-            self._text += bytes(content[record.begin : record.end]).decode('utf-8', 'replace')
+            self._list_left -= record.end - record.begin
+            text = bytes(content[record.begin : record.end]).decode('utf-8', 'replace')
+            self._listed.update(line.rpartition(': ')[2] for line in text.split('\n'))
 
     def numbers(self) -> frozenset[int]:
         """Return the identifiers of the known channels."""
@@ -662,7 +668,7 @@ class _Definitions:
         return max(weight, key=lambda definition: weight[definition])
 
     def _weights(self, votes: Counter[Any], name: Any) -> dict[Any, int]:
-        return {d: n + _LISTED * (f': {name(d)}\n' in self._text) for d, n in votes.items()}
+        return {d: n + _LISTED * (name(d) in self._listed) for d, n in votes.items()}
 
 
 def _votes(piece: Piece, content: Content) -> int:

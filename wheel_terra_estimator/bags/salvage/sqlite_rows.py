@@ -45,6 +45,9 @@ _INTEGERS = {1: 1, 2: 2, 3: 3, 4: 4, 5: 6, 6: 8, 8: 0, 9: 0}  # kind -> size [by
 _SIZES = {0: 0, 7: 8, **_INTEGERS}
 _BLOB, _TEXT = 12, 13  # kinds of empty ones; 2 more for each byte
 _LONGEST_NAME = 1000  # of a topic or type [byte]
+_MOST_CANDIDATES = 400  # places before a row at which a page that lists it may begin
+# Steps of a search (a row, page or link that is looked at) of which hostile files make more.
+_FREE_STEPS, _BYTES_PER_STEP = 500_000, 16
 _PROBES = 50  # rows from which the size of a page is learnt
 
 # How much speaks for a row: its bytes alone, the page that lists it, an intact page.
@@ -83,6 +86,8 @@ class Rows:
         Whether deleted rows may be among them, as the list of free pages is damaged.
     cut : bool
         Whether the file is shorter than it states.
+    given_up : bool
+        Whether there were too many places at which a row might begin to try them all.
     """
 
     number: Any
@@ -95,6 +100,7 @@ class Rows:
     usable: int
     free_unknown: bool
     cut: bool
+    given_up: bool
 
     def data(self, content: Buffer, place: int) -> bytes:
         """Return the data of the message at a place in these arrays."""
@@ -115,6 +121,7 @@ class _Search:
     def __init__(self, content: Buffer, largest: int) -> None:
         self._content = content
         self._largest = largest
+        self._steps = _FREE_STEPS + len(content) // _BYTES_PER_STEP  # left
         self._phases = [0]  # begins of pages, modulo their size; first the one that fitted last
         self._looked_at: dict[int, _Page | None] = {}
         self._intact: set[int] = set()  # begins of intact pages with rows
@@ -136,12 +143,17 @@ class _Search:
         found = array('q')  # columns: the first five of `Rows`, begin and end of the row, trust
         further = {}
         for hit in _MESSAGE.finditer(self._content):
+            self._steps -= 1
+            if self._steps < 0:
+                break
             message = self._message(hit.start())
             if message is not None:
                 columns, pages = message
                 found.extend(columns)
                 if pages:
                     further[columns[3]] = pages
+        given_up = self._steps < 0
+        self._steps = _FREE_STEPS  # for the topics, which are few
         table = np.asarray(found, dtype=np.int64).reshape(-1, 8)
         table = self._kept(table, further)
         number, topic, time, begin, size = table[:, :5].T
@@ -156,6 +168,7 @@ class _Search:
             self._usable,
             self._free_unknown,
             self._cut,
+            given_up or self._steps < 0,
         )
 
     # --- Rows. ---
@@ -217,6 +230,9 @@ class _Search:
     def _topics(self) -> dict[int, tuple[str, str]]:
         found: dict[int, tuple[int, tuple[str, str]]] = {}
         for hit in _TOPIC.finditer(self._content):
+            self._steps -= 1
+            if self._steps < 0:
+                break
             row = self._row(hit.start())
             if row is None or len(row.kinds) < 3:
                 continue
@@ -268,7 +284,8 @@ class _Search:
             pages: list[int] = []
             at = pointer
             while True:
-                number = self._uint(at, 4)
+                self._steps -= 1
+                number = self._uint(at, 4) if self._steps > 0 else 0
                 at = (number - 1) * self._size + shift
                 if len(pages) == count or number < 2 or at in pages[-1:] or at < 0:
                     break
@@ -286,14 +303,14 @@ class _Search:
 
     def _trust(self, begin: int) -> int | None:
         """Return how much speaks for a row that begins at a place, None for a deleted one."""
-        for phase in self._phases:
+        for phase in self._phases if self._steps > 0 else ():
             page = self._page(begin - (begin - phase) % self._size)
             if page is not None and begin in page.rows:
                 break
             if page is not None and page.intact:
                 return _FOUND if self._inside_of_another(begin, page) else None
         else:
-            page = self._page_that_lists(begin)
+            page = self._page_that_lists(begin) if self._steps > 0 else None
             if page is None:
                 return _FOUND
             phase = page.begin % self._size
@@ -305,6 +322,7 @@ class _Search:
 
     def _inside_of_another(self, begin: int, page: _Page) -> bool:
         """Whether a row stands in the bytes of a listed one, which then lost some of its own."""
+        self._steps -= len(page.rows) // 8
         before = max((place for place in page.rows if place < begin), default=None)
         row = None if before is None else self._row(self._columns(before))
         return row is not None and row.columns + self._local(row.size) > begin
@@ -313,7 +331,10 @@ class _Search:
         """Look before a row for a page that lists it, wherever pages may begin."""
         least = max(begin - self._size, 0)
         at = begin
-        while (at := self._content.rfind(bytes([_LEAF]), least, at)) >= 0:
+        for _ in range(_MOST_CANDIDATES):
+            at = self._content.rfind(bytes([_LEAF]), least, at)
+            if at < 0 or self._steps < 0:
+                break
             page = self._page(at)
             if page is not None and page.intact and begin in page.rows:
                 return page
@@ -334,6 +355,7 @@ class _Search:
         at = begin + (_HEADER if begin == 0 else 0)
         if begin < 0 or at + 12 > len(content):
             return None
+        self._steps -= 1
         kind = content[at]
         head = _PAGE_HEAD.get(kind, 0)
         count = self._uint(at + 3, 2)
@@ -344,6 +366,7 @@ class _Search:
         start = self._uint(at + 5, 2) or 65536
         if content[at + 7] > _FRAGMENTS or not behind <= begin + start <= end:
             return None
+        self._steps -= count
         places = [begin + p for p in struct.unpack_from(f'>{count}H', content, first)]
         intact = all(behind <= place < end for place in places) and self._fits(kind, places, end)
         return _Page(begin, frozenset(places if kind == _LEAF else ()), intact)
