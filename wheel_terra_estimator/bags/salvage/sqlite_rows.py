@@ -45,9 +45,10 @@ _INTEGERS = {1: 1, 2: 2, 3: 3, 4: 4, 5: 6, 6: 8, 8: 0, 9: 0}  # kind -> size [by
 _SIZES = {0: 0, 7: 8, **_INTEGERS}
 _BLOB, _TEXT = 12, 13  # kinds of empty ones; 2 more for each byte
 _LONGEST_NAME = 1000  # of a topic or type [byte]
-_MOST_CANDIDATES = 400  # places before a row at which a page that lists it may begin
-# Steps of a search (a row, page or link that is looked at) of which hostile files make more.
+# Work that only made-up files ask for: places at which a row may begin, and rows, pages and links
+# that are looked at to learn of a row whether it is listed, or how large a page is.
 _FREE_STEPS, _BYTES_PER_STEP = 500_000, 16
+_STEPS_TO_LEARN = 2_000_000
 _PROBES = 50  # rows from which the size of a page is learnt
 
 # How much speaks for a row: its bytes alone, the page that lists it, an intact page.
@@ -87,7 +88,7 @@ class Rows:
     cut : bool
         Whether the file is shorter than it states.
     given_up : bool
-        Whether there were too many places at which a row might begin to try them all.
+        Whether there was too much at which a row might begin, or be listed, to look at it all.
     """
 
     number: Any
@@ -121,7 +122,7 @@ class _Search:
     def __init__(self, content: Buffer, largest: int) -> None:
         self._content = content
         self._largest = largest
-        self._steps = _FREE_STEPS + len(content) // _BYTES_PER_STEP  # left
+        self._steps = _STEPS_TO_LEARN  # left
         self._phases = [0]  # begins of pages, modulo their size; first the one that fitted last
         self._looked_at: dict[int, _Page | None] = {}
         self._intact: set[int] = set()  # begins of intact pages with rows
@@ -140,19 +141,20 @@ class _Search:
 
     def rows(self) -> Rows:
         """Return what is found."""
+        most = _FREE_STEPS + len(self._content) // _BYTES_PER_STEP
+        self._steps = most
+        tried = 0
         found = array('q')  # columns: the first five of `Rows`, begin and end of the row, trust
         further = {}
-        for hit in _MESSAGE.finditer(self._content):
-            self._steps -= 1
-            if self._steps < 0:
-                break
+        for hit in islice(_MESSAGE.finditer(self._content), most):
+            tried += 1
             message = self._message(hit.start())
             if message is not None:
                 columns, pages = message
                 found.extend(columns)
                 if pages:
                     further[columns[3]] = pages
-        given_up = self._steps < 0
+        given_up = tried == most or self._steps <= 0
         self._steps = _FREE_STEPS  # for the topics, which are few
         table = np.asarray(found, dtype=np.int64).reshape(-1, 8)
         table = self._kept(table, further)
@@ -168,7 +170,7 @@ class _Search:
             self._usable,
             self._free_unknown,
             self._cut,
-            given_up or self._steps < 0,
+            given_up,
         )
 
     # --- Rows. ---
@@ -229,10 +231,7 @@ class _Search:
 
     def _topics(self) -> dict[int, tuple[str, str]]:
         found: dict[int, tuple[int, tuple[str, str]]] = {}
-        for hit in _TOPIC.finditer(self._content):
-            self._steps -= 1
-            if self._steps < 0:
-                break
+        for hit in islice(_TOPIC.finditer(self._content), _FREE_STEPS):
             row = self._row(hit.start())
             if row is None or len(row.kinds) < 3:
                 continue
@@ -331,10 +330,7 @@ class _Search:
         """Look before a row for a page that lists it, wherever pages may begin."""
         least = max(begin - self._size, 0)
         at = begin
-        for _ in range(_MOST_CANDIDATES):
-            at = self._content.rfind(bytes([_LEAF]), least, at)
-            if at < 0 or self._steps < 0:
-                break
+        while self._steps > 0 and (at := self._content.rfind(bytes([_LEAF]), least, at)) >= 0:
             page = self._page(at)
             if page is not None and page.intact and begin in page.rows:
                 return page
