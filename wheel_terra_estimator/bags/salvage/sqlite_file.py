@@ -185,7 +185,7 @@ class _DamagedTable:
         if len(rows.time):
             losses.start, losses.last = int(rows.time.min()), int(rows.time.max())
         if rows.given_up:
-            losses.left_out.append('it looks made up: too much at which rows may begin or be listed')
+            losses.left_out.append('it looks made up: too many places where rows may begin')
         if rows.free_unknown:
             losses.left_out.append('deleted rows may be among them: the list of free pages is lost')
         self._note_missing_numbers(losses)

@@ -47,7 +47,7 @@ _BLOB, _TEXT = 12, 13  # kinds of empty ones; 2 more for each byte
 _LONGEST_NAME = 1000  # of a topic or type [byte]
 # Work that only made-up files ask for: places at which a row may begin, and rows, pages and links
 # that are looked at to learn of a row whether it is listed, or how large a page is.
-_FREE_STEPS, _BYTES_PER_STEP = 500_000, 16
+_FREE_STEPS, _BYTES_PER_STEP = 500_000, 32
 _STEPS_TO_LEARN = 2_000_000
 _PROBES = 50  # rows from which the size of a page is learnt
 
