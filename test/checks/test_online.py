@@ -126,6 +126,9 @@ class AlwaysStuck:
         classes = np.full(self.wheels, SlipClass.STUCK, dtype=np.uint8)
         return some_estimates(self.wheels, stamp=self.stamp, slip_class=classes, stuck=True)
 
+    def health(self):
+        return {}
+
     def snapshot(self):
         return self.stamp
 

@@ -9,7 +9,6 @@ import pytest
 from parts import SAND, Parts
 
 from wheel_terra_estimator.configuration import reader
-from wheel_terra_estimator.estimation.contacts.loads import LoadState
 from wheel_terra_estimator.estimation.contacts.wheel_models import WheelState
 from wheel_terra_estimator.estimation.judgement.pull_margin import PullMargin
 
@@ -22,10 +21,14 @@ def parts():
 
 
 def margin(parts, slope, direction=1.0):
-    found = PullMargin(parts.sensors, parts.layout, parts.models)
-    loads = LoadState(LOADS, (9.8 * math.tan(slope), 0.0, 9.8), force_known=True)
-    found.update(0.0, parts.filter().mean, loads, direction)
-    return found, loads
+    found = PullMargin(len(LOADS), parts.models)
+    sinkages = parts.filter().mean[parts.layout.sinkage]
+    wheels = [
+        WheelState(1.0, z, load, 0.0, 0.0, mound=0.05)
+        for z, load in zip(sinkages.tolist(), LOADS, strict=True)
+    ]
+    found.update(0.0, wheels, direction * math.tan(slope))
+    return found.state.margin
 
 
 def test_the_margin_is_the_greatest_pull_less_what_the_slope_asks(parts):
@@ -37,10 +40,10 @@ def test_the_margin_is_the_greatest_pull_less_what_the_slope_asks(parts):
         ).pull
         for s in np.linspace(0.2, 0.95, 40)
     ]
-    level = margin(parts, 0.0)[0].state.margin
+    level = margin(parts, 0.0)
     assert level[0] == pytest.approx(max(pulls), abs=0.02 * 250.0)
     assert level[5] == 0.0  # in the air
-    uphill = margin(parts, 0.2)[0].state.margin
+    uphill = margin(parts, 0.2)
     assert level[0] - uphill[0] == pytest.approx(250.0 * math.tan(0.2))
     # Backwards up the same ground is downhill.
-    assert margin(parts, 0.2, direction=-1.0)[0].state.margin[0] > level[0]
+    assert margin(parts, 0.2, direction=-1.0)[0] > level[0]

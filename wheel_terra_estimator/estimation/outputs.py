@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""The set of estimates of a stamp, with reasons and faults in words."""
+"""The set of estimates of a stamp."""
 
 from __future__ import annotations
 
@@ -32,6 +32,11 @@ from wheel_terra_estimator.estimation.judgement.stuck.forecast import LONGEST_TI
 from wheel_terra_estimator.estimation.judgement.stuck.monitor import StuckAssessment
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
 from wheel_terra_estimator.estimation.sideways import Sideways
+from wheel_terra_estimator.estimation.words import (
+    MissingInputs,
+    faults_in_words,
+    reasons_in_words,
+)
 
 FloatArray = NDArray[np.float64]
 Floats = tuple[float, ...]
@@ -76,32 +81,6 @@ class Sources(NamedTuple):
     assessment: StuckAssessment
     slip_on_slope: SlipOnSlope | None
     sideways: Sideways | None = None
-
-
-class MissingInputs(NamedTuple):
-    """Which inputs are missing at a stamp."""
-
-    wheel_odometry: bool
-    imu: bool
-    acceleration: bool
-    angular_rate: bool
-    orientation: bool
-    torque: bool
-    sinkage: bool
-    reference: bool
-
-
-_COST = (
-    'no wheel odometry: slip held',
-    'no IMU: loads of level ground, turning from the wheels, no balance of forces',
-    'no acceleration: no balance of forces, loads of level ground or by the orientation',
-    'no angular rate: turning from the wheels',
-    'no orientation: slope from gyro and specific force',
-    'no torque: pull from the balance of forces and the soil model',
-    'no sinkage: held by its model',
-    'no reference velocity: slip from forces and soil model',
-)
-"""What each of `MissingInputs` costs."""
 
 
 class Outputs:
@@ -168,7 +147,7 @@ class Outputs:
             stuck=given.assessment.stuck,
             stuck_direction=given.assessment.direction,
             stuck_confirmed=given.assessment.confirmed,
-            reasons=reasons_in_words(given),
+            reasons=reasons_in_words(given.rims, given.slips, given.assessment),
             faults=faults_in_words(missing),
             slip_on_slope=given.slip_on_slope,
             sideways=given.sideways,
@@ -234,31 +213,3 @@ class Outputs:
             std = math.sqrt(variance + turning)
             deviation.append(math.hypot(std, rim_std))
         return velocity, deviation
-
-
-def reasons_in_words(given: Sources) -> tuple[str, ...]:
-    """Return for each wheel why it is judged as it is."""
-    assessment = given.assessment
-    stalled = assessment.stalled or (False,) * len(given.rims)
-    warning = f'; rover: {assessment.reason}' if assessment.stuck and assessment.reason else ''
-    words = []
-    for rim, stands, wheel in zip(given.rims, stalled, given.slips, strict=True):
-        if isnan(rim):
-            text = 'no wheel rate'
-        elif stands:
-            text = 'stalled: torque near its limit, hardly turning while others turn'
-        elif wheel.resting:
-            text = 'at rest'
-        else:
-            text = f'slip {wheel.slip:.2f} +- {wheel.std:.2f}'
-        words.append(text + warning)
-    return tuple(words)
-
-
-def faults_in_words(missing: MissingInputs) -> dict[str, str]:
-    """Return what is missing, and what that costs."""
-    return {
-        name: words
-        for name, absent, words in zip(MissingInputs._fields, missing, _COST, strict=True)
-        if absent
-    }

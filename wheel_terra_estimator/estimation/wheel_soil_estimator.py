@@ -34,7 +34,7 @@ from wheel_terra_estimator.estimation.contacts.steering import Steering
 from wheel_terra_estimator.estimation.contacts.torque_change import TorqueChange
 from wheel_terra_estimator.estimation.contacts.turning import Turning, sides_oppose
 from wheel_terra_estimator.estimation.contacts.unloaded_wheels import UnloadedWheels
-from wheel_terra_estimator.estimation.contacts.wheel_models import WheelModels
+from wheel_terra_estimator.estimation.contacts.wheel_models import WheelModels, WheelState
 from wheel_terra_estimator.estimation.estimates import EstimateSet
 from wheel_terra_estimator.estimation.filter.ekf import FloatArray, Row
 from wheel_terra_estimator.estimation.filter.force_balance import (
@@ -57,7 +57,9 @@ from wheel_terra_estimator.estimation.filter.sinkage_process import SinkageProce
 from wheel_terra_estimator.estimation.filter.soil_process import SoilProcess
 from wheel_terra_estimator.estimation.filter.speed_process import RimSpeeds, SpeedProcess
 from wheel_terra_estimator.estimation.filter.state import (
+    CENTROID,
     GRAVITY_BIAS,
+    MOUND,
     SHEAR_MODULUS,
     SHEAR_STRENGTH,
     SPEED,
@@ -89,7 +91,7 @@ from wheel_terra_estimator.estimation.judgement.stuck.situation import (
 )
 from wheel_terra_estimator.estimation.learned import Learned
 from wheel_terra_estimator.estimation.measurements import ReferenceVelocity, StepInputs
-from wheel_terra_estimator.estimation.outputs import MissingInputs, Outputs, Sources
+from wheel_terra_estimator.estimation.outputs import Outputs, Sources
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
 from wheel_terra_estimator.estimation.scalars import NAN, known, median
 from wheel_terra_estimator.estimation.sideways import (
@@ -98,6 +100,7 @@ from wheel_terra_estimator.estimation.sideways import (
     SidewaysRover,
 )
 from wheel_terra_estimator.estimation.smoothing.tape import Gaussian, Tape
+from wheel_terra_estimator.estimation.words import MissingInputs
 
 Floats = tuple[float, ...]
 _SECOND = 1e-9  # of a nanosecond
@@ -221,7 +224,7 @@ class WheelSoilEstimator:
         self._whiteness = Whiteness()
         # What it means.
         self._slips = SlipJudge(rover, sensors)
-        self._margin = PullMargin(sensors, layout, models)
+        self._margin = PullMargin(rover.wheel_count, models)
         self._slopes = SlopeCurve()
         self._sideways = SidewaysMotion(SidewaysRover.of(configuration))
         self._stuck = StuckMonitor(StuckSettings.from_configuration(configuration))
@@ -734,11 +737,24 @@ class WheelSoilEstimator:
             ),
         )
         self._clock = self._clock._replace(assessment=assessment, speed=(speed, variance))
-        self._margin.update(time, ekf.mean, loads, self._contact_age.state.direction)
+        if self._margin.due(time):
+            direction = self._contact_age.state.direction or 1.0
+            self._margin.update(time, self._wheel_states(loads), direction * loads.slope_share)
         self._learn_slopes(time, slips, rims, motion.lateral_motion)
         self._follow_sideways(time, body, rims)
         if self._tape is not None:
             self._tape.mark(self._instant(time, body), Gaussian(ekf.mean, ekf.covariance))
+
+    def _wheel_states(self, loads: LoadState) -> list[WheelState]:
+        """Return the state of each wheel as the models take it, at no slip."""
+        x, layout = self._ekf.mean, self._layout
+        common = float(x[SHEAR_MODULUS]), float(x[CENTROID]), float(x[MOUND])
+        strengths = (x[SHEAR_STRENGTH] + x[layout.shear_error]).tolist()
+        sinkages = x[layout.sinkage].tolist()
+        return [
+            WheelState(1.0, sinkage, load, strength, *common)
+            for sinkage, load, strength in zip(sinkages, loads.load, strengths, strict=True)
+        ]
 
     def _learn_slopes(
         self, time: float, slips: tuple[WheelSlip, ...], rims: Floats, lateral_motion: float

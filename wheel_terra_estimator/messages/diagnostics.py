@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from wheel_terra_estimator.estimation.estimates import EstimateSet, SlipClass
-from wheel_terra_estimator.estimation.outputs import MissingInputs
+from wheel_terra_estimator.estimation.words import MissingInputs
 from wheel_terra_estimator.messages.fault_log import FaultLog
 
 OK, WARN, ERROR, STALE = range(4)

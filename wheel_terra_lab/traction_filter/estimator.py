@@ -22,12 +22,8 @@ from numpy.typing import NDArray
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.contacts.loads import WheelLoads
 from wheel_terra_estimator.estimation.contacts.steering import Headings, Steering
-from wheel_terra_estimator.estimation.contacts.turning import Turning
-from wheel_terra_estimator.estimation.estimates import (
-    NO_ENTRAPMENT_IN_SIGHT,
-    EstimateSet,
-    SlipClass,
-)
+from wheel_terra_estimator.estimation.contacts.turning import Turning, sides_oppose
+from wheel_terra_estimator.estimation.estimates import EstimateSet
 from wheel_terra_estimator.estimation.filter.initial_state import SoilPriors
 from wheel_terra_estimator.estimation.inputs.contact_sensors import (
     LeavingAngleInput,
@@ -46,10 +42,26 @@ from wheel_terra_estimator.estimation.judgement.stuck.situation import (
 from wheel_terra_estimator.estimation.measurements import ReferenceVelocity, StepInputs
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
 from wheel_terra_estimator.estimation.scalars import NAN, gain_of, known
+from wheel_terra_estimator.estimation.words import MissingInputs
+from wheel_terra_lab.traction_filter.companions import (
+    SHARP_TURN,
+    Companions,
+    Scene,
+    seen_noise,
+)
+from wheel_terra_lab.traction_filter.consistency import Consistency
 from wheel_terra_lab.traction_filter.curve import OFFSET, WHEELS
+from wheel_terra_lab.traction_filter.learned import learned_parameters
+from wheel_terra_lab.traction_filter.outputs import Sources, estimate_set
 from wheel_terra_lab.traction_filter.pulls import Contact, PullModel, SumOfPulls, WheelPulls
 from wheel_terra_lab.traction_filter.references import HeldSlip, ReferenceTuning, joined, trust
 from wheel_terra_lab.traction_filter.sinkage import SinkageFilter
+from wheel_terra_lab.traction_filter.soil import (
+    SoilLogs,
+    SoilPosterior,
+    named_soil,
+    soil_shifts,
+)
 from wheel_terra_lab.traction_filter.speed import BodySlip, Rims, TorqueBalance, rims_at
 from wheel_terra_lab.traction_filter.steady_wheel import SteadyWheel
 
@@ -82,6 +94,9 @@ class TractionTuning:
     blind_std: float = 0.3  # of the slip where nothing tells
     pull_soil_std: float = 0.05  # ln strength of one wheel's soil, as pulls take it
     grade_std: float = 0.03  # of a torque coefficient that the slope tells
+    known_time: float = 20.0  # age up to which a reference is one [s]
+    fresh_time: float = 10.0  # age up to which the speed rests on it, for the warning [s]
+    sinkage_age: float = 2.0  # up to which a sinkage was read of late [s]
     speed_std: float = 5e-4  # [m/s]
     weight_std: float = 0.005  # of the weight that acts along: attitude, small bumps
     limits: tuple[float, float, float, float] = (0.6, 2.5, 1.5, 0.8)
@@ -107,6 +122,7 @@ class Memory(NamedTuple):
     zero: GyroZero = GyroZero()
     zero_weight: float = 0.0
     reference_time: float = -math.inf
+    sinkage_time: float = -math.inf
     rejected: int = 0
     speed: tuple[float, float] = (0.0, 1.0)  # of the body and its variance
     pulls: WheelPulls | None = None
@@ -125,6 +141,7 @@ class TractionEstimator:
     def __init__(
         self, configuration: Configuration, tuning: TractionTuning = TractionTuning()
     ) -> None:
+        self._configuration = configuration
         self._tuning, self._references = tuning, ReferenceTuning()
         self._rover = rover = Rover.from_configuration(configuration)
         self._sensors = sensors = SensorFigures.from_configuration(configuration)
@@ -141,6 +158,9 @@ class TractionEstimator:
         self._loads = WheelLoads(rover)
         self._sinkage = SinkageFilter(rover, self._steady, priors)
         self._pull_model = PullModel(configuration, rover, sensors)
+        self._companions = Companions(configuration, rover, sensors)
+        self._consistency = Consistency()
+        self._noise = seen_noise(configuration, sensors)
         self._slips = SlipJudge(rover, sensors)
         self._stuck = StuckMonitor(StuckSettings.from_configuration(configuration))
         self._parts: tuple[Any, ...] = (
@@ -154,30 +174,21 @@ class TractionEstimator:
             self._sinkage,
             self._slips,
             self._stuck,
+            self._companions,
+            self._consistency,
+            self._noise,
         )
-        self._start_covariance = self._prior(priors)
+        shifts = soil_shifts(self._steady, priors)
+        self._start_covariance = self._prior(shifts)
+        self._soil = SoilPosterior(shifts, self._start_covariance, priors)
         self._ekf = ExtendedKalmanFilter(dim_x=3 + n, dim_z=1)
         self._memory = Memory()
         self._balance: TorqueBalance | None = None
         self._begin()
 
-    def _prior(self, priors: SoilPriors) -> FloatArray:
+    def _prior(self, shifts: FloatArray) -> FloatArray:
         """Return the covariance that follows from the deviations of the soil."""
         tuning, n = self._tuning, self._n
-        columns = []
-        for name, std in (
-            ('strength', priors.strength_std),
-            ('shear_modulus', priors.shear_modulus_std),
-        ):
-            up, down = (self._steady.shift_to(**{name: sign * std}) for sign in (1.0, -1.0))
-            columns.append(
-                [
-                    0.5 * (up.offset - down.offset),
-                    0.5 * (up.log_scale - down.log_scale),
-                    0.5 * (up.log_strength - down.log_strength),
-                ]
-            )
-        shifts = np.array(columns).T
         own = [tuning.offset_std, tuning.log_scale_std, tuning.log_strength_std]
         P = np.diag(np.square(own + [tuning.wheel_std] * n))
         P[:3, :3] += shifts @ shifts.T
@@ -225,16 +236,26 @@ class TractionEstimator:
         rolled = inputs.wheel_odometry is not None
         silent = self._wheels.silent(time)
         due = isnan(memory.cycle_time) or time - memory.cycle_time >= self._rover.period - 1e-4
+        if inputs.reference is not None and not isnan(inputs.reference.lateral):
+            stated = inputs.reference.lateral_variance or self._sensors.reference_std**2
+            floor = self._sensors.reference_std_floor**2
+            self._companions.sideways.correct(inputs.reference.lateral, max(stated, floor))
         if inputs.reference is not None or (due and (rolled or silent)):
             self._run_cycle(time, inputs.reference)
         if rolled or silent:
             self._judge(time)
 
     def _take(self, time: float, inputs: StepInputs) -> None:
+        self._noise.take(time, inputs)
         if inputs.inertial is not None:
+            before = self._inertial.stated
             self._inertial.update(time, inputs.inertial, self._memory.zero)
+            if self._inertial.stated is not before:
+                self._noise.take_stated(self._inertial.stated)
         if inputs.sinkage is not None:
             self._sinkages.update(inputs.sinkage)
+            if not np.isnan(inputs.sinkage.sinkage).all():
+                self._memory = self._memory._replace(sinkage_time=time)
         if inputs.leaving_angle is not None:
             self._leaving_angles.update(time, inputs.leaving_angle)
         if inputs.wheel_odometry is not None:
@@ -416,6 +437,10 @@ class TractionEstimator:
         seen = (rims.body - reference.forward) / rims.scale
         found, balance = memory.solution, self._balance
         known = memory.slip, memory.slip_variance
+        spread = memory.slip_variance * rims.scale**2
+        innovation = (memory.slip - seen) * rims.scale
+        noise = R * rims.scale**2
+        self._noise.compare_reference(time, innovation, noise, spread, reference.variance)
         weight = trust(seen, R, known, memory.held, self._references)
         if found is not None and balance is not None:
             # Linear about the slip that was known before: on its plateau the torque tells none, but
@@ -425,6 +450,7 @@ class TractionEstimator:
             variance = self._torque_variance() + curve.slope**2 * R
             H = curve.gradient
             tail = residual**2 / (H @ ekf.P @ H + variance)
+            self._consistency.note(reference=tail)
             weight *= min((tuning.freedom + 1.0) / (tuning.freedom + tail), 1.0)
             ekf.update(
                 np.array([residual]),
@@ -451,6 +477,8 @@ class TractionEstimator:
         residual = demand[use] - found.expected[use]
         spread = found.expected[use] ** 2 * np.diagonal(ekf.P)[WHEELS + use] + tuning.wheel_noise**2
         weight = np.minimum((tuning.freedom + 1.0) / (tuning.freedom + residual**2 / spread), 1.0)
+        if len(use):
+            self._consistency.note(torque=float(np.mean(residual**2 / spread)))
         for row, r, w in zip(H, residual, weight, strict=True):
             place = int(np.argmax(row != 0.0)) if row.any() else -1
             if place < 0:
@@ -475,7 +503,8 @@ class TractionEstimator:
     def _sink(self, dt: float, rims: Rims, load: FloatArray) -> None:
         slip, std = self._wheel_slips(rims)
         self._sinkage.predict(slip, std, np.abs(rims.speed) * dt, np.maximum(load, 1e-3), dt)
-        self._sinkage.update(self._sinkages.take(), self._sensors.sinkage_std**2)
+        nis = self._sinkage.update(self._sinkages.take(), self._sensors.sinkage_std**2)
+        self._consistency.note(sinkage=nis)
 
     def _total(self, window: Any, speed: float, load: FloatArray) -> SumOfPulls | None:
         """Return what the specific force of a cycle says of the sum of the pulls."""
@@ -537,6 +566,7 @@ class TractionEstimator:
         guess = np.where(dragged, np.sign(speeds) * skidding, slope_share)
         pulls = self._pull_model.pulls(contact, before, guess, total, along)
         self._memory = memory._replace(pulls=pulls)
+        self._consistency.note(balance=pulls.nis)
 
     def _believed(self, demand: FloatArray, found: BodySlip, load: FloatArray) -> FloatArray:
         """Return the torque coefficients, between what is measured and what the curve expects.
@@ -584,13 +614,35 @@ class TractionEstimator:
             turning.lateral_motion,
             stopped=not isnan(self._memory.still_since),
         )
-        slips = self._slips.update(time, speeds, body)
+        self._slips.update(time, speeds, body)
         assessment = self._warned(time, speeds, speed)
         self._memory = self._memory._replace(speed=(speed, variance), assessment=assessment)
-        del slips
+        if self._companions.due(time):
+            self._companions.follow(self._scene(time, body))
+
+    def _scene(self, time: float, body: BodyMotion) -> Scene:
+        memory, n = self._memory, self._n
+        return Scene(
+            time,
+            body,
+            self._wheels.rim_speeds(time),
+            self._steering.state.angles,
+            self._slips.state,
+            self._loads.state,
+            time - self._inertial.state.force_time <= self._rover.silence,
+            memory.pulls.pull if memory.pulls else np.zeros(n),
+            self._sinkage.sinkage,
+            self._ekf.x[WHEELS:],
+            self._soil_logs(),
+            memory.direction,
+            memory.travel > self._rover.contact_length,
+        )
+
+    def _soil_logs(self) -> SoilLogs:
+        return self._soil.logs(self._ekf.x, self._ekf.P, self._sinkage.common_stiffness)
 
     def _warned(self, time: float, speeds: tuple[float, ...], speed: float) -> StuckAssessment:
-        rover, wheels = self._rover, self._wheels
+        rover, wheels, turning = self._rover, self._wheels, self._turning.state
         onward = max(known(speeds), key=abs, default=0.0)
         seen = []
         for i, (wheel, rim) in enumerate(zip(self._slips.state, speeds, strict=True)):
@@ -608,65 +660,83 @@ class TractionEstimator:
                     rate_told=not isnan(rim),
                 )
             )
-        known_reference = time - self._memory.reference_time < 5.0
+        fresh = time - self._memory.reference_time < self._tuning.fresh_time
         return self._stuck.update(
             time,
             RoverMotion(
                 speed,
-                known_reference,
+                fresh,
                 tuple(seen),
-                slip_told=known_reference or wheels.torque_known(time),
-                turning=self._turning.state.lateral_motion > 0.3,
+                slip_told=fresh or wheels.torque_known(time) or self._sinkage_told(time),
+                turning=turning.lateral_motion > SHARP_TURN
+                or sides_oppose(speeds, self._steering.state.headings.by_yaw_rate),
             ),
         )
 
     # -- Outputs ---------------------------------------------------------------------------------
 
+    def _sinkage_told(self, time: float) -> bool:
+        return time - self._memory.sinkage_time < self._tuning.sinkage_age
+
     def estimates(self) -> EstimateSet:
         """Return all outputs at the present stamp; nothing changes."""
+        time = self._memory.time
+        inertial = self._inertial.state
+        silent = time - inertial.time > self._rover.silence
+        missing = MissingInputs(
+            wheel_odometry=self._wheels.silent(time),
+            imu=silent,
+            orientation=not silent and not inertial.attitude.reported,
+            torque=not self._wheels.torque_known(time),
+            sinkage=not self._sinkage_told(time),
+            acceleration=not silent and time - inertial.force_time > self._rover.silence,
+            angular_rate=not silent and time - inertial.rate_time > self._rover.silence,
+            reference=time - self._memory.reference_time > self._tuning.known_time,
+        )
+        return estimate_set(self._rover, self._sensors, self._sources(), missing)
+
+    def _sources(self) -> Sources:
+        """Return what the outputs of the present stamp follow from."""
         memory, n = self._memory, self._n
-        load = np.array(self._loads.state.load)
-        rims = np.nan_to_num(np.array(self._wheels.rim_speeds(memory.time)))
-        headings, turning = self._steering.state.headings, self._turning.state
-        speed, variance = memory.speed
-        ground = np.array(headings.by_speed) * speed
-        ground = ground + np.array(headings.by_yaw_rate) * turning.yaw_rate
-        pulls = memory.pulls or WheelPulls(np.zeros(n), load, np.zeros(n))
-        ahead = memory.assessment.wheels
-        return EstimateSet(
+        loads, turning = self._loads.state, self._turning.state
+        pulls = memory.pulls or WheelPulls(np.zeros(n), np.array(loads.load), np.zeros(n))
+        return Sources(
             stamp=memory.stamp,
-            slip=np.array([wheel.slip for wheel in self._slips.state]),
-            slip_std=np.array([wheel.std for wheel in self._slips.state]),
-            slip_velocity=rims - ground,
-            slip_velocity_std=np.full(n, math.sqrt(variance)),
-            drawbar_pull=pulls.pull,
-            drawbar_pull_std=pulls.std + 1e-3,
-            sinkage=self._sinkage.sinkage.copy(),
-            sinkage_std=np.hypot(self._sinkage.std[:n], self._sensors.sinkage_zero_std),
-            sinkage_rate=np.zeros(n),
-            sinkage_rate_std=np.ones(n),
-            normal_load=load,
-            normal_load_std=np.full(n, self._rover.load_std * max(float(load.mean()), 1e-3)),
-            slip_class=np.array(
-                [SlipClass.LOW if w.judged else SlipClass.UNKNOWN for w in self._slips.state],
-                dtype=np.uint8,
-            ),
-            rim_travel_left=np.array([w.travel for w in ahead] or [NO_ENTRAPMENT_IN_SIGHT] * n),
-            pull_margin=np.zeros(n),
-            soil_names=(),
-            soil=np.zeros(0),
-            soil_std=np.zeros(0),
-            forward_velocity=speed,
-            forward_velocity_variance=variance,
+            speed=memory.speed[0],
+            speed_variance=memory.speed[1],
             yaw_rate=turning.yaw_rate,
-            yaw_rate_variance=turning.yaw_rate_std**2,
-            stuck=memory.assessment.stuck,
-            stuck_probability=np.array([w.probability for w in ahead] or [0.0] * n),
-            time_to_stuck=np.array([w.time for w in ahead] or [0.0] * n),
-            reasons=('',) * n,
-            faults={},
+            yaw_rate_std=turning.yaw_rate_std,
+            headings=self._steering.state.headings,
+            rims=self._wheels.rim_speeds(memory.time),
+            slips=self._slips.state,
+            loads=loads,
+            pull=pulls.pull,
+            pull_std=pulls.std,
+            sinkage=self._sinkage.sinkage,
+            sinkage_std=self._sinkage.std[:n],
+            sinkage_rate=self._companions.sinkage_rate,
+            soil=named_soil(self._configuration, self._soil_logs()),
+            assessment=memory.assessment,
+            margin=self._companions.margin.state.margin,
+            slip_on_slope=self._companions.slopes.state.told,
+            sideways=self._companions.sideways.state.told,
+        )
+
+    def learned(self) -> dict[str, Any]:
+        """Return what was learned: configuration key -> value, deviations ``_std`` too."""
+        return learned_parameters(
+            self._configuration, self._soil_logs(), self._soil.prior_std, self._memory.zero
         )
 
     def health(self) -> dict[str, Any]:
-        """Return counters for diagnostics."""
-        return {'rejected_reference': self._memory.rejected}
+        """Return counters and consistency figures for diagnostics."""
+        zero = self._memory.zero
+        report: dict[str, Any] = {
+            'rejected_reference': self._memory.rejected,
+            'rejected_sinkage': self._sinkage.rejected,
+            'gyro_zero_yaw_rad_s': float(f'{zero.yaw:.3g}'),
+        }
+        report |= self._consistency.report() | self._noise.report()
+        for than, words in self._noise.in_words().items():
+            report[f'noise_beyond_{than}'] = words
+        return report

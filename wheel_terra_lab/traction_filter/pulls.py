@@ -55,6 +55,7 @@ class WheelPulls(NamedTuple):
     pull: FloatArray  # [N]
     std: FloatArray  # [N]
     strength: FloatArray  # ln of the factor that gives the torque
+    nis: float = math.nan  # of the sum that the specific force says, squared over its variance
 
 
 class Contact(NamedTuple):
@@ -127,12 +128,15 @@ class PullModel:
         std = np.hypot(std, tuning.scrub_std * contact.sideways * contact.load)
         common = tuning.common_std * contact.load
         joint = np.diag(std**2) + np.outer(common, common)
+        nis = math.nan
         if total is not None:
             shares = joint @ along
-            gain = shares / (float(along @ shares) + total.variance)
-            pull = pull + gain * (total.along - float(along @ pull))
+            variance = float(along @ shares) + total.variance
+            lacking = total.along - float(along @ pull)
+            nis, gain = lacking**2 / variance, shares / variance
+            pull = pull + gain * lacking
             joint = joint - np.outer(gain, shares)
-        return WheelPulls(pull, np.sqrt(np.maximum(np.diagonal(joint), 0.0)), strength)
+        return WheelPulls(pull, np.sqrt(np.maximum(np.diagonal(joint), 0.0)), strength, nis)
 
     def _pull(self, i: int, contact: Contact, strength: float) -> tuple[float, float, float]:
         """Return pull and deviation [N] in the direction of rolling, and ln strength."""

@@ -31,6 +31,7 @@ class SinkageTuning:
     start_share: float = 0.5  # deviation at the start over the sinkage
     start_floor: float = 0.005  # [m]
     freedom: float = 4.0  # of the heavy tail of a reading
+    rejected: float = 16.0  # squared innovation over its variance that counts as a wild reading
     walk: float = 1e-9  # of a wheel that stands [m^2/s]
     step: float = 0.05  # of ln stiffness and slip, for derivatives
     shallowest: float = 1e-4  # [m]
@@ -72,15 +73,16 @@ class SinkageFilter:
 
     def reset(self) -> None:
         """Go back to the start of a run."""
+        self.rejected = 0
         self._ekf.x, self._ekf.P = self._start.copy(), self._spread.copy()
 
-    def snapshot(self) -> tuple[FloatArray, FloatArray]:
+    def snapshot(self) -> tuple[FloatArray, FloatArray, int]:
         """Return the memory."""
-        return self._ekf.x, self._ekf.P
+        return self._ekf.x, self._ekf.P, self.rejected
 
-    def restore(self, snapshot: tuple[FloatArray, FloatArray]) -> None:
+    def restore(self, snapshot: tuple[FloatArray, FloatArray, int]) -> None:
         """Go back to a snapshot."""
-        self._ekf.x, self._ekf.P = snapshot
+        self._ekf.x, self._ekf.P, self.rejected = snapshot
 
     @property
     def sinkage(self) -> FloatArray:
@@ -91,6 +93,13 @@ class SinkageFilter:
     def stiffness(self) -> FloatArray:
         """Logarithm of the factor on the bearing moduli (n,)."""
         return np.asarray(self._ekf.x[self._n :])
+
+    @property
+    def common_stiffness(self) -> tuple[float, float]:
+        """Mean of the wheels' stiffness, and its deviation."""
+        n, P = self._n, self._ekf.P
+        variance = float(P[n:, n:].sum()) / n**2
+        return float(self._ekf.x[n:].mean()), float(np.sqrt(max(variance, 0.0)))
 
     @property
     def std(self) -> FloatArray:
@@ -150,17 +159,26 @@ class SinkageFilter:
         ekf.predict()
         ekf.x = mean
 
-    def update(self, sums: SinkageSums, variance: float) -> None:
-        """Fuse the readings of a cycle; `variance` is that of one reading [m^2]."""
+    def update(self, sums: SinkageSums, variance: float) -> float:
+        """Fuse the readings of a cycle; `variance` is that of one reading [m^2].
+
+        Returns
+        -------
+        float
+            Mean of the squared innovations over their variances; nan = none came.
+        """
         read = [i for i, count in enumerate(sums.readings) if count]
         if not read:
-            return
+            return np.nan
         ekf, tuning = self._ekf, self._tuning
         count = np.array(sums.readings, dtype=float)[read]
         z = np.array(sums.total)[read] / count
         H = np.eye(2 * self._n)[read]
         R = variance / count
         spread = np.diagonal(ekf.P)[read] + R
-        weight = (tuning.freedom + 1.0) / (tuning.freedom + (z - ekf.x[read]) ** 2 / spread)
+        nis = (z - ekf.x[read]) ** 2 / spread
+        weight = (tuning.freedom + 1.0) / (tuning.freedom + nis)
+        self.rejected += int(np.count_nonzero(nis > tuning.rejected))
         R = R / np.minimum(weight, 1.0)
         ekf.update(z, lambda x: H, lambda x: x[read], R=np.diag(R))
+        return float(nis.mean())

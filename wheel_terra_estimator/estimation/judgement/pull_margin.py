@@ -4,25 +4,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from wheel_terra_estimator.estimation.component import Component
-from wheel_terra_estimator.estimation.contacts.loads import LoadState
 from wheel_terra_estimator.estimation.contacts.wheel_models import WheelModels, WheelState
-from wheel_terra_estimator.estimation.filter.state import (
-    CENTROID,
-    MOUND,
-    SHEAR_MODULUS,
-    SHEAR_STRENGTH,
-    StateLayout,
-)
-from wheel_terra_estimator.estimation.rover import SensorFigures
 
-FloatArray = NDArray[np.float64]
 Floats = tuple[float, ...]
 
 
@@ -47,52 +35,37 @@ class PullMargin(Component[MarginState]):
     """Works out the pull margins, once a second."""
 
     def __init__(
-        self,
-        sensors: SensorFigures,
-        layout: StateLayout,
-        models: WheelModels,
-        tuning: MarginTuning = MarginTuning(),
+        self, wheel_count: int, models: WheelModels, tuning: MarginTuning = MarginTuning()
     ) -> None:
-        super().__init__(MarginState((0.0,) * layout.wheel_count))
-        self._layout, self._models, self._tuning = layout, models, tuning
+        super().__init__(MarginState((0.0,) * wheel_count))
+        self._models, self._tuning = models, tuning
 
-    def update(self, time: float, x: FloatArray, loads: LoadState, direction: float) -> None:
-        """Work out the margins at a time [s] where they are due.
+    def due(self, time: float) -> bool:
+        """Return whether margins are to be worked out anew at a time [s]."""
+        return time - self.state.time >= self._tuning.period
+
+    def update(self, time: float, wheels: Sequence[WheelState], demand: float) -> None:
+        """Work out the margins.
 
         Parameters
         ----------
         time : float
             [s].
-        x : numpy.ndarray
-            (size,) state.
-        loads : LoadState
-            Of the wheels.
-        direction : float
-            Of the drive, 1 or -1; 0 counts as forward.
+        wheels : sequence of WheelState
+            Of all wheels; their speed ratios do not matter.
+        demand : float
+            Pull that the ground asks in the direction of driving, over the load [-].
         """
-        if time - self.state.time < self._tuning.period:
-            return
-        demand = (direction or 1.0) * loads.slope_share
         margin = [
-            self._greatest_pull(i, x, load) - demand * load
-            if load >= self._tuning.least_load
+            self._greatest_pull(i, wheel) - demand * wheel.load
+            if wheel.load >= self._tuning.least_load
             else 0.0
-            for i, load in enumerate(loads.load)
+            for i, wheel in enumerate(wheels)
         ]
         self.state = MarginState(tuple(margin), time)
 
-    def _greatest_pull(self, i: int, x: FloatArray, load: float) -> float:
-        layout = self._layout
-        state = WheelState(
-            1.0,
-            float(x[layout.sinkage.start + i]),
-            load,
-            float(x[SHEAR_STRENGTH] + x[layout.shear_error.start + i]),
-            float(x[SHEAR_MODULUS]),
-            float(x[CENTROID]),
-            float(x[MOUND]),
-        )
+    def _greatest_pull(self, i: int, wheel: WheelState) -> float:
         return max(
-            self._models.pull(i, state._replace(speed_ratio=1.0 - slip))
+            self._models.pull(i, wheel._replace(speed_ratio=1.0 - slip))
             for slip in self._tuning.slips
         )

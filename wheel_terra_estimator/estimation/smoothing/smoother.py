@@ -35,7 +35,7 @@ from wheel_terra_estimator.estimation.filter.state import SPEED
 from wheel_terra_estimator.estimation.judgement.classes import PublishedClasses
 from wheel_terra_estimator.estimation.judgement.slip import SlipJudge
 from wheel_terra_estimator.estimation.output_guard import OutputGuard
-from wheel_terra_estimator.estimation.outputs import MissingInputs, Outputs
+from wheel_terra_estimator.estimation.outputs import Outputs
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
 from wheel_terra_estimator.estimation.scalars import known
 from wheel_terra_estimator.estimation.smoothing.backward import smoothed_states
@@ -43,6 +43,7 @@ from wheel_terra_estimator.estimation.smoothing.spool import Spool
 from wheel_terra_estimator.estimation.smoothing.tape import Gaussian, Tape, packed, unpacked
 from wheel_terra_estimator.estimation.smoothing.window import Moment, centred
 from wheel_terra_estimator.estimation.wheel_soil_estimator import Instant, WheelSoilEstimator
+from wheel_terra_estimator.estimation.words import MissingInputs
 
 FloatArray = NDArray[np.float64]
 
