@@ -197,8 +197,6 @@ KINDS: Mapping[str, Mapping[str, Any]] = {
 }
 
 ENTRAPMENTS = ('entrapment_patch', 'entrapment_slope')
-RECOVERIES = ('near_stuck',)
-NO_ENTRAPMENT = ('cruise', 'descent', 'turns')
 
 FIRM: Mapping[str, Any] = _kind(
     _FIRM,

@@ -30,7 +30,6 @@ DRIVING = (0.0, 0.9)
 LEVEL_OF_TEXT = {'z(0)': 5.0, 'z(0.6)': 30.0}  # of wheel 3 [mm]
 RATIO = (3.0, 7.0)
 WONG_REECE = 5.0  # [mm]
-LITTLE = 1.0  # [mm] that the number of lugs may change
 CROSSING_SHARE = 0.15
 LUGS = (0.005, 0.010, 0.015)
 NOT_FIXED = 'the moduli are not printed: stiffness and angles are free for the two stated sinkages'

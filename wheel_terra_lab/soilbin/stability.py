@@ -12,7 +12,6 @@ from wheel_terra_estimator.errors import UserError
 from wheel_terra_lab.soilbin.case import Case
 from wheel_terra_lab.soilbin.geometry import bed_discs
 
-PAIR_MODES = 2.0  # two equal free discs: stiffness over reduced mass = 2 K / m
 # Densest mode of a frictional bed. On settled beds the highest eigenvalue of M^-1 K of the real
 # contact network (normal, tangential and turning motion) is 3.3 K_n / m of the lightest grain;
 # 4 is the value of a square lattice (four contacts each).

@@ -15,9 +15,6 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 
-_HARD = 0.98
-"""Share of hard ground from which on no soil is left to be ploughed or dug [-]."""
-
 
 @dataclass(frozen=True)
 class Ground:

@@ -64,7 +64,6 @@ MIXED = (
     'eight_skid',
 )
 LIGHT = ('six_light', 'eight_light')
-STEERED = ('four_front', 'four_all', 'six_rocker')
 ON_THE_SPOT = ('four_skid', 'four_all', 'six_rocker', 'six_rocker_skid', 'six_skid', 'eight_skid')
 
 

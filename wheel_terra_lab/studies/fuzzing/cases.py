@@ -321,8 +321,6 @@ def _measurement(dice: random.Random, stamp: int) -> Any:
     return ReferenceVelocity(stamp, float(some(1, 0.4)[0]), float(some(1, 1e-4)[0]))
 
 
-_FINITE = ('slip', 'slip_std', 'sinkage', 'drawbar_pull', 'normal_load', 'forward_velocity')
-
 _METADATA = """rosbag2_bagfile_information:
   version: 9
   storage_identifier: mcap
