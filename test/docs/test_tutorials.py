@@ -1,9 +1,16 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Tutorials do what they say: their blocks run from top to bottom in an empty folder."""
+"""Tutorials do what they say: their blocks run from top to bottom in an empty folder.
+
+A ``text`` block behind a block that runs holds lines that it prints, in their order; ``...`` stands
+for any. After a change of the estimator they are written anew by
+
+    WRITE_EXPECTED=1 pytest -n 0 -m '' test/docs/test_tutorials.py -k blocks
+"""
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import shlex
@@ -19,6 +26,9 @@ from wheel_terra_estimator.cli.main import main
 ROOT = Path(__file__).resolve().parents[2]
 FOLDER = ROOT / 'docs' / 'tutorials'
 BLOCK = re.compile(r'^```(sh|python)\n(.*?)^```', re.M | re.S)
+BLOCK_OR_OUTPUT = re.compile(r'^```(sh|python|text)\n(.*?)^```', re.M | re.S)
+NUMBER = re.compile(r'\d+(?:\.\d+)?')
+NEAR = 0.05  # by how much a printed number may be another with other versions of the libraries
 
 
 def tutorials():
@@ -62,6 +72,53 @@ def run_shell(block, environment):
     return result.stdout
 
 
+def words(line):
+    """Return a line without its numbers and its spacing."""
+    return ' '.join(NUMBER.sub('#', line).split())
+
+
+def near(expected, said):
+    """Return whether the numbers of two lines are the same, or the last digits nearly so."""
+    pairs = zip(NUMBER.findall(expected), NUMBER.findall(said), strict=True)
+    return all(
+        abs(float(a) - float(b)) <= NEAR * abs(float(a)) + 2.0 * 10.0 ** -len(a.partition('.')[2])
+        for a, b in pairs
+    )
+
+
+def printed(expected, said):
+    """Return the lines that were printed in the place of the expected ones, in their order."""
+    rest = iter(said.splitlines())
+    found = []
+    for line in expected.splitlines():
+        if line in ('', '...'):
+            found.append(line)
+            continue
+        there = next((other for other in rest if words(other) == words(line)), None)
+        assert there is not None, f'not printed: {line}\n{said}'
+        found.append(there.rstrip())
+    return found
+
+
+def compared(expected, said):
+    """Return a block of expected output as it is to stand in the page."""
+    found = printed(expected, said)
+    if not os.environ.get('WRITE_EXPECTED'):
+        for line, there in zip(expected.splitlines(), found, strict=True):
+            assert near(line, there), f'expected {line}\nprinted  {there}'
+        return expected
+    return ''.join(f'{line}\n' for line in found)
+
+
+def test_another_number_is_seen(monkeypatch):
+    monkeypatch.delenv('WRITE_EXPECTED', raising=False)
+    said = 'a\nslip 0.30, 12 s\nb 1\n'
+    assert compared('slip 0.31,  12 s\n', said) == 'slip 0.31,  12 s\n'
+    for wrong in ('slip 0.40, 12 s\n', 'slip 0.30, 15 s\n', 'c\n', 'b 1\nslip 0.30, 12 s\n'):
+        with pytest.raises(AssertionError):
+            compared(wrong, said)
+
+
 @pytest.mark.parametrize('page', list(tutorials()))
 def test_blocks_of_a_tutorial_run(page, command, tmp_path, monkeypatch, capsys, undrawn):
     if page.stem == 'soil_bin':
@@ -71,12 +128,18 @@ def test_blocks_of_a_tutorial_run(page, command, tmp_path, monkeypatch, capsys, 
     monkeypatch.chdir(work)
     environment = {**os.environ, 'PYTHONPATH': str(ROOT), 'MPLBACKEND': 'agg'}
     environment['PATH'] = f'{command}:{environment["PATH"]}'
-    for kind, block in BLOCK.findall(page.read_text(encoding='utf-8')):
+    said = ''
+    text = page.read_text(encoding='utf-8')
+    for kind, block in BLOCK_OR_OUTPUT.findall(text):
+        if kind == 'text':
+            if said:
+                text = text.replace(block, compared(block, said))
+            continue
         if kind == 'python':
             exec(compile(block, page.name, 'exec'), {'__name__': '__main__'})
-            said = ''
-        elif words := commands(block):
-            assert [main(line[1:]) for line in words] == [0] * len(words), capsys.readouterr()
+            said = capsys.readouterr().out
+        elif lines := commands(block):
+            assert [main(line[1:]) for line in lines] == [0] * len(lines), capsys.readouterr()
             said = capsys.readouterr().out
         else:
             said = run_shell(block, environment)
@@ -84,6 +147,20 @@ def test_blocks_of_a_tutorial_run(page, command, tmp_path, monkeypatch, capsys, 
             assert 'slip_sinkage_exponent' in said
         if 'diagnose plain.csv' in block:
             assert not (work / 'out' / 'report.json').read_text().count('"verdict": "named"')
+    if os.environ.get('WRITE_EXPECTED'):
+        page.write_text(text, encoding='utf-8')
+
+
+@pytest.mark.slow
+def test_the_picture_of_the_report_shows_what_the_replay_says(tmp_path, capsys):
+    image = pytest.importorskip('PIL.Image')
+    drive = [str(ROOT / 'data' / 'demo' / 'entrapment')]
+    drive += ['--config', 'generic_six_wheel', '--config', 'test_sand']
+    assert main(['replay', *drive, '--json']) == 0
+    with image.open(ROOT / 'docs' / 'images' / 'report.png') as picture:
+        shown = picture.info['Description']
+    verdict = json.loads(capsys.readouterr().out)['verdict']
+    assert shown == verdict, 'python tools/readme_pictures.py makes it anew'
 
 
 def test_configuration_of_robot_localization_takes_speeds_and_turn_only():
