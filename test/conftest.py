@@ -15,6 +15,7 @@ from typing import Any
 import hypothesis
 import pytest
 import yaml
+from retries import pytest_sessionfinish, pytest_terminal_summary  # noqa: F401
 from rosbags.rosbag2 import writer as bag_writer
 
 from wheel_terra_estimator.bags.bag_file import BagFile
