@@ -251,7 +251,8 @@ os.execv(sys.executable, [sys.executable, '-m', 'wheel_terra_estimator.cli.main'
 def test_closed_streams(tmp_path, closed):
     path = tmp_path / 'rows.csv'
     line = f'predict --config hit_wh3 --config hit_fit --slip 0:0.8:9 -o {path}'.split()
-    for arguments, status in ((line, 0), (['effects'], 0), (['check', str(path)], 2)):
+    others = [(['effects'], 0), (['check', str(path)], 2)] if len(closed) == 3 else []
+    for arguments, status in [(line, 0), *others]:
         code = CLOSED.format(closed=closed, arguments=arguments)
         ended = subprocess.run([sys.executable, '-c', code], capture_output=True, check=False)
         assert ended.returncode == status, ended.stderr

@@ -170,6 +170,7 @@ def located(messages: Any, velocity: str) -> Filter:
     return ekf
 
 
+@pytest.mark.slow
 def test_our_velocity_keeps_robot_localization_on_its_way(drive: Any) -> None:
     messages, travelled = drive
     ends = {

@@ -39,6 +39,7 @@ from wheel_terra_lab.jobs import ResultFile
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = 'wheel_terra_estimator'
+OURS = (PACKAGE, 'wheel_terra_lab')
 FOLDERS = ('terramechanics', 'estimation', 'discrepancy')
 LEFT_OUT = ('discrepancy/report/pictures.py',)  # places and sizes in pictures are looked at
 TESTS_LIMIT = 8.0  # [s] of tests, as the map has them, that one mutant is shown
@@ -259,7 +260,7 @@ def verdict(mutant: Mutant, copy: Path, tests: list[str]) -> str:
     text = target.read_text(encoding='utf-8')  # of the copy: ROOT may be edited meanwhile
     target.write_text(text[: mutant.start] + mutant.new + text[mutant.end :], encoding='utf-8')
     try:
-        child = os.fork()  # the libraries are there already; the package is not
+        child = os.fork()  # the libraries are there already
         if child == 0:
             _run_tests(copy, tests)
         return _SURVIVED if os.waitpid(child, 0)[1] == 0 else _CAUGHT
@@ -274,6 +275,8 @@ def _run_tests(copy: Path, tests: list[str]) -> None:
         resource.setrlimit(resource.RLIMIT_CPU, (TIME_LIMIT, TIME_LIMIT))
         os.chdir(copy)
         sys.path.insert(0, str(copy))
+        for name in [n for n in sys.modules if n.partition('.')[0] in OURS]:
+            del sys.modules[name]  # what this study needs of them: the tests take the copy's
         nowhere = os.open(os.devnull, os.O_RDWR)
         for stream in (0, 1, 2):
             os.dup2(nowhere, stream)
