@@ -55,8 +55,7 @@ def report_head() -> None:
         said = PngImagePlugin.PngInfo()
         said.add_text('Description', html.unescape(verdict[1]) if verdict else '')
         with Image.open(shot) as picture:
-            flat = picture.convert('RGB').quantize(64, dither=Image.Dither.NONE)
-            flat.save(REPORT, optimize=True, pnginfo=said)
+            picture.convert('RGB').save(REPORT, optimize=True, pnginfo=said)
 
 
 def blind_trial() -> None:
@@ -80,7 +79,7 @@ def blind_trial() -> None:
         left.set_xlabel('slip ratio [-]')
         left.set_ylabel('sinkage [mm]')
         left.set_title('dots: measured; dotted: model before; lines: after')
-        left.legend()
+        left.legend(loc='upper center', bbox_to_anchor=(0.5, -0.17), ncols=5)
         plot_diagnosis(diagnosis, right)
         right.set_title(f'said: {" + ".join(outcome.said)}; hidden: {outcome.hidden}')
         figure.savefig(IMAGES / 'diagnosis.png', dpi=110)

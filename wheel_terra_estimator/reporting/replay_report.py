@@ -130,7 +130,7 @@ def _cards(summary: DriveSummary) -> list[tuple[str, str]]:
         ),
         (f'{stuck:.1f} s', 'longest time of a wheel in class stuck'),
         (
-            f'{sinkages(deep)}{unit}',
+            f'{sinkages(deep)}{unit}'.replace(' ± ', '\u00a0±\u00a0').replace(' mm', '\u00a0mm'),
             f'sinkage of {deep.name}, 5 to 95 % of the time; at most {deepest(deep)}',
         ),
         (f'{100 * unknown / len(summary.wheels):.0f} %', 'of the time at rest or unknown'),
