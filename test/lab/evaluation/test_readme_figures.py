@@ -1,0 +1,93 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""README's table of the estimator: figures by hand, intervals over soils, written in its place."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from wheel_terra_lab.studies import readme_figures
+
+ERRORS = {'A': {1: 0.1, 2: 0.1, 3: 0.4}, 'B': {1: 0.2, 2: 0.2, 3: 0.2}}
+"""Simulator -> seed -> error of the slip in every sample."""
+
+
+def rows() -> list[dict[str, Any]]:
+    return [
+        {
+            'simulator': simulator,
+            'kind': 'climb',
+            'seed': seed,
+            'mode': mode,
+            'commit': 'abc1234',
+            **{f'{name}_samples': 100 for name in readme_figures.QUANTITIES},
+            **{f'{name}_squares': 100 * error**2 for name in readme_figures.QUANTITIES},
+            'slip_within': 50 if seed == 3 else 95,
+            'entrapped': 1,
+            'warned': int(seed == 1),
+            'false': 2,
+            'hours': 0.5,
+        }
+        for simulator, soils in ERRORS.items()
+        for seed, error in soils.items()
+        for mode in readme_figures.MODES
+    ]
+
+
+def test_figures_are_those_by_hand() -> None:
+    found = readme_figures.table(rows())
+    # sqrt((0.1^2 + 0.1^2 + 0.4^2) / 3); soils drawn anew are all of 0.1, or all of 0.4, at the ends
+    assert found['with one: slip, rms error'][0] == '0.245 (0.100 to 0.400)'
+    assert found['with one: slip, rms error'][1] == '0.200 (0.200 to 0.200)'
+    assert found['with one: slip, worst soil'][0] == '0.400, seed 3'
+    held = found['with one: 95 % intervals that hold the true slip; worst soil']
+    assert held[0] == '80 %; 50 %'
+    warned = found['without a reference: entrapments warned before; false warnings']
+    assert warned[0] == '1 of 3; 6 in 1.5 h'
+
+
+def test_rows_of_two_commits_are_refused() -> None:
+    from wheel_terra_estimator.errors import UserError
+
+    mixed = rows()
+    mixed[0]['commit'] = 'def5678'
+    with pytest.raises(UserError, match='abc1234, def5678'):
+        readme_figures.write(mixed)
+
+
+def test_written_in_its_place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ('README', 'FIGURES'):
+        source = getattr(readme_figures, name)
+        copy = tmp_path / source.name
+        copy.write_text(source.read_text(encoding='utf-8'), encoding='utf-8')
+        monkeypatch.setattr(readme_figures, name, copy)
+    for _ in range(2):  # a second time changes nothing more
+        readme_figures.write(rows())
+        readme = readme_figures.README.read_text(encoding='utf-8')
+        entries = yaml.safe_load(readme_figures.FIGURES.read_text(encoding='utf-8'))
+    assert readme.count(readme_figures.markdown(rows())) == 1
+    assert readme.count('simulator A') == 1 and '0.394' not in readme
+    assert [entry['what'] for entry in entries].count(readme_figures.WHAT) == 1
+    assert entries[0]['commit'] == 'abc1234' and entries[0]['seeds'] == '1 to 3'
+    assert entries[0]['rows'] == readme_figures.table(rows())
+
+
+@pytest.mark.skipif(not readme_figures.RESULTS.is_file(), reason='the study was not run yet')
+def test_the_readme_shows_the_committed_results() -> None:
+    with readme_figures.RESULTS.open(encoding='utf-8', newline='') as stream:
+        assert readme_figures.markdown(list(csv.DictReader(stream))) in (
+            readme_figures.README.read_text(encoding='utf-8')
+        )
+
+
+@pytest.mark.slow
+def test_a_drive_has_a_row_for_each_mode() -> None:
+    found = readme_figures.rows_of(('A', 'cruise', 1), 'abc1234')
+    assert [row['mode'] for row in found] == list(readme_figures.MODES)
+    assert all(int(row['slip_samples']) > 1000 for row in found)
+    assert all(0.0 < readme_figures.rms([row], 'sinkage') < 0.01 for row in found)
