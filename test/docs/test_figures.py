@@ -50,14 +50,13 @@ def test_every_number_of_the_text_is_a_result() -> None:
 @pytest.mark.parametrize('result', RESULTS, ids=lambda result: result['what'])
 def test_a_result_says_where_it_comes_from(result: dict[str, Any]) -> None:
     assert result['command'] and result['seeds']
-    commit = result['commit']
-    if commit is None:
-        return
-    assert re.fullmatch(r'[0-9a-f]{7,40}', commit)
+    commits = result['commit'] if isinstance(result['commit'], list) else [result['commit']]
+    assert commits and all(re.fullmatch(r'[0-9a-f]{7,40}', commit) for commit in commits)
     git = ['git', '-C', str(ROOT)]
     whole = subprocess.run(
         [*git, 'rev-parse', '--is-shallow-repository'], capture_output=True, text=True
     )
     if whole.stdout.strip() == 'false':  # with its history, not an unpacked archive
-        known = subprocess.run([*git, 'cat-file', '-e', f'{commit}^{{commit}}'])
-        assert known.returncode == 0, f'{commit} is no commit of this repository'
+        for commit in commits:
+            known = subprocess.run([*git, 'cat-file', '-e', f'{commit}^{{commit}}'])
+            assert known.returncode == 0, f'{commit} is no commit of this repository'
