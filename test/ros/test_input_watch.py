@@ -30,3 +30,17 @@ def test_loss_by_the_publishers_own_count_is_told_whatever_comes_next():
         watch.heard('joint_states', 0.1 + 0.01 * i, 0.0, None)
     assert watch.faults(10.1) == [('joint_states', '2 messages lost on the way so far')]
     assert watch.faults(10.1) == [], 'told: whoever asked keeps it'
+
+
+def test_a_process_that_is_late_calls_no_topic_silent_and_says_by_how_much():
+    watch = InputWatch()
+    for number in range(41):
+        watch.heard('joint_states', 0.05 * number, 0.0, number)
+        watch.looked(0.05 * number, 0.05)
+    assert watch.faults(2.1) == []
+    assert watch.faults(4.0) == [], 'messages may wait'
+    watch.looked(4.0, 0.05)
+    late = ('inputs', 'taken 1.9 s late: this process lacks processor time')
+    assert watch.faults(4.0) == [late, ('joint_states', 'silent for 2.0 s')]
+    watch.looked(4.05, 0.05)
+    assert watch.faults(4.05) == [('joint_states', 'silent for 2.0 s')]

@@ -89,6 +89,26 @@ def test_a_process_that_stood_tells_each_loss_with_its_count(drive):
     assert time.monotonic() - first > 9.0, 'ten seconds in words'
 
 
+def test_a_process_that_stood_and_lost_nothing_is_behind_and_no_topic_silent(drive):
+    rover, until, start = drive
+    for topic in RATES:  # what the middleware keeps while the process stands
+        rover.slow_down(topic, 20.0 if topic in ('joint_states', 'imu/data') else 2.0)
+    process = start()
+    until(lambda: rover.sets > 20)
+    until(lambda: rover.said == 'running')
+    until(lasts(1.5))  # the first second of a process may be late
+    process.send_signal(signal.SIGSTOP)
+    until(lasts(1.5))
+    process.send_signal(signal.SIGCONT)
+    sets, said = rover.sets, set()
+    until(lambda: 'late' in rover.said)
+    assert re.search(r'inputs: taken [12]\.\d s late', rover.said), rover.said
+    until(lambda: said.add(rover.said) or rover.said == 'running')
+    if not lost(rover):  # the middleware may keep nothing for a process that stands
+        assert not [words for words in said if re.search('silent|lost|ahead|older', words)]
+    assert rover.sets > sets
+
+
 def test_an_orderly_life_is_quiet(drive):
     """The inputs are there, or come within a second; nothing warns from start to end."""
     rover, until, start = drive

@@ -14,6 +14,8 @@ PERIODS_TO_SILENCE = 3.0
 LEAST_SILENCE = 0.75  # [s]
 MESSAGES_TO_PERIOD = 3  # from which the period of a topic is known
 UNKNOWN_PERIOD = 5.0  # [s] of silence until then
+BEHIND = 0.5  # [s] of which it is told, and beyond which no topic is called silent
+START = 1.0  # [s] in which the process may be late
 _SMOOTHING = 0.1
 
 
@@ -38,6 +40,18 @@ class InputWatch:
 
     def __init__(self) -> None:
         self._topics: dict[str, _Topic] = {}
+        self._first_look: float | None = None
+        self._looked_at = 0.0
+        self._behind = self._told = 0.0
+
+    def looked(self, now: float, period: float) -> None:
+        """Note that all that waited was taken, which should be done once a period [s]."""
+        if self._first_look is None:
+            self._first_look = now
+        if now - self._first_look > START:
+            self._behind = max(now - self._looked_at - period, 0.0)
+            self._told = max(self._told, self._behind)
+        self._looked_at = now
 
     def heard(self, topic: str, now: float, delay: float, number: int | None) -> None:
         """Note a message.
@@ -77,15 +91,19 @@ class InputWatch:
     def is_silent(self, topic: str, now: float) -> bool:
         """Whether a topic that was heard is late by three of its periods."""
         age = self.age(topic, now)
-        if age is None:
+        if age is None or (self._first_look is not None and now - self._looked_at > BEHIND):
             return False
         state = self._topics[topic]
         least = LEAST_SILENCE if state.received > MESSAGES_TO_PERIOD else UNKNOWN_PERIOD
         return age > max(least, PERIODS_TO_SILENCE * state.period)
 
     def faults(self, now: float) -> list[tuple[str, str]]:
-        """Return topics that are silent, and losses since this was last asked, in words."""
+        """Return topics that are silent, losses and delays since this was last asked, in words."""
         found = []
+        if self._told > BEHIND:
+            words = f'taken {self._told:.1f} s late: this process lacks processor time'
+            found.append(('inputs', words))
+        self._told = 0.0
         for topic, state in self._topics.items():
             if state.lost != state.told:
                 found.append((topic, f'{state.lost} messages lost on the way so far'))
@@ -96,7 +114,7 @@ class InputWatch:
 
     def values(self, now: float) -> Mapping[str, Any]:
         """Return key -> value for diagnostics."""
-        found: dict[str, Any] = {}
+        found: dict[str, Any] = {'inputs_behind_s': round(self._behind, 2)}
         for topic, state in self._topics.items():
             if state.received:
                 silent = self.is_silent(topic, now)

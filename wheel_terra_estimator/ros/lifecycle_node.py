@@ -98,6 +98,11 @@ def why_no_arrival_log(path: Path) -> str:
     return '' if topic.strip() == RESET else 'is no arrival log of this program'
 
 
+def _came(info: dict[str, Any]) -> int:
+    """Return when a message came to this process [ns], or where unknown when it was sent."""
+    return int(info['received_timestamp'] or info['source_timestamp'])
+
+
 class WithInfo:
     """A callback that takes a message and what the middleware knows of it.
 
@@ -134,7 +139,7 @@ class EstimatorNode(LifecycleNode):
         self._pipeline: Pipeline | None = None
         self._publisher: EstimatePublisher | None = None
         self._views: LiveViews | None = None
-        self._subscriptions_made: list[Subscription] = []
+        self._subscriptions_made: dict[str, Subscription] = {}
         self._unpack = {topic: _topic_messages(topic).unpack for topic in MESSAGE_TYPES}
         self._timers_made: list[Timer] = []
         self._kept: KeptSoil | None = None
@@ -253,9 +258,9 @@ class EstimatorNode(LifecycleNode):
             self._kept.close()
         for timer in self._timers_made:
             self.destroy_timer(timer)
-        for subscription in self._subscriptions_made:
+        for subscription in self._subscriptions_made.values():
             self.destroy_subscription(subscription)
-        self._timers_made, self._subscriptions_made = [], []
+        self._timers_made, self._subscriptions_made = [], {}
         if self._publisher is not None:
             self._publisher.destroy()
         if self._views is not None:
@@ -270,21 +275,29 @@ class EstimatorNode(LifecycleNode):
     def _listen(self) -> None:
         assert self._pipeline is not None
         for topic in self._pipeline.converter.layout.topics:
-            self._subscriptions_made.append(
-                self.create_subscription(
-                    MESSAGE_TYPES[topic],
-                    topic,
-                    WithInfo(partial(self._hear, topic)),
-                    input_profile(topic),
-                    event_callbacks=SubscriptionEventCallbacks(
-                        incompatible_qos=partial(self._on_incompatible_qos, topic),
-                        message_lost=partial(self._on_message_lost, topic),
-                        use_default_callbacks=False,
-                    ),
-                    qos_overriding_options=OVERRIDABLE,
-                    raw=True,  # rclpy builds every field of a message, most of them for nothing
-                )
+            self._subscriptions_made[topic] = self.create_subscription(
+                MESSAGE_TYPES[topic],
+                topic,
+                WithInfo(partial(self._hear, topic)),
+                input_profile(topic),
+                event_callbacks=SubscriptionEventCallbacks(
+                    incompatible_qos=partial(self._on_incompatible_qos, topic),
+                    message_lost=partial(self._on_message_lost, topic),
+                    use_default_callbacks=False,
+                ),
+                qos_overriding_options=OVERRIDABLE,
+                raw=True,  # rclpy builds every field of a message, most of them for nothing
             )
+
+    def _catch_up(self) -> None:
+        """Take all that waits in the queues in the order in which it came: no topic runs ahead."""
+        taken: list[tuple[str, bytes, dict[str, Any]]] = []
+        for topic, subscription in self._subscriptions_made.items():
+            with subscription.handle:
+                while found := subscription.handle.take_message(subscription.msg_type, True):
+                    taken.append((topic, *found))
+        for topic, data, info in sorted(taken, key=lambda each: _came(each[2])):
+            self._hear(topic, data, info)
 
     def _hear(self, topic: str, data: bytes, info: dict[str, Any]) -> None:
         pipeline = self._pipeline
@@ -474,7 +487,9 @@ class EstimatorNode(LifecycleNode):
         """Keep diagnostics going when stamps do not: silence, or a slowly played bag."""
         assert self._pipeline is not None
         self._say_ready()
+        self._catch_up()  # what waits to be taken is not silent
         now = self._seconds()
+        self._watch_inputs.looked(now, WATCH_PERIOD)
         diagnostics = self._pipeline.diagnostics
         diagnostics.look()
         silent = now - self._set_at > SILENCE
