@@ -190,6 +190,8 @@ def test_a_configuration_is_read_only_and_can_be_copied():
         c.rover.mass = 3.0
     with pytest.raises(ValueError):
         c.wheels.radius[0] = 3.0
+    with pytest.raises(ValueError):
+        c.wheels.slip_radius[0] = 3.0
     with pytest.raises(AttributeError):
         _ = c.filter.no_such_thing
     for other in (pickle.loads(pickle.dumps(c)), copy.deepcopy(c)):

@@ -199,3 +199,10 @@ def test_a_file_of_keys_alone_is_one_of_ros(tmp_path):
     ros.write_text('/**:\n  ros__parameters:\n' + textwrap.indent(text, '    '))
     assert ros_yaml.read(plain) == ros_yaml.read(ros)
     assert ros_yaml.read(plain)['soil.cohesion'] == 8  # numbers as ROS reads them
+
+
+@pytest.mark.parametrize('value', [math.inf, -math.inf, 1.8e6, 0.1, -3, True, 'yes', 'a "b"\n'])
+def test_a_written_value_is_read_as_it_was(value):
+    read = ros_yaml.parse_value(ros_yaml.format_value(value), 'test')
+    assert read == value
+    assert type(read) is type(value)

@@ -399,3 +399,30 @@ def test_without_steering_joints_positions_are_not_looked_at(
         factory.header(STAMP), ('left',), position=(math.nan,), velocity=(2.0,)
     )
     assert converter.convert('joint_states', message).steering is None
+
+
+@pytest.mark.parametrize(
+    ('lateral', 'stated', 'told', 'variance'),
+    [
+        (0.2, 1e-4, 0.2, 1e-4),
+        (-0.2, 0.0, -0.2, 0.0),  # variance not stated
+        (-0.2, -1.0, -0.2, 0.0),
+        (0.0, 1e-4, math.nan, 1e-4),  # what a source without a lateral speed sends
+        (0.2, 1e6, math.nan, 1e6),  # says that nothing is known
+    ],
+)
+def test_a_reference_tells_a_lateral_speed_where_it_knows_one(
+    converter: InputConverter,
+    factory: Any,
+    lateral: float,
+    stated: float,
+    told: float,
+    variance: float,
+) -> None:
+    covariance = np.zeros(36)
+    covariance[[0, 7]] = 4e-4, stated
+    twist = factory.twist_with_covariance(0.7, 0.0, covariance)
+    twist.twist.linear.y = lateral
+    message = factory.odometry(factory.header(STAMP), twist)
+    reference = converter.convert('reference_odom', message)
+    np.testing.assert_equal((reference.lateral, reference.lateral_variance), (told, variance))
