@@ -26,6 +26,8 @@ NOISE_STD = 0.1
 """Relative deviation of a noise that a drive tells [-]."""
 LEAST_SURE = 0.8
 """Confidence from which a cure is written [-]."""
+CLEAR = 2.0
+"""Deviations by which a zero is off, from which it is written [-]."""
 BLUNT_REFERENCE = 0.005
 """Deviation of the radius by the noise of the reference alone, as a share, that is told [-]."""
 
@@ -214,7 +216,7 @@ def _torques(changes: _Changes, evidence: Evidence) -> None:
         source = 'sum of T/r against mass times specific force on slopes; the mass taken as stated'
         changes.add_with_deviation('sensors.torque_gain', whole.round(4).tolist(), std, source)
     zeros = torque.torque_zeros(evidence)
-    if zeros is not None:
+    if zeros is not None and any(zero.sigmas_from(0.0) > CLEAR for zero in zeros):
         zeros = torque.whole_zeros(evidence, zeros)
         after, std = [round(zero.value, 3) for zero in zeros], max(zero.std for zero in zeros)
         source = 'straight stretches driven both ways'

@@ -61,6 +61,8 @@ FIRM_SLIP = 0.12
 """Slip at the usual traction above which the ground is too soft to tell the radius [-]."""
 SLOPE_OF_SLIP = Estimate(0.2, 0.2)
 """Slip over traction of firm ground where the drive does not tell it: mean, deviation [-]."""
+LEAST_SEEN = 0.5
+"""Weight of the drive beside what firm ground does elsewhere from which it tells its slip [-]."""
 FIRM_DEPTH = Estimate(0.02, 0.015)
 """Sinkage over radius of firm ground where no sensor tells it: mean, deviation [-]."""
 DEEPEST = 0.3
@@ -188,6 +190,12 @@ def _without_slip(evidence: Evidence, speeds: _Speeds, plain: Estimate) -> Estim
     seen = Estimate(-both[1].value / both[0].value, both[1].std)
     weight = SLOPE_OF_SLIP.std**2 / (SLOPE_OF_SLIP.std**2 + seen.std**2)
     slope = max(weight * seen.value + (1.0 - weight) * SLOPE_OF_SLIP.value, 0.0)
+    if plain.value < 1.0 and weight < LEAST_SEEN and evidence.recording.sinkage is None:
+        return NotChecked(
+            'radius',
+            'neither sinkage nor slopes say that the ground is firm: a ratio of speeds may be '
+            'slip; drive ten metres over firm ground, or up and down a slope',
+        )
     middle = float(np.median(demand)) + resistance.value
     slip, skid = slope * middle, slope * resistance.value
     if slip > FIRM_SLIP:

@@ -26,6 +26,7 @@ from wheel_terra_estimator.checks.faults import (
 from wheel_terra_estimator.checks.felt_motion import LEAST_YAW, YAW_SIGMAS
 from wheel_terra_estimator.checks.finding import Finding
 from wheel_terra_estimator.checks.online_motion import MotionHistory
+from wheel_terra_estimator.checks.turning import ordinary_track
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.measurements import (
     InertialReading,
@@ -133,7 +134,7 @@ RULES = {
     'torque_of_wheel': Rule(8, 20),
     'torque_unit': Rule(4, 20),
     'sinkage': Rule(5, 20),
-    'frozen': Rule(4, 2),
+    'frozen': Rule(10, 2),  # a coarse encoder repeats itself at a steady speed
     'imu_frozen': Rule(3, 2),
     'imu_yaw': Rule(2, 3),
     'exchanged': Rule(2, 3),
@@ -490,7 +491,7 @@ class OnlineChecks:
             yield 'gyro_unit', -1, True, yaw_rate
         elif ORDINARY_TRACKS[0] < ratio < ORDINARY_TRACKS[1]:
             yield 'gyro_unit', -1, False, yaw_rate
-        if ORDINARY_TRACKS[0] < abs(ratio) < ORDINARY_TRACKS[1]:
+        if ratio > ORDINARY_TRACKS[0] or ordinary_track(ratio):
             yield 'sides', -1, ratio < 0.0, ratio
         if ORDINARY_TRACKS[0] < ratio < ORDINARY_TRACKS[1]:
             yield 'rate_unit_in_turns', -1, False, ratio

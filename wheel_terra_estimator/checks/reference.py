@@ -164,10 +164,8 @@ def _covariance(
     configuration, told = evidence.facts.configuration, {'noise': noise, 'variance': noise**2}
     if usual == 0.0:
         own = configuration.sensors.reference_std if configuration is not None else None
-        if own is not None and evidence.facts.stated('sensors.reference_std'):
-            usual = own
-            if usual / COVARIANCE_FACTOR < noise < COVARIANCE_FACTOR * usual:
-                return []  # the rover file decides, and says what is seen
+        if own is not None and own / COVARIANCE_FACTOR < noise < COVARIANCE_FACTOR * own:
+            return []  # the rover file decides, and says what is seen
         words = 'states no variance (0): the rover file decides'
         if own is not None and noise > COVARIANCE_FACTOR * own:
             words = f'states no variance (0) and scatters by {noise:.2g} m/s'

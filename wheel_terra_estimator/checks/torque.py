@@ -48,15 +48,23 @@ SOFT_TRACTION = 0.25
 """Level traction above which the soil itself changes what a slope costs."""
 LEAST_SLOPE_STD = 0.25
 """Scatter of the specific force along the drive that a scale needs [m/s^2]."""
+UP_AND_DOWN = 0.3
+"""The same of uphill and of downhill stretches: one way alone the soil may resist more the steeper
+the slope [m/s^2]."""
 GAIN_MODEL_STD = 0.05
 """What rolling resistance, larger uphill, adds to the scale (firm drives of the simulator)."""
+SLOPE_TIME = 2.0
+"""Forces are averaged over this for a slope that a sign is told on [s]."""
 SMOOTH_ROWS = 20
 """Rows over which slopes are averaged."""
 AXES_APART = math.radians(20.0)
 """No heading by the torques is told where the slopes vary along another axis than it [rad]."""
 LEAST_BACK_ROWS = 10
 """Rows of wheels turning back in the air that tell zero and friction apart."""
+RUTS = 0.3
+"""Half of the difference of resistance one way and back over its mean, one deviation [-]."""
 LEAST_GAIN_ERROR = 0.15
+GAIN_SIGMAS = 4.0
 ZERO_FACTOR = 6.0
 
 
@@ -98,7 +106,9 @@ def _signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     straight = evidence.straight.sum() > LEAST_MOVING_ROWS
     rows = evidence.straight.copy() if straight else evidence.moving.copy()
     if evidence.force is not None:
-        along = evidence.force[:, 0] * np.sign(evidence.common_rate) / facts.gravity
+        # Vibration is no slope.
+        along = moving_mean(evidence.force[:, 0], evidence.rows_in(SLOPE_TIME))
+        along = along * np.sign(evidence.common_rate) / facts.gravity
         rows &= along > UPHILL_ENOUGH
     if rows.sum() < LEAST_MOVING_ROWS:
         return [NotChecked('sign', 'torque: no stretch on the level or uphill')], evidence
@@ -200,9 +210,10 @@ def _slope_fit(evidence: Evidence) -> _Slopes | None:
     # Noise of a regressor makes a slope look flat: both sides are means over the same time.
     along = moving_mean(evidence.force[:, 0], SMOOTH_ROWS)[rows]
     pushed = moving_mean(thrust(evidence), SMOOTH_ROWS)[rows]
-    if float(np.std(along)) < LEAST_SLOPE_STD:
-        return None
     sense = np.sign(evidence.rim[rows])
+    down, up = np.quantile(along * sense, (0.05, 0.95))
+    if float(np.std(along)) < LEAST_SLOPE_STD or max(down, -up) > -UP_AND_DOWN:
+        return None
     columns = [evidence.facts.mass * along, sense]
     if (sense > 0).any() and (sense < 0).any():
         columns.append(np.ones(along.size))
@@ -239,6 +250,7 @@ def torque_gain(evidence: Evidence) -> _Slopes | NotChecked:
     if fit is None:
         return NotChecked('gain', 'torque: no slopes in it; drive up and down 5 to 10 degrees')
     traction = evidence.figures.get('torque.level_traction', 1.0)
+    traction = max(traction, traction / max(fit.gain.value, 1e-3))  # with this scale as well
     if traction > SOFT_TRACTION:
         return NotChecked(
             'gain', f'torque: soft ground (it costs {traction:.2f} of the weight); drive on firm'
@@ -248,7 +260,9 @@ def torque_gain(evidence: Evidence) -> _Slopes | NotChecked:
             'gain',
             'torque: its scale by one half of the drive does not fit the slopes of the other',
         )
-    return _Slopes(Estimate(fit.gain.value, math.hypot(fit.gain.std, GAIN_MODEL_STD)), fit.trial)
+    apart = min(0.5 * fit.trial.after, 1.0)
+    std = math.hypot(fit.gain.std, GAIN_MODEL_STD, apart)
+    return _Slopes(Estimate(fit.gain.value, std), fit.trial)
 
 
 def _gain(evidence: Evidence) -> list[Outcome]:
@@ -263,7 +277,7 @@ def _gain(evidence: Evidence) -> list[Outcome]:
         return []
     stated = facts.configuration.sensors.torque_gain_std
     sigmas = abs(gain - 1.0) / math.hypot(std, stated)
-    if sigmas < 3.0:
+    if sigmas < GAIN_SIGMAS:
         return _not_told(
             f'torque: {gain:.2f} is within what the rover file leaves open ({stated:g})'
         )
@@ -280,7 +294,10 @@ def _gain(evidence: Evidence) -> list[Outcome]:
 
 
 def torque_zeros(evidence: Evidence) -> list[Estimate] | None:
-    """Return the zero of each torque from driving both ways on a straight; None without both."""
+    """Return the zero of each torque from driving both ways on a straight; None without both.
+
+    Ground that resists more one way than back, over the rover's own ruts, looks like a zero.
+    """
     assert evidence.force is not None
     smooth = moving_mean(evidence.common_rate, evidence.rows_in(SETTLING))
     rows = evidence.straight & (np.abs(smooth) > 0.5 * evidence.working_rate)
@@ -290,10 +307,11 @@ def torque_zeros(evidence: Evidence) -> list[Estimate] | None:
     design = np.column_stack([np.ones(sense.size), sense, evidence.force[rows, 0]])
     if float(np.std(_smooth(evidence.force[rows, :1]))) < LEAST_SLOPE_STD:
         design = design[:, :2]
-    return [
-        block_fit(design, np.nan_to_num(evidence.torque[rows, i]))[0]
-        for i in range(len(evidence.facts.names))
-    ]
+    zeros = []
+    for i in range(len(evidence.facts.names)):
+        zero, resistance = block_fit(design, np.nan_to_num(evidence.torque[rows, i]))[:2]
+        zeros.append(Estimate(zero.value, math.hypot(zero.std, RUTS * resistance.value)))
+    return zeros
 
 
 def drive_friction(evidence: Evidence) -> Estimate | NotChecked:

@@ -39,7 +39,8 @@ def check_transport(
         channel = getattr(recording, name)
         if channel is None or channel.stamp.size < 3:
             continue
-        outcomes += _order(channel) or _drop_outs(name, channel, figures)
+        most_back = BACKWARD_SHARE if name in ('joints', 'imu') else 1.0  # others are fused late
+        outcomes += _order(channel, most_back) or _drop_outs(name, channel, figures)
         delays[name] = float(np.median(channel.log_time - channel.stamp)) * 1e-9
     imu, joints = recording.imu, recording.joints
     if imu is None or joints is None or not {'imu', 'joints'} <= set(delays):
@@ -62,7 +63,7 @@ def _jitter(channel: Channel) -> float:
     return robust_std(np.asarray((channel.log_time - channel.stamp) * 1e-9, dtype=np.float64))
 
 
-def _order(channel: Channel) -> list[Outcome]:
+def _order(channel: Channel, most_back: float) -> list[Outcome]:
     zero = float(np.mean(channel.stamp <= 0))
     stamps = channel.stamp[channel.stamp > 0]
     step = np.diff(stamps) * 1e-9
@@ -74,7 +75,7 @@ def _order(channel: Channel) -> list[Outcome]:
     words = []
     if zero > 0.01:
         words.append(f'{100 * zero:.0f} % of the stamps are 0')
-    if far or back > BACKWARD_SHARE:
+    if far or back > most_back:
         words.append(
             f'{100 * back:.1f} % of the stamps go back, by up to {-min(step.min(), 0.0):.2g} s'
         )
