@@ -43,10 +43,10 @@ LEAST_PERIODS = 0.5
 """The same in periods of the reference: between its stamps nothing is known."""
 LEAST_FIT = {'turns': 0.75, 'starts': 0.3, 'speeds': 0.9}
 """Correlation with the lag taken off, from which it is told [-]."""
-FALLS = {'turns': 0.75, 'starts': 0.9, 'speeds': 0.9}
+FALLS = {'turns': 0.65, 'starts': 0.9, 'speeds': 0.75}
 """Unlike part on the other half with the lag taken off over that without, at most [-]: an
 accelerometer is noisy, a slow reference ragged."""
-LEAST_STD = {'turns': 0.03, 'starts': 0.15, 'speeds': 0.05}
+LEAST_STD = {'turns': 0.08, 'starts': 0.15, 'speeds': 0.05}
 """Deviation of a lag, at least [s]: chassis and filters delay what is felt."""
 APART = 0.2
 """Lags of two halves or of two kinds of motion that differ by less agree [s]; also 3 deviations."""
@@ -65,7 +65,7 @@ class Lag(NamedTuple):
     """How late the second sensor's stamps are [s], by which motion, and what the trial showed."""
 
     value: float
-    std: float
+    own_std: float
     by: str
     trial: Trial
     halves: tuple[float, float]
@@ -73,7 +73,12 @@ class Lag(NamedTuple):
     @property
     def steady(self) -> bool:
         """Whether both halves of the drive show the same."""
-        return abs(self.halves[0] - self.halves[1]) < max(APART, 3.0 * self.std)
+        return abs(self.halves[0] - self.halves[1]) < max(APART, 3.0 * self.own_std)
+
+    @property
+    def std(self) -> float:
+        """Deviation, of the halves as well [s]."""
+        return max(self.own_std, 0.5 * abs(self.halves[0] - self.halves[1]))
 
     def counts(self, least: float) -> bool:
         """Whether it is a lag and stood its trial."""
@@ -284,8 +289,7 @@ def lag_of(
     for part, other in zip(parts, (b, a), strict=True):
         moved = np.interp(time[part] + other.value, time[part], second[part])
         trials.append(Trial(unlike(first[part], second[part]), unlike(first[part], moved)))
-    std = max(whole.std, 0.5 * abs(a.value - b.value))
-    return Lag(whole.value, std, by, worst(trials), (a.value, b.value))
+    return Lag(whole.value, whole.std, by, worst(trials), (a.value, b.value))
 
 
 def unlike(first: FloatArray, second: FloatArray) -> float:

@@ -21,12 +21,11 @@ JUMP_FACTOR = 8.0
 """A velocity that leaves its neighbours by so many times the usual scatter is a jump."""
 JUMP_SHARE = 0.005
 """Share of jumps that is a fault of the source, not a single wild reading."""
+LEAST_JUMPS = 5
 LEAST_JUMP = 0.3
 """A jump is also larger than this share of the speed."""
 COVARIANCE_FACTOR = 6.0
 """Ratio of stated to seen standard deviation that makes a covariance a placeholder."""
-TOO_SMALL_STD = 4.0
-"""Seen standard deviation over the stated one from which a variance that changes is too small."""
 LEAST_STD = 1e-4
 """Standard deviation [m/s] that is proposed at least."""
 AHEAD = 0.5
@@ -145,7 +144,7 @@ def _jumps(evidence: Evidence, reference: VelocitySeries) -> tuple[list[Outcome]
     wild &= (calm[0] | calm[1])[2:-2]
     share = float(np.mean(wild))
     forward[2:-2] = np.where(wild, beside, forward[2:-2])
-    if share < JUMP_SHARE or wild.sum() < 3:
+    if share < JUMP_SHARE or wild.sum() < LEAST_JUMPS:
         return [], forward
     told = {'count': int(wild.sum()), 'share': 100.0 * share, 'most': float(np.abs(off).max())}
     return [evidence.found('jumps', 0.97, **told)], forward
@@ -171,7 +170,7 @@ def _covariance(
             words = f'states no variance (0) and scatters by {noise:.2g} m/s'
     elif constant and (usual > COVARIANCE_FACTOR * noise or usual * COVARIANCE_FACTOR < noise):
         words = f'states {usual:.2g} m/s, always the same, and scatters by {noise:.2g} m/s'
-    elif noise > TOO_SMALL_STD * usual:
+    elif noise > COVARIANCE_FACTOR * usual:
         value = float(f'{noise:.2g}')
         return [evidence.found('reference_noise', 0.9, value=value, stated=usual, **told)]
     else:

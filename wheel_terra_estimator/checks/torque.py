@@ -176,7 +176,9 @@ def _scale(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     if traction < LEAST_TRACTION < size:
         reason = 'torque: does not fit the slopes: mounting of the IMU, or zeros of the torques'
         return _not_told(reason), evidence
-    if LEAST_TRACTION <= traction <= MOST_TRACTION:
+    assert facts.configuration is not None
+    open_to = 1.0 + 3.0 * float(facts.configuration.sensors.torque_gain_std)
+    if LEAST_TRACTION <= traction <= MOST_TRACTION * open_to:
         return [], evidence
     fit = _slope_fit(evidence)
     told: dict[str, Any] = {'gains': '...'}

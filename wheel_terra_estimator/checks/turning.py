@@ -221,13 +221,17 @@ def _known(evidence: Evidence) -> tuple[NDArray[np.intp], Mask]:
 
 
 class _Chosen(NamedTuple):
-    """What the wheels say: signs (n,), track (0: no turns), exchanged wheels, trial, certainty."""
+    """What the wheels say: signs (n,), track (0: no turns), exchanged wheels, trial, certainty.
+
+    ``unlike`` where another hypothesis is far better and none is good.
+    """
 
     signs: FloatArray
     track: float = 0.0
     exchanged: tuple[int, int] | None = None
     trial: str = ''
     sure: float = 0.99
+    unlike: bool = False
 
 
 def check_signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
@@ -239,6 +243,9 @@ def check_signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     outcomes: list[Outcome] = []
     chosen = _chosen(evidence, there, rows)
     signs, turn, mended = chosen.signs, chosen.track, evidence
+    if chosen.unlike:
+        reason = 'the wheels are too unlike to tell which one counts backwards; drive straight'
+        outcomes.append(NotChecked('sign', reason))
     if chosen.exchanged is not None:
         finding, mended = _exchanged(evidence, chosen.exchanged, chosen)
         outcomes.append(finding)
@@ -283,7 +290,8 @@ def _chosen(evidence: Evidence, there: NDArray[np.intp], rows: Mask) -> _Chosen:
         best = again if again is not None and again.trial.falls else best
     # Nothing is clearly better than what the rover file says, or good enough.
     if not best.trial.falls or best.trial.after > MOST_LEFT:
-        return _Chosen(signs, fit_of(Fix((1,) * count), stretch).clear_track)
+        track = fit_of(Fix((1,) * count), stretch).clear_track
+        return _Chosen(signs, track, unlike=best.trial.falls)
     turn = best.fit.clear_track
     signs[there] = best.fix.signs
     if evidence.gyro is None and _like_a_spin(evidence, signs):
