@@ -246,7 +246,8 @@ def test_sinkage_in_millimetres_and_a_variance_of_a_million_are_told_with_their_
 def test_a_frozen_rate_is_told_and_noisy_ones_are_not():
     wheels = Wheels()
     assert not wheels.checks_after(10).findings
-    (finding,) = wheels.checks_after(10, frozen=True).findings
+    assert not wheels.checks_after(8, frozen=True).findings  # nor is a coarse encoder's
+    (finding,) = wheels.checks_after(12, frozen=True).findings
     assert (finding.kind, finding.wheel) == ('frozen', wheels.configuration.wheels.names[2])
 
 
