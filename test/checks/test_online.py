@@ -247,7 +247,7 @@ def test_a_frozen_rate_is_told_and_noisy_ones_are_not():
     wheels = Wheels()
     assert not wheels.checks_after(10).findings
     assert not wheels.checks_after(8, frozen=True).findings  # nor is a coarse encoder's
-    (finding,) = wheels.checks_after(12, frozen=True).findings
+    (finding,) = wheels.checks_after(14, frozen=True).findings
     assert (finding.kind, finding.wheel) == ('frozen', wheels.configuration.wheels.names[2])
 
 
