@@ -156,7 +156,11 @@ def test_a_stop_by_its_topics_outlives_the_limiter(start, listener, tmp_path):
 
 @pytest.mark.parametrize(
     ('parameter', 'said'),
-    [('state_file:={rover}', 'remove it'), ('critical_slip:=0.1', 'must be below')],
+    [
+        ('state_file:={rover}', 'remove it'),
+        ('state_file:={rover}.state.json', 'give the limiter another one'),
+        ('critical_slip:=0.1', 'must be below'),
+    ],
 )
 def test_what_cannot_be_used_is_refused_at_the_start(start, parameters, parameter, said):
     before = Path(parameters).read_text()

@@ -19,6 +19,8 @@ from wheel_terra_estimator.output_folder import new_file
 _LATEST_STAMP = 2**63 - 1  # [ns]
 HEADER = 'Learned by the estimator on the drive; read at its next start.'
 """First line, as a comment, of every soil file."""
+STATE = '.state.json'
+"""Behind the name of a soil file: the file that keeps the warning."""
 _COMMENT = f'{HEADER}\nWritten anew each time: keep nothing of your own in it.'
 _SECTIONS = ('soil.', 'sensors.')
 """Of the keys that are written."""
@@ -49,7 +51,7 @@ class StuckState:
 
 def state_path(soil_file: Path) -> Path:
     """Return where the warning is kept beside a soil file."""
-    return soil_file.with_name(f'{soil_file.name}.state.json')
+    return soil_file.with_name(f'{soil_file.name}{STATE}')
 
 
 def read_values(soil_file: Path) -> dict[str, Any]:

@@ -202,6 +202,11 @@ class TractionLimiter(Node):
         state = LimiterState(still_since=self._now())
         if self._file is None:
             return state
+        if self._file.name.endswith(soil_file.STATE):
+            raise UserError(
+                f'state_file: {self._file}: an estimator keeps its warning in files of that name '
+                f'(<soil_file>{soil_file.STATE}); give the limiter another one'
+            )
         kept = soil_file.read_state(self._file)
         if kept.stuck:
             self.get_logger().error(f'stopped before the restart: {kept.reason}')
