@@ -169,7 +169,7 @@ def test_the_class_is_that_of_the_published_slip(stretches, dt):
     assert contradictions([classes.follow(e) for e in given_sets], judged) == []
 
 
-@pytest.mark.parametrize('kind', ['near_stuck', 'turns'])
+@pytest.mark.parametrize('kind', ['near_stuck', pytest.param('turns', marks=pytest.mark.slow)])
 def test_the_class_is_that_of_the_published_slip_in_drives(kind):
     """References come late, so that the past is estimated anew while the present is published."""
     from wheel_terra_lab.evaluation.kinds import KINDS
