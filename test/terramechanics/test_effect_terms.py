@@ -88,10 +88,11 @@ def test_neutral_values_change_nothing_and_defaults_what_is_said(name: str, meth
         if column.any()
     }  # fmt: skip
     aside = {**ROW, 'slip_angle': 0.3, 'wheel': wheel, 'method': method}
-    if not changed and not np.array_equal(
-        state(**aside).lateral_force, state(**aside, effects={name: {}}).lateral_force
-    ):
-        changed = {'lateral_force'}
+    if not changed:
+        off, on = (state(**aside, effects=effects) for effects in ({}, {name: {}}))
+        pairs = {output: (getattr(off, output), getattr(on, output))
+                 for output in (*OUTPUTS, 'lateral_force')}  # fmt: skip
+        changed = {output for output, pair in pairs.items() if not np.array_equal(*pair)}
     assert changed == set(effect.touches)
 
 

@@ -173,3 +173,55 @@ def test_sliding_sideways_digs_in_as_slip_does() -> None:
     other = replace(SAND, sinkage_exponent=SAND.sinkage_exponent + 0.3)
     same = state([1.0 - math.cos(beta)], slip_angle=beta, soil=other, slip_radius='rim')
     assert sliding.sinkage == pytest.approx(same.sinkage)
+
+
+def plate_state(slip: float, beta: float, load: float, **points_of: float):
+    effects = {'side_bulldozing': {'form': 'plate', 'ks': 0.7}}
+    row = points([slip], load, slip_angle=beta, **points_of)
+    on, off = (WheelSoilModel(SAND, e).steady_state(row) for e in (effects, {}))
+    push = float(off.lateral_force[0] - on.lateral_force[0])
+    return push, float(on.drawbar_pull[0] - off.drawbar_pull[0]), on, off
+
+
+@pytest.mark.parametrize('beta', [0.05, 0.6, 1.2])
+def test_flank_as_a_plate_agrees_with_an_integral_of_its_own(beta: float) -> None:
+    slip, load = 0.2, 200.0
+    push, rub, on, off = plate_state(slip, beta, load)
+    r, phi = WHEEL.radius, SAND.friction_angle
+    t1, t2 = float(on.entrance_angle[0]), float(on.leaving_angle[0])
+    front, back = r * math.sin(t1), r * math.sin(t2)
+
+    def per_length(x: float) -> float:
+        bottom = math.sqrt(r * r - x * x)
+        share = (front - x) / (front - back)
+        surface = r * (math.cos(t1) + share * (math.cos(t2) - math.cos(t1)))
+        h = max(bottom - surface, 0.0)
+        cot = math.tan(math.pi / 4 + phi / 2)
+        d1, d2 = 2.0 * cot, cot + cot**2 * math.tan(phi)
+        weight = SAND.density * 9.80665
+        moved = -math.expm1(-(front - x) * math.tan(beta) / SAND.shear_modulus)
+        return moved * d1 * (SAND.cohesion * h + d2 * weight * h * h / 2)
+
+    assert push == pytest.approx(0.7 * quad(per_length, back, front, epsrel=1e-9)[0], rel=1e-3)
+    # Friction on the flank works against the flank's motion, and its torque at two thirds of r.
+    assert abs(rub) <= push * math.tan(phi)
+    assert float(on.torque[0] - off.torque[0]) == pytest.approx(2.0 / 3.0 * r * rub)
+
+
+def test_a_wheel_pushed_straight_aside_is_a_plate() -> None:
+    aside = {'beta': math.pi / 2, 'load': 80.0}
+    push, rub, _, _ = plate_state(1.0, **aside, lateral_speed_ratio=0.02)
+    # Spinning fast, all friction of the flank drives the wheel on; hardly turning, none does.
+    assert rub == pytest.approx(push * math.tan(SAND.friction_angle), rel=1e-2)
+    _, slow, _, _ = plate_state(1.0, **aside, lateral_speed_ratio=200.0)
+    assert abs(slow) < 0.02 * push
+    # It pushes no soil ahead, and bears less than where it rolls.
+    ahead = {'bulldozing': {'kb': 1.0}}
+    row = {'slip_angle': math.pi / 2, 'lateral_speed_ratio': 0.5}
+    plain, blade = (state([1.0], effects=e, **row).drawbar_pull[0] for e in ({}, ahead))
+    assert blade == pytest.approx(plain, abs=1e-6)
+    # Wholly from the side, the soil has lost the stated share of its stiffness.
+    soft = state([1.0], effects={'slip_sinkage_exponent': {'n1': 0.0, 'side': 0.6}}, **row)
+    weaker = replace(SAND, cohesive_modulus=0.4 * SAND.cohesive_modulus,
+                     frictional_modulus=0.4 * SAND.frictional_modulus)  # fmt: skip
+    assert soft.sinkage == pytest.approx(state([1.0], soil=weaker, **row).sinkage)

@@ -96,7 +96,7 @@ def test_forms_are_effects_of_one_form_under_keys_of_their_own() -> None:
     assert names == [SKID, f'{SKID}:lyasko', f'{SKID}:load']
     assert catalogue()[f'{SKID}:lyasko'] == effect.forms[1]
     assert effect.forms[1].base_name == SKID
-    assert {p.name for p in effect.all_parameters} == {'n1', 'n2', 'n3', 'gain', 'nw'}
+    assert {p.name for p in effect.all_parameters} == {'n1', 'n2', 'side', 'gain', 'nw'}
     assert f'{SKID}:none' not in catalogue()
     assert by_variant({SKID: {'form': 'lyasko', 'gain': 0.5}}) == {f'{SKID}:lyasko': {'gain': 0.5}}
 
@@ -178,7 +178,7 @@ def configured(*keys: str) -> dict:
 
 
 def test_the_form_is_a_key_of_the_configuration() -> None:
-    assert configured('n1:=0.4')[SKID] == {'n1': 0.4, 'n2': 0.0, 'n3': 0.0}
+    assert configured('n1:=0.4')[SKID] == {'n1': 0.4, 'n2': 0.0, 'side': 0.0}
     settings = configured('form:=lyasko', 'gain:=0.7')
     assert settings[SKID] == {'form': 'lyasko', 'gain': 0.7}
     assert state(0.4, effects=settings).sinkage > state(0.4).sinkage

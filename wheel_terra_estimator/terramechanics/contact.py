@@ -67,3 +67,11 @@ class Contact:
     def straight(self) -> bool:
         """Whether no wheel slides sideways: lateral force is zero and need not be worked out."""
         return isinstance(self.lateral_ratio, float) and self.lateral_ratio == 0.0
+
+    def heading(self, maths: Any) -> tuple[Any, Any]:
+        """Cosine and sine (positive left) of the slip angle, from the two speeds of the hub [-]."""
+        if self.straight:
+            return 1.0, 0.0
+        forward, aside = self.velocity_ratio, self.lateral_ratio
+        speed = maths.maximum(maths.sqrt(forward * forward + aside * aside), 1e-300)
+        return forward / speed, aside / speed

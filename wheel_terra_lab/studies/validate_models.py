@@ -23,6 +23,7 @@ SECTIONS = (
     'equivalent_circle',
     'grc3_wheel',
     'cmu_wheel',
+    'cmu_sideways',
     'small_wheels',
     'transfer',
     'rover_slope',

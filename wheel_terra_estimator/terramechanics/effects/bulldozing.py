@@ -27,9 +27,18 @@ def wedge_resistance(contact: Contact, depth: Any, maths: Any) -> Any:
     return d1 * (contact.cohesion * depth + 0.5 * d2 * weight * depth**2)
 
 
+def _blade(contact: Contact, maths: Any) -> Any:
+    """Width of the wheel as a plate across its motion, its share along the wheel [m].
+
+    b without sideways motion, none at a slip angle of 90 degrees.
+    """
+    cosine, sine = contact.heading(maths)
+    return (contact.width * cosine + 2.0 * contact.rim_radius * maths.abs(sine)) * cosine
+
+
 def _push(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
     depth = contact.radius * (1.0 - maths.cos(contact.entrance_angle))
-    resistance = contact.width * wedge_resistance(contact, depth, maths)
+    resistance = _blade(contact, maths) * wedge_resistance(contact, depth, maths)
     contact.drawbar_pull = contact.drawbar_pull - contact.direction * p.kb * resistance
 
 
@@ -48,9 +57,8 @@ def _earth_pressure(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
     # Front of the wheel as a blade that leans by half the entrance angle from the horizontal.
     lean = 0.5 * maths.pi - 0.5 * contact.entrance_angle
     front = maths.sin(lean + friction) / (2.0 * maths.sin(lean) * cos)
-    resistance = (
-        contact.width * front * depth * (2.0 * contact.cohesion * k_c + weight * depth * k_gamma)
-    )
+    pressure = 2.0 * contact.cohesion * k_c + weight * depth * k_gamma
+    resistance = _blade(contact, maths) * front * depth * pressure
     contact.drawbar_pull = contact.drawbar_pull - contact.direction * p.kb * resistance
 
 
@@ -67,7 +75,8 @@ EFFECT = Effect(
     parameters=(_KB,),
     touches=frozenset({'drawbar_pull'}),
     confounded_with={'pitch_bias': 'three times the load or another wheel; a level check'},
-    validity='sinkage below half the radius; the wedge is taken over the rim width',
+    validity='sinkage below half the radius; the wedge is taken over the rim width, of a wheel '
+    'that slides sideways over the width that rim and flank show to the motion',
     source='Hegedus 1960 in the form of Ishigami et al. 2007 (side force turned to the front)',
     on_outputs=_push,
     other_forms=(

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from wheel_terra_estimator.terramechanics.contact import Contact
-from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter
+from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter, Form
 from wheel_terra_estimator.terramechanics.effects.bulldozing import wedge_resistance
 from wheel_terra_estimator.terramechanics.stresses import mobilised_share
 
@@ -19,6 +19,7 @@ _NODES = tuple(
     (0.5 * (x + 1.0), 0.5 * w)
     for x, w in zip(*(part.tolist() for part in np.polynomial.legendre.leggauss(8)), strict=True)
 )
+_CENTRE = 2.0 / 3.0  # distance from the hub at which soil rubs on the flank, share of the radius
 
 
 def _push_aside(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
@@ -38,20 +39,67 @@ def _push_aside(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
     contact.lateral_force = contact.lateral_force - p.ks * span * force
 
 
+def _plate(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
+    if contact.straight:
+        return
+    t1, t2, r = contact.entrance_angle, contact.leaving_angle, contact.radius
+    cosine, sine = contact.heading(maths)
+    along = maths.maximum(cosine, 1e-9)
+    span = t1 - t2
+    # Soil surface along the flank: straight from where the rim goes in to where it leaves.
+    fall = (maths.cos(t2) - maths.cos(t1)) / (maths.sin(t1) - maths.sin(t2))
+    force = 0.0
+    for place, weight in _NODES:
+        angle = t1 - place * span
+        behind = r * (maths.sin(t1) - maths.sin(angle))
+        depth = maths.maximum(r * (maths.cos(angle) - maths.cos(t1)) - fall * behind, 0.0)
+        moved = mobilised_share(behind * sine, contact.shear_modulus * along, maths)
+        width = r * maths.cos(angle)
+        force = force + weight * width * moved * wedge_resistance(contact, depth, maths)
+    push = p.ks * span * force
+    contact.lateral_force = contact.lateral_force - push
+    # The flank slides past the wedge: backwards as the wheel turns, down as the wedge rises.
+    back = _CENTRE * r - contact.velocity_ratio
+    wedge = 0.25 * maths.pi - 0.5 * maths.arctan(contact.tan_friction)
+    rise = maths.tan(wedge) * contact.lateral_ratio
+    slide = maths.maximum(maths.sqrt(back * back + rise * rise), 1e-12)
+    rub = contact.tan_friction * maths.abs(push) * back / slide
+    contact.drawbar_pull = contact.drawbar_pull + contact.direction * rub
+    contact.torque = contact.torque + contact.direction * _CENTRE * r * rub
+
+
+_KS = EffectParameter(
+    'ks', '-', 1.0, 0.0, 5.0, 0.5, 'half_normal', 'share of the full passive resistance'
+)
+
 EFFECT = Effect(
     name='side_bulldozing',
+    form='ishigami',
     claim='a wheel that slides sideways pushes soil aside with its flank',
     symbol='F_y -= ks Int D1 (c h + D2 rho g h^2/2) (1 - exp(-|j_y|/K)) (r - h cos t) dt, '
     'h = r (cos t - cos t_1), j_y = (v_y/w)(t_1 - t); D1, D2 as in bulldozing',
-    parameters=(
-        EffectParameter(
-            'ks', '-', 1.0, 0.0, 5.0, 0.5, 'half_normal', 'share of the full passive resistance'
-        ),
-    ),
+    parameters=(_KS,),
     touches=frozenset({'lateral_force'}),
     needs=('slip_angle',),
     validity='flank smooth and upright, sinkage below half the radius; the share that the lateral '
     'displacement mobilises is taken as that of shear, so that no slip angle gives no force',
     source='Ishigami et al. 2007 eq. 9 and 11 (doi 10.1002/rob.20187), resistance of Hegedus 1960',
     on_outputs=_push_aside,
+    other_forms=(
+        Form(
+            name='plate',
+            claim='the flank is a plate pushed sideways, and soil rubs along it',
+            symbol='F_y -= P, P = ks Int D1 (c h + D2 rho g h^2/2) (1 - exp(-|j_f|/K)) r cos t dt, '
+            'h below the line from entry to exit, j_f = (v_y/v) r (sin t_1 - sin t); '
+            'F += P tan(phi) u/|(u, v_y tan X)|, T += 2/3 r times that, u = 2/3 r w - v',
+            parameters=(_KS,),
+            touches=frozenset({'lateral_force', 'drawbar_pull', 'torque'}),
+            needs=('slip_angle',),
+            validity='slip angles to 90 degrees, sinkage below one radius; what friction on '
+            'the flank carries of the load is left out',
+            source='own form: resistance of Hegedus 1960 on the outline of the flank, friction '
+            'against the motion of the flank past a rising wedge (docs/models/sideways.md)',
+            on_outputs=_plate,
+        ),
+    ),
 )

@@ -17,28 +17,30 @@ from wheel_terra_estimator.terramechanics.effects.base import (
 from wheel_terra_estimator.terramechanics.kinematics import speed_ratio
 
 
-def _sliding(contact: Contact, maths: Any) -> tuple[Any, Any]:
-    """Speed of the rim through the soil, and sideways, over the faster of rim and hub [-].
-
-    The first is |s| of a wheel that does not slide sideways.
-    """
+def _sliding(contact: Contact, maths: Any) -> Any:
+    """Speed of the rim through the soil over the faster of rim and hub; |s| without side slip."""
     if contact.straight:
-        return maths.abs(contact.slip), 0.0
+        return maths.abs(contact.slip)
     forward = speed_ratio(contact.slip, maths)
-    back, aside = 1.0 - forward, maths.abs(contact.lateral_ratio / contact.rim_radius)
+    back, aside = 1.0 - forward, contact.lateral_ratio / contact.rim_radius
     fastest = maths.maximum(maths.sqrt(forward * forward + aside * aside), 1.0)
-    return maths.sqrt(back * back + aside * aside) / fastest, aside / fastest
+    return maths.sqrt(back * back + aside * aside) / fastest
 
 
 def _exponent(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
     skid = maths.maximum(-contact.slip, 0.0)
-    sliding, aside = _sliding(contact, maths)
-    growth = p.n1 * sliding + p.n2 * skid + p.n3 * aside
+    growth = p.n1 * _sliding(contact, maths) + p.n2 * skid
     contact.sinkage_exponent = contact.sinkage_exponent + growth
+    if not contact.straight:
+        # Soil that comes in past the flank was never rolled over: it bears less.
+        cosine, sine = contact.heading(maths)
+        aside = contact.rim_radius * maths.abs(sine)
+        share = aside / (aside + contact.width * cosine)
+        contact.bearing_modulus = contact.bearing_modulus * (1.0 - p.side * share * share)
 
 
 def _lyasko(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
-    slip, _ = _sliding(contact, maths)
+    slip = _sliding(contact, maths)
     gain = 1.0 + p.gain * ((1.0 + slip) / (1.0 - 0.5 * slip) - 1.0)
     # The load grows with k z^(N + 1/2): this modulus gives the sinkage `gain` times as much.
     weaker = gain ** -(contact.sinkage_exponent + 0.5)
@@ -46,7 +48,7 @@ def _lyasko(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
 
 
 def _with_load(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
-    growth = p.nw * maths.log(relative_pressure(contact)) + p.n1 * _sliding(contact, maths)[0]
+    growth = p.nw * maths.log(relative_pressure(contact)) + p.n1 * _sliding(contact, maths)
     contact.sinkage_exponent = contact.sinkage_exponent + growth
 
 
@@ -59,8 +61,8 @@ EFFECT = Effect(
     claim='sinkage exponent N = n0 + n1 |s|: slip or skid makes the wheel sink more than its load '
     'does',
     form='linear',
-    symbol='N = n0 + n1 |s| (+ n2 |s| where s < 0); sideways |s| becomes |(v - r w, v_y)|/u and '
-    'n3 |v_y|/u is added, u = max(r w, |(v, v_y)|)',
+    symbol='N = n0 + n1 |s| (+ n2 |s| where s < 0); sideways |s| becomes |(v - r w, v_y)|/u, '
+    'u = max(r w, |(v, v_y)|), and k *= 1 - side q^2, q = r |v_y|/(r |v_y| + b |v|)',
     parameters=(
         _N1,
         EffectParameter(
@@ -75,14 +77,14 @@ EFFECT = Effect(
             free=False,
         ),
         EffectParameter(
-            'n3',
+            'side',
             '-',
             0.0,
-            -2.0,
-            3.0,
+            0.0,
+            0.98,
             0.5,
-            'normal',
-            'what sliding sideways adds beyond n1, per share of the speed',
+            'half_normal',
+            'share of the stiffness lost where all soil comes in past the flank',
             free=False,
         ),
     ),
@@ -97,7 +99,7 @@ EFFECT = Effect(
     '1 m, where k z^N has its reference',
     source='Ding et al. 2010 eq. 13 (doi 10.1007/s11771-010-0021-7); |s| and n2: measured rows of '
     'a single wheel that brakes, sliding sideways: of one that is dragged at up to 90 degrees '
-    '(docs/models/validation.md)',
+    '(docs/models/sideways.md)',
     on_inputs=_exponent,
     other_forms=(
         Form(

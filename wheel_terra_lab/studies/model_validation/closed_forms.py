@@ -126,7 +126,7 @@ def family(
     load = random.uniform(1e3, 10e3, count) * radius * width
     slip = random.uniform(*slips, count)
     effects = {
-        'slip_sinkage_exponent': {'n1': random.uniform(0.0, 0.5, count), 'n2': 0.0, 'n3': 0.0},
+        'slip_sinkage_exponent': {'n1': random.uniform(0.0, 0.5, count), 'n2': 0.0, 'side': 0.0},
         'stress_peak_shift': {'c2': random.uniform(0.0, 0.3, count), 'skid': 0.0},
         'lug_shear_radius': {'lam': random.uniform(0.0, 1.0, count)},
     }
