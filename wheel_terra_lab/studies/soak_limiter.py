@@ -93,6 +93,7 @@ class DrivenRover(Rover):
         self.heard_of: Counter[str] = Counter()  # words of the estimator on losses
         self.released_at = time.monotonic()  # infinite: the answer has not come
         self.broken: Counter[str] = Counter()
+        self._suspected: list[tuple[float, str]] = []  # broken unless ~/stuck just changed
         self.outs = self.judged = 0
         self.risen, self.risen_at = 0, 0.0
         latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -108,6 +109,9 @@ class DrivenRover(Rover):
         if now - self._looked_at > ON_TIME:
             self._late_at = now
         self._looked_at = now
+        while self._suspected and now - self._suspected[0][0] > SETTLED:
+            at, words = self._suspected.pop(0)
+            self.broken[words] += self.changed_at < at - SETTLED
         if now >= self._command_due:
             self._command_due = now + COMMAND_PERIOD
             message = TwistStamped()
@@ -143,9 +147,9 @@ class DrivenRover(Rover):
     def _on_out(self, message: TwistStamped) -> None:
         now, before, silent = time.monotonic(), self._sent, time.monotonic() - self._sent_at
         out, turn = message.twist.linear.x, message.twist.angular.z
-        commanded_at, *command = map(float, message.header.frame_id.split())
-        again = tuple(command) == self._sent_for and silent < SETTLED
-        self._sent, self._sent_at, self._sent_for = out, now, tuple(command)
+        commanded_at, wanted, wanted_turn = map(float, message.header.frame_id.split())
+        again = (wanted, wanted_turn) == self._sent_for and silent < SETTLED
+        self._sent, self._sent_at, self._sent_for = out, now, (wanted, wanted_turn)
         self._same = self._same + 1 if again else 0
         self.outs += 1
         if now - self._late_at < 2.0 * SETTLED:
@@ -154,14 +158,14 @@ class DrivenRover(Rover):
         known = self.stuck and self.direction and commanded_at - self.changed_at > SETTLED
         released = self.risen_at < self.released_at > now - 10.0 - SETTLED
         if known and not released:
-            wanted, wanted_turn = command
             if out * self.direction > 0.0:
-                self.broken['passed in the direction that led in'] += 1
-            held = self._same > REACHED
-            if held and wanted * self.direction < 0.0 and abs(out - CREEP * wanted) > 1e-6:
-                self.broken['the way out was not open'] += 1
-            if held and wanted == 0.0 and abs(turn - CREEP * wanted_turn) > 1e-6:
-                self.broken['no turning on the spot'] += 1
+                self._suspected.append((now, 'passed in the direction that led in'))
+            if self._same > REACHED and wanted * self.direction < 0.0:
+                share = out / wanted
+                if abs(share - CREEP) > 1e-6:
+                    self._suspected.append((now, f'the way out was open by {share:.2f}'))
+            if self._same > REACHED and wanted == 0.0 and abs(turn - CREEP * wanted_turn) > 1e-6:
+                self._suspected.append((now, 'no turning on the spot'))
         if abs(out) > abs(before if before * out > 0.0 else 0.0) + STEP + 1e-9:
             self.broken['an increase without the ramp'] += 1
         unheard = now - self.heard_at > 2.0 * SETTLED
@@ -233,7 +237,7 @@ class Soak:
         for name, node in self._nodes.items():
             if node.end(signal.SIGINT):
                 self.problems.append(f'the {name} ended with another status than 0')
-        self.problems += [f'{words} ({n} times)' for words, n in self.rover.broken.items()]
+        self.problems += [f'{words} ({n} times)' for words, n in self.rover.broken.items() if n]
 
     def _dig_in(self, direction: int) -> None:
         self.rover.steer(direction * SPEED)
