@@ -41,7 +41,7 @@ from wheel_terra_estimator.estimation.judgement.stuck.situation import (
 )
 from wheel_terra_estimator.estimation.measurements import ReferenceVelocity, StepInputs
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
-from wheel_terra_estimator.estimation.scalars import NAN, gain_of, known
+from wheel_terra_estimator.estimation.scalars import NAN, clipped, gain_of, known
 from wheel_terra_estimator.estimation.words import MissingInputs
 from wheel_terra_lab.traction_filter.companions import (
     SHARP_TURN,
@@ -50,7 +50,7 @@ from wheel_terra_lab.traction_filter.companions import (
     seen_noise,
 )
 from wheel_terra_lab.traction_filter.consistency import Consistency
-from wheel_terra_lab.traction_filter.curve import OFFSET, WHEELS
+from wheel_terra_lab.traction_filter.curve import LOG_STRENGTH, OFFSET, WHEELS
 from wheel_terra_lab.traction_filter.learned import learned_parameters
 from wheel_terra_lab.traction_filter.outputs import Sources, estimate_set
 from wheel_terra_lab.traction_filter.pulls import Contact, PullModel, SumOfPulls, WheelPulls
@@ -77,7 +77,10 @@ class TractionTuning:
     log_scale_std: float = 0.2
     log_strength_std: float = 0.1
     wheel_std: float = 0.15  # ln strength of one wheel against the others
-    offset_walk: float = 0.015  # [1/sqrt(m)] of rim travel, as all walks
+    offset_walk: float = 0.015  # [1/sqrt(m)] of rim travel, as all walks; the least
+    most_offset_walk: float = 0.15
+    walk_gain: float = 0.5  # of its logarithm, by the product of two normalised innovations
+    walk_leak: float = 0.02  # back to the least, at each reference
     log_scale_walk: float = 0.05
     log_strength_walk: float = 0.05
     wheel_walk: float = 0.15
@@ -91,14 +94,13 @@ class TractionTuning:
     rest_time: float = 0.5  # [s] of standing wheels after which the gyro's zero is learned
     most_yaw_rate: float = 0.05  # [rad/s] of a rover that stands
     most_cycles: float = 200.0  # in the mean of the gyro's zero
+    sinkage_floor: float = 0.1  # of the slip's deviation, which the sinkage does not make smaller
     blind_std: float = 0.3  # of the slip where nothing tells
-    pull_soil_std: float = 0.05  # ln strength of one wheel's soil, as pulls take it
     grade_std: float = 0.03  # of a torque coefficient that the slope tells
     known_time: float = 20.0  # age up to which a reference is one [s]
     fresh_time: float = 10.0  # age up to which the speed rests on it, for the warning [s]
     sinkage_age: float = 2.0  # up to which a sinkage was read of late [s]
     speed_std: float = 5e-4  # [m/s]
-    weight_std: float = 0.005  # of the weight that acts along: attitude, small bumps
     limits: tuple[float, float, float, float] = (0.6, 2.5, 1.5, 0.8)
     """Of offset, ln scale, ln strength and ln strength of a wheel."""
 
@@ -115,6 +117,7 @@ class Memory(NamedTuple):
     solution: BodySlip | None = None
     slip: float = 0.1  # of the body, last known
     slip_variance: float = 1.0
+    told_variance: float = 1.0  # of the error of the slip that the sinkage may tell
     held: HeldSlip = HeldSlip()
     travel: float = 0.0  # of the rims since a start or reversal [m]
     direction: float = 1.0
@@ -124,6 +127,8 @@ class Memory(NamedTuple):
     reference_time: float = -math.inf
     sinkage_time: float = -math.inf
     rejected: int = 0
+    innovation: float = 0.0  # of the last reference over its deviation, within +-2
+    log_walk: float = 0.0  # ln of the walk of the offset over its least
     speed: tuple[float, float] = (0.0, 1.0)  # of the body and its variance
     pulls: WheelPulls | None = None
     assessment: StuckAssessment = StuckAssessment()
@@ -298,7 +303,8 @@ class TractionEstimator:
             self._fuse_reference(time, reference, rims)
         self._follow_wheels(torque, load)
         self._sink(dt, rims, load)
-        self._pull(time, rims, load, loads.slope_share, self._total(window, memory.speed[0], load))
+        total = self._total(window, memory.speed[0], load)
+        self._pull(time, dt, rims, load, loads.slope_share, total)
         self._memory = self._memory._replace(cycle_time=time)
 
     def _note_rest(self, time: float, still: bool, yaw_rate: float, window: Any) -> None:
@@ -323,6 +329,7 @@ class TractionEstimator:
         """Let the curve change over the travel of the rims [m]."""
         memory, tuning, ekf, n = self._memory, self._tuning, self._ekf, self._n
         walks = [tuning.offset_walk, tuning.log_scale_walk, tuning.log_strength_walk]
+        walks[OFFSET] *= math.exp(memory.log_walk)
         Q = np.square(walks + [tuning.wheel_walk] * n) * travel
         keep = np.ones(3 + n)
         keep[WHEELS:] = 1.0 - Q[WHEELS:] / (2.0 * tuning.wheel_std**2)
@@ -412,7 +419,14 @@ class TractionEstimator:
         start = memory.solution.slip if memory.solution else memory.slip
         found = self._balance.solved(ekf.x, start, self._torque_variance(), ekf.P)
         slip, variance = joined(found, memory.held, self._references)
-        self._memory = memory._replace(solution=found, slip=slip, slip_variance=variance)
+        told = max(variance - self._tuning.sinkage_floor**2, 0.0)
+        self._sinkage.limit_slip(told)
+        self._memory = memory._replace(
+            solution=found,
+            slip=clipped(slip + self._sinkage.slip_error, -1.0, 1.0),
+            slip_variance=min(self._sinkage.slip_variance + variance - told, variance),
+            told_variance=told,
+        )
 
     def _torque_variance(self) -> float:
         """Return the variance of the mean torque coefficient [-]."""
@@ -451,6 +465,7 @@ class TractionEstimator:
             H = curve.gradient
             tail = residual**2 / (H @ ekf.P @ H + variance)
             self._consistency.note(reference=tail)
+            self._memory = memory = self._adapted(weight * math.copysign(math.sqrt(tail), residual))
             weight *= min((tuning.freedom + 1.0) / (tuning.freedom + tail), 1.0)
             ekf.update(
                 np.array([residual]),
@@ -464,6 +479,19 @@ class TractionEstimator:
             self._memory = memory = memory._replace(rejected=memory.rejected + 1)
         self._memory = memory._replace(held=memory.held.corrected(seen, R / weight))
         self._settle()
+
+    def _adapted(self, innovation: float) -> Memory:
+        """Return the memory with the walk of the offset that the innovations ask for.
+
+        Innovations of one sign after the other say that the curve changes faster than it may; white
+        noise, of whatever size, does not.
+        """
+        memory, tuning = self._memory, self._tuning
+        innovation = clipped(innovation, -2.0, 2.0)
+        most = math.log(tuning.most_offset_walk / tuning.offset_walk)
+        grown = memory.log_walk * (1.0 - tuning.walk_leak)
+        grown += tuning.walk_gain * innovation * memory.innovation
+        return memory._replace(innovation=innovation, log_walk=clipped(grown, 0.0, most))
 
     def _follow_wheels(self, torque: FloatArray, load: FloatArray) -> None:
         """Learn the strength under each wheel from its torque against that of the curve."""
@@ -501,10 +529,22 @@ class TractionEstimator:
         return np.clip(slip, -1.0, 1.0), np.minimum(math.sqrt(variance) / larger, 1.0)
 
     def _sink(self, dt: float, rims: Rims, load: FloatArray) -> None:
-        slip, std = self._wheel_slips(rims)
-        self._sinkage.predict(slip, std, np.abs(rims.speed) * dt, np.maximum(load, 1e-3), dt)
+        slip, _ = self._wheel_slips(rims)
+        self._sinkage.predict(
+            slip,
+            self._by_body(rims),
+            self._memory.told_variance,
+            np.abs(rims.speed) * dt,
+            np.maximum(load, 1e-3),
+            dt,
+        )
         nis = self._sinkage.update(self._sinkages.take(), self._sensors.sinkage_std**2)
         self._consistency.note(sinkage=nis)
+
+    def _by_body(self, rims: Rims) -> FloatArray:
+        """Return the derivative (n,) of the wheels' slips by that of the body."""
+        by_speed = np.array(self._steering.state.headings.by_speed)
+        return np.minimum(np.abs(by_speed * rims.scale) / np.maximum(np.abs(rims.speed), 1e-3), 2.0)
 
     def _total(self, window: Any, speed: float, load: FloatArray) -> SumOfPulls | None:
         """Return what the specific force of a cycle says of the sum of the pulls."""
@@ -518,43 +558,47 @@ class TractionEstimator:
         curvature = self._turning.curvature(speed)
         uphill = curvature * float(load @ np.array(rover.longitudinal))
         std = window.stated.specific_force_std or sensors.specific_force_std
-        noise = std**2 / window.readings + sensors.specific_force_bias_std**2
+        noise = std**2 / window.readings
         if window.duration > 0.0:
             noise += window.noise_density / window.duration
         return SumOfPulls(
             rover.mass * force[0] + uphill - weight * tilt,
-            rover.mass**2 * noise + (self._tuning.weight_std * weight) ** 2,
+            rover.mass**2 * noise,
         )
 
     def _pull(
         self,
         time: float,
+        dt: float,
         rims: Rims,
         load: FloatArray,
         slope_share: float,
         total: SumOfPulls | None,
     ) -> None:
         memory, n = self._memory, self._n
-        slip, std = self._wheel_slips(rims)
+        slip, _ = self._wheel_slips(rims)
         ratio = np.where(slip >= 0.0, 1.0 - slip, 1.0 / np.maximum(1.0 + slip, 0.3))
         rolling = np.where(rims.turning, np.sign(rims.speed), 0.0)
         demand = memory.demand if memory.demand is not None else np.full(n, NAN)
-        if memory.solution is not None:
-            demand = self._believed(demand, memory.solution, load)
         headings, turning = self._steering.state.headings, self._turning.state
         side = np.abs(np.array(headings.side_speeds(memory.speed[0], turning.yaw_rate)))
+        ekf, found = self._ekf, memory.solution
+        larger = np.maximum(np.abs(rims.speed), 1e-3)
         contact = Contact(
             speed_ratio=ratio,
-            ratio_std=std * np.maximum(ratio, 1.0),
+            by_slip=-np.maximum(ratio, 1.0) * self._by_body(rims),
+            slip_std=math.sqrt(min(memory.slip_variance, 1.0)),
             sinkage=np.maximum(self._sinkage.sinkage, 1e-4),
             sinkage_std=self._sinkage.std[:n],
+            strength=float(ekf.x[LOG_STRENGTH]),
+            strength_std=math.hypot(math.sqrt(ekf.P[LOG_STRENGTH, LOG_STRENGTH]), 0.05),
+            agreement=found.agreement if found else np.ones(n),
             load=load,
             torque=demand * self._radius * load * np.where(rolling, rolling, 1.0),
             rolling=rolling,
-            sideways=np.minimum(side / np.maximum(np.abs(rims.speed), 1e-3), 1.0) * (rolling != 0),
+            sideways=np.minimum(side / larger, 1.0) * (rolling != 0),
             leaving_angle=self._leaving_angles.angles(time),
         )
-        before = memory.pulls.strength if memory.pulls else np.zeros(n)
         along = np.array(headings.along)
         # A wheel that is held while the rover moves is dragged as one that skids at slip -1.
         speeds = np.array(headings.by_speed) * memory.speed[0]
@@ -564,23 +608,9 @@ class TractionEstimator:
             -np.ones(n), self._sinkage.relative_stiffness(np.maximum(load, 1e-3))
         )
         guess = np.where(dragged, np.sign(speeds) * skidding, slope_share)
-        pulls = self._pull_model.pulls(contact, before, guess, total, along)
+        pulls = self._pull_model.pulls(contact, memory.pulls, guess, total, along, dt)
         self._memory = memory._replace(pulls=pulls)
         self._consistency.note(balance=pulls.nis)
-
-    def _believed(self, demand: FloatArray, found: BodySlip, load: FloatArray) -> FloatArray:
-        """Return the torque coefficients, between what is measured and what the curve expects.
-
-        A torque that differs from that of the other wheels tells another soil, or an error of its
-        zero or gain: the shares follow from their deviations. One that is far off is no such error.
-        """
-        sensors, tuning = self._sensors, self._tuning
-        common = found.expected / np.exp(self._ekf.x[WHEELS:])
-        zero = sensors.torque_zero_std / (self._radius * np.maximum(load, 1.0))
-        error = zero**2 + (sensors.torque_gain_std * common) ** 2
-        own = (tuning.pull_soil_std * common) ** 2
-        share = np.maximum(own / (own + error), 1.0 - found.agreement)
-        return common + share * (demand - common)
 
     # -- What it means ---------------------------------------------------------------------------
 
@@ -699,7 +729,7 @@ class TractionEstimator:
         """Return what the outputs of the present stamp follow from."""
         memory, n = self._memory, self._n
         loads, turning = self._loads.state, self._turning.state
-        pulls = memory.pulls or WheelPulls(np.zeros(n), np.array(loads.load), np.zeros(n))
+        pulls = memory.pulls
         return Sources(
             stamp=memory.stamp,
             speed=memory.speed[0],
@@ -710,8 +740,8 @@ class TractionEstimator:
             rims=self._wheels.rim_speeds(memory.time),
             slips=self._slips.state,
             loads=loads,
-            pull=pulls.pull,
-            pull_std=pulls.std,
+            pull=np.zeros(n) if pulls is None else pulls.pull,
+            pull_std=np.array(loads.load) if pulls is None else pulls.std,
             sinkage=self._sinkage.sinkage,
             sinkage_std=self._sinkage.std[:n],
             sinkage_rate=self._companions.sinkage_rate,

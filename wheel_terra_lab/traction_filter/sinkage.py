@@ -1,6 +1,10 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Sinkage and soil stiffness under each wheel: the wheel sinks towards what its load asks."""
+"""Sinkage and soil stiffness under each wheel: the wheel sinks towards what its load asks.
+
+It sinks deeper as it slips. So an error of the slip that torques and references tell is a state
+beside them: where the torque lies on the plateau of its curve, the sinkage tells the slip.
+"""
 
 from __future__ import annotations
 
@@ -33,13 +37,16 @@ class SinkageTuning:
     freedom: float = 4.0  # of the heavy tail of a reading
     rejected: float = 16.0  # squared innovation over its variance that counts as a wild reading
     walk: float = 1e-9  # of a wheel that stands [m^2/s]
+    error_time: float = 30.0  # [s] that an error of the slip lasts
+    most_error: float = 2.5  # of it, in its deviations
+    most_stiffness: float = 2.2  # of its logarithm
     step: float = 0.05  # of ln stiffness and slip, for derivatives
     shallowest: float = 1e-4  # [m]
     loads: tuple[float, float] = (0.05, 20.0)  # over the mean, that the law follows
 
 
 class SinkageFilter:
-    """State (2 n,): sinkage [m] of each wheel, then ln stiffness of the soil under each.
+    """State (2 n + 1,): sinkage [m] of each wheel, ln stiffness under each, error of the slip.
 
     Parameters
     ----------
@@ -61,14 +68,14 @@ class SinkageFilter:
         self._n = n = rover.wheel_count
         self._radius = np.array(rover.rim_radius)
         self._steady, self._tuning = steady, tuning
-        self._start = np.concatenate([steady.sinkage(np.zeros(n), np.zeros(n)), np.zeros(n)])
+        self._start = np.concatenate([steady.sinkage(np.zeros(n), np.zeros(n)), np.zeros(n + 1)])
         spread = (tuning.start_share * self._start[:n] + tuning.start_floor) ** 2
         stiffness = np.full((n, n), priors.stiffness_std**2)
         stiffness += np.eye(n) * (tuning.own_stiffness * priors.stiffness_std) ** 2
-        self._spread = np.zeros((2 * n, 2 * n))
+        self._spread = np.zeros((2 * n + 1, 2 * n + 1))
         self._spread[:n, :n] = np.diag(spread)
-        self._spread[n:, n:] = stiffness
-        self._ekf = ExtendedKalmanFilter(dim_x=2 * n, dim_z=n)
+        self._spread[n:-1, n:-1] = stiffness
+        self._ekf = ExtendedKalmanFilter(dim_x=2 * n + 1, dim_z=n)
         self.reset()
 
     def reset(self) -> None:
@@ -92,14 +99,24 @@ class SinkageFilter:
     @property
     def stiffness(self) -> FloatArray:
         """Logarithm of the factor on the bearing moduli (n,)."""
-        return np.asarray(self._ekf.x[self._n :])
+        return np.asarray(self._ekf.x[self._n : -1])
+
+    @property
+    def slip_error(self) -> float:
+        """What the sinkage adds to the slip of the body [-]."""
+        return float(self._ekf.x[-1])
+
+    @property
+    def slip_variance(self) -> float:
+        """Of the slip with it [-]."""
+        return float(self._ekf.P[-1, -1])
 
     @property
     def common_stiffness(self) -> tuple[float, float]:
         """Mean of the wheels' stiffness, and its deviation."""
         n, P = self._n, self._ekf.P
-        variance = float(P[n:, n:].sum()) / n**2
-        return float(self._ekf.x[n:].mean()), float(np.sqrt(max(variance, 0.0)))
+        variance = float(P[n:-1, n:-1].sum()) / n**2
+        return float(self._ekf.x[n:-1].mean()), float(np.sqrt(max(variance, 0.0)))
 
     @property
     def std(self) -> FloatArray:
@@ -114,7 +131,8 @@ class SinkageFilter:
     def predict(
         self,
         slip: FloatArray,
-        slip_std: FloatArray,
+        by_body: FloatArray,
+        slip_variance: float,
         rim_travel: FloatArray,
         load: FloatArray,
         dt: float,
@@ -123,8 +141,12 @@ class SinkageFilter:
 
         Parameters
         ----------
-        slip, slip_std : numpy.ndarray
-            (n,) of each wheel.
+        slip : numpy.ndarray
+            (n,) of each wheel, with the error that is known.
+        by_body : numpy.ndarray
+            (n,) derivative of it by the slip of the body.
+        slip_variance : float
+            Of the error of the body's slip that the sinkage may tell [-].
         rim_travel : numpy.ndarray
             (n,) travel of the rims in the step, unsigned [m].
         load : numpy.ndarray
@@ -139,25 +161,43 @@ class SinkageFilter:
         gain = -np.expm1(-travel / contact)
         stiffness = self.relative_stiffness(load)
         target = steady.sinkage(slip, stiffness)
-        by_stiffness = (steady.sinkage(slip, stiffness + tuning.step) - target) / tuning.step
+        step = np.where(
+            stiffness > 0.0, -tuning.step, tuning.step
+        )  # towards the middle of its table
+        by_stiffness = (steady.sinkage(slip, stiffness + step) - target) / step
         by_slip = (steady.sinkage(slip + tuning.step, stiffness) - target) / tuning.step
-        F = np.eye(2 * n)
+        F = np.eye(2 * n + 1)
         wheels = np.arange(n)
         F[wheels, wheels] = 1.0 - gain
         F[wheels, n + wheels] = gain * by_stiffness
+        F[wheels, -1] = gain * by_slip * by_body
+        F[-1, -1] = keep = float(np.exp(-dt / tuning.error_time))
         noise = (
             2.0 * gain * (tuning.law_error * depth) ** 2
             + (tuning.digging * np.clip(slip, 0.0, 1.0) ** 2 * rim_travel) ** 2
-            + (gain * by_slip * slip_std) ** 2
             + tuning.walk * dt
         )
         ekf = self._ekf
         mean = ekf.x.copy()
         mean[:n] += gain * (target - mean[:n])
+        mean[-1] *= keep
         ekf.F = F
-        ekf.Q = np.diag(np.concatenate([noise, tuning.stiffness_walk**2 * rim_travel]))
+        walk = tuning.stiffness_walk**2 * rim_travel
+        ekf.Q = np.diag(np.concatenate([noise, walk, [(1.0 - keep**2) * slip_variance]]))
         ekf.predict()
         ekf.x = mean
+        self.limit_slip(slip_variance)
+
+    def limit_slip(self, variance: float) -> None:
+        """Let torques and references tell the slip with a variance: its error is no larger."""
+        ekf = self._ekf
+        if ekf.P[-1, -1] > variance:
+            share = np.sqrt(variance / ekf.P[-1, -1])
+            x, P = ekf.x.copy(), ekf.P.copy()
+            x[-1] *= share
+            P[-1, :] *= share
+            P[:, -1] *= share
+            ekf.x, ekf.P = x, P
 
     def update(self, sums: SinkageSums, variance: float) -> float:
         """Fuse the readings of a cycle; `variance` is that of one reading [m^2].
@@ -173,7 +213,7 @@ class SinkageFilter:
         ekf, tuning = self._ekf, self._tuning
         count = np.array(sums.readings, dtype=float)[read]
         z = np.array(sums.total)[read] / count
-        H = np.eye(2 * self._n)[read]
+        H = np.eye(2 * self._n + 1)[read]
         R = variance / count
         spread = np.diagonal(ekf.P)[read] + R
         nis = (z - ekf.x[read]) ** 2 / spread
@@ -181,4 +221,12 @@ class SinkageFilter:
         self.rejected += int(np.count_nonzero(nis > tuning.rejected))
         R = R / np.minimum(weight, 1.0)
         ekf.update(z, lambda x: H, lambda x: x[read], R=np.diag(R))
+        far = np.concatenate(
+            [
+                np.full(self._n, np.inf),
+                np.full(self._n, tuning.most_stiffness),
+                [tuning.most_error * np.sqrt(self._ekf.P[-1, -1])],
+            ]
+        )
+        ekf.x = np.clip(ekf.x, -far, far)
         return float(nis.mean())
