@@ -344,6 +344,7 @@ class TractionEstimator:
             travel=0.0 if begun else memory.travel + travel,
             direction=direction if reverses else memory.direction,
             demand=None if begun else memory.demand,
+            held=HeldSlip() if reverses else memory.held,
         )
 
     def _note_demand(
