@@ -23,7 +23,8 @@ endif
 
 BIN := $(VENV)/bin
 PINS := $(wildcard requirements/*.txt)
-PIP := $(BIN)/python -m pip --disable-pip-version-check install -qq
+# Modules are compiled when they are first imported: half of the time of a set-up.
+PIP := $(BIN)/python -m pip --disable-pip-version-check install -qq --no-compile
 # Tests and demo stay on this machine and do not fight over cores.
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
