@@ -332,7 +332,8 @@ class TractionEstimator:
         walks[OFFSET] *= math.exp(memory.log_walk)
         Q = np.square(walks + [tuning.wheel_walk] * n) * travel
         keep = np.ones(3 + n)
-        keep[WHEELS:] = 1.0 - Q[WHEELS:] / (2.0 * tuning.wheel_std**2)
+        keep[WHEELS:] = np.exp(-Q[WHEELS:] / (2.0 * tuning.wheel_std**2))
+        Q[WHEELS:] = tuning.wheel_std**2 * (1.0 - keep[WHEELS:] ** 2)
         direction = 1.0 if rims.body >= 0.0 else -1.0
         reverses = abs(rims.body) > self._rover.rest_speed and direction != memory.direction
         if reverses:
