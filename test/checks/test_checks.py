@@ -192,6 +192,15 @@ def test_sinkage():
     )
 
 
+def test_stamps_of_the_sinkage_ahead_of_their_arrival():
+    sinkage = WHOLE.sinkage
+    late = replace(sinkage, stamp=sinkage.stamp + 800_000_000)
+    report = check_recording(replace(WHOLE, sinkage=late), rolling.rover())
+    (told,) = (f for f in report.findings if f.kind == 'delay')
+    assert told.parameter == 'sensors.sinkage_stamp_offset' and told.topic == '/sinkage'
+    assert abs(told.value - 0.8) < 2.0 * told.std < 0.2
+
+
 def test_names():
     joints = replace(WHOLE.joints, names=('fl_wheel', 'front_right', 'rear_left', 'rear_right'))
     finding = only(checked(joints=joints), 'unknown_name', 'front_left')

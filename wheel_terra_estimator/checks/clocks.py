@@ -28,6 +28,7 @@ from wheel_terra_estimator.checks.statistics import (
     moving_mean,
     without_drift,
 )
+from wheel_terra_estimator.checks.transport import FUTURE
 from wheel_terra_estimator.checks.trial import Trial, halves, worst
 from wheel_terra_estimator.configuration.configuration import Configuration
 
@@ -55,8 +56,6 @@ BETWEEN = 0.25
 """Part of a period that a lag is not known to, one deviation [-]."""
 SLOWEST = 1.5
 """Period of a reference [s] above which nothing is said of its stamps."""
-FUTURE = -0.1
-"""Arrival less stamp that no message has [s]."""
 SMOOTHING = 0.4
 """Speeds and accelerations are averaged over this [s]."""
 

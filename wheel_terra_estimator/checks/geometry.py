@@ -190,11 +190,11 @@ def _without_slip(evidence: Evidence, speeds: _Speeds, plain: Estimate) -> Estim
     seen = Estimate(-both[1].value / both[0].value, both[1].std)
     weight = SLOPE_OF_SLIP.std**2 / (SLOPE_OF_SLIP.std**2 + seen.std**2)
     slope = max(weight * seen.value + (1.0 - weight) * SLOPE_OF_SLIP.value, 0.0)
-    if plain.value < 1.0 and weight < LEAST_SEEN and evidence.recording.sinkage is None:
+    if plain.value < 1.0 and weight < LEAST_SEEN:
         return NotChecked(
             'radius',
-            'neither sinkage nor slopes say that the ground is firm: a ratio of speeds may be '
-            'slip; drive ten metres over firm ground, or up and down a slope',
+            'no slopes tell the slip of this ground, and a ratio of speeds may be slip; drive up '
+            'and down a slope, or measure ten metres with a tape',
         )
     middle = float(np.median(demand)) + resistance.value
     slip, skid = slope * middle, slope * resistance.value

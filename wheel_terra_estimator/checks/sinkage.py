@@ -40,13 +40,19 @@ ORDER = NotChecked(
     'see which reading changes',
 )
 
+STAMPS = NotChecked(
+    'delay',
+    'sinkage: no motion tells its stamps; those ahead of their arrival are told, the others: '
+    'synchronise the clocks',
+)
+
 
 def check_sinkage(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     """Return what is wrong with the sinkage readings, and the evidence with their signs mended."""
     sinkage, configuration = evidence.recording.sinkage, evidence.facts.configuration
     if sinkage is None:
         return [NotChecked('zero', 'no sinkage in the recording')], evidence
-    outcomes: list[Outcome] = [ORDER]
+    outcomes: list[Outcome] = [ORDER, STAMPS]
     stated = configuration.wheels.names if configuration else ()
     mute = [name for name in stated if name not in sinkage.names]
     if mute:

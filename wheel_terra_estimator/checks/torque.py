@@ -35,7 +35,7 @@ UPHILL_ENOUGH = -0.02
 """Specific force along the drive, in g, above which a driven wheel takes power."""
 AS_MUCH = 3.0
 """Torque of a wheel over that of the others, and the reverse, that is alike [-]."""
-ALIKE = 0.3
+ALIKE = 0.5
 """Correlation of the changes of two torques that have the same sign [-]."""
 WRONG_SIGN = -0.4
 """Correlation of torque and rate below which the sign is wrong."""

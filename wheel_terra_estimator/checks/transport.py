@@ -25,6 +25,10 @@ BACKWARD_SHARE = 0.05
 """Share of messages whose stamp lies before that of an earlier arrival by more than a period."""
 FAR_BACK = 1.0
 """A stamp that goes back by more than this [s] is out of order by itself."""
+FUTURE = -0.1
+"""Arrival less stamp that no message has [s]."""
+ARRIVAL_STD = 0.05
+"""Time that messages of two sensors take to arrive may differ by this, one deviation [s]."""
 CLOCK_DIFFERENCE = 1.0
 """Greatest difference between the clocks (log time minus stamp) of two topics [s]."""
 
@@ -42,20 +46,23 @@ def check_transport(
         most_back = BACKWARD_SHARE if name in ('joints', 'imu') else 1.0  # others are fused late
         outcomes += _order(channel, most_back) or _drop_outs(name, channel, figures)
         delays[name] = float(np.median(channel.log_time - channel.stamp)) * 1e-9
-    imu, joints = recording.imu, recording.joints
-    if imu is None or joints is None or not {'imu', 'joints'} <= set(delays):
-        return outcomes, {}
-    left = delays['joints'] - delays['imu']
-    if abs(left) < CLOCK_DIFFERENCE:
-        return outcomes, {}
-    std, against = math.hypot(_jitter(imu), _jitter(joints)), 'log time: two clocks'
-    # Stamps lie near their arrival: those that are farther off are wrong.
-    key, name, late = 'imu', 'imu', left
-    if abs(delays['joints']) > abs(delays['imu']):
-        key, name, late = 'joints', 'wheel_odometry', -left
-    told = of_offset(name, late, std, against, configuration)
-    topic = getattr(recording, key).topic
-    return [*outcomes, found(f'{name}_offset', topic, 0.999, **told)], {key: late}
+    late: dict[str, float] = {}
+    if 'joints' not in delays:
+        return outcomes, late
+    left = delays['joints'] - delays.get('imu', delays['joints'])
+    if abs(left) > CLOCK_DIFFERENCE:
+        # Stamps lie near their arrival: those that are farther off are wrong.
+        by_wheels = abs(delays['joints']) > abs(delays['imu'])
+        late = {'joints': -left} if by_wheels else {'imu': left}
+    if delays.get('sinkage', 0.0) < FUTURE < delays['joints']:  # its age is honest
+        late['sinkage'] = delays['joints'] - delays['sinkage']
+    for key, value in late.items():
+        channel, name = getattr(recording, key), 'wheel_odometry' if key == 'joints' else key
+        assert recording.joints is not None
+        std = math.hypot(_jitter(channel), _jitter(recording.joints), ARRIVAL_STD)
+        told = of_offset(name, value, std, 'log time: two clocks', configuration)
+        outcomes.append(found(f'{name}_offset', channel.topic, 0.999, **told))
+    return outcomes, late
 
 
 def _jitter(channel: Channel) -> float:

@@ -91,11 +91,11 @@ def check_dead_wheels(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
 
 def _longest_frozen(evidence: Evidence, index: int, change: float) -> float:
     """Return the longest stretch [s] in which a rate stays the same while the others change."""
-    own, time = evidence.rate[:, index], evidence.time
+    own = evidence.rate[:, index]
     others = np.delete(evidence.rate, index, axis=1)
     longest = 0.0
     for start, end in runs(np.diff(own) == 0.0):
-        lasts = float(time[end] - time[start])
+        lasts = (end - start) * evidence.period  # a gap is none
         if lasts < FROZEN_TIME:
             continue
         stretch = slice(start, end + 1)

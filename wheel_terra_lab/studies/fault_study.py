@@ -4,7 +4,7 @@
 
 python -m wheel_terra_lab.studies.fault_study B:turns C:firm drive=my_rover.yaml --seeds 7001 7002
 
-A case is KIND of a simulator or BAG=CONFIG (several files with a +). Fifty-two kinds of fault are
+A case is KIND of a simulator or BAG=CONFIG (several files with a +). Fifty-three kinds of fault are
 put into the readings of each, or into its rover file; wheel, size, sign and time are drawn by the
 seed. What was found without the fault is left out. A fault counts as
 
@@ -438,6 +438,7 @@ FAULTS = (
     Fault('stamps of the IMU off', ('delay',), _stamped('imu', 0.4, 1.8)),
     Fault('stamps of the wheels off', ('delay',), _stamped('joints', 0.4, 1.5)),
     Fault('stamps of the reference off', ('delay',), _stamped('reference', 0.5, 2.0)),
+    Fault('stamps of the sinkage off', ('delay',), _stamped('sinkage', 0.4, 2.0)),
     Fault('torque of a wheel reversed', ('sign',), _torque_sign),
     Fault('torque in N mm', ('unit',), _scaled('joints', 'torque', 1000.0), SCALES),
     Fault('scale of the torques', ('gain',), _scaled(
@@ -448,6 +449,7 @@ FAULTS = (
     Fault('sinkage in mm', ('unit',), _scaled('sinkage', 'sinkage', 1000.0)),
     Fault('sinkage upwards', ('sign',), _scaled('sinkage', 'sinkage', -1.0), ('zero',)),
     Fault('zero of a sinkage', ('zero',), _sinkage_zero, ('sign',)),
+    # No drive tells it; it stays to be sure that nothing else is named for it.
     Fault('sinkage sensors exchanged', ('exchanged_wheels',), _exchanged('one', 'sinkage')),
     Fault('reference reversed', ('sign',), _scaled('reference', 'velocity', -1.0)),
     Fault('reference in km/h', ('unit',), _scaled('reference', 'velocity', 3.6)),
