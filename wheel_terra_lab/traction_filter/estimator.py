@@ -42,6 +42,7 @@ from wheel_terra_estimator.estimation.judgement.stuck.situation import (
 from wheel_terra_estimator.estimation.measurements import ReferenceVelocity, StepInputs
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
 from wheel_terra_estimator.estimation.scalars import NAN, clipped, gain_of, known
+from wheel_terra_estimator.estimation.smoothing.tape import Gaussian
 from wheel_terra_estimator.estimation.words import MissingInputs
 from wheel_terra_lab.traction_filter.companions import (
     SHARP_TURN,
@@ -57,6 +58,7 @@ from wheel_terra_lab.traction_filter.pulls import Contact, PullModel, SumOfPulls
 from wheel_terra_lab.traction_filter.references import HeldSlip, ReferenceTuning, joined, trust
 from wheel_terra_lab.traction_filter.sinkage import SinkageFilter
 from wheel_terra_lab.traction_filter.soil import (
+    NamedSoil,
     SoilLogs,
     SoilPosterior,
     named_soil,
@@ -64,6 +66,7 @@ from wheel_terra_lab.traction_filter.soil import (
 )
 from wheel_terra_lab.traction_filter.speed import BodySlip, Rims, TorqueBalance, rims_at
 from wheel_terra_lab.traction_filter.steady_wheel import SteadyWheel
+from wheel_terra_lab.traction_filter.tape import Cycle, DriveTape, Evidence, Instant, Prediction
 
 FloatArray = NDArray[np.float64]
 _SECOND = 1e-9  # of a nanosecond
@@ -86,6 +89,7 @@ class TractionTuning:
     wheel_walk: float = 0.15
     reversal_std: float = 0.1  # of the offset, at a change of direction
     torque_time: float = 0.25  # low-pass of the torques [s]
+    most_demand: float = 5.0  # torque coefficient: more is no reading of a wheel on soil
     torque_std: float = 0.02  # of a torque coefficient, what the sensor's noise leaves
     wheel_noise: float = 0.07  # of a wheel's torque coefficient against the curve
     freedom: float = 4.0  # of the heavy tail of references and torques
@@ -134,6 +138,17 @@ class Memory(NamedTuple):
     assessment: StuckAssessment = StuckAssessment()
 
 
+class Resolved(NamedTuple):
+    """What a cycle tells."""
+
+    time: float  # [s]
+    slip: float  # of the body [-]
+    variance: float  # infinite where it is not known better than before
+    sinkage: FloatArray  # (n,) [m]
+    sinkage_std: FloatArray
+    soil: NamedSoil
+
+
 class TractionEstimator:
     """Estimator of one rover; sees stamps in order and only checked numbers.
 
@@ -141,10 +156,15 @@ class TractionEstimator:
     ----------
     configuration : Configuration
         Rover, soil, sensors, tuning.
+    tape : DriveTape, optional
+        Keeps what a smoother needs.
     """
 
     def __init__(
-        self, configuration: Configuration, tuning: TractionTuning = TractionTuning()
+        self,
+        configuration: Configuration,
+        tuning: TractionTuning = TractionTuning(),
+        tape: DriveTape | None = None,
     ) -> None:
         self._configuration = configuration
         self._tuning, self._references = tuning, ReferenceTuning()
@@ -183,6 +203,18 @@ class TractionEstimator:
             self._consistency,
             self._noise,
         )
+        curve = np.array([*tuning.limits[:3], *[tuning.limits[3]] * n])
+        deepest = np.concatenate([rover.rim_radius, np.full(n + 1, np.inf)])
+        self._bounds = (-curve, curve), (-deepest, deepest)
+        self._of_a_cycle: tuple[Any, ...] = (
+            self._steering,
+            self._turning,
+            self._wheels,
+            self._leaving_angles,
+        )
+        self._tape = tape
+        if tape is not None:
+            self._parts += (tape,)
         shifts = soil_shifts(self._steady, priors)
         self._start_covariance = self._prior(shifts)
         self._soil = SoilPosterior(shifts, self._start_covariance, priors)
@@ -217,6 +249,8 @@ class TractionEstimator:
                 zero=memory.zero, zero_weight=0.5 * memory.zero_weight, rejected=memory.rejected
             )
         self._memory = self._memory._replace(origin=stamp, stamp=stamp)
+        if self._tape is not None:
+            self._tape.cut()
 
     def snapshot(self) -> tuple[Any, ...]:
         """Return what `restore` needs to come back to this state."""
@@ -297,6 +331,7 @@ class TractionEstimator:
         rims = rims_at(speeds, headings, turning.yaw_rate, rover.low_rim)
         travel = float(np.abs(rims.speed).max(initial=0.0)) * dt
         self._walk(travel, rims, still)
+        walked = Prediction.of(self._ekf) if self._tape is not None else None
         self._note_demand(dt, torque, load, loads.slope_share, rims, still=still)
         self._solve(dt, rims, headings, turning.yaw_rate, load)
         if reference is not None:
@@ -306,6 +341,17 @@ class TractionEstimator:
         total = self._total(window, memory.speed[0], load)
         self._pull(time, dt, rims, load, loads.slope_share, total)
         self._memory = self._memory._replace(cycle_time=time)
+        if self._tape is not None and walked is not None:
+            parts = tuple([part.snapshot() for part in self._of_a_cycle])
+            kept = self._memory._replace(assessment=StuckAssessment())
+            self._tape.cycles.append(
+                Cycle(
+                    (walked, self._sinkage.predicted),
+                    (Gaussian(self._ekf.x.copy(), self._ekf.P.copy()), self._sinkage.gaussian),
+                    self._references.walk**2 * dt,
+                    Evidence(time, kept, parts, rims, load),
+                )
+            )
 
     def _note_rest(self, time: float, still: bool, yaw_rate: float, window: Any) -> None:
         """Learn the zero of the gyro where all wheels stand."""
@@ -371,6 +417,7 @@ class TractionEstimator:
         if not torque_told:
             torque = self._torque_of_grade(slope_share, load, rims)
         now = torque / (self._radius * np.where(carried, load, np.inf))
+        now = np.clip(now, -self._tuning.most_demand, self._tuning.most_demand)
         if before is None:
             demand = now
         else:
@@ -475,8 +522,7 @@ class TractionEstimator:
                 lambda x: np.zeros(1),
                 R=np.array([[variance / weight]]),
             )
-            limits = np.array([*tuning.limits[:3], *[tuning.limits[3]] * self._n])
-            ekf.x = np.clip(ekf.x, -limits, limits)
+            ekf.x = np.clip(ekf.x, *self.bounds[0])
         if weight < 0.5:
             self._memory = memory = memory._replace(rejected=memory.rejected + 1)
         self._memory = memory._replace(held=memory.held.corrected(seen, R / weight))
@@ -520,6 +566,7 @@ class TractionEstimator:
             ekf.P[place, :] *= keep
             ekf.P[:, place] *= keep
             ekf.P[place, place] = p * keep
+        ekf.x = np.clip(ekf.x, *self.bounds[0])
 
     def _wheel_slips(self, rims: Rims) -> tuple[FloatArray, FloatArray]:
         """Return slip (n,) of the turning wheels and its deviation."""
@@ -649,6 +696,9 @@ class TractionEstimator:
         self._slips.update(time, speeds, body)
         assessment = self._warned(time, speeds, speed)
         self._memory = self._memory._replace(speed=(speed, variance), assessment=assessment)
+        if self._tape is not None:
+            cycle = len(self._tape.cycles) - 1
+            self._tape.instants.append(Instant(self._memory.stamp, time, cycle, body, speeds))
         if self._companions.due(time):
             self._companions.follow(self._scene(time, body))
 
@@ -703,6 +753,46 @@ class TractionEstimator:
                 turning=turning.lateral_motion > SHARP_TURN
                 or sides_oppose(speeds, self._steering.state.headings.by_yaw_rate),
             ),
+        )
+
+    # -- Once more, for a smoother ---------------------------------------------------------------
+
+    @property
+    def bounds(self) -> tuple[tuple[FloatArray, FloatArray], ...]:
+        """Lower and upper bounds of the states of curve and sinkage."""
+        return self._bounds
+
+    @property
+    def torque_time(self) -> float:
+        """Time constant of the low-pass of the torques [s]."""
+        return self._tuning.torque_time
+
+    def resolved(
+        self,
+        evidence: Evidence,
+        states: tuple[Gaussian, ...],
+        held: HeldSlip,
+        demand: FloatArray | None,
+    ) -> Resolved:
+        """Solve a cycle again, with states, held slip and torque coefficients known better."""
+        (self._ekf.x, self._ekf.P), self._sinkage.gaussian = states
+        for part, state in zip(self._of_a_cycle, evidence.parts, strict=True):
+            part.restore(state)
+        self._memory = evidence.memory._replace(held=held, demand=demand)
+        yaw_rate, headings = self._turning.state.yaw_rate, self._steering.state.headings
+        self._solve(0.0, evidence.rims, headings, yaw_rate, evidence.load)
+        memory = self._memory
+        # Behind a start neither torques nor references tell more than they did at first.
+        settled = memory.travel > self._rover.contact_length
+        told = settled and memory.solution is not None
+        told = told and memory.slip_variance <= evidence.memory.slip_variance
+        return Resolved(
+            evidence.time,
+            memory.slip,
+            memory.slip_variance if told else math.inf,
+            self._sinkage.sinkage,
+            np.hypot(self._sinkage.std[: self._n], self._sensors.sinkage_zero_std),
+            named_soil(self._configuration, self._soil_logs()),
         )
 
     # -- Outputs ---------------------------------------------------------------------------------

@@ -17,7 +17,9 @@ from numpy.typing import NDArray
 from wheel_terra_estimator.estimation.filter.initial_state import SoilPriors
 from wheel_terra_estimator.estimation.inputs.contact_sensors import SinkageSums
 from wheel_terra_estimator.estimation.rover import Rover
+from wheel_terra_estimator.estimation.smoothing.tape import Gaussian
 from wheel_terra_lab.traction_filter.steady_wheel import SteadyWheel
+from wheel_terra_lab.traction_filter.tape import Prediction
 
 FloatArray = NDArray[np.float64]
 
@@ -90,6 +92,15 @@ class SinkageFilter:
     def restore(self, snapshot: tuple[FloatArray, FloatArray, int]) -> None:
         """Go back to a snapshot."""
         self._ekf.x, self._ekf.P, self.rejected = snapshot
+
+    @property
+    def gaussian(self) -> Gaussian:
+        """Whole state and its covariance."""
+        return Gaussian(self._ekf.x, self._ekf.P)
+
+    @gaussian.setter
+    def gaussian(self, state: Gaussian) -> None:
+        self._ekf.x, self._ekf.P = state
 
     @property
     def sinkage(self) -> FloatArray:
@@ -186,6 +197,7 @@ class SinkageFilter:
         ekf.Q = np.diag(np.concatenate([noise, walk, [(1.0 - keep**2) * slip_variance]]))
         ekf.predict()
         ekf.x = mean
+        self.predicted = Prediction.of(ekf)
         self.limit_slip(slip_variance)
 
     def limit_slip(self, variance: float) -> None:

@@ -13,6 +13,7 @@ from wheel_terra_estimator.estimation.filter.initial_state import SoilPriors
 from wheel_terra_estimator.estimation.rover import Rover
 from wheel_terra_lab.evaluation.simulators import SIMULATORS
 from wheel_terra_lab.traction_filter.estimator import TractionEstimator
+from wheel_terra_lab.traction_filter.smoother import DriveSmoother
 from wheel_terra_lab.traction_filter.soil import SoilPosterior, soil_shifts
 from wheel_terra_lab.traction_filter.steady_wheel import SteadyWheel
 
@@ -93,3 +94,32 @@ def test_what_was_learned_is_a_configuration_that_the_next_drive_takes(driven):
     np.testing.assert_allclose(begun.soil[:3], sets[-1].soil[:3], rtol=1e-6)
     health = core.health()
     assert {'nis_torque', 'nis_balance', 'nis_sinkage', 'nis_reference'} <= health.keys()
+
+
+def test_the_smoother_changes_nothing_of_the_filter_and_is_nearer_to_the_truth(driven):
+    drive, _, sets = driven
+    smoother = DriveSmoother(drive.configuration)
+    core = EstimatorCore(drive.configuration, smoother.estimator)
+    taped = []
+    for arrival in drive.arrivals:  # references come late: the tape is wound back
+        taped += core.add(arrival.measurement)
+    taped += core.flush()
+    for estimates, plain in zip(taped, sets, strict=True):
+        np.testing.assert_array_equal(estimates.slip, plain.slip)
+        smoother.keep(estimates, 'beside')
+    found = list(smoother.sets())
+    assert [kept.companion for kept in found] == ['beside'] * len(sets)
+    rows = {stamp: i for i, stamp in enumerate(drive.truth.stamp.tolist())}
+    errors, live_errors, stds = [], [], []
+    for live, (smoothed, _) in zip(sets, found, strict=True):
+        assert smoothed.stamp == live.stamp
+        assert smoothed.stuck == live.stuck
+        row = rows.get(live.stamp)
+        if row is not None and row > len(rows) // 4:
+            errors.append(smoothed.slip - drive.truth.slip[row])
+            live_errors.append(live.slip - drive.truth.slip[row])
+            stds.append(smoothed.slip_std)
+    rmse = [np.sqrt(np.nanmean(np.square(e))) for e in (errors, live_errors)]
+    assert rmse[0] < 0.95 * rmse[1]
+    inside = np.abs(errors) < 1.96 * np.array(stds)
+    assert inside[~np.isnan(errors)].mean() > 0.93
