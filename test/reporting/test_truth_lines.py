@@ -4,11 +4,19 @@
 
 from __future__ import annotations
 
-from wheel_terra_estimator.reporting.truth_scores import TruthErrors, WarningScore, as_lines
+from wheel_terra_estimator.estimation.judgement.entrapment import Outcome, Verdict
+from wheel_terra_estimator.reporting.truth_scores import TruthErrors, as_lines
 
 
 def test_a_warning_without_its_slip_is_said() -> None:
-    warnings = (WarningScore(3.0, True, 12.5), WarningScore(40.0, False, None))
-    lines = as_lines(TruthErrors('test', (), None, warnings, None))
-    assert 'warning at 3.0 s: borne out, 12.5 s before the median slip passed 0.75' in lines[-2]
-    assert 'at 40.0 s: not borne out, the median slip did not pass 0.75 within 20 s' in lines[-1]
+    warnings = (
+        (3.0, Verdict(Outcome.ENTRAPPED, 12.5)),
+        (16.0, Verdict(Outcome.ENTRAPPED, -0.5)),
+        (40.0, Verdict(Outcome.NEAR_MISS)),
+        (80.0, Verdict(Outcome.FALSE)),
+    )
+    lines = as_lines(TruthErrors('test', (), None, warnings, 15.5, 12.5))
+    assert 'warning at 3.0 s: right, 12.5 s before the rover was entrapped' in lines[-4]
+    assert 'at 16.0 s: late, 0.5 s after the rover was entrapped' in lines[-3]
+    assert 'at 40.0 s: a near miss, the median slip passed 0.75 and fell again' in lines[-2]
+    assert 'at 80.0 s: false, the median slip did not pass 0.75 within 20 s' in lines[-1]

@@ -10,6 +10,7 @@ import pytest
 from wheel_terra_estimator.bags.history import WHEEL_FIELDS, EstimateHistory, StuckWarning
 from wheel_terra_estimator.bags.truth import Truth, WheelTruth
 from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.estimation.judgement.entrapment import Outcome
 from wheel_terra_estimator.reporting.comparison import compare
 from wheel_terra_estimator.reporting.estimates_table import write_table
 from wheel_terra_estimator.reporting.truth_scores import as_lines, truth_errors
@@ -55,15 +56,15 @@ def test_errors_and_classes():
 
 def test_lead_of_a_warning_and_one_that_was_wrong():
     true = np.zeros((100, 2))
-    true[60:] = 0.8
+    true[60:] = 0.95
     right = StuckWarning(int(STAMP[40]), None, '')
     errors = truth_errors(history(true, warnings=(right,)), truth(true), THRESHOLDS)
-    assert errors.warnings[0].right and errors.warnings[0].lead == pytest.approx(2.0)
-    assert errors.first_stuck == pytest.approx(6.0)
+    assert errors.warnings[0][1].lead == errors.lead == pytest.approx(3.0)
+    assert errors.entrapped == pytest.approx(7.0)
     calm = truth_errors(history(true, warnings=(right,)), truth(0.0 * true), THRESHOLDS)
-    assert not calm.warnings[0].right and calm.first_stuck is None
+    assert calm.warnings[0][1].outcome is Outcome.FALSE and calm.entrapped is None
     assert 'did not pass' in as_lines(calm)[-1]
-    assert '2.0 s before the median slip passed 0.75' in as_lines(errors)[-1]
+    assert '3.0 s before the rover was entrapped' in as_lines(errors)[-1]
 
 
 def test_comparison():

@@ -20,14 +20,12 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-import numpy as np
-
 from wheel_terra_estimator.cli.outputs import Output
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.output_folder import working_folder
 
 if TYPE_CHECKING:
-    from wheel_terra_estimator.bags.truth import Truth
+    pass
 
 SEAL_SHA256 = '78c7f9baa4662e0969d5b5dff2c94fbd5cbd89ae14923cf0fcc754b1af82c5c7'
 """Of the shipped ``sealed.json``, which says what was hidden in the table beside it."""
@@ -168,7 +166,7 @@ def _outcome(drive: DemoDrive, output: Path) -> str:
     from wheel_terra_estimator.bags.truth import read_truth
     from wheel_terra_estimator.configuration import reader
     from wheel_terra_estimator.configuration.shipped import demo_recording
-    from wheel_terra_estimator.simulation.truth import entrapped
+    from wheel_terra_estimator.reporting.truth_scores import truth_errors
 
     configuration = reader.load(drive.configuration)
     with open_bag(demo_recording(drive.name)) as bag:
@@ -177,15 +175,10 @@ def _outcome(drive: DemoDrive, output: Path) -> str:
         history = read_estimates(bag)
     if truth is None or truth.slip is None:
         return f'{len(history.warnings)} stuck warnings'
-    stuck = entrapped(truth.slip.stamp, truth.slip.value)
-    warnings = [_seconds(truth, np.array([w.start]))[0] for w in history.warnings]
-    if stuck.any():
-        at = float(_seconds(truth, truth.slip.stamp[stuck][:1])[0])
-        before = [w for w in warnings if w <= at]
-        words = f'warned {at - before[-1]:.1f} s before' if before else 'no warning before'
-        return f'entrapped at {at:.1f} s (median slip above 0.9 for 1 s), {words}'
-    return f'never entrapped, {f"{len(warnings)} false warnings" if warnings else "never warned"}'
-
-
-def _seconds(truth: Truth, stamp: np.ndarray) -> np.ndarray:
-    return (stamp - truth.velocity.stamp[0]) * 1e-9
+    errors = truth_errors(history, truth, configuration.filter.class_thresholds)
+    if errors is not None and errors.entrapped is not None:
+        lead = errors.lead
+        words = 'no warning before' if lead is None else f'warned {lead:.1f} s before'
+        return f'entrapped at {errors.entrapped:.1f} s (median slip above 0.9 for 1 s), {words}'
+    warnings = len(history.warnings)
+    return f'never entrapped, {f"{warnings} false warnings" if warnings else "never warned"}'

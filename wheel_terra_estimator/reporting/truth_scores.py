@@ -13,14 +13,20 @@ from numpy.typing import NDArray
 from wheel_terra_estimator.bags.history import EstimateHistory
 from wheel_terra_estimator.bags.truth import Truth, WheelTruth
 from wheel_terra_estimator.estimation.estimates import SlipClass
+from wheel_terra_estimator.estimation.judgement.entrapment import (
+    FORESIGHT,
+    NEAR_MISS_SLIP,
+    Outcome,
+    Span,
+    Verdict,
+    entrapments,
+    lead_of,
+    verdicts,
+)
 from wheel_terra_estimator.reporting.drive_style import Border, known
 
 FloatArray = NDArray[np.float64]
 
-WARNED_SLIP = 0.75
-"""Median absolute slip that a warning foretells [-]."""
-WARNING_HORIZON = 20.0
-"""A warning is right if that slip comes within this time [s]."""
 LONGEST_BRIDGE = 0.5
 """Truth further away than this [s] is not compared."""
 TRUE_CLASSES = (SlipClass.LOW, SlipClass.MODERATE, SlipClass.HIGH, SlipClass.STUCK)
@@ -40,23 +46,15 @@ class QuantityError:
 
 
 @dataclass(frozen=True)
-class WarningScore:
-    """A stuck warning: when [s], whether right, its lead over the slip [s] (negative: late)."""
-
-    start: float
-    right: bool
-    lead: float | None
-
-
-@dataclass(frozen=True)
 class TruthErrors:
     """Everything that the truth says; ``class_matrix`` (true, estimated) in shares of time."""
 
     source: str
     quantities: tuple[QuantityError, ...]
     class_matrix: FloatArray | None  # (4, 5)
-    warnings: tuple[WarningScore, ...]
-    first_stuck: float | None  # true slip first above ``WARNED_SLIP`` [s]
+    warnings: tuple[tuple[float, Verdict], ...]  # when each rose [s], what came of it
+    entrapped: float | None  # when the rover was entrapped first [s]
+    lead: float | None  # of the warning that stood then [s]
 
 
 def truth_errors(
@@ -104,12 +102,14 @@ def truth_errors(
         if rows.any():
             quantities.append(_error(name, unit, (seen - there)[rows], std[rows]))
     slip = None if truth.slip is None else at_stamps(truth.slip, history.stamp)
+    entrapped = None if slip is None else _entrapped(history, slip)
     return TruthErrors(
         source=truth.source,
         quantities=tuple(quantities),
         class_matrix=None if slip is None else _matrix(slip, history.slip_class, thresholds),
         warnings=() if slip is None else _warnings(history, slip),
-        first_stuck=None if slip is None else _first_stuck(history, slip),
+        entrapped=entrapped,
+        lead=None if entrapped is None else lead_of(entrapped, _spans(history)),
     )
 
 
@@ -147,25 +147,22 @@ def _matrix(slip: FloatArray, seen: NDArray[np.uint8], thresholds: FloatArray) -
     return np.asarray(counts / max(counts.sum(), 1.0))
 
 
-def _first_stuck(history: EstimateHistory, slip: FloatArray) -> float | None:
-    deep = np.flatnonzero(_median(slip) > WARNED_SLIP)
-    return float(history.seconds[deep[0]]) if deep.size else None
+def _spans(history: EstimateHistory) -> list[Span]:
+    begin = int(history.stamp[0])
+    return [
+        Span((w.start - begin) * 1e-9, np.inf if w.end is None else (w.end - begin) * 1e-9)
+        for w in history.warnings
+    ]
 
 
-def _median(slip: FloatArray) -> FloatArray:
-    return np.median(np.abs(np.nan_to_num(slip)), axis=1)
+def _entrapped(history: EstimateHistory, slip: FloatArray) -> float | None:
+    there = entrapments(history.seconds, slip).there
+    return float(history.seconds[there[0]]) if there.size else None
 
 
-def _warnings(history: EstimateHistory, slip: FloatArray) -> tuple[WarningScore, ...]:
-    deep, seconds, begin = _median(slip) > WARNED_SLIP, history.seconds, int(history.stamp[0])
-    scores = []
-    for warning in history.warnings:
-        start = (warning.start - begin) * 1e-9
-        near = np.flatnonzero(deep & (np.abs(seconds - start) <= WARNING_HORIZON))
-        right = bool(near.size and seconds[near[-1]] >= start)
-        lead = float(seconds[near[0]] - start) if right else None
-        scores.append(WarningScore(start, right, lead))
-    return tuple(scores)
+def _warnings(history: EstimateHistory, slip: FloatArray) -> tuple[tuple[float, Verdict], ...]:
+    starts = [span.start for span in _spans(history)]
+    return tuple(zip(starts, verdicts(history.seconds, slip, starts), strict=True))
 
 
 def seen_later(history: EstimateHistory, border: Border) -> tuple[str, ...]:
@@ -173,27 +170,24 @@ def seen_later(history: EstimateHistory, border: Border) -> tuple[str, ...]:
     slip = known(history, 'slip', border)
     there = np.isfinite(slip).any(axis=1)
     found = []
-    for score in _warnings(history, slip):
-        after = (history.seconds >= score.start) & (
-            history.seconds <= score.start + WARNING_HORIZON
-        )
+    for start, verdict in _warnings(history, slip) if history.warnings else ():
+        after = (history.seconds >= start) & (history.seconds <= start + FORESIGHT)
         if not (after & there).any():
             found.append('Whether it was right is not known: the slip after it is not.')
         else:
-            found.append(f'By the estimates: {in_words(score)}.')
+            found.append(f'By the estimates: {in_words(verdict)}.')
     return tuple(found)
 
 
-def in_words(score: WarningScore) -> str:
-    """Return what the slip says of a warning."""
-    if score.lead is None:
-        return (
-            f'not borne out, the median slip did not pass {WARNED_SLIP:g} '
-            f'within {WARNING_HORIZON:g} s'
-        )
-    if score.lead < 0.0:
-        return f'late, {-score.lead:.1f} s after the median slip had passed {WARNED_SLIP:g}'
-    return f'borne out, {score.lead:.1f} s before the median slip passed {WARNED_SLIP:g}'
+def in_words(verdict: Verdict) -> str:
+    """Return what came of a warning."""
+    if verdict.lead is not None:
+        early = verdict.lead >= 0.0
+        word, when = ('right', 'before') if early else ('late', 'after')
+        return f'{word}, {abs(verdict.lead):.1f} s {when} the rover was entrapped'
+    if verdict.outcome is Outcome.NEAR_MISS:
+        return f'a near miss, the median slip passed {NEAR_MISS_SLIP:g} and fell again'
+    return f'false, the median slip did not pass {NEAR_MISS_SLIP:g} within {FORESIGHT:g} s'
 
 
 def as_lines(errors: TruthErrors) -> list[str]:
@@ -210,10 +204,10 @@ def as_lines(errors: TruthErrors) -> list[str]:
         for name, row in zip(names, errors.class_matrix, strict=False):
             shares = ''.join(f'{100 * share:9.1f}%' for share in row)
             lines.append(f'    {name:18}{shares}')
-    for warning in errors.warnings:
-        lines.append(f'    warning at {warning.start:.1f} s: {in_words(warning)}')
-    if errors.first_stuck is not None and not errors.warnings:
-        lines.append(f'    no warning, though the slip passed 0.75 at {errors.first_stuck:.1f} s')
+    for start, verdict in errors.warnings:
+        lines.append(f'    warning at {start:.1f} s: {in_words(verdict)}')
+    if errors.entrapped is not None and not errors.warnings:
+        lines.append(f'    no warning, though the rover was entrapped at {errors.entrapped:.1f} s')
     return lines
 
 
@@ -245,6 +239,9 @@ def as_dict(errors: TruthErrors) -> dict[str, Any]:
         },
         'classes': [c.name.lower() for c in CLASSES],
         'class_matrix': None if errors.class_matrix is None else errors.class_matrix.tolist(),
-        'warnings': [vars(warning) for warning in errors.warnings],
-        'first_stuck': errors.first_stuck,
+        'warnings': [
+            {'start': start, 'outcome': verdict.outcome.value, 'lead': verdict.lead}
+            for start, verdict in errors.warnings
+        ],
+        'entrapped': errors.entrapped,
     }

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from wheel_terra_estimator.estimation.judgement.entrapment import entrapments
 from wheel_terra_estimator.frames import Columns, to_frame
 
 if TYPE_CHECKING:
@@ -163,12 +164,10 @@ def slip_classes(slip: FloatArray, thresholds: FloatArray) -> NDArray[np.uint8]:
 def entrapped(
     stamp: NDArray[np.int64],
     slip: FloatArray,
-    above: float = 0.9,
-    hold: float = 1.0,
     below: float = 0.6,
     clear: float = 3.0,
 ) -> NDArray[np.bool_]:
-    """Return where the rover is entrapped: the scoring rule of the estimator's warnings.
+    """Return where the rover is entrapped, from an entrapment until it is free again.
 
     Parameters
     ----------
@@ -176,27 +175,20 @@ def entrapped(
         (k,) [ns].
     slip : numpy.ndarray
         (k, n) slip ratio, nan at rest.
-    above, hold : float
-        Entrapped once the median abs(slip) has been above ``above`` for ``hold`` [s].
     below, clear : float
-        Free once it has been below ``below`` for ``clear`` [s].
+        Free once the median abs(slip) has been below ``below`` for ``clear`` [s].
     """
     turning: NDArray[np.bool_] = np.asarray(~np.isnan(slip).all(axis=1))
     median = np.zeros(len(stamp))
     median[turning] = np.nanmedian(np.abs(slip[turning]), axis=1)
-    # Skidding with locked wheels is no entrapment.
-    driving = np.zeros(len(stamp))
-    driving[turning] = np.nanmedian(slip[turning], axis=1)
     result = np.zeros(len(stamp), dtype=bool)
-    since_high = since_low = None
-    stuck = False
-    for i, now in enumerate(stamp * 1e-9):
-        high, low = turning[i] and driving[i] > above, median[i] < below
-        since_high = (since_high if since_high is not None else now) if high else None
-        since_low = (since_low if since_low is not None else now) if low else None
-        if since_high is not None and now - since_high >= hold:
-            stuck = True
-        elif since_low is not None and now - since_low >= clear:
-            stuck = False
+    time = np.asarray(stamp * 1e-9, dtype=np.float64)
+    result[entrapments(time, slip).there] = True
+    since_low, stuck = None, False
+    for i, now in enumerate(time):
+        low = median[i] < below
+        since_low = (now if since_low is None else since_low) if low else None
+        free = since_low is not None and now - since_low >= clear
+        stuck = result[i] or (stuck and not free)
         result[i] = stuck
     return result

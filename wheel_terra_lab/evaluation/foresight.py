@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The probability of an entrapment against what came: reliability and Brier score.
 
-The event: the median driving slip stays above 0.9 for a second, from within
-``filter.stuck_horizon`` or ``filter.stuck_travel`` of rim travel on. It is judged while it is not
+The event: an entrapment begins within ``filter.stuck_horizon`` or ``filter.stuck_travel`` of rim
+travel. It is judged while it is not
 yet under way, once in `SPACING`. The probability of the rover is the median of those of its wheels;
 the warning is a probability of 0 or 1.
 """
@@ -16,15 +16,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from wheel_terra_estimator.estimation.judgement.entrapment import entrapments
 from wheel_terra_estimator.estimation.judgement.stuck.settings import StuckSettings
 from wheel_terra_lab.evaluation.runner import Record
 from wheel_terra_lab.evaluation.simulators import Truth
 
 FloatArray = NDArray[np.float64]
 
-ENTRAPPED_SLIP = 0.9
-HELD = 1.0
-"""Time for which the slip stays above it [s]."""
 SPACING = 0.5
 """Between two rows that are scored [s]."""
 FIRST_SECONDS = 10.0
@@ -61,7 +59,7 @@ def foresight(
     time = (truth.stamp - truth.stamp[0]) * 1e-9
     rim = np.abs(truth.wheel_rate * slip_radius).mean(axis=1)
     travel = np.concatenate([[0.0], np.cumsum(rim[1:] * np.diff(time))])
-    begins, under_way = entrapments(time, truth.slip)
+    begins, _, under_way = entrapments(time, truth.slip)
     # The first beginning behind each row, by time and by travel.
     ahead = np.searchsorted(begins, np.arange(time.size))
     there = ahead < len(begins)
@@ -81,25 +79,6 @@ def foresight(
         record.stuck[position][rows].astype(float),
         came[rows].astype(float),
     )
-
-
-def entrapments(time: FloatArray, slip: FloatArray) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-    """Return where the event begins (row numbers), and whether it is under way (k,).
-
-    `slip` (k, n) is nan at rest; a rover at rest is in no entrapment that begins.
-    """
-    known = ~np.isnan(slip).all(axis=1)
-    median = np.zeros(len(time))
-    median[known] = np.nanmedian(slip[known], axis=1)
-    above = np.concatenate([[False], median > ENTRAPPED_SLIP, [False]]).astype(int)
-    starts, ends = np.flatnonzero(np.diff(above) == 1), np.flatnonzero(np.diff(above) == -1)
-    under_way = np.zeros(len(time), dtype=bool)
-    begins = []
-    for start, end in zip(starts, ends, strict=True):
-        if time[end - 1] - time[start] >= HELD:
-            begins.append(start)
-            under_way[start:end] = True
-    return np.array(begins, dtype=np.int64), under_way
 
 
 def brier_interval(parts: Sequence[Foresight]) -> dict[str, tuple[float, float, float]]:

@@ -32,6 +32,7 @@ from wheel_terra_estimator.checks.input_judge import InputJudge
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.estimation.core import EstimatorCore
 from wheel_terra_estimator.estimation.estimates import EstimateSet
+from wheel_terra_estimator.estimation.judgement.entrapment import FORESIGHT, NEAR_MISS_SLIP
 from wheel_terra_estimator.estimation.measurements import Measurement
 from wheel_terra_estimator.output_folder import working_folder
 from wheel_terra_estimator.simulation.commands import Command
@@ -74,8 +75,6 @@ FIGURES, STATE = 'hours.jsonl', 'state.pickle'
 FILES = (FIGURES, STATE, f'.{STATE}.new')
 """All that a run writes into its folder."""
 
-RIGHT_SLIP, RIGHT_TIME = 0.75, 20.0
-"""A warning is right if the median |slip| passes this within this time [s]."""
 OF_THE_PROCESS = ('living_objects', 'memory_peak', 'processor_time')
 """Figures in which an interrupted run may differ."""
 _REMEMBERED = 100
@@ -217,7 +216,7 @@ class LongDrive:
         if not waiting:
             return
         slip = np.abs(truth.slip[~np.isnan(truth.slip)])
-        if slip.size and np.median(slip) >= RIGHT_SLIP:
+        if slip.size and np.median(slip) > NEAR_MISS_SLIP:
             waiting.clear()
         while waiting and truth.time > waiting[0]:
             waiting.pop(0)
@@ -232,7 +231,7 @@ class LongDrive:
                 sums.not_finite += not np.isfinite(value).all()
         if estimates.stuck and not warned.stands:
             sums.warnings += 1
-            warned.waiting.append((estimates.stamp - START) * 1e-9 + RIGHT_TIME)
+            warned.waiting.append((estimates.stamp - START) * 1e-9 + FORESIGHT)
         warned.stands = estimates.stuck
         truth = self._known.get(round((estimates.stamp - START) * 1e-6))
         if truth is None:

@@ -14,6 +14,13 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
+from wheel_terra_estimator.estimation.judgement.entrapment import (
+    Outcome,
+    Span,
+    entrapments,
+    lead_of,
+    verdicts,
+)
 from wheel_terra_lab.evaluation.runner import Record
 from wheel_terra_lab.evaluation.simulators import Truth
 from wheel_terra_lab.evaluation.two_state_filters import SlipCourse
@@ -80,11 +87,12 @@ class Samples:
 class Warnings:
     """Stuck warnings of one drive; times in seconds from its start."""
 
-    entrapped: float | None  # when the truth was entrapped
+    entrapped: float | None  # when the rover was entrapped first
     raised: tuple[float, ...]
-    lead_time: float | None  # of the warning in force at the entrapment
+    lead_time: float | None  # of the warning that stood then
     lead_travel: float | None  # rim travel [m]
-    false_alarms: int  # warnings after which the median |slip| did not pass 0.75 within 20 s
+    near_misses: int  # warnings after which it almost came
+    false_alarms: int
     duration: float
     distance: float  # rim travel [m]
 
@@ -196,32 +204,25 @@ def warnings(truth: Truth, record: Record, slip_radius: FloatArray) -> Warnings:
     """Return how the stuck warning did in a drive."""
     time = (truth.stamp - truth.stamp[0]) * 1e-9
     position = np.clip(np.searchsorted(record.stamp, truth.stamp), 0, len(record.stamp) - 1)
-    stuck = record.stuck[position]
-    rises = np.flatnonzero(np.diff(np.concatenate([[0], stuck.astype(int)])) == 1)
+    warned = np.diff(np.concatenate([[0], record.stuck[position].astype(int), [0]]))
+    starts, ends = time[np.flatnonzero(warned == 1)], np.append(time, np.inf)[warned == -1]
+    spans = [Span(*pair) for pair in zip(starts.tolist(), ends.tolist(), strict=True)]
+    outcomes = [v.outcome for v in verdicts(time, truth.slip, starts.tolist())]
     rim = np.abs(truth.wheel_rate * slip_radius).mean(axis=1)
     travel = np.concatenate([[0.0], np.cumsum(rim[1:] * np.diff(time))])
-    turning = ~np.isnan(truth.slip).all(axis=1)
-    median = np.zeros(len(time))
-    median[turning] = np.nanmedian(np.abs(truth.slip[turning]), axis=1)
-    false_alarms = 0
-    for rise in rises:
-        soon = (time >= time[rise]) & (time <= time[rise] + 20.0)
-        if median[soon].max(initial=0.0) < 0.75:
-            false_alarms += 1
-    entrapped = truth.first_stuck()
-    lead_time = lead_travel = None
-    if entrapped is not None:
-        row = int(np.searchsorted(time, entrapped - 1e-6))
-        before = rises[rises <= row]
-        if stuck[row] and len(before):
-            lead_time = float(time[row] - time[before[-1]])
-            lead_travel = float(travel[row] - travel[before[-1]])
+    there = entrapments(time, truth.slip).there
+    entrapped = float(time[there[0]]) if there.size else None
+    lead = None if entrapped is None else lead_of(entrapped, spans)
+    lead_travel = None
+    if entrapped is not None and lead is not None:
+        lead_travel = float(np.diff(np.interp([entrapped - lead, entrapped], time, travel))[0])
     return Warnings(
         entrapped,
-        tuple(float(time[r]) for r in rises),
-        lead_time,
+        tuple(starts.tolist()),
+        lead,
         lead_travel,
-        false_alarms,
+        outcomes.count(Outcome.NEAR_MISS),
+        outcomes.count(Outcome.FALSE),
         float(time[-1]),
         float(travel[-1]),
     )

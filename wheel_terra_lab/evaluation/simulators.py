@@ -55,7 +55,6 @@ class Truth(Protocol):
     def slip_class(self) -> NDArray[np.uint8]: ...  # noqa: D102
     @property
     def yaw_rate(self) -> FloatArray: ...  # noqa: D102
-    def first_stuck(self) -> float | None: ...  # noqa: D102
 
 
 @dataclass(frozen=True)

@@ -275,6 +275,7 @@ def _warnings(by_kind: dict[str, list[DriveScore]]) -> str:
         travels = [w.lead_travel for w in warned if w.lead_travel is not None]
         hours = sum(w.duration for w in found) / 3600.0
         kilometres = sum(w.distance for w in found) / 1000.0
+        near = sum(w.near_misses for w in found)
         false = sum(w.false_alarms for w in found)
         made_to = any(kind in SIMULATORS[d.simulator].entrapments for d in drives)
         rows.append(
@@ -284,6 +285,7 @@ def _warnings(by_kind: dict[str, list[DriveScore]]) -> str:
                 f'{len(warned)} of {len(trapped)}' if trapped else '-',
                 f'{np.median(times):.1f} ({min(times):.1f})' if times else '-',
                 f'{np.median(travels):.2f} ({min(travels):.2f})' if travels else '-',
+                str(near),
                 str(false),
                 f'{false / hours:.2f}',
                 f'{false / max(kilometres, 1e-9):.1f}',
@@ -296,6 +298,7 @@ def _warnings(by_kind: dict[str, list[DriveScore]]) -> str:
             'warned before',
             'lead [s], median (least)',
             'lead [m of rim travel]',
+            'near misses',
             'false alarms',
             'per hour',
             'per km',
@@ -402,6 +405,7 @@ def _numbers(drives: Sequence[DriveScore]) -> dict[str, Any]:
         'best_baseline_filter': {'name': better, 'slip_rms': _or_none(scores.rms(baseline))},
         'entrapped': len(trapped),
         'warned_before': sum(w.lead_time is not None for w in trapped),
+        'near_misses': sum(w.near_misses for w in warnings),
         'false_alarms': sum(w.false_alarms for w in warnings),
         'hours': sum(w.duration for w in warnings) / 3600.0,
         **_foresight_numbers([d.foresight for d in drives if d.foresight is not None]),

@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
+from wheel_terra_estimator.estimation.judgement.entrapment import ENTRAPPED_SLIP
 from wheel_terra_estimator.estimation.judgement.stuck.monitor import StuckMonitor
 from wheel_terra_estimator.estimation.judgement.stuck.passage import (
-    ENTRAPPED_SLIP,
     FirstPassage,
     SlipProcess,
 )

@@ -9,8 +9,8 @@ import pytest
 from fake_estimator import make_core, odometry, play
 
 from wheel_terra_estimator.estimation.estimates import SLOPE_NAMES, SLOPES, SlipOnSlope
+from wheel_terra_estimator.estimation.judgement.entrapment import ENTRAPPED_SLIP
 from wheel_terra_estimator.estimation.judgement.slip_on_slope import (
-    ENTRAPPED_SLIP,
     Instant,
     OncePerSecond,
     SlopeCurve,

@@ -11,7 +11,6 @@ from wheel_terra_estimator.estimation.judgement.stuck.settings import StuckSetti
 from wheel_terra_lab.evaluation.foresight import (
     Foresight,
     brier_interval,
-    entrapments,
     foresight,
     reliability,
     reliability_error,
@@ -35,22 +34,6 @@ def drive(slips, rim=0.1, probability=0.0):
         stuck_probability=np.full((slips.size, 2), probability),
     )
     return foresight(truth, record, np.full(2, 0.1), StuckSettings(horizon=15.0, travel=0.3))
-
-
-def test_only_what_lasts_a_second_is_an_entrapment():
-    slip = np.full((100, 3), 0.2)
-    slip[20:25] = 0.95  # half a second
-    slip[40:60] = 0.95
-    slip[70:90, :1] = 1.0  # one wheel of three
-    slip[95:] = np.nan
-    begins, under_way = entrapments(np.arange(100) * STEP, slip)
-    assert begins.tolist() == [40]
-    assert np.flatnonzero(under_way).tolist() == list(range(40, 60))
-
-
-def test_braking_is_no_entrapment():
-    begins, _ = entrapments(np.arange(100) * STEP, np.full((100, 2), -1.0))
-    assert not begins.size
 
 
 def test_the_event_lies_within_the_horizon():

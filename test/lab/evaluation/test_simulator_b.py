@@ -156,7 +156,7 @@ def test_orientation_is_nose_up_on_a_climb(climb):
     assert last.specific_force[0] > 0.5 * climb.draw.vehicle.gravity * np.sin(nose)
 
 
-def test_truth_knows_rest_classes_and_entrapment():
+def test_truth_knows_rest_and_classes():
     time = np.arange(0.0, 10.0, 0.1)
     rim = np.where(time < 5.0, 0.05, 0.0)[:, None]
     rest = truth.resting(time, rim, 0.5 * rim)
@@ -164,9 +164,6 @@ def test_truth_knows_rest_classes_and_entrapment():
     np.testing.assert_array_equal(
         truth.slip_classes(np.array([-0.3, 0.31, 0.6, 0.95, np.nan])), [0, 1, 1, 3, 255]
     )
-    slip = np.where(time < 4.0, 0.5, 0.95)[:, None] * np.ones(4)
-    assert time[np.argmax(truth.trapped(time, slip))] == pytest.approx(6.0, abs=0.15)
-    assert not truth.trapped(time, -slip).any()
 
 
 def test_steered_wheels_roll_round_where_they_are_told():

@@ -24,12 +24,11 @@ from scipy.special import ndtr, ndtri
 
 from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.estimates import SLOPES, SlipOnSlope
+from wheel_terra_estimator.estimation.judgement.entrapment import ENTRAPPED_SLIP
 from wheel_terra_estimator.estimation.scalars import gain_of
 
 FloatArray = NDArray[np.float64]
 
-ENTRAPPED_SLIP = 0.9
-"""Slip above which a rover makes no way that matters: class *stuck*."""
 _DEMANDS = np.tan(np.radians(SLOPES))
 _DRAWS = 64
 _BASES = 2, 3, 5  # of the Halton sequence

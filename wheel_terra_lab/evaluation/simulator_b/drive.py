@@ -34,7 +34,6 @@ from wheel_terra_lab.evaluation.simulator_b.truth import (
     Truth,
     resting,
     slip_classes,
-    trapped,
 )
 from wheel_terra_lab.evaluation.simulator_b.wheel_soil import slip_ratio
 
@@ -356,7 +355,6 @@ def _truth(course: Course, rows: _TruthRows, sensors: SensorSet, draw: Draw) -> 
         torque=course.at('torque', time),
         wheel_rate=rate,
         slip_class=slip_classes(slip),
-        stuck=trapped(time, slip),
         forward_velocity=speed[:, 0],
         yaw_rate=speed[:, 2],
     )

@@ -12,9 +12,6 @@ from numpy.typing import NDArray
 FloatArray = NDArray[np.float64]
 
 CLASS_BORDERS = (0.3, 0.6, 0.9)
-TRAPPED_SLIP, TRAPPED_TIME = 0.9, 2.0
-"""Trapped: the median driving slip has been above 0.9 for 2 s."""
-
 REST_SPEED, REST_TIME = 2e-3, 0.5  # [m/s], [s]
 _UNKNOWN_CLASS = 255
 
@@ -32,14 +29,8 @@ class Truth:
     torque: FloatArray  # (k, n) [N m]
     wheel_rate: FloatArray  # (k, n) [rad/s]
     slip_class: NDArray[np.uint8]  # (k, n)
-    stuck: NDArray[np.bool_]  # (k,)
     forward_velocity: FloatArray  # (k,) [m/s]
     yaw_rate: FloatArray  # (k,) [rad/s]
-
-    def first_stuck(self) -> float | None:
-        """Return when the rover was trapped first [s from the first stamp], None if never."""
-        rows = np.flatnonzero(self.stuck)
-        return float((self.stamp[rows[0]] - self.stamp[0]) * 1e-9) if len(rows) else None
 
 
 def resting(time: FloatArray, rim: FloatArray, ground: FloatArray) -> NDArray[np.bool_]:
@@ -54,11 +45,3 @@ def slip_classes(slip: FloatArray) -> NDArray[np.uint8]:
     """Return classes 0 to 3 of slips, 255 where nan."""
     found = np.searchsorted(CLASS_BORDERS, np.abs(np.nan_to_num(slip)), side='left')
     return np.where(np.isnan(slip), _UNKNOWN_CLASS, found).astype(np.uint8)
-
-
-def trapped(time: FloatArray, slip: FloatArray) -> NDArray[np.bool_]:
-    """Return where (k,) the rover is trapped."""
-    high = np.median(np.nan_to_num(slip), axis=1) > TRAPPED_SLIP
-    last_free = np.maximum.accumulate(np.where(high, -np.inf, time))
-    since = time - np.maximum(last_free, time[0])
-    return np.asarray(high & (since >= TRAPPED_TIME))

@@ -26,7 +26,6 @@ from wheel_terra_lab.evaluation.simulator_c.plans import (
 from wheel_terra_lab.evaluation.simulator_c.rover import FAMILIES, Rover, draw_rover
 from wheel_terra_lab.evaluation.simulator_c.rover_file import configuration_of
 from wheel_terra_lab.evaluation.simulator_c.sensors import (
-    START,
     Arrival,
     Sensing,
     draw_instruments,
@@ -59,11 +58,6 @@ class Truth:
     wheel_rate: FloatArray
     slip_class: NDArray[np.uint8]
     yaw_rate: FloatArray
-    stuck_since: float | None
-
-    def first_stuck(self) -> float | None:
-        """Return when the first entrapment begins, from the first stamp on [s]."""
-        return self.stuck_since
 
 
 @dataclass(frozen=True)
@@ -183,8 +177,6 @@ def truth_of(course: Course, configuration: Configuration, stamps: NDArray[np.in
     resting = sampled(course.time, at_rest.astype(float), stamps) > 0.5
     bounds = configuration.filter.class_thresholds
     classes = np.searchsorted(bounds, np.abs(slip), side='left').astype(np.uint8)
-    began = _beginning(_driving_median(course, radius))
-    first = (int(stamps[0]) - START) * 1e-9
     return Truth(
         stamp=stamps,
         slip=np.where(resting, np.nan, slip),
@@ -195,5 +187,4 @@ def truth_of(course: Course, configuration: Configuration, stamps: NDArray[np.in
         wheel_rate=rate,
         slip_class=np.where(resting, _UNKNOWN, classes).astype(np.uint8),
         yaw_rate=sampled(course.time, course.velocity[:, 2], stamps),
-        stuck_since=None if began is None else max(course.time[began] - first, 0.0),
     )

@@ -8,7 +8,8 @@ import math
 from typing import TYPE_CHECKING, NamedTuple
 
 from wheel_terra_estimator.estimation.estimates import NO_ENTRAPMENT_IN_SIGHT
-from wheel_terra_estimator.estimation.judgement.stuck.passage import ENTRAPPED_SLIP, FirstPassage
+from wheel_terra_estimator.estimation.judgement.entrapment import ENTRAPPED_SLIP
+from wheel_terra_estimator.estimation.judgement.stuck.passage import FirstPassage
 from wheel_terra_estimator.estimation.scalars import median
 
 if TYPE_CHECKING:

@@ -23,10 +23,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr
 
+from wheel_terra_estimator.estimation.judgement.entrapment import ENTRAPPED_SLIP
+
 FloatArray = NDArray[np.float64]
 
-ENTRAPPED_SLIP = 0.9
-"""Slip above which a rover makes no way that matters: class *stuck*."""
 _LOWEST = -0.5
 """Lower end of the grid: what comes below stays in its last cell [-]."""
 _CELLS = 48

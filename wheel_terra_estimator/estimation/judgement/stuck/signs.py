@@ -12,7 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from math import isnan
 
-from wheel_terra_estimator.estimation.judgement.stuck.passage import ENTRAPPED_SLIP
+from wheel_terra_estimator.estimation.judgement.entrapment import ENTRAPPED_SLIP
 from wheel_terra_estimator.estimation.judgement.stuck.situation import Situation
 
 ADVICE = 'stop, back out'

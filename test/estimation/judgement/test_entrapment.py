@@ -1,0 +1,60 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Entrapments and what came of warnings, on courses of slip whose answers are written down."""
+
+import numpy as np
+import pytest
+
+from wheel_terra_estimator.estimation.judgement.entrapment import (
+    Outcome,
+    Span,
+    entrapments,
+    lead_of,
+    verdicts,
+)
+
+TIME = np.arange(1000) * 0.1
+
+
+def course(*stretches, wheels=3):
+    """Slip 0.2 but for stretches (first row, last row, slip)."""
+    slip = np.full((TIME.size, wheels), 0.2)
+    for first, last, value in stretches:
+        slip[first:last] = value
+    return slip
+
+
+def test_only_what_lasts_a_second_is_an_entrapment():
+    slip = course((20, 30, 0.95), (40, 60, 0.95), (80, 91, 0.95))
+    slip[70:90, :1] = 1.0  # one wheel of three
+    slip[95:] = np.nan
+    found = entrapments(TIME, slip)
+    assert found.begins.tolist() == [40, 80]
+    assert found.there.tolist() == [50, 90]
+    assert np.flatnonzero(found.under_way).tolist() == [*range(40, 60), *range(80, 91)]
+
+
+@pytest.mark.parametrize('value', [-1.0, 0.9, np.nan])
+def test_skidding_the_border_and_rest_are_none(value):
+    found = entrapments(TIME, np.full((TIME.size, 2), value))
+    assert not found.there.size and not found.under_way.any()
+
+
+def test_a_warning_was_right_a_near_miss_false_or_late():
+    slip = course((300, 400, 0.95), (700, 705, -0.8))
+    told = verdicts(TIME, slip, [9.9, 10.1, 30.5, 35.0, 40.1, 51.0, 95.0])
+    outcomes = [Outcome.FALSE] + [Outcome.ENTRAPPED] * 3 + [Outcome.FALSE, Outcome.NEAR_MISS]
+    assert [v.outcome for v in told] == [*outcomes, Outcome.FALSE]
+    assert [v.lead for v in told[1:4]] == pytest.approx([20.9, 0.5, -4.0])
+    assert told[0].lead is None
+
+
+def test_slip_above_0_9_for_less_than_a_second_is_a_near_miss():
+    (told,) = verdicts(TIME, course((300, 309, 1.0)), [20.0])
+    assert told == (Outcome.NEAR_MISS, None)
+
+
+def test_the_lead_is_that_of_the_warning_that_stood():
+    assert lead_of(31.0, [Span(5.0, 9.0), Span(20.0, 40.0)]) == pytest.approx(11.0)
+    assert lead_of(31.0, [Span(20.0)]) == pytest.approx(11.0)
+    assert lead_of(31.0, [Span(5.0, 30.0), Span(31.5)]) is None

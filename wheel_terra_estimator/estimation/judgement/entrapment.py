@@ -1,0 +1,117 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""What an entrapment is, and whether a stuck warning was right: the one definition.
+
+A rover is entrapped once the median driving slip has been above 0.9 for a second. A warning was
+right if that begins within 20 s, a near miss if the median |slip| passes 0.75 then, else false.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from enum import Enum
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+ENTRAPPED_SLIP = 0.9
+"""Median driving slip above which a rover makes no way that matters: class *stuck*."""
+HELD = 1.0
+"""Time for which the slip stays above it in an entrapment [s]."""
+NEAR_MISS_SLIP = 0.75
+"""Median |slip| above which a warning without an entrapment was a near miss."""
+FORESIGHT = 20.0
+"""Time within which a warning comes true, or was false [s]."""
+_TIME_ROUNDING = 1e-6  # [s]
+
+
+class Entrapments(NamedTuple):
+    """Entrapments of a drive of k rows, as row numbers (m,) and a mask (k,)."""
+
+    begins: NDArray[np.int64]  # the slip passes 0.9
+    there: NDArray[np.int64]  # it has been above for the second: the rover is entrapped
+    under_way: NDArray[np.bool_]
+
+
+class Outcome(Enum):
+    """What came of a warning."""
+
+    ENTRAPPED = 'entrapped'
+    NEAR_MISS = 'near miss'
+    FALSE = 'false'
+
+
+class Verdict(NamedTuple):
+    """What came of a warning, and how long before the entrapment it stood [s] (negative: late)."""
+
+    outcome: Outcome
+    lead: float | None = None
+
+
+class Span(NamedTuple):
+    """A warning, from its rise until it was taken back [s]; inf: it stands at the end."""
+
+    start: float
+    end: float = np.inf
+
+
+def entrapments(time: FloatArray, slip: FloatArray) -> Entrapments:
+    """Return the entrapments of a drive.
+
+    Parameters
+    ----------
+    time : numpy.ndarray
+        (k,) [s].
+    slip : numpy.ndarray
+        (k, n) slip ratio, nan at rest; skidding is no entrapment, nor is rest.
+    """
+    above = np.concatenate([[False], _median(slip) > ENTRAPPED_SLIP, [False]]).astype(int)
+    starts, ends = np.flatnonzero(np.diff(above) == 1), np.flatnonzero(np.diff(above) == -1)
+    begins, there = [], []
+    under_way = np.zeros(len(time), dtype=bool)
+    for start, end in zip(starts, ends, strict=True):
+        full = int(np.searchsorted(time, time[start] + HELD - _TIME_ROUNDING))
+        if full < end:
+            begins.append(start)
+            there.append(full)
+            under_way[start:end] = True
+    return Entrapments(np.array(begins, dtype=int), np.array(there, dtype=int), under_way)
+
+
+def verdicts(time: FloatArray, slip: FloatArray, starts: Sequence[float]) -> tuple[Verdict, ...]:
+    """Return what came of the warnings that rose at some times [s]; slip as in `entrapments`."""
+    found = entrapments(time, slip)
+    over = np.append(~found.under_way, True)
+    ends = [row + int(np.argmax(over[row:])) for row in found.there]
+    high = _median(np.abs(slip)) > NEAR_MISS_SLIP
+    told = []
+    for start in starts:
+        first, last = np.searchsorted(time, [start, start + FORESIGHT]).tolist()
+        ahead = [
+            row
+            for begin, row, end in zip(found.begins, found.there, ends, strict=True)
+            if end > first and begin < last
+        ]
+        if ahead:
+            told.append(Verdict(Outcome.ENTRAPPED, float(time[ahead[0]] - start)))
+        else:
+            near = bool(high[first:last].any())
+            told.append(Verdict(Outcome.NEAR_MISS if near else Outcome.FALSE))
+    return tuple(told)
+
+
+def lead_of(entrapped: float, warnings: Sequence[Span]) -> float | None:
+    """Return for how long a warning had stood when the rover was entrapped [s]; None: none did."""
+    standing = [w.start for w in warnings if w.start <= entrapped < w.end]
+    return entrapped - standing[-1] if standing else None
+
+
+def _median(slip: FloatArray) -> FloatArray:
+    """Return (k,) the median of the wheels that turn, 0 where none does."""
+    known = ~np.isnan(slip).all(axis=1)
+    median = np.zeros(len(slip))
+    median[known] = np.nanmedian(slip[known], axis=1)
+    return median
