@@ -56,10 +56,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     _common(one, studies=False)
 
     for name, text in (
-        ('calibrate', 'fit what the paper does not state on wheel 2 alone'),
         ('reproduce', "the paper's tables 6 and 7, its figures' trends and its section 6"),
-        ('sensitivity', 'which assumption decides: the calibrated case, one thing changed'),
-        ('convergence', 'grain size, time step, speed factor and bin: what they change'),
         ('rows', 'virtual measurements for diagnose: pull sweep or slip sweep'),
     ):
         study = actions.add_parser(name, help=text, description=text)
@@ -79,16 +76,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                 choices=('table7', 'table6', 'loads', 'moon', 'high_lugs', 'paper_speed'),
                 help='only this part (may be given several times); paper_speed, half an hour per '
                 'case and core, runs only where it is asked for',
-            )  # fmt: skip
-        if name == 'sensitivity':
-            study.add_argument(
-                '--part', action='append', choices=('slopes', 'moon'),
-                help='only this part (may be given twice)',
-            )  # fmt: skip
-        if name == 'calibrate':
-            study.add_argument(
-                '--stage', choices=('screen', 'seeds', 'all'), default='all',
-                help='screen: one bed per setting; seeds: the final one on several beds',
             )  # fmt: skip
         _common(study, studies=True)
 

@@ -9,21 +9,12 @@ import os
 from pathlib import Path
 
 from wheel_terra_estimator.output_folder import working_folder
-from wheel_terra_lab.soilbin import (
-    calibration,
-    convergence,
-    measurements,
-    reproduction,
-    sensitivity,
-)
+from wheel_terra_lab.soilbin import measurements, reproduction
 from wheel_terra_lab.soilbin.output import WORK
 from wheel_terra_lab.soilbin.study import Job, run_study
 
 STUDIES = {
-    'calibrate': calibration,
     'reproduce': reproduction,
-    'sensitivity': sensitivity,
-    'convergence': convergence,
     'rows': measurements,
 }
 

@@ -17,12 +17,10 @@ from wheel_terra_estimator.errors import UserError
 from wheel_terra_lab import jobs as jobs_module
 from wheel_terra_lab.jobs import ResultFile
 from wheel_terra_lab.soilbin import (
-    calibration,
     files,
     output,
     reproduced_figures,
     reproduction,
-    sensitivity,
     snapshots,
     study,
 )
@@ -258,13 +256,6 @@ def test_coarse_grains_say_how_far_they_are_from_full_scale():
     assert output.grain_note(quick.replace(bed__grain_scale=1.0)) == ''
 
 
-def test_calibration_misfit_is_zero_on_the_papers_numbers():
-    wanted = {name: value for name, (value, _) in calibration.TARGETS.items()}
-    assert calibration.misfit(wanted) == 0
-    wanted['slip_25_deg'] += 0.08
-    assert calibration.misfit(wanted) == pytest.approx(1 / math.sqrt(5))
-
-
 def test_existing_output_is_refused(tmp_path, capsys):
     assert main(['soilbin', 'run', 'quick', '-o', str(tmp_path)]) == 2
     assert '--resume' in capsys.readouterr().err
@@ -361,27 +352,6 @@ def test_case_that_cannot_run_is_refused_before_anything_is_written(
     assert words in said
     assert len(said.strip().splitlines()) == 1
     assert not output.exists()
-
-
-def test_sensitivity_page_shows_changes_and_beds_that_slide(tmp_path):
-    arguments = argparse.Namespace(part=None, seeds=2, grain_scale=0.0)
-    found = sensitivity.jobs(arguments)
-    assert len({job.key for job in found}) == len(found)
-    rows = []
-    for job in found:
-        row = {k: str(v) for k, v in job.labels.items()} | {'slip': '0.5', 'stopped': ''}
-        if job.labels['setting'] == 'no resistance to rolling' and job.labels['slope_deg'] == 25:
-            row |= {'slip': '', 'stopped': 'the bed itself slides on a slope of 25 deg'}
-        elif job.labels['seed'] == 2:
-            row['slip'] = '0.6'
-        rows.append(row)
-    sensitivity.report(arguments, rows, tmp_path)
-    page = (tmp_path / 'sensitivity_table.md').read_text()
-    assert '| no resistance to rolling | 2 | 55 (7.1) | the bed slides | - |' in page
-    assert '| random bed | 2 | 55 (7.1) | 55 (7.1) | - |' in page
-    assert '| the same on Earth (1 g) | 2 | 55 (7.1) |' in page
-    # Every line changes one thing: the case differs from the calibrated one.
-    assert all(job.key != found[0].key for job in found[1:])
 
 
 def test_ranks_wait_for_the_slopes_of_every_wheel(tmp_path):
