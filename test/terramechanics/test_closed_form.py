@@ -21,8 +21,6 @@ from wheel_terra_estimator.terramechanics.operating_points import OperatingPoint
 from wheel_terra_estimator.terramechanics.soil import Soil
 from wheel_terra_estimator.terramechanics.terms import Terms, build_contact, set_angles
 from wheel_terra_estimator.terramechanics.wheel import Wheel
-from wheel_terra_lab.terramechanics.steady_sinkage import INPUTS as SINKAGE_INPUTS
-from wheel_terra_lab.terramechanics.steady_sinkage import SteadySinkage
 
 MOUND = {**EFFECTS, 'soil_mound': {'kappa': 1.5, 'onset': 0.2}}
 
@@ -203,8 +201,6 @@ def test_no_input_ends_in_an_exception_or_in_nan(entry: int, value: float) -> No
         got = conditioned(effects).forces(0, *inputs)
         assert np.isfinite([got.torque, got.drawbar_pull, *got.d_torque, *got.d_pull]).all()
         assert got.clamped == (not (INPUTS[entry] == 'centroid_shift' and value == -1.0))
-        depth, derivatives, _ = SteadySinkage(WHEEL, SAND, effects).sinkage(0, *inputs[:1], 80.0)
-        assert np.isfinite([depth, *derivatives]).all()
 
 
 def test_six_wheels_and_a_measured_leaving_angle() -> None:
@@ -243,30 +239,6 @@ def test_soil_without_shear_strength_takes_no_torque_and_resists() -> None:
     assert backwards.clamped and backwards.torque == spinning.torque
 
 
-def test_steady_sinkage_solves_the_closed_form_balance() -> None:
-    for soil, effects, row in random_cases(60, 8):
-        steady = WheelSoilModel(soil, effects, 'closed_form', strict=False).steady_state(row)
-        if steady.flags.any():
-            continue
-        model = SteadySinkage(row.wheel, soil, effects)
-        for k, slip in enumerate(row.slip):
-            ratio = 1.0 - slip if slip >= 0.0 else 1.0 / (1.0 + slip)
-            depth, _, carried = model.sinkage(0, ratio, float(row.normal_load[k]))
-            assert carried
-            assert depth == pytest.approx(steady.sinkage[k], rel=1e-4)
-            scalar = model.state(0, ratio, float(row.normal_load[k]))
-            assert scalar == pytest.approx(steady.outputs()[k], rel=1e-4, abs=1e-4)
-
-
-def test_plain_soil_is_prepared_once_and_answers_the_same() -> None:
-    model = SteadySinkage(Wheel(np.array([0.1, 0.2]), 0.1, 0.01, 20), SAND)
-    for slip in (-0.5, 0.0, 0.3, 0.95):
-        ratio = 1.0 - slip if slip >= 0.0 else 1.0 / (1.0 + slip)
-        for wheel, radius in enumerate((0.1, 0.2)):
-            truth = state(slip, 60.0, wheel=Wheel(radius, 0.1, 0.01, 20), method='closed_form')
-            assert model.state(wheel, ratio, 60.0) == pytest.approx(truth.outputs()[0], rel=1e-5)
-
-
 def test_balance_without_iteration_agrees_with_the_bracketed_solver() -> None:
     random, count = np.random.default_rng(12), 500
     wheel = Wheel(random.uniform(0.05, 0.3, count), random.uniform(0.05, 0.3, count), 0.01, 20)
@@ -285,24 +257,6 @@ def test_balance_without_iteration_agrees_with_the_bracketed_solver() -> None:
     for name in ('sinkage', 'drawbar_pull', 'torque', 'leaving_angle', 'peak_stress_angle'):
         a, b = getattr(ours, name), getattr(general, name)
         np.testing.assert_allclose(a, b, rtol=1e-8, atol=1e-9 * np.abs(b).max(), err_msg=name)
-
-
-def test_derivatives_of_the_steady_sinkage() -> None:
-    model = SteadySinkage(WHEEL, SAND, {**EFFECTS, 'hard_layer': {}})
-    base = [0.6, 80.0, 0.1, 0.1, 0.6, 300.0, 0.01]
-    _, derivatives, _ = model.sinkage(0, *base)
-    for k, name in enumerate(SINKAGE_INPUTS):
-        step = 1e-4 * max(abs(base[k]), 1e-2)
-        up, down = list(base), list(base)
-        up[k] += step
-        down[k] -= step
-        truth = (model.sinkage(0, *up)[0] - model.sinkage(0, *down)[0]) / (2 * step)
-        assert derivatives[k] == pytest.approx(truth, rel=0.02), name
-
-
-def test_soil_that_cannot_carry_is_said_not_raised() -> None:
-    depth, derivatives, carried = SteadySinkage(WHEEL, SAND).sinkage(0, 0.9, 1e6)
-    assert not carried and depth <= WHEEL.radius and derivatives == (0.0,) * 7
 
 
 def test_closed_form_in_skid_is_as_close_as_in_slip() -> None:

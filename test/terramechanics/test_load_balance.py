@@ -17,7 +17,6 @@ from wheel_terra_estimator.terramechanics import model as model_module
 from wheel_terra_estimator.terramechanics.load_balance import balance, solve_entrance_angle
 from wheel_terra_estimator.terramechanics.model import WheelSoilModel
 from wheel_terra_estimator.terramechanics.soil import PRESSURE_LAWS
-from wheel_terra_lab.terramechanics.steady_sinkage import SteadySinkage
 
 
 @pytest.mark.parametrize('load', [1e-6, 1.0, 1e6])
@@ -74,16 +73,6 @@ def test_the_first_guess_is_near_in_either_pressure_law(
         soil = replace(soil, pressure_law=law, frictional_modulus=modulus)
     found = WheelSoilModel(soil).steady_state(points(np.array([0.05, 0.1]), 80.0))
     np.testing.assert_allclose(guesses[0], found.entrance_angle, rtol=0.4)
-
-
-@pytest.mark.parametrize('slip', [-0.3, 0.2, 0.8])
-def test_a_wheel_of_half_a_newton_sinks_as_the_arrays_say(slip: float) -> None:
-    soil = replace(SAND, cohesion=2000.0)
-    ratio = 1.0 - slip if slip >= 0.0 else 1.0 / (1.0 + slip)
-    found, _, carried = SteadySinkage(WHEEL, soil).sinkage(0, ratio, 0.5)
-    assert carried
-    expected = state(slip, 0.5, soil=soil, method='closed_form').sinkage
-    assert found == pytest.approx(float(expected[0]), rel=1e-4)
 
 
 def test_a_derivative_within_the_range_is_taken_to_both_sides() -> None:

@@ -23,7 +23,6 @@ from wheel_terra_estimator.terramechanics.soil import Soil
 from wheel_terra_estimator.terramechanics.wheel import Wheel
 from wheel_terra_lab.benchmarks.pairs import Figure, timed_pairs
 from wheel_terra_lab.benchmarks.peers import PlainFilter, read_with_rosbags, smooth_wheel
-from wheel_terra_lab.terramechanics.steady_sinkage import SteadySinkage
 
 SCENARIO = 'firm_drive'
 FILES = ('generic_six_wheel', 'test_sand')
@@ -32,8 +31,6 @@ RATES = {'sensors.wheel_odometry_rate': 100.0, 'sensors.imu_rate': 100.0}
 WHEELS = 6
 CYCLES = 300
 """Filter cycles in one timing."""
-REPEATS = 20
-"""Of the one wheel in plain floats, which is too quick for the clock."""
 RADIUS, WIDTH = 0.135, 0.165
 """Wheel of the wheel tests on HIT-LSS1 [m] (Ding et al. 2011)."""
 ROW_SEED = 1
@@ -149,18 +146,7 @@ def _models(size: Size) -> Iterator[Figure]:
         for i in chosen:
             forces(soil, 'closed_form', slips[i : i + 1], loads[i : i + 1])
 
-    wheels = SteadySinkage(Wheel(RADIUS, WIDTH), soil)
-
-    def plain_floats() -> None:
-        for _ in range(REPEATS):
-            for i in chosen:
-                wheels.state(0, 1.0 - float(slips[i]), float(loads[i]))
-
     other = (peers, size.peers)
-    yield timed_pairs(
-        'closed form, one wheel in plain floats', (plain_floats, REPEATS * size.peers),
-        peer, other, size.pairs,
-    )  # fmt: skip
     yield timed_pairs(
         'closed form, one wheel in arrays', (scalars, size.peers), peer, other, size.pairs
     )

@@ -27,7 +27,6 @@ SECTIONS = (
     'small_wheels',
     'transfer',
     'rover_slope',
-    'speed',
 )
 HEAD = '# Validation of the wheel-soil models'
 

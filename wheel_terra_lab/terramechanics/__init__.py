@@ -1,7 +1,3 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Published relations that no part of the product asks for, held against its models by tests.
-
-- ``equivalent_contact``: drawbar pull from measured torque, load and contact.
-- ``steady_sinkage``: load to sinkage with derivatives, plain floats, a second way beside the model.
-"""
+"""Published relations that no part of the product asks for, held against its models by tests."""
