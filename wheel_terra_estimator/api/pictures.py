@@ -151,7 +151,7 @@ def plot_diagnosis(diagnosis: Diagnosis, axes: Axes | None = None) -> Axes:
                 textcoords='offset points',
             )
         panel.set_xticks([])
-        panel.set_ylabel('held-out error / as configured [-]')
+        panel.set_ylabel('error on unseen rows / as configured [-]')
         panel.set_title(diagnosis.verdict)
         panel.legend(loc='upper center', bbox_to_anchor=(0.5, -0.08), ncols=4)
     return panel

@@ -162,7 +162,7 @@ def _warnings(summary: DriveSummary, errors: TruthErrors | None) -> list[dict[st
         end = 'to the end' if warning.end is None else f'to {warning.end:.1f} s'
         verdict = warning.later
         if errors and errors.warnings:
-            verdict = f'By the truth: {truth_scores.in_words(errors.warnings[number][1])}.'
+            verdict = f'By the truth: {truth_scores.outcomes(errors)[number]}.'
         rows.append(
             {
                 'when': f'{warning.start:.1f} s {end}',

@@ -169,25 +169,47 @@ def seen_later(history: EstimateHistory, border: Border) -> tuple[str, ...]:
     """Return for each warning whether the slip estimated after it bears it out, in a sentence."""
     slip = known(history, 'slip', border)
     there = np.isfinite(slip).any(axis=1)
+    if not history.warnings:
+        return ()
+    entrapped = _entrapped(history, slip)
+    lead = None if entrapped is None else lead_of(entrapped, _spans(history))
     found = []
-    for start, verdict in _warnings(history, slip) if history.warnings else ():
+    for start, verdict in _warnings(history, slip):
         after = (history.seconds >= start) & (history.seconds <= start + FORESIGHT)
         if not (after & there).any():
             found.append('Whether it was right is not known: the slip after it is not.')
         else:
-            found.append(f'By the estimates: {in_words(verdict)}.')
+            words = _in_words(verdict, _stood_for(start, entrapped, lead))
+            found.append(f'By the estimates: {words}.')
     return tuple(found)
 
 
-def in_words(verdict: Verdict) -> str:
-    """Return what came of a warning."""
+def outcomes(errors: TruthErrors) -> tuple[str, ...]:
+    """Return what came of each warning by the truth, in words."""
+    return tuple(
+        _in_words(verdict, _stood_for(start, errors.entrapped, errors.lead))
+        for start, verdict in errors.warnings
+    )
+
+
+def _stood_for(start: float, entrapped: float | None, lead: float | None) -> float | None:
+    """Return how long [s] a warning had stood at the first entrapment; None: it did not."""
+    if entrapped is None or lead is None or not np.isclose(start, entrapped - lead):
+        return None
+    return lead
+
+
+def _in_words(verdict: Verdict, stood: float | None) -> str:
     if verdict.lead is not None:
         early = verdict.lead >= 0.0
         word, when = ('right', 'before') if early else ('late', 'after')
         return f'{word}, {abs(verdict.lead):.1f} s {when} the rover was entrapped'
+    if stood is not None:
+        return f'early, {stood:.1f} s before the rover was entrapped, and it stood till then'
+    within = f'within {FORESIGHT:g} s'
     if verdict.outcome is Outcome.NEAR_MISS:
-        return f'a near miss, the median slip passed {NEAR_MISS_SLIP:g} and fell again'
-    return f'false, the median slip did not pass {NEAR_MISS_SLIP:g} within {FORESIGHT:g} s'
+        return f'a near miss, the median slip passed {NEAR_MISS_SLIP:g}, no entrapment {within}'
+    return f'false, the median slip did not pass {NEAR_MISS_SLIP:g} {within}'
 
 
 def as_lines(errors: TruthErrors) -> list[str]:
@@ -204,8 +226,8 @@ def as_lines(errors: TruthErrors) -> list[str]:
         for name, row in zip(names, errors.class_matrix, strict=False):
             shares = ''.join(f'{100 * share:9.1f}%' for share in row)
             lines.append(f'    {name:18}{shares}')
-    for start, verdict in errors.warnings:
-        lines.append(f'    warning at {start:.1f} s: {in_words(verdict)}')
+    for (start, _), words in zip(errors.warnings, outcomes(errors), strict=True):
+        lines.append(f'    warning at {start:.1f} s: {words}')
     if errors.entrapped is not None and not errors.warnings:
         lines.append(f'    no warning, though the rover was entrapped at {errors.entrapped:.1f} s')
     return lines

@@ -65,6 +65,7 @@ from wheel_terra_estimator.ros.lifecycle_node import MESSAGE_TYPES
 QUEUE = 5000
 PATIENCE = 5.0  # [s] until the next message is sent though the node has not heard the last one
 DISCOVERY_TIMEOUT = 60.0  # [s]
+NOT_FOUND = 4  # exit status
 QUIET = 3.0  # [s] without an output after the last input: the node is done
 
 OUTPUT_MESSAGES = {
@@ -75,6 +76,10 @@ OUTPUT_MESSAGES = {
     STUCK_DIRECTION: Int8,
     DIAGNOSTICS: DiagnosticArray,  # the last: `_Player.wait_for_partners` relies on it
 }
+
+
+class NodeNotFoundError(UserError):
+    """Player and node did not find each other: DDS has no way here."""
 
 
 class Heard(NamedTuple):
@@ -220,7 +225,7 @@ class _Player(Node):
             )
 
         if not self._spin_until(ready, DISCOVERY_TIMEOUT):
-            raise UserError(f'the node was not found within {DISCOVERY_TIMEOUT:.0f} s')
+            raise NodeNotFoundError(f'the node was not found within {DISCOVERY_TIMEOUT:.0f} s')
 
     def play(
         self,
@@ -343,7 +348,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         _run(arguments)
     except UserError as error:
         print(f'live_drive: {error}', file=sys.stderr)
-        return 2
+        return NOT_FOUND if isinstance(error, NodeNotFoundError) else 2
     return 0
 
 

@@ -83,6 +83,7 @@ def write_report(diagnosis: Diagnosis, folder: str | Path) -> Path:
         # How things are written
         words=pictures.words,
         number=number,
+        percent=percent,
         amount=amount,
         unit_of=lambda quantity: SHOWN[quantity][1],
         with_unit=_with_unit,
