@@ -8,7 +8,6 @@ from estimate_sets import some_estimates
 
 from wheel_terra_estimator.checks.input_judge import InputJudge
 from wheel_terra_estimator.checks.online import OnlineChecks
-from wheel_terra_estimator.checks.online_motion import MotionHistory
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.estimation.measurements import (
     ReferenceVelocity,
@@ -101,9 +100,10 @@ def test_a_kept_state_gives_the_same_verdict():
 
 
 def test_a_pause_begins_anew():
-    history = MotionHistory(rims=(0.1,))
-    history.advance(0)
-    history.advance(10**9)
-    assert len(history.rows) == 10
-    assert not history.advance(10**12)
-    assert history.begin == 10**12 and history.rows == ()
+    checks = after(late=0.0, end=10.0)
+    kept = checks.window().joints.stamp.size
+    stamp = 10**12
+    for k in range(6):
+        rates = WheelOdometry(stamp + k * STEP, np.ones(6), np.full(6, np.nan))
+        checks.step(rates.stamp, StepInputs(wheel_odometry=rates))
+    assert kept > 90 and checks.window().joints.stamp.size == 2

@@ -38,6 +38,8 @@ STEP = 0.05
 """Time between the values that are compared [s]."""
 LONGEST = {'imu': 2.0, 'reference': 3.0}
 """Greatest lag that is looked for [s]."""
+IN_A_DRIVE = 15.0
+"""Length of a drive over the greatest lag that it tells [-]."""
 LEAST_OFFSET = {'imu': 0.3, 'reference': 0.25}
 """Lags below this [s] are those of chassis, soil, jitter and filters of encoders."""
 LEAST_PERIODS = 0.5
@@ -203,14 +205,14 @@ def _of_imu(evidence: Evidence) -> Lag | NotChecked:
         yaw = averaged(at, (imu.rate @ evidence.rotation.T)[:, 2:3], time, 2 * STEP)[:, 0]
         wheels = _even(evidence, difference, time)
         wheels = wheels * np.sign(correlation(wheels, yaw) or 1.0)
-        turned = lag_of(time, wheels, yaw, LONGEST['imu'], 'turns')
+        turned = lag_of(time, wheels, yaw, 'imu', 'turns')
     if evidence.force is not None and time.size > 2:
         width = round(SMOOTHING / STEP)
         speed = moving_mean(_even(evidence, evidence.rim, time), width)
         forward = averaged(at, (imu.force @ evidence.rotation.T)[:, :1], time, 2 * STEP)[:, 0]
         change = without_drift(np.gradient(speed, STEP), STEP)
         felt = without_drift(moving_mean(forward, width), STEP)
-        started = lag_of(time, change, felt, LONGEST['imu'], 'starts')
+        started = lag_of(time, change, felt, 'imu', 'starts')
     best = turned or started
     if best is None:
         reason = 'IMU against wheels: no clear turns in it; drive a circle'
@@ -241,7 +243,7 @@ def _of_reference(evidence: Evidence) -> Lag | NotChecked:
     rim, speed = as_smooth(time, _even(evidence, evidence.rim, time), at[order], forward)
     if period > SLOWEST or float(np.std(rim)) < 0.1 * float(np.abs(rim).mean() + 1e-9):
         return NotChecked('delay', 'reference: hardly a change of speed in it; stop and go')
-    told = lag_of(time, rim, speed, LONGEST['reference'], 'speeds')
+    told = lag_of(time, rim, speed, 'reference', 'speeds')
     if told is None:
         return NotChecked('delay', 'reference: does not follow the wheels closely enough')
     evidence.figures['reference.delay_s'] = round(told.value, 3)
@@ -270,13 +272,12 @@ def _even(evidence: Evidence, values: FloatArray, time: FloatArray) -> FloatArra
     return averaged(evidence.time, np.nan_to_num(values)[:, None], time, 2 * STEP)[:, 0]
 
 
-def lag_of(
-    time: FloatArray, first: FloatArray, second: FloatArray, limit: float, by: str
-) -> Lag | None:
+def lag_of(time: FloatArray, first: FloatArray, second: FloatArray, of: str, by: str) -> Lag | None:
     """Return by how much the second series lags the first; None where they are not alike.
 
     The halves share the motion evenly, wherever in the drive it is.
     """
+    limit = min(LONGEST[of], float(time[-1] - time[0]) / IN_A_DRIVE)
     whole = lag(time, first, second, limit)
     if whole is None or whole.fit < LEAST_FIT[by]:
         return None

@@ -28,6 +28,8 @@ NOISY_REST = 0.15
 """Noise of a mean rate, as a share of the working rate, in which no standstill is seen [-]."""
 SHORTEST_REST = 1.0
 """A standstill counts as rest after this time [s]."""
+LEAST_REST = 0.4
+"""Rest that tells the bias of a gyro [s]."""
 SETTLING = 0.5
 """A speed counts as steady this long after it changed [s]."""
 STRAIGHT_SHARE = 0.25
@@ -162,8 +164,13 @@ class Evidence:
         """Yaw rate (k,) less its bias at rest [rad/s]; zeros without a gyro."""
         if self.gyro is None:
             return _shared(np.zeros(self.time.size))
-        yaw, rest = self.gyro[:, 2], self.at_rest
-        return _shared(yaw - (np.median(yaw[rest]) if rest.sum() > 20 else 0.0))
+        yaw = self.gyro[:, 2]
+        return _shared(yaw - (np.median(yaw[self.at_rest]) if self.rested else 0.0))
+
+    @property
+    def rested(self) -> bool:
+        """Whether a standstill tells the bias of the gyro."""
+        return float(self.at_rest.sum()) * self.period > LEAST_REST
 
     @cached_property
     def moving(self) -> Mask:

@@ -98,12 +98,6 @@ FAULTS: dict[str, Fault] = {
         'multiply velocity by 2 pi / counts per turn (about {value:.3g}) in the driver '
         '(rad/s, REP 103)',
     ),
-    'absurd_rate': Fault(
-        'unit',
-        'rim speed {figure:.3g} m/s: velocity is not in rad/s',
-        'publish rad/s (REP 103): revolutions per minute times 0.10472, degrees per second '
-        'times 0.0174533',
-    ),
     'gravity_off': Fault(
         'gravity',
         'mean specific force {size:.3g} m/s^2 where gravity is {gravity:.4g}: gravity was taken '
@@ -167,13 +161,6 @@ FAULTS: dict[str, Fault] = {
         'sign',
         'counts backwards when the rover drives forward{trial}',
         _DIRECTIONS + '{torque}',
-        'wheels.direction',
-    ),
-    'one_side_backwards': Fault(
-        'sign',
-        'left and right wheels turn against each other while the gyro sees no turn: one side '
-        'counts backwards',
-        'wheels.direction: [{left}] if the left side is the one, [{right}] if the right',
         'wheels.direction',
     ),
     'all_backwards': Fault(
@@ -323,13 +310,6 @@ FAULTS: dict[str, Fault] = {
         'sum of T/r is {traction:.3g} times the weight: effort is in N mm',
         'multiply effort by 0.001 in the driver (N m, REP 103)',
     ),
-    'torque_absurd': Fault(
-        'unit',
-        'sum of T/r is {figure:.3g} times the weight: N mm, a current or a motor torque',
-        'publish the torque at the wheel in N m (N mm times 0.001), or state its scale in '
-        'sensors.torque_gain (wheel-terra calibrate)',
-        'sensors.torque_gain',
-    ),
     'torque_sign': Fault(
         'sign',
         'torque brakes where the wheel drives on the level or uphill',
@@ -381,14 +361,6 @@ FAULTS: dict[str, Fault] = {
         'sign',
         'median sinkage {reading:.0f} mm{others}: counted upwards',
         'negate position{of} in the driver (positive down)',
-        channel='sinkage',
-    ),
-    'sinkage_above': Fault(
-        'sign',
-        'the wheels seem to run {height:.0f} mm above the surface: counted upwards, or the zero '
-        'is off',
-        'negate position in the driver (positive down), or state sensors.sinkage_zero [m]',
-        'sensors.sinkage_zero',
         channel='sinkage',
     ),
     'sinkage_zero': Fault(

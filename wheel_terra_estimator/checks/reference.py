@@ -36,7 +36,7 @@ MOSTLY = 0.4
 """Mean over median rim speed of wheels most of which turn one way [-]."""
 AROUND = 0.3
 """Half of the time around a velocity that rim speeds are averaged over [s]."""
-LEAST_ROWS = 8
+LEAST_ROWS = 5
 """Velocities beside rims that a ratio needs."""
 KNOWN_UNITS = {'kilometres per hour': 3.6, 'millimetres per second': 1000.0, 'knots': 1.9438}
 

@@ -12,7 +12,8 @@ import logging
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import fields, replace
-from typing import TypeVar
+from types import ModuleType
+from typing import TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -102,17 +103,7 @@ def _examined(
         facts = rover_facts.from_configuration(configuration)
     else:
         facts = rover_facts.from_names(recording.joints.names if recording.joints else ())
-
-    def mended(
-        kind: str, given: Given, check: Callable[[], list[Outcome] | tuple[list[Outcome], Given]]
-    ) -> Given:
-        """Take what a check finds; return what it was given, with that mended."""
-        nothing: list[Outcome] | tuple[list[Outcome], Given] = []
-        told = run_apart(report, kind, nothing, check)
-        outcomes, given = told if isinstance(told, tuple) else (told, given)
-        report.take(outcomes)
-        return given
-
+    mended = Mended(report)
     mended('drop_outs', None, lambda: names.check_required(recording, configuration))
     mended('unknown_name', None, lambda: names.check_topics(recording, remapped))
     mended('missing_wheel', None, lambda: names.check_wheel_names(recording, facts))
@@ -125,21 +116,63 @@ def _examined(
         on_time = clocks.shifted(getattr(recording, name), round(offset * 1e9))
         recording = replace(recording, **{name: on_time})
     recording = _whole_rows(recording)
-    state = imu.ImuState(recording, configured_mounting(configuration))
-    state = mended('gravity', state, lambda: imu.check_imu(state, facts))
-    evidence = gather(state.recording, facts, state.rotation, report.figures)
-    if evidence is None or evidence.time.size < LEAST_MOVING_ROWS:
+    evidence = against_each_other(recording, facts, AGAINST_EACH_OTHER, mended)
+    if evidence is None:
         report.not_checked.append(NotChecked('sign', 'no wheel rates to compare with'))
-        return None
-    force = evidence.force if state.usable_force else None
-    evidence = replace(evidence, force=force, gyro=evidence.gyro if state.usable_gyro else None)
-    for kind, module, check in AGAINST_EACH_OTHER:
-        given = evidence
-        evidence = mended(kind, given, lambda: getattr(module, check)(given))  # noqa: B023
     return evidence
 
 
-AGAINST_EACH_OTHER = (
+class Mended:
+    """Takes what each check finds; gives back what it was given, with that mended.
+
+    Attributes
+    ----------
+    report : CheckReport
+        What was found so far.
+    by_check : dict
+        Name of each check that ran -> its outcomes.
+    """
+
+    def __init__(self, report: CheckReport) -> None:
+        self.report = report
+        self.by_check: dict[str, list[Outcome]] = {}
+
+    def __call__(
+        self,
+        kind: str,
+        given: Given,
+        check: Callable[[], list[Outcome] | tuple[list[Outcome], Given]],
+        name: str = '',
+    ) -> Given:
+        """Run a check of a kind of fault on what is given, and note what it said by its name."""
+        nothing: list[Outcome] | tuple[list[Outcome], Given] = []
+        told = run_apart(self.report, kind, nothing, check)
+        outcomes, given = told if isinstance(told, tuple) else (told, given)
+        self.report.take(outcomes)
+        self.by_check[name] = outcomes
+        return given
+
+
+def against_each_other(
+    recording: Recording, facts: RoverFacts, checks: Sequence[Check], mended: Mended
+) -> Evidence | None:
+    """Hold one channel against another; None where hardly any wheel rates are."""
+    state = imu.ImuState(recording, configured_mounting(facts.configuration))
+    state = mended('gravity', state, lambda: imu.check_imu(state, facts), 'check_imu')
+    evidence = gather(state.recording, facts, state.rotation, mended.report.figures)
+    if evidence is None or evidence.time.size < LEAST_MOVING_ROWS:
+        return None
+    force = evidence.force if state.usable_force else None
+    evidence = replace(evidence, force=force, gyro=evidence.gyro if state.usable_gyro else None)
+    for kind, module, check in checks:
+        given = evidence
+        evidence = mended(kind, given, lambda: getattr(module, check)(given), check)  # noqa: B023
+    return evidence
+
+
+Check: TypeAlias = 'tuple[str, ModuleType, str]'
+"""Kind of what it finds, module and name of a check."""
+AGAINST_EACH_OTHER: tuple[Check, ...] = (
     ('mounting', imu, 'check_upside'),
     ('missing_wheel', wheel_rates, 'check_dead_wheels'),
     ('sign', turning, 'check_signs'),

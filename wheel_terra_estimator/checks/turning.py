@@ -13,7 +13,8 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -46,6 +47,8 @@ UNTURNED = 0.5
 """What the residual of turns without an answer of the wheels weighs beside wheels unlike [-]."""
 CLEAR_DIRECTION = 0.8
 """Cosine of the angle by which starts and curves are felt turned that tells the sense [-]."""
+SAME_SENSE = 0.5
+"""Share of the way by the reference that goes where the wheels turn, less the rest, that tells."""
 OPPOSED = -0.3
 """Correlation of torque and rate of a wheel that takes power, if one of them is reversed [-]."""
 LEAST_CORRELATION = 0.7
@@ -58,7 +61,8 @@ GYRO_DEGREES = (0.004, 0.07)
 """Effective over stated track that a gyro in degrees per second gives [-]."""
 
 
-class Turning(NamedTuple):
+@dataclass(frozen=True)
+class Turning:
     """Rim speeds (k, m) [m/s] and yaw rate (k,) [rad/s] of a stretch, places of the wheels.
 
     ``lateral`` (m,) [m] is +1 and -1 where the places are not known, zeros where the sides are not.
@@ -71,10 +75,11 @@ class Turning(NamedTuple):
 
     def rows(self, part: slice | Mask) -> Turning:
         """Return a part of the stretch."""
-        return self._replace(speed=self.speed[part], yaw=self.yaw[part])
+        return replace(self, speed=self.speed[part], yaw=self.yaw[part])
 
+    @cached_property
     def turns(self) -> Mask:
-        """Return the rows in which the gyro sees a turn."""
+        """Rows in which the gyro sees a turn."""
         size = np.abs(self.yaw)
         if size.size < 3 or not self.lateral.any():
             return np.zeros(size.shape, dtype=bool)
@@ -131,7 +136,7 @@ def fit_of(fix: Fix, stretch: Turning) -> Fit:
     """Return how well a hypothesis accounts for wheels and gyro."""
     speed, yaw, lateral = fix.applied(stretch.speed), stretch.yaw, stretch.lateral
     track, alike, cost, rolling = 0.0, 0.0, 0.0, speed
-    if stretch.turns().sum() >= LEAST_TURNING_ROWS:
+    if stretch.turns.sum() >= LEAST_TURNING_ROWS:
         left, right = lateral > 0.0, lateral < 0.0
         stated = float(lateral[left].mean() - lateral[right].mean())
         difference = speed[:, right].mean(axis=1) - speed[:, left].mean(axis=1)
@@ -150,10 +155,8 @@ def fit_of(fix: Fix, stretch: Turning) -> Fit:
 def compare(stretch: Turning, fixes: Sequence[Fix]) -> Comparison:
     """Compare hypotheses, the first of which is that nothing is wrong."""
     whole = [fit_of(fix, stretch) for fix in fixes]
-    parts = [
-        [fit_of(fix, stretch.rows(half)).cost for fix in fixes]
-        for half in halves(np.ones(stretch.yaw.size))
-    ]
+    both = [stretch.rows(half) for half in halves(np.ones(stretch.yaw.size))]
+    parts = [[fit_of(fix, half).cost for fix in fixes] for half in both]
     least = min(fit.cost for fit in whole)
     alike = [i for i, fit in enumerate(whole) if fit.cost < least + TIE]
     # Of two that differ by swapped sides the one that agrees with the gyro is meant.
@@ -192,7 +195,7 @@ def exchanges(count: int, lateral: FloatArray) -> list[Fix]:
 
 def compare_exchanges(stretch: Turning) -> Comparison | None:
     """Compare exchanged wheels in the turns alone, where they show; None for too few of them."""
-    turns, count = stretch.turns(), stretch.speed.shape[1]
+    turns, count = stretch.turns, stretch.speed.shape[1]
     if count < 3 or turns.sum() < 2 * LEAST_TURNING_ROWS:
         return None
     return compare(stretch.rows(turns), exchanges(count, stretch.lateral))
@@ -211,7 +214,7 @@ def stretch_of(evidence: Evidence, there: NDArray[np.intp], rows: Mask) -> Turni
     if evidence.gyro is None or not sides:
         lateral = np.zeros(there.size)
     speed = (evidence.rate * evidence.radius)[keep][:, there]
-    return Turning(speed, evidence.yaw[keep], lateral, evidence.at_rest.sum() > 20)
+    return Turning(speed, evidence.yaw[keep], lateral, evidence.rested)
 
 
 def _known(evidence: Evidence) -> tuple[NDArray[np.intp], Mask]:
@@ -239,7 +242,9 @@ def check_signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     facts = evidence.facts
     there, rows = _known(evidence)
     if rows.sum() < LEAST_MOVING_ROWS or not there.size:
-        return [NotChecked('sign', 'the rover hardly moves in it; drive straight')], evidence
+        reason = 'the rover hardly moves in it; drive straight, then circles'
+        kinds = ('sign', 'swapped_sides', 'exchanged_wheels')
+        return [NotChecked(kind, reason) for kind in kinds], evidence
     outcomes: list[Outcome] = []
     chosen = _chosen(evidence, there, rows)
     signs, turn, mended = chosen.signs, chosen.track, evidence
@@ -254,8 +259,12 @@ def check_signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         if not facts.known:
             reason = 'left and right need the places of the wheels: a rover file (wheel-terra init)'
         outcomes += [NotChecked(kind, reason) for kind in ('swapped_sides', 'exchanged_wheels')]
-    told = _told_direction(mended, signs)
-    blame = _blame(told, 2 * int(np.sum(signs[there] < 0.0)) >= there.size, turn)
+    told, reversed_twice = _told_direction(mended, signs), 2 * int(np.sum(signs[there] < 0.0))
+    blame = _blame(told, reversed_twice >= there.size, turn)
+    if reversed_twice == there.size and not turn and told == _Told(None, None):
+        others = ', '.join(facts.names[i] for i in there if signs[i] > 0.0)
+        trial = f'{chosen.trial}, or {others} do: drive a circle, or beside a reference'
+        chosen = chosen._replace(sure=0.5, trial=trial)
     if blame == 'unsure':
         cure = _directions(evidence, -np.ones(signs.size))
         outcomes.append(evidence.found('all_backwards', 0.4, value=-1.0, directions=cure))
@@ -367,9 +376,10 @@ def _told_direction(evidence: Evidence, signs: FloatArray) -> _Told:
     speed = row_medians(np.nan_to_num(evidence.rate) * signs)
     reference, by_reference, by_force = evidence.recording.reference, None, None
     if reference is not None:
-        at = evidence.rim_at(reference.stamp, speed, 0.3)
-        fit = correlation(np.nan_to_num(at), reference.velocity[:, 0])
-        by_reference = fit if abs(fit) > 0.5 else None
+        sense = np.sign(np.nan_to_num(evidence.rim_at(reference.stamp, speed, 0.3)))
+        forward = np.nan_to_num(reference.velocity[:, 0])  # the faster, the more it tells
+        fit = float(sense @ forward) / max(float(np.abs(forward).sum()), 1e-12)
+        by_reference = fit if abs(fit) > SAME_SENSE else None
     if evidence.force is not None and evidence.time.size > 100:
         width = evidence.rows_in(0.4)
         change = np.gradient(moving_mean(speed, width), evidence.period)

@@ -66,51 +66,56 @@ OFF_A_STEP = 0.05
 
 def check_dead_wheels(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     """Return wheels whose rate is frozen; they are left out of what follows."""
-    rate, moving = evidence.rate, evidence.moving
-    if moving.sum() < LEAST_MOVING_ROWS or rate.shape[1] < 2:
+    moving = evidence.moving
+    if moving.sum() < LEAST_MOVING_ROWS or evidence.rate.shape[1] < 2:
         return [], evidence
-    step = common_step(rate[moving], evidence.time[moving])
+    step = common_step(evidence.rate[moving], evidence.time[moving])
     change = max(FROZEN_CHANGE * evidence.working_rate, 1.5 * step)
     outcomes: list[Outcome] = []
-    mended = rate.copy()
-    for index, name in enumerate(evidence.facts.names):
-        longest = _longest_frozen(evidence, index, change)
-        others = np.delete(rate, index, axis=1)
-        repeats = np.mean(np.diff(rate[moving, index]) == 0.0)
-        beside = np.mean(np.diff(others[moving], axis=0) == 0.0)
-        if longest > 0.0:
-            how = f'does not change for up to {longest:.1f} s'
-        elif repeats > 0.6 and beside < 0.2 and not _held(evidence, index, moving):
-            how = f'repeats its last value in {100 * repeats:.0f} % of the messages'
-        else:
-            continue
-        outcomes.append(evidence.found('rate_frozen', 0.97, wheel=name, how=how))
-        mended[:, index] = np.nan
-    return outcomes, evidence.with_rate(mended) if outcomes else evidence
+    for at_zero in (True, False):  # beside a dead wheel a steady one is no frozen one
+        mended = evidence.rate.copy()
+        for index, name in enumerate(evidence.facts.names):
+            how = _frozen(evidence, index, change, at_zero)
+            if how:
+                outcomes.append(evidence.found('rate_frozen', 0.97, wheel=name, how=how))
+                mended[:, index] = np.nan
+        evidence = evidence.with_rate(mended) if np.isnan(mended).any() else evidence
+    return outcomes, evidence
 
 
-def _longest_frozen(evidence: Evidence, index: int, change: float) -> float:
-    """Return the longest stretch [s] in which a rate stays the same while the others change."""
-    own = evidence.rate[:, index]
-    others = np.delete(evidence.rate, index, axis=1)
+def _frozen(evidence: Evidence, index: int, change: float, at_zero: bool) -> str:
+    """Return how a rate is frozen, at zero or elsewhere; '' if it is not."""
+    rate, moving = evidence.rate, evidence.moving
+    own, others = rate[:, index], np.delete(rate, index, axis=1)
     longest = 0.0
     for start, end in runs(np.diff(own) == 0.0):
         lasts = (end - start) * evidence.period  # a gap is none
-        if lasts < FROZEN_TIME:
+        if lasts < FROZEN_TIME or (own[start] == 0.0) != at_zero:
             continue
         stretch = slice(start, end + 1)
-        if own[start] == 0.0:
+        if at_zero:
             busy = row_medians(np.abs(others[stretch])) > LIVELY * evidence.working_rate
             lasts *= float(busy.mean())
             lively = lasts > FROZEN_TIME and not _held(evidence, index, np.r_[stretch][busy])
         else:
             beside = np.nanmedian(others[stretch], axis=1)
-            changes = np.mean(np.diff(others[stretch], axis=0) != 0.0)
-            steady = lasts > LONG_FROZEN_TIME and changes > 0.5
+            steady = lasts > LONG_FROZEN_TIME and _repeats(others[stretch]) < 0.5
             lively = bool(np.ptp(beside) > change or steady)
         if lively:
             longest = max(longest, lasts)
-    return longest
+    if longest > 0.0:
+        return f'does not change for up to {longest:.1f} s'
+    repeats, beside = _repeats(own[moving]), _repeats(others[moving])
+    lasts = moving.sum() * evidence.period > LONG_FROZEN_TIME
+    if at_zero or not lasts or repeats < 0.6 or beside > 0.2 or _held(evidence, index, moving):
+        return ''
+    return f'repeats its last value in {100 * repeats:.0f} % of the messages'
+
+
+def _repeats(rate: FloatArray) -> float:
+    """Return the share of rates (k,) or (k, n) that repeat the one before."""
+    change = np.diff(rate, axis=0)
+    return float(np.mean(change[np.isfinite(change)] == 0.0)) if np.isfinite(change).any() else 1.0
 
 
 def _held(evidence: Evidence, index: int, rows: Any) -> bool:

@@ -34,6 +34,8 @@ FloatArray = NDArray[np.float64]
 
 START = 1_000_000_000_000
 """Stamp of the start of a drive [ns]; not 0, which is no stamp."""
+LEAST_GAIN = 0.1
+"""Gain of a torque that is drawn at least [-]: another scale is no other sign."""
 
 
 class Arrival(NamedTuple):
@@ -71,7 +73,7 @@ class SensorSuite:
         self._torque_zero = scale * figures.torque_zero_std * random.standard_normal(n)
         # One current sensor type, one motor constant: most of the gain error is common.
         gain = 0.8 * random.standard_normal() + 0.6 * random.standard_normal(n)
-        self._torque_gain = 1.0 + scale * figures.torque_gain_std * gain
+        self._torque_gain = np.maximum(1.0 + scale * figures.torque_gain_std * gain, LEAST_GAIN)
         self._sinkage_zero = scale * figures.sinkage_zero_std * random.standard_normal(n)
         self._force_bias = scale * figures.specific_force_bias_std * random.standard_normal(3)
         self._rate_bias = scale * figures.angular_rate_bias_std * random.standard_normal(3)
