@@ -14,7 +14,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from wheel_terra_estimator.checks.evidence import Evidence
 from wheel_terra_estimator.checks.faults import STANDARD_GRAVITY, found, listed
@@ -218,6 +217,8 @@ def _gravity(facts: RoverFacts, state: ImuState) -> Judged:
 
 def _against_orientation(state: ImuState) -> Judged:
     """Compare the gyro with the turning of the orientation, axis by axis."""
+    from scipy.spatial.transform import Rotation  # heavy
+
     imu = state.imu
     time, q = imu.stamp * 1e-9, imu.orientation
     if not np.isfinite(q).all(axis=1).mean() > 0.9 or imu.stamp.size < 200:
@@ -277,12 +278,16 @@ class Mounting:
 
     def taken_off(self, rotation: FloatArray) -> FloatArray:
         """Return a rotation into ``base_link`` without the tilt: about x, then y."""
+        from scipy.spatial.transform import Rotation  # heavy
+
         tilt = Rotation.from_euler('xy', [self.roll.value, self.pitch.value])
         return np.asarray(tilt.as_matrix() @ rotation)
 
 
 def gross_tilt(evidence: Evidence) -> FloatArray | None:
     """Return the rotation that brings the mean specific force upright, if it is far from it."""
+    from scipy.spatial.transform import Rotation  # heavy
+
     if evidence.force is None:
         return None
     up = np.median(evidence.force, axis=0)
@@ -397,6 +402,8 @@ def check_yaw(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
 
 def without_yaw(seen: Estimate) -> FloatArray:
     """Return the rotation that takes a yaw off; right angles are meant where they fit."""
+    from scipy.spatial.transform import Rotation  # heavy
+
     angle = -seen.value
     quarter = round(angle / (math.pi / 2.0)) * math.pi / 2.0
     if abs(angle - quarter) < 2.5 * max(seen.std, math.radians(4.0)):
@@ -439,6 +446,8 @@ def check_tilt(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
 
 def mounting_angles(rotation: FloatArray) -> list[float]:
     """Return roll, pitch, yaw [deg] of a rotation (fixed axes x, then y, then z, as in URDF)."""
+    from scipy.spatial.transform import Rotation  # heavy
+
     angles: list[float] = Rotation.from_matrix(rotation).as_euler('xyz', degrees=True).tolist()
     return angles
 

@@ -17,7 +17,6 @@ from typing import TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from wheel_terra_estimator.checks import (
     clocks,
@@ -215,6 +214,8 @@ def _rows(series: Series, known: NDArray[np.bool_]) -> Series | None:
 
 def configured_mounting(configuration: Configuration | None) -> NDArray[np.float64]:
     """Return the (3, 3) rotation that the rover file states for the IMU."""
+    from scipy.spatial.transform import Rotation  # heavy
+
     if configuration is None:
         return np.eye(3)
     sensors = configuration.sensors
