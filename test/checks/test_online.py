@@ -2,16 +2,20 @@
 # SPDX-License-Identifier: Apache-2.0
 """Faults put into a simulated drive are told while driving, and nothing is judged meanwhile."""
 
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
 from estimate_sets import some_estimates
 
+from wheel_terra_estimator.checks.faults import FAULTS as FAULT_TABLE
 from wheel_terra_estimator.checks.faults import found
+from wheel_terra_estimator.checks.finding import KINDS
 from wheel_terra_estimator.checks.input_judge import LONGEST_WAIT, InputJudge
 from wheel_terra_estimator.checks.online import CAP, OnlineChecks, Tally
+from wheel_terra_estimator.checks.series import Recording
 from wheel_terra_estimator.configuration import reader
+from wheel_terra_estimator.configuration.parameters import DECLARED
 from wheel_terra_estimator.estimation.core import EstimatorCore
 from wheel_terra_estimator.estimation.estimates import SlipClass
 from wheel_terra_estimator.estimation.measurements import (
@@ -301,9 +305,15 @@ def test_noise_beyond_what_is_stated_is_told_with_its_parameter(than, told):
     np.testing.assert_array_equal(estimates.slip_class, some_estimates(6).slip_class)
 
 
-def test_kinds_are_those_of_the_checks_of_a_recording(drives):
-    from wheel_terra_estimator.checks.finding import KINDS
+def test_the_table_of_faults_names_kinds_parameters_and_channels_that_there_are():
+    keys = {declared.key for declared in DECLARED}
+    for fault in FAULT_TABLE.values():
+        assert fault.kind in KINDS and fault.driving in ('', 'slip', 'beside')
+        assert fault.parameter is None or fault.parameter in keys
+        assert fault.channel in {field.name for field in fields(Recording)}
 
+
+def test_kinds_are_those_of_the_checks_of_a_recording(drives):
     for name, (fault, kind, topic, _, begins) in FAULTS.items():
         if name not in ('g', 'no_gravity', 'upside_down'):
             continue

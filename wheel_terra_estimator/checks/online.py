@@ -81,19 +81,6 @@ WHILE_DRIVING: tuple[Check, ...] = (
     ('zero', sinkage, 'check_sinkage'),
 )
 """What half a minute can tell, in the order of ``run.AGAINST_EACH_OTHER``."""
-MEANINGLESS = frozenset(
-    (
-        *('force_unit', 'gravity_off', 'planet', 'force_scale', 'imu_upside', 'gyro_degrees'),
-        *('backwards', 'all_backwards', 'swapped_sides', 'reference_reversed', 'reference_unit'),
-        *('rate_unit', 'rate_counts', 'rate_frozen'),
-        *('torque_sign', 'torque_unit', 'torque_scale', 'sinkage_sign'),
-    )
-)
-"""Faults with which slip means nothing."""
-REMARKS = frozenset(('sensor_frozen', 'imu_yaw', 'exchanged', 'reference_offset'))
-"""Faults that are told while slip is judged all the same."""
-MAY_COME = frozenset(('rate_frozen', 'sensor_frozen'))
-"""Faults that begin at any time and show by their length: what was right before says nothing."""
 
 
 class Row(NamedTuple):
@@ -191,17 +178,17 @@ class OnlineChecks:
     @property
     def findings(self) -> tuple[Finding, ...]:
         """What stands now and makes slip meaningless; empty: nothing."""
-        return self._standing(MEANINGLESS)
+        return self._standing('slip')
 
     @property
     def remarks(self) -> tuple[Finding, ...]:
         """What stands now beside which slip is judged all the same."""
-        return self._standing(REMARKS)
+        return self._standing('beside')
 
-    def _standing(self, names: frozenset[str]) -> tuple[Finding, ...]:
+    def _standing(self, driving: str) -> tuple[Finding, ...]:
         tallies = self._verdicts.tallies
-        told = sorted((RANK[n], n) for n, t in tallies.items() if t.stands and n in names)
-        return tuple(tallies[name].finding for _, name in told)
+        told = [n for n, t in tallies.items() if t.stands and FAULTS[n].driving == driving]
+        return tuple(tallies[name].finding for name in sorted(told, key=RANK.__getitem__))
 
     @property
     def undecided(self) -> str:
@@ -209,7 +196,7 @@ class OnlineChecks:
         if self._verdicts.moved < TRIAL:
             return 'the first seconds of motion show whether signs and units are right'
         for name, tally in self._verdicts.tallies.items():
-            if tally.open and name in MEANINGLESS:
+            if tally.open and FAULTS[name].driving == 'slip':
                 return f'a fault of the inputs is not excluded yet ({name.replace("_", " ")})'
         return ''
 
@@ -287,9 +274,9 @@ class OnlineChecks:
             found = {f.fault: f for f in outcomes if isinstance(f, Finding)}
             silent = {entry.kind for entry in outcomes if isinstance(entry, NotChecked)}
             for name, finding in found.items():
-                if name not in MEANINGLESS | REMARKS or finding.confidence < LEAST_SURE:
+                if not FAULTS[name].driving or finding.confidence < LEAST_SURE:
                     continue
-                right = 0 if name in MAY_COME else clean.get((check, finding.kind), 0)
+                right = 0 if FAULTS[name].begins else clean.get((check, finding.kind), 0)
                 tally = tallies.get(name) or Tally(-min(right, MEMORY), check, finding)
                 tallies[name] = tally.after(finding)
             for name, tally in list(tallies.items()):

@@ -33,6 +33,8 @@ FASTEST_RIM = 15.0
 """Rim speed that no rover of this kind drives [m/s]."""
 FROZEN_TIME = 5.0
 """A rate that does not change in the last digit for this long [s] while the others do."""
+STEPS = 5.0
+"""Change of the other rates at a steady speed over the least change of a wheel's own [-]."""
 FROZEN_CHANGE = 0.3
 """Change of the other rates meanwhile, as a share of the working rate; steps of coarse encoders are
 none."""
@@ -87,7 +89,8 @@ def _frozen(evidence: Evidence, index: int, change: float, at_zero: bool) -> str
     """Return how a rate is frozen, at zero or elsewhere; '' if it is not."""
     rate, moving = evidence.rate, evidence.moving
     own, others = rate[:, index], np.delete(rate, index, axis=1)
-    longest = 0.0
+    steps, longest = np.abs(np.diff(own)), 0.0
+    least = np.min(steps[steps > SAME_VALUE * evidence.working_rate], initial=np.inf)
     for start, end in runs(np.diff(own) == 0.0):
         lasts = (end - start) * evidence.period  # a gap is none
         if lasts < FROZEN_TIME or (own[start] == 0.0) != at_zero:
@@ -98,9 +101,10 @@ def _frozen(evidence: Evidence, index: int, change: float, at_zero: bool) -> str
             lasts *= float(busy.mean())
             lively = lasts > FROZEN_TIME and not _held(evidence, index, np.r_[stretch][busy])
         else:
-            beside = np.nanmedian(others[stretch], axis=1)
+            beside = np.nanmax(others[stretch], axis=0) - np.nanmin(others[stretch], axis=0)
             steady = lasts > LONG_FROZEN_TIME and _repeats(others[stretch]) < 0.5
-            lively = bool(np.ptp(beside) > change or steady)
+            steady &= bool(np.nanmedian(beside) > STEPS * least)
+            lively = steady or float(np.mean(beside > change)) > 0.5
         if lively:
             longest = max(longest, lasts)
     if longest > 0.0:
@@ -115,7 +119,7 @@ def _frozen(evidence: Evidence, index: int, change: float, at_zero: bool) -> str
 def _repeats(rate: FloatArray) -> float:
     """Return the share of rates (k,) or (k, n) that repeat the one before."""
     change = np.diff(rate, axis=0)
-    return float(np.mean(change[np.isfinite(change)] == 0.0)) if np.isfinite(change).any() else 1.0
+    return float(np.mean(change[np.isfinite(change)] == 0.0)) if np.isfinite(change).any() else 0.0
 
 
 def _held(evidence: Evidence, index: int, rows: Any) -> bool:
