@@ -9,10 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from wheel_terra_estimator.checks.finding import Finding
 from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.configuration.parameters import plain_table
 
 RATE_UNITS = {
     'revolutions per minute': 2.0 * math.pi / 60.0,
@@ -41,13 +40,10 @@ class Fault:
     begins: str = ''
 
 
-def read_table(path: Path) -> dict[str, Fault]:
-    """Return the faults of a YAML file by name, in its order."""
-    text, loader = path.read_text(encoding='utf-8'), getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
-    return {name: Fault(**entry) for name, entry in yaml.load(text, loader).items()}
-
-
-FAULTS = read_table(Path(__file__).with_name('faults.yaml'))
+FAULTS = {
+    name: Fault(**entry)
+    for name, entry in plain_table(Path(__file__).with_name('faults.yaml')).items()
+}
 """The faults, worst first: one table for recordings and while driving."""
 RANK = {key: rank for rank, key in enumerate(FAULTS)}
 """Place of a fault, worst first."""

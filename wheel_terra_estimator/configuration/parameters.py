@@ -99,6 +99,13 @@ class Parameter:
         return words
 
 
+def plain_table(path: Path) -> dict[str, Any]:
+    """Return the entries of a YAML file of the package by name, in its order."""
+    loader = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
+    table: dict[str, Any] = yaml.load(path.read_text(encoding='utf-8'), loader)
+    return table
+
+
 def read_table(path: Path) -> tuple[tuple[Parameter, ...], dict[str, str]]:
     """Read a table of declarations.
 
@@ -112,9 +119,7 @@ def read_table(path: Path) -> tuple[tuple[Parameter, ...], dict[str, str]]:
     tuple
         Parameters in the order of the file; retired keys -> what became of them.
     """
-    table = yaml.load(
-        path.read_text(encoding='utf-8'), getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
-    )
+    table = plain_table(path)
     retired = table.pop('retired', {})
     found = []
     for name, entry in table.items():
