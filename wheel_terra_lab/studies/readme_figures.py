@@ -1,9 +1,9 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""README's figures of the estimator: drives of ten soils, scored once, written into README.
+"""README's figures of the estimator: drives of ten soils, scored once, written into the pages.
 
     python -m wheel_terra_lab.studies.readme_figures run --jobs 2   # goes on where it was ended
-    python -m wheel_terra_lab.studies.readme_figures write          # README.md, docs/figures.yaml
+    python -m wheel_terra_lab.studies.readme_figures write   # README, worth.md, figures.yaml
 
 All kinds of simulators A and B, each with and without a reference velocity, on ten seeds. A seed is
 one soil in A (in B also other rovers), so intervals are those of soils drawn anew. Each row of
@@ -35,6 +35,7 @@ ROOT = Path(__file__).resolve().parents[2]
 RESULTS = ROOT / 'docs' / 'figures.csv'
 FIGURES = ROOT / 'docs' / 'figures.yaml'
 README = ROOT / 'README.md'
+WORTH = ROOT / 'docs' / 'worth.md'
 BEGIN, END = '<!-- readme_figures: begin -->\n', '<!-- readme_figures: end -->\n'
 COMMAND = 'python -m wheel_terra_lab.studies.readme_figures run'
 WHAT = 'the estimator on simulated drives'
@@ -45,6 +46,8 @@ MODES = ('no_reference', 'reference')
 FIRST_SEED, SOILS = 7800, 10
 FILTERS = ('torque', 'pitch', 'curve')
 QUANTITIES = ('slip', 'sinkage', 'pull', *(f'{name}_filter' for name in FILTERS))
+WORST_KINDS = 5
+"""Of each simulator in the table of kinds."""
 DRAWS = 2000
 """Of the soils, for the 95 % intervals."""
 Row = Mapping[str, Any]
@@ -235,15 +238,58 @@ def markdown(rows: Sequence[Row]) -> str:
     return '\n'.join(lines) + '\n'
 
 
-def write(rows: Sequence[Row]) -> None:
-    """Put the table into README, and its cells into the file of all figures."""
-    commit = _one_commit(rows)
+def kinds(rows: Sequence[Row]) -> str:
+    """Return a table of the kinds of drives with the largest errors without a reference."""
+    lines = [
+        '| worst kinds | without a reference: slip; in the 95 % intervals | with one |',
+        '|---|---|---|',
+    ]
+    for simulator in DRIVEN:
+        found: dict[str, list[Row]] = defaultdict(list)
+        for row in rows:
+            if row['simulator'] == simulator:
+                found[row['kind']].append(row)
+        cells = {kind: [_of_mode(part, mode) for mode in MODES] for kind, part in found.items()}
+        worst = sorted(found, key=lambda kind: rms(cells[kind][0], 'slip'), reverse=True)
+        lines += [
+            f'| {simulator} {kind.replace("_", " ")} | '
+            + ' | '.join(f'{rms(c, "slip"):.3f}; {_coverage(c):.0f} %' for c in cells[kind])
+            + ' |'
+            for kind in worst[:WORST_KINDS]
+        ]
+    return '\n'.join(lines) + '\n'
+
+
+def _of_mode(rows: Sequence[Row], mode: str) -> list[Row]:
+    return [row for row in rows if row['mode'] == mode]
+
+
+def page(rows: Sequence[Row]) -> str:
+    """Return what stands in docs/worth.md: README's table, then the worst kinds of drives."""
     seeds = sorted(int(seed) for seed in by_soil(rows))
-    before, begin, rest = README.read_text(encoding='utf-8').partition(BEGIN)
+    said = (
+        f'Every kind of drive once on each of the seeds {seeds[0]} to {seeds[-1]}, commit '
+        f"{_one_commit(rows)}; the rover file's soil is off by 20 % and more. Drive by drive: "
+        '`docs/figures.csv`.\n'
+    )
+    return f'{said}\n{markdown(rows)}\n{kinds(rows)}'
+
+
+def _put(page: Path, text: str) -> None:
+    """Put a text between the two lines of a page that mark its place."""
+    before, begin, rest = page.read_text(encoding='utf-8').partition(BEGIN)
     _, end, after = rest.partition(END)
     if not (begin and end):
-        raise UserError(f'{README.name}: the lines {BEGIN.strip()} and {END.strip()} are missing')
-    README.write_text(f'{before}{BEGIN}{markdown(rows)}{END}{after}', encoding='utf-8')
+        raise UserError(f'{page.name}: the lines {BEGIN.strip()} and {END.strip()} are missing')
+    page.write_text(f'{before}{BEGIN}{text}{END}{after}', encoding='utf-8')
+
+
+def write(rows: Sequence[Row]) -> None:
+    """Put the tables into README and worth, README's cells into the file of all figures."""
+    commit = _one_commit(rows)
+    seeds = sorted(int(seed) for seed in by_soil(rows))
+    _put(README, markdown(rows))
+    _put(WORTH, page(rows))
     text = FIGURES.read_text(encoding='utf-8')
     comment = ''.join(line for line in text.splitlines(True) if line.startswith('#'))
     entry = {

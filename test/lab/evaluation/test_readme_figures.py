@@ -61,7 +61,7 @@ def test_rows_of_two_commits_are_refused() -> None:
 
 
 def test_written_in_its_place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in ('README', 'FIGURES'):
+    for name in ('README', 'WORTH', 'FIGURES'):
         source = getattr(readme_figures, name)
         copy = tmp_path / source.name
         copy.write_text(source.read_text(encoding='utf-8'), encoding='utf-8')
@@ -72,17 +72,20 @@ def test_written_in_its_place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
         entries = yaml.safe_load(readme_figures.FIGURES.read_text(encoding='utf-8'))
     assert readme.count(readme_figures.markdown(rows())) == 1
     assert readme.count('simulator A') == 1 and '0.394' not in readme
+    worth = readme_figures.WORTH.read_text(encoding='utf-8')
+    assert worth.count(readme_figures.page(rows())) == 1 and '0.394' not in worth
+    assert '| A climb | 0.245; 80 % | 0.245; 80 % |' in worth
     assert [entry['what'] for entry in entries].count(readme_figures.WHAT) == 1
     assert entries[0]['commit'] == 'abc1234' and entries[0]['seeds'] == '1 to 3'
     assert entries[0]['rows'] == readme_figures.table(rows())
 
 
 @pytest.mark.skipif(not readme_figures.RESULTS.is_file(), reason='the study was not run yet')
-def test_the_readme_shows_the_committed_results() -> None:
+def test_the_pages_show_the_committed_results() -> None:
     with readme_figures.RESULTS.open(encoding='utf-8', newline='') as stream:
-        assert readme_figures.markdown(list(csv.DictReader(stream))) in (
-            readme_figures.README.read_text(encoding='utf-8')
-        )
+        found = list(csv.DictReader(stream))
+    assert readme_figures.markdown(found) in readme_figures.README.read_text(encoding='utf-8')
+    assert readme_figures.page(found) in readme_figures.WORTH.read_text(encoding='utf-8')
 
 
 @pytest.mark.slow
