@@ -1,32 +1,45 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Stuck warning: raised by any sign of entrapment, cleared when none has been there for a while."""
+"""Stuck warning: raised by either of two signs, cleared when neither has been there for a while.
+
+Slip: an entrapment, ahead or under way, is more likely than the threshold, or the median slip is
+above 0.8. Standing: the wheels stand for want of power. Only driving slip counts, and a single
+wheel never raises a warning.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from math import isnan
 from typing import NamedTuple
 
 from wheel_terra_estimator.estimation.component import Component
-from wheel_terra_estimator.estimation.judgement.stuck.forecast import WheelForecast
-from wheel_terra_estimator.estimation.judgement.stuck.settings import StuckSettings
-from wheel_terra_estimator.estimation.judgement.stuck.signs import (
-    SIGNS,
-    Sign,
-    SignTuning,
-    in_words,
+from wheel_terra_estimator.estimation.judgement.entrapment import ENTRAPPED_SLIP
+from wheel_terra_estimator.estimation.judgement.stuck.forecast import (
+    Outlook,
+    WheelForecast,
+    outlook,
 )
+from wheel_terra_estimator.estimation.judgement.stuck.passage import FirstPassage
+from wheel_terra_estimator.estimation.judgement.stuck.settings import StuckSettings
 from wheel_terra_estimator.estimation.judgement.stuck.situation import (
-    Observed,
+    Memory,
     RoverMotion,
     Situation,
-    SituationObserver,
+    SituationTuning,
+    observe,
 )
 from wheel_terra_estimator.estimation.scalars import NAN
 
+ADVICE = 'stop, back out'
+"""What to do where wheels dig themselves in: they climb their own ruts better than fresh soil."""
+HOLDS = 0.5, 0.2
+"""Times for which the signs must be there [s]; the second: two readings of wheel odometry."""
+_DIGGING_SLIP, _SURE_STD = 0.8, 0.25
+"""Median slip above which a rover that drives on digs itself in, and how well it must be known."""
+_SURE = 2.0  # deviations within which a rover stands by its reference
+_AT_LIMIT = 0.2  # of the torque limit: farther above it the unit is wrong
 _TIME_ROUNDING = 1e-9  # [s]
-_SETTINGS, _TUNING = StuckSettings(), SignTuning()
+_SETTINGS, _TUNING = StuckSettings(), SituationTuning()
 
 
 class StuckAssessment(NamedTuple):
@@ -44,12 +57,12 @@ class StuckAssessment(NamedTuple):
 class StuckState(NamedTuple):
     """What the monitor remembers."""
 
-    observed: Observed
-    since: tuple[float, ...]  # when each sign came [s], nan = it is not there
+    memory: Memory = Memory()
+    since: tuple[float, float] = (NAN, NAN)  # when each sign came [s], nan = it is not there
     stuck: bool = False
     reason: str = ''
-    clear_since: float = NAN  # [s]
     direction: int = 0
+    clear_since: float = NAN  # [s]
 
 
 class StuckMonitor(Component[StuckState]):
@@ -59,61 +72,83 @@ class StuckMonitor(Component[StuckState]):
     ----------
     settings : StuckSettings
         The parameters.
-    signs : sequence of Sign
-        What raises the warning.
     """
 
     def __init__(
-        self,
-        settings: StuckSettings = _SETTINGS,
-        signs: Sequence[Sign] = SIGNS,
-        tuning: SignTuning = _TUNING,
+        self, settings: StuckSettings = _SETTINGS, tuning: SituationTuning = _TUNING
     ) -> None:
-        self._observer = SituationObserver(settings)
-        super().__init__(StuckState(self._observer.state, (NAN,) * len(signs)))
-        self._settings, self._signs, self._tuning = settings, tuple(signs), tuning
+        super().__init__(StuckState())
+        self._settings, self._tuning, self._passage = settings, tuning, FirstPassage()
 
     def update(self, time: float, motion: RoverMotion) -> StuckAssessment:
         """Judge the motion of the rover at a time [s]."""
-        self._observer.restore(self.state.observed)
-        situation = self._observer.update(time, motion)
-        since, raised = self._signs_at(time, situation)
-        old = self.state
-        stuck, reason, direction, clear_since = old.stuck, old.reason, old.direction, NAN
-        if raised:
-            if not stuck:
-                reason = in_words(raised[0], situation, self._tuning)
-                stuck, direction = True, situation.led_by
-        elif stuck:
-            clear_since = self._clear_since(time, situation, since)
-            if time - clear_since >= self._settings.clear_time:
-                stuck, reason, direction, clear_since = False, '', 0, NAN
-        self.state = StuckState(situation.observed, since, stuck, reason, clear_since, direction)
-        wheels = situation.outlook.wheels
+        old, settings = self.state, self._settings
+        situation = observe(old.memory, time, motion, self._tuning)
+        ahead = outlook(situation, self._passage, settings)
+        slips = motion.slip_told and situation.fastest > 0.0 and not situation.braked
+        likely = ahead.probability > settings.threshold or _digs(situation)
+        there = slips and likely, situation.standing
+        first, second = (
+            (time if isnan(begun) else begun) if sign else NAN
+            for sign, begun in zip(there, old.since, strict=True)
+        )
+        held = [
+            time - begun >= hold - _TIME_ROUNDING
+            for begun, hold in zip((first, second), HOLDS, strict=True)
+        ]
+        state = old._replace(memory=situation.memory, since=(first, second), clear_since=NAN)
+        if any(held) and not old.stuck:
+            memory = situation.memory
+            one_way = time - memory.way_since >= HOLDS[0] - _TIME_ROUNDING
+            direction = memory.way if one_way else 0
+            reason = _in_words(situation, ahead, settings, standing=not held[0])
+            state = state._replace(stuck=True, reason=reason, direction=direction)
+        elif old.stuck and not any(there) and situation.slip_magnitude < settings.clear_slip:
+            since = time if isnan(old.clear_since) else old.clear_since
+            free = time - since >= settings.clear_time
+            state = StuckState(situation.memory) if free else state._replace(clear_since=since)
+        self.state = state
         return StuckAssessment(
-            stuck, reason, wheels, situation.stalled, direction, stuck and situation.confirmed
+            state.stuck,
+            state.reason,
+            ahead.wheels,
+            situation.stalled,
+            state.direction,
+            state.stuck and _confirmed(situation),
         )
 
-    def _signs_at(self, time: float, situation: Situation) -> tuple[tuple[float, ...], list[Sign]]:
-        """Return since when each sign is there, and the signs that have been for long enough."""
-        since, raised = [], []
-        for sign, before in zip(self._signs, self.state.since, strict=True):
-            if not sign.present(situation, self._tuning):
-                since.append(NAN)
-                continue
-            begun = time if isnan(before) else before
-            since.append(begun)
-            held = time - begun >= sign.hold - _TIME_ROUNDING
-            if held and (sign.while_stopping or not situation.stopping):
-                raised.append(sign)
-        return tuple(since), raised
 
-    def _clear_since(self, time: float, situation: Situation, since: tuple[float, ...]) -> float:
-        """Return since when the rover seems to be free [s], nan = it does not.
+def _digs(s: Situation) -> bool:
+    return s.settled and s.slip > _DIGGING_SLIP and s.slip_std < _SURE_STD
 
-        A sign that is there counts, whether or not it has been for long enough to raise a warning.
-        """
-        slipping = not situation.typical_magnitude < self._settings.clear_slip
-        if slipping or not all(isnan(begun) for begun in since):
-            return NAN
-        return time if isnan(self.state.clear_since) else self.state.clear_since
+
+def _confirmed(s: Situation) -> bool:
+    """Whether the rover stands by a reference, or two wheels are at their torque limit.
+
+    In a wrong unit rim speeds make a slip near 1 of any speed, but no speed of zero; torques are
+    then far beyond their limit.
+    """
+    still = abs(s.motion.speed) < _SURE * s.slip_std * s.fastest
+    return (s.motion.speed_known and still) or abs(s.strain - 1.0) < _AT_LIMIT
+
+
+def _in_words(s: Situation, ahead: Outlook, settings: StuckSettings, *, standing: bool) -> str:
+    """Return what is seen, how likely an entrapment is, and what to do."""
+    count = sum(s.stalled)
+    if standing and count > 1:
+        told = f'{count} wheels stalled near their torque limit'
+    elif standing:
+        told = f'wheels slowed to {s.rim:.2f} m/s near their torque limit'
+    elif s.slip > ENTRAPPED_SLIP:
+        told = f'median slip {s.slip:.2f}: entrapment under way'
+    elif ahead.probability <= settings.threshold:
+        told = f'median slip {s.slip:.2f}: digging in'
+    else:
+        told = (
+            f'median slip {s.slip:.2f}: entrapment within {settings.horizon:g} s '
+            f'{ahead.probability:.0%} likely'
+        )
+    centimetres = round(100.0 * s.digging)
+    if centimetres > 0:
+        told += f', most wheels sink {centimetres} cm per metre of rim travel'
+    return f'{told}; {ADVICE}'

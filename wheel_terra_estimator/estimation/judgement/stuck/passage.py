@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from scipy.special import ndtr
 
 from wheel_terra_estimator.estimation.judgement.entrapment import ENTRAPPED_SLIP
+from wheel_terra_estimator.estimation.scalars import clipped, median
 
 FloatArray = NDArray[np.float64]
 
@@ -33,19 +34,21 @@ _CELLS = 48
 _STEP = 0.05
 """Rim travel of a step [m]: a second at 5 cm/s, for which an entrapment must last."""
 _STEPS = 80
+TRAVELS = _STEP * np.arange(_STEPS + 1)
+"""Rim travels at which the probability is told [m]."""
 _LEVELS = np.linspace(0.0, 1.6, 9) * ENTRAPPED_SLIP
 _LEAST_STD = 1e-3
 
 
 @dataclass(frozen=True)
 class SlipProcess:
-    """Greatest likelihood of what came, on simulators A and B, seeds 1000 to 1003 (140 drives)."""
+    """Near the greatest likelihood of what came, on tuning drives of simulators A, B and C."""
 
-    return_length: float = 0.264  # L [m]
-    scatter: float = 0.77  # sigma [1/sqrt(m)]
-    digging: float = 61.0  # k [1]: over the present slip and the sinkage gained per rim travel
-    usual_slip: float = 0.12  # of a rover in loose soil
-    usual_std: float = 0.43
+    return_length: float = 0.3  # L [m]
+    scatter: float = 0.8  # sigma [1/sqrt(m)]
+    digging: float = 45.0  # k [1]: over the present slip and the sinkage gained per rim travel
+    usual_slip: float = 0.06  # of a rover in loose soil
+    usual_std: float = 0.28
     """Deviation of slips around it: a slip that is hardly known is worth no more than this."""
 
 
@@ -64,18 +67,16 @@ class FirstPassage:
         self._table = _table(process)
 
     def probability(
-        self, slip: Sequence[float], std: Sequence[float], deepening: float, travel: float
+        self, slip: Sequence[float], std: Sequence[float], deepening: float
     ) -> FloatArray:
-        """Return the probability for each of n wheels, (n,).
+        """Return the probability within each of the `TRAVELS` for each of n wheels, (n, travels).
 
         Parameters
         ----------
         slip, std : sequence of float
             Present slip and its standard deviation [-].
         deepening : float
-            Sinkage gained over rim travel [m/m].
-        travel : float
-            Rim travel looked ahead [m]; what is beyond 4 m is taken as 4 m.
+            Sinkage gained over rim travel by the rover [m/m]; s_0 is the median slip.
         """
         process = self._process
         variance = np.square(np.maximum(std, _LEAST_STD))
@@ -84,33 +85,16 @@ class FirstPassage:
         below = ndtr((self._edges - mean[:, None]) / np.sqrt(known * variance)[:, None])
         weights = np.diff(below, axis=1)
         weights[:, 0] += below[:, 0]
-        level = process.digging * max(deepening, 0.0) * np.clip(mean, 0.0, 1.0)
-        place = np.minimum(level / _LEVELS[1], len(_LEVELS) - 1 - 1e-9)
-        i = place.astype(np.intp)
-        share = (place - i)[:, None]
-        k = min(int(travel / _STEP), _STEPS - 1)
-        part = min(travel / _STEP - k, 1.0)
-        ahead = (1.0 - part) * self._table[:, k] + part * self._table[:, k + 1]
-        return np.asarray(
-            1.0
-            - below[:, -1]
-            + np.add.reduce(weights * ((1.0 - share) * ahead[i] + share * ahead[i + 1]), axis=1)
-        )
-
-    def digging_travel(self, slip: float, deepening: float) -> float:
-        """Return the rim travel after which the expected slip passes the border [m]."""
-        process = self._process
-        level = process.digging * deepening * min(slip, 1.0)
-        if slip >= ENTRAPPED_SLIP:
-            return 0.0
-        if level <= ENTRAPPED_SLIP:
-            return math.inf
-        return process.return_length * math.log((level - slip) / (level - ENTRAPPED_SLIP))
+        level = process.digging * max(deepening, 0.0) * clipped(median(mean.tolist()), 0.0, 1.0)
+        place = min(level / _LEVELS[1], len(_LEVELS) - 1 - 1e-9)
+        i = int(place)
+        ahead = (1.0 - place + i) * self._table[i] + (place - i) * self._table[i + 1]
+        return np.asarray(1.0 - below[:, -1:] + weights @ ahead.T)
 
 
 @lru_cache(maxsize=4)
 def _table(process: SlipProcess) -> FloatArray:
-    """Return (levels, steps + 1, cells) the probability from the middle of each cell."""
+    """Return (levels, travels, cells) the probability from the middle of each cell."""
     edges = np.linspace(_LOWEST, ENTRAPPED_SLIP, _CELLS + 1)
     middle = 0.5 * (edges[1:] + edges[:-1])
     kept = math.exp(-_STEP / process.return_length)
