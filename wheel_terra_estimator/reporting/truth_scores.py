@@ -161,8 +161,9 @@ def _entrapped(history: EstimateHistory, slip: FloatArray) -> float | None:
 
 
 def _warnings(history: EstimateHistory, slip: FloatArray) -> tuple[tuple[float, Verdict], ...]:
-    starts = [span.start for span in _spans(history)]
-    return tuple(zip(starts, verdicts(history.seconds, slip, starts), strict=True))
+    spans = _spans(history)
+    found = verdicts(history.seconds, slip, spans)
+    return tuple((span.start, verdict) for span, verdict in zip(spans, found, strict=True))
 
 
 def seen_later(history: EstimateHistory, border: Border) -> tuple[str, ...]:

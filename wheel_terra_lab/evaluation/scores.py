@@ -207,7 +207,7 @@ def warnings(truth: Truth, record: Record, slip_radius: FloatArray) -> Warnings:
     warned = np.diff(np.concatenate([[0], record.stuck[position].astype(int), [0]]))
     starts, ends = time[np.flatnonzero(warned == 1)], np.append(time, np.inf)[warned == -1]
     spans = [Span(*pair) for pair in zip(starts.tolist(), ends.tolist(), strict=True)]
-    outcomes = [v.outcome for v in verdicts(time, truth.slip, starts.tolist())]
+    outcomes = [v.outcome for v in verdicts(time, truth.slip, spans)]
     rim = np.abs(truth.wheel_rate * slip_radius).mean(axis=1)
     travel = np.concatenate([[0.0], np.cumsum(rim[1:] * np.diff(time))])
     there = entrapments(time, truth.slip).there

@@ -42,7 +42,8 @@ def test_skidding_the_border_and_rest_are_none(value):
 
 def test_a_warning_was_right_a_near_miss_false_or_late():
     slip = course((300, 400, 0.95), (700, 705, -0.8))
-    told = verdicts(TIME, slip, [9.9, 10.1, 30.5, 35.0, 40.1, 51.0, 95.0])
+    starts = [9.9, 10.1, 30.5, 35.0, 40.1, 51.0, 95.0]
+    told = verdicts(TIME, slip, [Span(start, start + 1.0) for start in starts])
     outcomes = [Outcome.FALSE] + [Outcome.ENTRAPPED] * 3 + [Outcome.FALSE, Outcome.NEAR_MISS]
     assert [v.outcome for v in told] == [*outcomes, Outcome.FALSE]
     assert [v.lead for v in told[1:4]] == pytest.approx([20.9, 0.5, -4.0])
@@ -50,8 +51,14 @@ def test_a_warning_was_right_a_near_miss_false_or_late():
 
 
 def test_slip_above_0_9_for_less_than_a_second_is_a_near_miss():
-    (told,) = verdicts(TIME, course((300, 309, 1.0)), [20.0])
+    (told,) = verdicts(TIME, course((300, 309, 1.0)), [Span(20.0)])
     assert told == (Outcome.NEAR_MISS, None)
+
+
+def test_a_warning_that_stands_until_it_comes_was_right():
+    early, taken_back = verdicts(TIME, course((600, 700, 0.95)), [Span(10.0), Span(10.0, 59.0)])
+    assert early.outcome is Outcome.ENTRAPPED and early.lead == pytest.approx(51.0)
+    assert taken_back.outcome is Outcome.FALSE
 
 
 def test_the_lead_is_that_of_the_warning_that_stood():

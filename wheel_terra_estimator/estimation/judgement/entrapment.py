@@ -3,7 +3,8 @@
 """What an entrapment is, and whether a stuck warning was right: the one definition.
 
 A rover is entrapped once the median driving slip has been above 0.9 for a second. A warning was
-right if that begins within 20 s, a near miss if the median |slip| passes 0.75 then, else false.
+right if that begins within 20 s or while it stands, a near miss if the median |slip| passes 0.75
+within 20 s, else false.
 """
 
 from __future__ import annotations
@@ -81,15 +82,17 @@ def entrapments(time: FloatArray, slip: FloatArray) -> Entrapments:
     return Entrapments(np.array(begins, dtype=int), np.array(there, dtype=int), under_way)
 
 
-def verdicts(time: FloatArray, slip: FloatArray, starts: Sequence[float]) -> tuple[Verdict, ...]:
-    """Return what came of the warnings that rose at some times [s]; slip as in `entrapments`."""
+def verdicts(time: FloatArray, slip: FloatArray, warnings: Sequence[Span]) -> tuple[Verdict, ...]:
+    """Return what came of warnings; time and slip as in `entrapments`."""
     found = entrapments(time, slip)
     over = np.append(~found.under_way, True)
     ends = [row + int(np.argmax(over[row:])) for row in found.there]
     high = _median(np.abs(slip)) > NEAR_MISS_SLIP
     told = []
-    for start in starts:
-        first, last = np.searchsorted(time, [start, start + FORESIGHT]).tolist()
+    for start, taken_back in warnings:
+        first, soon, last = np.searchsorted(
+            time, [start, start + FORESIGHT, max(start + FORESIGHT, taken_back)]
+        ).tolist()
         ahead = [
             row
             for begin, row, end in zip(found.begins, found.there, ends, strict=True)
@@ -98,7 +101,7 @@ def verdicts(time: FloatArray, slip: FloatArray, starts: Sequence[float]) -> tup
         if ahead:
             told.append(Verdict(Outcome.ENTRAPPED, float(time[ahead[0]] - start)))
         else:
-            near = bool(high[first:last].any())
+            near = bool(high[first:soon].any())
             told.append(Verdict(Outcome.NEAR_MISS if near else Outcome.FALSE))
     return tuple(told)
 

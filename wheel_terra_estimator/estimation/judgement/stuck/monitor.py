@@ -32,8 +32,11 @@ from wheel_terra_estimator.estimation.scalars import NAN
 
 ADVICE = 'stop, back out'
 """What to do where wheels dig themselves in: they climb their own ruts better than fresh soil."""
-HOLDS = 0.5, 0.2
-"""Times for which the signs must be there [s]; the second: two readings of wheel odometry."""
+HOLD, SINKING_HOLD, STANDING_HOLD = 1.0, 0.5, 0.2
+"""Times [s] for which the signs must be there: slip, slip of wheels that sink, standing (two
+readings of wheel odometry). Where the rover stops, a reference stands up to 0.9 s before the wheels
+do, and none of them sinks."""
+_SINKING = 0.01  # sinkage gained over rim travel by most wheels [m/m]
 _DIGGING_SLIP, _SURE_STD = 0.8, 0.25
 """Median slip above which a rover that drives on digs itself in, and how well it must be known."""
 _SURE = 2.0  # deviations within which a rover stands by its reference
@@ -92,14 +95,15 @@ class StuckMonitor(Component[StuckState]):
             (time if isnan(begun) else begun) if sign else NAN
             for sign, begun in zip(there, old.since, strict=True)
         )
+        holds = SINKING_HOLD if situation.digging > _SINKING else HOLD, STANDING_HOLD
         held = [
             time - begun >= hold - _TIME_ROUNDING
-            for begun, hold in zip((first, second), HOLDS, strict=True)
+            for begun, hold in zip((first, second), holds, strict=True)
         ]
         state = old._replace(memory=situation.memory, since=(first, second), clear_since=NAN)
         if any(held) and not old.stuck:
             memory = situation.memory
-            one_way = time - memory.way_since >= HOLDS[0] - _TIME_ROUNDING
+            one_way = time - memory.way_since >= SINKING_HOLD - _TIME_ROUNDING
             direction = memory.way if one_way else 0
             reason = _in_words(situation, ahead, settings, standing=not held[0])
             state = state._replace(stuck=True, reason=reason, direction=direction)

@@ -203,7 +203,8 @@ def observe(memory: Memory, time: float, motion: RoverMotion, tuning: SituationT
         started = time
     rolled = memory.rolled + now.fastest * dt if moves else 0.0
     # Wheels settle into their ruts after a start; those that turn on the spot dig by command.
-    fresh = motion.turning or rolled < tuning.start_travel or not memory.ruts
+    fresh = motion.turning or rolled < tuning.start_travel
+    ruts = memory.ruts or tuple([w.sinkage for w in motion.wheels])
     way = memory.way
     if moves:
         forward = sum([1 if w.rim_speed > 0.0 else -1 for w in now.moving])
@@ -221,7 +222,7 @@ def observe(memory: Memory, time: float, motion: RoverMotion, tuning: SituationT
                     w.sinkage
                     if fresh
                     else rut + gain_of(abs(w.rim_speed) * dt, tuning.rut_length) * (w.sinkage - rut)
-                    for w, rut in zip(motion.wheels, memory.ruts or motion.wheels, strict=True)
+                    for w, rut in zip(motion.wheels, ruts, strict=True)
                 ]
             ),
             way=way,
