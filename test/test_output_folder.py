@@ -71,7 +71,7 @@ def test_a_folder_without_our_list_is_never_overwritten(tmp_path: Path, foreign:
     with pytest.raises(UserError, match='not overwritten'):
         write(out, overwrite=True)
     with pytest.raises(UserError, match='not overwritten'):
-        working_folder(out, True, False, ['summary.json'])
+        working_folder(out, True, False, ['summary.json']).__enter__()
     assert (out / foreign).exists()
 
 
@@ -188,19 +188,40 @@ def test_a_report_in_an_output_folder_is_listed(tmp_path: Path) -> None:
 def test_a_working_folder_goes_on_or_starts_anew(tmp_path: Path) -> None:
     run = tmp_path / 'run'
     entries = ['summary.json', '.work/']
-    working_folder(run, False, False, entries)
-    (run / '.work' / 'frames').mkdir(parents=True)
-    (run / '.work' / 'frames' / '0.npz').write_text('0')
+
+    def fill(overwrite: bool, resume: bool, name: str = '') -> None:
+        with working_folder(run, overwrite, resume, entries):
+            (run / '.work' / 'frames').mkdir(parents=True, exist_ok=True)
+            if name:
+                (run / '.work' / 'frames' / name).write_text('0')
+            raise KeyboardInterrupt
+
+    for _ in range(2):  # nothing was written: the place is free
+        with pytest.raises(KeyboardInterrupt):
+            fill(False, False)
+        assert not run.exists()
+    with pytest.raises(KeyboardInterrupt):
+        fill(False, False, '0.npz')
     with pytest.raises(UserError, match='--resume goes on with it, --overwrite replaces it'):
-        working_folder(run, False, False, entries)
-    working_folder(run, False, True, entries)
-    assert '.work/frames/0.npz' in contents(run)
-    working_folder(run, True, False, entries)
-    assert contents(run) == {}
+        fill(False, False)
+    with pytest.raises(KeyboardInterrupt):
+        fill(False, True)
+    assert set(contents(run)) == {'.work/frames/0.npz'}
+    with pytest.raises(KeyboardInterrupt):
+        fill(True, False, '1.npz')
+    assert set(contents(run)) == {'.work/frames/1.npz'}
     (run / 'notes.md').write_text('mine')
     with pytest.raises(UserError, match=r'notes\.md'):
-        working_folder(run, True, False, entries)
-    assert contents(run) == {'notes.md': 'mine'}
+        fill(True, False)
+    assert set(contents(run)) == {'.work/frames/1.npz', 'notes.md'}
+
+
+def test_an_empty_folder_of_the_user_stays(tmp_path: Path) -> None:
+    run = tmp_path / 'run'
+    run.mkdir()
+    with pytest.raises(UserError), working_folder(run, True, False, ['.work/']):
+        raise UserError('refused')
+    assert list(run.iterdir()) == []
 
 
 def test_commands_refuse_folders_of_others(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:

@@ -240,14 +240,18 @@ def new_file(
             os.close(held)
 
 
+@contextmanager
 def working_folder(
     path: Path,
     overwrite: bool,
     resume: bool,
     entries: Iterable[str],
     inputs: Iterable[Path] = (),
-) -> None:
-    """Make a folder that a command fills in place, so that an interrupted run can go on.
+) -> Iterator[None]:
+    """Make a folder that a command fills in place in the block, so that it can go on after an end.
+
+    Where the block ends with no result in it, the folder goes again: the next try finds the place
+    free.
 
     Parameters
     ----------
@@ -265,6 +269,7 @@ def working_folder(
     UserError
         See `check_folder`.
     """
+    found = path.is_dir() and not is_ours(path)  # then it is the user's, and stays
     if resume and path.is_dir():
         _refuse_place(path, inputs)
         if not is_ours(path):
@@ -282,6 +287,19 @@ def working_folder(
         mark(path, entries)
     except OSError as error:
         raise cannot_write(path, error) from None
+    try:
+        yield
+    finally:
+        with suppress(OSError, UserError):
+            if path.is_dir() and not any(_holds(path / name) for name in _own_files(path)):
+                _remove_own_files(path)
+                if found:
+                    path.mkdir()
+
+
+def _holds(entry: Path) -> bool:
+    """Whether a file (or what looks like one) holds something; empty folders do not."""
+    return not entry.is_dir() and entry.lstat().st_size > 0
 
 
 def mark(

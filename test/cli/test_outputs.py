@@ -6,11 +6,14 @@ from __future__ import annotations
 
 import argparse
 import re
+import socket
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
+from wheel_terra_estimator import scheduler
+from wheel_terra_estimator.cli import demo
 from wheel_terra_estimator.cli.main import main, sub_parsers
 from wheel_terra_estimator.cli.outputs import Output, file_or_entry
 from wheel_terra_estimator.configuration import reader, soil_file
@@ -145,3 +148,55 @@ def test_a_soil_file_replaces_no_file_of_another_kind(
     assert main(line) == 2
     assert f"does not begin with '# {soil_file.HEADER}'" in capsys.readouterr().err
     assert mine.read_bytes() == before
+
+
+REFUSED = {
+    'simulate': 'simulate --config {bad} -o',
+    'check': 'check {bag} --report',
+    'calibrate': 'calibrate {bag} -o',
+    'init': 'init --bag {bag} -o',
+    'config views': 'config views {bad} -o',
+    'compare': 'compare {bag} {bag} --report',
+    'convert': 'convert {table} -o',
+    'replay': 'replay {bag} {bad} --scheduler {silent} -o',
+    'predict': 'predict --points {table} -o',
+    'diagnose': 'diagnose {table} -o',
+    'trial': 'trial --effect nobody -o',
+    'soilbin run': 'soilbin run {bad} -o',
+    'soilbin reproduce': 'soilbin reproduce --no-cache --scheduler {silent} -o',
+    'soilbin rows': 'soilbin rows --no-cache --sweep pull --scheduler {silent} -o',
+    'reproduce': 'reproduce guo --figure 99 -o',
+    'evaluate': 'evaluate --hours 1 --first-seed -1 -o',
+    'bench': 'bench --against {table} --report',
+    'demo': 'demo --no-node -o',
+}
+"""Command line of every command that writes, refused as late as can be; the place is appended."""
+
+
+def test_the_refused_are_all_commands() -> None:
+    assert {' '.join(words) for words, parser in COMMANDS.items() if outputs(parser)} == {*REFUSED}
+
+
+@pytest.mark.parametrize('command', REFUSED)
+def test_a_refused_run_leaves_nothing_and_its_place_free(
+    command: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture,
+) -> None:
+    """The next try is refused for the same reason, not because of what the first one left."""
+    monkeypatch.setattr(scheduler, 'CONNECT_TIMEOUT', 0.2)
+    monkeypatch.setattr(demo.subprocess, 'run', lambda *_, **__: argparse.Namespace(returncode=2))
+    with socket.create_server(('127.0.0.1', 0)) as silent:
+        paths = {name: tmp_path / f'given.{name}' for name in ('bag', 'bad', 'table')}
+        for path in paths.values():
+            path.write_text('none of yours\n')
+        names = {**paths, 'silent': f'tcp://127.0.0.1:{silent.getsockname()[1]}'}
+        line = REFUSED[command].format(**names).split()
+        said = []
+        for _ in range(2):
+            assert main([*line, str(tmp_path / 'out')]) == 2
+            assert {path.name for path in tmp_path.iterdir()} == {p.name for p in paths.values()}
+            said.append(capsys.readouterr().err)
+    assert said[0] == said[1]
+    assert 'exists' not in said[0]

@@ -78,7 +78,12 @@ def run(arguments: argparse.Namespace) -> int:
     """Run the command."""
     output: Path = arguments.output
     entries = [f'{drive.name}{end}' for drive in DRIVES for end in ('/', '.html')]
-    working_folder(output, arguments.overwrite, False, [*entries, 'trial/'])
+    with working_folder(output, arguments.overwrite, False, [*entries, 'trial/']):
+        return _show(arguments, output)
+
+
+def _show(arguments: argparse.Namespace, output: Path) -> int:
+    """Run drives and trial into the folder; return the first status that is not 0."""
     live = not arguments.no_node and importlib.util.find_spec('rclpy') is not None
     if live:
         print('The drives go over DDS to estimator_node, as fast as it takes them.')

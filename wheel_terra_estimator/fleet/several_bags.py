@@ -13,7 +13,7 @@ import hashlib
 import json
 import sys
 from collections.abc import Generator, Iterator, Mapping, Sequence
-from contextlib import closing
+from contextlib import closing, contextmanager
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -111,10 +111,17 @@ def replay_bags(
     UserError
         The output folder cannot be used.
     """
+    with _folder(settings.output, bags, overwrite):
+        settings = replace(settings, output=settings.output.absolute())
+        return _replay_into(settings, bags, jobs, scheduler)
+
+
+def _replay_into(
+    settings: Settings, bags: Sequence[Path], jobs: int, scheduler: str
+) -> list[DriveRow]:
+    """Replay what the folder does not hold yet, and write what all came to."""
     output = settings.output
-    _open_folder(output, bags, overwrite)
     paths = [path.absolute() for path in bags]
-    settings = replace(settings, output=output.absolute())
     rows: dict[int, DriveRow] = {}
     digests: dict[int, str] = {}
     compared = finished(partial(_digest, settings), paths, jobs, scheduler)
@@ -143,7 +150,8 @@ def replay_bags(
     return told
 
 
-def _open_folder(output: Path, bags: Sequence[Path], overwrite: bool) -> None:
+@contextmanager
+def _folder(output: Path, bags: Sequence[Path], overwrite: bool) -> Iterator[None]:
     """Make the folder, or go on with one that an earlier run of this kind has begun."""
     ours = is_ours(output) and facts_of(output).items() >= HOLDS.items()
     if output.exists() and not ours and not overwrite:
@@ -154,11 +162,13 @@ def _open_folder(output: Path, bags: Sequence[Path], overwrite: bool) -> None:
     if ours:
         for left in output.glob('.*.wheel-terra-*'):
             remove_leftovers(output, left.name[1:].rpartition('.wheel-terra-')[0])
-    working_folder(output, overwrite, ours and not overwrite, [SUMMARY_TABLE, SUMMARY_PAGE], bags)
-    try:
-        mark(output, [], HOLDS)
-    except OSError as error:
-        raise cannot_write(output, error) from None
+    entries = SUMMARY_TABLE, SUMMARY_PAGE
+    with working_folder(output, overwrite, ours and not overwrite, entries, bags):
+        try:
+            mark(output, [], HOLDS)
+        except OSError as error:
+            raise cannot_write(output, error) from None
+        yield
 
 
 def _tasks(

@@ -119,15 +119,15 @@ def _run_one(arguments: argparse.Namespace, cache: Path | None) -> int:
     folder: Path = arguments.output
     work = folder / '.work'
     fresh = not folder.exists()
-    working_folder(folder, arguments.overwrite, arguments.resume, output.FILES)
     try:
-        with progress.bar() as report:
-            summary = run_case(case, work, cache, report)
-        output.write_folder(folder, work, case, summary, arguments.film)
+        with working_folder(folder, arguments.overwrite, arguments.resume, output.FILES):
+            with progress.bar() as report:
+                summary = run_case(case, work, cache, report)
+            output.write_folder(folder, work, case, summary, arguments.film)
     except StoppedByUserError as stopped:
         raise UserError(f'{stopped}; go on with --resume') from stopped
     except UserError:
-        if fresh and not any(work.rglob(STATE)):  # nothing that --resume could go on with
+        if fresh and folder.exists() and not any(work.rglob(STATE)):  # nothing for --resume
             shutil.rmtree(folder)
         raise
     except OSError as error:

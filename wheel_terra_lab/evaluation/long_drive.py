@@ -298,22 +298,22 @@ def drive_for_hours(
     UserError
         The folder cannot be written, or it holds another drive.
     """
-    working_folder(folder, overwrite, resume, FILES)
-    figures, state = folder / FIGURES, folder / STATE
-    lines: list[str] = []
-    if resume and state.is_file():
-        drive, lines = _resumed(state, hours, seed)
-    else:
-        drive = LongDrive(hours, seed)
-    figures.write_text(''.join(f'{line}\n' for line in lines), encoding='utf-8')
-    while not drive.over:
-        lines.append(drive.go_on(span).line())
-        with figures.open('a', encoding='utf-8') as stream:
-            stream.write(lines[-1] + '\n')
-        fresh = folder / f'.{STATE}.new'
-        fresh.write_bytes(pickle.dumps((__version__, drive, lines)))
-        fresh.replace(state)
-        progress(lines[-1])
+    with working_folder(folder, overwrite, resume, FILES):
+        figures, state = folder / FIGURES, folder / STATE
+        lines: list[str] = []
+        if resume and state.is_file():
+            drive, lines = _resumed(state, hours, seed)
+        else:
+            drive = LongDrive(hours, seed)
+        figures.write_text(''.join(f'{line}\n' for line in lines), encoding='utf-8')
+        while not drive.over:
+            lines.append(drive.go_on(span).line())
+            with figures.open('a', encoding='utf-8') as stream:
+                stream.write(lines[-1] + '\n')
+            fresh = folder / f'.{STATE}.new'
+            fresh.write_bytes(pickle.dumps((__version__, drive, lines)))
+            fresh.replace(state)
+            progress(lines[-1])
     return [json.loads(line) for line in lines]
 
 

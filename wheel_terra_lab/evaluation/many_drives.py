@@ -87,23 +87,23 @@ def drive_kinds_for_hours(
     UserError
         The folder cannot be written, or it holds other drives.
     """
-    working_folder(folder, overwrite, resume, (FIGURES,))
-    results = ResultFile(folder / FIGURES)
-    _check_same(results, chosen, modes, first_seed)
-    done = {
-        tuple(row[key] for key in ('simulator', 'kind', 'seed', 'mode')) for row in results.rows
-    }
-    driven = sum(row['hours'] for row in results.rows if row['mode'] == modes[-1])
-    for simulator, kind, seed in _drives(chosen, first_seed):
-        if driven >= hours:
-            break
-        missing = [mode for mode in modes if (simulator, kind, seed, mode) not in done]
-        if not missing:
-            continue
-        for figures in _figures(simulator, kind, seed, missing):
-            results.add(asdict(figures))
-            progress(json.dumps(results.rows[-1]))
-            driven += figures.hours if figures.mode == modes[-1] else 0.0
+    with working_folder(folder, overwrite, resume, (FIGURES,)):
+        results = ResultFile(folder / FIGURES)
+        _check_same(results, chosen, modes, first_seed)
+        done = {
+            tuple(row[key] for key in ('simulator', 'kind', 'seed', 'mode')) for row in results.rows
+        }
+        driven = sum(row['hours'] for row in results.rows if row['mode'] == modes[-1])
+        for simulator, kind, seed in _drives(chosen, first_seed):
+            if driven >= hours:
+                break
+            missing = [mode for mode in modes if (simulator, kind, seed, mode) not in done]
+            if not missing:
+                continue
+            for figures in _figures(simulator, kind, seed, missing):
+                results.add(asdict(figures))
+                progress(json.dumps(results.rows[-1]))
+                driven += figures.hours if figures.mode == modes[-1] else 0.0
     return results.rows
 
 

@@ -24,14 +24,14 @@ def run(arguments: argparse.Namespace, cache: Path | None) -> int:
     module = STUDIES[arguments.action]
     folder: Path = arguments.output
     table = folder / module.TABLE
-    working_folder(
+    jobs: list[Job] = module.jobs(arguments)
+    workers = 0 if arguments.report_only else arguments.jobs or os.cpu_count() or 1
+    with working_folder(
         folder,
         arguments.overwrite,
         arguments.resume or arguments.report_only,
         (module.TABLE, *module.PAGES, 'series/', WORK),
-    )
-    jobs: list[Job] = module.jobs(arguments)
-    workers = 0 if arguments.report_only else arguments.jobs or os.cpu_count() or 1
-    rows = run_study(jobs, table, folder / '.work', cache, workers, arguments.scheduler or '')
-    module.report(arguments, rows, folder)
+    ):
+        rows = run_study(jobs, table, folder / '.work', cache, workers, arguments.scheduler or '')
+        module.report(arguments, rows, folder)
     return 0

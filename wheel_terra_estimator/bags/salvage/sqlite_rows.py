@@ -14,6 +14,7 @@ import math
 import re
 import struct
 from array import array
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import islice, pairwise
 from mmap import mmap
@@ -35,10 +36,12 @@ _INDEX_HEAD = 3  # of a row of the index: its length, the kinds of time and numb
 
 # Head of a row: its length, nothing for the number (which stands before the row), then the kinds
 # of the columns: two whole numbers and a blob, or two texts and more.
-_MESSAGE = re.compile(rb'[\x05-\x09](?=\x00[\x01-\x06\x08\x09][\x01-\x06\x08\x09])')
-_TOPIC = re.compile(
-    rb'[\x04-\x20](?=\x00(?:[\x0f-\x7f]|[\x81-\x9f][\x00-\x7f])[\x0f-\x7f\x81-\x9f])'
+_MESSAGE = range(5, 10), re.compile(rb'[\x01-\x06\x08\x09][\x01-\x06\x08\x09]')
+_TOPIC = (
+    range(4, 33),
+    re.compile(rb'(?:[\x0f-\x7f]|[\x81-\x9f][\x00-\x7f])[\x0f-\x7f\x81-\x9f]'),
 )
+_BLOCK = 2**20  # that is searched at a time for the first two bytes of these [byte]
 _NAME = re.compile(rb'[/~A-Za-z_][A-Za-z0-9_/~{}.-]*')
 _TYPE = re.compile(rb'[A-Za-z][A-Za-z0-9_]*(/|::)[A-Za-z0-9_/:.-]+')
 _INTEGERS = {1: 1, 2: 2, 3: 3, 4: 4, 5: 6, 6: 8, 8: 0, 9: 0}  # kind -> size [byte]
@@ -146,9 +149,9 @@ class _Search:
         tried = 0
         found = array('q')  # columns: the first five of `Rows`, begin and end of the row, trust
         further = {}
-        for hit in islice(_MESSAGE.finditer(self._content), most):
+        for at in islice(_heads(self._content, *_MESSAGE), most):
             tried += 1
-            message = self._message(hit.start())
+            message = self._message(at)
             if message is not None:
                 columns, pages = message
                 found.extend(columns)
@@ -231,8 +234,8 @@ class _Search:
 
     def _topics(self) -> dict[int, tuple[str, str]]:
         found: dict[int, tuple[int, tuple[str, str]]] = {}
-        for hit in islice(_TOPIC.finditer(self._content), _FREE_STEPS):
-            row = self._row(hit.start())
+        for at in islice(_heads(self._content, *_TOPIC), _FREE_STEPS):
+            row = self._row(at)
             if row is None or len(row.kinds) < 3:
                 continue
             sizes = [(kind - _TEXT) // 2 for kind in row.kinds[1:3] if kind % 2]
@@ -387,8 +390,8 @@ class _Search:
         """Return the size of pages of a file whose header is lost."""
         self._size, self._usable = _PAGE_SIZES[-1], _PAGE_SIZES[-1]
         pages = set()
-        for hit in islice(_MESSAGE.finditer(self._content), _PROBES):
-            row = self._row(hit.start())
+        for at in islice(_heads(self._content, *_MESSAGE), _PROBES):
+            row = self._row(at)
             page = self._page_that_lists(row.begin) if row is not None else None
             if page is not None:
                 pages.add(page.begin)
@@ -441,6 +444,16 @@ class _Search:
 
     def _uint(self, at: int, size: int) -> int:
         return int.from_bytes(self._content[at : at + size], 'big')
+
+
+def _heads(content: Buffer, lengths: range, kinds: re.Pattern[bytes]) -> Iterator[int]:
+    """Yield where the head of a row can stand: a length, nothing for the number, kinds."""
+    for begin in range(0, len(content), _BLOCK):
+        block = np.frombuffer(content[begin : begin + _BLOCK + 1], dtype=np.uint8)
+        long = block[:-1] - np.uint8(lengths.start) < len(lengths)
+        for at in (np.flatnonzero(long & (block[1:] == 0)) + begin).tolist():
+            if kinds.match(content, at + 2):
+                yield at
 
 
 def _encoded(value: int) -> bytes:
