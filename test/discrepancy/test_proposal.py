@@ -58,6 +58,22 @@ def test_the_law_is_found_and_said_in_words(speedy):
         assert quantities['torque'].law < quantities['torque'].refit
 
 
+def test_what_acts_only_where_two_things_meet_is_a_product():
+    """Torque that grows with slip, the faster the more: one term, where single ones need three."""
+    table, values, *_ = make('full56')
+    decades = np.log10(table['angular_velocity'] * table['wheel_radius'] / REFERENCE_SPEED)
+    lever = table['normal_load'] * table['wheel_radius']
+    table['torque'] = table['torque'] + 0.2 * lever * np.abs(table['slip']) * decades
+    found = run(table, values)
+    assert found.verdict in ('unexplained', 'undecided')
+    proposal = found.proposal
+    pairs = list(zip(proposal.targets, proposal.features, strict=True))
+    at = pairs.index(('torque', 'slip_times_rim_speed'))
+    assert abs(proposal.coefficients[at] - 0.2) < 4.0 * proposal.coefficients_std[at]
+    assert 'per 0.1 of slip times decade of rim speed' in proposal.words
+    assert proposal.gap['torque'].after < 0.6 * proposal.gap['torque'].refit
+
+
 def test_the_file_of_the_law_gives_the_reported_gap(speedy, tmp_path):
     table, values, found = speedy
     configuration = reader.from_parameters(values, complete=False)

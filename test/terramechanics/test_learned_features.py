@@ -45,6 +45,14 @@ BY_HAND = {
     'pass': 2.0,  # earlier ones
     'slope': 0.1,
     'depth': 0.25,  # z/r = 1 - cos(t1)
+    'slip_times_load': 0.5,
+    'slip_times_lug': 0.025,
+    'slip_times_width': 0.25,
+    'slip_times_rim_speed': 0.5,
+    'slip_times_pass': 1.0,
+    'load_times_lug': 0.05,
+    'load_times_rim_speed': 1.0,
+    'load_times_pass': 2.0,
     'torque_squared': -0.9,  # against the way: 0.3^2 of W r, ten times as heavy as rho g b r^2
 }
 

@@ -3,7 +3,8 @@
 """Find a sparse law in the closures of the model, and judge it on what it was not fitted to.
 
 Terms (a target changed by a feature, see ``learned_closure``) are added one at a time, those with
-the greatest evidence first, soil and all terms refitted; then each is left out again. The law is
+the greatest evidence beyond the length of their description first, soil and all terms refitted;
+then each is left out again. A product of two features says two of them. The law is
 proposed only where it predicts whole levels of an input (loads, lug heights, wheels, ...) that
 were left out better than the soil refit does.
 """
@@ -11,7 +12,7 @@ were left out better than the soil refit does.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -40,6 +41,7 @@ from wheel_terra_estimator.terramechanics.effects.learned_closure import (
     EFFECT,
     FEATURES,
     NAME,
+    PRODUCTS,
     pair_of,
 )
 
@@ -49,7 +51,7 @@ IndexArray = NDArray[np.intp]
 MOST_TERMS = 4
 _BRANCHES = 3  # first terms that are gone on from, where laws do not predict what was left out
 _TRIED = 6  # terms of the greatest promise that are fitted in each step
-_WORTH = 3.0  # nats by which a term must raise the evidence beyond the choice among all terms
+_WORTH = 3.0  # nats by which a term must raise the evidence beyond those that say which it is
 _LEVELS = 6  # levels of an input that are left out one at a time, at most
 _CLOSED = 0.15  # share of the gap on what was left out that a law must close
 _SMALL_FLOOR = 0.015  # structural error that stays beside a law [share of the range]
@@ -200,10 +202,11 @@ def promise_on_top(table: SteadyTable, setting: Setting, fitted: Fit) -> float:
     """Return the nats that the best term of an unlisted law promises on top of a fit.
 
     Near zero where the fit leaves noise alone; several nats where what is left has the shape of
-    some closure, so that the named effect is not the whole truth, or not the truth. Bands of slip
-    and a bent reading are left out: the confidence that this is a feature of was fitted without.
+    some closure, so that the named effect is not the whole truth, or not the truth. Bands of slip,
+    products and a bent reading are left out: the confidence that this is a feature of was fitted
+    without.
     """
-    late = {*BANDS, *BENT_READING}
+    late = {*BANDS, *BENT_READING, *PRODUCTS}
     found = {name: term for name, term in _terms(table).items() if pair_of(name)[1] not in late}
     terms = replace(setting, effects=found)
     starts = linear_starts(terms, fitted, tuple(terms.effects))
@@ -217,8 +220,11 @@ def _terms(table: SteadyTable) -> dict[str, Effect]:
     found = {}
     for parameter in EFFECT.parameters:
         target, feature = pair_of(parameter.name)
-        columns = FEATURES[feature].columns
-        known = not columns or any(len(_levels(table, c)) > 2 for c in varying & set(columns))
+        parts = [FEATURES[part].columns for part in FEATURES[feature].factors or (feature,)]
+        known = all(
+            not columns or any(len(_levels(table, c)) > 2 for c in varying & set(columns))
+            for columns in parts
+        )
         if known and target not in set(QUANTITIES) - measured:
             found[parameter.name] = replace(EFFECT, parameters=(parameter,))
     return found
@@ -232,26 +238,35 @@ def _levels(table: SteadyTable, column: str) -> FloatArray:
 
 def _search(setting: Setting, nothing: Explanation, begun: Sequence[str] = ()) -> list[Explanation]:
     """Return laws of one, two, ... terms, each with the greatest evidence, not with `begun`."""
-    price = math.log(max(len(setting.effects), 1)) + _WORTH
-    best, score = nothing, nothing.log_evidence
-    found = []
+    price = _description_lengths(setting.effects)
+
+    def worth(law: Explanation) -> float:
+        return law.log_evidence - sum(price[name] for name in law.names)
+
+    best, found = nothing, list[Explanation]()
     for _ in range(MOST_TERMS):
         others = [name for name in setting.effects if name not in {*best.names, *begun}]
-        starts = sorted(linear_starts(setting, best.fitted, others), key=lambda s: -s[0])[:_TRIED]
+        starts = linear_starts(setting, best.fitted, others)
+        starts = sorted(starts, key=lambda s: price[s[1][-1]] - s[0])[:_TRIED]
         fits = setting.fit([n for _, n, _ in starts], [u for _, _, u in starts], best.fitted.angle)
-        tried = [setting.explain(f) for f in fits]
-        if not tried:
+        top = max((setting.explain(f) for f in fits), key=worth, default=None)
+        if top is None or worth(top) < worth(best):
             break
-        top = max(tried, key=lambda e: e.log_evidence)
-        if top.log_evidence - price < score:
-            break
-        best, score = top, top.log_evidence
+        best = top
         found.append(best)
     if len(best.names) > 2:
-        fewer = max(explain_fewer(setting, best), key=lambda e: e.log_evidence)
-        if fewer.log_evidence > best.log_evidence - price:  # later terms have made one idle
+        fewer = max(explain_fewer(setting, best), key=worth)
+        if worth(fewer) > worth(best):  # later terms have made one idle
             found.append(fewer)
     return found
+
+
+def _description_lengths(terms: Iterable[str]) -> dict[str, float]:
+    """Return the nats that it takes to say each term; a product says a second feature."""
+    single = [name for name in terms if pair_of(name)[1] not in PRODUCTS]
+    plain = math.log(max(len(single), 1)) + _WORTH
+    second = math.log(max(len({pair_of(name)[1] for name in single}), 1))
+    return {name: plain if name in single else plain + second for name in terms}
 
 
 def _groupings(table: SteadyTable, count: int) -> dict[str, IndexArray]:

@@ -16,7 +16,7 @@ from wheel_terra_estimator.discrepancy.tables.steady_table import (
     UNITS,
     SteadyTable,
 )
-from wheel_terra_estimator.terramechanics.effects.learned_closure import TARGETS, pair_of
+from wheel_terra_estimator.terramechanics.effects.learned_closure import FEATURES, TARGETS, pair_of
 from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
 
 _TWICE = math.log(2.0)  # from which a growth is said as a factor
@@ -56,7 +56,7 @@ def law_in_words(
     for name, value in zip(names, coefficients, strict=True):
         target, feature = pair_of(name)
         law = TARGETS[target]
-        per, step = _PER[feature]
+        per, step = _per(feature)
         change = value * step
         change *= law.bound / (law.bound + abs(change))
         if law.factor and change > _TWICE:
@@ -73,6 +73,13 @@ def law_in_words(
         parts.append(f'{law.meaning} {"grows" if change > 0.0 else "falls"} by {size} {per}')
     text = '; '.join(parts)
     return f'{text[0].upper()}{text[1:]}, beyond what the soil explains.'
+
+
+def _per(feature: str) -> tuple[str, float]:
+    """Return for which step of a feature a change is stated, and that step."""
+    parts = [_PER[part] for part in FEATURES[feature].factors or (feature,)]
+    words = ' times '.join(text.removeprefix('per ') for text, _ in parts)
+    return parts[0][0] if len(parts) == 1 else f'per {words}', math.prod(s for _, s in parts)
 
 
 def _size(target: str, change: float, table: SteadyTable, points: OperatingPoints) -> str:

@@ -7,7 +7,8 @@ A closure (a target) is changed by a sum of coefficients times dimensionless fea
     x = sum of coefficient * feature        x' = L x / (L + |x|)   (bounded by L)
 
 Factors are multiplied by exp(x'), offsets are increased by x'. Each pair of target and feature is
-one parameter here (``torque_by_rim_speed``); configuration files state them as flat lists.
+one parameter here (``torque_by_rim_speed``); a feature may be the product of two
+(``torque_by_slip_times_load``). Configuration files state them as flat lists.
 """
 
 from __future__ import annotations
@@ -26,6 +27,8 @@ _BY = '_by_'
 _LEAST = 1e-9  # keeps logarithms finite
 _BAND = 0.25  # half width of a band of slip, at its foot [-]
 _AFTER_CONTACT = ('torque', 'drawbar_pull')  # may depend on the sinkage
+_TIMES = '_times_'  # between the features of a product
+_OF_PRODUCTS = ('bearing_pressure', 'exponent', 'friction', *_AFTER_CONTACT, 'sinkage')
 # Soil that peaks at some shear displacement and then softens, or a reading that is off there.
 _IN_A_BAND = ('friction', 'torque', 'drawbar_pull', 'sinkage')
 
@@ -69,6 +72,8 @@ class Feature:
         For people.
     targets : tuple of str
         Closures that may use it; none: all.
+    factors : tuple of str
+        Names of the two features that a product multiplies.
     """
 
     value: Callable[[Contact, Any], Any]
@@ -76,6 +81,7 @@ class Feature:
     columns: tuple[str, ...]
     meaning: str
     targets: tuple[str, ...] = ()
+    factors: tuple[str, ...] = ()
 
 
 TARGETS: Mapping[str, Target] = {
@@ -145,7 +151,7 @@ BENT_READING: Mapping[str, Feature] = {
     ),
 }
 
-FEATURES: Mapping[str, Feature] = {
+_SINGLE: Mapping[str, Feature] = {
     'one': Feature(lambda c, m: 1.0 + 0.0 * c.slip, 1.0, (), 'everywhere alike'),
     'slip': Feature(lambda c, m: m.abs(c.slip), 0.5, ('slip',), '|s|'),
     'slip_squared': Feature(lambda c, m: c.slip * c.slip, 0.4, ('slip',), 's^2'),
@@ -170,6 +176,35 @@ FEATURES: Mapping[str, Feature] = {
     ),
     **BENT_READING,
 }
+
+
+def _product(first: str, second: str) -> Feature:
+    """Return a feature for what acts only where two others do."""
+    one, other = _SINGLE[first], _SINGLE[second]
+    return Feature(
+        lambda c, m: one.value(c, m) * other.value(c, m),
+        one.spread * other.spread,
+        (*one.columns, *other.columns),
+        f'{one.meaning} times {other.meaning}',
+        _OF_PRODUCTS,
+        (first, second),
+    )
+
+
+PRODUCTS: Mapping[str, Feature] = {
+    f'{first}{_TIMES}{second}': _product(first, second)
+    for first, second in (
+        ('slip', 'load'),
+        ('slip', 'lug'),
+        ('slip', 'width'),
+        ('slip', 'rim_speed'),
+        ('slip', 'pass'),
+        ('load', 'lug'),
+        ('load', 'rim_speed'),
+        ('load', 'pass'),
+    )
+}
+FEATURES: Mapping[str, Feature] = {**_SINGLE, **PRODUCTS}
 
 
 def allowed(target: str, feature: str) -> bool:
