@@ -17,7 +17,7 @@ from wheel_terra_lab.evaluation.scores import coverage, rms
 
 SEED = 1090
 LENGTH = 12.0  # of a drive [s]; the first ten are not scored
-HOURS = 3.5 * LENGTH / 3600.0
+HOURS = 2.5 * LENGTH / 3600.0
 CHOSEN = [('A', 'cruise'), ('A', 'climb')]
 
 
@@ -50,12 +50,11 @@ def test_seed_after_seed_until_the_hours_are_driven_and_gone_on_with(short, tmp_
         ('cruise', SEED),
         ('climb', SEED),
         ('cruise', SEED + 1),
-        ('climb', SEED + 1),
     ]
-    assert sum(row['hours'] for row in rows[:3]) < HOURS <= sum(row['hours'] for row in rows)
+    assert sum(row['hours'] for row in rows[:2]) < HOURS <= sum(row['hours'] for row in rows)
     assert all(row['slip_samples'] > 0 and row['metres'] > 0.0 for row in rows)
 
-    # Killed while the third line was written.
+    # Killed while the last line was written.
     lines = (tmp_path / 'whole' / 'drives.jsonl').read_text().splitlines(keepends=True)
     broken = tmp_path / 'broken'
     drive_kinds_for_hours(broken, 1e-9, CHOSEN, modes, SEED, progress=str)
@@ -64,7 +63,7 @@ def test_seed_after_seed_until_the_hours_are_driven_and_gone_on_with(short, tmp_
     again = drive_kinds_for_hours(
         broken, HOURS, CHOSEN, modes, SEED, resume=True, progress=told.append
     )
-    assert without_process(again) == without_process(rows) and len(told) == 2
+    assert without_process(again) == without_process(rows) and len(told) == 1
     assert [json.loads(line) for line in (broken / 'drives.jsonl').open()] == again
     for other in (
         {'chosen': CHOSEN[:1]},

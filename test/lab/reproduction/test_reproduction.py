@@ -25,7 +25,7 @@ def test_all_papers_stand_on_one_page_with_a_verdict_each(tmp_path, capsys):
     assert {path.name for path in folder.glob('*.svg')} == {'ding.svg', 'nakashima.svg'}
 
 
-def test_one_figure_alone_and_one_that_is_not_there(tmp_path, capsys):
+def test_one_figure_alone_and_one_that_is_not_there(tmp_path, capsys, undrawn):
     assert main(['reproduce', 'nakashima', '--figure', '12', '-o', str(tmp_path / 'a')]) == 0
     page = capsys.readouterr().out
     assert 'figure 12(a)' in page and 'figure 12(b)' in page and 'table 7' not in page
