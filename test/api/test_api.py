@@ -285,6 +285,8 @@ def test_units_go_with_frames(drive):
     estimates, truth = api.estimate(drive), drive.truth.to_frame()
     wheel = drive.configuration.wheels.names[0]
     assert estimates.attrs['units'][f'pull_margin.{wheel}'] == 'N'
+    assert estimates.attrs['units'][f'lateral_force.{wheel}'] == 'N'
+    assert estimates.attrs['units'][f'slip_angle_std.{wheel}'] == 'rad'
     assert truth.attrs['units'][f'slip_velocity.{wheel}'] == 'm/s'
     beside = estimates[[f'slip.{wheel}']].join(truth[[f'slip.{wheel}']], rsuffix='.true')
     assert len(beside) == len(estimates)

@@ -244,16 +244,12 @@ def _estimated(
 
 
 def _result(history: Any, as_frame: bool) -> DataFrame | Columns:
-    stuck = np.zeros(history.stamp.size, dtype=bool)
-    for warning in history.warnings:
-        until = True if warning.end is None else history.stamp < warning.end
-        stuck |= (history.stamp >= warning.start) & until
     columns: Columns = {
         'stamp': history.stamp,
         'time': history.seconds,
         'forward_velocity': history.forward_velocity,
         'forward_velocity_std': history.forward_velocity_std,
-        'stuck': stuck,
+        'stuck': history.stuck,
     }
     for field, values in {**history.values, 'slip_class': history.slip_class}.items():
         columns |= {f'{field}.{name}': values[:, i] for i, name in enumerate(history.names)}

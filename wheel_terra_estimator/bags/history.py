@@ -166,6 +166,15 @@ class EstimateHistory:
         """Time since the first set [s]."""
         return (self.stamp - self.stamp[0]) * 1e-9 if self.stamp.size else np.empty(0)
 
+    @property
+    def stuck(self) -> NDArray[np.bool_]:
+        """Whether a stuck warning ran, per set."""
+        running = np.zeros(self.stamp.size, dtype=bool)
+        for warning in self.warnings:
+            until = True if warning.end is None else self.stamp < warning.end
+            running |= (self.stamp >= warning.start) & until
+        return running
+
     def figures(self) -> DriveFigures:
         """Return the figures of the whole drive."""
         if self.whole is not None:

@@ -23,6 +23,7 @@ from wheel_terra_estimator.configuration import reader as configuration_reader
 from wheel_terra_estimator.configuration.readings import Readings
 from wheel_terra_estimator.discrepancy.tables.steady_table import INPUT_UNITS
 from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.frames import unit_of
 from wheel_terra_estimator.output_folder import check_file, new_file
 from wheel_terra_estimator.terramechanics.model import METHODS, OVERLOADED, WheelSoilModel
 from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
@@ -391,10 +392,7 @@ def _write_csv(columns: Mapping[str, FloatArray], stream: Any) -> None:
 
 
 def _write_text(columns: Mapping[str, FloatArray], stream: Any) -> None:
-    units = {'slip': '-', 'normal_load': 'N', 'drawbar_pull': 'N', 'torque': 'N m', SIDEWAYS: 'N'}
-    units |= dict.fromkeys(('sinkage', 'wheel_radius', 'wheel_width', 'lug_height'), 'm')
-    units |= dict.fromkeys(('slope', 'slip_angle', *ANGLES), 'rad')
-    heads = [f'{name} [{units[name]}]' if name in units else name for name in columns]
+    heads = [f'{name} [{unit_of(name)}]' for name in columns]
     stream.write('  '.join(heads) + '\n')
     for row in zip(*columns.values(), strict=True):
         cells = (f'{value:.5g}'.rjust(len(head)) for value, head in zip(row, heads, strict=True))

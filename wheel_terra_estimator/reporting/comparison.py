@@ -18,12 +18,12 @@ from wheel_terra_estimator.bags.truth import Truth
 from wheel_terra_estimator.bags.writer import Origin
 from wheel_terra_estimator.configuration.parameters import declared
 from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.frames import unit_of
 from wheel_terra_estimator.output_folder import new_file
 from wheel_terra_estimator.reporting import truth_scores
 from wheel_terra_estimator.reporting.drive_figure import SLIP_RANGE
 from wheel_terra_estimator.reporting.drive_style import Border, known
 from wheel_terra_estimator.reporting.drive_summary import short_names
-from wheel_terra_estimator.reporting.estimates_table import UNITS
 from wheel_terra_estimator.reporting.style import LINE_COLOURS, RIM_COLOUR
 from wheel_terra_estimator.reporting.time_figure import (
     Panel,
@@ -143,7 +143,7 @@ def _difference(
     row, wheel = np.unravel_index(int(np.argmax(np.abs(change))), change.shape)
     return Difference(
         name=name,
-        unit=UNITS[name],
+        unit=unit_of(name),
         mean=float(change.mean()),
         rms=float(np.sqrt(np.mean(change**2))),
         greatest=float(change[row, wheel]),

@@ -4,31 +4,17 @@
 
 from __future__ import annotations
 
-import csv
 import importlib
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from wheel_terra_estimator.bags.history import EstimateHistory
+from wheel_terra_estimator.bags.history import WHEEL_FIELDS, EstimateHistory
+from wheel_terra_estimator.csv_file import write_csv
 from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.frames import unit_of
 
-UNITS = {
-    'slip': '-',
-    'slip_std': '-',
-    'slip_velocity': 'm/s',
-    'drawbar_pull': 'N',
-    'drawbar_pull_std': 'N',
-    'sinkage': 'm',
-    'sinkage_std': 'm',
-    'normal_load': 'N',
-    'rim_travel_left': 'm',
-    'pull_margin': 'N',
-    'slip_angle': 'rad',
-    'slip_angle_std': 'rad',
-    'lateral_force': 'N',
-}
 SUFFIXES = ('.csv', '.parquet')
 
 
@@ -48,20 +34,11 @@ def columns_of(history: EstimateHistory) -> dict[str, Any]:
         'wheel': np.tile(np.array(history.names, dtype=object), sets),
         'slip_class': history.slip_class.reshape(-1),
     }
-    for name, unit in UNITS.items():
-        table[f'{name} [{unit}]'] = history.values[name].reshape(-1)
+    for name in WHEEL_FIELDS:
+        table[f'{name} [{unit_of(name)}]'] = history.values[name].reshape(-1)
     table['forward_velocity [m/s]'] = np.repeat(history.forward_velocity, wheels)
-    table['stuck'] = np.repeat(stuck_at(history), wheels)
+    table['stuck'] = np.repeat(history.stuck, wheels)
     return table
-
-
-def stuck_at(history: EstimateHistory) -> Any:
-    """Return whether a stuck warning ran, per set."""
-    running = np.zeros(history.stamp.size, dtype=bool)
-    for warning in history.warnings:
-        end = history.stamp[-1] + 1 if warning.end is None else warning.end
-        running |= (history.stamp >= warning.start) & (history.stamp < end)
-    return running
 
 
 def write_table(history: EstimateHistory, path: Path) -> None:
@@ -70,10 +47,7 @@ def write_table(history: EstimateHistory, path: Path) -> None:
     if path.suffix == '.parquet':
         _pandas(path).DataFrame(table).to_parquet(path, index=False)
         return
-    with path.open('w', newline='', encoding='utf-8') as file:
-        writer = csv.writer(file)
-        writer.writerow(table)
-        writer.writerows(zip(*(column.tolist() for column in table.values()), strict=True))
+    write_csv(path, table, zip(*(column.tolist() for column in table.values()), strict=True))
 
 
 def _pandas(path: Path) -> Any:

@@ -4,13 +4,13 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
 from wheel_terra_estimator.checks.finding import CheckReport
+from wheel_terra_estimator.csv_file import write_csv
 from wheel_terra_estimator.estimation.estimates import SlipClass
 from wheel_terra_estimator.reporting.drive_style import CLASS_COLOURS
 from wheel_terra_estimator.reporting.drive_summary import DriveSummary
@@ -95,20 +95,21 @@ def write_table(rows: Sequence[DriveRow], path: Path) -> None:
     header = ['bag', 'folder', 'duration [s]', 'sets', 'stuck_warnings', 'first_warning [s]']
     header += [f'{c} [s]' for c in CLASSES]
     header += ['longest_stuck [s]', 'max_slip', 'max_sinkage [m]', 'findings', 'error']
-    with path.open('w', newline='', encoding='utf-8') as file:
-        writer = csv.writer(file)
-        writer.writerow(header)
-        for row in rows:
-            figures: list[Any] = [''] * (len(header) - 4)
-            if not row.error:
-                first = '' if row.first_warning is None else f'{row.first_warning:.3f}'
-                figures = [f'{row.duration:.3f}', row.sets, row.stuck_warnings, first]
-                figures += [f'{row.seconds[c]:.3f}' for c in CLASSES]
-                figures += [f'{row.longest_stuck:.3f}']
-                extremes = (row.max_slip, row.max_sinkage)
-                figures += ['' if value is None else f'{value:.4f}' for value in extremes]
-            findings = '; '.join(row.findings)
-            writer.writerow([row.bag, row.folder, *figures, findings, row.error])
+    blank = [''] * (len(header) - 4)
+    table: list[list[Any]] = [
+        [r.bag, r.folder, *(blank if r.error else _figures(r)), '; '.join(r.findings), r.error]
+        for r in rows
+    ]
+    write_csv(path, header, table)
+
+
+def _figures(row: DriveRow) -> list[Any]:
+    def told(value: float | None, digits: int) -> str:
+        return '' if value is None else f'{value:.{digits}f}'
+
+    figures = [told(row.duration, 3), row.sets, row.stuck_warnings, told(row.first_warning, 3)]
+    figures += [told(row.seconds[c], 3) for c in CLASSES]
+    return [*figures, told(row.longest_stuck, 3), told(row.max_slip, 4), told(row.max_sinkage, 4)]
 
 
 def write_summary_page(rows: Sequence[DriveRow], path: Path, report: str = '') -> None:

@@ -4,9 +4,9 @@
 
 from __future__ import annotations
 
-import csv
 from pathlib import Path
 
+from wheel_terra_estimator.csv_file import write_csv
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.estimation.estimates import SLOPES, SlipOnSlope
 from wheel_terra_estimator.reporting.style import LINE_COLOURS, WARNING_COLOUR
@@ -25,11 +25,8 @@ def check_slopes(path: Path) -> None:
 
 def write_slopes(found: SlipOnSlope, path: Path) -> None:
     """Write a row for each slope as CSV."""
-    with path.open('w', newline='', encoding='utf-8') as file:
-        writer = csv.writer(file)
-        writer.writerow(_HEAD)
-        for row in zip(SLOPES, *found, strict=True):
-            writer.writerow([f'{value:.6g}' for value in row])
+    rows = zip(SLOPES, *found, strict=True)
+    write_csv(path, _HEAD, ([f'{value:.6g}' for value in row] for row in rows))
 
 
 def slopes_figure(found: SlipOnSlope) -> TimeFigure:

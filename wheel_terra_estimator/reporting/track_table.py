@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import math
 from pathlib import Path
@@ -13,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from wheel_terra_estimator.bags.track import COLUMNS, Track
+from wheel_terra_estimator.csv_file import write_csv
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.estimation.estimates import SlipClass
 
@@ -51,17 +51,14 @@ def write_track(track: Track, path: Path, origin: tuple[float, float] = (0.0, 0.
     if path.suffix == '.geojson':
         path.write_text(json.dumps(as_geojson(track, origin), indent=1) + '\n', encoding='utf-8')
         return
-    with path.open('w', newline='', encoding='utf-8') as file:
-        writer = csv.writer(file)
-        heads = [f'{name} [{unit}]' if unit else name for name, unit in COLUMNS.items()]
-        writer.writerow(['stamp [ns]', *heads])
-        columns = [
-            [int(v) for v in track.values[name]]
-            if name in WHOLE
-            else [f'{v:.{DIGITS}g}' for v in track.values[name]]
-            for name in COLUMNS
-        ]
-        writer.writerows(zip(track.stamp.tolist(), *columns, strict=True))
+    heads = [f'{name} [{unit}]' if unit else name for name, unit in COLUMNS.items()]
+    columns = [
+        [int(v) for v in track.values[name]]
+        if name in WHOLE
+        else [f'{v:.{DIGITS}g}' for v in track.values[name]]
+        for name in COLUMNS
+    ]
+    write_csv(path, ['stamp [ns]', *heads], zip(track.stamp.tolist(), *columns, strict=True))
 
 
 def as_geojson(track: Track, origin: tuple[float, float]) -> dict[str, Any]:
