@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The soil file of a node: nobody else's file is written, one node writes, nothing fails unsaid."""
 
+import argparse
 import errno
 import json
 import os
@@ -15,6 +16,7 @@ from wheel_terra_estimator import output_folder
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.configuration.soil_file import HEADER, StuckState, write_values
 from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.ros import kept_soil, lifecycle_node
 from wheel_terra_estimator.ros.kept_soil import KeptSoil
 from wheel_terra_estimator.ros.lifecycle_node import why_no_arrival_log
 
@@ -223,3 +225,34 @@ def test_a_damaged_state_is_told_and_the_soil_is_kept_all_the_same(tmp_path):
         kept.save(LEARNED, STUCK)
     assert path.exists()
     assert json.loads(state.read_text()) == ['no state']
+
+
+def test_every_file_of_the_nodes_was_decided_on_by_the_one_function(
+    tmp_path, monkeypatch, listener
+):
+    """Soil and warning of the estimator, its arrival log, the stop of the limiter."""
+    from rclpy.parameter import Parameter
+
+    from wheel_terra_estimator.ros.limiter_node import TractionLimiter
+
+    asked = set()
+
+    def ask(path, *arguments, decide=output_folder.check_target, **options):
+        decide(path, *arguments, **options)
+        asked.add(path)
+
+    for module in (output_folder, kept_soil, lifecycle_node):
+        monkeypatch.setattr(module, 'check_target', ask)
+    kept = KeptSoil(tmp_path / 's.yaml')
+    kept.save(LEARNED, STUCK)
+    kept.close()
+    configuration = reader.load(['pathfinder'], [f'record_arrival:={tmp_path / "arrival.txt"}'])
+    lifecycle_node.EstimatorNode._open_arrival_log(
+        argparse.Namespace(_files=()), configuration
+    ).close()
+    stop = Parameter('state_file', value=str(tmp_path / 'limiter.json'))
+    TractionLimiter(context=listener[0].context, parameter_overrides=[stop]).destroy_node()
+    written = {path for path in tmp_path.iterdir() if path.suffix != '.lock'}
+    assert asked == written == {
+        tmp_path / name for name in ('s.yaml', 's.yaml.state.json', 'arrival.txt', 'limiter.json')
+    }  # fmt: skip

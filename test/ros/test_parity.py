@@ -2,6 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """A recording over DDS through the real node gives the numbers of a replay, to the bit."""
 
+import signal
+import subprocess
+import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -120,3 +124,19 @@ def test_as_fast_as_it_goes_is_in_the_order_of_the_bag(tmp_path):
     run_live(source, live, *REPLAY['pathfinder'])
     assert main(['replay', str(source), '-o', str(again), *REPLAY['pathfinder']]) == 0
     assert_same_bits(live, again, least=90)
+
+
+def test_ctrl_c_ends_a_live_drive_without_a_traceback(own_domain, tmp_path):
+    recording = DEMO / 'pathfinder'
+    command = [sys.executable, '-m', 'wheel_terra_estimator.ros.live_drive', str(recording)]
+    command += ['--config', 'pathfinder', '--rate', '0.1', '-o', str(tmp_path / 'out')]
+    command += ['--arrival', str(tmp_path / 'arrival.txt')]
+    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+    until = time.monotonic() + 60.0
+    while not (tmp_path / 'arrival.txt').is_file() and time.monotonic() < until:
+        time.sleep(0.1)
+    process.send_signal(signal.SIGINT)
+    _, said = process.communicate(timeout=60.0)
+    assert process.returncode == 130
+    assert 'Traceback' not in said and said.endswith('live_drive: interrupted\n')
+    assert not (tmp_path / 'out').exists()

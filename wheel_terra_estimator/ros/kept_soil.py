@@ -4,25 +4,22 @@
 
 from __future__ import annotations
 
-import errno
-import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 from wheel_terra_estimator.configuration import soil_file
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.configuration.soil_file import StuckState
 from wheel_terra_estimator.errors import UserError
-from wheel_terra_estimator.output_folder import cannot_write, check_target, try_to_write
-
-_TAKEN = (errno.EWOULDBLOCK, errno.EACCES, errno.EAGAIN)  # by another process
+from wheel_terra_estimator.output_folder import check_target, try_to_write
+from wheel_terra_estimator.ros.file_claim import FileClaim
 
 
 class KeptSoil:
     """Soil, sensor biases and stuck warning of one node in the file of its ``soil_file``.
 
-    One node writes to a file: the lock beside it (``.NAME.lock``) says which. A file that may
+    One node writes to a file, see `FileClaim`. A file that may
     never be written to is refused; what may change (a folder that is missing, a disk that is full,
     another node) is told in `fault`, and nothing is written as long as it stands.
 
@@ -50,7 +47,7 @@ class KeptSoil:
         self.path = path.resolve()
         self._state_path = soil_file.state_path(self.path)
         self.fault = ''
-        self._lock: IO[str] | None = None
+        self._claim = FileClaim(self.path, 'soil_file')
         self._unusable = ''
         try:
             check_target(self.path, True, inputs, foreign=soil_file.why_foreign)
@@ -60,7 +57,7 @@ class KeptSoil:
                 'read at the start without that'
             ) from None
         try:
-            self._claim()
+            self._claim.take()
             try_to_write(self.path)
         except UserError as error:
             self.fault = str(error)
@@ -93,7 +90,7 @@ class KeptSoil:
             It cannot be written, or must not be; also in `fault`.
         """
         try:
-            self._claim()
+            self._claim.take()
             try:
                 if learned and self._unusable:
                     raise UserError(self._unusable)
@@ -109,44 +106,11 @@ class KeptSoil:
     def forget_warning(self) -> None:
         """Remove the warning that was kept."""
         try:
-            self._claim()
+            self._claim.take()
             soil_file.clear_state(self._state_path)
         except UserError as error:
             self.fault = str(error)
 
     def close(self) -> None:
         """Let another node write to the file."""
-        if self._lock is not None:
-            self._lock.close()
-            self._lock = None
-
-    def _claim(self) -> None:
-        """Make sure that this node, and no other, writes to the file."""
-        if not self.path.parent.is_dir():
-            raise UserError(f'{self.path}: there is no folder {self.path.parent}; make it')
-        if self._lock is not None:
-            return
-        try:
-            import fcntl
-        except ImportError:  # not a POSIX system
-            return
-        try:
-            lock = self.path.with_name(f'.{self.path.name}.lock').open('a+', encoding='utf-8')
-            try:
-                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except OSError as error:
-                lock.seek(0)
-                holder = lock.read(100).strip()
-                lock.close()
-                if error.errno not in _TAKEN:
-                    return  # a file system without locks
-                raise UserError(
-                    f'{self.path}: another node ({holder}) writes to it, so this one does not; '
-                    'give each a soil_file of its own'
-                ) from None
-            self._lock = lock
-            lock.truncate(0)
-            lock.write(f'process {os.getpid()} on {os.uname().nodename}\n')
-            lock.flush()
-        except OSError as error:
-            raise cannot_write(self.path, error) from None
+        self._claim.release()

@@ -33,6 +33,8 @@ from wheel_terra_estimator.estimation.traction_law import LimiterTuning
 from wheel_terra_estimator.estimation.traction_limiter import Interlock, LimiterState, Velocity
 from wheel_terra_estimator.messages.convert import stamp_of
 from wheel_terra_estimator.messages.diagnostics import ERROR, NODE, OK, STALE, WARN
+from wheel_terra_estimator.output_folder import cannot_write, check_file
+from wheel_terra_estimator.ros.file_claim import FileClaim
 from wheel_terra_estimator.ros.qos import input_profile, output_profile
 
 DIAGNOSTICS_PERIOD = 1.0  # [s]
@@ -55,6 +57,8 @@ class TractionLimiter(Node):
         words = 'file that keeps a stop over a restart of this node; empty: none does'
         name = str(self._declare('state_file', '', words))
         self._file = Path(name).expanduser() if name else None
+        self._claim = FileClaim(self._file, 'state_file') if self._file else None
+        self._unkept = ''  # why the state is not in its file
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._state = self._start()
         self._decision: limiter.Decision | None = None
@@ -167,6 +171,8 @@ class TractionLimiter(Node):
 
     def _say(self) -> None:
         """Publish diagnostics."""
+        if self._unkept:
+            self._keep()
         now, state, decision = self._now(), self._state, self._decision
         name = self.get_fully_qualified_name().lstrip('/')
         words, level = 'no commands', OK if decision is None else STALE
@@ -175,6 +181,9 @@ class TractionLimiter(Node):
         if state.interlock is not Interlock.FREE:
             level = ERROR
             words = words if state.reason in words else f'{state.reason}; {words}'
+        if self._unkept:
+            level = max(level, WARN)
+            words = f'{words}; state_file: {self._unkept}'
         age = limiter.estimate_age(state, now)
         values = {
             'scale': f'{decision.scale:.3f}' if decision is not None else '',
@@ -200,7 +209,7 @@ class TractionLimiter(Node):
     def _start(self) -> LimiterState:
         """Return the state at the start, stopped where the file says so."""
         state = LimiterState(still_since=self._now())
-        if self._file is None:
+        if self._file is None or self._claim is None:
             return state
         if self._file.name.endswith(soil_file.STATE):
             raise UserError(
@@ -211,19 +220,30 @@ class TractionLimiter(Node):
         if kept.stuck:
             self.get_logger().error(f'stopped before the restart: {kept.reason}')
             state = limiter.after_event(state, limiter.Event.STOP, kept.direction, kept.reason)
-        soil_file.write_state(self._file, kept)  # says at once where it cannot be written
+        try:
+            self._file.parent.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise cannot_write(self._file, error) from None
+        check_file(self._file, overwrite=True)  # says at once where it cannot be written
+        self._keep(kept)
         return state
 
-    def _keep(self) -> None:
-        if self._file is None:
+    def _keep(self, kept: soil_file.StuckState | None = None) -> None:
+        """Write the present state (or the one that was found) to the file of this node."""
+        if self._file is None or self._claim is None:
             return
-        stopped = self._state.interlock is not Interlock.FREE
-        stamp = self.get_clock().now().nanoseconds
-        kept = soil_file.StuckState(stopped, self._state.reason, stamp, self._state.direction)
+        if kept is None:
+            stopped = self._state.interlock is not Interlock.FREE
+            stamp = self.get_clock().now().nanoseconds
+            kept = soil_file.StuckState(stopped, self._state.reason, stamp, self._state.direction)
         try:
+            self._claim.take()
             soil_file.write_state(self._file, kept)
+            self._unkept = ''
         except UserError as error:
-            self.get_logger().error(str(error))
+            if str(error) != self._unkept:
+                self.get_logger().error(f'state_file: {error}')
+            self._unkept = str(error)
 
     # -- Parameters and time --------------------------------------------------------------------
 

@@ -32,6 +32,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.serialization import deserialize_message
+from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import try_shutdown
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Int8, UInt8MultiArray
@@ -65,7 +66,7 @@ from wheel_terra_estimator.ros.lifecycle_node import MESSAGE_TYPES
 QUEUE = 5000
 PATIENCE = 5.0  # [s] until the next message is sent though the node has not heard the last one
 DISCOVERY_TIMEOUT = 60.0  # [s]
-NOT_FOUND = 4  # exit status
+NOT_FOUND, INTERRUPTED = 4, 130  # exit statuses
 QUIET = 3.0  # [s] without an output after the last input: the node is done
 
 OUTPUT_MESSAGES = {
@@ -162,7 +163,8 @@ def _node_arguments(parameters: Path, topics: Mapping[str, str], arrival: Path) 
 
 @contextmanager
 def _context() -> Iterator[None]:
-    rclpy.init(args=[])  # the arguments are our own, not those of ROS
+    # The arguments are our own, not those of ROS, and Ctrl-C is an interrupt as elsewhere.
+    rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     try:
         yield
     finally:
@@ -349,6 +351,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     except UserError as error:
         print(f'live_drive: {error}', file=sys.stderr)
         return NOT_FOUND if isinstance(error, NodeNotFoundError) else 2
+    except KeyboardInterrupt:
+        print('live_drive: interrupted', file=sys.stderr)
+        return INTERRUPTED
     return 0
 
 
