@@ -84,6 +84,25 @@ def test_the_probability_is_that_of_drawn_curves():
         assert told.entrapment[place] == pytest.approx(beyond.mean(), abs=0.03)
 
 
+def test_beyond_what_was_driven_the_greatest_pull_is_less_known():
+    mean, covariance = np.array([0.05, -0.8, -0.5]), np.diag([0.01, 0.05, 0.05]) ** 2
+    beyond = np.where(SLOPES > 10.0, 0.4, 0.0)
+    sure, told = slips_at(mean, covariance, 0.03), slips_at(mean, covariance, 0.03, beyond)
+    np.testing.assert_array_equal(told.std[SLOPES <= 10.0], sure.std[SLOPES <= 10.0])
+    draws = np.random.default_rng(3).normal(mean, np.sqrt(np.diag(covariance)), (200_000, 3))
+    greatest = np.exp(draws[:, 2] + np.random.default_rng(4).normal(0.0, 0.4, 200_000))
+    for place in (7, 8, 9):
+        share = np.minimum(math.tan(math.radians(SLOPES[place])) / greatest, 1.0 - 1e-12)
+        slip = np.minimum(draws[:, 0] - np.exp(draws[:, 1]) * np.log1p(-share), 1.0)
+        assert told.slip[place] == pytest.approx(slip.mean(), abs=0.03)
+        assert told.std[place] == pytest.approx(math.hypot(slip.std(), 0.03), rel=0.2)
+    driven = learned((0.0, 5.0, 10.0)).state
+    assert math.degrees(math.atan(driven.driven[1])) == pytest.approx(10.0, abs=0.5)
+    plain = slips_at(driven.mean, driven.covariance, 0.03)
+    assert at(driven.told, 20.0)[1] > 1.5 * at(plain, 20.0)[1]
+    assert at(driven.told, 5.0)[1] == pytest.approx(at(plain, 5.0)[1], rel=0.02)
+
+
 def test_what_is_not_known_teaches_nothing():
     curve = SlopeCurve()
     before = curve.state

@@ -10,6 +10,8 @@ the shear law of Janosi and Hanamoto (1961) turned round gives the slip that it 
 a: what the curve does not know (rolling resistance, another soil, a wrong radius) [-]; s_0: slip
 that mobilises the soil [-]; p_max: the greatest pull over the load [-]. An extended Kalman filter
 of (a, ln s_0, ln p_max) is corrected by the published slip. It needs nothing else of the estimator.
+Beyond the demands that were driven nothing says that the law goes on, nor that the soil does: there
+p_max is less known, in proportion to how far beyond.
 """
 
 from __future__ import annotations
@@ -31,7 +33,7 @@ FloatArray = NDArray[np.float64]
 
 _DEMANDS = np.tan(np.radians(SLOPES))
 _DRAWS = 64
-_BASES = 2, 3, 5  # of the Halton sequence
+_BASES = 2, 3, 5, 7  # of the Halton sequence
 
 
 @dataclass(frozen=True)
@@ -48,6 +50,7 @@ class CurveTuning:
     scatter: float = 0.03  # of the slip from place to place [-]
     correlation: float = 0.3  # rim travel within which slips are one piece of information [m]
     most_std: float = 0.4  # of a slip that teaches
+    beyond_std: float = 3.0  # of ln p_max, per unit of demand beyond those driven
 
 
 class Instant(NamedTuple):
@@ -66,6 +69,7 @@ class CurveState(NamedTuple):
 
     mean: FloatArray  # (3,)
     covariance: FloatArray  # (3, 3)
+    driven: tuple[float, float] = (0.0, 0.0)  # least and greatest demand that taught
     demand: float = math.nan  # low-passed
     time: float = math.nan  # [s]
     direction: float = 0.0
@@ -97,7 +101,13 @@ class SlopeCurve(Component[CurveState]):
                 state = self._corrected(state, now, reversed_)
         second = int(now.time)
         if second != state.told_second:
-            told = slips_at(state.mean, state.covariance, tuning.scatter)
+            beyond = np.maximum(_DEMANDS - state.driven[1], state.driven[0] - _DEMANDS)
+            told = slips_at(
+                state.mean,
+                state.covariance,
+                tuning.scatter,
+                tuning.beyond_std * np.maximum(beyond, 0.0),
+            )
             state = state._replace(told=told, told_second=second)
         self.state = state
 
@@ -119,11 +129,16 @@ class SlopeCurve(Component[CurveState]):
         gain = column / (spread + noise * max(tail, 1.0))
         covariance -= np.outer(gain, column)
         covariance = 0.5 * (covariance + covariance.T)
-        return state._replace(mean=mean + gain * residual, covariance=covariance)
+        least, greatest = state.driven
+        return state._replace(
+            mean=mean + gain * residual,
+            covariance=covariance,
+            driven=(min(least, state.demand), max(greatest, state.demand)),
+        )
 
 
 def _halton() -> FloatArray:
-    """Return evenly spread draws of three standard normal numbers, (draws, 3); Halton (1960)."""
+    """Return evenly spread draws of four standard normal numbers, (draws, 4); Halton (1960)."""
     columns = []
     for base in _BASES:
         column = np.zeros(_DRAWS)
@@ -141,7 +156,9 @@ def _halton() -> FloatArray:
 _STANDARD = _halton()
 
 
-def slips_at(mean: FloatArray, covariance: FloatArray, scatter: float) -> SlipOnSlope:
+def slips_at(
+    mean: FloatArray, covariance: FloatArray, scatter: float, beyond: FloatArray | float = 0.0
+) -> SlipOnSlope:
     """Return the slips that a curve gives at the `SLOPES`, driving forward.
 
     Parameters
@@ -150,10 +167,12 @@ def slips_at(mean: FloatArray, covariance: FloatArray, scatter: float) -> SlipOn
         (3,), (3, 3) of a, ln s_0, ln p_max.
     scatter : float
         Deviation of the slip from place to place on one slope [-].
+    beyond : numpy.ndarray or float
+        (11,) deviation of ln p_max that comes on top, of slopes beyond those driven.
     """
     lower = np.linalg.cholesky(covariance + 1e-12 * np.eye(3))
-    offset, scale, greatest = (mean + _STANDARD @ lower.T).T[:, :, None]
-    share = np.abs(_DEMANDS) / np.exp(greatest)
+    offset, scale, greatest = (mean + _STANDARD[:, :3] @ lower.T).T[:, :, None]
+    share = np.abs(_DEMANDS) / np.exp(greatest + _STANDARD[:, 3:] * beyond)
     carried = share < 1.0
     mobilised = -np.sign(_DEMANDS) * np.log1p(-np.where(carried, share, 0.0))
     slip = np.where(carried, offset + np.exp(scale) * mobilised, np.sign(_DEMANDS))
