@@ -66,6 +66,17 @@ def test_steep_climb_that_holds_raises_nothing():
     assert first(course([[wheel(s)] * 6 for s in slips])) is None
 
 
+def test_a_near_miss_raises_nothing():
+    """Slip peaks at 0.65 while all wheels sink by 1 cm per metre of rim travel, and falls again."""
+    slips = [0.2 + 0.45 * math.exp(-(((0.1 * i - 30.0) / 8.0) ** 2)) for i in range(600)]
+    rows = [
+        [wheel(s)._replace(sinkage=0.02 + 0.01 * 0.05 * 0.1 * i)] * 6 for i, s in enumerate(slips)
+    ]
+    found = course(rows)
+    assert max(slips) > 0.64 and first(found) is None
+    assert max(a.wheels[0].probability for a in found) < 0.5
+
+
 def test_one_spinning_wheel_raises_nothing():
     rows = [[wheel(0.1)] * 5 + [wheel(0.95, rim=0.2)] for _ in range(600)]
     assert first(course(rows)) is None
