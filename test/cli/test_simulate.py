@@ -86,6 +86,7 @@ def test_log_times_are_arrivals(bag_path: Path) -> None:
         (['-o', 'x', '--scenario', 'clim_soft_patch'], 'climb_soft_patch'),
         (['-o', 'x', '--seed', '-1'], '--seed'),
         (['-o', 'x', '--duration', '0'], '--duration'),
+        (['-o', 'x', '--duration', '1e-9'], '--duration'),
         (['-o', 'x', '-p', 'rover.mas:=3.0'], 'rover.mass'),
     ],
 )

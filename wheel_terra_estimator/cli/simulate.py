@@ -17,6 +17,7 @@ EXAMPLES = (
     'wheel-terra simulate -o drive',
     'wheel-terra simulate --scenario steep_climb --seed 3 -o climb',
 )
+SHORTEST = 0.1  # drive [s]
 LONGEST = 86400.0  # [s]
 
 
@@ -71,8 +72,8 @@ def run(arguments: argparse.Namespace) -> int:
         rover=arguments.rover,
     )
     duration = scenario.duration if arguments.duration is None else arguments.duration
-    if not 0.0 < duration <= LONGEST:
-        raise UserError(f'--duration {duration:g}: must be above 0 and at most {LONGEST:g} s')
+    if not SHORTEST <= duration <= LONGEST:
+        raise UserError(f'--duration {duration:g}: must be {SHORTEST:g} to {LONGEST:g} s')
 
     from tqdm import tqdm
 

@@ -112,6 +112,10 @@ def _above(limit: float) -> _Test:
     return lambda values: values > limit
 
 
+def _below(limit: float) -> _Test:
+    return lambda values: values < limit
+
+
 def _beyond(limit: float) -> _Test:
     """Above a limit in either direction."""
     return lambda values: np.abs(values) > limit
@@ -138,12 +142,14 @@ _KILONEWTON = 'looks like kN; multiply the column by 1000'
 _DEGREES = 'looks like degrees; multiply the column by pi/180'
 _MILLIMETRES = 'looks like millimetres; divide the column by 1000'
 _NO_LENGTH = 'is not a positive length in m'
-_NO_DEVIATION = 'is not positive; leave it empty where the deviation is unknown'
+_NO_DEVIATION = 'is not positive, or next to nothing; leave it empty where the deviation is unknown'
+_LEAST_DEVIATION = 1e-12  # [m], [N], [N m] or [rad]: below all that is measured
 
 _RANGES: tuple[tuple[str, _Test, str], ...] = (
     ('slip', _beyond(1.5), _PERCENT),
     ('slip', _beyond(1.0), 'is outside -1..1; check how the slip ratio was computed'),
     ('normal_load', _not_positive, 'is not positive; state the load in N'),
+    ('normal_load', _above(1e7), 'is more than any wheel bears; state the load in N'),
     ('normal_load', _all_below(0.5), _KILONEWTON),
     ('slope', _beyond(0.9), _DEGREES),
     ('slip_angle', _beyond(3.15), _DEGREES),
@@ -159,10 +165,10 @@ _RANGES: tuple[tuple[str, _Test, str], ...] = (
     ('pass_number', _outside(1.0, 1000.0), 'is outside 1..1000'),
     ('angular_velocity', _beyond(60.0), 'looks like degrees per second; give rad/s'),
     ('sinkage', _beyond(1.0), 'looks like millimetres (or centimetres); give it in m'),
-    *((f'{quantity}_std', _not_positive, _NO_DEVIATION) for quantity in QUANTITIES),
+    *((f'{name}_std', _below(_LEAST_DEVIATION), _NO_DEVIATION) for name in QUANTITIES),
     ('slip_std', _negative, _NO_DEVIATION),
     ('slip_std', _above(0.5), 'is over 0.5; it looks like percent'),
-    ('leaving_angle_std', _not_positive, _NO_DEVIATION),
+    ('leaving_angle_std', _below(_LEAST_DEVIATION), _NO_DEVIATION),
 )
 """What no value of a column can be, in SI, and what one that is looks like."""
 
