@@ -159,8 +159,9 @@ def _blamed(evidence: Evidence, lags: dict[str, Lag]) -> dict[str, Lag]:
 def _by_arrival(evidence: Evidence, name: str, late: float) -> bool:
     """Whether the wheels' stamps lie off their arrival by what another sensor seems late [s]."""
     own, others = arrival(evidence.joints), arrival(getattr(evidence.recording, name))
-    if name == 'reference':  # its age is honest, the future is not
-        return own < FUTURE and others > FUTURE
+    if name == 'reference':  # its age is honest, that of wheels is none, nor is the future
+        by_age = abs(own - late) < abs(own) - 0.5 * abs(late)
+        return by_age or own < FUTURE < others
     by_wheels = abs(others) + abs(own - late)
     return by_wheels < abs(own) + abs(others + late) - 0.5 * abs(late)
 

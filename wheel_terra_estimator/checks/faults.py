@@ -22,7 +22,7 @@ RATE_UNITS = {
 """Units that wheel rates come in by mistake: factor to rad/s."""
 SKID_TRACKS = (0.7, 6.0)
 """Effective over geometric track of rovers, skidding or not [-]."""
-LEAST_TURN_RATE = 0.02
+LEAST_TURN_RATE = 0.01
 """Yaw rate [rad/s] below which sides are not compared."""
 STANDARD_GRAVITY = 9.80665  # [m/s^2]
 

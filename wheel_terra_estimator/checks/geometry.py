@@ -33,6 +33,8 @@ LEAST_RADIUS_ERROR = 0.025
 RADIUS_SIGMAS = 4.0
 LEAST_RATIO = 0.3
 """Speed over rim speed below which a rover is stuck, or its reference dead [-]."""
+MOST_RATIO = 1.4
+"""The same, or its inverse, that no wrong radius makes [-]."""
 OUTRUN_STD = 0.01
 """Slip that is left open where a rover outruns its wheels [-]."""
 AROUND = 0.25
@@ -127,6 +129,9 @@ def radius_ratio(evidence: Evidence) -> Told | NotChecked:
     figures['rover.speed_over_rim_speed'] = round(plain.value, 4)
     if plain.value < LEAST_RATIO:
         return NotChecked('radius', 'the rover hardly moves beside its wheels')
+    if plain.value > MOST_RATIO:
+        reason = f'speed over rim speed is {plain.value:.2f}: signs, unit or scale, no radius'
+        return NotChecked('radius', reason)
     ratio = _without_slip(evidence, speeds, plain)
     if isinstance(ratio, NotChecked):
         return ratio

@@ -69,6 +69,8 @@ NOISE_FACTOR = 4.0
 """Noise above so many times the stated one is a finding."""
 DEGREES = (0.4, 4.0)
 """Noise of a gyro over the one stated, if it were in degrees per second, that tells it is [-]."""
+PERHAPS_DEGREES = 0.15
+"""The same, from which it may be [-]."""
 BIAS_FACTOR = 6.0
 """A bias above so many stated deviations is a finding."""
 LEAST_GYRO_BIAS = 0.004  # [rad/s]
@@ -487,7 +489,10 @@ def check_noise_and_zero(evidence: Evidence) -> list[Outcome]:
         if values is imu.rate and DEGREES[0] < math.radians(noise) / stated < DEGREES[1]:
             told = {'times': noise / stated, 'how': 'noise of a gyro'}
             return [*outcomes, evidence.found('gyro_degrees', 0.8, value=math.radians(1), **told)]
-        if noise > NOISE_FACTOR * stated:
+        if values is imu.rate and PERHAPS_DEGREES < math.radians(noise) / stated < DEGREES[0]:
+            reason = f'gyro: noise of {noise:.2g}: vibration, or degrees per second; drive a circle'
+            outcomes += [NotChecked(kind, reason) for kind in ('unit', 'noise')]
+        elif noise > NOISE_FACTOR * stated:
             told = {'value': float(f'{noise:.2g}'), 'parameter': f'sensors.{key}', 'unit': unit}
             sure = confidence(noise / stated)
             outcomes.append(evidence.found('imu_noise', sure, noise=noise, stated=stated, **told))

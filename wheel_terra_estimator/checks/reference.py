@@ -21,7 +21,9 @@ JUMP_FACTOR = 8.0
 """A velocity that leaves its neighbours by so many times the usual scatter is a jump."""
 JUMP_SHARE = 0.005
 """Share of jumps that is a fault of the source, not a single wild reading."""
-LEAST_JUMPS = 5
+LEAST_JUMPS = 3
+BEYOND = 2.0
+"""Speed over the fastest of the rims that is a jump whatever the wheels do [-]."""
 LEAST_JUMP = 0.3
 """A jump is also larger than this share of the speed."""
 COVARIANCE_FACTOR = 6.0
@@ -141,7 +143,9 @@ def _jumps(evidence: Evidence, reference: VelocitySeries) -> tuple[list[Outcome]
         np.nan_to_num(evidence.rim_at(reference.stamp, rows.astype(float), period)) > 0.99
         for rows in (evidence.steady, evidence.at_rest)
     ]
-    wild &= (calm[0] | calm[1])[2:-2]
+    if evidence.facts.known:
+        calm.append(np.abs(forward) > BEYOND * float(np.quantile(np.abs(evidence.rim), 0.99)))
+    wild &= np.any(calm, axis=0)[2:-2]
     share = float(np.mean(wild))
     forward[2:-2] = np.where(wild, beside, forward[2:-2])
     if share < JUMP_SHARE or wild.sum() < LEAST_JUMPS:
