@@ -16,6 +16,8 @@ from wheel_terra_estimator.discrepancy import workflow
 from wheel_terra_estimator.discrepancy.report.model_file import corrected, write_model
 from wheel_terra_estimator.discrepancy.tables.checks import check_table
 from wheel_terra_estimator.discrepancy.workflow import Options, diagnose
+from wheel_terra_lab.trials.forms import FORMS
+from wheel_terra_lab.trials.truth import solve
 
 QUANTITIES = ('sinkage', 'drawbar_pull', 'torque')
 
@@ -66,6 +68,35 @@ def test_predict_with_the_written_model_gives_the_reported_error(hidden, design,
         assert error == pytest.approx(found.gap[quantity].after, rel=0.3)
     again = reader.load([tmp_path / 'base.yaml', tmp_path / 'model.yaml'], complete=False)
     assert diagnose(check_table('t.csv', table), again).verdict == 'agrees'
+
+
+def test_an_effect_that_is_on_in_the_wrong_form_is_opened_again(tmp_path):
+    """Slip multiplies the sinkage (Lyasko); the engineer has an exponent that grows with slip."""
+    _, values, soil, rows = make('sweep40')
+    law = FORMS['slip_sinkage_exponent:lyasko'].make(1.5, 0.5, rows, soil)
+    rng, table = np.random.default_rng(9), dict(rows)
+    for quantity, exact in solve(rows, soil, (law,)).items():
+        if quantity in QUANTITIES:
+            std = 0.015 * np.ptp(exact)
+            table[quantity] = exact + std * rng.standard_normal(exact.shape)
+            table[f'{quantity}_std'] = np.full(exact.shape, std)
+    prefix = 'effects.slip_sinkage_exponent'
+    values |= {f'{prefix}.enabled': True, f'{prefix}.n1': 0.3}
+    configuration = reader.from_parameters(values, complete=False)
+    found = diagnose(check_table('t.csv', table), configuration)
+    assert [(e.name, e.form) for e in found.effects] == [('slip_sinkage_exponent', 'lyasko')]
+    gain = found.effects[0].parameters['gain']
+    assert abs(gain.value - 1.5) < 4.0 * gain.std
+    assert 'the form named here takes its place' in found.notes[0]
+    assert 'other forms, in its place, were tried' in found.not_tried['slip_sinkage_exponent']
+    write_model(found, tmp_path / 'model.yaml')
+    configured = predicted(table, configuration, tmp_path)
+    corrected_rows = predicted(table, configuration, tmp_path, 'model.yaml')
+    for q, quantity in enumerate(QUANTITIES):
+        gap = found.gap[quantity]
+        for rows, said in ((configured, gap.before), (corrected_rows, gap.fitted)):
+            error = np.sqrt(np.mean((rows[:, q] - table[quantity]) ** 2))
+            assert error == pytest.approx(said, rel=2e-3)
 
 
 def with_errors(table, factors, zeros):

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.configuration.readings import Readings
-from wheel_terra_estimator.discrepancy.decision import decide
+from wheel_terra_estimator.discrepancy.decision import Decision, decide
 from wheel_terra_estimator.discrepancy.fitting.coordinates import (
     Coordinate,
     base_coordinates,
@@ -23,9 +23,7 @@ from wheel_terra_estimator.discrepancy.fitting.forward import Forward
 from wheel_terra_estimator.discrepancy.fitting.reference import join
 from wheel_terra_estimator.discrepancy.fitting.soil_deviations import deviations
 from wheel_terra_estimator.discrepancy.render import render
-from wheel_terra_estimator.discrepancy.result import (
-    Diagnosis,
-)
+from wheel_terra_estimator.discrepancy.result import OPEN, Diagnosis
 from wheel_terra_estimator.discrepancy.selection.search import search
 from wheel_terra_estimator.discrepancy.selection.weights import default_floors, shared_floors
 from wheel_terra_estimator.discrepancy.tables.checks import (
@@ -36,7 +34,7 @@ from wheel_terra_estimator.discrepancy.tables.checks import (
 from wheel_terra_estimator.discrepancy.tables.steady_table import SteadyTable
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.terramechanics.effects import catalogue
-from wheel_terra_estimator.terramechanics.effects.base import Effect
+from wheel_terra_estimator.terramechanics.effects.base import Effect, effect_of
 from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
 from wheel_terra_estimator.terramechanics.wheel import Wheel
 
@@ -116,11 +114,28 @@ def diagnose(
     check_pull_against_model(both, configured[:, 1])
     nuisance = nuisance_coordinates(configuration, known, chosen.soil_known_to)
     floors = default_floors(chosen.floor) if reference is None else shared_floors()
-    findings = search(both, forward, nuisance, effects, floors)
-    decision = decide(table, both, findings, chosen.allowed_error)
+
+    def decided(
+        model: Forward, free: tuple[Coordinate, ...], more: Mapping[str, Effect]
+    ) -> Decision:
+        findings = search(both, model, free, {**effects, **more}, floors)
+        return decide(table, both, findings, chosen.allowed_error)
+
+    decision = decided(forward, nuisance, {})
+    notes: tuple[str, ...] = ()
+    if decision.verdict.word in OPEN and reference is None:
+        for name, forms in _other_forms(forward, chosen).items():
+            not_tried[name] += '; its other forms, in its place, were tried'
+            rest = tuple(c for c in nuisance if effect_of(c.owner) != name)
+            again = decided(forward.without(name), rest, forms)
+            if name in {effect_of(naming.key) for naming in again.names}:
+                notes = (f'{name} is on in another form; the form named here takes its place',)
+                decision = _measured_from(again, decision)
+                break
     diagnosis = render(table, both, configuration, decision)
     seconds = time.perf_counter() - started
-    return replace(diagnosis, not_tried=not_tried, seconds=seconds)
+    notes = (*notes, *diagnosis.notes)
+    return replace(diagnosis, not_tried=not_tried, notes=notes, seconds=seconds)
 
 
 def operating_points(table: SteadyTable, configuration: Configuration) -> OperatingPoints:
@@ -223,6 +238,24 @@ def _effects_to_try(
                 why = f': {form.why_aside}' if form.why_aside else ''
                 not_tried[key] = f'is tried only when asked for (--only {name}){why}'
     return tried, not_tried
+
+
+def _other_forms(forward: Forward, options: Options) -> dict[str, dict[str, Effect]]:
+    """Return each effect that is on with its other forms, where these may be named."""
+    found = {}
+    for key in forward.base_effects:
+        name = effect_of(key)
+        forms = {f.name: f for f in forward.catalogue[name].forms if f.candidate and f.name != key}
+        if forms and name in (options.effects or (name,)):
+            found[name] = forms
+    return found
+
+
+def _measured_from(decision: Decision, configured: Decision) -> Decision:
+    """Return a decision whose gaps start from the model as configured in another one."""
+    gap = {q: replace(g, before=configured.gap[q].before) for q, g in decision.gap.items()}
+    curves = replace(decision.curves, before=configured.curves.before)
+    return replace(decision, gap=gap, curves=curves)
 
 
 def _check_soil_carries(

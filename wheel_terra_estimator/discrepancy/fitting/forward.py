@@ -22,7 +22,7 @@ from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES
 from wheel_terra_estimator.terramechanics import quadrature
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects import by_variant
-from wheel_terra_estimator.terramechanics.effects.base import Effect
+from wheel_terra_estimator.terramechanics.effects.base import Effect, effect_of
 from wheel_terra_estimator.terramechanics.load_balance import explicit_entrance_angle
 from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
 from wheel_terra_estimator.terramechanics.soil import Soil
@@ -89,6 +89,13 @@ class Forward:
             self.nodes,
             None if other_rows else self.active,
             None if other_rows else self.readings,
+        )
+
+    def without(self, name: str) -> Forward:
+        """Return the same model with an effect switched off, whichever its form."""
+        rest = {key: v for key, v in self.base_effects.items() if effect_of(key) != name}
+        return Forward(
+            self.points, self.soil, rest, self.catalogue, self.nodes, self.active, self.readings
         )
 
     def _contact(
