@@ -172,7 +172,7 @@ def test_loads_at_rest_carry_the_weight_where_its_centre_is(family):
 def test_the_pull_in_a_steady_climb_is_the_weight_along_the_slope(family):
     tangent = 0.15
     rover, motion = rover_on(family, {'slope': tangent, 'slope_start': -50.0})
-    course = drive(motion, straight(rover), 20.0)
+    course = drive(motion, straight(rover), 16.0)
     late = course.time > 12.0
     needed = rover.mass * EARTH * np.sin(np.arctan(tangent))
     assert course.velocity[late, 0].min() > 0.3 * rover.speed
@@ -192,7 +192,7 @@ def test_free_rolling_on_hard_ground_has_no_slip():
 
 def test_a_parked_rover_stays_where_it_is():
     rover, motion = rover_on('four_skid', {'slope': 0.2, 'slope_start': -50.0})
-    course = drive(motion, straight(rover, 0.0), 20.0)
+    course = drive(motion, straight(rover, 0.0), 10.0)
     assert abs(course.x[-1] - course.x[200]) < 1e-3
 
 
