@@ -57,6 +57,17 @@ def test_missing_wheel_odometry_says_which_and_what_is_there(
     assert '-p wheel_odometry:=odom --remap odom:=/reference_odom' in text
 
 
+def test_what_is_missing_is_told_with_what_it_costs(make_bag: Any, rover: Any, drive: Any) -> None:
+    path = make_bag(
+        messages=[row for row in drive if row[0] == '/joint_states'],
+        topics={'/joint_states': 'sensor_msgs/msg/JointState'},
+    )
+    with open_bag(path) as bag:
+        absent, cost = MeasurementReader(bag, {}, rover).notes
+    assert 'imu/data' in absent and 'reference_odom' in absent
+    assert 'without a reference velocity slip can be wrong' in cost
+
+
 def test_remap_to_a_topic_that_is_not_there_or_of_another_type(make_bag: Any, rover: Any) -> None:
     bag = make_bag()
     with pytest.raises(UserError, match=r'/vo is not in the bag.*--remap reference_odom:='):

@@ -51,6 +51,7 @@ def test_drive_gives_a_bag_a_report_and_a_summary(
     assert '40 estimates' in said
     assert re.search(r'joint_states +40 +none', said)
     assert 'not in the bag: sinkage, leaving_angle' in said
+    assert 'without a reference velocity' not in said
     with open_bag(out) as bag:
         history = read_estimates(bag)
     assert_slip_follows_the_reference(history)

@@ -88,6 +88,14 @@ class MeasurementReader:
         return self.converter.rejected
 
     @property
+    def notes(self) -> list[str]:
+        """What is not in the bag, and what that costs."""
+        notes = [f'not in the bag: {", ".join(self.absent)}'] if self.absent else []
+        if 'reference_odom' in self.absent:
+            notes.append('without a reference velocity slip can be wrong and sure of itself')
+        return notes
+
+    @property
     def message_count(self) -> int:
         """Number of messages on the used topics."""
         return sum(self.bag.topics[topic].message_count for topic in self.topics.values())

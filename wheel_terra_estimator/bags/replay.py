@@ -188,8 +188,7 @@ def _notes(
         yield f'the filter failed and was started anew {restarts} times; please report this drive'
     if steps := counters.get('clock_steps_back', 0):
         yield f'the clock stepped back {steps} times; the estimates start anew there'
-    if reader.absent:
-        yield f'not in the bag: {", ".join(reader.absent)}'
+    yield from reader.notes
     used = set(reader.topics.values())
     unknown = [
         t

@@ -59,8 +59,8 @@ def read_urdf(path: Path, wheels: Sequence[str] = (), data: bytes | None = None)
     if missing or not names:
         turning = [n for n, j in joints.items() if j.get('type') in ('continuous', 'revolute')]
         raise UserError(
-            f'{path}: {"no joint " + missing[0] if missing else "no wheel joints found"}; name the '
-            f'wheels with --wheels; turning joints: {", ".join(turning) or "none"}'
+            f'{path}: {"no joint " + missing[0] if missing else "no joint named as a wheel"}; give '
+            f'the wheels, of its turning joints: --wheels {",".join(turning) or "(none)"}'
         )
     base = _base(links, joints)
     placed = [(name, _pose(joints[name], joints, base, path)) for name in names]

@@ -379,8 +379,8 @@ def _run(arguments: argparse.Namespace) -> None:
     with open_bag(arguments.output) as estimates:
         history = read_estimates(estimates)
     title = f'{arguments.bag.resolve().name}, live'
-    notes = [f'not in the bag: {", ".join(reader.absent)}'] if reader.absent else []
-    summary = summarise(title, history, reader.topics, counts, {}, notes, Border.of(configuration))
+    border = Border.of(configuration)
+    summary = summarise(title, history, reader.topics, counts, {}, reader.notes, border)
     # A truth that the node was given as its reference is none to judge it by.
     judged = truth if truth and truth.source not in reader.topics.values() else None
     thresholds = configuration.filter.class_thresholds
