@@ -44,3 +44,20 @@ def test_a_process_that_is_late_calls_no_topic_silent_and_says_by_how_much():
     assert watch.faults(4.0) == [late, ('joint_states', 'silent for 2.0 s')]
     watch.looked(4.05, 0.05)
     assert watch.faults(4.05) == [('joint_states', 'silent for 2.0 s')]
+
+
+def test_stamps_ahead_of_the_clock_are_told_of_the_topic_that_has_them():
+    """A message that came late says nothing; one that is ahead among others neither."""
+    watch = InputWatch()
+
+    def told(joints, imu):
+        for k in range(20):
+            watch.heard('joint_states', 0.05 * k, joints[k % len(joints)], None)
+            watch.heard('imu/data', 0.05 * k, imu, None)
+        return [(topic, words[:14]) for topic, words in watch.faults(1.0)]
+
+    assert told([0.0], 0.0) == []
+    assert told([-2.0], 0.0) == [('joint_states', 'stamps 2 s ahe')]
+    assert told([-2.0, 0.0], 3.0) == []
+    assert told([-3600.0], -3599.0) == [('inputs', 'stamps 3600 s ')]
+    assert watch.faults(1.0) == []

@@ -7,6 +7,7 @@ Times are of a steady clock, so that silence is seen when nothing comes any more
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -15,6 +16,7 @@ LEAST_SILENCE = 0.75  # [s]
 MESSAGES_TO_PERIOD = 3  # from which the period of a topic is known
 UNKNOWN_PERIOD = 5.0  # [s] of silence until then
 BEHIND = 0.5  # [s] of which it is told, and beyond which no topic is called silent
+AHEAD = 1.0  # [s] of stamps before the clock here, of which it is told
 START = 1.0  # [s] in which the process may be late
 _SMOOTHING = 0.1
 
@@ -22,13 +24,24 @@ _SMOOTHING = 0.1
 class _Topic:
     """What is known of one topic."""
 
-    __slots__ = ('delay', 'heard', 'lost', 'number', 'period', 'received', 'stamp', 'told')
+    __slots__ = (
+        'delay',
+        'heard',
+        'latest',
+        'lost',
+        'number',
+        'period',
+        'received',
+        'stamp',
+        'told',
+    )
 
     def __init__(self) -> None:
         self.received = 0
         self.heard = 0.0
         self.period = 0.0
         self.delay = 0.0
+        self.latest = -math.inf  # greatest delay since this was last asked
         self.stamp = 0
         self.number: int | None = None  # of the publisher's last message
         self.lost = 0
@@ -73,6 +86,7 @@ class InputWatch:
             keep = _SMOOTHING if state.received > 10 else 1.0 / state.received
             state.period += keep * (gap - state.period)
         state.delay += (_SMOOTHING if state.received else 1.0) * (delay - state.delay)
+        state.latest = max(state.latest, delay)
         state.heard = now
         state.received += 1
         if number is not None and state.number is not None and number > state.number + 1:
@@ -104,6 +118,7 @@ class InputWatch:
             words = f'taken {self._told:.1f} s late: this process lacks processor time'
             found.append(('inputs', words))
         self._told = 0.0
+        found += self._ahead()
         for topic, state in self._topics.items():
             if state.lost != state.told:
                 found.append((topic, f'{state.lost} messages lost on the way so far'))
@@ -111,6 +126,17 @@ class InputWatch:
             if self.is_silent(topic, now):
                 found.append((topic, f'silent for {now - state.heard:.1f} s'))
         return found
+
+    def _ahead(self) -> list[tuple[str, str]]:
+        """Return topics whose stamps since this was last asked all lie ahead of the clock."""
+        heard = {t: state.latest for t, state in self._topics.items() if state.latest > -math.inf}
+        for topic in heard:
+            self._topics[topic].latest = -math.inf
+        ahead = {topic: -delay for topic, delay in heard.items() if delay < -AHEAD}
+        if len(ahead) > 1 and len(ahead) == len(heard):
+            ahead = {'inputs': max(ahead.values())}
+        words = 'stamps {:.0f} s ahead of the clock here: set the clocks, or stamp in the driver'
+        return [(topic, words.format(by)) for topic, by in ahead.items()]
 
     def values(self, now: float) -> Mapping[str, Any]:
         """Return key -> value for diagnostics."""

@@ -313,7 +313,8 @@ class EstimatorNode(LifecycleNode):
             self._arrival.write(f'{topic} {stamp}\n')
         now = self._seconds()
         number = info.get('publication_sequence_number') if topic in self._numbered else None
-        self._watch_inputs.heard(topic, now, (self._nanoseconds() - stamp) / _SECOND, number)
+        clock = self._nanoseconds()  # 0: none has come yet
+        self._watch_inputs.heard(topic, now, (clock - stamp) / _SECOND if clock else 0.0, number)
         self._incompatible.pop(topic, None)
         for estimates in pipeline.hear(topic, message):
             self._take(estimates, now)

@@ -40,6 +40,7 @@ RECOVERY = 17.0  # [s]: a fault is told of for 10 s
 SETTLED = 600.0  # [s] after which memory must not grow
 GROWTH = 2.0  # [MB]
 LOST = 'messages lost on the way so far'
+AHEAD = 'set the clocks, or stamp in the driver'  # as the clock of the rover here may be
 
 FAULTS = (
     'drop',
@@ -194,11 +195,11 @@ class Soak:
             self.grown = max(self.grown, memory - self._settled)
 
     def _is_well(self) -> bool:
-        """Whether the node says OK, or nothing but what a machine without time for it loses."""
+        """Whether the node says OK, or what a machine without time loses and its clock is."""
         if not self.rover.levels:
             return False
         said = self.rover.said.split('; ')
-        return self.rover.levels[-1][1] == 0 or all(words.endswith(LOST) for words in said)
+        return self.rover.levels[-1][1] == 0 or all(words.endswith((LOST, AHEAD)) for words in said)
 
     def _wait(self, condition: Callable[[], bool], seconds: float) -> bool:
         end = time.monotonic() + seconds
