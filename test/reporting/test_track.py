@@ -83,6 +83,17 @@ def test_nothing_is_reckoned_over_a_pause_or_a_step_of_the_clock(rover):
     assert values['x'][-1] == pytest.approx(3 * 99 * SPEED * STEP * 1e-9, abs=0.03)
 
 
+def test_a_point_stands_every_two_centimetres_and_every_second_of_standing(rover):
+    driven = drive(rover, 41, yaw_rate=0.0)  # 5 mm from set to set
+    standing = drive(rover, 60, yaw_rate=0.0)
+    standing = [replace(s, stamp=s.stamp + 41 * STEP, forward_velocity=0.0) for s in standing]
+    values = recorded(rover, [*driven, *standing]).track().values
+    way, time = np.diff(values['distance']), np.diff(values['time'])
+    assert way[:7] == pytest.approx(0.02, abs=0.0051) and (way[:7] > 0.0199).all()
+    assert (way[-2:] == 0.0).all()
+    assert time[-2:] == pytest.approx(1.0)
+
+
 def test_table_and_map(rover, tmp_path):
     sets = drive(rover, 400, yaw_rate=0.0)
     sets[200:300] = [replace(s, slip_class=np.array([0, 2], dtype=np.uint8)) for s in sets[200:300]]
