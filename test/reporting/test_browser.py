@@ -232,6 +232,18 @@ def limiter_report(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope='module')
+def evaluation_report(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    from wheel_terra_lab.evaluation import page
+
+    head = ['kind', *[f'squared error over variance, quantity {i}' for i in range(13)]]
+    rows = [head, ['---'] * 14, ['entrapment patch', *['0.54, 0.23'] * 13]]
+    text = '\n'.join(f'| {" | ".join(row)} |' for row in rows)
+    path = tmp_path_factory.mktemp('evaluation') / 'report.html'
+    page.write(path, 'The estimator', f'# Slip\n\n{text}\n', None, None)
+    return path
+
+
+@pytest.fixture(scope='module')
 def fleet_report(tmp_path_factory: pytest.TempPathFactory) -> Path:
     from wheel_terra_estimator.reporting.fleet_summary import CLASSES, DriveRow, write_summary_page
 
@@ -261,6 +273,7 @@ KINDS = {
     'comparison_report': 7,
     'soilbin_report': 6,
     'limiter_report': 8,
+    'evaluation_report': 0,
     'fleet_report': 0,
     'check_report': 0,
 }
