@@ -235,8 +235,12 @@ def limiter_report(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def evaluation_report(tmp_path_factory: pytest.TempPathFactory) -> Path:
     from wheel_terra_lab.evaluation import page
 
-    head = ['kind', *[f'squared error over variance, quantity {i}' for i in range(13)]]
-    rows = [head, ['---'] * 14, ['entrapment patch', *['0.54, 0.23'] * 13]]
+    head = ['drives', 'slip RMSE', 'two states, torque', 'two states, pitch', 'three states']
+    head += ['best', 'ratio (95 % interval)', 'rule kept', 'slow part (20 s means)', 'coverage']
+    head += ['30 s after a start', 'coverage of two states, torque', 'squared error over variance']
+    cells = ['0.0425', '0.0582', '0.0991', '0.0534', '0.0534', '0.79 (0.68 to 0.93)', '100 %']
+    cells += ['0.0176', '99.5 %', '100.0 %', '99.9 %', '0.54, 0.23']
+    rows = [head, ['---'] * len(head), ['creeping_entrapment', *cells], ['all', *cells]]
     text = '\n'.join(f'| {" | ".join(row)} |' for row in rows)
     path = tmp_path_factory.mktemp('evaluation') / 'report.html'
     page.write(path, 'The estimator', f'# Slip\n\n{text}\n', None, None)
