@@ -60,4 +60,5 @@ def test_stamps_ahead_of_the_clock_are_told_of_the_topic_that_has_them():
     assert told([-2.0], 0.0) == [('joint_states', 'stamps 2 s ahe')]
     assert told([-2.0, 0.0], 3.0) == []
     assert told([-3600.0], -3599.0) == [('inputs', 'stamps 3600 s ')]
-    assert watch.faults(1.0) == []
+    watch.heard('imu/data', 1.0, -3599.0, None)
+    assert [topic for topic, _ in watch.faults(1.0)] == ['inputs']

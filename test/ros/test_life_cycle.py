@@ -97,6 +97,9 @@ def test_life_cycle_services_and_live_parameters(start, parameters, listener, tm
 
     assert state() == 'unconfigured'
     assert not call(node, until, Trigger, 'reset', Trigger.Request()).success
+    refused = set_parameter('rover.mass', -5.0)
+    assert not refused.successful and 'rover.mass' in refused.reason
+    assert set_parameter('rover.mass', 120.0).successful
     assert change(Transition.TRANSITION_CONFIGURE)
     until(lambda: wheels.get_subscription_count() and stuck)
     drive(lambda: said and said[-1].status[0].message.startswith('inactive'))

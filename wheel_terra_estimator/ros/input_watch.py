@@ -25,6 +25,7 @@ class _Topic:
     """What is known of one topic."""
 
     __slots__ = (
+        'ahead',
         'delay',
         'heard',
         'latest',
@@ -41,6 +42,7 @@ class _Topic:
         self.heard = 0.0
         self.period = 0.0
         self.delay = 0.0
+        self.ahead = 0.0  # least of what the stamps were before the clock
         self.latest = -math.inf  # greatest delay since this was last asked
         self.stamp = 0
         self.number: int | None = None  # of the publisher's last message
@@ -118,7 +120,7 @@ class InputWatch:
             words = f'taken {self._told:.1f} s late: this process lacks processor time'
             found.append(('inputs', words))
         self._told = 0.0
-        found += self._ahead()
+        found += self._ahead(now)
         for topic, state in self._topics.items():
             if state.lost != state.told:
                 found.append((topic, f'{state.lost} messages lost on the way so far'))
@@ -127,12 +129,13 @@ class InputWatch:
                 found.append((topic, f'silent for {now - state.heard:.1f} s'))
         return found
 
-    def _ahead(self) -> list[tuple[str, str]]:
-        """Return topics whose stamps since this was last asked all lie ahead of the clock."""
-        heard = {t: state.latest for t, state in self._topics.items() if state.latest > -math.inf}
-        for topic in heard:
-            self._topics[topic].latest = -math.inf
-        ahead = {topic: -delay for topic, delay in heard.items() if delay < -AHEAD}
+    def _ahead(self, now: float) -> list[tuple[str, str]]:
+        """Return topics whose stamps all lie ahead of the clock, since they were last heard."""
+        for state in self._topics.values():
+            if state.latest > -math.inf:
+                state.ahead, state.latest = -state.latest, -math.inf
+        heard = {t: s.ahead for t, s in self._topics.items() if not self.is_silent(t, now)}
+        ahead = {topic: by for topic, by in heard.items() if by > AHEAD}
         if len(ahead) > 1 and len(ahead) == len(heard):
             ahead = {'inputs': max(ahead.values())}
         words = 'stamps {:.0f} s ahead of the clock here: set the clocks, or stamp in the driver'

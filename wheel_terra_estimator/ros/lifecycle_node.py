@@ -143,7 +143,7 @@ class EstimatorNode(LifecycleNode):
         self._unpack = {topic: _topic_messages(topic).unpack for topic in MESSAGE_TYPES}
         self._timers_made: list[Timer] = []
         self._kept: KeptSoil | None = None
-        self._active = False
+        self._active = self._declaring = False
         self._enabled = True
         self._arrival: TextIO | None = None
         self._said = (-1, False)  # level of the node that was logged last, and whether quietly
@@ -211,7 +211,9 @@ class EstimatorNode(LifecycleNode):
         self._kept = self._kept_over_restart(configuration)
         kept = self._kept.values(configuration) if self._kept is not None else {}
         configuration = configuration.replace(kept) if kept else configuration
+        self._declaring = True
         parameters.declare(self, configuration)
+        self._declaring = False
         self._arrival = self._open_arrival_log(configuration)
         self._pipeline = Pipeline(configuration, self._full_name)
         self._pipeline.core.warning.restore(self._kept_warning())
@@ -577,8 +579,10 @@ class EstimatorNode(LifecycleNode):
         """Take changes of tuning at once; all else only while the node is not configured."""
         values = {change.name: change.value for change in changes}
         if self._pipeline is None:
-            self._given.update(values)
-            return SetParametersResult(successful=True)
+            reason = '' if self._declaring else parameters.why_refused(self._given, values)
+            if not reason:
+                self._given.update(values)
+            return SetParametersResult(successful=not reason, reason=reason)
         values = {key: v for key, v in values.items() if key in self._known}
         fixed = [key for key in values if not parameters.is_tuning(key)]
         if fixed:

@@ -15,7 +15,7 @@ from rclpy.node import Node
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.configuration.parameters import Parameter, declared
-from wheel_terra_estimator.errors import ConfigurationWarning
+from wheel_terra_estimator.errors import ConfigurationWarning, UserError
 
 TUNING = ('output_rate', 'max_lag', 'history', 'reference_odom_max_rate')
 """May be changed while the node runs, as all of ``filter.*``."""
@@ -65,6 +65,23 @@ def configuration(given: Mapping[str, Any], warn: Callable[[str], Any]) -> Confi
     for warning in doubtful:
         warn(str(warning.message))
     return checked
+
+
+def why_refused(given: Mapping[str, Any], changes: Mapping[str, Any]) -> str:
+    """Return why one of the changes cannot be used, whatever the others are; empty where all can.
+
+    What hangs together is judged when the node is configured.
+    """
+    table = declared()
+    wheels = len({**given, **changes}.get('wheels.names') or ())
+    for key, value in changes.items():
+        value = value.tolist() if hasattr(value, 'tolist') else value
+        if key in table and (wheels or table[key].size != 'wheels'):
+            try:
+                reader.checked_value(table[key], {key: (value, 'parameters')}, wheels)
+            except UserError as error:
+                return str(error)
+    return ''
 
 
 def declare(node: Node, configuration: Configuration) -> None:
