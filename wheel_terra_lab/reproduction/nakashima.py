@@ -22,7 +22,7 @@ SLIP_POINTS, FORCE_SHARE, SINKAGE_SHARE = 8.0, 0.10, 0.15
 RANK_AGREEMENT = 0.7
 WHY = {
     'sinkage': 'z_a counts from the start of rotation, and how far the wheel sinks before hangs on '
-    'how the load is put on, which the paper does not state (calibration.md)',
+    'how the load is put on, which the paper does not state',
     'steep': 'one or two beds; the wheel digs on, so slip grows with the travel that is counted',
     'soft': 'grain friction and rolling resistance of ours are a stand-in for a strength that the '
     'published list does not contain',
@@ -112,7 +112,8 @@ def _figures(rows: Sequence[Row]) -> list[Statement]:
             for curve, value in zip(figure.curves, values, strict=True)
             if math.isfinite(value)
         )
-        holds = figure.holds(figure, rows)
+        answer = figure.holds(figure, rows)
+        holds = None if answer is None else bool(answer)
         why = 'not run' if holds is None else '' if holds else WHY['soft']
         place = f'figure {figure.name}'
         found.append(Statement(place, figure.statement, 'yes', told or '-', holds, why))

@@ -8,6 +8,7 @@ import argparse
 import os
 from pathlib import Path
 
+from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.output_folder import working_folder
 from wheel_terra_lab.soilbin import measurements, reproduction
 from wheel_terra_lab.soilbin.output import WORK
@@ -24,6 +25,11 @@ def run(arguments: argparse.Namespace, cache: Path | None) -> int:
     module = STUDIES[arguments.action]
     folder: Path = arguments.output
     table = folder / module.TABLE
+    if arguments.report_only and not table.is_file():
+        raise UserError(
+            f'{table}: no rows to report; copy kept ones there, run the study without '
+            '--report-only, or see the shipped ones with wheel-terra reproduce nakashima'
+        )
     jobs: list[Job] = module.jobs(arguments)
     workers = 0 if arguments.report_only else arguments.jobs or os.cpu_count() or 1
     with working_folder(

@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 
 from wheel_terra_estimator.cli.main import main
@@ -22,6 +24,8 @@ def test_all_papers_stand_on_one_page_with_a_verdict_each(tmp_path, capsys):
         verdict = row.split(' | ')[-1]
         assert verdict.startswith(('reproduced', '**not**: ', 'no test')), row  # each not says why
     assert 'kept results' in page
+    stated = [int(held) for held in re.findall(r'^(\d+) of \d+ statements', page, re.MULTILINE)]
+    assert sum(stated) == sum(row.split(' | ')[-1].startswith('reproduced') for row in rows)
     assert {path.name for path in folder.glob('*.svg')} == {'ding.svg', 'nakashima.svg'}
 
 

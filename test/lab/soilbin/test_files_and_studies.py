@@ -263,6 +263,14 @@ def test_existing_output_is_refused(tmp_path, capsys):
     assert '--overwrite' in capsys.readouterr().err
 
 
+@pytest.mark.parametrize('study', [['reproduce'], ['rows', '--sweep', 'pull']])
+def test_a_page_needs_rows(tmp_path, capsys, study):
+    folder = tmp_path / 'fresh'
+    assert main(['soilbin', *study, '--report-only', '-o', str(folder)]) == 2
+    assert 'no rows to report' in capsys.readouterr().err
+    assert not folder.exists()
+
+
 FAKE_ABSENT = "raise ImportError('libmpi.so.12: cannot open shared object file')"
 FAKE_BROKEN = """
 class lammps:
