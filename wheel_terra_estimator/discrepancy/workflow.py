@@ -128,7 +128,9 @@ def diagnose(
             not_tried[name] += '; its other forms, in its place, were tried'
             rest = tuple(c for c in nuisance if effect_of(c.owner) != name)
             again = decided(forward.without(name), rest, forms)
-            if name in {effect_of(naming.key) for naming in again.names}:
+            new = [naming.key for naming in again.names if naming.key not in forward.base_effects]
+            # Its own form, free as well, is a rival: what both explain is no other form.
+            if len(again.names) == 1 and new and effect_of(new[0]) == name:
                 notes = (f'{name} is on in another form; the form named here takes its place',)
                 decision = _measured_from(again, decision)
                 break
@@ -241,12 +243,21 @@ def _effects_to_try(
 
 
 def _other_forms(forward: Forward, options: Options) -> dict[str, dict[str, Effect]]:
-    """Return each effect that is on with its other forms, where these may be named."""
+    """Return each effect that is on with its forms, where others of them may be named.
+
+    A form that has all parameters of the one that is on extends it: what it explains better may be
+    anything.
+    """
     found = {}
     for key in forward.base_effects:
         name = effect_of(key)
-        forms = {f.name: f for f in forward.catalogue[name].forms if f.candidate and f.name != key}
-        if forms and name in (options.effects or (name,)):
+        own = forward.catalogue[key]
+        held = {p.name for p in own.parameters if p.free}
+        forms = {key: own}
+        for form in forward.catalogue[name].forms:
+            if form.candidate and not held <= {p.name for p in form.parameters}:
+                forms[form.name] = form
+        if len(forms) > 1 and name in (options.effects or (name,)):
             found[name] = forms
     return found
 
