@@ -20,11 +20,3 @@ def test_a_warning_without_its_slip_is_said() -> None:
     assert 'at 16.0 s: late, 0.5 s after the rover was entrapped' in lines[-3]
     assert 'at 40.0 s: a near miss, the median slip passed 0.75, no entrapment' in lines[-2]
     assert 'at 80.0 s: false, the median slip did not pass 0.75 within 20 s' in lines[-1]
-
-
-def test_a_warning_that_stood_until_a_late_entrapment_is_early() -> None:
-    warnings = ((78.6, Verdict(Outcome.NEAR_MISS)),)
-    lines = as_lines(TruthErrors('test', (), None, warnings, 107.2, 28.6))
-    assert 'at 78.6 s: early, 28.6 s before the rover was entrapped' in lines[-1]
-    lines = as_lines(TruthErrors('test', (), None, warnings, 107.2, 1.0))  # another one stood
-    assert 'a near miss' in lines[-1]

@@ -172,41 +172,26 @@ def seen_later(history: EstimateHistory, border: Border) -> tuple[str, ...]:
     there = np.isfinite(slip).any(axis=1)
     if not history.warnings:
         return ()
-    entrapped = _entrapped(history, slip)
-    lead = None if entrapped is None else lead_of(entrapped, _spans(history))
     found = []
     for start, verdict in _warnings(history, slip):
         after = (history.seconds >= start) & (history.seconds <= start + FORESIGHT)
         if not (after & there).any():
             found.append('Whether it was right is not known: the slip after it is not.')
         else:
-            words = _in_words(verdict, _stood_for(start, entrapped, lead))
-            found.append(f'By the estimates: {words}.')
+            found.append(f'By the estimates: {_in_words(verdict)}.')
     return tuple(found)
 
 
 def outcomes(errors: TruthErrors) -> tuple[str, ...]:
     """Return what came of each warning by the truth, in words."""
-    return tuple(
-        _in_words(verdict, _stood_for(start, errors.entrapped, errors.lead))
-        for start, verdict in errors.warnings
-    )
+    return tuple(_in_words(verdict) for _, verdict in errors.warnings)
 
 
-def _stood_for(start: float, entrapped: float | None, lead: float | None) -> float | None:
-    """Return how long [s] a warning had stood at the first entrapment; None: it did not."""
-    if entrapped is None or lead is None or not np.isclose(start, entrapped - lead):
-        return None
-    return lead
-
-
-def _in_words(verdict: Verdict, stood: float | None) -> str:
+def _in_words(verdict: Verdict) -> str:
     if verdict.lead is not None:
         early = verdict.lead >= 0.0
         word, when = ('right', 'before') if early else ('late', 'after')
         return f'{word}, {abs(verdict.lead):.1f} s {when} the rover was entrapped'
-    if stood is not None:
-        return f'early, {stood:.1f} s before the rover was entrapped, and it stood till then'
     within = f'within {FORESIGHT:g} s'
     if verdict.outcome is Outcome.NEAR_MISS:
         return f'a near miss, the median slip passed {NEAR_MISS_SLIP:g}, no entrapment {within}'
