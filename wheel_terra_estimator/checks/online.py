@@ -311,7 +311,8 @@ class OnlineChecks:
             facts.direction * rate[k],
             facts.direction * errors.torque.reading(torques[k]),
         )
-        k, base = there(inertial), inertial.reshape(-1, 2, 3)
+        # A reading with a part that is no number says nothing of the sensor.
+        k, base = np.isfinite(inertial).all(axis=1), inertial.reshape(-1, 2, 3)
         read = base + np.stack([errors.specific_force_bias, errors.angular_rate_bias])
         force, turning = ((read[k, i] @ self._mounting) for i in (0, 1))
         none = np.full((force.shape[0], 4), np.nan)
@@ -319,7 +320,7 @@ class OnlineChecks:
         k = there(depth)
         deep = errors.sinkage.reading(depth[k])
         digs = SinkageSeries('sinkage', stamp[k], stamp[k], names, deep)
-        k = there(velocity)
+        k = np.isfinite(velocity[:, 0])
         ahead = np.column_stack([velocity[k, 0], np.zeros((k.sum(), 2))])
         slip_free = VelocitySeries(
             'reference_odom', stamp[k], stamp[k], ahead, ahead[:, 1], velocity[k, 1]
