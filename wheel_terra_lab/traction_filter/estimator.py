@@ -55,7 +55,13 @@ from wheel_terra_lab.traction_filter.curve import LOG_STRENGTH, OFFSET, WHEELS
 from wheel_terra_lab.traction_filter.learned import learned_parameters
 from wheel_terra_lab.traction_filter.outputs import Sources, estimate_set
 from wheel_terra_lab.traction_filter.pulls import Contact, PullModel, SumOfPulls, WheelPulls
-from wheel_terra_lab.traction_filter.references import HeldSlip, ReferenceTuning, joined, trust
+from wheel_terra_lab.traction_filter.references import (
+    HeldSlip,
+    ReferenceTuning,
+    joined,
+    mixed,
+    weighed,
+)
 from wheel_terra_lab.traction_filter.sinkage import SinkageFilter
 from wheel_terra_lab.traction_filter.soil import (
     NamedSoil,
@@ -80,10 +86,9 @@ class TractionTuning:
     log_scale_std: float = 0.2
     log_strength_std: float = 0.1
     wheel_std: float = 0.15  # ln strength of one wheel against the others
-    offset_walk: float = 0.015  # [1/sqrt(m)] of rim travel, as all walks; the least
-    most_offset_walk: float = 0.15
-    walk_gain: float = 0.5  # of its logarithm, by the product of two normalised innovations
-    walk_leak: float = 0.02  # back to the least, at each reference
+    offset_walk: float = 0.015  # [1/sqrt(m)] of rim travel, as all walks
+    offset_jump: float = 0.15  # of the curve that does not hold, at each reference
+    strength_jump: float = 0.15
     log_scale_walk: float = 0.05
     log_strength_walk: float = 0.05
     wheel_walk: float = 0.15
@@ -121,6 +126,7 @@ class Memory(NamedTuple):
     solution: BodySlip | None = None
     slip: float = 0.1  # of the body, last known
     slip_variance: float = 1.0
+    steady: tuple[float, float] = (0.1, 1.0)  # the same where the curve holds
     told_variance: float = 1.0  # of the error of the slip that the sinkage may tell
     held: HeldSlip = HeldSlip()
     travel: float = 0.0  # of the rims since a start or reversal [m]
@@ -131,8 +137,7 @@ class Memory(NamedTuple):
     reference_time: float = -math.inf
     sinkage_time: float = -math.inf
     rejected: int = 0
-    innovation: float = 0.0  # of the last reference over its deviation, within +-2
-    log_walk: float = 0.0  # ln of the walk of the offset over its least
+    disagreement: float = 0.0  # of the wheels' torques with the curve, over their variance
     speed: tuple[float, float] = (0.0, 1.0)  # of the body and its variance
     pulls: WheelPulls | None = None
     assessment: StuckAssessment = StuckAssessment()
@@ -375,7 +380,6 @@ class TractionEstimator:
         """Let the curve change over the travel of the rims [m]."""
         memory, tuning, ekf, n = self._memory, self._tuning, self._ekf, self._n
         walks = [tuning.offset_walk, tuning.log_scale_walk, tuning.log_strength_walk]
-        walks[OFFSET] *= math.exp(memory.log_walk)
         Q = np.square(walks + [tuning.wheel_walk] * n) * travel
         keep = np.ones(3 + n)
         keep[WHEELS:] = np.exp(-Q[WHEELS:] / (2.0 * tuning.wheel_std**2))
@@ -441,7 +445,7 @@ class TractionEstimator:
         memory = self._memory
         demand = memory.demand
         self._balance = None
-        held = memory.held.later(dt, self._references)
+        held = memory.held.later(dt, memory.steady, memory.disagreement, self._references)
         self._memory = memory = memory._replace(held=held)
         if demand is None:
             return
@@ -467,12 +471,15 @@ class TractionEstimator:
             return
         start = memory.solution.slip if memory.solution else memory.slip
         found = self._balance.solved(ekf.x, start, self._torque_variance(), ekf.P)
-        slip, variance = joined(found, memory.held, self._references)
+        most = self._references.most_slip
+        steady = joined(found, memory.held, self._references)
+        slip, variance = mixed(steady, memory.held)
         told = max(variance - self._tuning.sinkage_floor**2, 0.0)
         self._sinkage.limit_slip(told)
         self._memory = memory._replace(
             solution=found,
-            slip=clipped(slip + self._sinkage.slip_error, -1.0, 1.0),
+            steady=steady,
+            slip=clipped(slip + self._sinkage.slip_error, -most, most),
             slip_variance=min(self._sinkage.slip_variance + variance - told, variance),
             told_variance=told,
         )
@@ -499,12 +506,15 @@ class TractionEstimator:
         R = max(stated, sensors.reference_std_floor**2) / rims.scale**2
         seen = (rims.body - reference.forward) / rims.scale
         found, balance = memory.solution, self._balance
-        known = memory.slip, memory.slip_variance
         spread = memory.slip_variance * rims.scale**2
         innovation = (memory.slip - seen) * rims.scale
         noise = R * rims.scale**2
         self._noise.compare_reference(time, innovation, noise, spread, reference.variance)
-        weight = trust(seen, R, known, memory.held, self._references)
+        weights = weighed(seen, R, memory.steady, memory.held, self._references)
+        jump = np.zeros(3 + self._n)
+        jump[OFFSET], jump[LOG_STRENGTH] = tuning.offset_jump, tuning.strength_jump
+        ekf.P = ekf.P + np.diag((1.0 - weights.holding) * jump**2)
+        weight = weights.in_steady
         if found is not None and balance is not None:
             # Linear about the slip that was known before: on its plateau the torque tells none, but
             # a slip that is known tells the strength.
@@ -514,7 +524,6 @@ class TractionEstimator:
             H = curve.gradient
             tail = residual**2 / (H @ ekf.P @ H + variance)
             self._consistency.note(reference=tail)
-            self._memory = memory = self._adapted(weight * math.copysign(math.sqrt(tail), residual))
             weight *= min((tuning.freedom + 1.0) / (tuning.freedom + tail), 1.0)
             ekf.update(
                 np.array([residual]),
@@ -523,23 +532,11 @@ class TractionEstimator:
                 R=np.array([[variance / weight]]),
             )
             ekf.x = np.clip(ekf.x, *self.bounds[0])
-        if weight < 0.5:
+        if weights.sound < 0.5:
             self._memory = memory = memory._replace(rejected=memory.rejected + 1)
-        self._memory = memory._replace(held=memory.held.corrected(seen, R / weight))
+        held = memory.held.corrected(seen, R, weights, self._references)
+        self._memory = memory._replace(held=held)
         self._settle()
-
-    def _adapted(self, innovation: float) -> Memory:
-        """Return the memory with the walk of the offset that the innovations ask for.
-
-        Innovations of one sign after the other say that the curve changes faster than it may; white
-        noise, of whatever size, does not.
-        """
-        memory, tuning = self._memory, self._tuning
-        innovation = clipped(innovation, -2.0, 2.0)
-        most = math.log(tuning.most_offset_walk / tuning.offset_walk)
-        grown = memory.log_walk * (1.0 - tuning.walk_leak)
-        grown += tuning.walk_gain * innovation * memory.innovation
-        return memory._replace(innovation=innovation, log_walk=clipped(grown, 0.0, most))
 
     def _follow_wheels(self, torque: FloatArray, load: FloatArray) -> None:
         """Learn the strength under each wheel from its torque against that of the curve."""
@@ -554,7 +551,9 @@ class TractionEstimator:
         spread = found.expected[use] ** 2 * np.diagonal(ekf.P)[WHEELS + use] + tuning.wheel_noise**2
         weight = np.minimum((tuning.freedom + 1.0) / (tuning.freedom + residual**2 / spread), 1.0)
         if len(use):
-            self._consistency.note(torque=float(np.mean(residual**2 / spread)))
+            nis = float(np.mean(residual**2 / spread))
+            self._consistency.note(torque=nis)
+            self._memory = memory._replace(disagreement=nis)
         for row, r, w in zip(H, residual, weight, strict=True):
             place = int(np.argmax(row != 0.0)) if row.any() else -1
             if place < 0:

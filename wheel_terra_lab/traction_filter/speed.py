@@ -35,8 +35,8 @@ class SolverTuning:
     least_slope: float = 0.1  # of the torque coefficient over the slip, in a step [-]
     agreement: float = 0.1
     """Torque coefficient within which wheels agree [-]; what is far beyond loses its weight."""
-    agreement_share: float = 0.15  # of the median coefficient, besides
-    freedom: float = 2.0  # of that heavy tail
+    agreement_share: float = 0.5  # of the median coefficient, besides
+    freedom: float = 10.0  # of that heavy tail
     scale_share: float = 0.5  # of the fastest rim, where wheels turn against one another
     tolerance: float = 1e-4  # of the slip
     iterations: int = 8
