@@ -86,12 +86,12 @@ class TractionTuning:
     log_scale_std: float = 0.2
     log_strength_std: float = 0.1
     wheel_std: float = 0.15  # ln strength of one wheel against the others
-    offset_walk: float = 0.015  # [1/sqrt(m)] of rim travel, as all walks
+    offset_walk: float = 0.004  # [1/sqrt(m)] of rim travel, as all walks
     offset_jump: float = 0.15  # of the curve that does not hold, at each reference
     strength_jump: float = 0.15
-    log_scale_walk: float = 0.05
-    log_strength_walk: float = 0.05
-    wheel_walk: float = 0.15
+    log_scale_walk: float = 0.015
+    log_strength_walk: float = 0.015
+    wheel_walk: float = 0.1
     reversal_std: float = 0.1  # of the offset, at a change of direction
     torque_time: float = 0.25  # low-pass of the torques [s]
     most_demand: float = 5.0  # torque coefficient: more is no reading of a wheel on soil

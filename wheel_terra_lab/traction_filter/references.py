@@ -26,11 +26,11 @@ class ReferenceTuning:
     wild_range: float = 2.0  # of their slips, evenly
     slip_std: float = 0.005  # floor of what torques tell
     most_slip: float = 2.0  # that is held: a rover that slides back has more than 1
-    change_rate: float = 0.003  # of the soil, faster than the curve walks [1/s]
+    change_rate: float = 0.001  # of the soil, faster than the curve walks [1/s]
     change_by_torque: float = 0.05  # more, by what the wheels' torques disagree [1/s]
     settle_rate: float = 1.0  # at which the curve holds again [1/s]
     change_std: float = 0.4  # of the slip, at a change
-    least_share: float = 1e-3  # of either mode
+    least_share: float = 1e-5  # of either mode
 
 
 class Weights(NamedTuple):
@@ -68,7 +68,7 @@ class HeldSlip(NamedTuple):
         if math.isinf(self.variance):
             return self
         walked = tuning.walk**2 * dt
-        rate = tuning.change_rate + tuning.change_by_torque * disagreement
+        rate = tuning.change_rate + tuning.change_by_torque * max(disagreement - 1.0, 0.0)
         come = self.holding * (1.0 - math.exp(-rate * dt))
         stayed = (1.0 - self.holding) * math.exp(-tuning.settle_rate * dt)
         new = steady[0], steady[1] + tuning.change_std**2
