@@ -65,7 +65,7 @@ class HeldSlip(NamedTuple):
         disagreement : float
             Of the wheels' torques with the curve: mean squared residual over its variance.
         """
-        if math.isinf(self.variance):
+        if math.isinf(self.variance) or dt <= 0.0:
             return self
         walked = tuning.walk**2 * dt
         rate = tuning.change_rate + tuning.change_by_torque * max(disagreement - 1.0, 0.0)
@@ -122,7 +122,8 @@ def mixed(steady: tuple[float, float], held: HeldSlip) -> tuple[float, float]:
     """Return slip and variance of both modes; `steady` is that where the curve holds."""
     if math.isinf(held.variance):
         return steady
-    return _mean((held.holding, steady), (1.0 - held.holding, (held.changed, held.changed_variance)))
+    changed = held.changed, held.changed_variance
+    return _mean((held.holding, steady), (1.0 - held.holding, changed))
 
 
 def weighed(
