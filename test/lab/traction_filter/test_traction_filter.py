@@ -113,13 +113,13 @@ def test_the_speed_is_the_one_that_gives_the_torques(steady, rover, slip, yaw_ra
     rims, headings, demand, body = drive_of(steady, rover, slip, yaw_rate=yaw_rate)
     load, level = np.ones(6) * steady.load, np.zeros(6)
 
-    def found(state, demand=demand, tuning=SolverTuning()):
+    def found(state, demand=demand, **tuning):
         balance = TorqueBalance(
             *(steady, rims, headings, yaw_rate),
             demand=demand,
             load=load,
             stiffness=level,
-            tuning=tuning,
+            tuning=SolverTuning(**tuning),
         )
         return balance.solved(state, 0.1, 1e-4, 1e-4 * np.eye(9))
 
@@ -129,7 +129,7 @@ def test_the_speed_is_the_one_that_gives_the_torques(steady, rover, slip, yaw_ra
     odd[2] = 0.0  # a wheel in the air turns without a torque
     # It counts less than the others where they pull, though it is not left out.
     most = 0.9 if slip >= 0.3 else 1.01
-    plain = found(np.zeros(9), odd, SolverTuning(agreement=1e3)).slip
+    plain = found(np.zeros(9), odd, agreement=1e3).slip
     assert abs(found(np.zeros(9), odd).slip - at.slip) < most * abs(plain - at.slip)
     for k in (0, 1, 2, 5):
         step = 5e-3 * np.eye(9)[k]
