@@ -29,8 +29,8 @@ RIM = 0.05  # [m/s]
 DEFAULTS = StuckSettings()
 
 
-def motion(slip, sunk=0.01, std=0.03):
-    wheel = WheelMotion(slip, std, RIM, True, math.nan, sunk, 0.12)
+def motion(slip, sunk=0.01, std=0.03, radius=0.12):
+    wheel = WheelMotion(slip, std, RIM, True, math.nan, sunk, radius)
     return RoverMotion(RIM * (1.0 - slip), True, (wheel,) * 6)
 
 
@@ -47,10 +47,10 @@ def likely(situation, settings=DEFAULTS):
     return outlook(situation, FirstPassage(), settings).probability
 
 
-def sinking(slip, growth=0.0, std=0.03, seconds=20.0):
+def sinking(slip, growth=0.0, std=0.03, seconds=20.0, radius=0.12):
     """Return the situation after a drive in which the sinkage grew steadily up to now."""
     times = 0.1 * np.arange(round(10 * seconds) + 1)
-    return followed(motion(slip, growth * RIM * time, std) for time in times)
+    return followed(motion(slip, growth * RIM * time, std, radius) for time in times)
 
 
 def simulated(slip, std, deepening, travel, paths=100_000):
@@ -134,12 +134,20 @@ def test_the_first_axle_of_two_that_enters_loose_soil_is_no_entrapment():
 
 @pytest.mark.parametrize('slip', [0.3, 0.7, 0.9])
 def test_the_travel_left_is_that_within_which_it_is_as_likely_as_not(slip):
-    (wheel, *_), _ = outlook(sinking(slip, 0.08), FirstPassage(), DEFAULTS)
+    (wheel, *_), _ = outlook(sinking(slip, 0.08, radius=1.0), FirstPassage(), DEFAULTS)
     course = FirstPassage().probability([slip], [0.03], 0.08)[0]
     assert np.interp(wheel.travel, TRAVELS, course) == pytest.approx(0.5, abs=0.04)
     assert wheel.time == pytest.approx(wheel.travel / RIM)
     nothing = outlook(sinking(0.2), FirstPassage(), DEFAULTS).wheels[0]
     assert (nothing.travel, nothing.time) == (10.0, 600.0)
+
+
+def test_the_travel_left_ends_where_a_wheel_is_in_too_deep_to_climb_out():
+    growth, seconds = 0.03, 20.0
+    (wheel, *_), _ = outlook(sinking(0.35, growth, seconds=seconds), FirstPassage(), DEFAULTS)
+    left = (0.4 * 0.12 - growth * RIM * seconds) / growth
+    assert wheel.travel == pytest.approx(left, rel=0.05)
+    assert wheel.time == pytest.approx(wheel.travel / RIM)
 
 
 @pytest.mark.parametrize(('rim', 'share'), [(0.05, 0.75), (-0.05, -0.75)])

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -21,7 +22,11 @@ _LEAST_RIM = 1e-3
 
 
 class WheelForecast(NamedTuple):
-    """Outlook of one wheel; time and travel within which it is as likely as not."""
+    """Outlook of one wheel.
+
+    Time and travel are those within which an entrapment is as likely as not, or the wheel is in
+    too deep to climb out, if that comes first.
+    """
 
     probability: float  # of an entrapment within the horizon [-]
     time: float  # [s]
@@ -41,16 +46,19 @@ def outlook(s: Situation, passage: FirstPassage, settings: StuckSettings) -> Out
     within = passage.probability([w.slip for w in wheels], [w.slip_std for w in wheels], s.digging)
     travel = max(settings.horizon * s.fastest, settings.travel) if s.settled else 0.0
     found = []
-    for wheel, stands, course in zip(wheels, s.stalled, within, strict=True):
+    for wheel, stands, course, room in zip(
+        wheels, s.stalled, within, s.climbing_room or [math.inf] * len(wheels), strict=True
+    ):
         if stands:
             found.append(WheelForecast(1.0, 0.0, 0.0))
         elif not wheel.known:
             found.append(WheelForecast(0.0, LONGEST_TIME, NO_ENTRAPMENT_IN_SIGHT))
         else:
             likely = float(np.interp(travel, TRAVELS, course))
-            left, time = NO_ENTRAPMENT_IN_SIGHT, LONGEST_TIME
+            left, time = min(room, NO_ENTRAPMENT_IN_SIGHT), LONGEST_TIME
             if course[-1] > 0.5:
-                left = float(np.interp(0.5, course, TRAVELS))
+                left = min(left, float(np.interp(0.5, course, TRAVELS)))
+            if left < NO_ENTRAPMENT_IN_SIGHT:
                 time = min(left / max(abs(wheel.rim_speed), _LEAST_RIM), LONGEST_TIME)
             found.append(WheelForecast(likely, time, left))
     telling = [

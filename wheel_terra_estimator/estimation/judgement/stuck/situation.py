@@ -58,6 +58,12 @@ class SituationTuning:
     start_travel: float = 0.25  # [m] of rim travel in which slip and sinkage settle after a start
     stall_ratio: float = 0.6  # of the fastest rim speed: a wheel below it hardly turns
     rut_length: float = 0.08  # [m] of rim travel over which the growth of the sinkage is taken
+    digs: float = 0.02  # sinkage gained over rim travel by a wheel that digs in [m/m]
+    digging_slip: float = 0.2  # at least, of such a wheel
+    deep: float = 0.4
+    """Sinkage over the radius from which a wheel does not climb out: its entrance angle is 53
+    degrees there, and the normal stress, centred at about half of it, leans back by 27 degrees, as
+    much as the friction of loose soil pulls forward."""
     cruise_time: float = 5.0  # [s] in which the speed before is forgotten
     braked: float = 0.2  # slowing of wheels that are being stopped
     free_strain: float = 0.5  # of the torque limit: below it no soil holds the wheels
@@ -135,11 +141,30 @@ class Situation:
         Half of the wheels sink where the first axle of two enters other soil: that is a step, and
         no rover that digs itself in.
         """
-        growths = [
+        growths = sorted(self.growths)
+        return growths[(len(growths) - 1) // 2] if growths else 0.0
+
+    @cached_property
+    def growths(self) -> tuple[float, ...]:
+        """Sinkage gained over rim travel by each wheel [m/m]."""
+        return tuple(
             (wheel.sinkage - rut) / self.tuning.rut_length
             for wheel, rut in zip(self.motion.wheels, self.memory.ruts, strict=True)
-        ]
-        return sorted(growths)[(len(growths) - 1) // 2] if growths else 0.0
+        )
+
+    @cached_property
+    def climbing_room(self) -> tuple[float, ...]:
+        """Rim travel after which each wheel is in too deep for its lugs to climb out [m].
+
+        It sinks as it turns, as over its last travel; infinite where it does not.
+        """
+        t = self.tuning
+        return tuple(
+            max(t.deep * wheel.radius - wheel.sinkage, 0.0) / growth
+            if self.settled and wheel.known and growth > t.digs and wheel.slip > t.digging_slip
+            else math.inf
+            for wheel, growth in zip(self.motion.wheels, self.growths, strict=True)
+        )
 
     @cached_property
     def strain(self) -> float:
