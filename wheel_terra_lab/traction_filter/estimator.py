@@ -210,6 +210,9 @@ class TractionEstimator:
         )
         curve = np.array([*tuning.limits[:3], *[tuning.limits[3]] * n])
         deepest = np.concatenate([rover.rim_radius, np.full(n + 1, np.inf)])
+        self._change = np.zeros((3 + n, 3 + n))  # of the curve, where the soil has changed
+        self._change[OFFSET, OFFSET] = tuning.offset_jump**2
+        self._change[LOG_STRENGTH, LOG_STRENGTH] = tuning.strength_jump**2
         self._bounds = (-curve, curve), (-deepest, deepest)
         self._of_a_cycle: tuple[Any, ...] = (
             self._steering,
@@ -511,9 +514,7 @@ class TractionEstimator:
         noise = R * rims.scale**2
         self._noise.compare_reference(time, innovation, noise, spread, reference.variance)
         weights = weighed(seen, R, memory.steady, memory.held, self._references)
-        jump = np.zeros(3 + self._n)
-        jump[OFFSET], jump[LOG_STRENGTH] = tuning.offset_jump, tuning.strength_jump
-        ekf.P = ekf.P + np.diag((1.0 - weights.holding) * jump**2)
+        ekf.P = ekf.P + (1.0 - weights.holding) * self._change
         weight = weights.in_steady
         if found is not None and balance is not None:
             # Linear about the slip that was known before: on its plateau the torque tells none, but
@@ -567,17 +568,17 @@ class TractionEstimator:
             ekf.P[place, place] = p * keep
         ekf.x = np.clip(ekf.x, *self.bounds[0])
 
-    def _wheel_slips(self, rims: Rims) -> tuple[FloatArray, FloatArray]:
-        """Return slip (n,) of the turning wheels and its deviation."""
+    def _wheel_slips(self, rims: Rims) -> FloatArray:
+        """Return the slip (n,) of the turning wheels."""
         headings, yaw_rate = self._steering.state.headings, self._turning.state.yaw_rate
-        speed, variance = self._body_speed(rims)
+        speed, _ = self._body_speed(rims)
         ground = np.array(headings.by_speed) * speed + np.array(headings.by_yaw_rate) * yaw_rate
         larger = np.maximum(np.maximum(np.abs(rims.speed), np.abs(ground)), 1e-3)
         slip = (rims.speed - ground) / larger * np.where(rims.speed >= 0.0, 1.0, -1.0)
-        return np.clip(slip, -1.0, 1.0), np.minimum(math.sqrt(variance) / larger, 1.0)
+        return np.clip(slip, -1.0, 1.0)
 
     def _sink(self, dt: float, rims: Rims, load: FloatArray) -> None:
-        slip, _ = self._wheel_slips(rims)
+        slip = self._wheel_slips(rims)
         self._sinkage.predict(
             slip,
             self._by_body(rims),
@@ -624,7 +625,7 @@ class TractionEstimator:
         total: SumOfPulls | None,
     ) -> None:
         memory, n = self._memory, self._n
-        slip, _ = self._wheel_slips(rims)
+        slip = self._wheel_slips(rims)
         ratio = np.where(slip >= 0.0, 1.0 - slip, 1.0 / np.maximum(1.0 + slip, 0.3))
         rolling = np.where(rims.turning, np.sign(rims.speed), 0.0)
         demand = memory.demand if memory.demand is not None else np.full(n, NAN)

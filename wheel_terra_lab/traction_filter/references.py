@@ -120,7 +120,7 @@ def joined(found: BodySlip, held: HeldSlip, tuning: ReferenceTuning) -> tuple[fl
 
 def mixed(steady: tuple[float, float], held: HeldSlip) -> tuple[float, float]:
     """Return slip and variance of both modes; `steady` is that where the curve holds."""
-    if math.isinf(held.variance):
+    if math.isinf(held.changed_variance):  # no reference yet, whatever a smoother knows
         return steady
     changed = held.changed, held.changed_variance
     return _mean((held.holding, steady), (1.0 - held.holding, changed))

@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +27,7 @@ from wheel_terra_estimator.estimation.output_guard import OutputGuard
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
 from wheel_terra_estimator.estimation.scalars import gain_of
 from wheel_terra_estimator.estimation.smoothing.backward import smoothed_before
+from wheel_terra_estimator.estimation.smoothing.smoother import Kept
 from wheel_terra_estimator.estimation.smoothing.spool import Spool
 from wheel_terra_estimator.estimation.smoothing.tape import Gaussian, Transition
 from wheel_terra_lab.traction_filter.estimator import Resolved, TractionEstimator
@@ -44,13 +45,6 @@ class SmootherTuning:
     least_share: float = 0.7
     """Of the filter's deviation of a speed: model errors do not average out as noise does."""
     longest_gap: float = 0.25  # between a set and a cycle beside it [s]
-
-
-class Kept(NamedTuple):
-    """A set of the filter, and what else came with it."""
-
-    estimates: EstimateSet
-    companion: Any
 
 
 class DriveSmoother:

@@ -18,6 +18,7 @@ from wheel_terra_estimator.terramechanics.operating_points import OperatingPoint
 from wheel_terra_lab.evaluation.runner import record, run_candidate
 from wheel_terra_lab.evaluation.simulators import SIMULATORS
 from wheel_terra_lab.traction_filter.curve import WheelSpeeds, coefficients
+from wheel_terra_lab.traction_filter.references import HeldSlip, mixed
 from wheel_terra_lab.traction_filter.speed import SolverTuning, TorqueBalance, rims_at
 from wheel_terra_lab.traction_filter.steady_wheel import SteadyWheel
 
@@ -135,6 +136,10 @@ def test_the_speed_is_the_one_that_gives_the_torques(steady, rover, slip, yaw_ra
         step = 5e-3 * np.eye(9)[k]
         true = (found(step).slip - found(-step).slip) / 1e-2
         assert -at.mean.gradient[k] / at.mean.slope == pytest.approx(true, abs=0.05, rel=0.1)
+
+
+def test_before_the_first_reference_a_smoothed_slip_changes_no_mixture():
+    assert mixed((0.2, 0.01), HeldSlip(0.3, 0.02)) == (0.2, 0.01)
 
 
 def test_a_softer_soil_sinks_deeper_and_another_soil_is_a_shift(steady):

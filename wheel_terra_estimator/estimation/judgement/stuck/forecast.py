@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -46,9 +45,8 @@ def outlook(s: Situation, passage: FirstPassage, settings: StuckSettings) -> Out
     within = passage.probability([w.slip for w in wheels], [w.slip_std for w in wheels], s.digging)
     travel = max(settings.horizon * s.fastest, settings.travel) if s.settled else 0.0
     found = []
-    for wheel, stands, course, room in zip(
-        wheels, s.stalled, within, s.climbing_room or [math.inf] * len(wheels), strict=True
-    ):
+    by_wheel = zip(wheels, s.stalled, within, s.climbing_room, strict=True)
+    for wheel, stands, course, room in by_wheel:
         if stands:
             found.append(WheelForecast(1.0, 0.0, 0.0))
         elif not wheel.known:
