@@ -32,7 +32,7 @@ import os
 import shutil
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path, PurePosixPath
 from types import MappingProxyType
 from typing import Any
@@ -251,12 +251,12 @@ def working_folder(
     """Make a folder that a command fills in place in the block, so that it can go on after an end.
 
     Where the block ends with no result in it, the folder goes again: the next try finds the place
-    free.
+    as this one did, with the output of an earlier run in it.
 
     Parameters
     ----------
     path, overwrite
-        As in `check_target`; what an earlier run listed is removed at once.
+        As in `check_target`; an earlier output is kept aside until the block ends.
     resume : bool
         Whether to go on with a folder as it is, where it is one of ours.
     entries : iterable of str
@@ -269,7 +269,6 @@ def working_folder(
     UserError
         See `check_folder`.
     """
-    found = path.is_dir() and not is_ours(path)  # then it is the user's, and stays
     if resume and path.is_dir():
         _refuse_place(path, inputs)
         if not is_ours(path):
@@ -280,21 +279,30 @@ def working_folder(
         )
     else:
         check_folder(path, overwrite, inputs)
-    try:
-        if path.exists() and not resume:
-            _remove_own_files(path)
-        path.mkdir(parents=True, exist_ok=True)
-        mark(path, entries)
-    except OSError as error:
-        raise cannot_write(path, error) from None
-    try:
-        yield
-    finally:
-        with suppress(OSError, UserError):
-            if path.is_dir() and not any(_holds(path / name) for name in _own_files(path)):
-                _remove_own_files(path)
-                if found:
-                    path.mkdir()
+    path = _absolute(path)
+    empty = path.is_dir() and not any(path.iterdir())  # then it is the user's, and stays
+    with ExitStack() as aside:
+        earlier: Path | None = None
+        try:
+            if path.exists() and not resume:
+                beside = tempfile.TemporaryDirectory(
+                    dir=path.parent, prefix=f'.{path.name}.wheel-terra-'
+                )
+                earlier = path.rename(Path(aside.enter_context(beside)) / path.name)
+            path.mkdir(parents=True, exist_ok=True)
+            mark(path, entries)
+        except OSError as error:
+            raise cannot_write(path, error) from None
+        try:
+            yield
+        finally:
+            with suppress(OSError, UserError):
+                if path.is_dir() and not any(_holds(path / name) for name in _own_files(path)):
+                    _remove_own_files(path)
+                    if earlier is not None:
+                        earlier.rename(path)
+                    elif empty:
+                        path.mkdir()
 
 
 def _holds(entry: Path) -> bool:
