@@ -5,12 +5,14 @@
 from __future__ import annotations
 
 import csv
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
 import pytest
 import yaml
 
+from wheel_terra_lab.evaluation.simulators import SIMULATORS
 from wheel_terra_lab.studies import readme_figures
 
 ERRORS = {'A': {1: 0.1, 2: 0.1, 3: 0.4}, 'B': {1: 0.2, 2: 0.2, 3: 0.2}}
@@ -49,6 +51,17 @@ def test_figures_are_those_by_hand() -> None:
     assert held[0] == '80 %; 50 %'
     warned = found['without a reference: entrapments warned before; false warnings']
     assert warned[0] == '1 of 3; 6 in 1.5 h'
+
+
+def test_each_kind_on_half_of_the_soils_and_an_entrapment_of_each_simulator_on_each() -> None:
+    driven = readme_figures.drives(7800, 10)
+    counts = Counter((simulator, kind) for simulator, kind, _ in driven)
+    assert set(counts.values()) == {5} and len(driven) == len(set(driven))
+    for name in readme_figures.DRIVEN:
+        simulator = SIMULATORS[name]
+        assert {kind for driver, kind in counts if driver == name} == set(simulator.kinds)
+        trapped = [seed for s, kind, seed in driven if s == name and kind in simulator.entrapments]
+        assert set(trapped) == set(range(7800, 7810))
 
 
 def test_rows_of_two_commits_are_refused() -> None:
