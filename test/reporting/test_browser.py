@@ -215,39 +215,6 @@ def soilbin_report(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope='module')
-def limiter_report(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    from wheel_terra_lab.evaluation import page
-    from wheel_terra_lab.evaluation.closed_loop import ClosedLoopDrive, Comparison, report
-
-    time = np.linspace(0.0, 90.0, 900)
-    wheels = np.outer(time / 90.0, np.ones(6))
-    free = ClosedLoopDrive(
-        time, time, 0.1 * wheels, wheels, np.ones(900), None, 'command passes', {}
-    )
-    limited = dataclasses.replace(free, stopped=40.0, reason='stop: 0.05 m of rim travel left')
-    drive = Comparison(3, 0.1, free, limited)
-    path = tmp_path_factory.mktemp('limiter') / 'report.html'
-    page.write(path, 'The traction limiter', report([drive]), None, drive)
-    return path
-
-
-@pytest.fixture(scope='module')
-def evaluation_report(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    from wheel_terra_lab.evaluation import page
-
-    head = ['drives', 'slip RMSE', 'two states, torque', 'two states, pitch', 'three states']
-    head += ['best', 'ratio (95 % interval)', 'rule kept', 'slow part (20 s means)', 'coverage']
-    head += ['30 s after a start', 'coverage of two states, torque', 'squared error over variance']
-    cells = ['0.0425', '0.0582', '0.0991', '0.0534', '0.0534', '0.79 (0.68 to 0.93)', '100 %']
-    cells += ['0.0176', '99.5 %', '100.0 %', '99.9 %', '0.54, 0.23']
-    rows = [head, ['---'] * len(head), ['creeping_entrapment', *cells], ['all', *cells]]
-    text = '\n'.join(f'| {" | ".join(row)} |' for row in rows)
-    path = tmp_path_factory.mktemp('evaluation') / 'report.html'
-    page.write(path, 'The estimator', f'# Slip\n\n{text}\n', None, None)
-    return path
-
-
-@pytest.fixture(scope='module')
 def fleet_report(tmp_path_factory: pytest.TempPathFactory) -> Path:
     from wheel_terra_estimator.reporting.fleet_summary import CLASSES, DriveRow, write_summary_page
 
@@ -276,8 +243,6 @@ KINDS = {
     'diagnosis_report': 0,
     'comparison_report': 7,
     'soilbin_report': 6,
-    'limiter_report': 8,
-    'evaluation_report': 0,
     'fleet_report': 0,
     'check_report': 0,
 }

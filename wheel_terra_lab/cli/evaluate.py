@@ -17,7 +17,6 @@ from wheel_terra_estimator.scheduler import add_jobs_argument
 
 if TYPE_CHECKING:
     from wheel_terra_lab.evaluation.bench import Results
-    from wheel_terra_lab.evaluation.closed_loop import Comparison
 
 FILTER_FAILED = 1
 """Exit status where the filter failed on a drive; none of them should make it."""
@@ -106,9 +105,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         dest='output',
         action=Output,
         type=Path,
-        metavar='F.md|F.html|DIR',
-        help='write the tables; as a page with a picture where the name ends in .html; with '
-        '--hours a folder',
+        metavar='F.md|DIR',
+        help='write the tables; with --hours a folder',
     )
     parser.add_argument(
         '--hours',
@@ -132,7 +130,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Run the command."""
     from wheel_terra_estimator.output_folder import check_file, new_file
-    from wheel_terra_lab.evaluation import page, tables
+    from wheel_terra_lab.evaluation import tables
 
     if arguments.hours is not None:
         return _drive_for_hours(arguments)
@@ -161,10 +159,7 @@ def run(arguments: argparse.Namespace) -> int:
         print(text)
     if arguments.output:
         with new_file(arguments.output, arguments.overwrite) as fresh:
-            if page.is_page(arguments.output):
-                page.write(fresh, told.title, text, told.results, told.limited)
-            else:
-                fresh.write_text(text + '\n', encoding='utf-8')
+            fresh.write_text(text + '\n', encoding='utf-8')
     return told.status or (FILTER_FAILED if restarts else 0)
 
 
@@ -173,9 +168,7 @@ class _Told(NamedTuple):
 
     text: str
     healths: Sequence[Mapping[str, Any]]
-    title: str = 'The estimator against truth and baselines'
     results: Results | None = None
-    limited: Comparison | None = None
     status: int = 0
 
 
@@ -198,21 +191,19 @@ def _seeds(arguments: argparse.Namespace) -> range:
 
 def _limiter(arguments: argparse.Namespace) -> _Told:
     from wheel_terra_estimator.output_folder import check_file, new_file
-    from wheel_terra_lab.evaluation import closed_loop, page
+    from wheel_terra_lab.evaluation import closed_loop
 
     picture: Path | None = None
-    if arguments.output and not page.is_page(arguments.output):
+    if arguments.output:
         picture = arguments.output.with_suffix('.png')
         check_file(picture, arguments.overwrite)
     drives = closed_loop.compare(_seeds(arguments))
     if picture:
         with new_file(picture, arguments.overwrite) as fresh:
-            page.draw_limiter(drives[0], fresh)
+            closed_loop.draw(drives[0], fresh)
     return _Told(
         closed_loop.report(drives),
         [run.health for pair in drives for run in (pair.free, pair.limited)],
-        'The traction limiter in a closed loop',
-        limited=drives[0],
     )
 
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,7 @@ from wheel_terra_estimator.estimation.traction_limiter import (
     after_estimates,
     after_stuck,
 )
+from wheel_terra_estimator.reporting.style import LINE_COLOURS, picture_style
 from wheel_terra_estimator.simulation.commands import Command
 from wheel_terra_estimator.simulation.drive import Drive
 from wheel_terra_estimator.simulation.scenario import Scenario, load
@@ -151,3 +153,28 @@ def report(drives: Sequence[Comparison]) -> str:
     return table(
         ('seed', 'good ground', 'with limiter', 'without', 'stopped at [s]', 'because'), rows
     )
+
+
+def draw(drive: Comparison, path: Path) -> None:
+    """Draw a drive with and without the limiter: way, slip, sinkage, scale of the command."""
+    from matplotlib.figure import Figure
+
+    with picture_style():
+        figure = Figure(figsize=(8.0, 7.2))
+        axes = figure.subplots(4, 1, sharex=True)
+        for name, run, colour in (
+            ('without limiter', drive.free, LINE_COLOURS[1]),
+            ('with limiter', drive.limited, LINE_COLOURS[0]),
+        ):
+            panels = {
+                'way [m]': run.position,
+                'median slip [-]': np.median(np.nan_to_num(run.slip), axis=1),
+                'deepest wheel [mm]': 1e3 * run.sinkage.max(axis=1),
+                'scale of the command [-]': run.scale,
+            }
+            for axis, (title, values) in zip(axes, panels.items(), strict=True):
+                axis.plot(run.time, values, color=colour, label=name)
+                axis.set_title(title)
+        axes[0].legend(loc='lower right', bbox_to_anchor=(1.0, 1.0), ncols=2)
+        axes[-1].set_xlabel('time [s]')
+        figure.savefig(path, format='png', dpi=110)

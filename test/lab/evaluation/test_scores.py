@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from wheel_terra_estimator.simulation.truth import TruthTable, entrapped, slip_classes
-from wheel_terra_lab.evaluation import page, scores, tables
+from wheel_terra_lab.evaluation import scores, tables
 from wheel_terra_lab.evaluation.bench import DriveScore, Results
 from wheel_terra_lab.evaluation.runner import Record
 from wheel_terra_lab.evaluation.two_state_filters import SlipCourse
@@ -191,33 +191,6 @@ def test_tables_hold_every_kind():
     pooled = tables.pooled_report(Results([drive]), ['reference', 'no_torque'])
     assert '| With reference at 1 Hz (1 drives) |' in pooled
     assert 'climb' not in pooled
-
-
-def test_a_page_holds_the_numbers_of_the_tables(tmp_path):
-    """Every cell of the Markdown stands in the page; the picture has the error of the tables."""
-    true = truth(np.concatenate([np.full(200, 0.1), np.full(200, 0.7)]))
-    record = said(true)
-    drive = DriveScore(
-        'climb', 1, 'reference', take(true, record), scores.warnings(true, record, RADIUS), {}
-    )
-    results = Results([drive, replace(drive, kind='near_stuck')])
-    text = tables.report(results, ['reference'])
-    page.write(tmp_path / 'page.html', 'a title', text, results, None)
-    written = (tmp_path / 'page.html').read_text(encoding='utf-8')
-    found = list(page.blocks(text))
-    assert next(block.text for block in found if block.kind == 'heading') in written
-    cells = {
-        cell.strip().strip('*')
-        for line in text.splitlines()
-        if line.startswith('|') and '---' not in line
-        for cell in line.strip('|').split('|')
-    }
-    rows = [row for block in found if block.kind == 'table' for row in [block.head, *block.rows]]
-    assert {cell for row in rows for cell in row} == cells
-    assert all(f'>{cell}<' in written for cell in cells if not set(cell) & set('|<>&'))
-    axis = page.slip_errors(results, page.PHONE).axes[0]
-    drawn = [line.get_xdata()[0] for line in axis.lines if line.get_marker() == 'o']
-    assert any(x == pytest.approx(scores.rms(drive.samples.slip_error)) for x in drawn)
 
 
 def test_figures_for_programs_are_those_of_the_tables():
