@@ -173,11 +173,6 @@ LABORATORY_MAY_USE = {
     ),
     # The truth of a trial knows nothing of the models that are to find it.
     'trials': ({'configuration', 'discrepancy', 'reporting'}, {'numpy'} | PICTURES),
-    # The candidate for the core knows what the core knows.
-    'traction_filter': (
-        {'configuration', 'terramechanics', 'estimation'},
-        {'numpy', 'scipy', 'filterpy'},
-    ),
     # Limits of rates are quantiles of scipy.
     'evaluation': (
         {
@@ -229,10 +224,10 @@ def test_folders_use_what_is_below_them(folder):
 @pytest.mark.parametrize('folder', LABORATORY_MAY_USE)
 def test_folders_of_the_laboratory_too(folder):
     folders, libraries = LABORATORY_MAY_USE[folder]
-    own = {'jobs', 'terramechanics', folder} | (
-        {'traction_filter'} if folder == 'evaluation' else set()
-    )
-    allowed = {PACKAGE.name: folders | COMMON, LABORATORY.name: own}
+    allowed = {
+        PACKAGE.name: folders | COMMON,
+        LABORATORY.name: {'jobs', 'terramechanics', folder},
+    }
     assert not list(beyond(LABORATORY / folder, allowed, libraries))
 
 

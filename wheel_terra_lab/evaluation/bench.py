@@ -17,11 +17,9 @@ from wheel_terra_estimator.scheduler import finished
 from wheel_terra_lab.evaluation import baselines, scores
 from wheel_terra_lab.evaluation.foresight import Foresight, foresight
 from wheel_terra_lab.evaluation.runner import (
-    CANDIDATE,
     SMOOTHED,
     inputs_of_mode,
     record,
-    run_candidate,
     run_estimator,
     run_smoother,
 )
@@ -76,7 +74,7 @@ def score_mode(simulator: str, kind: str, seed: int, mode: str, drive: BenchDriv
     """Score the estimator in one mode on a drive."""
     configuration, truth = drive.configuration, drive.truth
     measurements = list(inputs_of_mode(drive.arrivals, mode))
-    run = _runner_of(mode)
+    run = run_smoother if mode.startswith(SMOOTHED) else run_estimator
     sets, health = run(configuration, measurements)
     kept = record(sets, health)
     radius = configuration.wheels.slip_radius
@@ -90,13 +88,6 @@ def score_mode(simulator: str, kind: str, seed: int, mode: str, drive: BenchDriv
         simulator=simulator,
         foresight=foresight(truth, kept, radius, StuckSettings.from_configuration(configuration)),
     )
-
-
-def _runner_of(mode: str) -> Callable[..., tuple[list[Any], dict[str, Any]]]:
-    """Return what runs in a mode: the estimator, the smoother, or the candidate for the core."""
-    if mode.startswith(SMOOTHED):
-        return run_smoother
-    return run_candidate if mode.startswith(CANDIDATE) else run_estimator
 
 
 def _baselines(drive: BenchDrive, measurements: Sequence[Measurement]) -> scores.BaselineSlips:

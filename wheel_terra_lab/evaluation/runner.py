@@ -37,13 +37,10 @@ MODES = (
     *REFERENCE_DELAYS,
     'smoothed',
     'smoothed_no_reference',
-    'traction_filter',
-    'traction_filter_no_reference',
 )
-"""What the estimator gets: everything, all but one input, or the reference sooner or later; what
-the smoother makes of it; and what the candidate for the core, `traction_filter`, does with it."""
+"""What the estimator gets: everything, all but one input, or the reference sooner or later; and
+what the smoother makes of it."""
 SMOOTHED = 'smoothed'
-CANDIDATE = 'traction_filter'
 
 
 @dataclass(frozen=True)
@@ -69,7 +66,7 @@ class Record:
 
 def inputs_of_mode(arrivals: Iterable[TimedMeasurement], mode: str) -> Iterator[Measurement]:
     """Yield what a mode gets of a drive, in the order of arrival."""
-    mode = mode.removeprefix(SMOOTHED).removeprefix(CANDIDATE).removeprefix('_')
+    mode = mode.removeprefix(SMOOTHED).removeprefix('_')
     timed = [(a.arrival, a.measurement) for a in arrivals]
     if mode in REFERENCE_DELAYS:
         delay = round(REFERENCE_DELAYS[mode] * 1e9)
@@ -101,21 +98,6 @@ def run_estimator(
     from wheel_terra_estimator.estimation.core import EstimatorCore
 
     core = EstimatorCore(configuration, judged_by=InputJudge)
-    sets: list[EstimateSet] = []
-    for measurement in measurements:
-        sets += core.add(measurement)
-    sets += core.flush()
-    return sets, core.health()
-
-
-def run_candidate(
-    configuration: Configuration, measurements: Iterable[Measurement]
-) -> tuple[list[EstimateSet], dict[str, Any]]:
-    """Run the candidate for the core; as `run_estimator`, but for the watch over the inputs."""
-    from wheel_terra_estimator.estimation.core import EstimatorCore
-    from wheel_terra_lab.traction_filter.estimator import TractionEstimator
-
-    core = EstimatorCore(configuration, TractionEstimator(configuration))
     sets: list[EstimateSet] = []
     for measurement in measurements:
         sets += core.add(measurement)

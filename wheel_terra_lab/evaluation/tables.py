@@ -33,8 +33,6 @@ _MODES = {
     'reference_2s_late': 'Reference 2 s late',
     'smoothed': 'Smoother with reference at 1 Hz',
     'smoothed_no_reference': 'Smoother without reference',
-    'traction_filter': 'Traction filter (candidate) with reference',
-    'traction_filter_no_reference': 'Traction filter (candidate) without reference',
 }
 
 
