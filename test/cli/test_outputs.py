@@ -166,7 +166,7 @@ REFUSED = {
     'soilbin reproduce': 'soilbin reproduce --no-cache --scheduler {silent} -o',
     'soilbin rows': 'soilbin rows --no-cache --sweep pull --scheduler {silent} -o',
     'reproduce': 'reproduce guo --figure 99 -o',
-    'evaluate': 'evaluate --hours 1 --first-seed -1 -o',
+    'evaluate': 'evaluate --hours 1 --kinds climb --first-seed -1 -o',
     'bench': 'bench --against {table} --report',
     'demo': 'demo --no-node -o',
 }

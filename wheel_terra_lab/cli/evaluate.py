@@ -22,13 +22,11 @@ FILTER_FAILED = 1
 """Exit status where the filter failed on a drive; none of them should make it."""
 INTERRUPTED = 130
 MOST_HOURS = 1000.0
-"""Longest drive: its ground is drawn before the start."""
+"""More than anybody waits for."""
 EXAMPLES = (
     'wheel-terra evaluate --kinds climb turns --seeds 4',
     'wheel-terra evaluate --rover my_rover.yaml --kinds climb scenarios/slow_entrapment --seeds 2',
     'wheel-terra evaluate --limiter --seeds 10 -o limiter.md',
-    'wheel-terra evaluate --hours 24 -o day',
-    'wheel-terra evaluate --hours 24 -o day --resume',
     'wheel-terra evaluate --hours 10 --simulator A B --kinds firm --modes reference -o firm',
 )
 
@@ -112,9 +110,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--hours',
         type=float,
         metavar='N',
-        help='one drive of so many hours with slopes, turns, stops and sensor faults; -o DIR keeps '
-        'a line of JSON per hour (an hour takes about three minutes). With --kinds drives of these '
-        'kinds, seed after seed, until so many hours are driven in each mode, a line per drive',
+        help='drives of the --kinds, seed after seed, until so many hours are driven in each mode; '
+        '-o DIR keeps a line of JSON per drive (an hour takes about three minutes)',
     )
     parser.add_argument(
         '--resume',
@@ -240,67 +237,47 @@ def _simulated(arguments: argparse.Namespace) -> _Told:
 
 
 def _drive_for_hours(arguments: argparse.Namespace) -> int:
-    """Run one long drive or many of some kinds, or go on with them."""
-    from wheel_terra_lab.evaluation import long_drive, many_drives
+    """Run drives of some kinds for so many hours, or go on with them."""
+    from wheel_terra_lab.evaluation import many_drives, runner
 
     if any((arguments.measured, arguments.limiter, arguments.rover)):
         raise UserError('--hours goes with neither --measured nor --limiter nor --rover')
-    if arguments.simulator != ['A'] and not arguments.kinds:
-        raise UserError(f'--hours --simulator {" ".join(arguments.simulator)} needs --kinds')
+    if not arguments.kinds:
+        raise UserError('--hours needs --kinds')
     if arguments.output is None:
         raise UserError('--hours needs -o DIR, where its figures are kept')
     if not 0.0 < arguments.hours <= MOST_HOURS:
         raise UserError(f'--hours {arguments.hours:g}: must be above 0, at most {MOST_HOURS:g}')
-    report = many_drives.report if arguments.kinds else long_drive.report
+    chosen = _chosen(arguments.simulator, arguments.kinds)
+    _check_names(arguments.modes, runner.MODES, 'mode')
+    smoothed = [mode for mode in arguments.modes if mode.startswith(runner.SMOOTHED)]
+    if smoothed:
+        raise UserError(f'--hours does not go with the mode {smoothed[0]}')
     try:
-        rows = _hours_of_kinds(arguments) if arguments.kinds else _one_long_drive(arguments)
+        rows = many_drives.drive_kinds_for_hours(
+            arguments.output,
+            arguments.hours,
+            chosen,
+            arguments.modes,
+            _seeds(arguments).start,
+            resume=arguments.resume,
+            overwrite=arguments.overwrite,
+        )
     except KeyboardInterrupt:
         which = ''
         if arguments.tuning:
             which = '--tuning '
         elif arguments.first_seed is not None:
             which = f'--first-seed {arguments.first_seed} '
-        if arguments.kinds:
-            kinds, modes = ' '.join(arguments.kinds), ' '.join(arguments.modes)
-            which += f'--simulator {" ".join(arguments.simulator)} --kinds {kinds} --modes {modes} '
+        kinds, modes = ' '.join(arguments.kinds), ' '.join(arguments.modes)
+        which += f'--simulator {" ".join(arguments.simulator)} --kinds {kinds} --modes {modes} '
         print(
             f'interrupted; go on with: --hours {arguments.hours:g} {which}-o {arguments.output} '
             '--resume'
         )
         return INTERRUPTED
-    print(report(rows))
+    print(many_drives.report(rows))
     return FILTER_FAILED if any(row['filter_restarts'] for row in rows) else 0
-
-
-def _one_long_drive(arguments: argparse.Namespace) -> list[dict[str, Any]]:
-    from wheel_terra_lab.evaluation import long_drive
-
-    return long_drive.drive_for_hours(
-        arguments.output,
-        arguments.hours,
-        _seeds(arguments).start,
-        resume=arguments.resume,
-        overwrite=arguments.overwrite,
-    )
-
-
-def _hours_of_kinds(arguments: argparse.Namespace) -> list[dict[str, Any]]:
-    from wheel_terra_lab.evaluation import many_drives, runner
-
-    chosen = _chosen(arguments.simulator, arguments.kinds)
-    _check_names(arguments.modes, runner.MODES, 'mode')
-    smoothed = [mode for mode in arguments.modes if mode.startswith(runner.SMOOTHED)]
-    if smoothed:
-        raise UserError(f'--hours does not go with the mode {smoothed[0]}')
-    return many_drives.drive_kinds_for_hours(
-        arguments.output,
-        arguments.hours,
-        chosen,
-        arguments.modes,
-        _seeds(arguments).start,
-        resume=arguments.resume,
-        overwrite=arguments.overwrite,
-    )
 
 
 def _chosen(names: Sequence[str], kinds: list[str] | None) -> list[tuple[str, str]]:
