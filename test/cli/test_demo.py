@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import importlib.util
+from pathlib import Path
 
 import pytest
 
@@ -14,17 +15,24 @@ from wheel_terra_estimator.cli import demo, main
 def test_a_node_that_is_not_found_does_not_end_the_demo(monkeypatch, tmp_path, capsys):
     ran = []
 
-    def run_drive(drive, output, live):
-        ran.append((drive.name, live))
-        return demo.NODE_NOT_FOUND if live else 0
+    def run(command, environment):
+        live = command[0].endswith('live_drive')
+        ran.append((Path(command[1 if live else 2]).name, live, environment['ROS_DOMAIN_ID']))
+        return demo.Part(demo.NODE_NOT_FOUND if live else 0, f'{ran[-1][0]} ran\n')
 
     monkeypatch.setattr(importlib.util, 'find_spec', lambda name: name)
-    monkeypatch.setattr(demo, '_run_drive', run_drive)
+    monkeypatch.setattr(demo, '_run', run)
     monkeypatch.setattr(demo, '_outcome', lambda drive, output: 'replayed')
-    monkeypatch.setattr(demo, '_trial', lambda folder: (0, 'named'))
+    monkeypatch.setattr(demo, '_trial', lambda folder: demo.Part(0, 'table\n'))
+    monkeypatch.setattr(demo, '_named', lambda folder: 'named')
     assert main.main(['demo', '-o', str(tmp_path / 'out')]) == 0
-    assert ran == [('entrapment', True), ('entrapment', False), ('pathfinder', False)]
-    assert 'DDS has no way to the node' in capsys.readouterr().out
+    assert {(name, live) for name, live, _ in ran} == {
+        (name, live) for name in ('entrapment', 'pathfinder') for live in (True, False)
+    }
+    assert len({domain for *_, domain in ran}) == 2  # the nodes do not hear each other's drive
+    said = capsys.readouterr().out
+    assert said.count('DDS has no way to the node') == 2
+    assert said.index('entrapment ran') < said.index('pathfinder ran') < said.index('table')
 
 
 def test_the_exit_status_is_that_of_the_live_drive():

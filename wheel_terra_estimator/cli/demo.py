@@ -17,6 +17,8 @@ import json
 import os
 import subprocess
 import sys
+from collections.abc import Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import NamedTuple
 
@@ -28,7 +30,19 @@ SEAL_SHA256 = '78c7f9baa4662e0969d5b5dff2c94fbd5cbd89ae14923cf0fcc754b1af82c5c7'
 """Of the shipped ``sealed.json``, which says what was hidden in the table beside it."""
 NODE_NOT_FOUND = 4
 """Exit status of ``ros.live_drive`` where DDS does not connect it with the node."""
+AT_ONCE = 2
+"""Parts that run side by side: most of a drive is work of one core."""
+DOMAINS = 101
+"""ROS domains that every system has."""
+ONE_THREAD = {'OMP_NUM_THREADS': '1', 'OPENBLAS_NUM_THREADS': '1'}
 EXAMPLES = ('wheel-terra demo', 'wheel-terra demo --no-node -o /tmp/demo --overwrite')
+
+
+class Part(NamedTuple):
+    """A part that has ended: its exit status and what it said."""
+
+    status: int
+    said: str
 
 
 class DemoDrive(NamedTuple):
@@ -90,66 +104,89 @@ def _show(arguments: argparse.Namespace, output: Path) -> int:
     else:
         why = '' if arguments.no_node else 'There is no rclpy here (no sourced Jazzy): '
         print(f'{why}the drives go through `wheel-terra replay`; the numbers are the same.')
-    reports, shown = [], []
-    for drive in DRIVES:
-        print(f'\n=== {drive.name}: {drive.title}\n', flush=True)
-        status = _run_drive(drive, output, live)
-        if live and status == NODE_NOT_FOUND:
-            print('DDS has no way to the node on this machine: `wheel-terra replay` goes on.')
-            live, status = False, _run_drive(drive, output, False)
-        if status:
+    with ThreadPoolExecutor(AT_ONCE) as pool:
+        drives = [pool.submit(_drive, i, output, live) for i in range(len(DRIVES))]
+        trial = pool.submit(_trial, output / 'trial')
+        for drive, part in zip(DRIVES, drives, strict=True):
+            if status := _told(f'{drive.name}: {drive.title}', part):
+                return status
+        if status := _told('trial: what is missing in the model of a wheel?', trial):
             return status
-        shown.append(f'{drive.name}: {_outcome(drive, output)}')
-        reports.append(output / f'{drive.name}.html')
-    print('\n=== trial: what is missing in the model of a wheel?\n', flush=True)
-    status, outcome = _trial(output / 'trial')
-    if status:
-        return status
-    shown.append(f'trial: {outcome}')
-    reports.append(output / 'trial' / 'diagnosis' / 'report.html')
+    shown = [f'{drive.name}: {_outcome(drive, output)}' for drive in DRIVES]
+    shown.append(f'trial: {_named(output / "trial")}')
     print('\nReports with pictures, to be opened in a browser:')
-    for report in reports:
-        print(f'  {report.resolve()}')
+    for report in (*(f'{drive.name}.html' for drive in DRIVES), 'trial/diagnosis/report.html'):
+        print(f'  {(output / report).resolve()}')
     print('\nWhat was shown:')
     for line in shown:
         print(f'  {line}')
     return 0
 
 
-def _trial(folder: Path) -> tuple[int, str]:
-    """Diagnose the shipped table blind, open its seal; return the status and what came of it."""
+def _told(title: str, part: Future[Part]) -> int:
+    """Print the title, then what a part said once it has ended; return its status."""
+    print(f'\n=== {title}\n', flush=True)
+    status, said = part.result()
+    print(said, end='', flush=True)
+    return status
+
+
+def _run(command: Sequence[str], environment: Mapping[str, str]) -> Part:
+    """Run a command of the package; return its status and what it said."""
+    done = subprocess.run(
+        [sys.executable, '-m', *command],
+        env={**os.environ, **environment},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        check=False,
+    )
+    return Part(done.returncode, done.stdout)
+
+
+def _trial(folder: Path) -> Part:
+    """Diagnose the shipped table blind."""
     from wheel_terra_estimator.configuration.shipped import demo_recording
 
     shipped = demo_recording('trial')
-    sealed = (shipped / 'sealed.json').read_bytes()
-    if hashlib.sha256(sealed).hexdigest() != SEAL_SHA256:
-        raise UserError(f'{shipped / "sealed.json"}: the seal is broken; install the package anew')
-    print(f'blind table, truth sealed (SHA-256 {SEAL_SHA256[:16]}...)', flush=True)
-    command = [sys.executable, '-m', 'wheel_terra_estimator.cli.main', 'diagnose', '--overwrite']
+    command = ['wheel_terra_estimator.cli.main', 'diagnose', '--overwrite']
     command += [str(shipped / 'blind.csv'), '--config', str(shipped / 'rig.yaml')]
-    command += ['-o', str(folder / 'diagnosis')]
-    status = subprocess.run(command, env=_environment(), check=False).returncode
-    if status:
-        return status, ''
+    status, said = _run([*command, '-o', str(folder / 'diagnosis')], ONE_THREAD)
+    return Part(status, f'blind table, truth sealed (SHA-256 {SEAL_SHA256[:16]}...)\n{said}')
+
+
+def _named(folder: Path) -> str:
+    """Open the seal; return whether what was named is what was hidden."""
+    from wheel_terra_estimator.configuration.shipped import demo_recording
+
+    path = demo_recording('trial') / 'sealed.json'
+    sealed = path.read_bytes()
+    if hashlib.sha256(sealed).hexdigest() != SEAL_SHA256:
+        raise UserError(f'{path}: the seal is broken; install the package anew')
     report = json.loads((folder / 'diagnosis' / 'report.json').read_text(encoding='utf-8'))
     hidden = ' + '.join(json.loads(sealed)['hidden'])
     said = ' + '.join(effect['name'] for effect in report['effects']) or report['verdict']
     judged = 'right' if said == hidden else 'wrong'
-    return 0, f'seal opened: {hidden} was hidden; said: {said}: {judged}'
+    return f'seal opened: {hidden} was hidden; said: {said}: {judged}'
 
 
-def _run_drive(drive: DemoDrive, output: Path, live: bool) -> int:
-    command = _command(drive, output, live)
-    return subprocess.run(command, env=_environment(), check=False).returncode
+def _drive(number: int, output: Path, live: bool) -> Part:
+    """Run a drive; where DDS does not connect it with the node, replay it."""
+    part = _run(_command(DRIVES[number], output, live), _environment(number))
+    if live and part.status == NODE_NOT_FOUND:
+        said = 'DDS has no way to the node on this machine: `wheel-terra replay` instead.\n'
+        status, replayed = _run(_command(DRIVES[number], output, False), _environment(number))
+        return Part(status, said + replayed)
+    return part
 
 
 def _command(drive: DemoDrive, output: Path, live: bool) -> list[str]:
     from wheel_terra_estimator.configuration.shipped import demo_recording
 
-    program = ['wheel_terra_estimator.ros.live_drive']
+    command = ['wheel_terra_estimator.ros.live_drive']
     if not live:
-        program = ['wheel_terra_estimator.cli.main', 'replay']
-    command = [sys.executable, '-m', *program, str(demo_recording(drive.name))]
+        command = ['wheel_terra_estimator.cli.main', 'replay']
+    command += [str(demo_recording(drive.name))]
     command += ['-o', str(output / drive.name), '--report', str(output / f'{drive.name}.html')]
     for name in drive.configuration:
         command += ['--config', name]
@@ -158,15 +195,15 @@ def _command(drive: DemoDrive, output: Path, live: bool) -> list[str]:
     return [*command, '--overwrite']
 
 
-def _environment() -> dict[str, str]:
-    """Keep the demonstration to this machine and apart from other robots on it."""
-    own = {
-        'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
-        'ROS_DOMAIN_ID': str(os.getpid() % 100 + 1),
-        'OMP_NUM_THREADS': '1',
-        'OPENBLAS_NUM_THREADS': '1',
+def _environment(number: int) -> dict[str, str]:
+    """Keep a drive to this machine, and apart from other robots on it and from the other drive."""
+    domain = int(os.environ.get('ROS_DOMAIN_ID') or os.getpid()) + number
+    reach = os.environ.get('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
+    return {
+        **ONE_THREAD,
+        'ROS_AUTOMATIC_DISCOVERY_RANGE': reach,
+        'ROS_DOMAIN_ID': str(domain % DOMAINS),
     }
-    return {**own, **os.environ}
 
 
 def _outcome(drive: DemoDrive, output: Path) -> str:

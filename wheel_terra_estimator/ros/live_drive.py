@@ -67,7 +67,7 @@ QUEUE = 5000
 PATIENCE = 5.0  # [s] until the next message is sent though the node has not heard the last one
 DISCOVERY_TIMEOUT = 60.0  # [s]
 NOT_FOUND, INTERRUPTED = 4, 130  # exit statuses
-QUIET = 3.0  # [s] without an output after the last input: the node is done
+QUIET, PAUSE = 2.0, 0.2  # [s] without an output, looked for so often: the node is done
 
 OUTPUT_MESSAGES = {
     **{f'{NAMESPACE}/{topic}': JointState for topic in JOINT_OUTPUTS},
@@ -252,13 +252,12 @@ class _Player(Node):
 
     def wait_for_end(self) -> None:
         """Wait until the node says nothing new."""
-        count = -1
-        while count != len(self.heard):
-            count = len(self.heard)
-            self._spin_until(lambda: False, QUIET)
+        count, quiet = len(self.heard), 0
+        while quiet * PAUSE < QUIET:
+            self._spin_until(lambda: False, PAUSE)
             # Diagnostics go on for ever.
-            if all(heard.topic == DIAGNOSTICS for heard in self.heard[count:]):
-                return
+            said = any(heard.topic != DIAGNOSTICS for heard in self.heard[count:])
+            count, quiet = len(self.heard), 0 if said else quiet + 1
 
     def _keeper(self, topic: str) -> Any:
         def keep(data: bytes, info: Mapping[str, int]) -> None:
