@@ -186,7 +186,8 @@ def test_a_refused_run_leaves_nothing_and_its_place_free(
 ) -> None:
     """The next try is refused for the same reason, not because of what the first one left."""
     monkeypatch.setattr(scheduler, 'CONNECT_TIMEOUT', 0.2)
-    monkeypatch.setattr(demo.subprocess, 'run', lambda *_, **__: argparse.Namespace(returncode=2, stdout=''))
+    refused = argparse.Namespace(returncode=2, stdout='')
+    monkeypatch.setattr(demo.subprocess, 'run', lambda *_, **__: refused)
     with socket.create_server(('127.0.0.1', 0)) as silent:
         paths = {name: tmp_path / f'given.{name}' for name in ('bag', 'bad', 'table')}
         for path in paths.values():
