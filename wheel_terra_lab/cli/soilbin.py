@@ -67,7 +67,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         study.add_argument(
             '--grain-scale', type=float, default=0.0, metavar='K', help='grains larger by K'
         )
-        study.add_argument('--report-only', action='store_true', help='write the page, run nothing')
         if name == 'rows':
             study.add_argument('--sweep', choices=('pull', 'slip'), required=True)
         if name == 'reproduce':
@@ -102,9 +101,11 @@ def run(arguments: argparse.Namespace) -> int:
     cache = None if arguments.no_cache else arguments.cache or snapshots.default_cache()
     if arguments.action == 'run':
         return _run_one(arguments, cache)
-    from wheel_terra_lab.soilbin import studies
+    from wheel_terra_lab.reproduction import nakashima
+    from wheel_terra_lab.soilbin import measurements, studies
 
-    return studies.run(arguments, cache)
+    report = nakashima.report if arguments.action == 'reproduce' else measurements.report
+    return studies.run(arguments, cache, report)
 
 
 def _run_one(arguments: argparse.Namespace, cache: Path | None) -> int:

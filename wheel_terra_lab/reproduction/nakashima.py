@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import argparse
 import csv
 import math
 from collections.abc import Sequence
@@ -11,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from wheel_terra_lab.reproduction.statement import Statement
+from wheel_terra_lab.reproduction.statement import Statement, page
 from wheel_terra_lab.soilbin import metrics, reproduced_figures, reproduction
 from wheel_terra_lab.soilbin.metrics import Row
 
@@ -41,12 +42,28 @@ def kept() -> list[Row]:
 
 def statements(rows: Sequence[Row]) -> list[Statement]:
     """Return everything the paper states in numbers or words, beside the rows."""
-    return [*_table7(rows), *_table6(rows), *_figures(rows), *_moon(rows)]
+    return [
+        *_table7(rows),
+        *_paper_speed(rows),
+        *_table6(rows),
+        *_figures(rows),
+        *_moon(rows),
+    ]
 
 
 def draw(rows: Sequence[Row], path: Path) -> None:
     """Draw the figures side by side."""
     reproduced_figures.draw(rows, path)
+
+
+def report(_: argparse.Namespace, rows: Sequence[Row], folder: Path) -> None:
+    """Write the page and the picture of a study of the soil bin."""
+    page_of, picture = (folder / name for name in reproduction.PAGES)
+    lines = [*page(TITLE, statements(rows)), f'![paper and ours]({picture.name})', '']
+    stopped = [row for row in rows if row.get('stopped')]
+    lines += [f'- stopped early, {row["name"]}: {row["stopped"]}' for row in stopped]
+    page_of.write_text('\n'.join(lines).rstrip() + '\n', encoding='utf-8')
+    draw(rows, picture)
 
 
 def _table7(rows: Sequence[Row]) -> list[Statement]:
@@ -66,6 +83,28 @@ def _table7(rows: Sequence[Row]) -> list[Statement]:
             place, what = 'table 7', f'wheel {wheel}, 25 degrees: {name}'
             found.append(Statement(place, what, f'{said:.3g}', f'{have:.3g}', good, why))
     return found
+
+
+def _paper_speed(rows: Sequence[Row]) -> list[Statement]:
+    """Slip of the nine wheels at the paper's own rim speed, as far as they were run."""
+    paper = metrics.published('table7')
+    steep = [
+        row
+        for row in reproduction.of(rows, reproduction.PAPER_SPEED)
+        if float(row['slope_deg']) == reproduction.TABLE7_SLOPE
+    ]
+    pairs = [
+        (np.mean([metrics.number(row, 'slip') for row in mine]), paper[wheel]['slip'])
+        for wheel in reproduction.WHEELS
+        if (mine := [row for row in steep if row['wheel'] == str(wheel)])
+    ]
+    what = "nine wheels, 25 degrees, the paper's rim speed: largest miss of slip [points]"
+    if len(pairs) < len(paper):
+        return [Statement('table 7', what, '0', '-', None, f'{len(pairs)} wheels run')]
+    off = 100.0 * max(abs(ours - theirs) for ours, theirs in pairs)
+    order = metrics.rank_correlation(*zip(*pairs, strict=True))
+    why = f'{SLIP_POINTS:g} allowed; rank correlation {order:.2f}'
+    return [Statement('table 7', what, '0', f'{off:.1f}', bool(off <= SLIP_POINTS), why)]
 
 
 def _table6(rows: Sequence[Row]) -> list[Statement]:
@@ -128,6 +167,8 @@ def _figures(rows: Sequence[Row]) -> list[Statement]:
 
 
 def _moon(rows: Sequence[Row]) -> list[Statement]:
+    if not reproduction.of(rows, 'moon'):
+        return [Statement('section 6', 'wheel 5 in 1/6 g', '-', '-', None, 'not run')]
     found = []
     for (slope, name), said in MOON.items():
         have = _mean(rows, slope, moon=True, name=name)

@@ -20,7 +20,6 @@ TABLE6 = (
     'power_number_20_percent',
 )
 TABLE7 = ('slip', 'gross_traction', 'motion_resistance', 'sinkage_average')
-RANK_DRAWS = 4000
 WIDEST = 10.0  # [deg] between two slopes that a figure may be interpolated from
 Row = Mapping[str, str]
 
@@ -148,21 +147,3 @@ def rank_correlation(ours: Sequence[float], theirs: Sequence[float]) -> float:
     from scipy.stats import spearmanr
 
     return float(spearmanr(ours, theirs).statistic)
-
-
-def rank_spread(values: Sequence[float], deviation: float, beds: int) -> tuple[float, float, float]:
-    """Return the rank correlation that beds alone leave: its 5 %, 50 % and 95 % quantile.
-
-    Both sides have the same true values and the same deviation between beds; one is a single bed
-    (the paper), the other the mean over ``beds`` (ours).
-    """
-    from scipy.stats import rankdata
-
-    random = np.random.default_rng(1)
-    truth = np.asarray(values, float)
-    theirs = truth + deviation * random.normal(size=(RANK_DRAWS, truth.size))
-    ours = truth + deviation / math.sqrt(beds) * random.normal(size=(RANK_DRAWS, truth.size))
-    ranks = (rankdata(side, axis=1) - 0.5 * (truth.size + 1) for side in (theirs, ours))
-    first, second = (rank / np.linalg.norm(rank, axis=1, keepdims=True) for rank in ranks)
-    low, middle, high = np.quantile(np.sum(first * second, axis=1), (0.05, 0.5, 0.95))
-    return float(low), float(middle), float(high)

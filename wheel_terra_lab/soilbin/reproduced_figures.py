@@ -20,8 +20,6 @@ from wheel_terra_estimator.reporting.style import LINE_COLOURS, picture_style
 from wheel_terra_lab.soilbin import metrics
 from wheel_terra_lab.soilbin.metrics import Row
 
-PICTURE = 'figures.svg'
-PAGE = 'figures.md'
 FULL_LOAD = 19.6  # [N]
 LIGHTER = 14.7  # [N]
 EARTH = 5.0  # [m/s^2] below it a row is one of the Moon
@@ -126,8 +124,6 @@ class Figure:
     curves: tuple[Curve, ...]
     statement: str
     holds: Callable[[Figure, Sequence[Row]], bool | None]
-    own_error: str = ''
-    """How far the paper's runs are from its tests, as its text states it."""
 
     def at(self, rows: Sequence[Row], slope: float, name: str = '') -> list[float]:
         """Return the value of each curve at a slope [deg]; nan where it was not run."""
@@ -209,7 +205,6 @@ FIGURES = (
         '6', SLIP, (_coarse('20 mm, 14.7 N (grains x2)', 8, LIGHTER), Curve('10 mm', 2, LIGHTER)),
         'under 14.7 N lugs of 20 mm slip less on 25 degrees than those of 10 mm',
         _order_at(STEEPEST),
-        'slip: 20 points (10 mm, 15 degrees), 16.3 (20 mm, 20 degrees)',
     ),
     Figure(
         '7', SLIP,
@@ -219,7 +214,6 @@ FIGURES = (
     Figure(
         '9', TORQUE, (Curve('20 mm, 19.6 N', 8),),
         'the torque coefficient rises linearly with the slope', _torque_rises_linearly,
-        'up to 0.15 too high',
     ),
     Figure(
         '11', POWER, (Curve('250 mm', 5), Curve('200 mm', 2), Curve('150 mm', 4)),
@@ -269,44 +263,6 @@ FIGURES = (
         'less gravity needs more power on all slopes', _moon_costs_more,
     ),
 )  # fmt: skip
-
-
-def lines(rows: Sequence[Row]) -> list[str]:
-    """Return the table of statements."""
-    from wheel_terra_lab.soilbin.tables import table
-
-    words = {True: 'yes', False: '**no**', None: 'not run'}
-    body = []
-    for figure in FIGURES:
-        values = figure.at(rows, STEEPEST)
-        told = ', '.join(
-            f'{curve.label}: {value:.2f}'
-            for curve, value in zip(figure.curves, values, strict=True)
-            if math.isfinite(value)
-        )
-        answer = words[figure.holds(figure, rows)]
-        body.append([figure.name, figure.statement, answer, told, figure.own_error])
-    head = ['figure', 'what the text says', 'ours do so', 'ours on 25 degrees',
-            "the paper's runs beside its tests"]  # fmt: skip
-    return ['## Figures 6 to 18', '', *table(head, body)]
-
-
-def page_lines(rows: Sequence[Row]) -> list[str]:
-    """Return the page of pictures."""
-    _, *statements = lines(rows)
-    return [
-        "# The paper's figures and ours, side by side",
-        '',
-        'Left what the paper states in numbers (tables 6 and 7, text; on 25 degrees the power '
-        'number is (H/W)/(1 - s) of table 7), joined by lines: its curves are pictures and are not '
-        'read off. Empty where it states none. Right ours, mean over the beds, at eight times the '
-        "paper's rim speed. Figures 10, 19 and 20 (soil) are what `wheel-terra soilbin run` draws "
-        'as `film.gif` and `bed.png`. '
-        'Written by `wheel-terra soilbin reproduce`.',
-        '',
-        f'![paper and ours]({PICTURE})',
-        *statements,
-    ]
 
 
 def draw(rows: Sequence[Row], path: Path) -> None:

@@ -1,16 +1,17 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""The studies behind ``wheel-terra soilbin``: which cases, what page."""
+"""The studies behind ``wheel-terra soilbin``: which cases."""
 
 from __future__ import annotations
 
 import argparse
 import os
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.output_folder import working_folder
 from wheel_terra_lab.soilbin import measurements, reproduction
+from wheel_terra_lab.soilbin.metrics import Row
 from wheel_terra_lab.soilbin.output import WORK
 from wheel_terra_lab.soilbin.study import Job, run_study
 
@@ -20,24 +21,24 @@ STUDIES = {
 }
 
 
-def run(arguments: argparse.Namespace, cache: Path | None) -> int:
-    """Run (or go on with) a study; write its table as rows come and its page at the end."""
+def run(
+    arguments: argparse.Namespace,
+    cache: Path | None,
+    report: Callable[[argparse.Namespace, Sequence[Row], Path], None],
+) -> int:
+    """Run (or go on with) a study; write its table as rows come and its report at the end."""
     module = STUDIES[arguments.action]
     folder: Path = arguments.output
-    table = folder / module.TABLE
-    if arguments.report_only and not table.is_file():
-        raise UserError(
-            f'{table}: no rows to report; copy kept ones there, run the study without '
-            '--report-only, or see the shipped ones with wheel-terra reproduce nakashima'
-        )
     jobs: list[Job] = module.jobs(arguments)
-    workers = 0 if arguments.report_only else arguments.jobs or os.cpu_count() or 1
+    workers = arguments.jobs or os.cpu_count() or 1
     with working_folder(
         folder,
         arguments.overwrite,
-        arguments.resume or arguments.report_only,
+        arguments.resume,
         (module.TABLE, *module.PAGES, 'series/', WORK),
     ):
-        rows = run_study(jobs, table, folder / '.work', cache, workers, arguments.scheduler or '')
-        module.report(arguments, rows, folder)
+        rows = run_study(
+            jobs, folder / module.TABLE, folder / '.work', cache, workers, arguments.scheduler or ''
+        )
+        report(arguments, rows, folder)
     return 0

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import argparse
 import re
 
 import pytest
@@ -11,6 +12,7 @@ import pytest
 from wheel_terra_estimator.cli.main import main
 from wheel_terra_lab.reproduction import ding, guo, nakashima
 from wheel_terra_lab.reproduction.statement import belongs_to
+from wheel_terra_lab.soilbin import reproduction
 
 
 def test_all_papers_stand_on_one_page_with_a_verdict_each(tmp_path, capsys):
@@ -50,6 +52,25 @@ def test_known_misses_are_told_and_other_rows_change_the_verdict():
     assert sum(s.holds is True for s in nakashima.statements(swapped)) < held - 3
     figures = [s for s in nakashima.statements(rows) if belongs_to(s, 'figure 13')]
     assert {s.place for s in figures} == {'figure 13(a)', 'figure 13(b)'}
+
+
+def test_a_study_of_the_soil_bin_writes_the_statements_of_the_rows_that_are_there(
+    tmp_path, undrawn
+):
+    """The paper's own table 7, each wheel slipping a twentieth more; the rest was not run."""
+    options = argparse.Namespace(part=['table7', 'paper_speed'], seeds=1, grain_scale=0.0)
+    paper, rows = reproduction.metrics.published('table7'), []
+    for job in reproduction.jobs(options):
+        stated = paper[job.labels['wheel']]
+        row = {name: str(value) for name, value in job.labels.items()}
+        row |= {'slip': str(stated['slip'] + 0.05), 'power_number': '2', 'stopped': ''}
+        row |= {k: str(stated[k]) for k in ('gross_traction', 'motion_resistance')}
+        rows.append(row | {'sinkage_average': str(2 * stated['sinkage_average'])})
+    nakashima.report(options, rows, tmp_path)
+    page = (tmp_path / 'reproduction.md').read_text(encoding='utf-8')
+    assert page.count('reproduced: 5.0 points |') == 9 and page.count('**not**: 100 % apart') == 9
+    assert 'reproduced: 8 allowed; rank correlation 1.00' in page
+    assert 'no test: 9 wheels run' not in page and page.count('not run') > 10
 
 
 @pytest.mark.parametrize('name', ['driving', 'skidding'])

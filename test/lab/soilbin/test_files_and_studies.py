@@ -16,6 +16,7 @@ from wheel_terra_estimator.cli.main import main
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_lab import jobs as jobs_module
 from wheel_terra_lab.jobs import ResultFile
+from wheel_terra_lab.reproduction import nakashima
 from wheel_terra_lab.soilbin import (
     files,
     output,
@@ -172,45 +173,6 @@ def test_reproduction_covers_the_papers_tables():
     assert all(job.case.bed.rows == 40 for job in lunar)
 
 
-def test_comparison_page_tells_misses(tmp_path, undrawn):
-    arguments = argparse.Namespace(part=['table7'], seeds=1, grain_scale=0.0)
-    rows = []
-    for job in reproduction.jobs(arguments):
-        paper = reproduction.metrics.published('table7')[job.labels['wheel']]
-        row = {k: str(v) for k, v in job.labels.items()}
-        row |= {'slip': str(paper['slip'] + 0.05), 'power_number': '2', 'stopped': ''}
-        row |= {k: str(paper[k]) for k in ('gross_traction', 'motion_resistance')}
-        row['sinkage_average'] = str(2 * paper['sinkage_average'])
-        rows.append(row)
-    reproduction.report(arguments, rows, tmp_path)
-    page = (tmp_path / 'comparison.md').read_text()
-    assert 'slip 5.0 points, H 0 %, R_r 0 %, z_a 100 %' in page
-    assert '| **no** |' in page  # all power numbers equal
-    assert 'slip 1.00, H 1.00' in page
-
-
-def test_rows_at_the_papers_speed_are_in_order_and_tell_the_largest_miss():
-    """The paper's own figures, but for one wheel's slip; depths in the opposite order."""
-    arguments = argparse.Namespace(part=['paper_speed'], seeds=1, grain_scale=0.0)
-    rows = []
-    for job in reproduction.jobs(arguments):
-        paper = reproduction.metrics.published('table7')[job.labels['wheel']]
-        row = {k: str(v) for k, v in job.labels.items()} | {'slip': str(paper['slip'])}
-        row['gross_traction'] = str(paper['gross_traction'])
-        row['sinkage_average'] = str(-paper['sinkage_average'])
-        rows.append(row)
-    fastest = min(rows, key=lambda row: float(row['slip']))
-    fastest['slip'] = str(float(fastest['slip']) - 0.0123)  # it stays the one that slips least
-    lines = reproduction.paper_speed_lines(rows)
-    order = [tuple(float(cell) for cell in line.split('|')[1:3]) for line in lines[4:-3]]
-    assert order == sorted(order)
-    assert [wheel for wheel, slope in order if slope == 25.0] == list(range(1, 10))
-    said = lines[-1]
-    assert '9 wheels on 25 degrees is at most 1.2 points' in said
-    assert 'slip 1.00, H 1.00, z_a -1.00' in said
-    assert len(reproduction.paper_speed_lines(rows[:5])) == len(lines) - 9  # wheel 2: no order yet
-
-
 def test_statements_of_the_papers_figures_hold_and_can_fail():
     """The published rows do what the paper's text says; with two wheels exchanged they do not."""
     table = reproduction.metrics.DATA / 'reproduction.csv'
@@ -223,16 +185,6 @@ def test_statements_of_the_papers_figures_hold_and_can_fail():
     failing = {f.name for f in reproduced_figures.FIGURES if not f.holds(f, swapped)}
     assert failing >= {'12(a)', '13(a)', '14', '15'}
     assert all(figure.holds(figure, []) is None for figure in reproduced_figures.FIGURES)
-
-
-def test_scatter_between_beds_bounds_the_rank_correlation():
-    values = [1.0, 2.0, 3.0, 4.0, 5.0]
-    assert reproduction.metrics.rank_spread(values, 1e-6, 3) == pytest.approx((1.0, 1.0, 1.0))
-    low, middle, high = reproduction.metrics.rank_spread(values, 1000.0, 3)
-    assert low == pytest.approx(-high, abs=0.2)  # nothing but scatter
-    assert abs(middle) < 0.1
-    one, many = (reproduction.metrics.rank_spread(values, 1.0, beds)[1] for beds in (1, 100))
-    assert 0.3 < one < many < 1.0
 
 
 def test_coarse_grains_say_how_far_they_are_from_full_scale():
@@ -261,14 +213,6 @@ def test_existing_output_is_refused(tmp_path, capsys):
     assert '--resume' in capsys.readouterr().err
     assert main(['soilbin', 'reproduce', '-o', str(tmp_path)]) == 2
     assert '--overwrite' in capsys.readouterr().err
-
-
-@pytest.mark.parametrize('study', [['reproduce'], ['rows', '--sweep', 'pull']])
-def test_a_page_needs_rows(tmp_path, capsys, study):
-    folder = tmp_path / 'fresh'
-    assert main(['soilbin', *study, '--report-only', '-o', str(folder)]) == 2
-    assert 'no rows to report' in capsys.readouterr().err
-    assert not folder.exists()
 
 
 FAKE_ABSENT = "raise ImportError('libmpi.so.12: cannot open shared object file')"
@@ -367,13 +311,18 @@ def test_ranks_wait_for_the_slopes_of_every_wheel(tmp_path):
     rows = []
     for job in reproduction.jobs(arguments):
         row = {k: str(v) for k, v in job.labels.items()}
-        slip = 0.1 + 0.002 * job.labels['wheel'] * job.labels['slope_deg']
-        rows.append(row | {'slip': str(slip), 'power_number': str(slip), 'stopped': ''})
-    whole = '\n'.join(reproduction.table6_lines(rows))
-    assert 'Smallest sum of ranks: wheel 1' in whole  # slips least on every slope but the level
-    short = [row for row in rows if (row['wheel'], row['slope_deg']) != ('4', '5.0')]
+        slip = 0.1 + (0.02 + 0.001 * job.labels['wheel']) * (1.0 + job.labels['slope_deg'])
+        power = slip + 0.01 * job.labels['wheel']
+        rows.append(row | {'slip': str(slip), 'power_number': str(power), 'stopped': ''})
+
+    def best(rows):
+        said = [s for s in nakashima.statements(rows) if s.what.endswith('smallest sum of ranks')]
+        return [s.ours for s in said]
+
+    assert best(rows) == ['1']  # slips least on every slope
+    short = [row for row in rows if (row['wheel'], row['slope_deg']) != ('4', '0.0')]
     assert len(short) == len(rows) - 1
-    assert 'Smallest sum' not in '\n'.join(reproduction.table6_lines(short))
+    assert best(short) == []
 
 
 def test_pictures_of_a_run_share_the_clock_of_the_stated_tip_speed(tmp_path):
