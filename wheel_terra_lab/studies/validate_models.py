@@ -20,13 +20,10 @@ SECTIONS = (
     'closed_forms',
     'hit_wheels',
     'ding_statements',
-    'equivalent_circle',
     'grc3_wheel',
     'cmu_wheel',
     'cmu_sideways',
     'small_wheels',
-    'transfer',
-    'rover_slope',
 )
 HEAD = '# Validation of the wheel-soil models'
 
