@@ -210,10 +210,40 @@ def test_a_working_folder_goes_on_or_starts_anew(tmp_path: Path) -> None:
     with pytest.raises(KeyboardInterrupt):
         fill(True, False, '1.npz')
     assert set(contents(run)) == {'.work/frames/1.npz'}
+    assert set(contents(tmp_path / 'run.earlier')) == {'.work/frames/0.npz'}
     (run / 'notes.md').write_text('mine')
     with pytest.raises(UserError, match=r'notes\.md'):
         fill(True, False)
     assert set(contents(run)) == {'.work/frames/1.npz', 'notes.md'}
+
+
+def test_an_earlier_output_stands_aside_until_the_new_one_is_whole(tmp_path: Path) -> None:
+    """Through ends half-way, another start, and a folder that is another run's by this name."""
+    run, aside = tmp_path / 'run', tmp_path / 'run.earlier'
+
+    def fill(text: str, resume: bool = False, end: type[BaseException] | None = None) -> None:
+        with working_folder(run, True, resume, ['rows.csv', 'more.csv']):
+            (run / 'rows.csv').write_text(text)
+            if end:
+                raise end
+            (run / 'more.csv').write_text(text)
+
+    fill('first')
+    for text in ('half', 'half again'):
+        with pytest.raises(KeyboardInterrupt):
+            fill(text, end=KeyboardInterrupt)
+        assert contents(run) == {'rows.csv': text}
+        assert contents(aside) == {'rows.csv': 'first', 'more.csv': 'first'}
+    fill('second', resume=True)
+    assert contents(run) == {'rows.csv': 'second', 'more.csv': 'second'}
+    assert [entry.name for entry in tmp_path.iterdir()] == ['run']
+    with working_folder(aside, False, False, ['rows.csv']):
+        (aside / 'rows.csv').write_text('of another run')
+    with pytest.raises(UserError, match='move it'):
+        fill('third')
+    fill('third', resume=True)
+    assert contents(run)['rows.csv'] == 'third'
+    assert contents(aside) == {'rows.csv': 'of another run'}
 
 
 def test_a_refused_run_leaves_the_earlier_output(tmp_path: Path) -> None:

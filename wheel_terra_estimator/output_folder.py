@@ -32,7 +32,7 @@ import os
 import shutil
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import contextmanager, suppress
 from pathlib import Path, PurePosixPath
 from types import MappingProxyType
 from typing import Any
@@ -42,6 +42,9 @@ from wheel_terra_estimator.errors import UserError
 
 MARKER = '.wheel-terra.json'
 """File in an output folder that lists what the program wrote there; folders end in ``/``."""
+
+EARLIER = 'put aside'
+"""Fact in the marker of a folder that is, or was, aside while another is written: its name."""
 
 LEAST_ROOM = 2**16
 """Room on the disk [byte] without which nothing is begun."""
@@ -191,7 +194,7 @@ def new_folder(
         _put_in_place(fresh, path, beside)
     except OSError as error:
         words = '; what was written before is kept there' if kept else ''
-        raise UserError(f'{cannot_write(path, error)}{words}') from None
+        raise CannotWriteError(f'{cannot_write(path, error)}{words}') from None
     finally:
         shutil.rmtree(beside, ignore_errors=True)
         if held is not None:
@@ -250,13 +253,13 @@ def working_folder(
 ) -> Iterator[None]:
     """Make a folder that a command fills in place in the block, so that it can go on after an end.
 
-    Where the block ends with no result in it, the folder goes again: the next try finds the place
-    as this one did, with the output of an earlier run in it.
+    Until the block has ended well, an earlier output stands whole beside it as ``NAME.earlier``;
+    where the block ends with no result, the place is again as it was found.
 
     Parameters
     ----------
     path, overwrite
-        As in `check_target`; an earlier output is kept aside until the block ends.
+        As in `check_target`.
     resume : bool
         Whether to go on with a folder as it is, where it is one of ours.
     entries : iterable of str
@@ -280,29 +283,45 @@ def working_folder(
     else:
         check_folder(path, overwrite, inputs)
     path = _absolute(path)
+    aside = path.with_name(f'{path.name}.earlier')
     empty = path.is_dir() and not any(path.iterdir())  # then it is the user's, and stays
-    with ExitStack() as aside:
-        earlier: Path | None = None
-        try:
-            if path.exists() and not resume:
-                beside = tempfile.TemporaryDirectory(
-                    dir=path.parent, prefix=f'.{path.name}.wheel-terra-'
-                )
-                earlier = path.rename(Path(aside.enter_context(beside)) / path.name)
-            path.mkdir(parents=True, exist_ok=True)
-            mark(path, entries)
-        except OSError as error:
-            raise cannot_write(path, error) from None
-        try:
-            yield
-        finally:
-            with suppress(OSError, UserError):
-                if path.is_dir() and not any(_holds(path / name) for name in _own_files(path)):
-                    _remove_own_files(path)
-                    if earlier is not None:
-                        earlier.rename(path)
-                    elif empty:
-                        path.mkdir()
+    try:
+        if path.exists() and not resume and not empty:
+            _put_aside(path, aside)
+        path.mkdir(parents=True, exist_ok=True)
+        mark(path, entries)
+    except OSError as error:
+        raise cannot_write(path, error) from None
+    whole = False
+    try:
+        yield
+        whole = True
+    finally:
+        with suppress(OSError, UserError):
+            if path.is_dir() and not any(_holds(path / name) for name in _own_files(path)):
+                _remove_own_files(path)
+                if _is_earlier(aside):
+                    aside.rename(path)
+                elif empty:
+                    path.mkdir()
+            elif whole and _is_earlier(aside):
+                _remove_own_files(aside)
+
+
+def _put_aside(path: Path, aside: Path) -> None:
+    """Rename an output that is to be replaced; one that stands aside already is the whole one."""
+    if _is_earlier(aside):
+        _remove_own_files(path)
+    elif aside.exists():
+        raise UserError(f'{aside}: the earlier output is to stand here meanwhile; move it')
+    else:
+        mark(path, [], {EARLIER: path.name})
+        path.rename(aside)
+
+
+def _is_earlier(aside: Path) -> bool:
+    """Whether `_put_aside` has put a folder here."""
+    return facts_of(aside).get(EARLIER) == aside.stem
 
 
 def _holds(entry: Path) -> bool:
@@ -357,7 +376,11 @@ def is_ours(folder: Path) -> bool:
     return (folder / MARKER).is_file()
 
 
-def cannot_write(path: Path, error: OSError) -> UserError:
+class CannotWriteError(UserError):
+    """The disk takes no more, or takes nothing here."""
+
+
+def cannot_write(path: Path, error: OSError) -> CannotWriteError:
     """Return the one line for an error of the disk."""
     reason = error.strerror or str(error) or type(error).__name__
     cure = {
@@ -366,7 +389,7 @@ def cannot_write(path: Path, error: OSError) -> UserError:
         errno.EROFS: '; choose another place',
         errno.EACCES: '; choose another place',
     }.get(error.errno or 0, '')
-    return UserError(f'{path}: cannot be written ({reason}){cure}')
+    return CannotWriteError(f'{path}: cannot be written ({reason}){cure}')
 
 
 def refuse_inputs(path: Path, inputs: Iterable[Path]) -> None:

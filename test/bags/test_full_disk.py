@@ -5,7 +5,9 @@
 from __future__ import annotations
 
 import errno
+import os
 import resource
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -17,6 +19,7 @@ from wheel_terra_estimator.bags.bag_file import BagFile
 from wheel_terra_estimator.bags.storage import open_bag
 from wheel_terra_estimator.cli.main import main
 from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.output_folder import MARKER
 
 TOPIC = '/diagnostics'
 KIND = 'std_msgs/msg/String'
@@ -115,6 +118,84 @@ def test_places_that_cannot_be_written_are_one_line_before_anything_is_computed(
         said = capsys.readouterr().err
         assert place in said
         assert said.count('\n') == 1
+
+
+OPENED: list[str] = []
+"""Of what is below `WATCHED`: the files that were opened to be written, in turn."""
+WATCHED: list[Path] = []
+FAILING: list[int] = []
+"""Which of them cannot be opened."""
+
+
+def _watch(event: str, arguments: tuple[Any, ...]) -> None:
+    if event != 'open' or not WATCHED or not isinstance(arguments[0], str):
+        return
+    path, _, flags = arguments
+    if flags & (os.O_WRONLY | os.O_RDWR) and Path(path).is_relative_to(WATCHED[0]):
+        OPENED.append(path)
+        if len(OPENED) in FAILING:
+            raise OSError(errno.ENOSPC, 'No space left on device', path)
+
+
+@contextmanager
+def disk(place: Path, full_at: int = 0) -> Iterator[None]:
+    """Note what is opened to be written below a place; the disk is full for one of them."""
+    if not OPENED:
+        sys.addaudithook(_watch)  # for good: it does nothing where nothing is watched
+    OPENED[:], WATCHED[:], FAILING[:] = [], [place], [full_at]
+    try:
+        yield
+    finally:
+        WATCHED.clear()
+
+
+def everything(folder: Path) -> dict[str, bytes]:
+    return {
+        str(path.relative_to(folder)): path.read_bytes()
+        for path in folder.rglob('*')
+        if path.is_file()
+    }
+
+
+@pytest.mark.parametrize('command', ['replay', 'replay two', 'diagnose', 'predict'])
+def test_a_disk_that_fills_up_at_any_file_leaves_the_earlier_output(
+    make_bag: Any, rover: Any, tmp_path: Path, capsys: Any, command: str
+) -> None:
+    """Whichever file is the first without room: the output of the run before stands, whole."""
+    read, out = tmp_path / 'read', tmp_path / 'out'
+    read.mkdir()
+    rover.write(read / 'rover.yaml')
+    table = read / 't.csv'
+    rows = [f'{0.05 * k},{100 + k % 3},{0.01 + 0.001 * k}\n' for k in range(1, 9)]
+    table.write_text('slip,normal_load,sinkage\n' + ''.join(rows))
+    bags = [str(make_bag(name=name)) for name in ('one', 'two')]
+    config = ['--config', str(read / 'rover.yaml')]
+    line = {
+        'replay': ['replay', bags[0], *config, '-o'],
+        'replay two': ['replay', *bags, *config, '-o'],
+        'diagnose': ['diagnose', str(table), '--config', 'pathfinder', '-o'],
+        'predict': ['predict', '--config', 'pathfinder', '-o'],
+    }[command]
+    line += [str(out / 'o.csv' if command == 'predict' else out), '--overwrite']
+    out.mkdir()
+    aside = tmp_path / 'out.earlier'
+    for _ in range(2):
+        with disk(tmp_path):
+            assert main(line) == 0, capsys.readouterr().err
+    count = len(OPENED)
+    assert count > 1
+    for full_at in range(1, count + 1, max(1, count // 6)):
+        before = everything(aside if aside.exists() else out)
+        with disk(tmp_path, full_at):
+            status = main(line)
+        told = ''.join(capsys.readouterr())
+        if status:
+            kept = everything(aside if aside.exists() else out)
+            for name in before.keys() - {MARKER}:
+                assert kept[name] == before[name]
+            assert 'No space left' in told
+        else:
+            assert everything(out).keys() == before.keys()
 
 
 @pytest.mark.slow

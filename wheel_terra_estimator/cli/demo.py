@@ -92,8 +92,13 @@ def run(arguments: argparse.Namespace) -> int:
     """Run the command."""
     output: Path = arguments.output
     entries = [f'{drive.name}{end}' for drive in DRIVES for end in ('/', '.html')]
-    with working_folder(output, arguments.overwrite, False, [*entries, 'trial/']):
-        return _show(arguments, output)
+    try:
+        with working_folder(output, arguments.overwrite, False, [*entries, 'trial/']):
+            if status := _show(arguments, output):
+                raise subprocess.CalledProcessError(status, 'demo')  # it is not whole
+    except subprocess.CalledProcessError as ended:
+        return ended.returncode
+    return 0
 
 
 def _show(arguments: argparse.Namespace, output: Path) -> int:

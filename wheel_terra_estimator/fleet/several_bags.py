@@ -25,6 +25,7 @@ from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.errors import UserError, outside_cause
 from wheel_terra_estimator.fleet.drive import replay_drive
 from wheel_terra_estimator.output_folder import (
+    CannotWriteError,
     cannot_write,
     facts_of,
     is_ours,
@@ -109,7 +110,7 @@ def replay_bags(
     Raises
     ------
     UserError
-        The output folder cannot be used.
+        The output folder cannot be used, or the disk is full: the same call goes on from there.
     """
     with _folder(settings.output, bags, overwrite):
         settings = replace(settings, output=settings.output.absolute())
@@ -136,6 +137,8 @@ def _replay_into(
     try:
         for k, row in _shown(replayed, len(tasks), 'replayed'):
             i = numbers[k]
+            if isinstance(row, CannotWriteError):
+                raise row  # no fault of the recording: the next would fare no better
             if isinstance(row, Exception):
                 row = DriveRow(str(bags[i]), error=_words(row, paths[i]))
             rows[i] = row

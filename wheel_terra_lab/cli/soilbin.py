@@ -119,21 +119,19 @@ def _run_one(arguments: argparse.Namespace, cache: Path | None) -> int:
     check(case)
     folder: Path = arguments.output
     work = folder / '.work'
-    fresh = not folder.exists()
     try:
         with working_folder(folder, arguments.overwrite, arguments.resume, output.FILES):
-            with progress.bar() as report:
-                summary = run_case(case, work, cache, report)
-            output.write_folder(folder, work, case, summary, arguments.film)
+            try:
+                with progress.bar() as report:
+                    summary = run_case(case, work, cache, report)
+                output.write_folder(folder, work, case, summary, arguments.film)
+            finally:
+                if not any(work.rglob(STATE)):  # nothing for --resume
+                    shutil.rmtree(work, ignore_errors=True)
     except StoppedByUserError as stopped:
         raise UserError(f'{stopped}; go on with --resume') from stopped
-    except UserError:
-        if fresh and folder.exists() and not any(work.rglob(STATE)):  # nothing for --resume
-            shutil.rmtree(folder)
-        raise
     except OSError as error:
         raise UserError(f'{folder}: cannot be written: {error}; free some space') from error
-    output.clean(work)
     print(output.as_text(summary, case))
     if summary['stopped']:
         print(f'stopped early: {summary["stopped"]}')

@@ -138,11 +138,6 @@ def write_folder(
     shutil.rmtree(work / 'checkpoint', ignore_errors=True)
 
 
-def clean(work: Path) -> None:
-    """Remove the working folder of a finished run."""
-    shutil.rmtree(work, ignore_errors=True)
-
-
 def figures_of(summary: Mapping[str, object], case: Case) -> dict[str, str]:
     """Return the main figures of a run: words -> value with unit."""
 

@@ -139,6 +139,11 @@ def test_the_command_takes_kinds_and_hours_and_refuses_what_does_not_go(
     assert '--tuning --simulator A --kinds cruise --modes reference -o' in capsys.readouterr().out
     assert main([*command, '--resume']) == 0
     assert '| A cruise | reference | 1 |' in capsys.readouterr().out
+    earlier = (folder / 'drives.jsonl').read_bytes()
+    with monkeypatch.context() as during:
+        during.setattr(many_drives, '_figures', interrupt)
+        assert main([*command, '--overwrite']) == INTERRUPTED
+    assert (folder / 'drives.jsonl').read_bytes() == earlier
     for wrong, words in (
         (['--simulator', 'B'], 'needs --kinds'),
         (['--kinds', 'cruise', '--modes', 'smoothed'], 'mode smoothed'),

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from wheel_terra_estimator.cli.main import main
+from wheel_terra_estimator.output_folder import working_folder
 from wheel_terra_lab.soilbin import engine as engine_module
 from wheel_terra_lab.soilbin import files, geometry, stability
 from wheel_terra_lab.soilbin.bookkeeping import SERIES
@@ -270,10 +271,14 @@ def test_engine_module_is_not_imported_by_the_package():
     assert engine_module.SOIL == 1
 
 
-def test_bed_that_does_not_settle_is_said(tmp_path, capsys):
+def test_bed_that_does_not_settle_is_said_and_the_earlier_output_stands(tmp_path, capsys):
+    with working_folder(tmp_path / 'out', False, False, ['summary.json']):
+        (tmp_path / 'out' / 'summary.json').write_text('{}')
     command = ['soilbin', 'run', 'quick', '-o', str(tmp_path / 'out'), '--no-cache', *SMALL]
-    command += ['-p', 'bed.settled_speed:=1.0e-9', '-p', 'bed.settling_time:=0.03']
+    command += ['-p', 'bed.settled_speed:=1.0e-9', '-p', 'bed.settling_time:=0.03', '--overwrite']
     assert main(command) == 2
+    assert (tmp_path / 'out' / 'summary.json').read_text() == '{}'
+    assert [path.name for path in tmp_path.iterdir()] == ['out']
     said = capsys.readouterr().err.strip().splitlines()[-1]
     assert 'still moves at' in said
     assert 'raise soilbin.bed.settling_time' in said
