@@ -4,8 +4,9 @@
 
 robot_localization is C++ and in no package index that we have. Its published equations stand here
 (T. Moore, D. Stouch: A generalized extended Kalman filter implementation for the Robot Operating
-System, IAS-13, 2014): 15 states of omnidirectional motion with constant acceleration, corrections
-of the states that the flags choose, defaults of its process noise and initial covariance.
+System, IAS-13, 2014), as ``src/ekf.cpp`` and ``src/filter_base.cpp`` have them: 15 states of
+omnidirectional motion with constant acceleration, corrections of the states that the flags choose,
+a first reading that is taken as it is, defaults of its process noise and initial covariance.
 """
 
 from __future__ import annotations
@@ -76,9 +77,13 @@ class Filter:
             jacobian = ((np.array(ends[0]) - np.array(ends[1])) / (2 * STEP)).T
             self.state = moved(self.state, dt)
             self.covariance = jacobian @ self.covariance @ jacobian.T + dt * np.diag(PROCESS_NOISE)
-        self.stamp = max(stamp, self.stamp or 0)
         chosen = np.flatnonzero(flags)
         noise = np.array(covariance)[np.ix_(chosen, chosen)]
+        if self.stamp is None:
+            self.stamp, self.state[chosen] = stamp, np.array(values)[chosen]
+            self.covariance[np.ix_(chosen, chosen)] = noise
+            return
+        self.stamp = max(stamp, self.stamp)
         np.fill_diagonal(noise, np.maximum(np.abs(np.diag(noise)), LEAST_VARIANCE))
         part = self.covariance[:, chosen]
         gain = part @ np.linalg.inv(self.covariance[np.ix_(chosen, chosen)] + noise)

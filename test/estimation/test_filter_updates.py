@@ -303,6 +303,34 @@ def test_a_spike_of_the_sinkage_is_dropped_and_eight_in_a_row_are_believed(parts
     assert update.unread(9.0) == list(range(6))
 
 
+@pytest.mark.parametrize('spike', [0.1, 0.2])  # within the deviations at the start, and beyond
+def test_a_first_reading_that_is_a_spike_is_outvoted_by_the_next_two(parts, ekf, spike):
+    zi = parts.layout.sinkage.start
+    update = SinkageUpdate(parts.configuration, parts.layout)
+    ekf.set(zi, 0.04, 0.025**2)  # as at rest in this soil
+
+    def read(time, depth):
+        sums = SinkageSums((depth,) + (0.0,) * 5, (1,) + (0,) * 5)
+        ekf.fuse(update.update(ekf, time, sums, parts.sensors.sinkage_std**2))
+        return float(ekf.mean[zi])
+
+    read(0.0, spike)
+    read(0.1, 0.03)
+    assert read(0.2, 0.03) == pytest.approx(0.03, abs=0.002)
+
+
+def test_a_wheel_far_from_the_configured_soil_is_believed_by_its_second_reading(parts, ekf):
+    zi = parts.layout.sinkage.start
+    update = SinkageUpdate(parts.configuration, parts.layout)
+    ekf.set(zi, 0.01, 0.005**2)
+    found = []
+    for time in (0.0, 0.1):
+        sums = SinkageSums((0.1,) + (0.0,) * 5, (1,) + (0,) * 5)
+        ekf.fuse(update.update(ekf, time, sums, parts.sensors.sinkage_std**2))
+        found.append(float(ekf.mean[zi]))
+    assert found == [0.01, pytest.approx(0.1, abs=0.002)]
+
+
 def relaxed(parts, ekf, seconds, loads=None, reference_known=True, speed=0.05, start=None):
     process = SinkageProcess(parts.rover, parts.layout, parts.models, 0.0)
     loads = loads or WheelLoads(parts.rover).state.load

@@ -63,19 +63,27 @@ def run(arguments: argparse.Namespace) -> int:
 def _write_page(path: Path, figures: list[dict[str, Any]], overwrite: bool) -> None:
     from wheel_terra_estimator.reporting.tables_page import Table, write_tables
 
+    compared = any('change' in entry for entry in figures)
     rows = [
         (
             entry['name'],
             f'{entry["times_as_fast"]:.3g} ({entry["least"]:.3g} to {entry["greatest"]:.3g})',
-            f'{entry["beside"]} ({entry["seconds_beside"]:.3g} s)',
-            f'{entry["seconds"]:.3g} s',
-            f'{entry["change"]:.2f}' if 'change' in entry else '-',
+            entry['beside'],
+            _milliseconds(entry['seconds']),
+            _milliseconds(entry['seconds_beside']),
+            *([f'{entry["change"]:.2f}' if 'change' in entry else '-'] if compared else []),
         )
         for entry in figures
     ]
-    head = ('what', 'times as fast', 'as', 'takes', 'times the earlier ratio')
+    head = ('what', 'times as fast', 'compared with', 'time', 'time of that')
+    if compared:
+        head = (*head, 'ratio, over the earlier')
     words = 'Ratios to another program or way on this machine; seconds alone say little.'
     write_tables(path, 'Speed', words, 'good', [Table('Figures', head, rows)], overwrite)
+
+
+def _milliseconds(seconds: float) -> str:
+    return f'{1e3 * seconds:.3g}\u00a0ms'
 
 
 def _line(entry: dict[str, Any]) -> str:

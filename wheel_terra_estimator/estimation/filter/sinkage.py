@@ -24,6 +24,9 @@ class SinkageUpdateTuning:
 
     believed_after: int = 8
     """Rejected readings in a row after which they are no spikes: the wheel is somewhere else."""
+    first_believed_after: int = 2
+    """The same at the start, where the configured soil or the first reading may be far off; later
+    those that are rejected have to outnumber those that were used."""
     age: float = 2.0  # up to which a reading counts as known [s]
     floor_variance: float = 1e-10  # of a reading [m^2]
 
@@ -33,6 +36,7 @@ class SinkageUpdateState(NamedTuple):
 
     time: tuple[float, ...]  # of the last reading that was used [s], -inf = none yet
     rejected_in_a_row: tuple[int, ...]
+    used: tuple[int, ...]  # readings, counted up to `believed_after`
     rejected: int = 0  # of all wheels
     nis: float | None = None
 
@@ -47,7 +51,7 @@ class SinkageUpdate(Component[SinkageUpdateState]):
         tuning: SinkageUpdateTuning = SinkageUpdateTuning(),
     ) -> None:
         n = layout.wheel_count
-        super().__init__(SinkageUpdateState((-math.inf,) * n, (0,) * n))
+        super().__init__(SinkageUpdateState((-math.inf,) * n, (0,) * n, (0,) * n))
         self._gate = float(configuration.filter.gate)
         self._layout, self._tuning = layout, tuning
 
@@ -70,7 +74,7 @@ class SinkageUpdate(Component[SinkageUpdateState]):
             return []
         tuning = self._tuning
         when, in_a_row = list(self.state.time), list(self.state.rejected_in_a_row)
-        rejected, mean_nis = self.state.rejected, self.state.nis
+        used, rejected, mean_nis = list(self.state.used), self.state.rejected, self.state.nis
         rows = []
         for i, (total, count) in enumerate(zip(*sums, strict=True)):
             if not count:
@@ -79,17 +83,21 @@ class SinkageUpdate(Component[SinkageUpdateState]):
             variance = reading_variance / count + tuning.floor_variance
             residual = total / count - float(ekf.mean[index])
             nis = residual * residual / (float(ekf.covariance[index, index]) + variance)
-            if when[i] > -math.inf and nis > self._gate:
+            if nis > self._gate:
                 rejected += 1
                 in_a_row[i] += 1
-                if in_a_row[i] < tuning.believed_after:
+                needed = max(used[i] + 1, tuning.first_believed_after)
+                if in_a_row[i] < min(needed, tuning.believed_after):
                     continue
                 ekf.widen(index, residual * residual)
             in_a_row[i] = 0
+            used[i] = min(used[i] + 1, tuning.believed_after)
             mean_nis = smoothed_nis(mean_nis, min(nis, self._gate))
             when[i] = time
             jacobian = np.zeros(self._layout.size)
             jacobian[index] = 1.0
             rows.append(Row(residual, jacobian, variance))
-        self.state = SinkageUpdateState(tuple(when), tuple(in_a_row), rejected, mean_nis)
+        self.state = SinkageUpdateState(
+            tuple(when), tuple(in_a_row), tuple(used), rejected, mean_nis
+        )
         return rows
