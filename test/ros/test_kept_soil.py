@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """The soil file of a node: nobody else's file is written, one node writes, nothing fails unsaid."""
 
-import argparse
 import errno
 import json
 import os
+import resource
 import signal
 from pathlib import Path
 
@@ -16,9 +16,9 @@ from wheel_terra_estimator import output_folder
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.configuration.soil_file import HEADER, StuckState, write_values
 from wheel_terra_estimator.errors import UserError
-from wheel_terra_estimator.ros import kept_soil, lifecycle_node
+from wheel_terra_estimator.ros import arrival_log, kept_soil
+from wheel_terra_estimator.ros.arrival_log import ArrivalLog, why_no_arrival_log
 from wheel_terra_estimator.ros.kept_soil import KeptSoil
-from wheel_terra_estimator.ros.lifecycle_node import why_no_arrival_log
 
 __all__ = ['parameters']
 LEARNED = {'soil.cohesion': 400.0, 'soil.cohesion_std': 100.0}
@@ -215,6 +215,26 @@ def test_an_arrival_log_replaces_nothing_but_an_arrival_log(tmp_path):
         assert why_no_arrival_log(write(log, content))
 
 
+def test_one_node_writes_an_arrival_log_and_a_full_disk_ends_the_log_alone(tmp_path):
+    """A second writer would cut the first one's lines off; an error would end the estimator."""
+    path, said = tmp_path / 'arrival.txt', []
+    first = ArrivalLog(str(path), (), said.append)
+    first.write('imu/data 1')
+    with pytest.raises(UserError, match=r'record_arrival: .* another node .* writes to it'):
+        ArrivalLog(str(path), (), said.append)
+    assert path.read_text() == 'imu/data 1\n'
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (20, hard))
+    try:
+        for stamp in range(5):
+            first.write(f'imu/data {stamp}')
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert said == ['record_arrival: the log ends here (File too large)']
+    ArrivalLog(str(path), (), said.append).close()  # free for the next
+    ArrivalLog('', (), said.append).write('imu/data 1')
+
+
 def test_a_damaged_state_is_told_and_the_soil_is_kept_all_the_same(tmp_path):
     path = tmp_path / 's.yaml'
     state = write(tmp_path / 's.yaml.state.json', json.dumps(['no state']))
@@ -241,15 +261,12 @@ def test_every_file_of_the_nodes_was_decided_on_by_the_one_function(
         decide(path, *arguments, **options)
         asked.add(path)
 
-    for module in (output_folder, kept_soil, lifecycle_node):
+    for module in (output_folder, kept_soil, arrival_log):
         monkeypatch.setattr(module, 'check_target', ask)
     kept = KeptSoil(tmp_path / 's.yaml')
     kept.save(LEARNED, STUCK)
     kept.close()
-    configuration = reader.load(['pathfinder'], [f'record_arrival:={tmp_path / "arrival.txt"}'])
-    lifecycle_node.EstimatorNode._open_arrival_log(
-        argparse.Namespace(_files=()), configuration
-    ).close()
+    ArrivalLog(str(tmp_path / 'arrival.txt'), (), print).close()
     stop = Parameter('state_file', value=str(tmp_path / 'limiter.json'))
     TractionLimiter(context=listener[0].context, parameter_overrides=[stop]).destroy_node()
     written = {path for path in tmp_path.iterdir() if path.suffix != '.lock'}

@@ -18,7 +18,7 @@ from functools import partial
 from importlib import import_module
 from inspect import signature
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import TYPE_CHECKING, Any
 
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.clock import Clock, ROSClock
@@ -46,8 +46,8 @@ from wheel_terra_estimator.messages.diagnostics import (
     Status,
 )
 from wheel_terra_estimator.messages.pipeline import Pipeline
-from wheel_terra_estimator.output_folder import check_target
 from wheel_terra_estimator.ros import parameters
+from wheel_terra_estimator.ros.arrival_log import RESET, ArrivalLog
 from wheel_terra_estimator.ros.input_watch import InputWatch
 from wheel_terra_estimator.ros.kept_soil import KeptSoil
 from wheel_terra_estimator.ros.outputs import EstimatePublisher, time_message
@@ -74,8 +74,6 @@ SILENCE = 1.5  # [s] of the steady clock without a set
 START = 1.0  # [s] in which the node says what it waits for, and not what is missing
 DISCOVERY = 5.0  # [s] in which publishers may not have been found yet: no warning in the log
 SAVE_PERIOD = 10.0  # [s]
-RESET = 'reset'  # line of an arrival log
-LONGEST_LINE = 100  # of an arrival log [byte]
 NAMES_PERIOD = 1.0  # [s] between two looks for a node of the same name
 
 LEVELS = ('OK', 'WARN', 'ERROR', 'STALE')
@@ -87,15 +85,6 @@ def _topic_messages(topic: str) -> TopicMessages:
     """Return what unpacks the messages of an input topic; rclpy where it is not done quickly."""
     kind = MESSAGE_TYPES[topic]
     return TopicMessages(INPUT_TYPES[topic], lambda data: deserialize_message(data, kind))
-
-
-def why_no_arrival_log(path: Path) -> str:
-    """Return why a file is no arrival log of a node; empty where it is one."""
-    with path.open('rb') as file:
-        topic, _, stamp = file.readline(LONGEST_LINE).decode(errors='replace').partition(' ')
-    if topic in MESSAGE_TYPES and stamp.strip().lstrip('-').isdigit():
-        return ''
-    return '' if topic.strip() == RESET else 'is no arrival log of this program'
 
 
 def _came(info: dict[str, Any]) -> int:
@@ -145,7 +134,6 @@ class EstimatorNode(LifecycleNode):
         self._kept: KeptSoil | None = None
         self._active = self._declaring = False
         self._enabled = True
-        self._arrival: TextIO | None = None
         self._said = (-1, False)  # level of the node that was logged last, and whether quietly
         self.create_service(Trigger, '~/reset', self._reset)
         self.create_service(Trigger, '~/save_soil', self._save_soil)
@@ -214,7 +202,9 @@ class EstimatorNode(LifecycleNode):
         self._declaring = True
         parameters.declare(self, configuration)
         self._declaring = False
-        self._arrival = self._open_arrival_log(configuration)
+        self._arrival = ArrivalLog(
+            str(configuration.flat()['record_arrival']), self._files, self.get_logger().error
+        )
         self._pipeline = Pipeline(configuration, self._full_name)
         self._pipeline.core.warning.restore(self._kept_warning())
         self._warned = self._pipeline.core.warning.state
@@ -267,9 +257,7 @@ class EstimatorNode(LifecycleNode):
             self._publisher.destroy()
         if self._views is not None:
             self._views.destroy()
-        if self._arrival is not None:
-            self._arrival.close()
-            self._arrival = None
+        self._arrival.close()
         self._pipeline = self._publisher = self._views = None
 
     # -- Inputs ---------------------------------------------------------------------------------
@@ -311,8 +299,7 @@ class EstimatorNode(LifecycleNode):
             pipeline.refuse(topic, DAMAGED)
             return
         stamp = stamp_of(message)
-        if self._arrival is not None:
-            self._arrival.write(f'{topic} {stamp}\n')
+        self._arrival.write(f'{topic} {stamp}')
         now = self._seconds()
         number = info.get('publication_sequence_number') if topic in self._numbered else None
         clock = self._nanoseconds()  # 0: none has come yet
@@ -361,8 +348,7 @@ class EstimatorNode(LifecycleNode):
         if self._pipeline is None or self._publisher is None:
             response.success, response.message = False, 'not configured: there is no state'
             return response
-        if self._arrival is not None:
-            self._arrival.write(f'{RESET}\n')
+        self._arrival.write(RESET)
         self._pipeline.reset()
         self._latest = None
         self._started = self._seconds()
@@ -604,19 +590,6 @@ class EstimatorNode(LifecycleNode):
         from wheel_terra_estimator.ros.live_views import LiveViews
 
         return LiveViews(self, configuration)
-
-    def _open_arrival_log(self, configuration: Configuration) -> TextIO | None:
-        name = str(configuration.flat()['record_arrival'])
-        if not name:
-            return None
-        path = Path(name).expanduser()
-        try:
-            check_target(path, True, self._files, foreign=why_no_arrival_log)
-            return path.open('w', encoding='utf-8', buffering=1)
-        except (OSError, UserError) as error:
-            reason = getattr(error, 'strerror', None)
-            words = f'{path} cannot be written ({reason})' if reason else str(error)
-            raise UserError(f'record_arrival: {words}') from None
 
     def _nanoseconds(self) -> int:
         """Return the time of the node's clock; the system's is asked without a detour by rcl."""

@@ -1,0 +1,82 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""The order in which a live node heard its inputs, for ``wheel-terra replay --arrival``."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from contextlib import suppress
+from pathlib import Path
+from typing import TextIO
+
+from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.messages.convert import INPUT_TYPES
+from wheel_terra_estimator.output_folder import check_target
+from wheel_terra_estimator.ros.file_claim import FileClaim
+
+RESET = 'reset'  # line
+LONGEST_LINE = 100  # [byte]
+
+
+def why_no_arrival_log(path: Path) -> str:
+    """Return why a file is no arrival log of a node; empty where it is one."""
+    with path.open('rb') as file:
+        topic, _, stamp = file.readline(LONGEST_LINE).decode(errors='replace').partition(' ')
+    if topic in INPUT_TYPES and stamp.strip().lstrip('-').isdigit():
+        return ''
+    return '' if topic.strip() == RESET else 'is no arrival log of this program'
+
+
+class ArrivalLog:
+    """Line after line, ``TOPIC STAMP`` or `RESET`, to a file of which this node alone is writer.
+
+    Parameters
+    ----------
+    name : str
+        The file; empty for none.
+    inputs : iterable of Path
+        Files that the node reads.
+    complain : callable
+        Is told, once, why the log ends early: a disk that is full ends the log, not the node.
+
+    Raises
+    ------
+    UserError
+        It may not, or cannot, be written, or another node writes it.
+    """
+
+    def __init__(
+        self, name: str, inputs: Iterable[Path], complain: Callable[[str], object]
+    ) -> None:
+        self._file: TextIO | None = None
+        self._complain = complain
+        if not name:
+            return
+        path = Path(name).expanduser()
+        self._claim = FileClaim(path, 'record_arrival')
+        try:
+            check_target(path, True, inputs, foreign=why_no_arrival_log)
+            self._claim.take()
+            self._file = path.open('w', encoding='utf-8', buffering=1)
+        except (OSError, UserError) as error:
+            reason = getattr(error, 'strerror', None)
+            words = f'{path} cannot be written ({reason})' if reason else str(error)
+            raise UserError(f'record_arrival: {words}') from None
+
+    def write(self, line: str) -> None:
+        """Write a line."""
+        if self._file is None:
+            return
+        try:
+            self._file.write(f'{line}\n')
+        except OSError as error:
+            self._complain(f'record_arrival: the log ends here ({error.strerror})')
+            self.close()
+
+    def close(self) -> None:
+        """End the log."""
+        if self._file is not None:
+            with suppress(OSError):
+                self._file.close()
+            self._claim.release()
+            self._file = None
