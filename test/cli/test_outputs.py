@@ -167,8 +167,8 @@ REFUSED = {
     'soilbin rows': 'soilbin rows --no-cache --sweep pull --scheduler {silent} -o',
     'reproduce': 'reproduce guo --figure 99 -o',
     'evaluate': 'evaluate --hours 1 --kinds climb --first-seed -1 -o',
-    'bench': 'bench --against {table} --report',
     'demo': 'demo --no-node -o',
+    'bench': 'bench --against {table} --report',
 }
 """Command line of every command that writes, refused as late as can be; the place is appended."""
 

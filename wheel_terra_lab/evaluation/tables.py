@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterable, Sequence
-from typing import Any
 
 import numpy as np
 
@@ -366,63 +365,3 @@ def _health(by_kind: dict[str, list[DriveScore]]) -> str:
             values.append(f'{np.mean(known):.2f}' if known else '-')
         rows.append((kind, *values))
     return table(('drives', 'NIS reference', 'sinkage', 'torque', 'balance', 'restarts'), rows)
-
-
-def as_dict(results: Results, modes: Sequence[str]) -> dict[str, Any]:
-    """Return the main figures for JSON: simulator -> mode -> kind and ``pooled`` -> figures.
-
-    Errors in slip [-], sinkage [m] and pull [share of the load]; ``coverage`` of 95 % intervals.
-    """
-    found: dict[str, Any] = {}
-    for simulator in results.simulators:
-        for mode in modes:
-            by_kind = results.of_mode(mode, simulator)
-            if by_kind:
-                pooled = [drive for drives in by_kind.values() for drive in drives]
-                rows = {**by_kind, 'pooled': pooled}
-                found.setdefault(simulator, {})[mode] = {k: _numbers(d) for k, d in rows.items()}
-    return found
-
-
-def _numbers(drives: Sequence[DriveScore]) -> dict[str, Any]:
-    data = Samples.joined(d.samples for d in drives)
-    warnings = [d.warnings for d in drives]
-    trapped = [w for w in warnings if w.entrapped is not None]
-    better, baseline = scores.better_baseline(data)
-    errors = {
-        'slip': (data.slip_error, data.slip_std),
-        'sinkage': (data.sinkage_error, data.sinkage_std),
-        'drawbar_pull': (data.pull_error, data.pull_std),
-    }
-    return {
-        'drives': len(drives),
-        'rms': {name: _or_none(scores.rms(error)) for name, (error, _) in errors.items()},
-        'coverage': {
-            name: _or_none(scores.coverage(error, std)) for name, (error, std) in errors.items()
-        },
-        'best_baseline_filter': {'name': better, 'slip_rms': _or_none(scores.rms(baseline))},
-        'entrapped': len(trapped),
-        'warned_before': sum(w.lead_time is not None for w in trapped),
-        'near_misses': sum(w.near_misses for w in warnings),
-        'false_alarms': sum(w.false_alarms for w in warnings),
-        'hours': sum(w.duration for w in warnings) / 3600.0,
-        **_foresight_numbers([d.foresight for d in drives if d.foresight is not None]),
-    }
-
-
-def _foresight_numbers(parts: Sequence[Foresight]) -> dict[str, Any]:
-    data = Foresight.joined(parts) if parts else None
-    if data is None or not data.came.size:
-        return {}
-    return {
-        'stuck_probability': {
-            'rows': int(data.came.size),
-            'events': float(data.came.mean()),
-            'reliability_error': reliability_error(data),
-            'brier': {name: list(found) for name, found in brier_interval(parts).items()},
-        }
-    }
-
-
-def _or_none(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None

@@ -99,7 +99,7 @@ def hit(shared: Path) -> Case:
     """HIT wheel with 10 mm lugs against the model fitted to its smooth twin."""
     return Case(
         'What do 10 mm lugs add to the smooth wheel of the same size, in the same sand?',
-        check_table('HIT wheel, 10 mm lugs', _published(shared, 'ding2011_lug10', _READING)),
+        _lugs(shared),
         # The share of rim friction that lugs take away was fitted to this very wheel: put back.
         reader.load(
             ['hit_fit'],
@@ -109,38 +109,35 @@ def hit(shared: Path) -> Case:
     )
 
 
+def _lugs(shared: Path) -> SteadyTable:
+    return check_table('HIT wheel, 10 mm lugs', _published(shared, 'ding2011_lug10', _READING))
+
+
+def _smooth(shared: Path) -> SteadyTable:
+    return check_table('HIT wheel, smooth', _published(shared, 'ding2011_smooth', _READING))
+
+
+def _on_rim(soil: str, share: float) -> Configuration:
+    """Return the soil as measured, its numbers known to a share; slip is that of the rim."""
+    return reader.load([soil], ['slip_radius:=rim', *_known_to(share, soil)], complete=False)
+
+
 def hit_smooth(shared: Path) -> Case:
     """HIT smooth wheel against the measured soil, no effect on."""
-    return Case(
-        'Smooth HIT wheel against the soil as measured, no effect switched on.',
-        check_table('HIT wheel, smooth', _published(shared, 'ding2011_smooth', _READING)),
-        reader.load(
-            ['hit_lss1'], ['slip_radius:=rim', *_known_to(0.3, 'hit_lss1')], complete=False
-        ),
-    )
+    question = 'Smooth HIT wheel against the soil as measured, no effect switched on.'
+    return Case(question, _smooth(shared), _on_rim('hit_lss1', 0.3))
 
 
 def hit_paired(shared: Path) -> Case:
     """The same question with the smooth rows as the table in which the effect is absent."""
-    return Case(
-        'The same, from the soil as measured, the smooth wheel being the reference table.',
-        check_table('HIT wheel, 10 mm lugs', _published(shared, 'ding2011_lug10', _READING)),
-        reader.load(
-            ['hit_lss1'], ['slip_radius:=rim', *_known_to(0.3, 'hit_lss1')], complete=False
-        ),
-        check_table('HIT wheel, smooth', _published(shared, 'ding2011_smooth', _READING)),
-    )
+    question = 'The same, from the soil as measured, the smooth wheel being the reference table.'
+    return Case(question, _lugs(shared), _on_rim('hit_lss1', 0.3), _smooth(shared))
 
 
 def hit_static(shared: Path) -> Case:
     """HIT lugged wheel alone against the measured soil, no effect on."""
-    return Case(
-        'Lugged HIT wheel against the soil as measured, no effect switched on.',
-        check_table('HIT wheel, 10 mm lugs', _published(shared, 'ding2011_lug10', _READING)),
-        reader.load(
-            ['hit_lss1'], ['slip_radius:=rim', *_known_to(0.3, 'hit_lss1')], complete=False
-        ),
-    )
+    question = 'Lugged HIT wheel against the soil as measured, no effect switched on.'
+    return Case(question, _lugs(shared), _on_rim('hit_lss1', 0.3))
 
 
 def kls1(shared: Path) -> Case:
@@ -148,9 +145,7 @@ def kls1(shared: Path) -> Case:
     return Case(
         'Why is the torque of the KLS-1 wheels so high?',
         check_table('KLS-1 wheels', _published(shared, 'kls1', _READING)),
-        reader.load(
-            ['kls1_proxy'], ['slip_radius:=rim', *_known_to(0.4, 'kls1_proxy')], complete=False
-        ),
+        _on_rim('kls1_proxy', 0.4),
         notes=('moduli of the soil are proxies: all soil parameters stated to 40 %',),
     )
 

@@ -17,6 +17,7 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 from nav_msgs.msg import Odometry
+from rclpy.executors import Executor
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from sensor_msgs.msg import Imu, JointState
@@ -177,6 +178,23 @@ class Rover(Node):
                 self.diagnostics += 1
                 if not self.levels or self.levels[-1][1] != level:
                     self.levels.append((time.monotonic(), level, status.message))
+
+
+def serve(
+    rover: Any,
+    executor: Executor,
+    seconds: float,
+    until: Callable[[], bool] = lambda: False,
+    before: Callable[[], None] = lambda: None,
+) -> bool:
+    """Let a rover publish and hear for so long, or till a condition holds; say whether it does."""
+    end = time.monotonic() + seconds
+    while not (holds := until()) and time.monotonic() < end:
+        before()
+        due = rover.publish_due()
+        wait = max(min(due, end, time.monotonic() + 0.01) - time.monotonic(), 0.0)
+        executor.spin_once(timeout_sec=wait)
+    return holds
 
 
 def quantile(values: Sequence[float], share: float) -> float:

@@ -32,7 +32,7 @@ import rclpy
 from rclpy.executors import SingleThreadedExecutor
 
 from wheel_terra_estimator.configuration import reader
-from wheel_terra_lab.studies.live_rover import Process, Rover, quantile
+from wheel_terra_lab.studies.live_rover import Process, Rover, quantile, serve
 
 RATES = {'joint_states': 50.0, 'imu/data': 100.0, 'sinkage': 10.0, 'reference_odom': 1.0}
 HEALTH = 4.0  # [s] between two faults at least
@@ -202,20 +202,10 @@ class Soak:
         return self.rover.levels[-1][1] == 0 or all(words.endswith((LOST, AHEAD)) for words in said)
 
     def _wait(self, condition: Callable[[], bool], seconds: float) -> bool:
-        end = time.monotonic() + seconds
-        while not condition():
-            if time.monotonic() > end:
-                return False
-            self._serve(0.05)
-        return True
+        return serve(self.rover, self._executor, seconds, condition, self._link.release)
 
     def _serve(self, seconds: float) -> None:
-        end = time.monotonic() + seconds
-        while time.monotonic() < end:
-            self._link.release()
-            due = self.rover.publish_due()
-            wait = max(min(due, end, time.monotonic() + 0.01) - time.monotonic(), 0.0)
-            self._executor.spin_once(timeout_sec=wait)
+        serve(self.rover, self._executor, seconds, before=self._link.release)
 
     def report(self) -> str:
         """Return the table."""

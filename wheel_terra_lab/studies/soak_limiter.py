@@ -37,7 +37,7 @@ from std_msgs.msg import Bool, Int8
 from std_srvs.srv import Trigger
 
 from wheel_terra_estimator.configuration import reader
-from wheel_terra_lab.studies.live_rover import NODE, Process, Rover
+from wheel_terra_lab.studies.live_rover import NODE, Process, Rover, serve
 
 RATES = {'joint_states': 20.0, 'imu/data': 20.0, 'sinkage': 5.0, 'reference_odom': 2.0}
 COMMAND_PERIOD = 0.05  # [s]
@@ -350,19 +350,10 @@ class Soak:
             publish(message)
 
     def _until(self, condition: Callable[[], bool], seconds: float) -> bool:
-        end = time.monotonic() + seconds
-        while not condition():
-            if time.monotonic() > end:
-                return False
-            self._serve(0.05)
-        return True
+        return serve(self.rover, self._executor, seconds, condition)
 
     def _serve(self, seconds: float) -> None:
-        end = time.monotonic() + seconds
-        while time.monotonic() < end:
-            due = self.rover.publish_due()
-            wait = max(min(due, end, time.monotonic() + 0.01) - time.monotonic(), 0.0)
-            self._executor.spin_once(timeout_sec=wait)
+        serve(self.rover, self._executor, seconds)
 
     def report(self) -> str:
         """Return what happened."""

@@ -96,8 +96,7 @@ class Campaign:
     ``noise_free`` the noise and the true outputs of the same rows, ``believed`` the
     soil in the configuration, ``soil`` the true one, ``hidden`` what was hidden, ``distances`` its
     d' (each beyond the other when two), ``distance_left`` what the best listed effect leaves
-    (strangers only), ``distance_beside`` d' where the structural error counts as noise too,
-    ``true_outputs`` the noise-free truth of any rows.
+    (strangers only), ``true_outputs`` the noise-free truth of any rows.
     """
 
     seed: int
@@ -113,10 +112,8 @@ class Campaign:
     effects: tuple[Hidden, ...]
     distances: tuple[float, ...]
     distance_left: float
-    spice: tuple[float, ...] = ()
     noise_free: Rows = field(default_factory=dict)
     soil_deviations_stated: bool = True
-    distance_beside: float = float('nan')
     true_outputs: Callable[[Rows], Rows] | None = None
 
     def settings(self) -> dict[str, object]:
@@ -197,18 +194,14 @@ def _attempt(seed: int, design: str, plan: Plan, rng: np.random.Generator) -> Ca
         for key in ('sinkage', 'torque'):
             measured[key][rows['_whole_rover'] == 1] = np.nan
     ruler = Ruler(rows, soil, _with_slip_error(rows, soil, measured) if plan.drive else measured)
-    names, sizes, effects, spices = _hide(plan, rows, soil, ruler, measured, rng)
+    names, sizes, effects = _hide(plan, rows, soil, ruler, measured, rng)
     distances, left = _sizes_seen(plan, rows, ruler, names, effects)
     if any(not np.isfinite(d) for d in distances):
         raise _UnusableError
 
     structure: tuple[Hidden, ...] = ()
-    beside = float('nan')
     if plan.structure:
-        error = SmoothError(plan.structure, rows, base, rng)
-        structure = (error,)
-        if effects:
-            beside = ruler.distance_beside(effects, error)
+        structure = (SmoothError(plan.structure, rows, base, rng),)
     truth = _outputs(rows, soil, (*effects, *structure), plan)
     if not all(np.all(np.isfinite(truth[key])) for key in OUTPUTS):
         raise _UnusableError
@@ -232,10 +225,8 @@ def _attempt(seed: int, design: str, plan: Plan, rng: np.random.Generator) -> Ca
         effects,
         distances,
         left,
-        spices,
         {key: truth[key][kept] for key in OUTPUTS},
         stated,
-        beside,
         lambda rows: solve(rows, soil, effects),
     )
 
@@ -320,9 +311,9 @@ def _noise_level(rows: Rows, rng: np.random.Generator) -> Rows:
 
 def _hide(
     plan: Plan, rows: Rows, soil: TrueSoil, ruler: Ruler, measured: Rows, rng: np.random.Generator
-) -> tuple[tuple[str, ...], tuple[float, ...], tuple[Hidden, ...], tuple[float, ...]]:
+) -> tuple[tuple[str, ...], tuple[float, ...], tuple[Hidden, ...]]:
     if plan.hide == 'none':
-        return (), (), (), ()
+        return (), (), ()
     if plan.hide == 'outside':
         catalogue = {**OUTSIDE, **SCORED}
         names = [*plan.names] or [str(rng.choice(sorted(OUTSIDE)))]
@@ -337,7 +328,7 @@ def _hide(
         count = 2 if plan.hide == 'two' else 1
         drawn = rng.choice(sorted(possible), count, replace=False)
         names = [*plan.names] or [str(name) for name in drawn]
-    sizes, effects, spices = [], [], []
+    sizes, effects = [], []
     for name in names:
         low = plan.least or (4.0 if plan.hide == 'two' else 2.5)
         wanted = float(np.exp(rng.uniform(np.log(low), np.log(60.0))))
@@ -352,12 +343,10 @@ def _hide(
             raise _UnusableError from error
         sizes.append(size)
         effects.append(effect)
-        spices.append(spice)
     return (
         tuple(name.partition(':')[0] for name in names),
         tuple(sizes),
         tuple(effects),
-        tuple(spices),
     )
 
 

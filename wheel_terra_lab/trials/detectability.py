@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from wheel_terra_lab.trials.hidden import LISTED, Kind, SmoothError
+from wheel_terra_lab.trials.hidden import LISTED, Kind
 from wheel_terra_lab.trials.truth import (
     OUTPUTS,
     SOIL_SD,
@@ -68,17 +68,6 @@ class Ruler:
         """Distance of given outputs beyond the best refit of the soil."""
         y = np.stack([outputs[key] for key in OUTPUTS], 1) / self._std
         return float(np.linalg.norm(self._refit(y[np.isfinite(self._std)], None, 0.5)))
-
-    def distance_beside(self, hidden: tuple[Hidden, ...], structure: SmoothError) -> float:
-        """Distance of ``hidden`` where the structural error counts as noise (soil linear)."""
-        change = self.whitened(np.zeros(len(SOIL_SD)), hidden) - self.base
-        kept = np.isfinite(self._std)
-        row, output = np.nonzero(kept)
-        share = structure.std[output] / self._std[kept]
-        smooth = structure.correlation[np.ix_(row, row)] * np.outer(share, share)
-        smooth[output[:, None] != output[None, :]] = 0.0
-        covariance = np.eye(len(change)) + self._jacobian @ self._jacobian.T + smooth
-        return float(np.sqrt(change @ np.linalg.solve(covariance, change)))
 
     def _refit(self, target: FloatArray, rival: Kind | None, spice: float) -> FloatArray:
         """Damped Gauss-Newton over soil units and, with a rival, its size; returns the residual."""

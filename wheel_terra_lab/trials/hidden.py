@@ -535,12 +535,10 @@ class SmoothError(Hidden):
         ]
         x = np.stack(columns, 1)
         distance = ((x[:, None] - x[None]) ** 2).sum(-1)
-        self.correlation = np.exp(-distance / 2)  # (N, N) between rows
-        self.std = np.array([share * np.ptp(clean[key]) for key in OUTPUTS])
-        root = np.linalg.cholesky(self.correlation + 1e-8 * np.eye(len(x)))
+        root = np.linalg.cholesky(np.exp(-distance / 2) + 1e-8 * np.eye(len(x)))
         self._error = {
-            key: std * (root @ rng.standard_normal(len(x)))
-            for key, std in zip(OUTPUTS, self.std, strict=True)
+            key: share * np.ptp(clean[key]) * (root @ rng.standard_normal(len(x)))
+            for key in OUTPUTS
         }
 
     def finish(self, out: Rows, setup: Setup, rows: Rows) -> None:

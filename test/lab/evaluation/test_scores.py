@@ -193,25 +193,6 @@ def test_tables_hold_every_kind():
     assert 'climb' not in pooled
 
 
-def test_figures_for_programs_are_those_of_the_tables():
-    import json
-
-    true = truth(np.concatenate([np.full(200, 0.1), np.full(200, 0.7)]))
-    record = said(true)
-    drive = DriveScore(
-        'climb', 1, 'reference', take(true, record), scores.warnings(true, record, RADIUS), {}
-    )
-    results = Results([drive, replace(drive, kind='cruise', simulator='B')])
-    found = tables.as_dict(results, ['reference', 'no_torque'])
-    assert set(found) == {'A', 'B'}
-    assert set(found['A']) == {'reference'}
-    assert set(found['A']['reference']) == {'climb', 'pooled'}
-    figures = found['A']['reference']['climb']
-    assert figures['rms']['slip'] == pytest.approx(scores.rms(drive.samples.slip_error))
-    assert figures == found['A']['reference']['pooled']
-    json.dumps(found, allow_nan=False)
-
-
 def test_the_first_seconds_after_a_start_are_scored_apart():
     """Standing from 40 to 45 s of 100 s at 10 Hz; the estimate is off after the start alone."""
     slip = np.full(1000, 0.4)
