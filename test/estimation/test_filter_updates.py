@@ -63,9 +63,7 @@ def window(force_x, force_z, readings=5, noise=0.0):
 # -- Reference velocity -----------------------------------------------------------------------
 
 
-def references(
-    parts, ekf, speeds, torque_tells=True, last_change=-1e9, acceleration=0.0, held=None
-):
+def references(parts, ekf, speeds, acceleration=0.0, held=None):
     """Fuse one reference per second; return for each whether the speed was opened to it.
 
     Something else may hold the speed at a value.
@@ -84,8 +82,6 @@ def references(
                 still=False,
                 fastest_rim=0.05,
                 rim_acceleration=acceleration,
-                last_change=last_change,
-                torque_tells=torque_tells,
                 reading_variance=parts.sensors.reference_std**2,
             )
         )
@@ -109,14 +105,11 @@ def test_a_reference_within_a_ramp_counts_less(parts, ekf):
 
 
 def test_references_that_agree_with_one_another_are_believed_after_their_count(parts, ekf):
-    good = [0.045] * 10
-    for torque_tells, last_change, count in ((True, -1e9, 3), (False, -1e9, 2), (True, 9.9, 2)):
-        fresh = parts.filter()
-        fresh.set(SPEED, 0.045, 0.005**2)
-        update, opened = references(parts, fresh, good + [0.02] * 3, torque_tells, last_change)
-        assert opened.index(True) == 9 + count
-        assert update.state.rejected == count
-        assert fresh.mean[SPEED] == pytest.approx(0.02, abs=0.003)
+    ekf.set(SPEED, 0.045, 0.005**2)
+    update, opened = references(parts, ekf, [0.045] * 10 + [0.02] * 3)
+    assert opened.index(True) == 11
+    assert update.state.rejected == 2
+    assert ekf.mean[SPEED] == pytest.approx(0.02, abs=0.003)
 
 
 def test_a_rover_that_drives_faster_than_its_wheels_is_not_believed(parts):
@@ -166,15 +159,6 @@ def test_a_lean_of_fast_references_counts_by_what_passes_by_chance_in_a_second(p
     assert excess[0] / excess[1] == pytest.approx(chi2.isf(by_chance / rate, 1) / limit, rel=0.02)
 
 
-def test_a_run_of_references_to_one_side_opens_the_speed(parts):
-    """Slip that jumps within the gate: followed after three references, not after ten."""
-    fresh = parts.filter()
-    fresh.set(SPEED, 0.045, 0.001**2)
-    _, opened = references(parts, fresh, [0.045] * 5 + [0.037] * 4)
-    assert not any(opened)
-    assert fresh.mean[SPEED] == pytest.approx(0.037, abs=0.0015)
-
-
 def test_references_beyond_the_fastest_wheel_hardly_count(parts, ekf):
     _, opened = references(parts, ekf, [0.045] * 10 + [0.5] * 3)
     assert not any(opened)
@@ -191,8 +175,6 @@ def test_a_reference_on_standing_wheels_says_whether_the_rover_slides(parts, ekf
             still=True,
             fastest_rim=0.0,
             rim_acceleration=0.0,
-            last_change=-1e9,
-            torque_tells=True,
             reading_variance=parts.sensors.reference_std**2,
         )
         assert (update.state.sliding_until > time) is sliding
@@ -228,8 +210,6 @@ def test_readings_that_are_off_by_the_same_are_no_many_readings(stated, least, m
                 still=False,
                 fastest_rim=0.6,
                 rim_acceleration=0.0,
-                last_change=-1e9,
-                torque_tells=True,
                 reading_variance=1e-4,
             )
         inside.append(abs(ekf.mean[SPEED] - 0.5) < 1.96 * np.sqrt(ekf.covariance[SPEED, SPEED]))
@@ -239,16 +219,13 @@ def test_readings_that_are_off_by_the_same_are_no_many_readings(stated, least, m
 # -- Zero velocity ----------------------------------------------------------------------------
 
 
-def rest(parts, ekf, seconds, rims=(0.0,) * 6, yaw=0.0):
-    update = ZeroVelocityUpdate(parts.rover)
-    still = max(abs(r) for r in rims) < 0.001
+def rest(parts, ekf, seconds, yaw=0.0):
+    update = ZeroVelocityUpdate()
     for i in range(round(10 * seconds)):
         update.update(
             ekf,
             0.1 * i,
-            rims=rims,
-            typical_rim=float(np.median(rims)),
-            still=still,
+            still=True,
             sliding=False,
             window=InertialWindow(readings=5, rates=5, pitch_rate=5 * 0.002),
             yaw_rate=yaw,
@@ -273,12 +250,6 @@ def test_a_fast_rover_is_not_stopped_at_once(parts):
     assert fast.mean[SPEED] > 0.8
     rest(parts, fast, 4.0)
     assert abs(fast.mean[SPEED]) < 0.01
-
-
-def test_wheels_that_turn_against_each_other_hold_the_body(parts, ekf):
-    ekf.set(SPEED, 0.045, 0.05**2)
-    rest(parts, ekf, 3.0, rims=(0.05, -0.05) * 3)
-    assert abs(ekf.mean[SPEED]) < 0.01
 
 
 # -- Sinkage ----------------------------------------------------------------------------------

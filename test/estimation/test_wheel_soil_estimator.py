@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from parts import SAND
 
-from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.estimation.core import EstimatorCore
 from wheel_terra_estimator.estimation.estimates import SlipClass
 from wheel_terra_estimator.estimation.measurements import (
@@ -362,28 +361,6 @@ def test_a_wheel_sunk_to_its_hub_is_followed():
     assert found.sinkage[1] < 0.5 * sunk
 
 
-def test_two_wild_references_that_agree_need_a_witness():
-    """Torque, slope and rim speed say that nothing changed: a third one would have to agree.
-
-    So it is where the traction curve is steep; on its plateau torque shows no change of the slip.
-    """
-    run = drive(configuration=['generic_six_wheel', 'test_sand'])
-    wild = [a.measurement for a in run.arrivals]
-    references = [i for i, m in enumerate(wild) if isinstance(m, ReferenceVelocity)]
-    for i in references[8:10]:
-        wild[i] = replace(wild[i], forward=wild[i].forward + 0.03)
-    worst = 0.0
-    row = {int(stamp): i for i, stamp in enumerate(run.truth.stamp)}
-    estimator = WheelSoilEstimator(run.configuration)
-    for stamp, inputs in merged(wild):
-        estimator.step(stamp, inputs)
-        if stamp > wild[references[8]].stamp and stamp in row:
-            error = estimator.estimates().slip - run.truth.slip[row[stamp]]
-            worst = max(worst, np.abs(np.median(error)))
-    assert not estimator._speed.on_plateau
-    assert worst < 0.25  # of the 0.4 that the references say
-
-
 def errors_of(kind, duration, mode, of, truth):
     """Estimates less truth of a drive, first ten seconds left out, and deviations."""
     d = drive_of(kind, duration)
@@ -496,20 +473,3 @@ def test_what_a_standing_wheel_pulled_is_forgotten_when_all_have_stood():
         known.append(~np.isnan(estimator._pulls.state.stationary))
     assert known[59].tolist() == [False] * 5 + [True]
     assert not known[-1].any()
-
-
-def test_torques_open_the_speed_where_contacts_are_formed_not_while_they_form():
-    """The same jump, from 2 to 6 N m, well into a drive and a few centimetres behind a restart."""
-    opened = {}
-    for jump in (6.0, 9.6):
-        estimator = WheelSoilEstimator(reader.load(SAND))
-        estimator.begin_run(10**9, keep_soil=False)
-        for i in range(round(10 * jump) + 3):
-            time = 0.1 * i
-            rate = np.full(6, 0.0 if 7.0 < time < 9.0 else 0.5)
-            wheels = WheelOdometry(0, rate, np.full(6, 2.0 if time < jump else 6.0))
-            reference = ReferenceVelocity(0, 0.09 * float(rate[0]), 1e-6)
-            estimator.step(10**9 + i * 10**8, StepInputs(wheels, None, None, None, reference))
-        opened[jump] = estimator._speed.state.inflation
-    assert opened[6.0] > 0.001
-    assert opened[9.6] == 0.0

@@ -21,7 +21,6 @@ from wheel_terra_estimator.estimation.contacts.demand import Demand
 from wheel_terra_estimator.estimation.contacts.linearisation import (
     ContactForces,
     Linearisation,
-    traction_slope,
 )
 from wheel_terra_estimator.estimation.contacts.loads import LoadState, WheelLoads
 from wheel_terra_estimator.estimation.contacts.pulls import PullEvidence, Pulls
@@ -31,7 +30,6 @@ from wheel_terra_estimator.estimation.contacts.stationary_wheels import (
 )
 from wheel_terra_estimator.estimation.contacts.steepest_climb import SteepestClimb
 from wheel_terra_estimator.estimation.contacts.steering import Steering
-from wheel_terra_estimator.estimation.contacts.torque_change import TorqueChange
 from wheel_terra_estimator.estimation.contacts.turning import Turning, sides_oppose
 from wheel_terra_estimator.estimation.contacts.unloaded_wheels import UnloadedWheels
 from wheel_terra_estimator.estimation.contacts.wheel_models import WheelModels, WheelState
@@ -206,7 +204,6 @@ class WheelSoilEstimator:
         self._unloaded = UnloadedWheels(rover, sensors)
         self._demand = Demand()
         self._climb = SteepestClimb()
-        self._torque_change = TorqueChange(rover, sensors)
         angle_std = sensors.leaving_angle_std * self._leaving_angles.noise_share
         self._linearisation = Linearisation(rover, layout, models, angle_std)
         self._stationary = StationaryWheels(rover, sensors, layout, models)
@@ -217,7 +214,7 @@ class WheelSoilEstimator:
         self._sinkage_process = SinkageProcess(rover, layout, models, angle_std)
         self._soil_process = SoilProcess(configuration, layout)
         self._reference = ReferenceUpdate(configuration, rover, sensors, layout)
-        self._zero_velocity = ZeroVelocityUpdate(rover)
+        self._zero_velocity = ZeroVelocityUpdate()
         self._sinkage = SinkageUpdate(configuration, layout)
         self._torque = TorqueUpdate(configuration, rover, layout)
         self._balance = ForceBalance(configuration, rover, sensors, layout)
@@ -246,7 +243,6 @@ class WheelSoilEstimator:
             self._unloaded,
             self._demand,
             self._climb,
-            self._torque_change,
             self._linearisation,
             self._pulls,
             self._ekf,
@@ -367,8 +363,6 @@ class WheelSoilEstimator:
         self._zero_velocity.update(
             ekf,
             time,
-            rims=cycle.rims,
-            typical_rim=cycle.unturned.typical,
             still=cycle.still,
             sliding=time < self._reference.state.sliding_until,
             window=cycle.window,
@@ -379,7 +373,7 @@ class WheelSoilEstimator:
             ekf, time, self._sinkages.take(), self._noise.variance('sinkage')
         )
         depths, torques = len(rows), 0
-        self._compare_wheels(cycle)
+        self._find_unloaded(cycle)
         forces, total = None, None
         if cycle.still:
             self._forget_contacts()
@@ -408,8 +402,7 @@ class WheelSoilEstimator:
 
         self._speed.end_cycle(time, ekf, cycle.unturned, settled=self._contact_age.settled)
         self._sinkage_process.end_cycle(ekf, sinkage_before, cycle.dt)
-        lateral_motion = self._turning.state.lateral_motion
-        self._speed.keep_least_variance(ekf, cycle.rims, lateral_motion)
+        self._speed.keep_least_variance(ekf, cycle.rims)
         evidence = PullEvidence(
             forces=forces,
             total=total,
@@ -425,7 +418,7 @@ class WheelSoilEstimator:
                 ]
             ),
             stationary=self._pulls.state.stationary,
-            lateral_motion=lateral_motion,
+            lateral_motion=self._turning.state.lateral_motion,
         )
         tilt = rut_tilt(self._rover, layout, ekf.mean)
         self._pulls.update(ekf.mean, ekf.covariance, evidence, tilt=tilt)
@@ -454,7 +447,6 @@ class WheelSoilEstimator:
         loads = self._loads.update(
             window, pulls.model_pull, pulls.torque, self._unloaded.state.unloaded, headings
         )
-        speed.inflate(turning.speed_change)
         unturned = RimSpeeds.of(rims, turning.yaw_rate, headings)
         reference_known = self._reference.known(time)
         reverses = self._contact_age.update(unturned.typical)
@@ -470,7 +462,6 @@ class WheelSoilEstimator:
         self._note_climb(demand, unturned.typical, dt, told=reference_known)
         speed.begin(ekf, unturned)
         speed.follow_sides(unturned, dt)
-        speed.note_change(time, unturned)
         heard = known(rims)
         return _Cycle(
             time=time,
@@ -565,38 +556,21 @@ class WheelSoilEstimator:
             still=cycle.still,
             fastest_rim=self._wheels.fastest(),
             rim_acceleration=self._wheels.acceleration(),
-            last_change=self._speed.state.change_time,
-            torque_tells=self._wheels.torque_known(time) and not self._speed.on_plateau,
             reading_variance=noise,
         )
         self._whiteness.follow(time, ekf.innovations, reference=1)
 
-    def _compare_wheels(self, cycle: _Cycle) -> None:
-        """Find wheels without load, and sudden changes of what the wheels must give."""
+    def _find_unloaded(self, cycle: _Cycle) -> None:
+        """Find wheels without load."""
         low = self._rover.low_rim
         rolling = [
             i
             for i, (rim, torque) in enumerate(zip(cycle.rims, cycle.torque, strict=True))
             if abs(rim) > low and not isnan(torque)
         ]
-        unloaded = self._unloaded.update(
+        self._unloaded.update(
             cycle.time, rolling, cycle.torque, cycle.rims, self._turning.state.lateral_motion
         )
-        change = self._torque_change.update(
-            cycle.time,
-            rolling,
-            unloaded.unloaded,
-            torque=cycle.torque,
-            rims=cycle.rims,
-            loads=cycle.loads.load,
-            traction_slope=self._speed.state.traction_slope,
-        )
-        if change and self._torques_tell():
-            self._speed.inflate(change * max(abs(cycle.rims[i]) for i in rolling))
-
-    def _torques_tell(self) -> bool:
-        """Say whether torques that change tell of the ground: behind a start they build up."""
-        return self._contact_age.settled
 
     def _forget_contacts(self) -> None:
         """Let the contacts form anew: all wheels stand."""
@@ -622,12 +596,7 @@ class WheelSoilEstimator:
         forces = self._forces(cycle)
         stationary = self._stationary_pulls(cycle)
         start = self._contact_age.shear_variance
-        model_variance = tuple(
-            [
-                self._turning.scrub_variance(rim) + start if turns else 0.0
-                for rim, turns in zip(cycle.rims, cycle.turns, strict=True)
-            ]
-        )
+        model_variance = tuple([start if turns else 0.0 for turns in cycle.turns])
         repeats = repetitions(cycle.rims, cycle.dt) * self._reference.model_doubt
         rows = self._torque.update(
             ekf,
@@ -639,7 +608,6 @@ class WheelSoilEstimator:
             repeats=repeats,
         )
         self._speed.follow_contacts(
-            traction_slope(forces, cycle.rims, loads),
             self._contact_age.state.travel,
             dragging=any(
                 not turns and abs(rim) < self._rover.rest_speed

@@ -30,7 +30,6 @@ from wheel_terra_estimator.estimation.rover import Rover
 
 FloatArray = NDArray[np.float64]
 Floats = tuple[float, ...]
-_LEAST_LOADS = 1e-3  # [N]
 _STRENGTH = 2  # column of the strength in the derivatives of `WheelForces`
 
 
@@ -226,11 +225,3 @@ def smoothed_slopes(old: Floats | None, new: Floats, keep: float) -> Floats:
         return new
     gain = 1.0 - keep
     return tuple([keep * a + gain * b for a, b in zip(old, new, strict=True)])
-
-
-def traction_slope(forces: ContactForces, rims: Floats, loads: Floats) -> float:
-    """Return the slope of the traction curve: pull over load lost per v / rim speed [-]."""
-    total = sum(
-        float(forces.pull_rows[i, SPEED]) * abs(rim) for i, rim in enumerate(rims) if not isnan(rim)
-    )
-    return -total / max(sum(loads), _LEAST_LOADS)

@@ -12,7 +12,7 @@ from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.contacts.steering import Headings
 from wheel_terra_estimator.estimation.inputs.inertial import InertialWindow
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
-from wheel_terra_estimator.estimation.scalars import clipped, gain_of, known, median
+from wheel_terra_estimator.estimation.scalars import clipped, known, median
 
 Floats = tuple[float, ...]
 
@@ -24,12 +24,6 @@ class TurningTuning:
     least_gain: float = 0.25
     """Of the gyro per cycle while it agrees with the wheels; more than noise is followed."""
     least_noise: float = 1e-6  # of the yaw rate [rad/s]
-    side_time: float = 1.0
-    """Time over which the lateral motion must change to count as new [s]."""
-    side_dead_band: float = 0.05  # of the lateral motion [-]
-    side_noise: float = 3.0  # deviations of the yaw rate that are no change of it
-    speed_change: float = 1.5
-    """Change of the body's speed over the rim speed for each change of the lateral motion."""
     least_curvature_length: float = 0.1  # [m], for rovers with one axle
     least_travel_share: float = 0.1
     """Travel, as a share of the curvature length, below which no curvature is known."""
@@ -45,9 +39,6 @@ class TurningTuning:
     skid_yaw_doubt: float = 0.4  # of that yaw rate
     roll_yaw_doubt: float = 0.15  # of a rover that does not skid
     least_wheel_yaw_std: float = 0.005  # [rad/s]
-    scrub: float = 10.0
-    """Variance of a shear model, over its square, at full lateral motion: ten cycles of it are one
-    piece of information."""
 
 
 _OPPOSED = 0.5
@@ -82,16 +73,10 @@ class TurningState(NamedTuple):
     yaw_rate_std: float = 1.0  # nothing was heard yet
     by_wheels: float = 0.0
     """Yaw rate to expect of the rim speeds alone [rad/s]; a rover that skids turns less."""
-    side_speed: float = 0.0  # greatest with which a wheel is pushed sideways [m/s]
     lateral_motion: float = 0.0
     """Lateral motion of the outer wheels over the fastest rim speed, 0 to 1 [-]."""
-    lateral_motion_mean: float = 0.0  # over the last second
-    transient: float = 0.0
-    """How far the turning has changed while the contacts form anew [-]."""
     rotation: float = 0.0  # nose-up, over the last curvature length [rad]
     travel: float = 0.0  # and the travel that it took [m]
-    speed_change: float = 0.0
-    """Change of the body's speed that the last change of the turning may bring [m/s]."""
 
 
 class Turning(Component[TurningState]):
@@ -134,7 +119,6 @@ class Turning(Component[TurningState]):
             yaw_rate = by_wheels
             std = math.hypot(self._wheel_doubt * yaw_rate, tuning.least_wheel_yaw_std)
         else:
-            self.state = state = state._replace(speed_change=0.0)
             return state
         # Nose-up rotation over travel, both forgotten over the length of the rover.
         travel = speed * dt
@@ -143,17 +127,13 @@ class Turning(Component[TurningState]):
             yaw_rate=yaw_rate,
             yaw_rate_std=std,
             by_wheels=by_wheels,
-            side_speed=self._side_speed(speed, yaw_rate, headings),
             rotation=keep * state.rotation - window.pitch_rate / max(window.rates, 1) * dt,
             travel=keep * state.travel + travel,
-            speed_change=0.0,
         )
-        if fastest_rim > self._rover.low_rim:
-            state = self._with_lateral_motion(state, dt, fastest_rim)
-        else:
-            # The next start is no end of the last turn.
-            state = state._replace(lateral_motion=0.0, lateral_motion_mean=0.0)
-        self.state = state
+        turning = fastest_rim > self._rover.low_rim
+        side = self._side_speed(speed, yaw_rate, headings)
+        motion = min(side / fastest_rim, 1.0) if turning else 0.0
+        self.state = state = state._replace(lateral_motion=motion)
         return state
 
     def curvature(self, speed: float) -> float:
@@ -165,14 +145,6 @@ class Turning(Component[TurningState]):
         # What the gyro's zero makes of it, against the curvature of common ground.
         doubt = self._sensors.angular_rate_bias_std / max(abs(speed), tuning.least_speed)
         return curvature / (1.0 + (doubt / tuning.common_curvature) ** 2)
-
-    def scrub_variance(self, rim_speed: float) -> float:
-        """Return the variance of a wheel's shear model, over its square, from turning [-].
-
-        Turning shears the soil sideways too, which the model does not know.
-        """
-        side = self.state.side_speed / abs(rim_speed)
-        return self._tuning.scrub * min(side + self.state.transient, 1.0) ** 2
 
     def _side_speed(self, speed: float, yaw_rate: float, headings: Headings) -> float:
         """Return how fast the wheel is pushed sideways that is pushed most [m/s].
@@ -204,22 +176,3 @@ class Turning(Component[TurningState]):
         noise = max(self._noise(window) / math.sqrt(window.rates), tuning.least_noise)
         gain = clipped(tuning.least_gain * abs(now - expected) / noise, tuning.least_gain, 1.0)
         return expected + gain * (now - expected)
-
-    def _with_lateral_motion(self, state: TurningState, dt: float, fastest: float) -> TurningState:
-        """Return the state with the lateral motion, and where turning begins or ends."""
-        tuning, rover = self._tuning, self._rover
-        side = min(state.side_speed / fastest, 1.0)
-        mean = state.lateral_motion_mean
-        mean += gain_of(dt, tuning.side_time) * (side - mean)
-        noise = tuning.side_noise * state.yaw_rate_std * rover.curvature_length / fastest
-        change = abs(side - mean) - tuning.side_dead_band - noise
-        transient, speed_change = state.transient, 0.0
-        if change > 0.0:
-            speed_change = tuning.speed_change * change * fastest
-            transient = max(transient, change)
-        return state._replace(
-            lateral_motion=side,
-            lateral_motion_mean=mean,
-            transient=transient * math.exp(-fastest * dt / rover.contact_length),
-            speed_change=speed_change,
-        )

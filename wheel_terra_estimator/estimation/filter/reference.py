@@ -12,7 +12,7 @@ import numpy as np
 
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.component import Component
-from wheel_terra_estimator.estimation.filter.consistency import CONSISTENT, smoothed_nis
+from wheel_terra_estimator.estimation.filter.consistency import smoothed_nis
 from wheel_terra_estimator.estimation.filter.ekf import GatedFilter, Row, chi_square_gate
 from wheel_terra_estimator.estimation.filter.prediction import Prediction
 from wheel_terra_estimator.estimation.filter.state import SPEED, StateLayout
@@ -52,11 +52,7 @@ class ReferenceTuning:
     beyond_std: float = 5.0
     same_std: float = 4.0  # deviations within which two references disagree by the same amount
     count_beyond: int = 4  # references beyond the rim speed that must agree to be believed
-    count_unwitnessed: int = 3
-    """References that must agree where torque, slope and rim speed witness no change: a real change
-    of slip shows in them unless the traction curve is flat."""
-    count: int = 2  # where there is a witness, or no torque to ask, or none that could tell
-    witness_time: float = 2.5  # [s] for which a change of the contacts is a witness
+    count: int = 2  # references that must agree to be believed
     timing_std: float = 0.1
     """Doubt of when the wheels were as fast as they say, against the reference [s]: a ramp makes of
     it a doubt of v / rim speed, great while the wheels are slow."""
@@ -154,11 +150,10 @@ class ReferenceUpdate(Component[ReferenceState]):
         limit = self._tuning.run_excess
         return mean * mean * (2.0 * count - 1.0) * limit / (limit - _RISE * math.log(gap))
 
-    def believes(self, agreeing: int, *, beyond: bool, witnessed: bool) -> bool:
+    def believes(self, agreeing: int, *, beyond: bool) -> bool:
         """Say whether so many references in a row that disagree by the same amount are right."""
         tuning = self._tuning
-        needed = tuning.count if witnessed else tuning.count_unwitnessed
-        return agreeing >= (tuning.count_beyond if beyond else needed)
+        return agreeing >= (tuning.count_beyond if beyond else tuning.count)
 
     def update(
         self,
@@ -169,8 +164,6 @@ class ReferenceUpdate(Component[ReferenceState]):
         still: bool,
         fastest_rim: float,
         rim_acceleration: float,
-        last_change: float,
-        torque_tells: bool,
         reading_variance: float,
     ) -> bool:
         """Fuse a reference velocity; return whether the speed was opened to it.
@@ -189,15 +182,10 @@ class ReferenceUpdate(Component[ReferenceState]):
             Greatest rim speed [m/s].
         rim_acceleration : float
             Of the wheels at that time [m/s^2].
-        last_change : float
-            When torque, slope or rim speed last said that the slip may change [s].
-        torque_tells : bool
-            Whether there is a torque, and a traction curve so steep that it could say so.
         reading_variance : float
             Of the reading: `variance`, or more where more is seen [(m/s)^2].
         """
         tuning = self._tuning
-        witnessed = not (torque_tells and time - last_change > tuning.witness_time)
         variance = reading_variance + (tuning.timing_std * rim_acceleration) ** 2
         self._note_time(time)
         if still:
@@ -223,7 +211,7 @@ class ReferenceUpdate(Component[ReferenceState]):
             apart = abs(residual - state.last_rejected)
             same = apart < tuning.same_std * math.sqrt(2.0 * variance + total)
             agreeing = state.rejected_in_a_row + 1
-            opened = same and self.believes(agreeing, beyond=beyond, witnessed=witnessed)
+            opened = same and self.believes(agreeing, beyond=beyond)
             if opened:
                 ekf.widen(SPEED, residual * residual)
             else:
@@ -236,10 +224,6 @@ class ReferenceUpdate(Component[ReferenceState]):
             )
         else:
             state = state._replace(rejected_in_a_row=0)
-            excess = self._excess(state.mean_innovation, tuning.mean_count)
-            if excess > tuning.run_excess and nis > CONSISTENT:
-                # One more of a run to one side: the prediction is too sure of itself.
-                ekf.widen(SPEED, residual * residual / CONSISTENT - total)
         ekf.fuse([Row(self.innovation(ekf, reference)[0], self._reading, variance)])
         self.state = state
         return opened

@@ -35,6 +35,8 @@ from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
 from wheel_terra_estimator.estimation.scalars import NAN, clipped, gain_of, known, median
 
 Floats = tuple[float, ...]
+LEAST_SLIP_STD = 0.02
+"""Of a speed over the rim speed [-]: no set of soil models is better than that."""
 _LEAST_WHEELS = 3
 """Wheels that can disagree."""
 
@@ -84,12 +86,6 @@ class SpeedTuning:
     leaking_share: float = 0.3
     """Of gravity times the error of the attitude: what of it changes along the way."""
     leak_rate: float = 0.1  # of that change [1/s]
-    least_slope: float = 1e-3  # of the traction curve [-]
-    plateau_slope: float = 0.5
-    """Slope of the traction curve below which torque shows no change of the slip [-]: it is 1 to 2
-    at low slip. Tuned on entrapments of both worlds."""
-    restless_change: float = 0.02  # of the rim speed in a cycle: the command changes
-    restless_share: float = 0.05  # of the rim speed: an inflation that tells of new contacts
     usual_slip_std: float = 0.2  # about that of the configured soil on such a slope
     usual_length: float = 1.5  # rim travel over which slip returns to it [m]
     least_usual_slip: float = -0.2
@@ -98,8 +94,6 @@ class SpeedTuning:
     """Of the usual speed: what is farther from it at a start without reference is a jolt."""
     start_noise: float = 3.0
     """Times the accelerometer's noise over a second: what is more is no jolt but a slide."""
-    least_slip_std: float = 0.02  # no set of soil models is better than that
-    turning_slip_std: float = 0.04  # the same at full lateral motion
     present: float = 1e-6  # [s]: a cycle no older is the present
 
 
@@ -158,13 +152,11 @@ class SpeedState(NamedTuple):
     ratio: float  # v / rim speed
     ratio_std: float
     ratio_walk: float  # random walk of it [1/sqrt(m)]
-    traction_slope: float = 0.0  # of the traction curve at the last cycle; 0 = unknown [-]
     inflation: float = 0.0
     """Process-noise inflation: change of speed that changing contacts may bring [m/s]."""
     slow_rims: Floats = ()  # mean of `rims.each` over the last second [m/s]
     settled: bool = True  # the contacts were, at the last cycle
     other_direction: PastDrive | None = None
-    change_time: float = -math.inf  # when contacts or commands last changed [s]
 
 
 class AccelerationNoise(NamedTuple):
@@ -293,18 +285,8 @@ class SpeedProcess(Component[SpeedState]):
             other_direction=ended,
         )
 
-    def note_change(self, time: float, rims: RimSpeeds) -> None:
-        """Remember when contacts or commands last changed: a witness for references that jump."""
-        state, tuning, rim = self.state, self._tuning, rims.typical
-        if isnan(rim):
-            return
-        before = state.rims.typical
-        changed = isnan(before) or abs(rim - before) > tuning.restless_change * abs(rim)
-        if changed or state.inflation > tuning.restless_share * abs(rim):
-            self.state = state._replace(change_time=time)
-
-    def follow_contacts(self, slope: float, travel: float, *, dragging: bool) -> None:
-        """Note the slope of the traction curve, and how far the slip may walk.
+    def follow_contacts(self, travel: float, *, dragging: bool) -> None:
+        """Note how far the slip may walk.
 
         After a start it walks farther, over some `travel` [m], and so it does while a wheel is
         dragged, which digs in and asks more of the others.
@@ -312,15 +294,7 @@ class SpeedProcess(Component[SpeedState]):
         tuning = self._tuning
         start = tuning.start_walk * math.exp(-travel / tuning.start_walk_travel)
         drag = tuning.drag_walk if dragging else 0.0
-        self.state = self.state._replace(
-            traction_slope=max(slope, tuning.least_slope),
-            ratio_walk=max(self._walk, start, drag),
-        )
-
-    @property
-    def on_plateau(self) -> bool:
-        """Whether the traction curve is so flat that torque shows no change of the slip."""
-        return 0.0 < self.state.traction_slope < self._tuning.plateau_slope
+        self.state = self.state._replace(ratio_walk=max(self._walk, start, drag))
 
     # -- Prediction ------------------------------------------------------------------------------
 
@@ -513,12 +487,10 @@ class SpeedProcess(Component[SpeedState]):
         if abs(rim) > self._rover.low_rim and tuning.start_share * abs(usual) < off < noise:
             ekf.set(SPEED, usual, (state.ratio_std * rim) ** 2)
 
-    def keep_least_variance(self, ekf: GatedFilter, rims: Floats, lateral_motion: float) -> None:
+    def keep_least_variance(self, ekf: GatedFilter, rims: Floats) -> None:
         """Keep a least slip deviation."""
-        tuning = self._tuning
         typical = sum(abs(rim) for rim in known(rims)) / len(rims)
-        std = least_slip_std(lateral_motion, tuning)
-        lacking = (typical * std) ** 2 - float(ekf.covariance[SPEED, SPEED])
+        lacking = (typical * LEAST_SLIP_STD) ** 2 - float(ekf.covariance[SPEED, SPEED])
         if lacking > 0.0:
             ekf.widen(SPEED, lacking)
 
@@ -549,11 +521,3 @@ def spread(changes: Sequence[float]) -> float:
         return 0.0
     middle = median(there)
     return median([abs(change - middle) for change in there])
-
-
-def least_slip_std(lateral_motion: float, tuning: SpeedTuning = SpeedTuning()) -> float:
-    """Return the least deviation of a speed over the rim speed [-].
-
-    `lateral_motion` is that of the outer wheels over the fastest rim speed [-].
-    """
-    return tuning.least_slip_std + tuning.turning_slip_std * min(lateral_motion, 1.0)

@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Zero-velocity update where all wheels stand, or spin the rover in place; zero of the gyro."""
+"""Zero-velocity update where all wheels stand; zero of the gyro."""
 
 from __future__ import annotations
 
@@ -12,8 +12,7 @@ from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.filter.ekf import GatedFilter, chi_square_gate
 from wheel_terra_estimator.estimation.filter.state import SPEED
 from wheel_terra_estimator.estimation.inputs.inertial import GyroZero, InertialWindow
-from wheel_terra_estimator.estimation.rover import Rover
-from wheel_terra_estimator.estimation.scalars import NAN, known
+from wheel_terra_estimator.estimation.scalars import NAN
 
 
 @dataclass(frozen=True)
@@ -28,9 +27,6 @@ class ZeroVelocityTuning:
     gyro_settling_time: float = 0.5  # [s]
     most_yaw_rate: float = 0.05  # [rad/s]: what turns faster does not stand
     most_cycles: float = 200.0  # over which the zero of the gyro is a mean
-    spin_ratio: float = 0.2
-    """Typical over mean rim speed below which wheels turn against each other."""
-    least_spin_std: float = 0.002  # of the body's speed in a spin in place [m/s]
     kept_share: float = 0.5  # of the weight of the zeros, in a run that keeps soil and biases
 
 
@@ -45,9 +41,9 @@ class ZeroVelocityState(NamedTuple):
 class ZeroVelocityUpdate(Component[ZeroVelocityState]):
     """Fuses standing still; learns the zero of the gyro meanwhile."""
 
-    def __init__(self, rover: Rover, tuning: ZeroVelocityTuning = ZeroVelocityTuning()) -> None:
+    def __init__(self, tuning: ZeroVelocityTuning = ZeroVelocityTuning()) -> None:
         super().__init__(ZeroVelocityState())
-        self._rest_speed, self._tuning = rover.rest_speed, tuning
+        self._tuning = tuning
 
     def keep_zero_of(self, old: ZeroVelocityState) -> None:
         """Begin a run with the gyro's zero of an old one, at less weight."""
@@ -63,14 +59,12 @@ class ZeroVelocityUpdate(Component[ZeroVelocityState]):
         ekf: GatedFilter,
         time: float,
         *,
-        rims: tuple[float, ...],
-        typical_rim: float,
         still: bool,
         sliding: bool,
         window: InertialWindow,
         yaw_rate: float,
     ) -> None:
-        """Fuse what the wheels say of a rover that stands or spins in place.
+        """Fuse what the wheels say of a rover that stands.
 
         Parameters
         ----------
@@ -78,10 +72,6 @@ class ZeroVelocityUpdate(Component[ZeroVelocityState]):
             Is updated.
         time : float
             [s].
-        rims : tuple of float
-            Of each wheel [m/s], nan = unknown.
-        typical_rim : float
-            Median of them without the turning [m/s], nan = unknown.
         still : bool
             Whether all wheels stand.
         sliding : bool
@@ -94,7 +84,6 @@ class ZeroVelocityUpdate(Component[ZeroVelocityState]):
         if not still:
             if self.standing():
                 self.state = self.state._replace(since=NAN)
-            self._spin_in_place(ekf, rims, typical_rim)
             return
         if not self.standing():
             self.state = self.state._replace(since=time)
@@ -112,14 +101,6 @@ class ZeroVelocityUpdate(Component[ZeroVelocityState]):
         turning = abs(yaw_rate) >= tuning.most_yaw_rate
         if settled > tuning.gyro_settling_time and window.rates and not turning:
             self._learn_zero(yaw_rate, window.pitch_rate / window.rates)
-
-    def _spin_in_place(self, ekf: GatedFilter, rims: tuple[float, ...], typical_rim: float) -> None:
-        """Hold the body where it is, to a share of the rim speed."""
-        tuning = self._tuning
-        speeds = [abs(rim) for rim in known(rims)]
-        mean = sum(speeds) / len(speeds) if speeds else 0.0
-        if mean > self._rest_speed and abs(typical_rim) < tuning.spin_ratio * mean:
-            ekf.fuse_entry(SPEED, 0.0, max(mean, tuning.least_spin_std) ** 2)
 
     def _learn_zero(self, yaw_rate: float, pitch_rate: float) -> None:
         state = self.state

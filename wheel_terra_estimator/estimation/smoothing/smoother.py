@@ -30,7 +30,7 @@ from wheel_terra_estimator.estimation.contacts.pulls import PullEvidence, Pulls
 from wheel_terra_estimator.estimation.estimates import EstimateSet, SlipClass
 from wheel_terra_estimator.estimation.filter.force_balance import rut_tilt
 from wheel_terra_estimator.estimation.filter.initial_state import layout_of
-from wheel_terra_estimator.estimation.filter.speed_process import least_slip_std
+from wheel_terra_estimator.estimation.filter.speed_process import LEAST_SLIP_STD
 from wheel_terra_estimator.estimation.filter.state import SPEED
 from wheel_terra_estimator.estimation.judgement.classes import PublishedClasses
 from wheel_terra_estimator.estimation.judgement.slip import SlipJudge
@@ -206,7 +206,7 @@ class _Judges:
         heard = known(given.rims)
         typical = sum(map(abs, heard)) / len(given.rims)
         least = max(
-            typical * least_slip_std(instant.motion.lateral_motion),
+            typical * LEAST_SLIP_STD,
             self._tuning.least_share * instant.motion.speed_std,
         )
         return Moment(
