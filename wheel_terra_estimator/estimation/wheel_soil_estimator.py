@@ -377,12 +377,10 @@ class WheelSoilEstimator:
         forces, total = None, None
         if cycle.still:
             self._forget_contacts()
-        elif self._contact_age.settled:
+        else:
             forces, total, force_rows = self._force_rows(cycle)
             rows += force_rows
             torques = len(force_rows) - (total is not None)
-        elif self._contact_age.sheared:
-            forces = self._forces(cycle)  # for the pulls of a spin on the spot
         considered = considered_entries(
             layout,
             reference_known=self._reference.known(time),
@@ -524,7 +522,7 @@ class WheelSoilEstimator:
                 leaving_angles=cycle.leaving_angles,
                 reference_known=cycle.reference_known,
             )
-            self._contact_age.advance(travel, self._wheels.fastest() * cycle.dt)
+            self._contact_age.advance(travel)
             if travel > 0.0:
                 self._soil_process.predict(
                     prediction,
@@ -555,8 +553,7 @@ class WheelSoilEstimator:
             reference,
             still=cycle.still,
             fastest_rim=self._wheels.fastest(),
-            rim_acceleration=self._wheels.acceleration(),
-            reading_variance=noise,
+            variance=noise,
         )
         self._whiteness.follow(time, ekf.innovations, reference=1)
 
@@ -579,21 +576,18 @@ class WheelSoilEstimator:
         self._sinkage_process.forget_slopes()
         self._pulls.forget_stationary()
 
-    def _forces(self, cycle: _Cycle) -> ContactForces:
-        return self._linearisation.update(
-            self._ekf.mean,
+    def _force_rows(self, cycle: _Cycle) -> tuple[ContactForces, SumOfPulls | None, list[Row]]:
+        """Return forces, what is known of their sum, and the rows of torques and balance."""
+        ekf, loads = self._ekf, cycle.loads.load
+        forces = self._linearisation.update(
+            ekf.mean,
             turns=cycle.turns,
             yaw_rate=self._turning.state.yaw_rate,
             headings=self._steering.state.headings,
             rims=cycle.rims,
-            loads=cycle.loads.load,
+            loads=loads,
             leaving_angles=cycle.leaving_angles,
         )
-
-    def _force_rows(self, cycle: _Cycle) -> tuple[ContactForces, SumOfPulls | None, list[Row]]:
-        """Return forces, what is known of their sum, and the rows of torques and balance."""
-        ekf, loads = self._ekf, cycle.loads.load
-        forces = self._forces(cycle)
         stationary = self._stationary_pulls(cycle)
         start = self._contact_age.shear_variance
         model_variance = tuple([start if turns else 0.0 for turns in cycle.turns])

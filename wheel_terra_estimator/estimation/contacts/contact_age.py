@@ -25,7 +25,6 @@ class ContactAgeState(NamedTuple):
 
     travel: float = 0.0  # [m] since the start or the last change of direction
     direction: float = 0.0  # of the drive: 1, -1, 0 = none yet
-    rim_travel: float = 0.0  # [m] since the wheels last stood
 
 
 class ContactAge(Component[ContactAgeState]):
@@ -42,32 +41,24 @@ class ContactAge(Component[ContactAgeState]):
         """
         if not abs(rim_speed) >= self._rover.low_rim:
             return False
-        travel, before, rim_travel = self.state
+        travel, before = self.state
         direction = 1.0 if rim_speed > 0.0 else -1.0
         turned = direction != before
-        self.state = ContactAgeState(0.0 if turned else travel, direction, rim_travel)
+        self.state = ContactAgeState(0.0 if turned else travel, direction)
         return turned and before != 0.0
 
-    def advance(self, travel: float, rim_travel: float) -> None:
-        """Add the travel of a cycle and that of the fastest rim [m]."""
-        state = self.state
-        self.state = state._replace(
-            travel=state.travel + travel, rim_travel=state.rim_travel + rim_travel
-        )
+    def advance(self, travel: float) -> None:
+        """Add the travel of a cycle [m]."""
+        self.state = self.state._replace(travel=self.state.travel + travel)
 
     def stop(self) -> None:
         """Note that the wheels stand."""
-        self.state = self.state._replace(travel=0.0, rim_travel=0.0)
+        self.state = self.state._replace(travel=0.0)
 
     @property
     def settled(self) -> bool:
         """Whether the contacts are new no more."""
         return self.state.travel > self._rover.contact_length
-
-    @property
-    def sheared(self) -> bool:
-        """Whether the wheels have sheared the soil below them, on the spot or on their way."""
-        return self.state.rim_travel > self._rover.contact_length
 
     @property
     def shear_variance(self) -> float:

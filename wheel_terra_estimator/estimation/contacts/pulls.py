@@ -47,16 +47,13 @@ class PullTuning:
     least_excess: float = 1e-12  # square of it [N^2 m^2]
     turning_loss: float = 5.0  # trust in an excess lost per lateral motion
     scrub_std: float = 0.1  # of the load at full lateral motion: pushed sideways
-    fresh_scrub_std: float = 0.5
-    """The same where the contact is fresh: in a spin on the spot the sides work against one another
-    (0.2 of the load at a lateral motion of 0.4 in the rival simulator, seeds 1031 and 1032)."""
 
 
 class PullEvidence(NamedTuple):
     """What the pulls of a cycle follow from besides the state of the filter."""
 
     forces: ContactForces | None
-    """Of the turning wheels; None where the contacts are fresh after a start."""
+    """Of the turning wheels; None where all stand."""
     total: SumOfPulls | None  # what the specific force says of their sum; None = nothing
     loads: LoadState
     headings: Headings
@@ -151,11 +148,6 @@ class Pulls(Component[PullState]):
                 known = tuning.guess_std if loads.force_known else 1.0
                 std[i] = known * load + tuning.floor_std
                 own[i] = std[i] ** 2
-            elif forces is None:
-                # The contact is fresh after a start: the load's share is the best guess.
-                pull[i] = load * share
-                guess = math.hypot(tuning.guess_std, tuning.fresh_scrub_std * lateral_motion)
-                std[i] = guess * load + tuning.floor_std
             else:
                 excess[i] = self._smoothed_excess(excess[i], readings[i], torques[i])
                 beyond = self._believed(excess[i], readings[i], lateral_motion)

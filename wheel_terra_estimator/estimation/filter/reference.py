@@ -53,9 +53,6 @@ class ReferenceTuning:
     same_std: float = 4.0  # deviations within which two references disagree by the same amount
     count_beyond: int = 4  # references beyond the rim speed that must agree to be believed
     count: int = 2  # references that must agree to be believed
-    timing_std: float = 0.1
-    """Doubt of when the wheels were as fast as they say, against the reference [s]: a ramp makes of
-    it a doubt of v / rim speed, great while the wheels are slow."""
     gate: float = 4.0  # to which an outlier is weakened (squared deviations)
     gate_beyond: float = 0.01
 
@@ -163,8 +160,7 @@ class ReferenceUpdate(Component[ReferenceState]):
         *,
         still: bool,
         fastest_rim: float,
-        rim_acceleration: float,
-        reading_variance: float,
+        variance: float,
     ) -> bool:
         """Fuse a reference velocity; return whether the speed was opened to it.
 
@@ -180,13 +176,10 @@ class ReferenceUpdate(Component[ReferenceState]):
             Whether all wheels stand.
         fastest_rim : float
             Greatest rim speed [m/s].
-        rim_acceleration : float
-            Of the wheels at that time [m/s^2].
-        reading_variance : float
-            Of the reading: `variance`, or more where more is seen [(m/s)^2].
+        variance : float
+            Of the reading as stated, or more where more is seen [(m/s)^2].
         """
         tuning = self._tuning
-        variance = reading_variance + (tuning.timing_std * rim_acceleration) ** 2
         self._note_time(time)
         if still:
             self._note_slide(ekf, time, reference.forward, variance)

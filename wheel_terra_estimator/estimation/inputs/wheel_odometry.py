@@ -12,7 +12,7 @@ from typing import NamedTuple
 from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.measurements import WheelOdometry
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
-from wheel_terra_estimator.estimation.scalars import NAN, median
+from wheel_terra_estimator.estimation.scalars import NAN
 
 Floats = tuple[float, ...]
 
@@ -154,11 +154,6 @@ class WheelOdometryInput(Component[WheelOdometryState]):
         if abs(slope) <= self._least_slope or age > self._tuning.longest_carried:
             return rim
         return rim + slope * age
-
-    def acceleration(self) -> float:
-        """Return the median rate of change of the rim speeds, 0 where it may be noise [m/s^2]."""
-        slope = median(list(self.state.rim_slope))
-        return slope if abs(slope) > self._least_slope else 0.0
 
     def fastest(self) -> float:
         """Return the greatest known rim speed, whatever its direction or age [m/s]; 0 = none."""
