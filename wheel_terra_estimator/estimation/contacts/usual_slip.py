@@ -14,7 +14,7 @@ from wheel_terra_estimator.estimation.rover import Rover
 
 _SLIPS = (-0.5, -0.3, -0.2, -0.1, -0.05, 0.0, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6, 0.75, 0.9)
 """Slips of the curve, close together where it is steep."""
-_BISECTIONS = 14  # of the logarithm of the sinkage: to a thousandth
+_BISECTIONS = 20  # of the logarithm of the sinkage: to a hundred thousandth
 _SHALLOWEST = 1e-4  # sinkage [m]
 _DEEPEST = 0.9  # of the radius
 
@@ -85,12 +85,12 @@ def steady_pull(
     pull = 0.0
     for i, load in enumerate(loads):
         wheel = WheelState(ratio, 0.0, load, strength, shear_modulus, stiffness=stiffness)
-        sinkage = _steady_sinkage(models, i, wheel, rover.rim_radius[i])
+        sinkage = steady_sinkage(models, i, wheel, rover.rim_radius[i])
         pull += models.forces(i, wheel._replace(sinkage=sinkage)).pull
     return pull / sum(loads)
 
 
-def _steady_sinkage(models: WheelModels, index: int, wheel: WheelState, radius: float) -> float:
+def steady_sinkage(models: WheelModels, index: int, wheel: WheelState, radius: float) -> float:
     """Return the sinkage at which the bearing law carries the load of a wheel [m]."""
     low, high = _SHALLOWEST, _DEEPEST * radius
     for _ in range(_BISECTIONS):

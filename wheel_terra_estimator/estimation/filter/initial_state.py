@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.estimation.contacts.usual_slip import steady_sinkage
 from wheel_terra_estimator.estimation.contacts.wheel_models import WheelModels, WheelState
 from wheel_terra_estimator.estimation.filter.ekf import FilterMemory, GatedFilter
 from wheel_terra_estimator.estimation.filter.state import (
@@ -186,7 +187,10 @@ def initial_filter(
         P[index, index] = std**2
     mean[MOUND] = 0.0 if 'soil_mound' in configuration.effects else tuning.mound_mean
     mean[SLIP_PER_DEMAND] = tuning.slip_per_demand_mean
-    z = [resting_sinkage(models, i, loads[i], rover.rim_radius[i]) for i in range(n)]
+    z = [
+        steady_sinkage(models, i, WheelState(1.0, 0.0, loads[i], 0.0, 0.0), rover.rim_radius[i])
+        for i in range(n)
+    ]
     mean[layout.sinkage] = z
     spread = tuning.sinkage_share * np.array(z) + tuning.sinkage_floor
     P[layout.sinkage, layout.sinkage] = np.diag(spread**2)
@@ -240,20 +244,3 @@ def with_soil_of(
     covariance[block] = share * old.covariance[block] + (1.0 - share) * covariance[block]
     mean[kept] = old.mean[kept]
     return FilterMemory(mean, covariance, start.restarts)
-
-
-_BISECTIONS = 30  # to a thousandth of the sinkage and far less
-_SHALLOWEST = 1e-4  # [m]
-_DEEPEST = 0.5  # of the radius
-
-
-def resting_sinkage(models: WheelModels, wheel: int, load: float, radius: float) -> float:
-    """Return the sinkage at which the bearing law carries a load [N] without slip [m]."""
-    low, high = _SHALLOWEST, _DEEPEST * radius
-    for _ in range(_BISECTIONS):
-        z = math.sqrt(low * high)
-        if models.bearing(wheel, WheelState(1.0, z, load, 0.0, 0.0)).load < load:
-            low = z
-        else:
-            high = z
-    return high
