@@ -221,4 +221,4 @@ def test_every_figure_is_drawn_in_the_one_style() -> None:
             if 'figsize=' in text:
                 makers.append(path.name)
                 assert 'picture_style' in text, f'{path}: draw within reporting.style.picture_style'
-    assert {'pictures.py', 'predict.py', 'page.py'} <= set(makers)
+    assert {'pictures.py', 'predict.py'} <= set(makers)
