@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 import yaml
 from estimate_sets import STAMP, some_estimates
+from test_full_disk import fill, largest_file
 
 from wheel_terra_estimator.bags.history import HistoryRecorder, read_estimates
 from wheel_terra_estimator.bags.storage import open_bag
@@ -193,9 +194,13 @@ def test_a_reset_clears_the_stuck_warning(tmp_path: Path) -> None:
     assert said == [False, True, False, True, False]
 
 
-def test_bags_carry_checksums(make_bag: Any) -> None:
+@pytest.mark.parametrize('cut', [False, True], ids=['whole', 'on a disk that fills up'])
+def test_bags_carry_checksums(make_bag: Any, tmp_path: Path, cut: bool) -> None:
     """As the format asks: of a chunk over its records, of the summary up to the checksum itself."""
-    (file,) = make_bag().glob('*.mcap')
+    if cut:
+        with largest_file(int(2.5 * 2**20)), pytest.raises(UserError):
+            fill(tmp_path / 'out', 1000)
+    (file,) = (tmp_path / 'out' if cut else make_bag()).glob('*.mcap')
     content = file.read_bytes()
     at, chunks = 8, 0
     while content[at] != 2:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from wheel_terra_estimator.bags.salvage import mcap_file
 from wheel_terra_estimator.bags.storage import open_bag
 from wheel_terra_lab.studies.fuzzing.mcap_maker import Layout, Sample, make
 
@@ -69,3 +70,26 @@ def test_messages_outside_of_the_times_of_their_chunk_are_said(tmp_path: Path) -
         assert len(list(bag.messages(list(TYPES)))) == 200
         assert bag.notes[0].startswith('a.mcap is damaged')
         assert f'from {(first.log_time - START) * 1e-9:.1f} s' in bag.notes[0]
+
+
+@pytest.mark.parametrize(('most', 'left_out'), [(1, 1), (3, 0)])
+def test_chunks_without_their_heads_are_tried_up_to_a_number(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, most: int, left_out: int
+) -> None:
+    """Two of them, with a sound chunk between: each gap takes from what all of them may."""
+    monkeypatch.setattr(mcap_file, '_MOST_HEADLESS', most)
+    samples = [
+        Sample(START + 10_000_000 * i, '/imu/data', b'\0\1\0\0' + bytes(80)) for i in range(200)
+    ]
+    made = make(samples, TYPES, Layout(4000, 'zstd', summary=False))
+    content = bytearray(made.content)
+    lost = made.parts[1], made.parts[3]
+    for place, *_ in lost:
+        content[place : place + 29] = bytes(29)
+    path = tmp_path / 'a.mcap'
+    path.write_bytes(content)
+    with open_bag(path) as bag:
+        found = {message[0] for message in bag.messages(['/imu/data'])}
+        told = 'pieces without a head left out' in ' '.join(bag.notes)
+    assert len(samples) - len(found) == left_out * len(lost[1][2])
+    assert told == bool(left_out)

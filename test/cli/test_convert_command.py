@@ -51,6 +51,15 @@ def test_the_example_converts_units_and_signs(files):
     assert main(command(files)) == 2  # nothing is overwritten
 
 
+@pytest.mark.parametrize('entry', ['time', 'joint_states'])
+def test_a_map_without_what_is_needed_says_so(files, capsys, entry):
+    columns = yaml.safe_load((files / 'map.yaml').read_text())
+    del columns[entry]
+    (files / 'map.yaml').write_text(yaml.safe_dump(columns))
+    assert main(command(files)) == 2
+    assert 'time and joint_states are needed' in capsys.readouterr().err
+
+
 def test_steering_angles_reach_the_measurements(files):
     columns = (files / 'map.yaml').read_text()
     assert '\n# front_left_steering:' in columns

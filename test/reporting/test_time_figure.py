@@ -10,8 +10,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from wheel_terra_estimator.reporting.fleet_summary import DriveRow
 from wheel_terra_estimator.reporting.html import render
-from wheel_terra_estimator.reporting.time_figure import HEIGHT, Panel, Switch, TimeFigure, nice
+from wheel_terra_estimator.reporting.time_figure import (
+    HEIGHT,
+    Panel,
+    Switch,
+    TimeFigure,
+    limits,
+    nice,
+)
 
 LEAST_APART = 14.0  # px between two lines of text of 12 px
 PANELS = 800.0  # px of all panels together (templates/base.html)
@@ -75,3 +83,23 @@ def test_round_numbers_within_limits(low: float, high: float) -> None:
         assert low - 1e-9 <= value <= high + 1e-9
         assert float(text.replace('\u2212', '-')) == pytest.approx(value, abs=1e-12)
     assert nice(1.0, 1.0) == []
+
+
+def test_limits_leave_the_same_room_on_both_sides() -> None:
+    low, high = limits(np.array([0.0, np.nan, 10.0]), within=(2.0, 3.0))
+    assert 0.0 - low == pytest.approx(high - 10.0)
+    assert 0.5 < high - 10.0 < 1.0
+
+
+@pytest.mark.parametrize(
+    ('row', 'tone'),
+    [
+        (DriveRow('a', error='no wheel'), 'bad'),
+        (DriveRow('a', sets=10, stuck_warnings=1), 'bad'),
+        (DriveRow('a', sets=0), 'bad'),
+        (DriveRow('a', sets=10, seconds={'high': 0.0, 'stuck': 1.0}), 'warn'),
+        (DriveRow('a', sets=10, seconds={'high': 0.0, 'stuck': 0.0}), 'good'),
+    ],
+)
+def test_the_colour_of_a_drive_among_many(row: DriveRow, tone: str) -> None:
+    assert row.tone == tone

@@ -11,7 +11,7 @@ from wheel_terra_estimator.bags.history import WHEEL_FIELDS, EstimateHistory, St
 from wheel_terra_estimator.bags.truth import Truth, WheelTruth
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.estimation.judgement.entrapment import Outcome
-from wheel_terra_estimator.reporting.comparison import compare
+from wheel_terra_estimator.reporting.comparison import as_text, compare
 from wheel_terra_estimator.reporting.estimates_table import write_table
 from wheel_terra_estimator.reporting.truth_scores import as_lines, truth_errors
 
@@ -77,6 +77,13 @@ def test_comparison():
     apart = EstimateHistory(**{**vars(second), 'stamp': STAMP + 10**15})
     with pytest.raises(UserError, match='no stamp in common'):
         compare(first, apart, ('a', 'b'), None)
+
+
+def test_warnings_of_both_are_told():
+    warned = StuckWarning(int(STAMP[40]), None, '')
+    told = as_text(compare(history(np.zeros((100, 2)), warnings=(warned,)), history(
+        np.zeros((100, 2))), ('a', 'b'), None))  # fmt: skip
+    assert 'stuck warnings of A: 4.0 s\n' in told and 'stuck warnings of B: none\n' in told
 
 
 def test_table(tmp_path):

@@ -48,7 +48,7 @@ def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, object, object
         threading.settrace(None)  # type: ignore[arg-type]
         functions = sorted(
             f'{Path(code.co_filename).relative_to(ROOT).as_posix()}:{code.co_firstlineno}'
-            for code in _called
+            for code in tuple(_called)  # threads may still be running
             if code.co_filename.startswith(PACKAGE)
         )
         row = {
