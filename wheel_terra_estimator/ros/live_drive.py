@@ -247,7 +247,7 @@ class _Player(Node):
             self._inputs[names[message.topic]].publish(message.data)
             arrivals.expect()
             if rate <= 0.0:
-                self._spin_until(arrivals.complete, PATIENCE, pause=0.001)
+                self._spin_until(arrivals.complete, PATIENCE, pause=0.0002)
                 arrivals.forgive()
 
     def wait_for_end(self) -> None:
