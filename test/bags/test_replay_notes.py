@@ -13,7 +13,7 @@ import pytest
 from wheel_terra_estimator.bags.replay import replay
 from wheel_terra_estimator.bags.storage import open_bag
 from wheel_terra_estimator.cli.main import main
-from wheel_terra_estimator.configuration import reader
+from wheel_terra_estimator.configuration import reader, shipped
 from wheel_terra_estimator.estimation.wheel_soil_estimator import WheelSoilEstimator
 
 
@@ -55,22 +55,16 @@ def test_a_failing_filter_is_said_in_summary_and_diagnostics(
 
 
 def test_odometry_that_might_be_the_reference_is_named() -> None:
-    pathfinder = Path(__file__).resolve().parents[2] / 'data' / 'demo' / 'pathfinder'
-    with open_bag(pathfinder) as bag:
-        notes = replay(bag, reader.load(['pathfinder']), {}).notes
-        (said,) = [note for note in notes if 'reference_odom:=' in note]
-        assert '/wheel/odometry: one that does not come from the wheels' in said
-        used = {'reference_odom': '/wheel/odometry'}
-        notes = replay(bag, reader.load(['pathfinder']), used).notes
-    assert not [note for note in notes if 'reference_odom:=' in note]
-
-
-def test_a_measured_drive_never_restarts_the_filter() -> None:
+    """On a measured drive, on which the filter never restarts."""
     from wheel_terra_estimator.cli.demo import DRIVES
-    from wheel_terra_estimator.configuration import reader, shipped
 
     drive = next(drive for drive in DRIVES if drive.name == 'pathfinder')
-    remaps = dict(remap.split(':=') for remap in drive.remaps)
     with open_bag(shipped.demo_recording(drive.name)) as bag:
-        result = replay(bag, reader.load(drive.configuration), remaps)
-    assert result.counters['filter_restarts'] == 0
+        result = replay(bag, reader.load(['pathfinder']), {})
+        (said,) = [note for note in result.notes if 'reference_odom:=' in note]
+        assert '/wheel/odometry: one that does not come from the wheels' in said
+        used = dict(remap.split(':=') for remap in drive.remaps)
+        assert set(used) == {'reference_odom'}
+        with_reference = replay(bag, reader.load(drive.configuration), used)
+    assert not [note for note in with_reference.notes if 'reference_odom:=' in note]
+    assert with_reference.counters['filter_restarts'] == result.counters['filter_restarts'] == 0

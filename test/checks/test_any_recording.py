@@ -82,7 +82,7 @@ def recordings(draw):
     )
 
 
-@settings(max_examples=100, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=50, deadline=None, suppress_health_check=list(HealthCheck))
 @given(recordings(), st.booleans())
 def test_no_check_fails(any_recording, with_rover):
     with warnings.catch_warnings():
