@@ -26,6 +26,7 @@ from wheel_terra_estimator.bags.writer import EstimateBagWriter
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.estimation.smoothing.smoother import DriveSmoother
+from wheel_terra_estimator.estimation.taught import Taught
 from wheel_terra_estimator.input_file import read_text
 from wheel_terra_estimator.messages.convert import ODOMETRY, stamp_of
 from wheel_terra_estimator.messages.pipeline import Pipeline
@@ -58,6 +59,7 @@ class Replay:
     interrupted: bool
     learned: dict[str, Any]  # configuration key -> value, see `EstimatorCore.learned`
     track: Track
+    taught: tuple[Taught, ...] = ()
     filtered: EstimateHistory | None = None  # what the filter said, where ``history`` is smoothed
 
 
@@ -152,6 +154,7 @@ def replay(
         ),
         interrupted=interrupted.is_set(),
         learned=pipeline.core.learned(),
+        taught=pipeline.core.taught(),
         filtered=filtered() if filtered is not None else None,
         track=tracker.track(places),
     )

@@ -27,6 +27,7 @@ from wheel_terra_estimator.estimation.judgement.stuck.memory import StuckMemory
 from wheel_terra_estimator.estimation.measurements import Measurement
 from wheel_terra_estimator.estimation.output_guard import OutputGuard
 from wheel_terra_estimator.estimation.sensor_errors import SensorErrors
+from wheel_terra_estimator.estimation.taught import Taught
 from wheel_terra_estimator.estimation.timing.clock_watch import (
     Arrival,
     ClockWatch,
@@ -169,6 +170,12 @@ ReferenceVelocity
             return {}
         return dict(getattr(self._estimator, 'learned', dict)())
 
+    def taught(self) -> tuple[Taught, ...]:
+        """Return what the drive has taught of soil and sensors; empty before estimates."""
+        if self._latest is None:
+            return ()
+        return tuple(getattr(self._estimator, 'taught', tuple)())
+
     @property
     def rejected(self) -> Counter[tuple[str, str]]:
         """Messages, or parts of them, that were left out, by (input topic, reason in words)."""
@@ -202,7 +209,8 @@ ReferenceVelocity
         own = self._estimator.health()
         # The filter starts itself anew, or the core does it: both count.
         own['filter_restarts'] = own.get('filter_restarts', 0) + result['filter_restarts']
-        return result | own
+        taught = {f'taught {each.name}': each.in_words() for each in self.taught()}
+        return result | own | taught
 
     def _runners(self) -> list[Stepped]:
         return [self._estimator] if self._judge is None else [self._judge, self._estimator]

@@ -98,6 +98,7 @@ from wheel_terra_estimator.estimation.sideways import (
     SidewaysRover,
 )
 from wheel_terra_estimator.estimation.smoothing.tape import Gaussian, Tape
+from wheel_terra_estimator.estimation.taught import Taught, Teaching
 from wheel_terra_estimator.estimation.words import MissingInputs
 
 Floats = tuple[float, ...]
@@ -229,6 +230,8 @@ class WheelSoilEstimator:
         self._learned = Learned(
             configuration, layout, self._ekf.covariance, self._outputs.learned_soil
         )
+        wheels = configuration.wheels.names
+        self._teaching = Teaching.of_filter(layout, wheels, self._ekf.covariance)
         self._clock = _Clock()
         self._parts: tuple[Part, ...] = (
             self._inertial,
@@ -379,8 +382,9 @@ class WheelSoilEstimator:
             self._forget_contacts()
         else:
             forces, total, force_rows = self._force_rows(cycle)
-            rows += force_rows
-            torques = len(force_rows) - (total is not None)
+            if self._contact_age.settled or cycle.reference_known:
+                rows += force_rows
+                torques = len(force_rows) - (total is not None)
         considered = considered_entries(
             layout,
             reference_known=self._reference.known(time),
@@ -840,6 +844,10 @@ class WheelSoilEstimator:
         ekf = self._ekf
         zero, climbed = self._zero_velocity.state.zero, self._climb.state
         return self._learned.values(ekf.mean, ekf.covariance, zero, climbed)
+
+    def taught(self) -> tuple[Taught, ...]:
+        """Return what the drive has taught of each parameter so far."""
+        return self._teaching.judged(self._ekf.covariance)
 
     def health(self) -> dict[str, Any]:
         """Return counters and consistency figures for diagnostics."""

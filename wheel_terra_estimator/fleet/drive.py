@@ -140,6 +140,6 @@ def replay_drive(
         notes.append(NO_SOIL)
     summary = summarise(
         title, result.history, result.topics, result.heard, result.rejected, notes,
-        Border.of(configuration),
+        Border.of(configuration), result.taught,
     )  # fmt: skip
     return Drive(configuration, checked, result, truth, errors, summary, filter_errors)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from wheel_terra_estimator.bags.history import EstimateHistory
 from wheel_terra_estimator.estimation.estimates import SlipClass
+from wheel_terra_estimator.estimation.taught import LEARNED, Taught
 from wheel_terra_estimator.reporting import truth_scores
 from wheel_terra_estimator.reporting.drive_style import NOT_KNOWN, Border, known
 
@@ -77,6 +78,8 @@ class DriveSummary:
     warnings: tuple[WarningSpan, ...]
     messages: tuple[MessageRow, ...]
     notes: tuple[str, ...]
+    taught: tuple[Taught, ...] = ()
+    """What the drive has taught of soil and sensors, where it was replayed."""
 
     @property
     def verdict(self) -> str:
@@ -106,6 +109,7 @@ def summarise(
     rejected: Mapping[tuple[str, str], int],
     notes: Sequence[str],
     border: Border | None = None,
+    taught: Sequence[Taught] = (),
 ) -> DriveSummary:
     """Sum a drive up.
 
@@ -123,6 +127,8 @@ def summarise(
         What else the reader should know.
     border : Border, optional
         Beyond which standard deviations slip and sinkage are not known.
+    taught : sequence of Taught, optional
+        What the drive has taught of soil and sensors.
     """
     border = border or Border()
     figures = history.figures()
@@ -148,6 +154,7 @@ def summarise(
             for name, topic in topics.items()
         ),
         notes=tuple(notes),
+        taught=tuple(taught),
     )
 
 
@@ -276,6 +283,11 @@ def as_text(summary: DriveSummary) -> str:
     lines += ['', f'  {"messages":{width}}{"heard":>8}   rejected']
     for name, row in zip(heard, summary.messages, strict=True):
         lines.append(f'  {name:{width}}{row.count:8}   {row.rejected or "none"}')
+    if summary.taught:
+        learned = [
+            f'{row.name} ({row.bits:.1f} bits)' for row in summary.taught if row.verdict == LEARNED
+        ]
+        lines += ['', f'  learned on this drive: {", ".join(learned) or "nothing"}']
     lines += [f'  note: {note}' for note in summary.notes]
     return '\n'.join(lines)
 

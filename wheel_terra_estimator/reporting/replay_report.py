@@ -13,6 +13,7 @@ from wheel_terra_estimator.bags.track import Track
 from wheel_terra_estimator.bags.truth import Truth
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.estimates import SlipClass
+from wheel_terra_estimator.estimation.taught import RELATIVE, Taught
 from wheel_terra_estimator.output_folder import new_file
 from wheel_terra_estimator.reporting import track_picture, truth_scores
 from wheel_terra_estimator.reporting.drive_figure import drive_figure, way_figure
@@ -85,6 +86,7 @@ def write_replay_report(
         filter_errors=(
             [_error_row(error) for error in filter_errors.quantities] if filter_errors else []
         ),
+        taught=[_taught_row(row) for row in summary.taught],
         slopes=slopes_figure(history.slip_on_slope) if history.slip_on_slope else None,
         map=_map(track) if track and track_picture.has_map(track) else None,
         smoothed=filtered is not None,
@@ -95,6 +97,17 @@ def write_replay_report(
     )
     with new_file(path, overwrite) as fresh:
         write_page(fresh, page)
+
+
+def _taught_row(row: Taught) -> dict[str, str]:
+    relative = row.unit == RELATIVE
+    scale, unit = (100.0, ' %') if relative else (1.0, f' {row.unit}'.rstrip(' -'))
+    return {
+        'name': row.name,
+        'prior': f'{scale * row.prior_std:.2g}{unit}',
+        'std': f'{scale * row.std:.2g}{unit}',
+        'words': row.in_words(),
+    }
 
 
 def _error_row(error: QuantityError) -> dict[str, str]:

@@ -1,0 +1,61 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Bits and verdicts against the posterior of linear measurements, worked out by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from parts import SAND
+
+from wheel_terra_estimator.configuration import reader
+from wheel_terra_estimator.estimation.taught import (
+    ASSUMED,
+    CONFOUNDED,
+    LEARNED,
+    Parameter,
+    Teaching,
+)
+from wheel_terra_estimator.estimation.wheel_soil_estimator import WheelSoilEstimator
+
+
+def taught(rows, noise=0.1):
+    """Judge three parameters of unit variance after measurements of sums of them."""
+    names = ['a', 'b', 'c']
+    start = np.eye(3)
+    parameters = [Parameter(n, '-', row) for n, row in zip(names, start, strict=True)]
+    H = np.array(rows, dtype=float).reshape(-1, 3)
+    after = np.linalg.inv(start + H.T @ H / noise**2)
+    return {row.name: row for row in Teaching(parameters, start).judged(after)}
+
+
+def test_a_measured_parameter_is_learned_by_the_bits_of_its_deviation():
+    found = taught([[1, 0, 0]])
+    assert found['a'].verdict == LEARNED
+    assert found['a'].std == pytest.approx(0.1 / np.sqrt(1.01))
+    assert found['a'].bits == pytest.approx(0.5 * np.log2(101.0))  # capacity of a Gaussian channel
+    assert found['b'].verdict == ASSUMED and found['b'].bits == 0.0
+    assert found['b'].in_words() == 'assumed, not learned'
+
+
+def test_a_sum_tells_none_of_its_parts():
+    found = taught([[1, 1, 0]])
+    for name, other in (('a', 'b'), ('b', 'a')):
+        assert found[name].verdict == CONFOUNDED
+        assert found[name].confounded_with == other
+        assert found[name].std == pytest.approx(np.sqrt(0.5), rel=0.01)
+    assert found['c'].verdict == ASSUMED
+    both = taught([[1, 1, 0], [1, -1, 0]])
+    assert both['a'].verdict == both['b'].verdict == LEARNED
+
+
+def test_a_deviation_that_grew_has_gained_nothing():
+    row = Teaching([Parameter('a', '-', np.ones(1))], np.eye(1)).judged(np.array([[4.0]]))[0]
+    assert (row.verdict, row.bits, row.std) == (ASSUMED, 0.0, 2.0)
+
+
+def test_the_estimator_has_learned_nothing_before_it_drives():
+    rows = {row.name: row for row in WheelSoilEstimator(reader.load(SAND)).taught()}
+    assert all(row.verdict != LEARNED and row.bits == 0.0 for row in rows.values())
+    assert rows['soil.cohesion'].confounded_with == 'soil.friction_angle_deg'
+    assert rows['soil.cohesive_modulus'].confounded_with == 'soil.frictional_modulus'

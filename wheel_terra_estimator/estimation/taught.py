@@ -1,0 +1,150 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""What a drive has taught: of each parameter the deviation before and after, and the bits between.
+
+A Gaussian whose standard deviation falls from s0 to s has lost log2(s0 / s) bits of entropy. Where
+it hardly falls, the drive says nothing of the parameter, or something of a sum with another alone:
+then it would be known if that other one were.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wheel_terra_estimator.estimation.filter.state import (
+    CENTROID,
+    GRAVITY_BIAS,
+    MOUND,
+    SHEAR_MODULUS,
+    SHEAR_STRENGTH,
+    SLIP_PER_DEMAND,
+    SLIP_SINKAGE,
+    StateLayout,
+)
+
+FloatArray = NDArray[np.float64]
+
+LEARNED, ASSUMED, CONFOUNDED = 'learned', 'assumed', 'confounded'
+LEARNED_SHARE = 0.7
+"""Of the prior deviation: what has no less was not learned [-]; half a bit."""
+RELATIVE = 'of its value'
+"""Unit of deviations that are those of a logarithm."""
+_STRENGTH, _STIFFNESS = 'soil.friction_angle_deg', 'soil.frictional_modulus'
+_COMMON = (
+    (_STRENGTH, RELATIVE, SHEAR_STRENGTH),
+    ('soil.shear_modulus', RELATIVE, SHEAR_MODULUS),
+    ('effects.slip_sinkage_exponent.n1', '-', SLIP_SINKAGE),
+    ('stress centroid', 'of the entrance angle', CENTROID),
+    ('stress centroid at high slip', 'of the entrance angle', MOUND),
+    ('slip per traction coefficient', '-', SLIP_PER_DEMAND),
+    ('accelerometer bias', 'm/s^2', GRAVITY_BIAS),
+)
+"""Name, unit of the deviations, entry of the state; the friction angle by its tangent."""
+_SAME_FACTOR = {'soil.cohesion': _STRENGTH, 'soil.cohesive_modulus': _STIFFNESS}
+"""What the filter scales by one factor with another parameter, and so never tells from it."""
+
+
+@dataclass(frozen=True)
+class Taught:
+    """What a drive taught of one parameter."""
+
+    name: str
+    unit: str
+    prior_std: float
+    std: float
+    bits: float  # gained, not below 0
+    verdict: str  # LEARNED, ASSUMED or CONFOUNDED
+    confounded_with: str = ''
+
+    def in_words(self) -> str:
+        """Return the verdict for a reader."""
+        if self.verdict == LEARNED:
+            return f'learned, {self.bits:.1f} bits'
+        if self.verdict == CONFOUNDED:
+            return f'not told apart from {self.confounded_with}'
+        return 'assumed, not learned'
+
+
+class Parameter(NamedTuple):
+    """A parameter as a linear function of the state."""
+
+    name: str
+    unit: str
+    row: FloatArray  # (size,)
+
+
+class Teaching:
+    """Compares the covariance of the filter with that of its start.
+
+    Parameters
+    ----------
+    parameters : sequence of Parameter
+        To be judged.
+    start : numpy.ndarray
+        (size, size) covariance at the start.
+    """
+
+    def __init__(self, parameters: Sequence[Parameter], start: FloatArray) -> None:
+        self._parameters = parameters
+        self._rows = np.array([parameter.row for parameter in parameters])
+        self._prior = _deviations(self._rows @ start @ self._rows.T)
+
+    @classmethod
+    def of_filter(cls, layout: StateLayout, wheels: Sequence[str], start: FloatArray) -> Teaching:
+        """Return the comparison for what the estimator's filter learns."""
+        identity = np.eye(layout.size)
+        parameters = [Parameter(name, unit, identity[i]) for name, unit, i in _COMMON]
+        mean = identity[layout.stiffness].mean(axis=0)
+        parameters.append(Parameter(_STIFFNESS, RELATIVE, mean))
+        for name, row in zip(wheels, identity[layout.torque_zero], strict=False):
+            parameters.append(Parameter(f'torque zero of {name}', 'N m', row))
+        return cls(parameters, start)
+
+    def judged(self, covariance: FloatArray) -> tuple[Taught, ...]:
+        """Return what was taught, given the (size, size) covariance after a drive."""
+        P = self._rows @ covariance @ self._rows.T
+        std = _deviations(P)
+        found: dict[str, Taught] = {}
+        for i, parameter in enumerate(self._parameters):
+            prior, now = float(self._prior[i]), float(std[i])
+            learned = now < LEARNED_SHARE * prior
+            other = '' if learned else self._confounded_with(i, P, std)
+            found[parameter.name] = Taught(
+                parameter.name,
+                parameter.unit,
+                prior,
+                now,
+                max(math.log2(prior / now), 0.0) if prior > 0.0 and now > 0.0 else 0.0,
+                LEARNED if learned else CONFOUNDED if other else ASSUMED,
+                other,
+            )
+        for name, factor in _SAME_FACTOR.items():
+            if factor in found:
+                same = found[factor]
+                found[name] = Taught(
+                    name, same.unit, same.prior_std, same.prior_std, 0.0, CONFOUNDED, factor
+                )
+        return tuple(found.values())
+
+    def _confounded_with(self, i: int, P: FloatArray, std: FloatArray) -> str:
+        """Return the parameter that would have to be known for this one to be learned; '' = none.
+
+        Given another one, the deviation is s sqrt(1 - rho^2).
+        """
+        scale = np.maximum(std[i] * std, np.finfo(float).tiny)
+        correlation = np.abs(P[i] / scale)
+        correlation[i] = 0.0
+        other = int(np.argmax(correlation))
+        rest = float(std[i]) * math.sqrt(max(1.0 - float(correlation[other]) ** 2, 0.0))
+        known = rest < LEARNED_SHARE * float(self._prior[i])
+        return self._parameters[other].name if known else ''
+
+
+def _deviations(covariance: FloatArray) -> FloatArray:
+    return np.sqrt(np.maximum(np.diagonal(covariance), 0.0))
