@@ -75,7 +75,7 @@ def _write_page(path: Path, figures: list[dict[str, Any]], overwrite: bool) -> N
         )
         for entry in figures
     ]
-    head = ('what', 'times as fast', 'compared with', 'time', 'time of that')
+    head: tuple[str, ...] = ('what', 'times as fast', 'compared with', 'time', 'time of that')
     if compared:
         head = (*head, 'ratio, over the earlier')
     words = 'Ratios to another program or way on this machine; seconds alone say little.'
