@@ -110,6 +110,14 @@ def test_all_faults_of_a_header_come_in_one_line(tmp_path):
         assert part in message, message
 
 
+def test_a_table_laid_on_its_side_is_refused_at_once(tmp_path):
+    path = tmp_path / 't.csv'
+    path.write_text(','.join(f'c{i}' for i in range(200_000)) + '\n1\n')
+    with pytest.raises(UserError, match='200000 columns; a table of wheel tests') as caught:
+        read_table(path)
+    assert len(str(caught.value)) < 300
+
+
 def test_column_names_alone_are_no_table(tmp_path):
     with pytest.raises(UserError, match=r'bin.csv, line 2: no rows below'):
         read_table(write(tmp_path, HEADER + '\n'))

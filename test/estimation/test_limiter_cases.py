@@ -7,6 +7,8 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.estimation.traction_law import LimiterTuning
@@ -407,3 +409,54 @@ def test_an_event_that_opens_nothing_keeps_direction_and_reason():
     assert after_event(state, Event.STOP, -1, 'other') == state
     assert after_event(state, Event.BEGUN) == state
     assert after_event(state, Event.STUCK, 0, 'stuck').direction == 1
+
+
+WILD = (math.nan, math.inf, -math.inf, 1e308, -1e308, 5e-324, 0.0, -0.0, 0.5, -3.0, 0.95, 1e9)
+
+
+def wild(size):
+    return st.lists(st.sampled_from(WILD), min_size=size, max_size=size)
+
+
+@st.composite
+def wild_estimates(draw):
+    sizes = draw(st.sampled_from(((2, 2, 2, 2), (1, 1, 1, 1), (0, 0, 0, 0), (2, 0, 3, 1))))
+    slip, velocity, classes, travel = (draw(wild(size)) for size in sizes)
+    classes = tuple(draw(st.sampled_from((0, 1, 2, 3, 4, 200, 255))) for _ in classes)
+    delay = draw(st.floats(-1e11, 1e11))
+    return Estimates(delay, slip, velocity, classes, travel)
+
+
+EVENTS = st.one_of(
+    wild_estimates(),
+    wild(6).map(tuple),
+    st.integers(-128, 127),
+    st.tuples(st.booleans(), st.booleans()),
+    st.none(),
+)
+
+
+@pytest.mark.hypothesis
+@given(st.lists(st.tuples(st.sampled_from((0.0, 0.05, 1.5)), EVENTS), max_size=14))
+def test_wild_numbers_open_no_way_and_never_reach_the_base(events):
+    """Other publishers than the estimator: any number in any field, any direction of one byte."""
+    tuning, now, state = LimiterTuning(), 1000.0, LimiterState(still_since=1000.0)
+    for gap, event in events:
+        now += gap
+        if isinstance(event, Estimates):
+            state = after_estimates(state, now, event, tuning)
+        elif isinstance(event, int):
+            state = after_direction(state, event)
+        elif event is None:
+            state = after_release(state, now)[0]
+        elif len(event) == 2:
+            state = after_stuck(state, event[0], change=event[1])
+        else:
+            state, decision = after_command(state, now, event, tuning)
+            assert 0.0 <= decision.scale <= 1.0
+            asked = event if all(map(math.isfinite, event)) else ZERO
+            for out, component in zip(state.sent, asked, strict=True):
+                assert abs(out) <= abs(component) and out * component >= 0.0
+            if state.interlock is Interlock.STUCK and now >= state.released_until:
+                assert state.direction * state.sent[0] <= 0.0
+    assert state.direction in (-1, 0, 1)

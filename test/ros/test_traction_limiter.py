@@ -154,12 +154,41 @@ def test_a_stop_by_its_topics_outlives_the_limiter(start, listener, tmp_path):
     assert status == 0 and 'Traceback' not in words, words
 
 
+def test_a_stop_waits_for_no_disk(listener, tmp_path, monkeypatch):
+    """The state is kept with a sync of the disk, which a worn card makes seconds of."""
+    from geometry_msgs.msg import TwistStamped
+    from rclpy.parameter import Parameter
+
+    from wheel_terra_estimator.configuration import soil_file
+    from wheel_terra_estimator.estimation.traction_limiter import Event, after_event
+    from wheel_terra_estimator.ros.limiter_node import TractionLimiter
+
+    sent, kept = [], []
+    where = Parameter('state_file', value=str(tmp_path / 'limiter.json'))
+    node = TractionLimiter(context=listener[0].context, parameter_overrides=[where])
+    monkeypatch.setattr(node._output, 'publish', lambda m: sent.append(m.twist.linear.x))
+    monkeypatch.setattr(
+        soil_file, 'write_state', lambda path, state: kept.append((state.stuck, sent[-1]))
+    )
+    command = TwistStamped()
+    for _ in range(20):
+        command.twist.linear.x = 0.1
+        node._on_command(command)
+        time.sleep(0.01)
+    assert sent[-1] > 0.0
+    node._follow(after_event(node._state, Event.STOP, 1, 'stop'))
+    node.destroy_node()
+    assert kept == [(True, 0.0)]
+
+
 @pytest.mark.parametrize(
     ('parameter', 'said'),
     [
         ('state_file:={rover}', 'remove it'),
         ('state_file:={rover}.state.json', 'give the limiter another one'),
         ('critical_slip:=0.1', 'must be below'),
+        ('creep_scale:=.nan', 'out of range'),
+        ('stamped:=7', 'stamped'),
     ],
 )
 def test_what_cannot_be_used_is_refused_at_the_start(start, parameters, parameter, said):

@@ -166,6 +166,7 @@ def after_stuck(state: LimiterState, stuck: bool, *, change: bool) -> LimiterSta
 
 def after_direction(state: LimiterState, direction: int) -> LimiterState:
     """Return the state after ``~/stuck_direction``, which comes shortly before or after it."""
+    direction = _sign(direction)  # whatever its publisher sends
     state = replace(state, stuck_direction=direction)
     if direction and state.interlock is Interlock.STUCK:
         return replace(state, direction=direction)

@@ -134,8 +134,16 @@ class TractionLimiter(Node):
     # -- What goes out --------------------------------------------------------------------------
 
     def _follow(self, state: LimiterState) -> None:
-        """Take over a state; what it takes off the last command does not wait for the next."""
+        """Take over a state; what it takes off the last command does not wait for the next.
+
+        Nor for the disk, to which the state goes last.
+        """
         before, self._state = self._state, state
+        now = self._now()
+        if self._decision is not None and now - state.sent_at <= limiter.COMMAND_TIMEOUT:
+            lessened, decision = limiter.after_command(state, now, self._command, self._tuning)
+            if decision.scale < self._decision.scale:
+                self._send(lessened, decision)
         if (state.interlock, state.direction) != (before.interlock, before.direction):
             self._keep()
             why = f': {state.reason}' if state.reason else ''
@@ -148,12 +156,6 @@ class TractionLimiter(Node):
                 if before.clock_offset is None
                 else 'stamps of the estimates and the clock here agree again'
             )
-        now = self._now()
-        if self._decision is None or now - state.sent_at > limiter.COMMAND_TIMEOUT:
-            return
-        state, decision = limiter.after_command(state, now, self._command, self._tuning)
-        if decision.scale < self._decision.scale:
-            self._send(state, decision)
 
     def _send(self, state: LimiterState, decision: limiter.Decision) -> None:
         """Publish what is to go out, in the message of the command."""

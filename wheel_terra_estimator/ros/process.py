@@ -56,6 +56,7 @@ def run_node(make: Callable[[], Callable[[], Node]], args: list[str] | None = No
     signals = _Signals() if threading.current_thread() is threading.main_thread() else None
     factory = make()
     import rclpy
+    from rclpy.exceptions import ParameterException
     from rclpy.executors import ExternalShutdownException
     from rclpy.signals import SignalHandlerOptions
     from rclpy.utilities import try_shutdown
@@ -78,7 +79,7 @@ def run_node(make: Callable[[], Callable[[], Node]], args: list[str] | None = No
         _spin(node, lambda: signals is not None and signals.stopped)
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
-    except UserError as error:
+    except (UserError, ParameterException) as error:
         print(f'[FATAL] {error}', file=sys.stderr)
         status = 2
     finally:

@@ -34,6 +34,8 @@ Rows = Iterable[tuple[int, Sequence[Any]]]
 
 REQUIRED = ('slip', 'normal_load')
 _KNOWN = 'slip, normal_load, sinkage, drawbar_pull, torque, ...'
+MOST_COLUMNS = 1000
+"""A table with more was laid on its side."""
 _TITLE_LINES = 20
 """Lines above the column names that are looked through for them."""
 
@@ -87,6 +89,11 @@ def read_columns(
     with open_csv(path, LARGEST_TABLE) as file:
         if not file.header:
             raise UserError(f'{path}: empty; the first line must name the columns ({_KNOWN})')
+        if len(file.header) > MOST_COLUMNS:
+            raise UserError(
+                f'{path}: {len(file.header)} columns; a table of wheel tests has fewer than '
+                f'{MOST_COLUMNS}, one row for each test'
+            )
         first = list(islice(file.rows, _TITLE_LINES))
         _check_layout(file, first)
         header = Header(f'{path}, line {file.line}', file.header, choice, wanted)
