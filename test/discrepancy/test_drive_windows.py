@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from wheel_terra_estimator.configuration import reader
+from wheel_terra_estimator.discrepancy.drives import windows
 from wheel_terra_estimator.discrepancy.drives.series import collect
 from wheel_terra_estimator.discrepancy.drives.smoothed_speed import SpeedSmoother
 from wheel_terra_estimator.discrepancy.drives.windows import (
@@ -406,3 +407,13 @@ def test_two_readings_of_each_sensor_are_a_drive_and_one_is_none():
         first = next(m for m in drive if isinstance(m, kind))
         with pytest.raises(UserError, match=topic):
             collect([m for m in drive if m is not first], 4, 'a drive')
+
+
+@pytest.mark.parametrize(
+    ('step', 'at', 'told'), [(0.0, 40, False), (0.05, 60, True), (-0.05, 60, True), (0.5, 79, True)]
+)
+def test_a_drift_is_a_mean_that_changes(step, at, told):
+    """Noise of 0.01 about 0.3, with a step: in the middle, or only in the last value."""
+    values = 0.3 + 0.01 * np.random.default_rng(5).standard_normal(80)
+    values[at:] += step
+    assert windows._drifts(values, 0.03) == told

@@ -4,12 +4,15 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from test_model_file import predicted
 from test_workflow import make, run
 
 from wheel_terra_estimator.configuration import reader
+from wheel_terra_estimator.discrepancy.proposal import find, words
 from wheel_terra_estimator.discrepancy.report.model_file import write_proposal
 from wheel_terra_estimator.discrepancy.result import as_json
 from wheel_terra_estimator.errors import UserError
@@ -240,3 +243,25 @@ def test_an_open_verdict_says_what_the_law_leaves_and_what_would_settle_it(speed
     said = in_words(found)
     assert any('with the proposed law' in line for line in said['shrank'])
     assert any('angular velocity would confirm' in line for line in said['next'])
+
+
+def test_a_law_says_effects_only_where_all_of_its_terms_are_some():
+    def law(*terms):
+        targets, features = zip(*(term.split('_by_') for term in terms), strict=True)
+        return SimpleNamespace(targets=targets, features=features)
+
+    assert find.effects_said(law('torque_by_one', 'drawbar_pull_by_one')) == {
+        'drivetrain_friction',
+        'pull_zero',
+    }
+    assert find.effects_said(law('torque_by_one', 'exponent_by_slope')) == frozenset()
+
+
+def test_a_change_is_said_in_the_units_of_the_rows():
+    """A tenth of load, load times radius, radius: two wheels of 0.2 m, 100 and 300 N."""
+    rows = np.tile([0.02, 40.0, 20.0], (2, 1))
+    table = type('Table', (), {'measured': rows, '__len__': lambda self: len(rows)})()
+    at = OperatingPoints(np.array([0.1, 0.2]), np.array([100.0, 300.0]), Wheel(0.2, 0.1))
+    assert words._size('drawbar_pull', 0.1, table, at) == '20 N (50 % of its mean)'
+    assert words._size('torque', 0.1, table, at) == '4 N m (20 % of its mean)'
+    assert words._size('sinkage', 0.1, table, at) == '20 mm (100 % of its mean)'

@@ -198,6 +198,10 @@ def test_channel_effects_are_what_they_say() -> None:
         assert viscous[2] == pytest.approx(torque + 1.0)
     back = model(0.3, 'drivetrain_friction:viscous', values={'damping': 0.5}, angular_velocity=-2.0)
     assert back[2] == pytest.approx(-state(0.3, LOAD).torque[0] - 1.0)
+    unknown = model(
+        0.3, 'drivetrain_friction:viscous', values={'damping': 0.5}, angular_velocity=math.nan
+    )
+    assert unknown[2] == pytest.approx(state(0.3, LOAD).torque[0])
 
 
 def test_a_gain_acts_before_a_zero_error_and_after_the_soil() -> None:
