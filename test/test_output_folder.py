@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import errno
 import json
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -244,6 +245,22 @@ def test_an_earlier_output_stands_aside_until_the_new_one_is_whole(tmp_path: Pat
     fill('third', resume=True)
     assert contents(run)['rows.csv'] == 'third'
     assert contents(aside) == {'rows.csv': 'of another run'}
+    shutil.rmtree(aside)
+    with pytest.raises(UserError), working_folder(run, True, False, ['rows.csv']):
+        raise UserError('refused')
+    shutil.copytree(run, aside)  # by the user, of an output that once stood aside
+    with pytest.raises(UserError, match='move it'):
+        fill('fourth')
+    shutil.rmtree(aside)
+    with (
+        pytest.raises(UserError, match='which the command reads'),
+        working_folder(run, True, False, [], [aside / 'bag']),
+    ):
+        pass
+    aside.symlink_to('nowhere')
+    with pytest.raises(UserError, match='move it'):
+        fill('fourth')
+    assert contents(run)['rows.csv'] == 'third'
 
 
 def test_a_refused_run_leaves_the_earlier_output(tmp_path: Path) -> None:

@@ -44,7 +44,7 @@ MARKER = '.wheel-terra.json'
 """File in an output folder that lists what the program wrote there; folders end in ``/``."""
 
 EARLIER = 'put aside'
-"""Fact in the marker of a folder that is, or was, aside while another is written: its name."""
+"""Fact in the marker of a folder that stands aside while another is written: its name."""
 
 LEAST_ROOM = 2**16
 """Room on the disk [byte] without which nothing is begun."""
@@ -284,6 +284,7 @@ def working_folder(
         check_folder(path, overwrite, inputs)
     path = _absolute(path)
     aside = path.with_name(f'{path.name}.earlier')
+    refuse_inputs(aside, inputs)
     empty = path.is_dir() and not any(path.iterdir())  # then it is the user's, and stays
     try:
         if path.exists() and not resume and not empty:
@@ -302,6 +303,7 @@ def working_folder(
                 _remove_own_files(path)
                 if _is_earlier(aside):
                     aside.rename(path)
+                    mark(path, [], {EARLIER: ''})
                 elif empty:
                     path.mkdir()
             elif whole and _is_earlier(aside):
@@ -312,16 +314,16 @@ def _put_aside(path: Path, aside: Path) -> None:
     """Rename an output that is to be replaced; one that stands aside already is the whole one."""
     if _is_earlier(aside):
         _remove_own_files(path)
-    elif aside.exists():
+    elif aside.exists() or aside.is_symlink():
         raise UserError(f'{aside}: the earlier output is to stand here meanwhile; move it')
     else:
-        mark(path, [], {EARLIER: path.name})
         path.rename(aside)
+        mark(aside, [], {EARLIER: path.name})
 
 
 def _is_earlier(aside: Path) -> bool:
     """Whether `_put_aside` has put a folder here."""
-    return facts_of(aside).get(EARLIER) == aside.stem
+    return not aside.is_symlink() and facts_of(aside).get(EARLIER) == aside.stem
 
 
 def _holds(entry: Path) -> bool:

@@ -154,10 +154,13 @@ def test_a_stop_by_its_topics_outlives_the_limiter(start, listener, tmp_path):
     assert status == 0 and 'Traceback' not in words, words
 
 
-def test_a_stop_waits_for_no_disk(listener, tmp_path, monkeypatch):
-    """The state is kept with a sync of the disk, which a worn card makes seconds of."""
+def test_a_stop_waits_for_no_disk_and_a_rival_of_the_estimator_is_told(
+    listener, tmp_path, monkeypatch
+):
+    """The state is kept with a sync of the disk; a bag played back sends ``~/stuck``, too."""
     from geometry_msgs.msg import TwistStamped
     from rclpy.parameter import Parameter
+    from std_msgs.msg import Bool
 
     from wheel_terra_estimator.configuration import soil_file
     from wheel_terra_estimator.estimation.traction_limiter import Event, after_event
@@ -177,8 +180,18 @@ def test_a_stop_waits_for_no_disk(listener, tmp_path, monkeypatch):
         time.sleep(0.01)
     assert sent[-1] > 0.0
     node._follow(after_event(node._state, Event.STOP, 1, 'stop'))
-    node.destroy_node()
     assert kept == [(True, 0.0)]
+    said = []
+    monkeypatch.setattr(node._diagnostics, 'publish', said.append)
+    rival = listener[0].create_publisher(Bool, 'wheel_terra_estimator/stuck', 1)
+    node._say()
+    other = listener[0].create_publisher(Bool, 'wheel_terra_estimator/stuck', 1)
+    node._say()
+    words = [message.status[0].message for message in said]
+    assert ['2 publishers' in word for word in words] == [False, True], words
+    for publisher in (rival, other):
+        listener[0].destroy_publisher(publisher)
+    node.destroy_node()
 
 
 @pytest.mark.parametrize(

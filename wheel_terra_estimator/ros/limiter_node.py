@@ -183,6 +183,9 @@ class TractionLimiter(Node):
         if state.interlock is not Interlock.FREE:
             level = ERROR
             words = words if state.reason in words else f'{state.reason}; {words}'
+        if (publishers := self.count_publishers(f'{NODE}/stuck')) > 1:
+            level = max(level, WARN)
+            words = f'{words}; {publishers} publishers of ~/stuck: end all but one'
         if self._unkept:
             level = max(level, WARN)
             words = f'{words}; state_file: {self._unkept}'
