@@ -112,11 +112,14 @@ def _show(arguments: argparse.Namespace, output: Path) -> int:
     with ThreadPoolExecutor(AT_ONCE) as pool:
         drives = [pool.submit(_drive, i, output, live) for i in range(len(DRIVES))]
         trial = pool.submit(_trial, output / 'trial')
-        for drive, part in zip(DRIVES, drives, strict=True):
-            if status := _told(f'{drive.name}: {drive.title}', part):
+        try:
+            for drive, part in zip(DRIVES, drives, strict=True):
+                if status := _told(f'{drive.name}: {drive.title}', part):
+                    return status
+            if status := _told('trial: what is missing in the model of a wheel?', trial):
                 return status
-        if status := _told('trial: what is missing in the model of a wheel?', trial):
-            return status
+        finally:  # after Ctrl-C or an error nothing new begins
+            pool.shutdown(wait=False, cancel_futures=True)
     shown = [f'{drive.name}: {_outcome(drive, output)}' for drive in DRIVES]
     shown.append(f'trial: {_named(output / "trial")}')
     print('\nReports with pictures, to be opened in a browser:')
