@@ -76,9 +76,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=['reference', 'no_reference'],
         help=f'what the estimator gets: {", ".join(MODES)}',
     )
-    parser.add_argument(
-        '--pooled', action='store_true', help='one row per mode in place of one per kind'
-    )
     add_jobs_argument(parser, '--processes', words='drives at a time')
     parser.add_argument(
         '--measured',
@@ -136,9 +133,8 @@ def run(arguments: argparse.Namespace) -> int:
     else:
         told = _simulated(arguments)
     restarts = sum(health.get('filter_restarts', 0) for health in told.healths)
-    text = (
-        f'{told.text}\n\nThe filter was started anew {restarts} times in {len(told.healths)} runs.'
-    )
+    runs = len(told.healths)
+    text = f'{told.text}\n\nThe filter was started anew {restarts} times in {runs} runs.'
     print(text)
     if arguments.output:
         with new_file(arguments.output, arguments.overwrite) as fresh:
@@ -169,9 +165,8 @@ def _limiter(arguments: argparse.Namespace) -> _Told:
     from wheel_terra_estimator.output_folder import check_file, new_file
     from wheel_terra_lab.evaluation import closed_loop
 
-    picture: Path | None = None
-    if arguments.output:
-        picture = arguments.output.with_suffix('.png')
+    picture = arguments.output and arguments.output.with_suffix('.png')
+    if picture:
         check_file(picture, arguments.overwrite)
     drives = closed_loop.compare(_seeds(arguments))
     if picture:
@@ -201,8 +196,7 @@ def _simulated(arguments: argparse.Namespace) -> _Told:
             lambda _: bar.update(),
             arguments.rover,
         )
-    write = tables.pooled_report if arguments.pooled else tables.report
-    parts = [write(results, arguments.modes)]
+    parts = [tables.report(results, arguments.modes)]
     if arguments.rover:
         parts.append(f'Rover in place of that of the kinds: {arguments.rover}.')
     if results.interrupted:
@@ -220,10 +214,8 @@ def _drive_for_hours(arguments: argparse.Namespace) -> int:
 
     if any((arguments.measured, arguments.limiter, arguments.rover)):
         raise UserError('--hours goes with neither --measured nor --limiter nor --rover')
-    if not arguments.kinds:
-        raise UserError('--hours needs --kinds')
-    if arguments.output is None:
-        raise UserError('--hours needs -o DIR, where its figures are kept')
+    if not arguments.kinds or arguments.output is None:
+        raise UserError('--hours needs --kinds, and -o DIR, where its figures are kept')
     if not arguments.hours > 0.0:
         raise UserError(f'--hours {arguments.hours:g}: must be above 0')
     chosen = _chosen(arguments.simulator, arguments.kinds)
@@ -242,15 +234,7 @@ def _drive_for_hours(arguments: argparse.Namespace) -> int:
             overwrite=arguments.overwrite,
         )
     except KeyboardInterrupt:
-        which = '--tuning ' if arguments.tuning else ''
-        if arguments.first_seed is not None:
-            which = f'--first-seed {arguments.first_seed} '
-        kinds, modes = ' '.join(arguments.kinds), ' '.join(arguments.modes)
-        which += f'--simulator {" ".join(arguments.simulator)} --kinds {kinds} --modes {modes} '
-        print(
-            f'interrupted; go on with: --hours {arguments.hours:g} {which}-o {arguments.output} '
-            '--resume'
-        )
+        print('interrupted; the same command with --resume goes on')
         return INTERRUPTED
     print(many_drives.report(rows))
     return FILTER_FAILED if any(row['filter_restarts'] for row in rows) else 0

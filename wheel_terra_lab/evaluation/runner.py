@@ -25,8 +25,8 @@ from wheel_terra_lab.evaluation.simulators import TimedMeasurement
 
 FloatArray = NDArray[np.float64]
 
-REFERENCE_DELAYS = {'reference_at_once': 0.0, 'reference_2s_late': 2.0}
-"""Modes in which the reference arrives at another time than the sensor file says: delay [s]."""
+LATE = 'reference_2s_late'
+LATE_BY = 2_000_000_000  # [ns], in place of what the sensor file says
 
 MODES = (
     'reference',
@@ -34,11 +34,11 @@ MODES = (
     'no_torque',
     'no_sinkage',
     'no_orientation',
-    *REFERENCE_DELAYS,
+    LATE,
     'smoothed',
     'smoothed_no_reference',
 )
-"""What the estimator gets: everything, all but one input, or the reference sooner or later; and
+"""What the estimator gets: everything, all but one input, or the reference later; and
 what the smoother makes of it."""
 SMOOTHED = 'smoothed'
 
@@ -68,10 +68,9 @@ def inputs_of_mode(arrivals: Iterable[TimedMeasurement], mode: str) -> Iterator[
     """Yield what a mode gets of a drive, in the order of arrival."""
     mode = mode.removeprefix(SMOOTHED).removeprefix('_')
     timed = [(a.arrival, a.measurement) for a in arrivals]
-    if mode in REFERENCE_DELAYS:
-        delay = round(REFERENCE_DELAYS[mode] * 1e9)
+    if mode == LATE:
         timed = [
-            (m.stamp + delay if isinstance(m, ReferenceVelocity) else arrival, m)
+            (m.stamp + LATE_BY if isinstance(m, ReferenceVelocity) else arrival, m)
             for arrival, m in timed
         ]
         timed.sort(key=lambda pair: pair[0])

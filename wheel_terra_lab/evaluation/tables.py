@@ -28,7 +28,6 @@ _MODES = {
     'no_torque': 'Without torque',
     'no_sinkage': 'Without sinkage',
     'no_orientation': 'Without orientation',
-    'reference_at_once': 'Reference at once',
     'reference_2s_late': 'Reference 2 s late',
     'smoothed': 'Smoother with reference at 1 Hz',
     'smoothed_no_reference': 'Smoother without reference',
@@ -75,19 +74,6 @@ def report(results: Results, modes: Sequence[str]) -> str:
         parts.append(_health(by_kind))
         parts.append('')
     return '\n'.join(parts)
-
-
-def pooled_report(results: Results, modes: Sequence[str]) -> str:
-    """Return one table with a row per mode, pooled over all drives."""
-    rows, warnings = {}, {}
-    for mode in modes:
-        drives = [d for found in results.of_mode(mode).values() for d in found]
-        if drives:
-            rows[f'{_MODES[mode]} ({len(drives)} drives)'] = Samples.joined(
-                d.samples for d in drives
-            )
-            warnings[_MODES[mode]] = drives
-    return f'{_errors(rows)}\n\nStuck warnings:\n\n{_warnings(warnings)}\n'
 
 
 def _two_states(by_kind: dict[str, list[DriveScore]]) -> str:

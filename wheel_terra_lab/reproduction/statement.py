@@ -47,10 +47,10 @@ def belongs_to(statement: Statement, figure: str) -> bool:
     )
 
 
-def within(paper: float, ours: float, share: float, unit: str = '') -> tuple[bool, str]:
+def within(paper: float, ours: float, share: float) -> tuple[bool, str]:
     """Return whether two numbers agree to a share of the paper's, and how far they are apart."""
     off = abs(ours - paper) / abs(paper)
-    return off <= share, f'{100 * off:.0f} % apart, {100 * share:.0f} % allowed{unit}'
+    return off <= share, f'{100 * off:.0f} % apart, {100 * share:.0f} % allowed'
 
 
 def page(title: str, statements: Sequence[Statement]) -> list[str]:

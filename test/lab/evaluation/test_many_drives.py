@@ -136,7 +136,7 @@ def test_the_command_takes_kinds_and_hours_and_refuses_what_does_not_go(
 
         during.setattr(many_drives, '_figures', interrupt)
         assert main(command) == INTERRUPTED
-    assert '--tuning --simulator A --kinds cruise --modes reference -o' in capsys.readouterr().out
+    assert 'the same command with --resume goes on' in capsys.readouterr().out
     assert main([*command, '--resume']) == 0
     assert '| A cruise | reference | 1 |' in capsys.readouterr().out
     earlier = (folder / 'drives.jsonl').read_bytes()

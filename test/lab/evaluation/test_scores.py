@@ -188,9 +188,6 @@ def test_tables_hold_every_kind():
     assert '| climb |' in text and '| spin |' in text
     assert '**pooled**' in text
     assert 'Without torque' not in text
-    pooled = tables.pooled_report(Results([drive]), ['reference', 'no_torque'])
-    assert '| With reference at 1 Hz (1 drives) |' in pooled
-    assert 'climb' not in pooled
 
 
 def test_the_first_seconds_after_a_start_are_scored_apart():
