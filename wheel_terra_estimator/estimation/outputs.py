@@ -32,6 +32,7 @@ from wheel_terra_estimator.estimation.judgement.stuck.forecast import LONGEST_TI
 from wheel_terra_estimator.estimation.judgement.stuck.monitor import StuckAssessment
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
 from wheel_terra_estimator.estimation.sideways import Sideways
+from wheel_terra_estimator.estimation.taught import with_model_errors
 from wheel_terra_estimator.estimation.words import (
     MissingInputs,
     faults_in_words,
@@ -108,7 +109,8 @@ class Outputs:
         slip_velocity, slip_velocity_std = self._slip_velocity(given)
         variance = np.diagonal(given.covariance)[layout.sinkage]
         sinkage_std = np.sqrt(np.maximum(variance, 0.0) + self._sinkage_zero**2)
-        names, soil, soil_std = self.learned_soil(given.mean, given.covariance)
+        soil_covariance = with_model_errors(given.covariance, layout)
+        names, soil, soil_std = self.learned_soil(given.mean, soil_covariance)
         load_std, pull_std = self._force_deviations(given)
         ahead = given.assessment.wheels or (_NOTHING_AHEAD,) * n
         per_wheel = {

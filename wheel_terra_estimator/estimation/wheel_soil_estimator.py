@@ -98,7 +98,7 @@ from wheel_terra_estimator.estimation.sideways import (
     SidewaysRover,
 )
 from wheel_terra_estimator.estimation.smoothing.tape import Gaussian, Tape
-from wheel_terra_estimator.estimation.taught import Taught, Teaching
+from wheel_terra_estimator.estimation.taught import Taught, Teaching, with_model_errors
 from wheel_terra_estimator.estimation.words import MissingInputs
 
 Floats = tuple[float, ...]
@@ -847,7 +847,7 @@ class WheelSoilEstimator:
 
     def taught(self) -> tuple[Taught, ...]:
         """Return what the drive has taught of each parameter so far."""
-        return self._teaching.judged(self._ekf.covariance)
+        return self._teaching.judged(with_model_errors(self._ekf.covariance, self._layout))
 
     def health(self) -> dict[str, Any]:
         """Return counters and consistency figures for diagnostics."""
