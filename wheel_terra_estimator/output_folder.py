@@ -317,8 +317,8 @@ def _put_aside(path: Path, aside: Path) -> None:
     elif aside.exists() or aside.is_symlink():
         raise UserError(f'{aside}: the earlier output is to stand here meanwhile; move it')
     else:
+        mark(path, [], {EARLIER: path.name})  # first: a full disk then leaves it in its place
         path.rename(aside)
-        mark(aside, [], {EARLIER: path.name})
 
 
 def _is_earlier(aside: Path) -> bool:
