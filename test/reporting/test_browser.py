@@ -256,6 +256,16 @@ def bench_report(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+@pytest.fixture(scope='module')
+def evaluation_report(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    from wheel_terra_estimator.cli.main import main
+
+    path = tmp_path_factory.mktemp('evaluate') / 'report.html'
+    line = ['evaluate', '--kinds', 'cruise', '--seeds', '1', '--modes', 'reference', '--jobs', '1']
+    assert main([*line, '-o', str(path)]) == 0
+    return path
+
+
 KINDS = {
     'report': 20,
     'diagnosis_report': 0,
@@ -264,6 +274,7 @@ KINDS = {
     'fleet_report': 0,
     'check_report': 0,
     'bench_report': 0,
+    'evaluation_report': 0,
 }
 """Page -> lines that its figure has at least."""
 

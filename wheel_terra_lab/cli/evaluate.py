@@ -94,8 +94,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         dest='output',
         action=Output,
         type=Path,
-        metavar='F.md|DIR',
-        help='write the tables; with --hours a folder',
+        metavar='F.md|F.html|DIR',
+        help='write the tables, as a page where the name ends in .html; with --hours a folder',
     )
     parser.add_argument(
         '--hours',
@@ -115,6 +115,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Run the command."""
     from wheel_terra_estimator.output_folder import check_file, new_file
+    from wheel_terra_estimator.reporting.tables_page import write_tables
+    from wheel_terra_lab.evaluation import tables
 
     if arguments.hours is not None:
         return _drive_for_hours(arguments)
@@ -136,7 +138,13 @@ def run(arguments: argparse.Namespace) -> int:
     runs = len(told.healths)
     text = f'{told.text}\n\nThe filter was started anew {restarts} times in {runs} runs.'
     print(text)
-    if arguments.output:
+    if arguments.output and arguments.output.suffix == '.html':
+        tone, verdict = ('warn' if restarts or told.status else 'good'), text.splitlines()[-1]
+        title = 'The estimator against truth and baselines'
+        write_tables(
+            arguments.output, title, verdict, tone, tables.as_tables(text), arguments.overwrite
+        )
+    elif arguments.output:
         with new_file(arguments.output, arguments.overwrite) as fresh:
             fresh.write_text(text + '\n', encoding='utf-8')
     return told.status or (FILTER_FAILED if restarts else 0)
