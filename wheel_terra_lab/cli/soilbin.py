@@ -125,9 +125,11 @@ def _run_one(arguments: argparse.Namespace, cache: Path | None) -> int:
                 with progress.bar() as report:
                     summary = run_case(case, work, cache, report)
                 output.write_folder(folder, work, case, summary, arguments.film)
-            finally:
+            except UserError:
                 if not any(work.rglob(STATE)):  # nothing for --resume
                     shutil.rmtree(work, ignore_errors=True)
+                raise
+            shutil.rmtree(work, ignore_errors=True)
     except StoppedByUserError as stopped:
         raise UserError(f'{stopped}; go on with --resume') from stopped
     except OSError as error:
