@@ -20,7 +20,8 @@ SHORT = 14
 """Options of a command up to which its short help has all."""
 MORE = 'more'
 _GROUPS = {
-    'inputs': 'reference truth remap columns ignore_columns points urdf bag wheels example',
+    'inputs': 'reference truth remap columns ignore_columns points urdf bag wheels example figure '
+    'compute',
     'model': 'config parameters soil effects only smooth method scenario seed seeds duration '
     'slip load slope climb wheel radius width track wheelbase mass name gravity rate friction pull '
     'simulator kinds rover modes noise',

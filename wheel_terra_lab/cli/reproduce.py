@@ -5,18 +5,21 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from wheel_terra_estimator.cli.outputs import Output
 from wheel_terra_estimator.errors import UserError
+from wheel_terra_lab.cli.soilbin import add_study_arguments
 
 if TYPE_CHECKING:
-    from wheel_terra_lab.reproduction.statement import Statement
+    from wheel_terra_lab.soilbin.metrics import Row
 
 EXAMPLES = (
     'wheel-terra reproduce all -o papers',
     'wheel-terra reproduce ding --figure 5 -o figure_5',
+    'wheel-terra reproduce nakashima --figure 8 --run --seeds 1 -o grains',
 )
 PAPERS = ('ding', 'nakashima', 'guo')
 PAGE = 'reproduction.md'
@@ -32,9 +35,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--run',
         dest='compute',
         action='store_true',
-        help='compute the discrete elements of nakashima anew, hours of all cores, in the folder '
-        'DIR_soilbin (gone on with where it exists); without it the kept results of the shipped '
-        'runs are shown, and called so',
+        help='compute the discrete elements of nakashima anew, hours of all cores (of one --figure '
+        'minutes); without it the kept results of the shipped runs are shown, and called so',
     )
     parser.add_argument(
         '--points',
@@ -45,69 +47,79 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument('-o', dest='output', action=Output, type=Path, required=True, metavar='DIR')
     parser.add_argument('--overwrite', action='store_true', help='replace an output folder')
+    parser.add_argument(
+        '--part',
+        action='append',
+        choices=('table7', 'table6', 'loads', 'moon', 'high_lugs', 'paper_speed'),
+        help='run only this part (may be given several times); paper_speed, half an hour per case '
+        'and core, runs only where it is asked for',
+    )
+    add_study_arguments(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Write the page and the pictures; 0 whatever the verdicts."""
     from wheel_terra_estimator.output_folder import check_folder, new_folder
-    from wheel_terra_lab.reproduction.statement import belongs_to, page
 
     papers = PAPERS if arguments.paper == 'all' else (arguments.paper,)
     if arguments.points < LEAST_POINTS:
         raise UserError(f'--points {arguments.points}: give {LEAST_POINTS} or more')
-    if arguments.compute and 'nakashima' not in papers:
+    if not arguments.compute:
+        check_folder(arguments.output, arguments.overwrite)
+        with new_folder(arguments.output, arguments.overwrite) as folder:
+            _write(papers, arguments, folder)
+        return 0
+    if 'nakashima' not in papers:
         raise UserError('--run computes discrete elements, which only nakashima has; leave it')
-    check_folder(arguments.output, arguments.overwrite)
-    rows = _computed(arguments.output) if arguments.compute else None
-    lines, found = ['# Three papers, statement by statement', ''], 0
-    with new_folder(arguments.output, arguments.overwrite) as folder:
-        for paper in papers:
-            title, statements, note = _statements(paper, arguments, folder, rows)
-            if arguments.figure:
-                statements = [s for s in statements if belongs_to(s, arguments.figure)]
-            found += len(statements)
-            if statements:
-                lines += [*page(title, statements), *note]
-        if not found:
-            raise UserError(
-                f'--figure {arguments.figure}: no statement of {", ".join(papers)} has that figure'
-            )
-        text = '\n'.join(lines).rstrip() + '\n'
-        (folder / PAGE).write_text(text, encoding='utf-8')
-    print(text, end='')
+    from wheel_terra_lab.soilbin import reproduced_figures, reproduction, study
+
+    jobs = reproduction.jobs(arguments)
+    if arguments.figure:
+        jobs = reproduced_figures.jobs_of(arguments.figure, jobs)
+    study.run_in_folder(
+        arguments,
+        jobs,
+        reproduction.TABLE,
+        (PAGE, *PICTURES.values()),
+        lambda rows, folder: _write(papers, arguments, folder, rows),
+    )
     return 0
 
 
-def _statements(
-    paper: str, arguments: argparse.Namespace, folder: Path, rows: list[dict[str, str]] | None
-) -> tuple[str, list[Statement], list[str]]:
-    """Return title, statements and notes of a paper; draw its figures."""
+def _write(
+    papers: Sequence[str],
+    arguments: argparse.Namespace,
+    folder: Path,
+    rows: Sequence[Row] | None = None,
+) -> None:
+    """Write the page of papers and their pictures; `rows` are runs of this command, if any."""
     from wheel_terra_lab.reproduction import ding, guo, nakashima
+    from wheel_terra_lab.reproduction.statement import HEAD, belongs_to, page
 
-    if paper == 'guo':
-        return guo.TITLE, guo.statements(), []
-    note = [f'![figures]({PICTURES[paper]})', '']
-    if paper == 'ding':
-        ding.draw(folder / PICTURES[paper])
-        return ding.TITLE, ding.statements(0 if arguments.figure else arguments.points), note
-    source = nakashima.KEPT if rows is None else 'computed now'
-    runs = nakashima.kept() if rows is None else rows
-    nakashima.draw(runs, folder / PICTURES[paper])
-    return f'{nakashima.TITLE} ({source})', nakashima.statements(runs), note
-
-
-def _computed(output: Path) -> list[dict[str, str]]:
-    """Run the discrete elements beside the output folder and return their rows."""
-    import csv
-
-    from wheel_terra_estimator.cli.main import main
-    from wheel_terra_lab.soilbin.reproduction import TABLE
-
-    runs = output.with_name(f'{output.name}_soilbin')
-    status = main(['soilbin', 'reproduce', '-o', str(runs), *(['--resume'] * runs.exists())])
-    if status:
-        raise UserError(
-            f'{runs}: the soil bin ended with status {status}; the same command goes on'
-        )
-    with (runs / TABLE).open(newline='', encoding='utf-8') as stream:
-        return list(csv.DictReader(stream))
+    figure = arguments.figure
+    runs = nakashima.kept() if rows is None else nakashima.Runs(rows, folder)
+    titles = {'ding': ding.TITLE, 'nakashima': f'{nakashima.TITLE} ({runs.source})'}
+    titles['guo'] = guo.TITLE
+    lines, found = [*HEAD], False
+    for paper in papers:
+        if paper == 'ding':
+            statements = ding.statements(0 if figure else arguments.points)
+        else:
+            statements = guo.statements() if paper == 'guo' else nakashima.statements(runs)
+        if figure:
+            statements = [s for s in statements if belongs_to(s, figure)]
+        if not statements:
+            continue
+        found = True
+        lines += page(titles[paper], statements)
+        if paper in PICTURES:
+            lines += [f'![figures]({PICTURES[paper]})', '']
+    if not found:
+        raise UserError(f'--figure {figure}: no statement of {", ".join(papers)} has that figure')
+    if 'ding' in papers:
+        ding.draw(folder / PICTURES['ding'])
+    if 'nakashima' in papers:
+        nakashima.draw(runs, folder / PICTURES['nakashima'])
+    text = '\n'.join(lines).rstrip() + '\n'
+    (folder / PAGE).write_text(text, encoding='utf-8')
+    print(text, end='')

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import argparse
 import shutil
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -53,70 +54,66 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     one.add_argument('--grain-scale', type=float, metavar='K', help='grains larger by K')
     one.add_argument('-p', dest='overrides', action='append', default=[], metavar='NAME:=VALUE')
     one.add_argument('--film', action='store_true', help='also write film.gif')
-    _common(one, studies=False)
+    _cache(one)
 
-    for name, text in (
-        ('reproduce', "the paper's tables 6 and 7, its figures' trends and its section 6"),
-        ('rows', 'virtual measurements for diagnose: pull sweep or slip sweep'),
-    ):
-        study = actions.add_parser(name, help=text, description=text)
-        study.add_argument('-o', '--output', action=Output, type=Path, required=True, metavar='DIR')
-        study.add_argument('--resume', action='store_true', help='go on with the study in DIR')
-        study.add_argument('--overwrite', action='store_true', help='start the study in DIR anew')
-        study.add_argument('--seeds', type=int, default=0, metavar='N', help='beds per case')
-        study.add_argument(
-            '--grain-scale', type=float, default=0.0, metavar='K', help='grains larger by K'
-        )
-        if name == 'rows':
-            study.add_argument('--sweep', choices=('pull', 'slip'), required=True)
-        if name == 'reproduce':
-            study.add_argument(
-                '--part', action='append',
-                choices=('table7', 'table6', 'loads', 'moon', 'high_lugs', 'paper_speed'),
-                help='only this part (may be given several times); paper_speed, half an hour per '
-                'case and core, runs only where it is asked for',
-            )  # fmt: skip
-        _common(study, studies=True)
+    text = 'virtual measurements for diagnose: pull sweep or slip sweep'
+    study = actions.add_parser('rows', help=text, description=text)
+    study.add_argument('-o', '--output', action=Output, type=Path, required=True, metavar='DIR')
+    study.add_argument('--overwrite', action='store_true', help='start the study in DIR anew')
+    study.add_argument('--sweep', choices=('pull', 'slip'), required=True)
+    add_study_arguments(study)
 
 
-def _common(parser: argparse.ArgumentParser, studies: bool) -> None:
+def _cache(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--cache', action=Output, type=Path, metavar='DIR', help='where settled beds are kept'
     )
     parser.add_argument('--no-cache', action='store_true', help='settle every bed anew')
-    if studies:
-        add_jobs_argument(
-            parser,
-            '--workers',
-            default=0,
-            words='engine processes at a time (default: one per core)',
-        )
-        add_scheduler_argument(parser, '--dask', what='cases')
+
+
+def add_study_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare what every study of the soil bin takes."""
+    parser.add_argument('--resume', action='store_true', help='go on with the study in DIR')
+    parser.add_argument('--seeds', type=int, default=0, metavar='N', help='beds per case')
+    parser.add_argument(
+        '--grain-scale', type=float, default=0.0, metavar='K', help='grains larger by K'
+    )
+    _cache(parser)
+    add_jobs_argument(
+        parser,
+        '--workers',
+        default=0,
+        words='engine processes at a time (default: one per core)',
+    )
+    add_scheduler_argument(parser, '--dask', what='cases')
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the chosen action."""
-    from wheel_terra_lab.soilbin import snapshots
-
-    cache = None if arguments.no_cache else arguments.cache or snapshots.default_cache()
     if arguments.action == 'run':
-        return _run_one(arguments, cache)
-    from wheel_terra_lab.reproduction import nakashima
-    from wheel_terra_lab.soilbin import measurements, studies
+        return _run_one(arguments)
+    from wheel_terra_lab.soilbin import measurements, study
 
-    report = nakashima.report if arguments.action == 'reproduce' else measurements.report
-    return studies.run(arguments, cache, report)
+    study.run_in_folder(
+        arguments,
+        measurements.jobs(arguments),
+        measurements.TABLE,
+        measurements.PAGES,
+        partial(measurements.report, arguments.sweep),
+    )
+    return 0
 
 
-def _run_one(arguments: argparse.Namespace, cache: Path | None) -> int:
+def _run_one(arguments: argparse.Namespace) -> int:
     from wheel_terra_estimator.output_folder import working_folder
-    from wheel_terra_lab.soilbin import output, progress
+    from wheel_terra_lab.soilbin import output, progress, snapshots
     from wheel_terra_lab.soilbin.bookkeeping import STATE
     from wheel_terra_lab.soilbin.case import check
     from wheel_terra_lab.soilbin.launch import StoppedByUserError, run_case
 
     case = case_of(arguments)
     check(case)
+    cache = None if arguments.no_cache else arguments.cache or snapshots.default_cache()
     folder: Path = arguments.output
     work = folder / '.work'
     try:

@@ -7,6 +7,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+HEAD = (
+    '# Three papers, statement by statement',
+    '',
+    '`wheel-terra reproduce all -o DIR` writes this page from installed code and shipped data.',
+    '*no test*: an input, a definition, a picture, or an accuracy that the paper does not state.',
+    '',
+)
+
 
 @dataclass(frozen=True)
 class Statement:

@@ -61,7 +61,7 @@ def jobs(arguments: argparse.Namespace) -> list[Job]:
     return found
 
 
-def report(arguments: argparse.Namespace, rows: Sequence[Row], folder: Path) -> None:
+def report(sweep: str, rows: Sequence[Row], folder: Path) -> None:
     """Write the rows that travelled (level ones, and all) in the table format of diagnose."""
     usable = [row for row in rows if row.get('slip') and -1 <= float(row['slip']) <= 1]
     usable.sort(key=lambda row: (float(row['slope']), float(row['slip'])))
@@ -71,7 +71,7 @@ def report(arguments: argparse.Namespace, rows: Sequence[Row], folder: Path) -> 
         return {name: float(row[named.get(name, name)]) for name in output.ROW_COLUMNS}
 
     level = [measured(row) for row in usable if float(row['slope']) == 0]
-    output.write_rows(folder / f'{arguments.sweep}_sweep.csv', level)
+    output.write_rows(folder / f'{sweep}_sweep.csv', level)
     if any(float(row['slope']) > 0 for row in usable):
         climbing = [measured(row) for row in usable if row['name'].startswith('wheel')]
         output.write_rows(folder / 'slopes.csv', climbing)

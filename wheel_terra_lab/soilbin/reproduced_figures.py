@@ -9,16 +9,22 @@ beside ours, and what the text says of them in words is judged, figure by figure
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.reporting.style import LINE_COLOURS, picture_style
-from wheel_terra_lab.soilbin import metrics
+from wheel_terra_lab.soilbin import bookkeeping, metrics
 from wheel_terra_lab.soilbin.metrics import Row
+from wheel_terra_lab.soilbin.study import SERIES_FOLDER, Job
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 FULL_LOAD = 19.6  # [N]
 LIGHTER = 14.7  # [N]
@@ -26,6 +32,8 @@ EARTH = 5.0  # [m/s^2] below it a row is one of the Moon
 STEEPEST = 25.0  # [deg]
 POWER, SLIP, PULL = 'power_number', 'slip', 'pull_ratio'
 TORQUE = 'torque_coefficient'
+DEPTH = 'sinkage'
+PATH_FIGURE = '8'
 ALIKE = 0.1
 """Relative difference of power numbers within which the paper's "almost the same" holds."""
 
@@ -100,6 +108,8 @@ class PullCurve(Curve):
 
 def _tabled(wheel: int, name: str) -> dict[float, float]:
     """Return slope [deg] -> value of a figure from tables 6 and 7; on 25 deg PN = (H/W)/(1 - s)."""
+    if name == DEPTH:  # the paper states z_a, which counts from the start of rotation
+        return {}
     low, steep = metrics.published('table6')[wheel], metrics.published('table7')[wheel]
     at_20 = low['slope_at_20_percent_deg']
     slip, torque = steep[SLIP], steep['gross_traction'] / FULL_LOAD
@@ -202,6 +212,14 @@ def _coarse(label: str, wheel: int | str, load: float = FULL_LOAD) -> Curve:
 
 FIGURES = (
     Figure(
+        '10', DEPTH, (Curve('150 mm', 3), Curve('100 mm', 2), Curve('50 mm', 1)),
+        'the wider the wheel, the less it sinks', _order_at(STEEPEST),
+    ),
+    Figure(
+        '10', DEPTH, (Curve('250 mm', 5), Curve('200 mm', 2), Curve('150 mm', 4)),
+        'the larger the diameter, the less it sinks', _order_at(STEEPEST),
+    ),
+    Figure(
         '6', SLIP, (_coarse('20 mm, 14.7 N (grains x2)', 8, LIGHTER), Curve('10 mm', 2, LIGHTER)),
         'under 14.7 N lugs of 20 mm slip less on 25 degrees than those of 10 mm',
         _order_at(STEEPEST),
@@ -265,14 +283,72 @@ FIGURES = (
 )  # fmt: skip
 
 
-def draw(rows: Sequence[Row], path: Path) -> None:
-    """Draw each figure twice: what the paper states of it, and ours."""
+PATH = _coarse('20 mm, 14.7 N (grains x2)', 8, LIGHTER)
+"""Of figure 8, whose load the paper does not state."""
+
+
+def jobs_of(figure: str, jobs: Sequence[Job]) -> list[Job]:
+    """Return those of the jobs that a figure of the paper draws, ``12`` including ``12(a)``."""
+    curves = [c for f in FIGURES if figure in (f.name, f.name.partition('(')[0]) for c in f.curves]
+    curves += [PATH] * (figure == PATH_FIGURE)
+    if not curves:
+        raise UserError(f'--figure {figure}: no discrete elements belong to it; leave --run')
+    rows = [{**{k: str(v) for k, v in job.labels.items()}, SLIP: '0'} for job in jobs]
+    drawn = [row for curve in curves for row in curve.rows(rows)]
+    return [job for job, row in zip(jobs, rows, strict=True) if row in drawn]
+
+
+def paths(rows: Sequence[Row], folder: Path) -> dict[float, np.ndarray]:
+    """Return by slope [deg] how far the axle went up and down into the slope [m], (2, N).
+
+    Of the rows whose series the folder keeps, one bed each.
+    """
+    found = {}
+    columns = [bookkeeping.SERIES.index(name) for name in ('position', 'height')]
+    for row in PATH.rows(rows):
+        kept = folder / SERIES_FOLDER / f'{row["key"]}.npy'
+        slope = metrics.number(row, 'slope_deg')
+        if slope and slope not in found and kept.exists():
+            along, height = np.load(kept)[:, columns].T.astype(float)
+            found[slope] = np.stack([along - along[0], height[0] - height])
+    return found
+
+
+def equivalent_slope(slope: float, path: np.ndarray) -> float:
+    """Return the slope [deg] of the straight line from the start of a path to its end."""
+    along, down = path[:, -1]
+    return slope - math.degrees(math.atan2(down, along))
+
+
+def _draw_paths(axis: Axes, found: Mapping[float, np.ndarray]) -> None:
+    for (slope, (along, down)), colour in zip(sorted(found.items()), LINE_COLOURS, strict=False):
+        angle = math.radians(slope)
+        across = along * math.cos(angle) + down * math.sin(angle)
+        up = along * math.sin(angle) - down * math.cos(angle)
+        axis.plot(across, up, color=colour, label=f'{slope:g} deg')
+        axis.plot(across, across * math.tan(angle), ':', color=colour)
+    axis.set_title('figure 8: path of the axle, ours (dotted: the slope)')
+    axis.set_xlabel('across [m]')
+    axis.set_ylabel('up [m]')
+    if found:
+        axis.legend()
+
+
+def draw(rows: Sequence[Row], folder: Path, path: Path) -> None:
+    """Draw each figure twice, what the paper states of it and ours, and the paths of figure 8.
+
+    `folder` is that of the table of the rows.
+    """
     from matplotlib.figure import Figure as Canvas
 
     names = {POWER: 'power number [-]', SLIP: 'slip [-]', TORQUE: 'T/(W r) [-]', PULL: 'P/W [-]'}
+    names[DEPTH] = 'sinkage [m]'
     with picture_style():
-        canvas = Canvas(figsize=(9.6, 2.5 * len(FIGURES)), layout='constrained')
-        grid = canvas.subplots(len(FIGURES), 2, sharex='row', sharey='row')
+        canvas = Canvas(figsize=(9.6, 2.5 * (len(FIGURES) + 1)), layout='constrained')
+        halves: Any = canvas.subfigures(2, 1, height_ratios=(1, len(FIGURES)))
+        top, below = halves
+        _draw_paths(top.subplots(), paths(rows, folder))
+        grid = below.subplots(len(FIGURES), 2, sharex='row', sharey='row')
         for (paper, ours), figure in zip(grid, FIGURES, strict=True):
             for curve, colour in zip(figure.curves, LINE_COLOURS, strict=False):
                 paper.plot(*curve.paper(figure.quantity), '--s', ms=3.5, color=colour)

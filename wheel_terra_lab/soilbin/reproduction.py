@@ -19,7 +19,6 @@ from wheel_terra_lab.soilbin.metrics import Row
 from wheel_terra_lab.soilbin.study import Job
 
 TABLE = 'reproduction.csv'
-PAGES = ('reproduction.md', 'figures.svg')
 PARTS = ('table7', 'table6', 'loads', 'moon', 'high_lugs')
 PAPER_SPEED = 'paper_speed'
 """Part that runs only where it is asked for: some half an hour per case and core."""
@@ -29,12 +28,15 @@ WHEELS = range(1, 10)
 SLOPES_TABLE6 = (0.0, 5.0, 10.0, 15.0)
 TABLE7_SLOPE = 25.0  # [deg]
 MOON = EARTH_GRAVITY / 6
+MOON_LOAD = 14.7  # [N]
 MOON_PULLS = (0.0, 0.1, 0.2, 0.3)  # P/W on the level
 MOON_SLOPES = (10.0, 15.0, 21.0, 25.0)
-EARTH_SLOPES = (0.0, 15.0, 25.0)
+EARTH_SLOPES = (15.0, 25.0)
 HIGH_LUGS = 8  # wheel of figures 12(b) and 13(b): lugs of 20 mm
 HIGH_LUG_SLOPES = (25.0, 0.0, 15.0)  # the most telling ones first
 HIGH_LUG_GRAINS = 2.0  # least grain scale of these figures
+PATH_LOAD = 14.7  # [N]
+PATH_SLOPES = (10.0, 20.0)  # of figure 8, beside those above
 OTHER_LOADS = (9.8, 14.7)  # [N] of figure 12, beside 19.6
 OTHER_WIDTHS = (0.05, 0.15)  # [m] of figure 13, beside 0.1
 
@@ -105,7 +107,7 @@ def jobs(arguments: argparse.Namespace) -> list[Job]:
 
 
 def _high_lugs(seed: int, scale: float) -> list[Job]:
-    """Figures 12(b) and 13(b): lugs of 20 mm under three loads and on wheels of other widths."""
+    """Figures 8, 12(b), 13(b): lugs of 20 mm under three loads and on wheels of other widths."""
     found = []
     for slope in HIGH_LUG_SLOPES:
         base = wheel_case(HIGH_LUGS, slope, seed, max(scale, HIGH_LUG_GRAINS))
@@ -118,6 +120,12 @@ def _high_lugs(seed: int, scale: float) -> list[Job]:
             name = f'wheel {wheel}, {slope:g} deg, bed {seed}'
             case = base.replace(name=name, wheel__width=width)
             found.append(_job(case, 'high_lugs', wheel, slope))
+    for slope in PATH_SLOPES:
+        case = wheel_case(HIGH_LUGS, slope, seed, max(scale, HIGH_LUG_GRAINS)).replace(
+            name=f'wheel {HIGH_LUGS}, {PATH_LOAD:g} N, {slope:g} deg, bed {seed}',
+            operation__vertical_load=PATH_LOAD,
+        )
+        found.append(_job(case, 'high_lugs', HIGH_LUGS, slope))
     return found
 
 
@@ -146,27 +154,37 @@ def _paper_speed(seed: int, scale: float) -> list[Job]:
 
 
 def _moon(seed: int, scale: float) -> list[Job]:
-    """Section 6: wheel 5 under 14.7 N on a bed of 15 cm; slopes in the bin of 1.6 m."""
+    """Section 6: wheel 5 under 14.7 N on a bed of 15 cm; slopes of the Moon in the bin of 1.6 m.
+
+    Slopes of the Earth are those of section 5, in its bin: figure 20 alone is captioned "with
+    extended soil bin condition".
+    """
     found = []
     for gravity, place in ((MOON, 'Moon'), (EARTH_GRAVITY, 'Earth')):
         flat = wheel_case(5, 0.0, seed, scale).replace(
-            operation__gravity=gravity, operation__vertical_load=14.7, bed__rows=40
+            operation__gravity=gravity, operation__vertical_load=MOON_LOAD, bed__rows=40
         )
         for ratio in MOON_PULLS:
             case = flat.replace(
                 name=f'{place}, level, P/W {ratio:g}, bed {seed}',
-                operation__hitch_pull=ratio * 14.7,
+                operation__hitch_pull=ratio * MOON_LOAD,
             )
             found.append(_job(case, 'moon', 5, 0.0, pull_ratio=ratio))
-        slopes = MOON_SLOPES if place == 'Moon' else EARTH_SLOPES[1:]
-        for slope in slopes:
-            case = flat.replace(
-                name=f'{place}, {slope:g} deg, bed {seed}',
-                operation__slope=math.radians(slope),
-                operation__start=0.7,
-                bed__length=1.6,
-            )
-            found.append(_job(case, 'moon', 5, slope))
+    for slope in MOON_SLOPES:
+        case = wheel_case(5, slope, seed, scale).replace(
+            name=f'Moon, {slope:g} deg, bed {seed}',
+            operation__gravity=MOON,
+            operation__vertical_load=MOON_LOAD,
+            operation__start=0.7,
+            bed__length=1.6,
+            bed__rows=40,
+        )
+        found.append(_job(case, 'moon', 5, slope))
+    for slope in EARTH_SLOPES:
+        case = wheel_case(5, slope, seed, scale).replace(
+            name=f'Earth, {slope:g} deg, bed {seed}', operation__vertical_load=MOON_LOAD
+        )
+        found.append(_job(case, 'moon', 5, slope))
     return found
 
 

@@ -4,8 +4,10 @@
 
 from __future__ import annotations
 
+import argparse
 import hashlib
 import json
+import os
 import shutil
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -13,9 +15,15 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from wheel_terra_estimator.output_folder import working_folder
 from wheel_terra_lab.jobs import ResultFile, run_jobs
+from wheel_terra_lab.soilbin import snapshots
 from wheel_terra_lab.soilbin.case import Case, to_dict
 from wheel_terra_lab.soilbin.launch import CaseFailedError, run_case
+from wheel_terra_lab.soilbin.output import WORK
+
+SERIES_FOLDER = 'series'
+"""Beside the table of a study: ``KEY.npy``, columns as in `bookkeeping.SERIES`."""
 
 # Fields that were added after rows had been published: at these values a case is the old one.
 ADDED_LATER = {'operation': {'free_sinkage': 'held', 'drop_height': 0.0}}
@@ -46,7 +54,7 @@ def run_job(job: Job, work: str, cache: str) -> dict[str, object]:
     folder = Path(work) / job.key
     try:
         row = run_case(job.case, folder, Path(cache) if cache else None)
-        _keep_series(folder / 'series.npy', Path(work).parent / 'series' / f'{job.key}.npy')
+        _keep_series(folder / 'series.npy', Path(work).parent / SERIES_FOLDER / f'{job.key}.npy')
     except CaseFailedError as error:
         row = {'stopped': str(error)}
     shutil.rmtree(folder, ignore_errors=True)
@@ -55,10 +63,32 @@ def run_job(job: Job, work: str, cache: str) -> dict[str, object]:
 
 
 def _keep_series(series: Path, kept: Path) -> None:
-    """Keep the time series (columns: `bookkeeping.SERIES`) beside the table of the study."""
+    """Keep the time series beside the table of the study."""
     if series.exists():
         kept.parent.mkdir(exist_ok=True)
         shutil.move(series, kept)
+
+
+def run_in_folder(
+    arguments: argparse.Namespace,
+    jobs: Sequence[Job],
+    table: str,
+    pages: Sequence[str],
+    report: Callable[[Sequence[Mapping[str, str]], Path], None],
+) -> None:
+    """Run (or go on with) a study in an output folder: its table as rows come, then its pages.
+
+    ``arguments`` are those of ``cli.soilbin.add_study_arguments`` with output and overwrite.
+    """
+    folder: Path = arguments.output
+    cache = None if arguments.no_cache else arguments.cache or snapshots.default_cache()
+    entries = (table, *pages, f'{SERIES_FOLDER}/', WORK)
+    workers = arguments.jobs or os.cpu_count() or 1
+    with working_folder(folder, arguments.overwrite, arguments.resume, entries):
+        rows = run_study(
+            jobs, folder / table, folder / '.work', cache, workers, arguments.scheduler or ''
+        )
+        report(rows, folder)
 
 
 def run_study(

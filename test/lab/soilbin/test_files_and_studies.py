@@ -171,13 +171,14 @@ def test_reproduction_covers_the_papers_tables():
     lunar = [job for job in found if job.labels['gravity'] == pytest.approx(9.80665 / 6, abs=1e-4)]
     assert any(job.labels['pull_ratio'] == 0 and job.labels['slope_deg'] == 0 for job in lunar)
     assert all(job.case.bed.rows == 40 for job in lunar)
+    kept = {row['key'] for row in nakashima.kept().rows}  # all are rows of these very cases
+    more = argparse.Namespace(part=[*reproduction.PARTS, 'paper_speed'], seeds=3, grain_scale=0.0)
+    assert kept <= {job.key for job in reproduction.jobs(more)}
 
 
 def test_statements_of_the_papers_figures_hold_and_can_fail():
     """The published rows do what the paper's text says; with two wheels exchanged they do not."""
-    table = reproduction.metrics.DATA / 'reproduction.csv'
-    with table.open(newline='') as stream:
-        rows = list(csv.DictReader(stream))
+    rows = nakashima.kept().rows
     said = {figure.name: figure.holds(figure, rows) for figure in reproduced_figures.FIGURES}
     assert all(said.values()), said
     other = {'2': '6', '6': '2'}
@@ -211,7 +212,7 @@ def test_coarse_grains_say_how_far_they_are_from_full_scale():
 def test_existing_output_is_refused(tmp_path, capsys):
     assert main(['soilbin', 'run', 'quick', '-o', str(tmp_path)]) == 2
     assert '--resume' in capsys.readouterr().err
-    assert main(['soilbin', 'reproduce', '-o', str(tmp_path)]) == 2
+    assert main(['reproduce', 'nakashima', '--run', '-o', str(tmp_path)]) == 2
     assert '--overwrite' in capsys.readouterr().err
 
 
@@ -316,7 +317,11 @@ def test_ranks_wait_for_the_slopes_of_every_wheel(tmp_path):
         rows.append(row | {'slip': str(slip), 'power_number': str(power), 'stopped': ''})
 
     def best(rows):
-        said = [s for s in nakashima.statements(rows) if s.what.endswith('smallest sum of ranks')]
+        said = [
+            s
+            for s in nakashima.statements(nakashima.Runs(rows, tmp_path))
+            if s.what.endswith('smallest sum of ranks')
+        ]
         return [s.ours for s in said]
 
     assert best(rows) == ['1']  # slips least on every slope
