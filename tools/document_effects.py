@@ -7,13 +7,15 @@ python tools/document_effects.py
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 
-from wheel_terra_estimator.cli.effects import as_markdown
+from wheel_terra_estimator.cli.effects import left_aside, prior_in_words, touched
 from wheel_terra_estimator.reporting.style import LINE_COLOURS, picture_style
 from wheel_terra_estimator.terramechanics.effects import Effect, catalogue
+from wheel_terra_estimator.terramechanics.effects import learned_closure as law
 from wheel_terra_estimator.terramechanics.model import WheelSoilModel
 from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
 from wheel_terra_estimator.terramechanics.soil import Soil
@@ -66,6 +68,83 @@ def draw(effect: Effect, path: Path) -> None:
         axes[0].invert_yaxis()
         axes[0].legend(fontsize=7)
         figure.savefig(path, metadata={'Date': None})
+
+
+def as_markdown(effects: Mapping[str, Effect]) -> str:
+    """Return the catalogue as a page of the documentation."""
+    lines = [
+        '# Effects',
+        '',
+        '<!-- Written by `python tools/document_effects.py`; do not edit. -->',
+        '',
+        'Every physical or instrument effect that the models know. Each is off unless a model file '
+        'switches it on (`effects.<name>.enabled: true`); the same terms then run in the reference '
+        'quadrature, in the closed form and in the filter. Where an effect has several forms, '
+        '`effects.<name>.form` chooses one. A figure shows what the first parameter '
+        'does to a wheel of 157 mm radius with 10 mm lugs under 80 N in HIT-LSS1 sand.',
+        '',
+        '| effect | stands for | touches |',
+        '|---|---|---|',
+    ]
+    for effect in effects.values():
+        lines.append(f'| [`{effect.name}`](#{effect.name}) | {effect.claim} | {touched(effect)} |')
+    for effect in effects.values():
+        several = len(effect.forms) > 1
+        lines += ['', f'## {effect.name}', '']
+        for form in effect.forms:
+            if several:
+                first = ' (the first one, without a key)' if form is effect.forms[0] else ''
+                lines += [f'**`form: {form.form}`**{first}', '']
+            lines += [f'{form.claim[0].upper()}{form.claim[1:]}.', '', f'    {form.symbol}', '']
+            lines += _law_table() if form.sparse else _parameter_table(form)
+            lines.append(f'- Touches: {touched(form)}.')
+            if form.needs:
+                lines.append(f'- Needs to vary in a table: {", ".join(form.needs)}.')
+            lines += [f'- Valid: {form.validity}.', f'- Source: {form.source}.', '']
+        for other, separates in effect.confounded_with.items():
+            lines.append(f'- Nearly the same as `{other}`; what separates them: {separates}.')
+        if effect.incompatible_with:
+            lines.append(f'- Not together with: {", ".join(sorted(effect.incompatible_with))}.')
+        lines += [f'- {text[0].upper()}{text[1:]}.' for text in left_aside(effect)]
+        if lines[-1]:
+            lines.append('')
+        if not effect.sparse:
+            lines.append(f'![{effect.name}](models/effects/{effect.name}.svg)')
+    return '\n'.join(lines) + '\n'
+
+
+def _law_table() -> list[str]:
+    """Return what a sparse law may change, and with what, as tables."""
+    lines = [
+        'Flat lists of equal length: `targets`, `features`, `coefficients`, `coefficients_std`.',
+        '',
+        '| target | changes | how | bound of the change |',
+        '|---|---|---|---|',
+    ]
+    for name, target in law.TARGETS.items():
+        unit = '' if target.unit == '-' else f', in {target.unit}'
+        how = 'factor exp(x)' if target.factor else f'added{unit}'
+        lines.append(f'| `{name}` | {target.meaning} | {how} | {target.bound:g} |')
+    lines += ['', '| feature | value | varies with |', '|---|---|---|']
+    for name, feature in law.FEATURES.items():
+        columns = ', '.join(feature.columns) or '-'
+        only = f' ({", ".join(f"`{t}`" for t in feature.targets)} only)' if feature.targets else ''
+        lines.append(f'| `{name}` | {feature.meaning.replace("|", "&#124;")}{only} | {columns} |')
+    return [*lines, '']
+
+
+def _parameter_table(form: Effect) -> list[str]:
+    lines = [
+        '| parameter | unit | meaning | default | range | prior |',
+        '|---|---|---|---|---|---|',
+    ]
+    for p in form.parameters:
+        note = '' if p.free else ' (not fitted)'
+        lines.append(
+            f'| `{p.name}` | {p.unit} | {p.meaning}{note} | {p.default:g} '
+            f'| {p.lower:g} to {p.upper:g} | {prior_in_words(p)} |'
+        )
+    return [*lines, '']
 
 
 def main() -> None:

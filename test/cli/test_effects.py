@@ -8,8 +8,8 @@ import json
 from pathlib import Path
 
 import pytest
+from document_effects import as_markdown
 
-from wheel_terra_estimator.cli.effects import as_markdown
 from wheel_terra_estimator.cli.main import main
 from wheel_terra_estimator.terramechanics import effects as catalogue_module
 from wheel_terra_estimator.terramechanics.effects import catalogue

@@ -11,13 +11,14 @@ import subprocess
 import sys
 import types
 
+import document_commands
 import pytest
+from complete_shells import scripts
 from hypothesis import given
 from hypothesis import strategies as st
 
 from wheel_terra_estimator import __version__
-from wheel_terra_estimator.cli import completion, documentation, main
-from wheel_terra_estimator.cli.completion.__main__ import scripts
+from wheel_terra_estimator.cli import completion, main
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.worker_pool import worker_pool
 
@@ -140,7 +141,7 @@ def test_the_shipped_completion_is_that_of_the_parsers(shell, text, capsys):
     with pytest.raises(SystemExit) as end:
         main.main(['--print-completion', shell])
     assert end.value.code == 0
-    assert capsys.readouterr().out == text, 'run python -m wheel_terra_estimator.cli.completion'
+    assert capsys.readouterr().out == text, 'run python tools/complete_shells.py'
 
 
 @pytest.mark.parametrize(
@@ -183,9 +184,8 @@ def test_help_is_short_and_whole():
 
 
 def test_the_page_of_commands_is_that_of_the_parsers():
-    assert documentation.path().read_text(encoding='utf-8') == documentation.page(), (
-        'run python -m wheel_terra_estimator.cli.documentation'
-    )
+    page = document_commands.PAGE.read_text(encoding='utf-8')
+    assert page == document_commands.page(), 'run python tools/document_commands.py'
 
 
 def test_ctrl_c_while_the_commands_are_loaded_is_an_interrupt(monkeypatch, capsys):

@@ -4,18 +4,12 @@
 
 from __future__ import annotations
 
-import importlib.util
 import re
-from pathlib import Path
 
+import formulas
 import pytest
 
 from wheel_terra_estimator.terramechanics.effects import catalogue
-
-SOURCE = Path(__file__).resolve().parents[2] / 'tools' / 'formulas.py'
-SPECIFICATION = importlib.util.spec_from_file_location('formulas', SOURCE)
-formulas = importlib.util.module_from_spec(SPECIFICATION)
-SPECIFICATION.loader.exec_module(formulas)
 
 SYMBOLS = [form.symbol for effect in catalogue().values() for form in effect.forms]
 

@@ -21,6 +21,7 @@ from wheel_terra_estimator.terramechanics.operating_points import OperatingPoint
 from wheel_terra_estimator.terramechanics.soil import Soil
 from wheel_terra_estimator.terramechanics.terms import Terms, build_contact, set_angles
 from wheel_terra_estimator.terramechanics.wheel import Wheel
+from wheel_terra_lab.terramechanics.decoupled_pull import decoupled_pull, decoupled_pull_shaped
 
 MOUND = {**EFFECTS, 'soil_mound': {'kappa': 1.5, 'onset': 0.2}}
 
@@ -59,7 +60,7 @@ def test_decoupled_pull_is_exact_for_triangles() -> None:
         answer = WheelSoilModel(soil, effects, 'triangles', strict=False).steady_state(row)
         good = answer.flags == 0
         R = row.wheel.radius + effects['lug_shear_radius']['lam'] * row.wheel.lug_height
-        pull = closed_form.decoupled_pull(
+        pull = decoupled_pull(
             answer.torque,
             row.normal_load,
             answer.entrance_angle,
@@ -84,7 +85,7 @@ def family_errors(method: str, seed: int) -> tuple[np.ndarray, np.ndarray, np.nd
         terms = Terms(model.effects)
         contact = build_contact(driving, model._soil, 'bekker', terms)
         set_angles(contact, truth.entrance_angle, None, terms)
-        shaped = closed_form.decoupled_pull_shaped(truth.torque, contact)
+        shaped = decoupled_pull_shaped(truth.torque, contact)
         decoupled += list(((shaped - truth.drawbar_pull) / row.normal_load)[good])
     return np.abs(pull), np.abs(depth), np.abs(decoupled)
 
@@ -107,10 +108,10 @@ def test_pull_from_torque_hardly_asks_for_the_soil() -> None:
     terms = Terms(model.effects)
     contact = build_contact(row, model._soil, 'bekker', terms)
     set_angles(contact, truth.entrance_angle, None, terms)
-    right = closed_form.decoupled_pull_shaped(truth.torque, contact)
+    right = decoupled_pull_shaped(truth.torque, contact)
     contact.cohesion, contact.tan_friction = 2.0 * contact.cohesion, 0.5 * contact.tan_friction
     contact.shear_modulus = 2.0 * contact.shear_modulus
-    wrong = closed_form.decoupled_pull_shaped(truth.torque, contact)
+    wrong = decoupled_pull_shaped(truth.torque, contact)
     assert right == pytest.approx(truth.drawbar_pull, abs=0.01 * 80.0)
     assert wrong == pytest.approx(right, abs=0.01 * 80.0)
 
@@ -311,6 +312,6 @@ def test_shear_that_changes_its_sign_in_the_contact_is_shared_evenly() -> None:
         velocity_ratio=radius * np.linspace(1.145, 1.155, 21),  # a skid in which the sign changes
     )
     for torque in (-4.0, 1.0):
-        shaped = closed_form.decoupled_pull_shaped(torque, contact)
-        even = closed_form.decoupled_pull(torque, load, t1, tm, t2, radius)
+        shaped = decoupled_pull_shaped(torque, contact)
+        even = decoupled_pull(torque, load, t1, tm, t2, radius)
         assert shaped == pytest.approx(np.full(21, even), abs=0.005 * load)

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 from terra_tools import WHEEL
 
-from wheel_terra_estimator.terramechanics.closed_form import decoupled_pull
 from wheel_terra_estimator.terramechanics.model import WheelSoilModel
 from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
 from wheel_terra_estimator.terramechanics.soil import Soil
 from wheel_terra_estimator.terramechanics.wheel import Wheel
+from wheel_terra_lab.terramechanics.decoupled_pull import decoupled_pull
 from wheel_terra_lab.terramechanics.equivalent_contact import equivalent_contact
 
 EFFECTS = {

@@ -34,9 +34,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('names', nargs='*', metavar='NAME', help='only these, in full')
     parser.add_argument(
         '--format',
-        choices=('text', 'json', 'markdown'),
+        choices=('text', 'json'),
         default='text',
-        help='text (default), json for programs, markdown for the documentation',
+        help='text (default), or json for programs',
     )
     parser.add_argument(
         '--json',
@@ -69,8 +69,7 @@ def run(arguments: argparse.Namespace) -> int:
             hint = f"did you mean '{close[0]}'? " if close else ''
             raise UserError(f'no effect {name}; {hint}there are: {", ".join(known)}')
     chosen = {name: known[name] for name in arguments.names or known}
-    write = {'text': as_text, 'json': as_json, 'markdown': as_markdown}[arguments.format]
-    sys.stdout.write(write(chosen))
+    sys.stdout.write(as_json(chosen) if arguments.format == 'json' else as_text(chosen))
     return 0
 
 
@@ -91,7 +90,7 @@ def as_text(effects: Mapping[str, Effect]) -> str:
             if form is not effect.forms[0]:
                 lines += [*_wrapped('valid: ', form.validity), *_wrapped('source: ', form.source)]
         kind = 'instrument' if effect.instrument else 'soil'
-        lines += _wrapped('touches: ', f'{_touched(effect)} ({kind})')
+        lines += _wrapped('touches: ', f'{touched(effect)} ({kind})')
         if effect.needs:
             lines += _wrapped('needs: ', ', '.join(effect.needs))
         for other, separates in effect.confounded_with.items():
@@ -100,7 +99,7 @@ def as_text(effects: Mapping[str, Effect]) -> str:
             lines += _wrapped('not with: ', ', '.join(sorted(effect.incompatible_with)))
         if effect.sparse:
             lines.append('- Proposed by the discrepancy workflow, never named.')
-        for text in _aside(effect):
+        for text in left_aside(effect):
             lines += _wrapped('', text)
         lines += _wrapped('valid: ', effect.validity)
         lines += _wrapped('source: ', effect.source)
@@ -108,7 +107,7 @@ def as_text(effects: Mapping[str, Effect]) -> str:
     return '\n'.join(blocks).replace('±', '+-')
 
 
-def _aside(effect: Effect) -> list[str]:
+def left_aside(effect: Effect) -> list[str]:
     """Return which forms the discrepancy workflow leaves aside, and why."""
     found = []
     for form in effect.forms:
@@ -124,7 +123,7 @@ def _parameter_text(p: EffectParameter) -> list[str]:
     return _wrapped(
         f'{p.name} [{p.unit}]: ',
         f'{p.meaning}; default {p.default:g}, range {p.lower:g} to {p.upper:g}, '
-        f'prior {_prior(p)}{note}',
+        f'prior {prior_in_words(p)}{note}',
     )
 
 
@@ -133,89 +132,12 @@ def as_json(effects: Mapping[str, Effect]) -> str:
     return json.dumps([_record(effect) for effect in effects.values()], indent=2) + '\n'
 
 
-def as_markdown(effects: Mapping[str, Effect]) -> str:
-    """Return the catalogue as a page of the documentation."""
-    lines = [
-        '# Effects',
-        '',
-        '<!-- Written by `python tools/document_effects.py`; do not edit. -->',
-        '',
-        'Every physical or instrument effect that the models know. Each is off unless a model file '
-        'switches it on (`effects.<name>.enabled: true`); the same terms then run in the reference '
-        'quadrature, in the closed form and in the filter. Where an effect has several forms, '
-        '`effects.<name>.form` chooses one. A figure shows what the first parameter '
-        'does to a wheel of 157 mm radius with 10 mm lugs under 80 N in HIT-LSS1 sand.',
-        '',
-        '| effect | stands for | touches |',
-        '|---|---|---|',
-    ]
-    for effect in effects.values():
-        lines.append(f'| [`{effect.name}`](#{effect.name}) | {effect.claim} | {_touched(effect)} |')
-    for effect in effects.values():
-        several = len(effect.forms) > 1
-        lines += ['', f'## {effect.name}', '']
-        for form in effect.forms:
-            if several:
-                first = ' (the first one, without a key)' if form is effect.forms[0] else ''
-                lines += [f'**`form: {form.form}`**{first}', '']
-            lines += [f'{form.claim[0].upper()}{form.claim[1:]}.', '', f'    {form.symbol}', '']
-            lines += _law_table() if form.sparse else _parameter_table(form)
-            lines.append(f'- Touches: {_touched(form)}.')
-            if form.needs:
-                lines.append(f'- Needs to vary in a table: {", ".join(form.needs)}.')
-            lines += [f'- Valid: {form.validity}.', f'- Source: {form.source}.', '']
-        for other, separates in effect.confounded_with.items():
-            lines.append(f'- Nearly the same as `{other}`; what separates them: {separates}.')
-        if effect.incompatible_with:
-            lines.append(f'- Not together with: {", ".join(sorted(effect.incompatible_with))}.')
-        lines += [f'- {text[0].upper()}{text[1:]}.' for text in _aside(effect)]
-        if lines[-1]:
-            lines.append('')
-        if not effect.sparse:
-            lines.append(f'![{effect.name}](models/effects/{effect.name}.svg)')
-    return '\n'.join(lines) + '\n'
-
-
 def _law_text() -> list[str]:
     """Return what a sparse law may change, and with what, for a terminal."""
     return [
         *_wrapped('targets: ', ', '.join(law.TARGETS)),
         *_wrapped('features: ', ', '.join(law.FEATURES)),
     ]
-
-
-def _law_table() -> list[str]:
-    """Return what a sparse law may change, and with what, as tables."""
-    lines = [
-        'Flat lists of equal length: `targets`, `features`, `coefficients`, `coefficients_std`.',
-        '',
-        '| target | changes | how | bound of the change |',
-        '|---|---|---|---|',
-    ]
-    for name, target in law.TARGETS.items():
-        unit = '' if target.unit == '-' else f', in {target.unit}'
-        how = 'factor exp(x)' if target.factor else f'added{unit}'
-        lines.append(f'| `{name}` | {target.meaning} | {how} | {target.bound:g} |')
-    lines += ['', '| feature | value | varies with |', '|---|---|---|']
-    for name, feature in law.FEATURES.items():
-        columns = ', '.join(feature.columns) or '-'
-        only = f' ({", ".join(f"`{t}`" for t in feature.targets)} only)' if feature.targets else ''
-        lines.append(f'| `{name}` | {feature.meaning.replace("|", "&#124;")}{only} | {columns} |')
-    return [*lines, '']
-
-
-def _parameter_table(form: Effect) -> list[str]:
-    lines = [
-        '| parameter | unit | meaning | default | range | prior |',
-        '|---|---|---|---|---|---|',
-    ]
-    for p in form.parameters:
-        note = '' if p.free else ' (not fitted)'
-        lines.append(
-            f'| `{p.name}` | {p.unit} | {p.meaning}{note} | {p.default:g} '
-            f'| {p.lower:g} to {p.upper:g} | {_prior(p)} |'
-        )
-    return [*lines, '']
 
 
 def _record(effect: Effect) -> dict[str, Any]:
@@ -258,11 +180,13 @@ def _law(form: Effect) -> dict[str, Any]:
     }
 
 
-def _touched(effect: Effect) -> str:
+def touched(effect: Effect) -> str:
+    """Return which quantities an effect touches, in words."""
     return ', '.join(name.replace('_', ' ') for name in TOUCHABLE if name in effect.touches)
 
 
-def _prior(p: Any) -> str:
+def prior_in_words(p: EffectParameter) -> str:
+    """Return the prior of a parameter, in words."""
     if p.prior == 'half_normal':
         return f'half-normal, scale {p.prior_scale:g}'
     return f'normal, {p.prior_mean:g} ± {p.prior_scale:g}'

@@ -4,7 +4,7 @@
 
 To add a parameter, add an entry to ``parameters.yaml``: the reader then accepts and checks the key,
 the node declares it, ``configuration.<section>.<name>`` has its value, and
-``python -m wheel_terra_estimator.configuration.documentation`` writes it to ``docs/parameters.md``
+``python tools/document_parameters.py`` writes it to ``docs/parameters.md``
 (a test says when that was forgotten). A key that goes moves to ``retired``, with what became of it.
 
 The keys ``effects.<name>.enabled``, ``effects.<name>.form`` (where there are several),

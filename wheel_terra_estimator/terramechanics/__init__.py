@@ -6,7 +6,7 @@
 - Laws: ``kinematics`` (slip, shear displacement), ``stresses`` (pressure, shear), ``contact`` and
   ``terms`` (one contact with its effects).
 - Forces at given angles: ``quadrature`` (reference), ``branch_moments`` (closed form),
-  ``closed_form`` (its use with effects, the triangles A, B, C, pull from torque).
+  ``closed_form`` (its use with effects, the triangles A, B, C).
 - Load to sinkage, pull, torque: ``model`` (arrays, by ``load_balance``); sinkage to torque and
   pull: ``conditioned`` by ``balanced_branches`` (floats, for the filter).
 - Questions: ``slope_locomotion``, ``entrapment``.

@@ -20,7 +20,8 @@ from typing import Any
 import numpy as np
 
 from wheel_terra_estimator.terramechanics.checks import check_range
-from wheel_terra_estimator.terramechanics.closed_form import coefficients, decoupled_pull
+from wheel_terra_estimator.terramechanics.closed_form import coefficients
+from wheel_terra_lab.terramechanics.decoupled_pull import decoupled_pull
 
 
 @dataclass(frozen=True)

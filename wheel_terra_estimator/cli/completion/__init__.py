@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Completion in bash and zsh, shipped as files that ``python -m`` this package writes."""
+"""Completion in bash and zsh, shipped as files that ``tools/complete_shells.py`` writes."""
 
 from __future__ import annotations
 

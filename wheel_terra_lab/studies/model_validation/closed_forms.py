@@ -29,6 +29,7 @@ from wheel_terra_estimator.terramechanics.terms import (
 )
 from wheel_terra_estimator.terramechanics.wheel import Wheel
 from wheel_terra_lab.studies.model_validation.fitting import FloatArray
+from wheel_terra_lab.terramechanics.decoupled_pull import decoupled_pull, decoupled_pull_shaped
 
 FORMS = {
     'branch moments': closed_form.forces,
@@ -174,7 +175,7 @@ def table(count: int, seed: int) -> list[str]:
         told.append(f'{100 * np.quantile(given, 0.95):.1f} % ({label})')
         set_angles(cases.contact, cases.angle, None, cases.terms)
         contact = cases.contact
-        pull = closed_form.decoupled_pull(
+        pull = decoupled_pull(
             cases.torque,
             cases.load,
             contact.entrance_angle,
@@ -182,13 +183,13 @@ def table(count: int, seed: int) -> list[str]:
             contact.leaving_angle,
             contact.shear_radius,
         )
-        shaped = closed_form.decoupled_pull_shaped(cases.torque, contact)
+        shaped = decoupled_pull_shaped(cases.torque, contact)
         doubtful = replace(contact)
         random = np.random.default_rng(seed + 3)
         for field in ('cohesion', 'tan_friction', 'shear_modulus'):
             factor = 2.0 ** random.uniform(-1.0, 1.0, count)
             setattr(doubtful, field, getattr(contact, field) * factor)
-        guessed = closed_form.decoupled_pull_shaped(cases.torque, doubtful)
+        guessed = decoupled_pull_shaped(cases.torque, doubtful)
         for form, value in (
             ('A, B, C: no soil', pull),
             ('shaped by the soil', shaped),

@@ -1,6 +1,9 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Writes ``docs/commands.md`` from the parsers of the commands: ``python -m`` this module."""
+"""Write docs/commands.md from the parsers of the commands.
+
+python tools/document_commands.py
+"""
 
 from __future__ import annotations
 
@@ -11,10 +14,10 @@ from pathlib import Path
 from wheel_terra_estimator.cli.main import LABORATORY, sub_parsers
 from wheel_terra_estimator.cli.parser import Parser
 
+PAGE = Path(__file__).resolve().parents[1] / 'docs' / 'commands.md'
 _INTRODUCTION = """# Commands
 
-Written by `python -m wheel_terra_estimator.cli.documentation` from the help of the commands; do not
-edit.
+Written by `python tools/document_commands.py` from the help of the commands; do not edit.
 
 `wheel-terra COMMAND --help` says what most runs need, `--help-all` the same as this page. After
 colcon the commands are `ros2 run wheel_terra_estimator wheel-terra COMMAND`. Every command takes
@@ -84,10 +87,5 @@ def _sentence(words: str) -> str:
     return f'{words[:1].upper()}{words[1:]}.' if words else ''
 
 
-def path() -> Path:
-    """Return where the page stands in a source tree."""
-    return Path(__file__).resolve().parents[2] / 'docs' / 'commands.md'
-
-
 if __name__ == '__main__':
-    path().write_text(page(), encoding='utf-8')
+    PAGE.write_text(page(), encoding='utf-8')

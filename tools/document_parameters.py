@@ -1,6 +1,9 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Writes ``docs/parameters.md`` from the declared table: ``python -m`` this module."""
+"""Write docs/parameters.md from the declared table.
+
+python tools/document_parameters.py
+"""
 
 from __future__ import annotations
 
@@ -9,10 +12,10 @@ from pathlib import Path
 from wheel_terra_estimator.configuration.parameters import Parameter, declared
 from wheel_terra_estimator.configuration.ros_yaml import format_value
 
+PAGE = Path(__file__).resolve().parents[1] / 'docs' / 'parameters.md'
 _INTRODUCTION = """# Parameters
 
-Written by `python -m wheel_terra_estimator.configuration.documentation` from the declared table;
-do not edit.
+Written by `python tools/document_parameters.py` from the declared table; do not edit.
 
 Every file is a ROS parameter file, the same for the node (`--params-file F`) and the commands
 (`--config F`, a path or the bare name of a shipped file, several times; later files win key by
@@ -74,11 +77,5 @@ def _row(parameter: Parameter) -> str:
     return f'| `{parameter.key}` | {default} | {unit} | {parameter.allowed} | {meaning} |'
 
 
-def path() -> Path:
-    """Return where the page stands in a source tree."""
-    return Path(__file__).resolve().parents[2] / 'docs' / 'parameters.md'
-
-
 if __name__ == '__main__':
-    path().write_text(page(), encoding='utf-8')
-    print(path())
+    PAGE.write_text(page(), encoding='utf-8')

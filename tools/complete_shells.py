@@ -1,6 +1,9 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Writes the completion of bash and zsh from the parsers of the commands."""
+"""Write the completion of bash and zsh from the parsers of the commands.
+
+python tools/complete_shells.py
+"""
 
 from __future__ import annotations
 
@@ -12,7 +15,7 @@ from wheel_terra_estimator.cli.completion import path
 from wheel_terra_estimator.cli.main import COMMANDS, sub_parsers
 from wheel_terra_estimator.configuration import shipped
 
-_HEAD = '# Written by python -m wheel_terra_estimator.cli.completion; do not edit.'
+_HEAD = '# Written by python tools/complete_shells.py; do not edit.'
 _BASH = """\
 {head}
 _wheel_terra() {{
