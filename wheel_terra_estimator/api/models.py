@@ -176,19 +176,7 @@ class Model:
     @property
     def wheel(self) -> Wheel:
         """The wheel (the first of a rover)."""
-        wheels = self.configuration.wheels
-        return Wheel(
-            *(
-                float(values[0])
-                for values in (
-                    wheels.radius,
-                    wheels.width,
-                    wheels.lug_height,
-                    wheels.lug_count,
-                    wheels.lug_thickness,
-                )
-            )
-        )
+        return self.configuration.wheels.wheel.map(lambda values: float(values[0]))
 
     def __repr__(self) -> str:
         """Return wheel, effects and soil in five lines, the first line of the soil's left out."""

@@ -218,12 +218,7 @@ class HistoryRecorder:
         general = (e.forward_velocity, e.forward_velocity_variance)
         row = np.concatenate([general, e.slip_class, *values.values()])
         self._rows.add(e.stamp, row)
-        running = bool(self._warnings) and self._warnings[-1].end is None
-        if e.stuck and not running:
-            self._warnings.append(StuckWarning(e.stamp, None, stuck_reason(e.reasons)))
-        elif running and not e.stuck:
-            last = self._warnings[-1]
-            self._warnings[-1] = StuckWarning(last.start, e.stamp, last.reason)
+        _follow(self._warnings, e.stuck, e.stamp, stuck_reason(e.reasons))
 
     def history(self) -> EstimateHistory:
         """Return what was collected."""
@@ -352,13 +347,13 @@ class _EstimateMessages:
         )
 
 
-def _follow(warnings: list[StuckWarning], stuck: bool, log_time: int) -> None:
-    """Open or close a warning, in log time for now."""
+def _follow(warnings: list[StuckWarning], stuck: bool, time: int, reason: str = '') -> None:
+    """Begin or end a warning at a time [ns]."""
     running = bool(warnings) and warnings[-1].end is None
     if stuck and not running:
-        warnings.append(StuckWarning(log_time, None, ''))
+        warnings.append(StuckWarning(time, None, reason))
     elif running and not stuck:
-        warnings[-1] = StuckWarning(warnings[-1].start, log_time, warnings[-1].reason)
+        warnings[-1] = replace(warnings[-1], end=time)
 
 
 def _in_stamps(warnings: list[StuckWarning], sets: dict[int, dict[str, Any]]) -> list[StuckWarning]:

@@ -13,7 +13,6 @@ from wheel_terra_estimator.configuration.readings import Readings
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.terramechanics.model import WheelSoilModel
 from wheel_terra_estimator.terramechanics.slope_locomotion import rover_climb
-from wheel_terra_estimator.terramechanics.wheel import Wheel
 
 if TYPE_CHECKING:
     from wheel_terra_estimator.configuration.configuration import Configuration
@@ -73,12 +72,7 @@ def climb(
         loads = weight * np.cos(slopes)[:, None]
     state = rover_climb(
         model,
-        Wheel(
-            *(
-                np.asarray(getattr(wheels, name), dtype=float)[chosen]
-                for name in ('radius', 'width', 'lug_height', 'lug_count', 'lug_thickness')
-            )
-        ),
+        wheels.wheel.map(lambda values: values[chosen]),
         loads,
         slopes,
         np.asarray(wheels.passes, dtype=float)[chosen],

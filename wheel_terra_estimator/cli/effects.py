@@ -28,6 +28,11 @@ EXAMPLES = (
     'wheel-terra effects lug_digging multipass',
 )
 
+_PARAMETER_FIELDS = (
+    'name', 'unit', 'meaning', 'default', 'lower', 'upper', 'neutral', 'prior', 'prior_mean',
+    'prior_scale',
+)  # fmt: skip
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
@@ -158,19 +163,7 @@ def _law(form: Effect) -> dict[str, Any]:
         'claim': form.claim,
         'symbol': form.symbol,
         'parameters': [
-            {
-                'name': p.name,
-                'unit': p.unit,
-                'meaning': p.meaning,
-                'default': p.default,
-                'lower': p.lower,
-                'upper': p.upper,
-                'neutral': p.neutral,
-                'prior': p.prior,
-                'prior_mean': p.prior_mean,
-                'prior_scale': p.prior_scale,
-                'fitted': p.free,
-            }
+            {name: getattr(p, name) for name in _PARAMETER_FIELDS} | {'fitted': p.free}
             for p in form.parameters
         ],
         'touches': [name for name in TOUCHABLE if name in form.touches],

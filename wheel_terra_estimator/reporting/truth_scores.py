@@ -31,6 +31,13 @@ LONGEST_BRIDGE = 0.5
 """Truth further away than this [s] is not compared."""
 TRUE_CLASSES = (SlipClass.LOW, SlipClass.MODERATE, SlipClass.HIGH, SlipClass.STUCK)
 CLASSES = (*TRUE_CLASSES, SlipClass.UNKNOWN)
+COMPARED = (
+    ('slip', 'slip', '-'),
+    ('sinkage', 'sinkage', 'm'),
+    ('drawbar_pull', 'drawbar_pull', 'N'),
+    ('velocity', 'forward_velocity', 'm/s'),
+)
+"""Field of a `Truth`, name of the quantity, unit."""
 
 
 @dataclass(frozen=True)
@@ -73,28 +80,15 @@ def truth_errors(
     """
     if not history.stamp.size:
         return None
-    values = history.values
     quantities = []
-    table = (
-        ('slip', '-', truth.slip, values['slip'], values['slip_std']),
-        ('sinkage', 'm', truth.sinkage, values['sinkage'], values['sinkage_std']),
-        (
-            'drawbar_pull',
-            'N',
-            truth.drawbar_pull,
-            values['drawbar_pull'],
-            values['drawbar_pull_std'],
-        ),
-        (
-            'forward_velocity',
-            'm/s',
-            truth.velocity,
-            history.forward_velocity[:, None],
-            history.forward_velocity_std[:, None],
-        ),
-    )
+    values = {
+        **history.values,
+        'velocity': history.forward_velocity[:, None],
+        'velocity_std': history.forward_velocity_std[:, None],
+    }
     classed = history.slip_class != SlipClass.UNKNOWN
-    for name, unit, true, seen, std in table:
+    for field, name, unit in COMPARED:
+        true, seen, std = getattr(truth, field), values[field], values[f'{field}_std']
         if true is None or not true.stamp.size:
             continue
         there = at_stamps(true, history.stamp)
@@ -236,13 +230,7 @@ def as_dict(errors: TruthErrors) -> dict[str, Any]:
     return {
         'source': errors.source,
         'quantities': {
-            q.name: {
-                'unit': q.unit,
-                'rms': q.rms,
-                'bias': q.bias,
-                'worst': q.worst,
-                'within_two_std': q.within_two_std,
-            }
+            q.name: {key: value for key, value in vars(q).items() if key != 'name'}
             for q in errors.quantities
         },
         'classes': [c.name.lower() for c in CLASSES],

@@ -64,27 +64,6 @@ def moment_spread(exponent: Any) -> Any:
     return (exponent + 1.0) / (second * second * (exponent + 3.0))
 
 
-def mean_share_front(displacement: Any, maths: Any = np) -> Any:
-    """Mobilised share of shear strength in front of the peak; argument j/K at its centroid.
-
-    The mean of exp(-j/K) over the branch, where j spreads from 0: (1 + x/8)^-8 (the mean over a
-    gamma distribution whose variance is that of the stress-weighted j) instead of exp(-x).
-    """
-    base = 1.0 / (1.0 + 0.125 * maths.abs(displacement))
-    base *= base
-    base *= base
-    return maths.copysign(1.0 - base * base, displacement)
-
-
-def mean_share_rear(displacement: Any, maths: Any = np) -> Any:
-    """Return the same behind the peak, where j spreads less around its mean: (1 + x/16)^-16."""
-    base = 1.0 / (1.0 + 0.0625 * maths.abs(displacement))
-    base *= base
-    base *= base
-    base *= base
-    return maths.copysign(1.0 - base * base, displacement)
-
-
 class BranchForces:
     """Forces of a contact whose peak and leaving angle are fixed shares of the entrance angle.
 
@@ -191,11 +170,12 @@ class BranchForces:
         Given are the sines of the entrance angle and of the places of both centroids.
         """
         roll, square = self._roll, angle * angle
-        # Mean shares of strength, written out: floats spend a third on calls. In front that of
-        # mean_share_front, behind that of mean_share_rear, corrected by `wide`, half the variance
-        # that j/K really has there: the mean of exp(-j/K) grows by P b/2 per variance, with
-        # P = b^16 and b = 1/(1 + y/16). Cohesion: (1 + x/4)^-4 at the middle in front (x from 0,
-        # evenly), a step from the centroid to the middle behind.
+        # Mean shares of strength: 1 minus the mean of exp(-j/K) over the side. In front, where j
+        # spreads from 0, that is (1 + x/8)^-8, the mean over a gamma distribution whose variance
+        # is that of the stress-weighted j; behind, where it spreads less, P = b^16 with
+        # b = 1/(1 + y/16), corrected by `wide`, half the variance that j/K really has there: the
+        # mean grows by P b/2 per variance. Cohesion: (1 + x/4)^-4 at the middle in front (x from
+        # 0, evenly), a step from the centroid to the middle behind.
         x = self._rim_front * angle - roll * (top - front)  # j/K in front, y behind
         y = self._rim_rear * angle - roll * (top - rear)
         pace = self._turn - roll * cos_rear

@@ -11,15 +11,27 @@ from __future__ import annotations
 
 import math
 from copy import copy
+from dataclasses import astuple
 from typing import NamedTuple
 
+import numpy as np
+
 from wheel_terra_estimator.terramechanics.balanced_branches import Direction, balanced_forces
+from wheel_terra_estimator.terramechanics.checks import check_range
 from wheel_terra_estimator.terramechanics.contact import Contact
-from wheel_terra_estimator.terramechanics.effects import catalogue
+from wheel_terra_estimator.terramechanics.effects import EffectSettings, catalogue, check_settings
 from wheel_terra_estimator.terramechanics.kinematics import slip_of_speed_ratio
 from wheel_terra_estimator.terramechanics.maths import ScalarMaths
-from wheel_terra_estimator.terramechanics.scalar_wheels import ScalarWheels
-from wheel_terra_estimator.terramechanics.terms import PEAK_MARGIN, Terms, set_angles
+from wheel_terra_estimator.terramechanics.operating_points import STANDARD_GRAVITY
+from wheel_terra_estimator.terramechanics.soil import Soil
+from wheel_terra_estimator.terramechanics.stresses import bearing_law
+from wheel_terra_estimator.terramechanics.terms import (
+    PEAK_MARGIN,
+    SOIL_NUMBERS,
+    Terms,
+    set_angles,
+)
+from wheel_terra_estimator.terramechanics.wheel import Wheel
 
 # Columns of the derivatives that ``ConditionedForces`` returns.
 INPUTS = (
@@ -63,17 +75,42 @@ class Forces(NamedTuple):
     clamped: bool
 
 
-class ConditionedForces(ScalarWheels):
+class ConditionedForces:
     """Torque and pull given slip, sinkage and load, with analytic derivatives.
 
-    Parameters are those of ``ScalarWheels``; cohesion, friction and K of the soil are
-    given anew with each call.
+    Parameters
+    ----------
+    wheel : Wheel
+        Floats, or (n,) arrays for n wheels.
+    soil : Soil
+        Floats; cohesion, friction and K are given anew with each call.
+    effects : mapping
+        Switched-on effects.
+    slip_radius : str
+        ``lug_tip`` or ``rim``: radius of the rim speed in speed ratios.
+    gravity : float
+        [m/s^2].
     """
 
-    def _prepare(self) -> None:
-        known = catalogue()
+    def __init__(
+        self,
+        wheel: Wheel,
+        soil: Soil,
+        effects: EffectSettings | None = None,
+        slip_radius: str = 'lug_tip',
+        gravity: float = STANDARD_GRAVITY,
+    ) -> None:
+        for name in SOIL_NUMBERS:
+            if np.ndim(getattr(soil, name)):
+                raise ValueError(
+                    f'soil {name} has shape {np.shape(getattr(soil, name))}; allowed is one number'
+                )
+        check_range('gravity', gravity, 0.0, unit='m/s^2', open_lower=True)
+        settings, known = check_settings(effects or {}), catalogue()
+        self._terms = Terms(settings)
+        self._wheels = _contacts(wheel, soil, slip_radius, gravity)
         self._on_inputs = self._terms.stages['on_inputs']
-        outputs = {n: values for n, values in self._settings.items() if known[n].on_outputs}
+        outputs = {n: values for n, values in settings.items() if known[n].on_outputs}
         self._on_sinkage = Terms(
             {n: v for n, v in outputs.items() if 'sinkage' in known[n].touches}
         ).stages['on_outputs']
@@ -84,7 +121,6 @@ class ConditionedForces(ScalarWheels):
         self._plain = self._proportional and not (self._on_inputs or self._on_sinkage)
         self._depth_of_reading = self._inverse_gain()
         self._modulus = [contact.bearing_modulus for contact, _ in self._wheels]
-        soil = self._soil
         self._exponent = float(soil.sinkage_exponent)
         self._peak_ratio = float(soil.peak_stress_ratio)
         self._leaving_ratio = float(soil.leaving_angle_ratio)
@@ -390,6 +426,33 @@ class ConditionedForces(ScalarWheels):
         for term, parameters in self._on_forces:
             term(contact, parameters, ScalarMaths)
         return contact.torque, contact.drawbar_pull
+
+
+def _contacts(
+    wheel: Wheel, soil: Soil, slip_radius: str, gravity: float
+) -> list[tuple[Contact, float]]:
+    """Return, per wheel, a contact with its geometry filled in and its slip radius [m]."""
+    if slip_radius not in ('lug_tip', 'rim'):
+        raise ValueError(f"slip radius is {slip_radius!r}; allowed is 'lug_tip' or 'rim'")
+    columns = np.broadcast_arrays(*(np.atleast_1d(np.asarray(v, float)) for v in astuple(wheel)))
+    contacts = []
+    blank: dict[str, float] = dict.fromkeys(Contact.__dataclass_fields__, 0.0)
+    for radius, width, height, count, thickness in zip(*(c.tolist() for c in columns), strict=True):
+        contact = Contact(**blank)
+        contact.radius = contact.rim_radius = radius
+        contact.width = width
+        contact.lug_height, contact.lug_count, contact.lug_thickness = height, count, thickness
+        contact.gravity, contact.density = gravity, float(soil.density)
+        contact.bearing_modulus, contact.reference_depth = bearing_law(
+            soil.pressure_law,
+            soil.cohesive_modulus,
+            soil.frictional_modulus,
+            width,
+            soil.cohesion,
+            soil.density * gravity,
+        )
+        contacts.append((contact, radius + height if slip_radius == 'lug_tip' else radius))
+    return contacts
 
 
 def _set_shares(contact: Contact, angle: float) -> tuple[float, float]:

@@ -99,12 +99,7 @@ def rover_climb(
     def per_wheel(value: Any) -> FloatArray:
         return np.broadcast_to(np.asarray(value, float), loads.shape).ravel()
 
-    each = Wheel(
-        *(
-            per_wheel(getattr(wheels, name))
-            for name in ('radius', 'width', 'lug_height', 'lug_count', 'lug_thickness')
-        )
-    )
+    each = wheels.map(per_wheel)
 
     def solve(slip: FloatArray) -> SteadyState:
         return free.steady_state(

@@ -4,7 +4,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, fields
 from typing import Any
 
 from wheel_terra_estimator.terramechanics.checks import check_range
@@ -47,3 +48,7 @@ class Wheel:
     def tip_radius(self) -> Any:
         """Radius of the lug tips, r + h [m]."""
         return self.radius + self.lug_height
+
+    def map(self, function: Callable[[Any], Any]) -> Wheel:
+        """Return the wheel whose fields are a function of these."""
+        return Wheel(*(function(getattr(self, f.name)) for f in fields(self)))

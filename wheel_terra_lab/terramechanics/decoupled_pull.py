@@ -12,12 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from wheel_terra_estimator.terramechanics.branch_moments import (
-    branch_moments,
-    mean_share_front,
-    mean_share_rear,
-    moment_spread,
-)
+from wheel_terra_estimator.terramechanics.branch_moments import branch_moments, moment_spread
 from wheel_terra_estimator.terramechanics.closed_form import coefficients
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.kinematics import shear_displacement
@@ -61,8 +56,8 @@ def decoupled_pull_shaped(torque: Any, contact: Contact, maths: Any = np) -> Any
     area, centroid = branch_moments(contact.sinkage_exponent, front / (t1 + tm))
     spread = 0.5 * moment_spread(contact.sinkage_exponent)
     places = (
-        (front, t1 - front * centroid, t1 - 0.5 * front, mean_share_front),
-        (rear, t2 + rear * centroid, tm - 0.5 * rear, mean_share_rear),
+        (front, t1 - front * centroid, t1 - 0.5 * front, _mean_share_front),
+        (rear, t2 + rear * centroid, tm - 0.5 * rear, _mean_share_rear),
     )
     shares = [
         mean_share(shear_displacement(angle, t1, R, ratio, maths) / contact.shear_modulus, maths)
@@ -98,3 +93,24 @@ def decoupled_pull_shaped(torque: Any, contact: Contact, maths: Any = np) -> Any
         down = (friction_y + mix * cohesion_y) / total
         sigma = (unit_load - thrust * down) / (contact.radius * normal_x)
     return contact.width * (thrust * along - contact.radius * sigma * normal_y)
+
+
+def _mean_share_front(displacement: Any, maths: Any = np) -> Any:
+    """Mobilised share of shear strength in front of the peak; argument j/K at its centroid.
+
+    The mean of exp(-j/K) over the branch, where j spreads from 0: (1 + x/8)^-8 (the mean over a
+    gamma distribution whose variance is that of the stress-weighted j) instead of exp(-x).
+    """
+    base = 1.0 / (1.0 + 0.125 * maths.abs(displacement))
+    base *= base
+    base *= base
+    return maths.copysign(1.0 - base * base, displacement)
+
+
+def _mean_share_rear(displacement: Any, maths: Any = np) -> Any:
+    """Return the same behind the peak, where j spreads less around its mean: (1 + x/16)^-16."""
+    base = 1.0 / (1.0 + 0.0625 * maths.abs(displacement))
+    base *= base
+    base *= base
+    base *= base
+    return maths.copysign(1.0 - base * base, displacement)
