@@ -295,7 +295,7 @@ def test_unexplained_scatter_is_not_called_a_misfit_of_nothing():
     from wheel_terra_estimator.discrepancy.selection.remainder import Remainder
 
     def said(amplitude):
-        left = Remainder(1.0, 1.0, amplitude, 1e-6, soil_p_value=0.5)
+        left = Remainder(1.0, 1.0, amplitude, 1e-6, pull=0.0)
         return sentence(SimpleNamespace(word='unexplained'), (), 1e-6, left, 0.0)
 
     assert '12 % of the range' in said(0.12)
@@ -381,7 +381,7 @@ def test_two_shares_of_the_gap_that_closed_are_shown_as_percentages(named):
 def test_how_far_a_name_worsens_a_quantity_is_in_squares_of_its_noise(monkeypatch):
     """Errors of 3 where there were 2, at a noise of 5: (9 - 4) / 25."""
     monkeypatch.setattr(decision.significance, 'chi_square_p_value', lambda *_: 1.0)
-    monkeypatch.setattr(decision.significance, 'soil_pulls', lambda *_: {'cohesion': -3.5})
+    monkeypatch.setattr(decision.significance, 'farthest_pull', lambda *_: 3.5)
     findings = SimpleNamespace(
         nothing=SimpleNamespace(outputs=np.zeros((4, 3))),
         noise=SimpleNamespace(std=np.ones((4, 3))),

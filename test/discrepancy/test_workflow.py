@@ -85,6 +85,21 @@ def run(table, values, **options):
                     **options)  # fmt: skip
 
 
+@pytest.mark.parametrize(('stated', 'verdict'), [(0.02, 'unexplained'), (0.1, 'agrees')])
+def test_an_effect_that_is_on_is_believed_as_far_as_its_deviation_goes(stated, verdict):
+    """True 0.2, configured 0.03: seven deviations off, or a good one."""
+    table, values, soil, rows = make('sweep40', ('slip_sinkage_exponent',))
+    kind = LISTED['slip_sinkage_exponent'].typical(rows, soil)
+    prefix = 'effects.slip_sinkage_exponent'
+    on = {f'{prefix}.enabled': True, f'{prefix}.n1': 0.03, f'{prefix}.n1_std': stated}
+    diagnosis = run(table, {**values, **on}, options=Options(effects=()))
+    shift = next(s for s in diagnosis.moved if s.name == f'{prefix}.n1')
+    assert shift.after == pytest.approx(kind, abs=0.03)
+    assert shift.pull == pytest.approx((shift.after - 0.03) / stated)
+    assert diagnosis.to_dict()['soil_pulls'][shift.name]['std'] == pytest.approx(stated)
+    assert diagnosis.verdict == verdict
+
+
 @pytest.mark.parametrize(
     ('name', 'factor'),
     [

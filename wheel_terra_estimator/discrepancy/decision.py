@@ -44,7 +44,7 @@ from wheel_terra_estimator.terramechanics.effects.learned_closure import NAME as
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.intp]
 
-_USUAL_PULL = 2.5  # stated deviations: a right name leaves no soil number pulled farther
+_USUAL_PULL = 2.5  # stated deviations: farther than that a pull makes a name less sure
 _AT_NOISE = 1.2  # times the noise: a quantity that was never off
 _MOST_TRIED = 3  # doubtful names, after which none is given
 # A name is given where it, or one of those that the rows cannot tell from it, is more likely right
@@ -189,7 +189,7 @@ def _left_open(
     findings = decision.findings
     if decision.verdict.word not in OPEN:
         return decision
-    law = laws.beside(decision, decision.left.only_soil)
+    law = laws.beside(decision, decision.left.only_far)
     # Estimated noise may be next to nothing beside a few smooth rows.
     exact = 'estimated' not in findings.noise.origin.values()
     variance = findings.setting.problem.variance(0.0 if exact else FIT_FLOOR)
@@ -285,7 +285,7 @@ def _what_rows_show(
 
     ``worse``: how far an effect worsens a quantity; ``idle``: share of its signature in quantities
     that were never off; ``misfit``: how improbable the residual is; ``pull``: the
-    largest pull of a soil number beyond ``_USUAL_PULL`` of its stated deviations.
+    largest pull of a configured number beyond ``_USUAL_PULL`` of its stated deviations.
     """
     change = (fitted.outputs - findings.nothing.outputs)[: len(findings.noise.std)]
     worse, idle, total = 0.0, 0.0, 1e-12
@@ -297,8 +297,8 @@ def _what_rows_show(
         total += square
         idle += square if item.refit < _AT_NOISE * item.noise else 0.0
     misfit = significance.chi_square_p_value(fitted, fitted.variance)
-    pulls = significance.soil_pulls(fitted) if findings.setting.forward.active is None else {}
-    largest = max(map(abs, pulls.values()), default=0.0)
+    alone = findings.setting.forward.active is None  # a reference's structural error pulls as well
+    largest = significance.farthest_pull(fitted) if alone else 0.0
     return {
         'worse': float(np.tanh(worse)),
         'idle': idle / total,

@@ -66,7 +66,8 @@ def render(
     gap_p_value = significance.chi_square_p_value(decision.nothing, decision.variance)
     law = None if proposal is None else proposal.fit
     along = changes_along_rows(table, decision.curves.after, decision.curves.band)
-    soil = _soil_shifts(findings, after, variance)
+    soil = _shifts(findings, after, variance, 'soil')
+    moved = (*soil, *_shifts(findings, after, variance, *setting.forward.base_effects))
     return Diagnosis(
         verdict=decision.verdict.word,
         sentence=words.sentence(
@@ -91,6 +92,7 @@ def render(
         curves=decision.curves,
         noise=replace(findings.noise, std=findings.noise.std[: len(table)]),
         soil=soil,
+        moved=moved,
         outliers=tuple(
             (r, QUANTITIES[q], size) for r, q, size in findings.outliers if r < len(table)
         ),
@@ -99,7 +101,7 @@ def render(
         remainder_amplitude=left.amplitude,
         floor=decision.floor,
         notes=(
-            *words.notes(both, findings, after, soil, stretch),
+            *words.notes(both, findings, after, moved, stretch),
             *(f'{change.text}; look for what changed there' for change in along),
             *words.untried({e.name: known_alike(e.name, findings, known) for e in effects}),
         ),
@@ -200,7 +202,7 @@ def _proposal(decision: Decision) -> Proposal | None:
     base = _parameters(found.fit, base=True)
     return replace(
         found,
-        soil=_soil_shifts(findings, found.fit, decision.variance),
+        soil=_shifts(findings, found.fit, decision.variance, 'soil'),
         refitted={key: value for key, value in base.items() if not key.startswith(f'{NAME}.')},
     )
 
@@ -297,18 +299,21 @@ def _next(decision: Decision) -> tuple[NextMeasurement, ...]:
     return next_measurement.propose(findings.setting, after, rivals, noise)
 
 
-def _soil_shifts(findings: Findings, after: Fit, variance: FloatArray) -> tuple[SoilShift, ...]:
+def _shifts(
+    findings: Findings, after: Fit, variance: FloatArray, *owners: str
+) -> tuple[SoilShift, ...]:
+    """Return the configured numbers of the soil, or of effects that were on, before and after."""
     weighted = after.jacobian / variance[:, None]
     covariance = np.linalg.inv(weighted.T @ after.jacobian + np.diag(after.prior))
     refit = findings.nothing.values()
     found = []
     for index, c in enumerate(after.coordinates):
-        if c.owner != 'soil':
+        if c.owner not in owners or c.role != 'believed':
             continue
         u = float(after.u[index])
         found.append(
             SoilShift(
-                c.name,
+                c.name if c.owner == 'soil' else f'effects.{c.key}',
                 float(c.value(0.0)),
                 c.deviation(0.0, 1.0 / WIDENING),
                 refit[c.key],

@@ -211,7 +211,7 @@ class NextMeasurement:
 
 @dataclass(frozen=True)
 class SoilShift:
-    """A soil parameter before and after the fit.
+    """A soil number, or a parameter of an effect that was on, before and after the fit.
 
     ``pull`` is the shift in deviations of ``prior_std``, ``source`` says where these come from.
     """
@@ -279,6 +279,8 @@ class Diagnosis:
     curves: Curves = field(metadata=_ASIDE)
     noise: Noise = field(metadata=_ASIDE)
     soil: tuple[SoilShift, ...]
+    # The same with the parameters of effects that were on
+    moved: tuple[SoilShift, ...] = field(metadata=_ASIDE)
     # Row index, quantity, deviation in standard deviations of the cells that were set apart
     outliers: tuple[tuple[int, str, float], ...] = field(metadata=_ASIDE)
     gap_p_value: float  # of the test "the soil alone explains these rows"
@@ -315,7 +317,7 @@ class Diagnosis:
         freely = {
             'soil_pulls': {
                 key: {'pull': shift.pull, 'std': std, 'source': shift.source}
-                for shift in self.soil
+                for shift in self.moved
                 for key, std in (self._stated_std(shift),)
             },
             'not_visible': sorted(self.not_visible),

@@ -27,7 +27,7 @@ FloatArray = NDArray[np.float64]
 WIDENING = 2.5
 WORSE_SHARE = 0.15  # prior probability of the wider one
 # (width in units of the coordinates, prior probability): as stated, and worse.
-SOIL_WIDTHS = ((1.0 / WIDENING, 1.0 - WORSE_SHARE), (1.0, WORSE_SHARE))
+BELIEVED_WIDTHS = ((1.0 / WIDENING, 1.0 - WORSE_SHARE), (1.0, WORSE_SHARE))
 AS_THEY_ARE = ((1.0, 1.0),)  # of coordinates that are held on purpose
 # The same for the strength of an effect: small, large and very large ones (the catalogue cannot
 # know the size of the machine) are weighed against each other, with these shares.
@@ -53,13 +53,14 @@ class Coordinate:
     lower: float = -math.inf
     upper: float = math.inf
     logarithmic: bool = False  # the transform is the exponential
-    # ``soil``, ``strength`` (first of an effect, or without effect at its centre) or ``shape``
-    role: str = 'soil'
+    # ``believed`` (configured: soil, effects that are on), ``strength`` (first of a candidate, or
+    # without effect at its centre) or ``shape``
+    role: str = 'believed'
     neutral: float = 0.0  # value of an effect's parameter at which the term vanishes
     # For people
     unit: str = '-'
     meaning: str = ''
-    source: str = ''  # where the deviation of a soil number comes from
+    source: str = ''  # where the deviation of a configured number comes from
 
     @property
     def key(self) -> str:
@@ -120,10 +121,10 @@ def soil_coordinates(soil: Soil, known: Mapping[str, Deviation]) -> tuple[Coordi
 
 
 def narrowed(coordinates: Sequence[Coordinate], factor: float) -> tuple[Coordinate, ...]:
-    """Return the coordinates with the soil's prior so many times narrower."""
+    """Return the coordinates with the priors of configured numbers so many times narrower."""
     return tuple(
         replace(c, scale=c.scale / factor, lower=factor * c.lower, upper=factor * c.upper)
-        if c.owner == 'soil'
+        if c.role == 'believed'
         else c
         for c in coordinates
     )
@@ -170,20 +171,14 @@ def base_coordinates(
         for p in catalogue[name].parameters:
             std = stated.get(catalogue[name].base_name, {}).get(p.name, 0.0)
             if std > 0.0:
-                centre = values[p.name]
+                centre, scale = values[p.name], WIDENING * std
                 found.append(
                     Coordinate(
-                        name,
-                        p.name,
-                        centre,
-                        std,
-                        (p.lower - centre) / std,
-                        (p.upper - centre) / std,
-                        neutral=p.neutral,
-                        unit=p.unit,
-                        meaning=p.meaning,
+                        name, p.name, centre, scale,
+                        (p.lower - centre) / scale, (p.upper - centre) / scale,
+                        neutral=p.neutral, unit=p.unit, meaning=p.meaning, source='stated',
                     )
-                )
+                )  # fmt: skip
     return tuple(found)
 
 

@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from scipy.special import log_ndtr
 
 from wheel_terra_estimator.discrepancy.fitting.coordinates import (
+    BELIEVED_WIDTHS,
     EFFECT_SCALES,
     EFFECT_SHARES,
-    SOIL_WIDTHS,
 )
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
 from wheel_terra_estimator.discrepancy.fitting.problem import Problem
@@ -67,7 +67,7 @@ def evidence(
     fitted: Fit,
     floors: tuple[Floor, ...],
     noise_freedom: FloatArray,
-    soil_widths: Sequence[tuple[float, float]] = SOIL_WIDTHS,
+    believed_widths: Sequence[tuple[float, float]] = BELIEVED_WIDTHS,
 ) -> Posterior:
     """Return the evidence of a fit for every floor.
 
@@ -78,8 +78,9 @@ def evidence(
     ----------
     noise_freedom : numpy.ndarray
         (4,) degrees of freedom with which the noise of each quantity is known (inf = given).
-    soil_widths : sequence of (width, share)
-        Widths of the soil's prior in units of its coordinates, with their probabilities.
+    believed_widths : sequence of (width, share)
+        Widths of the priors of configured numbers in units of their coordinates, with their
+        probabilities.
     """
     jacobian = fitted.jacobian
     target = fitted.residual + jacobian @ fitted.u
@@ -92,7 +93,7 @@ def evidence(
     weighted = jacobian[None] / variance[:, :, None]
     information = np.swapaxes(weighted, 1, 2) @ jacobian  # (F, P, P)
     right = (target / variance) @ jacobian
-    priors, weights = _prior_precisions(fitted, soil_widths)  # (S, P), (S,)
+    priors, weights = _prior_precisions(fitted, believed_widths)  # (S, P), (S,)
     precision = information[None] + priors[:, None, :, None] * np.eye(len(fitted.u))
     covariance = np.asarray(np.linalg.inv(precision), dtype=float)
     mean = np.einsum('sfpq,fq->sfp', covariance, right)
@@ -125,16 +126,16 @@ def _variances(problem: Problem, floors: tuple[Floor, ...], factor: FloatArray) 
 
 
 def _prior_precisions(
-    fitted: Fit, soil_widths: Sequence[tuple[float, float]]
+    fitted: Fit, believed_widths: Sequence[tuple[float, float]]
 ) -> tuple[FloatArray, FloatArray]:
     """(S, P) prior precisions of u for all combinations of scales; (S,) their shares."""
-    soil = np.array([c.role == 'soil' for c in fitted.coordinates])
+    believed = np.array([c.role == 'believed' for c in fitted.coordinates])
     strength = np.array([c.role == 'strength' for c in fitted.coordinates])
     sizes = list(zip(EFFECT_SCALES, EFFECT_SHARES, strict=True)) if strength.any() else [(1.0, 1.0)]
     combinations, weights = [], []
-    for width, share in soil_widths:
+    for width, share in believed_widths:
         for size, part in sizes:
-            scale = np.where(soil, width, np.where(strength, size, 1.0))
+            scale = np.where(believed, width, np.where(strength, size, 1.0))
             combinations.append(scale**-2)
             weights.append(share * part)
     return np.array(combinations), np.array(weights)

@@ -28,10 +28,10 @@ from wheel_terra_estimator.discrepancy.selection.candidates import (
     Setting,
     linear_starts,
 )
-from wheel_terra_estimator.discrepancy.selection.remainder import IMPROBABLE_SOIL
+from wheel_terra_estimator.discrepancy.selection.remainder import FARTHEST_PULL
 from wheel_terra_estimator.discrepancy.selection.search import Findings
 from wheel_terra_estimator.discrepancy.selection.signatures import against_soil
-from wheel_terra_estimator.discrepancy.selection.significance import soil_p_value
+from wheel_terra_estimator.discrepancy.selection.significance import farthest_pull
 from wheel_terra_estimator.discrepancy.selection.weights import explain_fewer
 from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES, SteadyTable
 from wheel_terra_estimator.terramechanics.effects.base import Effect, effect_of
@@ -118,10 +118,10 @@ def propose(
     setting = replace(findings.setting, effects=_terms(table), floors=floors)
     plain = setting.fit([()], [findings.nothing.u], findings.nothing.angle)[0]
     for factor in _HOLDS if hold_soil else ():
-        if _soil_is_believed(plain, findings):
+        if _can_be_believed(plain, findings):
             break
         narrow = narrowed(findings.setting.nuisance, factor)
-        setting = replace(setting, nuisance=narrow, soil_widths=AS_THEY_ARE)
+        setting = replace(setting, nuisance=narrow, believed_widths=AS_THEY_ARE)
         plain = setting.fit([()], [np.zeros(len(plain.u))], findings.nothing.angle)[0]
     nothing = setting.explain(plain)
     refit = setting.fit([()], [plain.u], plain.angle, variance)[0]
@@ -136,7 +136,7 @@ def propose(
         for law in laws:
             fitted = setting.fit([law.names], [law.fitted.u], law.fitted.angle, variance)[0]
             fits = [refit, fitted]
-            if hold_soil and not _soil_is_believed(fitted, findings):
+            if hold_soil and not _can_be_believed(fitted, findings):
                 continue
             judged = {
                 name: _left_out(setting, fits, variance, groups, findings, table)
@@ -177,8 +177,8 @@ def effects_said(law: Proposal) -> frozenset[str]:
     return frozenset(_SAME[term] for term in terms) if set(terms) <= set(_SAME) else frozenset()
 
 
-def _soil_is_believed(fitted: Fit, findings: Findings) -> bool:
-    return soil_p_value(_widened(fitted, findings)) > IMPROBABLE_SOIL
+def _can_be_believed(fitted: Fit, findings: Findings) -> bool:
+    return farthest_pull(_widened(fitted, findings)) < FARTHEST_PULL
 
 
 def _widened(fitted: Fit, findings: Findings) -> Fit:

@@ -29,6 +29,7 @@ from wheel_terra_estimator.terramechanics.soil import Soil
 
 # Effects that are an error of a reading and nothing else: name -> its parameter.
 _GAINS = {'torque': 'torque_gain', 'sinkage': 'sinkage_gain'}
+_DECIMALS = 12  # a fit that stands at a bound is off by rounding, and no file may be
 _SINKAGE_ZERO, _TORQUE_ZERO = 'sinkage_offset', 'drivetrain_friction'
 
 
@@ -53,7 +54,7 @@ def corrected(diagnosis: Diagnosis) -> tuple[Configuration, list[str]]:
         if effect.form:
             changes[f'{prefix}.form'] = effect.form
         for name, parameter in effect.parameters.items():
-            changes[f'{prefix}.{name}'] = float(parameter.value)
+            changes[f'{prefix}.{name}'] = round(float(parameter.value), _DECIMALS)
             changes[f'{prefix}.{name}_std'] = float(parameter.std)
     changes['provenance'] = provenance(diagnosis)
     return _with(diagnosis, changes)
@@ -79,11 +80,12 @@ def _refitted(
     changes: dict[str, object] = {}
     for shift in soil:
         believed = diagnosis.configuration.soil
-        changes.update(_soil_keys(shift.name, shift.after, shift.after_std, believed))
+        after = round(shift.after, _DECIMALS)
+        changes.update(_soil_keys(shift.name, after, shift.after_std, believed))
     for key, parameter in refitted.items():
         owner, name = key.split('.', 1)
         prefix = f'effects.{effect_of(owner)}.{name}'
-        changes[prefix] = float(parameter.value)
+        changes[prefix] = round(float(parameter.value), _DECIMALS)
         changes[f'{prefix}_std'] = float(parameter.std)
     return changes
 

@@ -14,13 +14,9 @@ import numpy as np
 from wheel_terra_estimator.discrepancy.numbers import SHOWN, amount, number, percent
 from wheel_terra_estimator.discrepancy.report import pictures as pictures
 from wheel_terra_estimator.discrepancy.report.model_file import corrected
-from wheel_terra_estimator.discrepancy.report.words import (
-    STRONG_PULL,
-    far_soil,
-    in_words,
-    soil_line,
-)
+from wheel_terra_estimator.discrepancy.report.words import in_words, soil_line
 from wheel_terra_estimator.discrepancy.result import Diagnosis, FittedParameter, NextMeasurement
+from wheel_terra_estimator.discrepancy.selection.remainder import FARTHEST_PULL
 from wheel_terra_estimator.reporting.html import picture, render, write_page
 from wheel_terra_estimator.terramechanics.effects import catalogue
 
@@ -52,7 +48,6 @@ def write_report(diagnosis: Diagnosis, folder: str | Path) -> Path:
         The page.
     """
     folder = Path(folder)
-    another_soil = far_soil(diagnosis.soil) if diagnosis.verdict == 'agrees' else []
     configuration, keys = corrected(diagnosis)
     new, old = configuration.flat(), diagnosis.configuration.flat()
     known = catalogue()
@@ -61,8 +56,7 @@ def write_report(diagnosis: Diagnosis, folder: str | Path) -> Path:
         'diagnosis.html',
         TEMPLATES,
         diagnosis=diagnosis,
-        tone='warn' if another_soil else _TONES[diagnosis.verdict],
-        another_soil=another_soil,
+        tone=_TONES[diagnosis.verdict],
         said=in_words(diagnosis),
         title=Path(diagnosis.table.name).name,
         cards=_cards(diagnosis),
@@ -79,7 +73,7 @@ def write_report(diagnosis: Diagnosis, folder: str | Path) -> Path:
         soil_line=soil_line(diagnosis),
         where=_where(diagnosis),
         soil_words=SOIL_WORDS,
-        far=STRONG_PULL,
+        far=FARTHEST_PULL,
         # How things are written
         words=pictures.words,
         number=number,

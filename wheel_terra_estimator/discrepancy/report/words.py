@@ -23,7 +23,7 @@ from wheel_terra_estimator.discrepancy.result import (
     QuantityGap,
     SoilShift,
 )
-from wheel_terra_estimator.discrepancy.selection.remainder import Remainder
+from wheel_terra_estimator.discrepancy.selection.remainder import FARTHEST_PULL, Remainder
 from wheel_terra_estimator.discrepancy.selection.search import Findings
 from wheel_terra_estimator.discrepancy.selection.verdict import Verdict
 from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES, SteadyTable
@@ -33,8 +33,7 @@ from wheel_terra_estimator.terramechanics.effects.learned_closure import FEATURE
 
 FloatArray = NDArray[np.float64]
 
-STRONG_PULL = 3.0  # stated deviations
-_SOIL_KEYS = {
+_KEYS = {
     'stiffness': 'the factor on soil.frictional_modulus and soil.cohesive_modulus',
     'tan_friction': 'the tangent of soil.friction_angle_deg',
 }
@@ -121,10 +120,10 @@ def worth(item: NextMeasurement) -> str:
 
 
 def moved(shift: SoilShift) -> str:
-    """Return how far the fit moved a soil number, and how well it was known."""
-    name = _SOIL_KEYS.get(shift.name, f'soil.{shift.name}')
+    """Return how far the fit moved a configured number, and how well it was known."""
+    key = shift.name if shift.name.startswith('effects.') else f'soil.{shift.name}'
     return (
-        f'{name} from {number(shift.before)} to {number(shift.after)}, '
+        f'{_KEYS.get(shift.name, key)} from {number(shift.before)} to {number(shift.after)}, '
         f'{shift.pull:+.1f} of its standard deviations ({shift.source})'
     )
 
@@ -133,15 +132,18 @@ _CLASS = 'class of source: '
 
 
 def soil_line(diagnosis: Diagnosis) -> str:
-    """Return which soil number the fit pulls farthest, and how well the numbers were known."""
-    shift = max(diagnosis.soil, key=lambda shift: abs(shift.pull))
+    """Return which number the fit pulls farthest, and how well those of the soil were known."""
     sources = ', '.join(dict.fromkeys(s.source.removeprefix(_CLASS) for s in diagnosis.soil))
-    return f'Soil number that moved most: {moved(shift)}; deviations of all from: {sources}.'
+    return f'{_farthest(diagnosis.moved)}; deviations of the soil from: {sources}.'
 
 
-def far_soil(soil: Iterable[SoilShift]) -> list[str]:
-    """Return the soil numbers that had to move far, in words."""
-    return [moved(shift) for shift in soil if abs(shift.pull) > STRONG_PULL]
+def _farthest(shifts: Iterable[SoilShift]) -> str:
+    return f'Number that moved most: {moved(max(shifts, key=lambda shift: abs(shift.pull)))}'
+
+
+def far(shifts: Iterable[SoilShift]) -> list[str]:
+    """Return the numbers that had to move farther than can be believed, in words."""
+    return [moved(shift) for shift in shifts if abs(shift.pull) > FARTHEST_PULL]
 
 
 def _plain(name: str) -> str:
@@ -195,7 +197,7 @@ def notes(
     table: SteadyTable,
     findings: Findings,
     after: Fit,
-    soil: Iterable[SoilShift],
+    shifts: Iterable[SoilShift],
     stretch: Stretch | None,
 ) -> tuple[str, ...]:
     """Return remarks for people: the reader's, noise, outliers, soil far off, effects at bounds."""
@@ -212,7 +214,7 @@ def notes(
     if findings.outliers:
         count = len(findings.outliers)
         found.append(f'{count} {"cell was" if count == 1 else "cells were"} set apart as outliers')
-    found += [f'{text}: look at it before any effect' for text in far_soil(soil)]
+    found += [f'{text}: look at it before any effect' for text in far(shifts)]
     for c, u in zip(after.coordinates, after.u, strict=True):
         if c.owner != 'soil' and (u - c.lower < 1e-3 or c.upper - u < 1e-3):
             found.append(f'{c.key} stands at the end of its range ({number(float(c.value(u)))})')
@@ -273,11 +275,12 @@ def sentence(
             'Model and measurement disagree; none of the known effects alone explains it, but '
             f'{stretch.text}.'
         )
-    if verdict.word == 'unexplained' and left.only_soil:
+    if verdict.word == 'unexplained' and left.only_far:
         return (
-            'Model and measurement agree only with a soil too far from the configured one to be '
-            f'believed (p = {left.soil_p_value:.1g}): its numbers are wrong, or something is '
-            'missing that acts like another soil and is none of the known effects.'
+            'Model and measurement agree only with numbers too far from the configured ones to be '
+            f'believed (one by {left.pull:.1f} of its standard deviations, at most '
+            f'{FARTHEST_PULL:g} are believed): they are wrong, or something is missing that acts '
+            'like them and is none of the known effects.'
         )
     if verdict.word == 'unexplained':
         size = f'a misfit of about {100 * left.amplitude:.0f} % of the range'

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wheel_terra_estimator.discrepancy.fitting.coordinates import (
-    SOIL_WIDTHS,
+    BELIEVED_WIDTHS,
     Coordinate,
     effect_coordinates,
     loose_precision,
@@ -59,8 +59,8 @@ class Setting:
     floors: tuple[Floor, ...]
     noise_freedom: FloatArray
     deepest: float  # greatest rim sinkage of the baseline [m]
-    # Of the soil's prior, as in ``evidence``
-    soil_widths: Sequence[tuple[float, float]] = SOIL_WIDTHS
+    # Of the priors of configured numbers, as in ``evidence``
+    believed_widths: Sequence[tuple[float, float]] = BELIEVED_WIDTHS
 
     def coordinates(self, names: Iterable[str]) -> tuple[Coordinate, ...]:
         """Return nuisance coordinates followed by those of the effects."""
@@ -94,7 +94,7 @@ class Setting:
     def explain(self, fitted: Fit) -> Explanation:
         """Weigh a fit."""
         posterior = evidence(
-            self.problem, fitted, self.floors, self.noise_freedom, self.soil_widths
+            self.problem, fitted, self.floors, self.noise_freedom, self.believed_widths
         )
         return Explanation(fitted, posterior, marginal(posterior, self.floors))
 

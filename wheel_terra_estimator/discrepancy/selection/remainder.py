@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from wheel_terra_estimator.discrepancy.fitting.evidence import log_sum
 from wheel_terra_estimator.discrepancy.selection.significance import (
     chi_square_p_value,
-    soil_p_value,
+    farthest_pull,
 )
 from wheel_terra_estimator.discrepancy.selection.weights import Selection
 
@@ -22,8 +22,9 @@ Variance: TypeAlias = Callable[[ArrayLike, ArrayLike], NDArray[np.float64]]
 
 # Misfit that even the best floor leaves improbable.
 IMPROBABLE = 1e-3
-# The same for the soil number that is pulled farthest: about five stated deviations.
-IMPROBABLE_SOIL = 0.05
+# Stated deviations by which no configured number may be pulled: a chance of 5 % for the farthest of
+# seven, of which 15 % are known 2.5 times worse than stated (``coordinates.BELIEVED_WIDTHS``).
+FARTHEST_PULL = 5.0
 
 
 @dataclass(frozen=True)
@@ -35,17 +36,16 @@ class Remainder:
     probability_of_any: float
     amplitude: float  # most probable amplitude of the structural error, share of the range
     p_value: float  # of the whole misfit under the best floor (chi-square)
-    # Of the soil number that the fit pulls farthest, the choice among them paid for
-    soil_p_value: float
+    pull: float  # farthest of a configured number, in its stated deviations
 
     @property
     def accounted_for(self) -> bool:
-        """True where floor and noise, and a soil that can be believed, are enough."""
-        return self.p_value > IMPROBABLE and self.soil_p_value > IMPROBABLE_SOIL
+        """True where floor and noise, and numbers that can be believed, are enough."""
+        return self.p_value > IMPROBABLE and self.pull < FARTHEST_PULL
 
     @property
-    def only_soil(self) -> bool:
-        """True where everything fits, but with a soil that cannot be believed."""
+    def only_far(self) -> bool:
+        """True where everything fits, but with a number that cannot be believed."""
         return self.significant and self.probability <= 0.5 and self.p_value > IMPROBABLE
 
     @property
@@ -78,11 +78,11 @@ def remainder(selection: Selection, index: int, variance_of: Variance) -> Remain
     floor = selection.floors[best]
     variance = variance_of(floor.amplitude, explanation.posterior.noise_factor[best])
     # A reference has no misfit that asks for a name: its structural error moves the soil as well.
-    soil = soil_p_value(explanation.fitted) if selection.unexplained.any() else 1.0
+    pull = farthest_pull(explanation.fitted) if selection.unexplained.any() else 0.0
     return Remainder(
         share,
         any_share,
         selection.floors[top].largest,
         chi_square_p_value(explanation.fitted, variance),
-        soil,
+        pull,
     )

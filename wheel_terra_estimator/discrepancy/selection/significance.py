@@ -6,9 +6,9 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import chdtrc, ndtr  # scipy.stats takes longer to load than a diagnosis
+from scipy.special import chdtrc  # scipy.stats takes longer to load than a diagnosis
 
-from wheel_terra_estimator.discrepancy.fitting.coordinates import SOIL_WIDTHS, WIDENING
+from wheel_terra_estimator.discrepancy.fitting.coordinates import WIDENING
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
 
 FloatArray = NDArray[np.float64]
@@ -29,26 +29,22 @@ def chi_square_p_value(fitted: Fit, variance: FloatArray) -> float:
     return float(chdtrc(len(target) - strength.sum(), square))
 
 
-def soil_pulls(fitted: Fit) -> dict[str, float]:
-    """Return soil number -> shift by the fit, in the deviations of its prior as stated."""
+def pulls(fitted: Fit) -> dict[str, float]:
+    """Return configured number -> shift by the fit, in the deviations of its prior as stated.
+
+    Soil numbers and parameters of effects that are on: a fit may hide what is missing in either.
+    """
     return {
-        c.name: WIDENING * float(u)
+        c.key: WIDENING * float(u)
         for c, u in zip(fitted.coordinates, fitted.u, strict=True)
-        if c.owner == 'soil'
+        if c.role == 'believed'
     }
 
 
-def soil_p_value(fitted: Fit) -> float:
-    """P-value of the soil number that the fit pulls farthest, one of several looked at (Sidak).
+def farthest_pull(fitted: Fit) -> float:
+    """Return the largest pull of a configured number; 0 where none is free.
 
-    The prior is the one of the evidence: deviations as stated, or too small by ``WIDENING``. A sum
-    over all numbers would dilute one huge pull, by which a stranger that works like another soil
-    (friction that softens with slip) shows itself.
+    A sum over all numbers would dilute one huge pull, by which a stranger that works like another
+    soil (friction that softens with slip) shows itself.
     """
-    pulls = np.abs(list(soil_pulls(fitted).values()))
-    if not pulls.size:
-        return 1.0
-    scales = np.array([WIDENING * width for width, _ in SOIL_WIDTHS])
-    shares = np.array([share for _, share in SOIL_WIDTHS])
-    one = float(shares @ (2.0 * ndtr(-pulls.max() / scales)))
-    return float(-np.expm1(pulls.size * np.log1p(-min(one, 1.0 - 1e-12))))
+    return max(map(abs, pulls(fitted).values()), default=0.0)
