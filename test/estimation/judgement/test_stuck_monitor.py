@@ -212,6 +212,16 @@ def test_wheels_that_are_being_stopped_raise_nothing_by_an_early_reference():
     assert first(found) is None
 
 
+def test_a_stop_on_a_slope_is_no_want_of_power():
+    """Wheels that are stopped hold the slope: their torque is what it was, half of the limit."""
+    monitor, found = StuckMonitor(), []
+    for i in range(120):
+        rim = min(max(0.05 - 0.02 * max(0.1 * i - 8.0, 0.0), 0.0), 0.05)
+        rows = [wheel(0.2, rim=rim, known=rim > 0.002, torque=0.5)] * 4
+        found.append(judge(monitor, 0.1 * i, 0.8 * rim, False, rows))
+    assert first(found) is None
+
+
 def test_drives_that_give_way_near_their_limit_raise_it_without_any_speed():
     monitor = StuckMonitor()
     cruise = [wheel(0.2, rim=1.8, torque=0.4)] * 4

@@ -65,11 +65,9 @@ class SituationTuning:
     degrees there, and the normal stress, centred at about half of it, leans back by 27 degrees, as
     much as the friction of loose soil pulls forward."""
     cruise_time: float = 5.0  # [s] in which the speed before is forgotten
-    braked: float = 0.2  # slowing of wheels that are being stopped
-    free_strain: float = 0.5  # of the torque limit: below it no soil holds the wheels
-    standing: tuple[float, float, float, float] = (-4.3, 4.5, 2.9, 1.8)
-    """Logistic law of standing for want of power: constant, and for each unit of strain, slowing
-    and lag."""
+    slowed: float = 0.2  # of the rim speed: more is missing where wheels are held, or stopped
+    near_limit: float = 0.7
+    """Of the torque limit: below it nothing holds the wheels, above it nobody stops them."""
 
 
 class Memory(NamedTuple):
@@ -182,10 +180,11 @@ class Situation:
 
     @cached_property
     def standing(self) -> bool:
-        """Whether the rover more likely than not stands for want of power."""
+        """Whether the rover stands for want of power, or is about to."""
         if self.motion.turning or self.fastest <= 0.0:
             return False
-        return self._held(self.strain, self.slowing, 1.0 - self.rim / self.fastest)
+        lag = 1.0 - self.rim / self.fastest
+        return self._held(self.strain) and max(self.slowing, lag) > self.tuning.slowed
 
     @cached_property
     def stalled(self) -> tuple[bool, ...]:
@@ -193,21 +192,18 @@ class Situation:
         return tuple(
             [
                 abs(w.rim_speed) < self.tuning.stall_ratio * self.fastest
-                and self._held(w.torque_share, 0.0, 1.0 - abs(w.rim_speed) / self.fastest)
+                and self._held(w.torque_share)
                 for w in self.motion.wheels
             ]
         )
 
-    def _held(self, strain: float, slowing: float, lag: float) -> bool:
-        if not self.pulled_away:
-            return False
-        constant, by_strain, by_slowing, by_lag = self.tuning.standing
-        return constant + by_strain * min(strain, 1.0) + by_slowing * slowing + by_lag * lag > 0.0
+    def _held(self, strain: float) -> bool:
+        return self.pulled_away and strain > self.tuning.near_limit
 
     @property
     def braked(self) -> bool:
         """Whether the wheels are being stopped: a reference stands half a second before them."""
-        return self.slowing > self.tuning.braked and self.strain < self.tuning.free_strain
+        return self.slowing > self.tuning.slowed and self.strain < self.tuning.near_limit
 
     @property
     def slip_magnitude(self) -> float:
