@@ -46,6 +46,12 @@ def test_a_wrong_sinkage_moves_the_radius_by_no_more_than_its_deviation(factor):
     assert radius.after[0] == pytest.approx(rolling.RADIUS, rel=0.02)
 
 
+def test_the_gravity_of_another_planet_is_mended():
+    wrong = rolling.rover(**{'rover.gravity': 3.71})
+    told = {change.key: change for change in calibrate(rolling.recording(), wrong).changes}
+    assert told['rover.gravity'].after == pytest.approx(9.81, rel=0.01)
+
+
 def test_a_reference_whose_noise_alone_is_too_much_is_said():
     rough = rolling.recording().reference
     noise = 0.1 * np.random.default_rng(3).standard_normal(rough.velocity.shape[0])

@@ -75,7 +75,8 @@ def calibrate(
     changes = _Changes(configuration.flat())
     _directions(changes, report, configuration)
     for told in _sure(report):
-        if told.fault.endswith('_offset') and told.parameter and told.value is not None:
+        read_off = told.fault.endswith('_offset') or told.fault == 'planet'
+        if read_off and told.parameter and told.value is not None:
             changes.add(told.parameter, told.value, told.std, told.words)
     _mounting(changes, evidence)
     _biases(changes, evidence)
