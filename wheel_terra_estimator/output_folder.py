@@ -542,10 +542,10 @@ def _own_files(folder: Path) -> list[str]:
     lists = {name for name in whole if is_ours(folder / name)}  # these say themselves what is ours
     for name in lists:
         _own_files(folder / name)
-    strangers = [n for n in there if n not in listed and not n.startswith(tuple(whole))]
-    if strangers:
+    foreign = [n for n in there if n not in listed and not n.startswith(tuple(whole))]
+    if foreign:
         raise UserError(
-            f'{folder}: holds {strangers[0]}, which this program did not write, so it is not '
+            f'{folder}: holds {foreign[0]}, which this program did not write, so it is not '
             'overwritten; choose another path, or take that file away'
         )
     return there

@@ -92,7 +92,7 @@ class MeasurementReader:
         """What is not in the bag, and what that costs."""
         notes = [f'not in the bag: {", ".join(self.absent)}'] if self.absent else []
         if 'reference_odom' in self.absent:
-            notes.append('without a reference velocity slip can be wrong and sure of itself')
+            notes.append('without a reference velocity slip can be wrong and overconfident')
         return notes
 
     @property

@@ -32,7 +32,7 @@ from wheel_terra_estimator.errors import ConfigurationWarning, UserError, outsid
 
 COMMANDS = {
     'simulate': 'drive a simulated rover and write a rosbag2 with ground truth',
-    'check': 'say what is wrong with a recording or a rover file, and what mends it',
+    'check': 'say what is wrong with a recording or a rover file, and how to correct it',
     'calibrate': 'write a rover file with what a recording tells: radius, mounting, zeros, noise',
     'init': 'write a new rover file from a URDF, from a recording, or from a few questions',
     'config': 'list, show or find the shipped rover, soil and scenario files',

@@ -16,7 +16,7 @@ from typing import NamedTuple
 from wheel_terra_estimator.estimation.measurements import Measurement
 from wheel_terra_estimator.estimation.timing.input_checks import WHEEL_ODOMETRY
 
-WITNESSES = 5
+PROVING_MESSAGES = 5
 """Messages of wheel odometry that prove a step though other topics stay on the old time line."""
 
 MOST_HELD = 1000
@@ -147,7 +147,7 @@ class ClockWatch:
             or len(stamps) >= MOST_HELD
             # Wheel odometry keeps the time: where it and another topic have different clocks
             # for good, the other one gives way.
-            or self._odometry_astray >= WITNESSES
+            or self._odometry_astray >= PROVING_MESSAGES
         )
 
     def _accept(self, arrival: Arrival) -> None:

@@ -55,8 +55,8 @@ def _earth_pressure(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
     depth = contact.radius * (1.0 - maths.cos(contact.entrance_angle))
     weight = contact.density * contact.gravity
     # Front of the wheel as a blade that leans by half the entrance angle from the horizontal.
-    lean = 0.5 * maths.pi - 0.5 * contact.entrance_angle
-    front = maths.sin(lean + friction) / (2.0 * maths.sin(lean) * cos)
+    rake = 0.5 * maths.pi - 0.5 * contact.entrance_angle
+    front = maths.sin(rake + friction) / (2.0 * maths.sin(rake) * cos)
     pressure = 2.0 * contact.cohesion * k_c + weight * depth * k_gamma
     resistance = _blade(contact, maths) * front * depth * pressure
     contact.drawbar_pull = contact.drawbar_pull - contact.direction * p.kb * resistance
