@@ -17,7 +17,6 @@ from wheel_terra_estimator.discrepancy.workflow import diagnose
 from wheel_terra_lab.studies.discrepancy_demonstrations import cmu_fitted
 from wheel_terra_lab.studies.model_validation import (
     cmu_wheel,
-    ding_statements,
     grc3_wheel,
     hit_wheels,
     shipped_soils,
@@ -91,16 +90,3 @@ def test_mound_predicts_the_rows_it_did_not_see_on_grc3(shared: Path) -> None:
         errors.append(np.sqrt(np.mean(error[:, 1] ** 2)) / np.ptp(measured[:, 1]))
     assert errors[0] < 0.10
     assert errors[0] < 0.8 * errors[1]
-
-
-def test_statements_of_ding_2010_hold_together_where_they_can(shared: Path, tmp_path: Path) -> None:
-    text = ding_statements.section(shared.parent, tmp_path)
-    rows = {
-        cells[1].strip(): cells[3].strip()
-        for cells in (line.split('|') for line in text.splitlines() if line.startswith('| '))
-    }
-    assert float(rows['sinkage of Wh3 at s = 0 [mm]']) == pytest.approx(5.0, abs=0.5)
-    assert float(rows['sinkage of Wh3 at s = 0.6 [mm]']) == pytest.approx(30.0, abs=1.0)
-    assert 3.0 <= float(rows['z(0.6)/z(0), Wh3, h = 10 mm']) <= 7.0
-    assert 3.0 <= float(rows['z(0.6)/z(0), Wh2 with n0 = 0.93, n1 = 0.54, h = 10 mm']) <= 7.0
-    assert float(rows['Wong-Reece alone, z(0.6) - z(0) [mm]']) < 5.0

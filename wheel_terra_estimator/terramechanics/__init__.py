@@ -5,7 +5,7 @@
 - What is given: ``wheel``, ``soil``, ``operating_points``; ``effects`` is the catalogue.
 - Laws: ``kinematics`` (slip, shear displacement), ``stresses`` (pressure, shear), ``contact`` and
   ``terms`` (one contact with its effects).
-- Forces at given angles: ``quadrature`` (reference), ``branch_moments`` (closed form),
+- Forces at given angles: ``quadrature``, ``branch_moments`` (closed form),
   ``closed_form`` (its use with effects, the triangles A, B, C).
 - Load to sinkage, pull, torque: ``model`` (arrays, by ``load_balance``); sinkage to torque and
   pull: ``conditioned`` by ``balanced_branches`` (floats, for the filter).

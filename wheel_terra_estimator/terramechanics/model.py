@@ -82,8 +82,8 @@ class WheelSoilModel:
         Effect name -> parameter -> value, and ``form``; only switched-on effects; what is missing
         takes its default. ``model.effects`` has them by variant (``effects.by_variant``).
     method : str
-        ``quadrature`` (reference), ``closed_form`` (branch moments, for on-board use) or
-        ``triangles`` (the linearised stresses of the literature, for comparison).
+        ``quadrature``, ``closed_form`` (branch moments, for on-board use) or ``triangles``
+        (the linearised stresses of the literature, for comparison).
     strict : bool
         True: a soil that cannot carry the load raises ``ValueError``; False: the point is clamped
         at a sinkage of one radius and flagged.

@@ -19,7 +19,6 @@ ROOT = Path(__file__).resolve().parents[2]
 SECTIONS = (
     'closed_forms',
     'hit_wheels',
-    'ding_statements',
     'grc3_wheel',
     'cmu_wheel',
     'cmu_sideways',

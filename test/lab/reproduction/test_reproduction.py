@@ -14,7 +14,7 @@ import pytest
 
 from wheel_terra_estimator.cli.main import main
 from wheel_terra_estimator.errors import UserError
-from wheel_terra_lab.reproduction import ding, guo, nakashima
+from wheel_terra_lab.reproduction import ding, guo, integration, nakashima
 from wheel_terra_lab.reproduction.statement import belongs_to
 from wheel_terra_lab.soilbin import reproduced_figures, reproduction, study
 
@@ -109,5 +109,5 @@ def test_the_path_of_figure_8_is_that_of_a_gentler_slope_where_the_wheel_sinks()
 
 @pytest.mark.parametrize('name', ['driving', 'skidding'])
 def test_the_reference_is_settled_driving_and_skidding(name):
-    settled = [s for s in ding.numerics(1000) if s.holds is not None and name in s.what]
-    assert [s.holds for s in settled] == [True]
+    said = [s for s in integration.statements(1000) if name in s.what]
+    assert [s.holds for s in said if s.holds is not None] == [True]

@@ -152,9 +152,3 @@ def section(shared: Path, figures: Path) -> str:
             'a full change to soil friction overshoots at low slip.',
         ]
     )
-
-
-def fitted_soil(shared: Path) -> Model:
-    """Return the model fitted to the smooth wheel (for ``soils/hit_fit`` and the Ding facts)."""
-    smooth = read(shared / 'reference' / 'measured_single_wheel.csv', 'HIT_Wh34_smooth')
-    return fit(BASE, [smooth], SIGMA, SMOOTH_PARAMETERS)[0]
