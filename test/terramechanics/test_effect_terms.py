@@ -153,6 +153,29 @@ def test_mound_raises_the_pull_at_high_slip_only() -> None:
     assert -high.leaving_angle > high.entrance_angle
 
 
+def test_conveyed_mound_is_the_volume_that_lugs_carry_back_over_the_room_of_the_rut() -> None:
+    """Height behind the wheel by hand, from the angles of the answer."""
+    kappa, band, slip = 0.02, 0.002, np.array([0.1, 0.5, 0.9])
+    given = {'form': 'conveyed', 'kappa': kappa, 'band': band}
+    rises = []
+    for lug in (0.0, 0.01, 0.02):
+        wheel = Wheel(0.1574, 0.165, lug, 30)
+        answer = state(slip, wheel=wheel, effects={'soil_mound': given})
+        t1, t2 = answer.entrance_angle, answer.leaving_angle
+        room = wheel.radius * (1.0 - np.cos(t1))
+        free = wheel.radius * (1.0 - np.cos(SAND.leaving_angle_ratio * t1))
+        conveyed = (lug + band) * slip / (1.0 - slip)
+        rise = wheel.radius * (1.0 - np.cos(t2)) - free
+        assert rise == pytest.approx(kappa * room * (conveyed / (conveyed + room)) ** 2, rel=0.01)
+        rises.append(rise / room)
+    assert (np.diff(rises, axis=0) > 0.0).all()  # the higher the lugs, the higher the mound
+    bare = {'soil_mound': given | {'kappa': 1.0, 'band': 0.0}}
+    smooth = {'wheel': Wheel(0.1574, 0.165)}
+    assert state(slip, effects=bare, **smooth).outputs() == pytest.approx(
+        state(slip, **smooth).outputs()
+    )
+
+
 @pytest.mark.parametrize('name', LISTED)
 def test_a_soil_that_cannot_carry_the_wheel_gives_no_warning_of_numpy(name: str) -> None:
     for ratio, exponent, modulus, load in ((-1.0, 1.1, 1e4, 1e3), (-1.5, 0.3, 1e3, 1e4)):

@@ -8,16 +8,30 @@ from types import SimpleNamespace
 from typing import Any
 
 from wheel_terra_estimator.terramechanics.contact import Contact
-from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter
+from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter, Form
 
 SMALLEST_ROOM = 1e-12
 """Height left below the hub over r [-]; contact that leaves above the hub has none."""
 
 
 def _mound(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
-    """Raise the rear contact height by kappa z ((s - onset)+/(1 - onset))^2, below the hub."""
+    """Raise the rear contact height by kappa z ((s - onset)+/(1 - onset))^2."""
     excess = maths.maximum(contact.slip - p.onset, 0.0) / (1.0 - p.onset)
-    rise = p.kappa * excess * excess * (1.0 - maths.cos(contact.entrance_angle))
+    _raise(contact, p.kappa * excess * excess * (1.0 - maths.cos(contact.entrance_angle)), maths)
+
+
+def _conveyed(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
+    """Raise the rear contact height by kappa z (q/(q + z))^2, q conveyed per unit of advance."""
+    depth = 1.0 - maths.cos(contact.entrance_angle)  # over r
+    slip = maths.maximum(contact.slip, 0.0)
+    carried = (contact.lug_height + p.band) / contact.rim_radius * slip
+    room = maths.maximum(carried + depth * (1.0 - slip), SMALLEST_ROOM)
+    share = carried / room
+    _raise(contact, p.kappa * share * share * depth, maths)
+
+
+def _raise(contact: Contact, rise: Any, maths: Any) -> None:
+    """Raise the rear contact by a height over r, below the hub."""
     # 1 - cos is the contact height over r. The slope of a circle is steeper the higher one gets, so
     # the height saturates below the hub (1 - exp keeps it smooth).
     base = 1.0 - maths.cos(contact.leaving_angle)
@@ -27,22 +41,25 @@ def _mound(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
     contact.leaving_angle = maths.where(rise > 0.0, raised, contact.leaving_angle)
 
 
+_KAPPA = EffectParameter(
+    'kappa',
+    '-',
+    1.0,
+    0.0,
+    8.0,
+    1.0,
+    'half_normal',
+    'height of the mound at s = 1 over the sinkage',
+)
+
 EFFECT = Effect(
     name='soil_mound',
+    form='onset',
     claim='at high slip, soil piles up behind the wheel and moves the leaving angle back',
     symbol='1 - cos t_2 = b + (1 - b) [1 - exp(-kappa z x^2/(r (1 - b)))], b = 1 - cos(c_3 t_1), '
     'x = (s - onset)+/(1 - onset); about r (1 - cos t_2) += kappa z x^2 while small',
     parameters=(
-        EffectParameter(
-            'kappa',
-            '-',
-            1.0,
-            0.0,
-            8.0,
-            1.0,
-            'half_normal',
-            'height of the mound at s = 1 over the sinkage',
-        ),
+        _KAPPA,
         EffectParameter(
             'onset', '-', 0.4, 0.0, 0.9, 0.15, 'normal', 'slip at which it starts', prior_mean=0.4
         ),
@@ -54,4 +71,33 @@ EFFECT = Effect(
     source='Guo, Ding et al., high-slip contact modelling for grouser-wheeled rovers, Mech. Mach. '
     'Theory (a mound higher than the free surface); law reconstructed here',
     on_contact=_mound,
+    other_forms=(
+        Form(
+            name='conveyed',
+            claim='lugs carry soil back and pile it up behind the wheel: high ones the more',
+            symbol='1 - cos t_2 = b + (1 - b) [1 - exp(-kappa z x^2/(r (1 - b)))], '
+            'b = 1 - cos(c_3 t_1), x = q/(q + z), q = (h + band) s/(1 - s)',
+            parameters=(
+                _KAPPA,
+                EffectParameter(
+                    'band',
+                    'm',
+                    0.003,
+                    0.0,
+                    0.03,
+                    0.003,
+                    'normal',
+                    'layer that a smooth rim drags along',
+                    prior_mean=0.003,
+                    free=False,
+                ),
+            ),
+            needs=('slip', 'lug_height'),
+            validity='slip up to 0.95; a measured leaving angle overrides it',
+            source='own form: volume carried back per unit of advance against that of the rut',
+            candidate=False,
+            why_aside='no table with two lug heights at slips above 0.6 has been seen',
+            on_contact=_conveyed,
+        ),
+    ),
 )
