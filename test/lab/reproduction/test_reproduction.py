@@ -8,6 +8,7 @@ import argparse
 import dataclasses
 import math
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,10 +19,19 @@ from wheel_terra_lab.reproduction import ding, guo, integration, nakashima
 from wheel_terra_lab.reproduction.statement import belongs_to
 from wheel_terra_lab.soilbin import reproduced_figures, reproduction, study
 
+PAGE = Path(__file__).parents[3] / 'docs' / 'laboratory' / 'papers' / 'reproduction.md'
+
+
+def told(page: str) -> list[tuple[str, str, str]]:
+    """Return place, statement and verdict without its reason of each row; figures left out."""
+    cells = [line.strip('| ').split(' | ') for line in page.splitlines() if line.startswith('| ')]
+    rows = [(row[0], row[1], row[-1].partition(':')[0]) for row in cells]
+    return [(place, re.sub(r'\d+', '', what), verdict) for place, what, verdict in rows]
+
 
 def test_all_papers_stand_on_one_page_with_a_verdict_each(tmp_path, capsys):
     folder = tmp_path / 'papers'
-    assert main(['reproduce', 'all', '--points', '400', '-o', str(folder)]) == 0
+    assert main(['reproduce', 'all', '-o', str(folder)]) == 0
     page = (folder / 'reproduction.md').read_text(encoding='utf-8')
     assert page == capsys.readouterr().out
     rows = [line for line in page.splitlines() if line.startswith('| ') and 'verdict' not in line]
@@ -33,6 +43,9 @@ def test_all_papers_stand_on_one_page_with_a_verdict_each(tmp_path, capsys):
     stated = [int(held) for held in re.findall(r'^(\d+) of \d+ statements', page, re.MULTILINE)]
     assert sum(stated) == sum(row.split(' | ')[-1].startswith('reproduced') for row in rows)
     assert {path.name for path in folder.glob('*.svg')} == {'ding.svg', 'nakashima.svg'}
+    # The last digit of a figure hangs on the versions of the libraries, no verdict does.
+    kept = PAGE.read_text(encoding='utf-8')
+    assert told(kept) == told(page), 'wheel-terra reproduce all -o docs/laboratory/papers'
 
 
 def test_one_figure_alone_and_one_that_is_not_there(tmp_path, capsys, undrawn):
