@@ -74,9 +74,3 @@ def test_an_earlier_run_is_compared_by_its_ratios(tmp_path, monkeypatch, capsys)
     assert '>3 (3 to 3)</td>' in (text := page.read_text()) and '>1.50</td>' in text
     assert '3 times as fast (3 to 3) as b' in (said := capsys.readouterr().out)
     assert '1.50 times the earlier ratio' in said
-
-
-def test_what_is_no_earlier_run_is_said(tmp_path, capsys):
-    (tmp_path / 'f.json').write_text('[]')
-    assert main(['bench', '--quick', '--against', str(tmp_path / 'f.json')]) == 2
-    assert 'is no output of wheel-terra bench --json' in capsys.readouterr().err

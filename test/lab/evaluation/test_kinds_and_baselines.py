@@ -3,7 +3,6 @@
 """Kinds of drives load; seeds are apart; baselines do what they are called."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -17,7 +16,6 @@ from wheel_terra_estimator.estimation.measurements import (
 )
 from wheel_terra_estimator.simulation.scenario import load
 from wheel_terra_estimator.simulation.sensors import Arrival
-from wheel_terra_lab.cli import evaluate
 from wheel_terra_lab.evaluation import baselines, kinds, simulators
 from wheel_terra_lab.evaluation.runner import inputs_of_mode
 from wheel_terra_lab.evaluation.two_state_filters import slip_course
@@ -79,14 +77,6 @@ def test_baselines_between_references():
     assert held[-1] == 0.02
     reckoned = baselines.dead_reckoned_speed(rover, measurements, stamps)
     assert reckoned[13] == pytest.approx(0.04 + 9 * 0.1 * 0.1, abs=0.006)
-
-
-def test_command_names_what_it_does_not_know(capsys, tmp_path):
-    assert main(['evaluate', '--kinds', 'nonsense']) == 2
-    assert 'nonsense' in capsys.readouterr().err
-    there = tmp_path / 'there.md'
-    there.write_text('x', encoding='utf-8')
-    assert main(['evaluate', '-o', str(there)]) == 2
 
 
 def test_modes_change_what_the_estimator_gets():
@@ -163,15 +153,6 @@ def test_three_states_learn_the_curvature_that_two_cannot():
     assert errors[0].mean() < 0.6 * errors[1].mean()
 
 
-def test_deviation_of_two_states_grows_with_travel_and_falls_with_a_reference():
-    rover, measurements, stamps, _ = _two_state_drive(delay=0)
-    std = slip_course(rover, measurements, stamps, 'torque').std[:, 0]
-    assert std[0] > 0.1
-    without = [m for m in measurements if not isinstance(m, ReferenceVelocity)]
-    assert np.all(np.diff(slip_course(rover, without, stamps, 'torque').std[:, 0]) >= -1e-3)
-    assert std[-1] < 0.3 * slip_course(rover, without, stamps, 'torque').std[-1, 0]
-
-
 def test_pitch_filter_sees_the_slope_by_orientation_or_by_specific_force():
     rover = reader.load(['generic_six_wheel'])
     g, up = rover.rover.gravity, 0.1
@@ -189,16 +170,6 @@ def test_pitch_filter_sees_the_slope_by_orientation_or_by_specific_force():
     assert slips[0] == pytest.approx(0.05 + 1.0 * np.sin(up), abs=0.01)
 
 
-def test_simulators_and_kinds_of_the_command():
-    assert {s for s, _ in evaluate._chosen('ABC', None)} == set('ABC')
-    assert evaluate._chosen('AB', ['spin', 'climb']) == [
-        ('A', 'climb'),
-        ('B', 'spin'),
-        ('B', 'climb'),
-    ]
-    assert ('A', 'firm') not in evaluate._chosen(['A'], None)
-
-
 def test_a_filter_that_failed_on_a_drive_ends_evaluate_with_status_1(monkeypatch, capsys):
     from wheel_terra_lab.evaluation import bench, tables
 
@@ -210,17 +181,3 @@ def test_a_filter_that_failed_on_a_drive_ends_evaluate_with_status_1(monkeypatch
     assert 'The filter was started anew 2 times in 1 runs.' in capsys.readouterr().out
     health['filter_restarts'] = 0
     assert main(['evaluate', '--kinds', 'climb', '--seeds', '1']) == 0
-
-
-def test_evaluate_of_measured_drives_and_of_the_limiter_count_failures_too(monkeypatch, capsys):
-    from wheel_terra_lab.evaluation import closed_loop, real_drives
-
-    failed = {'filter_restarts': 1}
-    monkeypatch.setattr(real_drives, 'report', lambda _: ('tables', [failed, {}]))
-    assert main(['evaluate', '--measured', 'folder']) == 1
-    assert 'The filter was started anew 1 times in 2 runs.' in capsys.readouterr().out
-    drive = SimpleNamespace(free=SimpleNamespace(health={}), limited=SimpleNamespace(health=failed))
-    monkeypatch.setattr(closed_loop, 'compare', lambda _: [drive])
-    monkeypatch.setattr(closed_loop, 'report', lambda _: 'tables')
-    assert main(['evaluate', '--limiter', '--seeds', '1']) == 1
-    assert 'The filter was started anew 1 times in 2 runs.' in capsys.readouterr().out

@@ -151,15 +151,3 @@ def test_the_command_takes_kinds_and_hours_and_refuses_what_does_not_go(
     ):
         assert main(['evaluate', '--hours', '1', '-o', str(tmp_path / 'x'), *wrong]) == 2
         assert words in capsys.readouterr().err
-
-
-def test_the_command_begins_with_the_seed_that_is_asked_for(short, tmp_path, capsys):
-    folder = tmp_path / 'drives'
-    command = ['evaluate', '--hours', '1e-9', '--kinds', 'cruise', '--modes', 'reference']
-    assert main([*command, '--first-seed', str(SEED), '-o', str(folder)]) == 0
-    (row,) = [json.loads(line) for line in (folder / 'drives.jsonl').open()]
-    assert row['seed'] == SEED
-    assert main([*command, '--resume', '-o', str(folder)]) == 2
-    assert 'of other kinds, modes or seeds' in capsys.readouterr().err
-    assert main([*command, '--first-seed', '-1', '-o', str(tmp_path / 'x')]) == 2
-    assert '--first-seed -1: must be 0 or more' in capsys.readouterr().err

@@ -99,11 +99,3 @@ def test_the_pages_show_the_committed_results() -> None:
         found = list(csv.DictReader(stream))
     assert readme_figures.markdown(found) in readme_figures.README.read_text(encoding='utf-8')
     assert readme_figures.page(found) in readme_figures.WORTH.read_text(encoding='utf-8')
-
-
-@pytest.mark.slow
-def test_a_drive_has_a_row_for_each_mode() -> None:
-    found = readme_figures.rows_of(('A', 'cruise', 1), 'abc1234')
-    assert [row['mode'] for row in found] == list(readme_figures.MODES)
-    assert all(int(row['slip_samples']) > 1000 for row in found)
-    assert all(0.0 < readme_figures.rms([row], 'sinkage') < 0.01 for row in found)

@@ -93,13 +93,6 @@ def test_metrics_of_linear_curves():
     assert found['power_number_15_deg'] == pytest.approx(0.65)
 
 
-def test_slope_at_20_percent_of_a_wheel_that_slips_more_on_the_level():
-    rows = [
-        {'slope_deg': str(s), 'slip': str(0.25 + 0.01 * s), 'power_number': '1'} for s in (0, 5)
-    ]
-    assert metrics.table6_metrics(rows)['slope_at_20_percent_deg'] == pytest.approx(-5)
-
-
 def test_metrics_are_not_made_up_between_slopes_far_apart():
     rows = [{'slope_deg': str(s), 'slip': str(0.02 * s), 'power_number': '1'} for s in (7.1, 25)]
     assert all(math.isnan(value) for value in metrics.table6_metrics(rows).values())

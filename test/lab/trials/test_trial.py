@@ -84,18 +84,3 @@ def test_a_score_over_many_has_an_interval(tmp_path, capsys):
     # Wilson's interval, from the paper's formula at 8 of 10.
     low, high = trial.interval(8, 10)
     assert (low, high) == pytest.approx((0.4902, 0.9433), abs=5e-4)
-
-
-@pytest.mark.parametrize(
-    ('arguments', 'part'),
-    [
-        (('--effect', 'lug_diging'), "nearest is 'lug_digging'"),
-        (('--many', 0), '--many 0: must be between'),
-        (('--seed', -1), '--seed -1: must be'),
-    ],
-)
-def test_what_cannot_be_tried_ends_with_one_line(tmp_path, capsys, arguments, part):
-    assert run(tmp_path / 'x', *arguments) == 2
-    error = capsys.readouterr().err
-    assert part in error and error.count('\n') == 1
-    assert not (tmp_path / 'x').exists()
