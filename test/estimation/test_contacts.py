@@ -19,7 +19,6 @@ from wheel_terra_estimator.estimation.contacts.stationary_wheels import Stationa
 from wheel_terra_estimator.estimation.contacts.steering import headings, straight_headings
 from wheel_terra_estimator.estimation.contacts.turning import Turning, sides_oppose
 from wheel_terra_estimator.estimation.contacts.unloaded_wheels import UnloadedWheels
-from wheel_terra_estimator.estimation.contacts.wheel_models import WheelState
 from wheel_terra_estimator.estimation.filter.force_balance import SumOfPulls
 from wheel_terra_estimator.estimation.filter.state import SHEAR_STRENGTH, SPEED
 from wheel_terra_estimator.estimation.inputs.inertial import InertialWindow
@@ -118,12 +117,6 @@ def test_wheels_that_follow_ackermann_are_not_pushed_sideways(parts):
     assert found.side_speeds(2.0 * yaw_rate, yaw_rate) == pytest.approx([0.0] * 6, abs=1e-12)
 
 
-def test_a_rover_whose_wheels_all_head_aside_moves_aside(parts):
-    found = headings(parts.rover, [0.3] * 6)
-    assert found.by_speed == pytest.approx([1.0 / math.cos(0.3)] * 6)
-    assert found.side_by_speed == pytest.approx([0.0] * 6)
-
-
 def test_any_steering_is_that_of_a_rigid_body_which_slides_least(parts):
     rng = np.random.default_rng(3)
     angles, speed, yaw_rate = rng.uniform(-0.6, 0.6, 6), 0.05, 0.04
@@ -139,12 +132,6 @@ def test_any_steering_is_that_of_a_rigid_body_which_slides_least(parts):
     speeds = [found.speed(i, speed, yaw_rate) for i in range(6)]
     assert speeds == pytest.approx(along.tolist(), abs=1e-5)
     assert found.side_speeds(speed, yaw_rate) == pytest.approx(aside.tolist(), abs=1e-5)
-
-
-def test_angles_of_nought_are_those_of_a_rover_that_does_not_steer(parts):
-    found, straight = headings(parts.rover, [0.0] * 6), straight_headings(parts.rover)
-    for gains, expected in zip(found[:-1], straight[:-1], strict=True):
-        assert gains == pytest.approx(expected)
 
 
 def test_wheels_that_roll_ask_for_the_speed_of_the_body(parts):
@@ -354,25 +341,6 @@ def test_rows_are_the_derivatives_of_torque_and_pull(parts):
     pulls, torques = here.moved_to(here.state)
     assert pulls == pytest.approx(here.pull)
     assert torques == pytest.approx(here.torque)
-
-
-def test_every_slope_is_smoothed_until_the_contact_changes(parts):
-    linearisation = Linearisation(parts.rover, parts.layout, parts.models, 0.05)
-    forces = [
-        parts.models.forces(0, WheelState(ratio, 0.02, 200.0, 0.0, 0.0, rim_speed=0.05))
-        for ratio in (0.95, 0.9, 0.1)
-    ]
-    moment = 200.0 * parts.rover.shear_radius[0]
-    found, torque, pull = [], None, None
-    for k in range(80):
-        torque, pull = linearisation.smoothed(torque, pull, forces[k % 2], moment)
-        found.append((torque, pull))
-    for smoothed, raw in zip(np.moveaxis(found[40:], 1, 0), ('d_torque', 'd_pull'), strict=True):
-        swing = np.abs(np.subtract(*(getattr(f, raw) for f in forces[:2])))
-        assert (np.ptp(smoothed, axis=0) < 0.12 * swing + 1e-9).all()
-    torque, pull = linearisation.smoothed(torque, pull, forces[2], moment)
-    assert torque[1:] == forces[2].d_torque[1:]
-    assert pull[1:] == forces[2].d_pull[1:]
 
 
 # -- Pulls ------------------------------------------------------------------------------------

@@ -5,7 +5,6 @@
 import numpy as np
 import pytest
 from parts import SAND, Parts
-from scipy.stats import chi2
 
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.estimation.contacts.linearisation import Linearisation
@@ -13,12 +12,9 @@ from wheel_terra_estimator.estimation.contacts.loads import WheelLoads
 from wheel_terra_estimator.estimation.contacts.stationary_wheels import StationaryPull
 from wheel_terra_estimator.estimation.contacts.steering import straight_headings
 from wheel_terra_estimator.estimation.filter.force_balance import ForceBalance
-from wheel_terra_estimator.estimation.filter.initial_state import PriorTuning
 from wheel_terra_estimator.estimation.filter.observability import considered_entries
 from wheel_terra_estimator.estimation.filter.prediction import Prediction
 from wheel_terra_estimator.estimation.filter.reference import (
-    ReferenceState,
-    ReferenceTuning,
     ReferenceUpdate,
 )
 from wheel_terra_estimator.estimation.filter.repetition import repetitions
@@ -136,24 +132,6 @@ def test_models_are_doubted_where_a_small_lean_lasts(parts):
         for by in (0.0015, 0.0)
     )
     assert lean > 10.0 > 2.0 > white
-
-
-@pytest.mark.parametrize('rate', [2.0, 5.0, 10.0, 50.0])
-def test_a_lean_of_fast_references_counts_by_what_passes_by_chance_in_a_second(parts, rate):
-    update = ReferenceUpdate(parts.configuration, parts.rover, parts.sensors, parts.layout)
-    excess = []
-    for gap in (1.0, 1.0 / rate):
-        update.state = update.state._replace(mean_innovation=0.75, gap=gap)
-        excess.append(np.sqrt(update.model_doubt))
-    limit = ReferenceTuning().run_excess
-    by_chance = chi2.sf(limit, 1)
-    assert excess[0] / excess[1] == pytest.approx(chi2.isf(by_chance / rate, 1) / limit, rel=0.02)
-
-
-def test_references_beyond_the_fastest_wheel_hardly_count(parts, ekf):
-    _, opened = references(parts, ekf, [0.045] * 10 + [0.5] * 3)
-    assert not any(opened)
-    assert ekf.mean[SPEED] < 0.05
 
 
 def test_a_reference_on_standing_wheels_says_whether_the_rover_slides(parts, ekf):
@@ -362,14 +340,6 @@ def test_sinkage_tells_half_as_much_of_the_slip_without_a_reference(parts, ekf):
     assert columns[1] == pytest.approx(0.5 * columns[0])
 
 
-def test_a_wheel_in_the_air_keeps_its_sinkage(parts, ekf):
-    loads = (0.0, *WheelLoads(parts.rover).state.load[1:])
-    found, _, prediction = relaxed(parts, ekf, 0.1, loads=loads, start=0.03)
-    zi = parts.layout.sinkage.start
-    assert found[0] == 0.03
-    assert prediction.Q[zi, zi] > 10.0 * prediction.Q[zi + 1, zi + 1]
-
-
 # -- Soil -------------------------------------------------------------------------------------
 
 
@@ -483,15 +453,6 @@ def test_the_zero_of_a_torque_sensor_is_told_from_the_soil_by_the_load(parts, ek
         ekf.fuse(rows)
     assert update.zeros(ekf.mean) == pytest.approx((zero, -zero, 0, 0, 0, 0), abs=0.15 * zero)
     assert ekf.mean[SHEAR_STRENGTH] == pytest.approx(0.1, abs=0.01)
-
-
-def test_without_a_zero_stated_the_state_has_none(parts):
-    plain = Parts(reader.load(SAND, ['sensors.torque_zero_std:=0.0']))
-    assert parts.layout.size == plain.layout.size + 6
-    assert (
-        TorqueUpdate(plain.configuration, plain.rover, plain.layout).zeros(plain.filter().mean)
-        == (0.0,) * 6
-    )
 
 
 def test_the_error_of_a_measured_leaving_angle_weakens_torque_and_balance(parts, ekf):
@@ -666,22 +627,3 @@ def test_a_stiffer_soil_has_both_moduli_of_sinkage_larger_by_the_same_factor():
     for name in ('soil.cohesive_modulus', 'soil.frictional_modulus'):
         assert ratio[name] == pytest.approx(2.0)
     assert ratio['soil.shear_modulus'] == pytest.approx(1.0)
-
-
-def test_references_an_hour_apart_are_no_more_than_the_longest_gap():
-    assert ReferenceState().gap == ReferenceTuning().longest_gap
-
-
-def test_what_is_assumed_at_the_start_lies_within_its_bounds():
-    """A prior that reaches its bound is a bound: half of it at most."""
-    t = PriorTuning()
-    for spread, bound in (
-        (t.slip_sinkage_std, t.most_slip_sinkage),
-        (t.centroid_std, t.most_centroid),
-        (t.mound_mean + t.mound_std, t.most_mound),
-        (t.slip_per_demand_mean + t.slip_per_demand_std, t.most_slip_per_demand),
-        (t.least_strength_std, t.most_strength),
-        (t.least_shear_modulus_std, t.most_shear_modulus),
-        (t.least_stiffness_std, t.most_stiffness),
-    ):
-        assert 0.0 < spread <= 0.5 * bound

@@ -104,14 +104,6 @@ def test_a_gyro_without_accelerometer_and_the_reverse_are_kept_apart():
     assert window.mean_force() == pytest.approx((9.8 * np.sin(0.1), 0.0, 9.8 * np.cos(0.1)))
 
 
-def test_the_zero_of_the_gyro_is_taken_off():
-    imu = InertialInput(GRAVITY)
-    imu.update(0.0, reading(rate=(0.0, 0.03, 0.05)), GyroZero(yaw=0.01, pitch=0.02))
-    window = imu.take()
-    assert (window.yaw_rate, window.pitch_rate) == pytest.approx((0.04, 0.01))
-    assert imu.take().readings == 0
-
-
 def odometry(rate, torque):
     return WheelOdometry(0, np.array(rate), np.array(torque))
 

@@ -22,7 +22,6 @@ from wheel_terra_estimator.estimation.traction_limiter import (
     after_command,
     after_direction,
     after_estimates,
-    after_event,
     after_release,
     after_stuck,
     decide,
@@ -96,26 +95,6 @@ def test_a_warning_while_the_operator_already_tries_reverse_is_not_turned_round(
     rover.stuck(direction=1)
     assert rover.command(-0.1).scale == 0.3
     assert rover.command(0.1).scale == 0.0
-
-
-@pytest.mark.parametrize('first', ['direction', 'warning'])
-def test_warning_and_direction_come_in_either_order(first):
-    state = LimiterState()
-    if first == 'direction':
-        state = after_stuck(after_direction(state, -1), True, change=True)
-    else:
-        state = after_direction(after_stuck(state, True, change=True), -1)
-    assert state.direction == -1
-
-
-def test_out_of_stuck_and_on_the_spot_also_with_a_dead_estimator():
-    rover = Rover(stale_scale=0.0)
-    rover.drive(2.0, 0.1)
-    rover.stuck()
-    for _ in range(2):
-        assert (rover.scale(0.1), rover.scale(-0.1), rover.scale(turn=0.2)) == (0.0, 0.3, 0.3)
-        assert rover.scale(0.1, 0.2) == 0.0, 'nothing in that direction, in a curve neither'
-        rover.now += 1000.0
 
 
 def test_an_unknown_direction_opens_both_ways_but_one_at_a_time():
@@ -192,29 +171,12 @@ def test_release_of_a_stop_opens_a_crawl_then_the_law_decides_anew():
     assert rover.drive(0.2, 0.1).scale == 1.0
 
 
-def test_what_would_stop_the_rover_during_a_release_is_not_kept_beyond_it():
-    rover = Rover()
-    rover.drive(1.0, 0.1, slip=0.7, slip_class=2, travel=0.3)
-    rover.state, _ = after_release(rover.state, rover.now)
-    rover.drive(5.0, 0.1, slip=0.7, slip_class=2, travel=0.3)
-    assert rover.drive(5.1, 0.1).scale == 1.0
-
-
 def test_a_gap_in_the_estimates_is_no_motion_out():
     rover = Rover()
     rover.drive(1.0, 0.1, slip=0.7, slip_class=2, travel=0.3)
     for _ in range(3):
         rover.drive(2.0, -0.1, rim=-0.03)
         rover.now += 1.5
-    assert rover.scale(0.1) == 0.0
-
-
-def test_a_warning_that_rises_ends_the_release_of_a_stop():
-    rover = Rover()
-    rover.drive(1.0, 0.1, slip=0.7, slip_class=2, travel=0.3)
-    rover.state, _ = after_release(rover.state, rover.now)
-    assert rover.scale(0.1) == 0.3
-    rover.stuck()
     assert rover.scale(0.1) == 0.0
 
 
@@ -360,15 +322,6 @@ def test_late_news_counts_only_where_it_is_bad(slip):
 # -- The way up, and down -------------------------------------------------------------------------
 
 
-def test_the_first_command_takes_the_ramp():
-    rover = Rover(stale_scale=1.0)
-    for _ in range(30):
-        rover.command(0.5)
-    speeds = [sent[0] for sent in rover.sent]
-    assert speeds[0] == 0.0 and speeds[-1] == 0.5
-    assert max(b - a for a, b in pairwise(speeds)) <= 0.5 * STEP + 1e-12
-
-
 def test_a_stop_and_a_reduction_act_at_once():
     rover = Rover()
     rover.drive(3.0, 0.5, turn=0.2)
@@ -378,37 +331,16 @@ def test_a_stop_and_a_reduction_act_at_once():
     assert rover.sent[-1] == ZERO
 
 
-def test_a_turn_back_stops_at_once_and_then_takes_the_ramp():
-    rover = Rover()
-    rover.drive(3.0, 0.5)
-    rover.drive(STEP, -0.5)
-    assert rover.sent[-1][0] == pytest.approx(-0.5 * STEP)
-
-
 def test_a_curve_stays_the_same_curve_on_the_way_up():
     rover = Rover()
     rover.drive(1.0, 0.4, turn=0.2)
     assert all(s[5] == pytest.approx(0.5 * s[0]) for s in rover.sent[-20:])
 
 
-def test_what_is_no_number_stops():
-    rover = Rover()
-    rover.drive(3.0, 0.5)
-    assert rover.command(math.nan).state == 'zero'
-    assert rover.sent[-1] == ZERO
-
-
 @pytest.mark.parametrize('wrong', [{'critical_slip': 0.3}, {'stop_rim_travel': 2.0}])
 def test_bounds_that_cross_are_refused(wrong):
     with pytest.raises(UserError, match='must be below'):
         LimiterTuning(**wrong)
-
-
-def test_an_event_that_opens_nothing_keeps_direction_and_reason():
-    state = after_event(LimiterState(), Event.STOP, 1, 'stop: 0.3 m')
-    assert after_event(state, Event.STOP, -1, 'other') == state
-    assert after_event(state, Event.BEGUN) == state
-    assert after_event(state, Event.STUCK, 0, 'stuck').direction == 1
 
 
 WILD = (math.nan, math.inf, -math.inf, 1e308, -1e308, 5e-324, 0.0, -0.0, 0.5, -3.0, 0.95, 1e9)

@@ -81,14 +81,6 @@ def test_a_set_at_the_first_odometry_at_or_after_each_multiple(gaps, rate):
     assert [s.stamp for s in sets] == by_the_letter(stamps, rate)
 
 
-def test_twenty_sets_a_second_from_a_hundred_and_no_more_steps():
-    core, fake = make_core(**DEFAULT)
-    stream = [odometry(0.01 * i) for i in range(1000)] + [imu(0.005 * i) for i in range(2000)]
-    sets = play(core, sorted(stream, key=lambda m: m.stamp))
-    assert [s.stamp for s in sets] == [stamp_at(0.05 * i) for i in range(200)]
-    assert fake.steps <= 2 * 200 + 10  # equal stamps of the two topics: one step made again
-
-
 def test_rates_are_averaged_over_the_interval_that_each_stands_for():
     core, fake = recording_core()
     nan = math.nan
@@ -103,23 +95,6 @@ def test_rates_are_averaged_over_the_interval_that_each_stands_for():
     right = (8.0 * 0.04 + 6.0 * 0.01) / 0.05
     np.testing.assert_allclose(inputs.wheel_odometry.rate, [left, right])
     np.testing.assert_allclose(inputs.wheel_odometry.torque, [4.0, nan])
-
-
-def test_travel_is_kept_by_merging():
-    """Sum of rate times interval, before and after, for a wheel whose rate changes all the time."""
-    rng = np.random.default_rng(1)
-    core, fake = recording_core()
-    times = np.cumsum(rng.uniform(0.002, 0.02, 400))
-    rates = 1.0 + rng.uniform(0.0, 2.0, 400)
-    for t, rate in zip(times, rates, strict=True):
-        core.add(odometry(t, rate=rate))
-    core.flush()
-    stamps = [stamp for stamp, _ in fake.inputs]
-    means = [inputs.wheel_odometry.rate[0] for _, inputs in fake.inputs]
-    last = stamps[-1]
-    seconds = np.round(times * 1e9).astype(int) + stamp_at(0.0)
-    exact = np.sum(rates[1:] * np.diff(seconds) * (seconds[1:] <= last))
-    np.testing.assert_allclose(np.sum(np.diff(stamps) * means[1:]), exact, rtol=1e-9)
 
 
 def test_imu_and_sinkage_are_averaged_and_references_stay_at_their_stamps():
@@ -194,14 +169,6 @@ def test_late_inputs_within_the_history_end_in_the_same_state(seed):
     assert all(a.stamp < b.stamp for a, b in pairwise(sets))
 
 
-def test_the_order_of_arrival_alone_decides():
-    rng = np.random.default_rng(3)
-    stream = drive(5.0)
-    order = arriving(stream, rng.exponential(0.03, len(stream)))
-    runs = [essence(play(make_core(**DEFAULT)[0], order)) for _ in range(2)]
-    assert runs[0] == runs[1]
-
-
 # -- Lag ----------------------------------------------------------------------------------------
 
 
@@ -229,12 +196,6 @@ def test_what_lags_for_good_is_waited_for_and_no_set_is_lost(who, delay, jitter)
     assert len(sets) == len(expected) == 240
     assert fake.steps < 1.5 * punctual.steps
     assert not any('silent' in str(s.faults) for s in sets)
-
-
-def test_odometry_late_by_less_than_a_second_is_no_silence_though_nothing_waits():
-    core, _ = make_core(**{**DEFAULT, 'max_lag': 0.0})
-    sets = play(core, late(drive(10.0), WheelOdometry, 0.4))
-    assert len(sets) == 200
 
 
 def test_punctual_inputs_are_not_held_back():

@@ -99,12 +99,6 @@ def test_steps_and_gaps_are_no_noise(noise):
     assert noise.state.sinkage.readings == before
 
 
-def test_what_was_hardly_heard_is_not_told(noise):
-    assert read(noise, 'torque', 0.8, 0.1 * np.arange(50)) is None
-    assert noise.report() == {}
-    assert noise.in_words() == {}
-
-
 @pytest.mark.parametrize('factor', [0.5, 1.0, 4.0])
 def test_the_noise_of_references_is_seen_beside_a_filter_that_follows_them(noise, factor):
     """A Kalman filter of a constant, told a wrong R; what it lags behind does not count."""
@@ -128,13 +122,6 @@ def test_a_vibrating_rover_is_told_in_words(noise):
     words = noise.in_words()['stated']
     assert 'accelerometer noise' in words
     assert 'sensors.specific_force_std: 0.' in words
-
-
-def test_beyond_a_default_is_not_beyond_what_is_stated():
-    silent = SeenNoise(Parts(reader.load(SAND)).sensors, RATES, given=())
-    read(silent, 'torque', 20.0 * silent.stated['torque'], 0.1 * np.arange(400))
-    assert list(silent.in_words()) == ['default']
-    assert 'sensors.torque_std' in silent.in_words()['default']
 
 
 @pytest.mark.parametrize(('share', 'told'), [(1.0, False), (0.1, True)])

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from terra_tools import EFFECTS, SAND, WHEEL, points, state
+from terra_tools import SAND, WHEEL, points, state
 
 from wheel_terra_estimator.terramechanics.entrapment import (
     digging_per_turn,
@@ -95,12 +95,3 @@ def test_a_spinning_wheel_throws_out_the_layer_of_its_lugs_once_per_lug() -> Non
     """Thirty lugs of 10 mm pass in a turn; with all of it thrown out it is 300 mm deeper."""
     assert digging_per_turn(WHEEL, efficiency=1.0) == pytest.approx(0.300)
     assert digging_rate(1.0, WHEEL, 2.0 * math.pi) == pytest.approx(digging_per_turn(WHEEL))
-
-
-def test_wong_reece_alone_stays_below_5_mm() -> None:
-    # Ding et al. 2010 section 4.2; without exponent and digging terms.
-    effects = {'stress_peak_shift': EFFECTS['stress_peak_shift']}
-    z = state([0.0, 0.6], effects=effects, wheel=SMOOTH).sinkage
-    assert 0.0 < z[1] - z[0] < 0.005
-    grown = WheelSoilModel(SAND, {'slip_sinkage_exponent': {'n1': 0.3}})
-    assert np.diff(grown.steady_state(points([0.0, 0.6])).sinkage) > 0.005

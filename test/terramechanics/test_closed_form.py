@@ -13,7 +13,7 @@ import pytest
 from scipy.integrate import quad
 from terra_tools import EFFECTS, SAND, WHEEL, points, random_cases, state
 
-from wheel_terra_estimator.terramechanics import branch_moments, closed_form
+from wheel_terra_estimator.terramechanics import closed_form
 from wheel_terra_estimator.terramechanics.conditioned import INPUTS, ConditionedForces
 from wheel_terra_estimator.terramechanics.maths import ScalarMaths
 from wheel_terra_estimator.terramechanics.model import WheelSoilModel
@@ -40,19 +40,6 @@ def test_coefficients_are_the_integrals_of_a_triangle(angles: tuple[float, float
         assert ours == pytest.approx(truth, abs=1e-11)
     scalar = closed_form.coefficients(t1, tm, t2, ScalarMaths)
     assert scalar == pytest.approx(closed_form.coefficients(*map(np.array, angles)))
-
-
-@pytest.mark.parametrize('exponent', [0.5, 0.8, 1.0, 1.3, 2.0])
-def test_branch_moments_are_the_moments_of_the_stress(exponent: float) -> None:
-    for skew in (0.0, 0.3, 0.6):
-
-        def stress(v: float, q: float = skew) -> float:
-            return (v * (1.0 + q * (1.0 - v))) ** exponent
-
-        area = quad(stress, 0.0, 1.0)[0]
-        centroid = quad(lambda v: v * stress(v), 0.0, 1.0)[0] / area
-        ours = branch_moments.branch_moments(exponent, skew)
-        assert ours == pytest.approx((area, centroid), rel=0.01 if exponent != 1.0 else 1e-9)
 
 
 def test_decoupled_pull_is_exact_for_triangles() -> None:
@@ -99,21 +86,6 @@ def test_accuracy_over_random_contacts() -> None:
     # The triangles of the literature, for comparison: far off, which is why they are not used.
     triangle_pull, _, _ = family_errors('triangles', 11)
     assert np.quantile(triangle_pull, 0.95) > 4.0 * np.quantile(pull, 0.95)
-
-
-def test_pull_from_torque_hardly_asks_for_the_soil() -> None:
-    row = points(np.array([0.1, 0.3, 0.6, 0.9]))
-    model = WheelSoilModel(SAND, MOUND)
-    truth = model.steady_state(row)
-    terms = Terms(model.effects)
-    contact = build_contact(row, model._soil, 'bekker', terms)
-    set_angles(contact, truth.entrance_angle, None, terms)
-    right = decoupled_pull_shaped(truth.torque, contact)
-    contact.cohesion, contact.tan_friction = 2.0 * contact.cohesion, 0.5 * contact.tan_friction
-    contact.shear_modulus = 2.0 * contact.shear_modulus
-    wrong = decoupled_pull_shaped(truth.torque, contact)
-    assert right == pytest.approx(truth.drawbar_pull, abs=0.01 * 80.0)
-    assert wrong == pytest.approx(right, abs=0.01 * 80.0)
 
 
 def conditioned(effects: dict, wheel: Wheel = WHEEL) -> ConditionedForces:

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import itertools
-import math
 import warnings
 from dataclasses import replace
 from pathlib import Path
@@ -102,78 +101,6 @@ def test_closed_form_and_quadrature_tell_the_same_change(name: str) -> None:
     change = [outputs({name: {}}, m) - outputs({}, m) for m in ('quadrature', 'closed_form')]
     for ours, truth, scale in zip(change[1].T, change[0].T, (0.02, 100.0, 10.0), strict=True):
         assert ours == pytest.approx(truth, rel=0.25, abs=0.02 * scale)
-
-
-def test_signs_of_the_listed_effects() -> None:
-    base = state(0.3, slope=0.2)
-    tilted = state(0.3, slope=0.2, effects={'pitch_bias': {'bias': 0.05}})
-    assert tilted.drawbar_pull - base.drawbar_pull == pytest.approx(80.0 * math.sin(0.05))
-    deep = state(0.3, slope=0.2, effects={'sinkage_offset': {'offset': 0.003}})
-    assert deep.sinkage - base.sinkage == pytest.approx(0.003)
-    # The soil carries W cos(slope); the hitch gets what the soil gives less W sin(slope).
-    weight = state(0.3, slope=0.2, effects={'slope_gravity': {}})
-    soil = state(0.3, 80.0 * math.cos(0.2))
-    assert weight.sinkage == pytest.approx(soil.sinkage)
-    assert weight.torque == pytest.approx(soil.torque)
-    assert weight.drawbar_pull == pytest.approx(soil.drawbar_pull - 80.0 * math.sin(0.2))
-    # A wheel larger than configured goes faster than its encoder says: less slip was recorded.
-    assert state(0.3, effects={'wheel_radius_bias': {'bias': 0.1}}).drawbar_pull > base.drawbar_pull
-    friction = state(0.3, effects={'drivetrain_friction': {'torque': 0.4}})
-    assert friction.torque - base.torque == pytest.approx(0.4)
-
-
-def test_radius_bias_is_a_change_of_recorded_slip() -> None:
-    rim = Wheel(0.15, 0.15)
-    biased = state(0.3, wheel=rim, effects={'wheel_radius_bias': {'bias': -0.06}})
-    true_slip = 1.0 - (1.0 - 0.3) / 0.94
-    assert biased.outputs() == pytest.approx(state(true_slip, wheel=rim).outputs(), rel=1e-9)
-
-
-def test_digging_and_support_are_the_seed_s_terms() -> None:
-    z = state([0.0, 0.5], effects={}).sinkage
-    dug = state([0.0, 0.5], effects={'lug_digging': {'kd': 1.0}}).sinkage
-    assert dug - z == pytest.approx([0.0, 0.5 * WHEEL.lug_height])
-    reworked = state([0.5], effects={'lug_digging': {'kd': 1.0, 'rework': 1.0}}).sinkage
-    assert reworked - z[1] == pytest.approx(WHEEL.lug_height * 0.5 / (1 - 0.5))
-    assert z - state([0.0, 0.5], effects={'lug_support': {}}).sinkage == pytest.approx(0.0015)
-    smooth = Wheel(0.1574, 0.165)
-    assert state(0.5, wheel=smooth, effects={'lug_support': {}}).sinkage == pytest.approx(
-        state(0.5, wheel=smooth).sinkage
-    )
-
-
-def test_mound_raises_the_pull_at_high_slip_only() -> None:
-    slip = np.array([0.1, 0.3, 0.7, 0.9])
-    off, on = state(slip), state(slip, effects={'soil_mound': {'kappa': 1.5, 'onset': 0.4}})
-    assert on.outputs()[:2] == pytest.approx(off.outputs()[:2])
-    assert (on.drawbar_pull[2:] > off.drawbar_pull[2:] + 1.0).all()
-    assert (on.sinkage[2:] < off.sinkage[2:]).all()
-    # Higher than the free surface behind the wheel: leaving angle beyond the entrance angle.
-    high = state([0.9], effects={'soil_mound': {'kappa': 3.0, 'onset': 0.3}})
-    assert -high.leaving_angle > high.entrance_angle
-
-
-def test_conveyed_mound_is_the_volume_that_lugs_carry_back_over_the_room_of_the_rut() -> None:
-    """Height behind the wheel by hand, from the angles of the answer."""
-    kappa, band, slip = 0.02, 0.002, np.array([0.1, 0.5, 0.9])
-    given = {'form': 'conveyed', 'kappa': kappa, 'band': band}
-    rises = []
-    for lug in (0.0, 0.01, 0.02):
-        wheel = Wheel(0.1574, 0.165, lug, 30)
-        answer = state(slip, wheel=wheel, effects={'soil_mound': given})
-        t1, t2 = answer.entrance_angle, answer.leaving_angle
-        room = wheel.radius * (1.0 - np.cos(t1))
-        free = wheel.radius * (1.0 - np.cos(SAND.leaving_angle_ratio * t1))
-        conveyed = (lug + band) * slip / (1.0 - slip)
-        rise = wheel.radius * (1.0 - np.cos(t2)) - free
-        assert rise == pytest.approx(kappa * room * (conveyed / (conveyed + room)) ** 2, rel=0.01)
-        rises.append(rise / room)
-    assert (np.diff(rises, axis=0) > 0.0).all()  # the higher the lugs, the higher the mound
-    bare = {'soil_mound': given | {'kappa': 1.0, 'band': 0.0}}
-    smooth = {'wheel': Wheel(0.1574, 0.165)}
-    assert state(slip, effects=bare, **smooth).outputs() == pytest.approx(
-        state(slip, **smooth).outputs()
-    )
 
 
 @pytest.mark.parametrize('name', LISTED)
@@ -274,21 +201,6 @@ def test_registering_refuses_taken_names_and_empty_effects(tmp_path: Path) -> No
         load_file(broken)
     with pytest.raises(ValueError, match='not a Python file'):
         load_file(tmp_path / 'missing.py')
-
-
-def test_instruments_are_what_a_hard_floor_would_show_as_well() -> None:
-    """Errors of the four readings and the friction of the drive; all others are of the soil."""
-    readings = {
-        'pull_gain',
-        'pull_zero',
-        'torque_gain',
-        'sinkage_gain',
-        'sinkage_offset',
-        'wheel_radius_bias',
-        'pitch_bias',
-        'drivetrain_friction',
-    }
-    assert {name for name, effect in catalogue().items() if effect.instrument} == readings
 
 
 def test_no_effect_stands_twice_in_the_catalogue() -> None:

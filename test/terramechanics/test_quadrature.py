@@ -9,8 +9,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from terra_tools import EFFECTS, SAND, WHEEL, points, random_cases, second_model, state
 
 from wheel_terra_estimator.terramechanics import stresses
@@ -19,7 +17,6 @@ from wheel_terra_estimator.terramechanics.model import (
     OVERLOADED,
     WheelSoilModel,
 )
-from wheel_terra_estimator.terramechanics.soil import Soil
 from wheel_terra_estimator.terramechanics.wheel import Wheel
 
 
@@ -33,15 +30,6 @@ def test_agrees_with_a_second_model(slip: float) -> None:
     ours = state([slip], effects=effects).outputs()[0]
     truth = second_model(slip, 80.0, SAND, WHEEL, n1=0.3, c2=0.15, lam=0.5)
     assert ours == pytest.approx(truth, rel=3e-4, abs=1e-5)
-
-
-def test_without_effects_it_is_the_contract_s_base_model() -> None:
-    answer = state([0.4])
-    assert answer.outputs()[0] == pytest.approx(second_model(0.4, 80.0, SAND, WHEEL), rel=1e-4)
-    t1 = answer.entrance_angle
-    assert answer.peak_stress_angle == pytest.approx(SAND.peak_stress_ratio * t1)
-    assert answer.leaving_angle == pytest.approx(SAND.leaving_angle_ratio * t1)
-    assert answer.sinkage == pytest.approx(WHEEL.radius * (1.0 - np.cos(t1)))
 
 
 def test_error_of_the_nodes_is_below_a_thousandth() -> None:
@@ -65,16 +53,6 @@ def test_frictionless_soil_gives_minus_the_compaction_resistance() -> None:
     resistance = WHEEL.width * modulus * answer.sinkage**power / power
     assert answer.torque == pytest.approx(0.0, abs=1e-12)
     assert answer.drawbar_pull == pytest.approx(-resistance, rel=2e-3)
-
-
-def test_sinkage_at_rest_is_bekker_s() -> None:
-    # A large stiff wheel: small sinkage, where Bekker's expansion of the circle holds.
-    soil = Soil(0.0, 5e7, 1.0, 0.0, 0.0, 0.01, 0.0, 0.0)
-    wheel = Wheel(0.5, 0.2)
-    answer = state([0.0], 100.0, soil=soil, wheel=wheel)
-    assert answer.sinkage == pytest.approx(
-        stresses.rolling_sinkage(100.0, wheel.radius, wheel.width, 5e7, 1.0), rel=0.01
-    )
 
 
 def test_forces_scale_with_size() -> None:
@@ -111,65 +89,6 @@ def test_seed_1_s_printed_shear_is_the_shear_slip_radius() -> None:
     lug_tip_slip = 1.0 - (1.0 - 0.2) * (WHEEL.radius + 0.005) / WHEEL.tip_radius
     contract = state([lug_tip_slip], effects=effects)
     assert printed.outputs() == pytest.approx(contract.outputs(), rel=1e-9)
-
-
-def test_pull_and_torque_at_the_ends_of_slip() -> None:
-    answer = state([-1.0, 0.0, 1.0], wheel=Wheel(0.1574, 0.165))
-    assert np.isfinite(answer.outputs()).all()
-    # Rolling: hardly any shear; spinning: all of it; locked: all of it, backwards.
-    assert abs(answer.torque[1]) < 0.2 * answer.torque[2]
-    assert answer.torque[0] < 0.0 < answer.torque[2]
-    assert answer.drawbar_pull[0] < answer.drawbar_pull[1] < 0.0 < answer.drawbar_pull[2]
-
-
-@pytest.mark.parametrize('count', [8, 15, 24, 30])
-def test_number_of_lugs_has_no_effect(count: int) -> None:
-    # Ding et al. 2010, figure 3.
-    wheel = replace(WHEEL, lug_count=count)
-    assert state([0.4], effects=EFFECTS, wheel=wheel).outputs() == pytest.approx(
-        state([0.4], effects=EFFECTS).outputs()
-    )
-
-
-def test_narrow_and_small_wheels_sink_more() -> None:
-    # Ding et al. 2010, figure 5: Wh2 (narrow), Wh1 (small), Wh3.
-    slip = np.array([0.0, 0.3, 0.6])
-    wide, narrow, large = (
-        state(slip, effects=EFFECTS, wheel=Wheel(r, b, 0.01, 30)).sinkage
-        for r, b in ((0.135, 0.165), (0.135, 0.110), (0.1574, 0.165))
-    )
-    assert (narrow > wide).all() and (wide > large).all()
-
-
-def test_lug_height_sets_the_slope_of_the_sinkage() -> None:
-    # Ding et al. 2010, figures 4 and 5: the higher the lugs, the steeper the curve.
-    slopes = []
-    for height in (0.005, 0.010, 0.015):
-        z = state([0.0, 0.6], effects=EFFECTS, wheel=Wheel(0.1574, 0.165, height, 30)).sinkage
-        slopes.append(z[1] - z[0])
-    assert slopes[0] < slopes[1] < slopes[2]
-
-
-@settings(max_examples=60, deadline=None)
-@given(
-    slip=st.floats(-0.9, 0.95),
-    pressure=st.floats(500.0, 6000.0),
-    radius=st.floats(0.05, 0.3),
-    modulus=st.floats(4e5, 5e6),
-    exponent=st.floats(0.6, 1.3),
-    friction=st.floats(0.2, 0.8),
-)
-def test_sinkage_grows_with_load_and_everything_is_finite(
-    slip: float, pressure: float, radius: float, modulus: float, exponent: float, friction: float
-) -> None:
-    soil = Soil(0.0, modulus, exponent, 300.0, friction, 0.012, 0.45, -0.2)
-    wheel = Wheel(radius, radius, 0.05 * radius, 20)
-    loads = pressure * radius * radius * np.array([0.5, 1.0])
-    model = WheelSoilModel(soil, {'lug_shear_radius': {}}, strict=False)
-    answer = model.steady_state(points(slip, loads, wheel))
-    assert np.isfinite(answer.outputs()).all()
-    if not (answer.flags & OVERLOADED).any():
-        assert answer.sinkage[1] > answer.sinkage[0] > 0.0
 
 
 def test_reece_law_equals_bekker_s_at_one_width_and_gravity() -> None:
