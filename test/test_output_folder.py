@@ -263,20 +263,6 @@ def test_an_earlier_output_stands_aside_until_the_new_one_is_whole(tmp_path: Pat
     assert contents(run)['rows.csv'] == 'third'
 
 
-def test_a_refused_run_leaves_the_earlier_output(tmp_path: Path) -> None:
-    run = tmp_path / 'run'
-    with working_folder(run, False, False, ['summary.json']):
-        (run / 'summary.json').write_text('first')
-    with pytest.raises(UserError), working_folder(run, True, False, ['summary.json']):
-        raise UserError('refused')
-    assert (run / 'summary.json').read_text() == 'first'
-    with working_folder(run, True, False, ['summary.json']):
-        assert set(contents(run)) == set()
-        (run / 'summary.json').write_text('second')
-    assert (run / 'summary.json').read_text() == 'second'
-    assert [entry.name for entry in tmp_path.iterdir()] == ['run']
-
-
 def test_an_empty_folder_of_the_user_stays(tmp_path: Path) -> None:
     run = tmp_path / 'run'
     run.mkdir()

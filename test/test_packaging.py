@@ -48,18 +48,6 @@ def entry_points() -> dict[str, tuple[str, str]]:
     return {name: (module, function) for name, module, function in found}
 
 
-def test_manifest_is_format_3_of_an_ament_python_package(manifest: ElementTree.Element) -> None:
-    assert manifest.tag == 'package'
-    assert manifest.get('format') == '3'
-    assert manifest.findtext('name') == NAME
-    assert manifest.findtext('export/build_type') == 'ament_python'
-    assert manifest.findtext('license') == 'Apache-2.0'
-    for tag in ('description', 'maintainer', 'author'):
-        assert (manifest.findtext(tag) or '').strip(), tag
-    order = [child.tag for child in manifest]
-    assert order.index('version') < order.index('description') < order.index('maintainer')
-
-
 def test_rosdep_keys_only(manifest: ElementTree.Element) -> None:
     keys = [e.text or '' for e in manifest if e.tag.endswith('depend')]
     assert len(keys) == len(set(keys))

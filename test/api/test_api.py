@@ -213,15 +213,6 @@ def test_a_soil_is_saved_as_it_was(name, tmp_path):
         api.Soil.load('hit_wh3')
 
 
-def test_reprs_are_short(drive, named):
-    model = api.Model.load('hit_wh3', 'hit_fit')
-    curve = model.curve([0.1, 0.4], 80.0)
-    for shown in (model, model.soil, curve, drive, drive.truth, named[1]):
-        assert 0 < repr(shown).count('\n') + 1 <= 5
-        assert len(repr(shown)) < 600
-    assert 'rad (31.9' in repr(model.soil)
-
-
 @pytest.mark.parametrize('name', ['dlr_mss', 'grc1', 'lete_sand', 'hit_fit'])
 def test_a_soil_is_found_again_without_its_file(name, monkeypatch):
     """The start may be any other shipped soil; what one wheel width tells is kc/b + kphi."""

@@ -162,26 +162,6 @@ def test_bag_is_closed_and_readable_after_a_failure(tmp_path: Path) -> None:
     assert sum(topic.endswith('/slip') for _, topic, _ in messages(path)) == 1
 
 
-def test_existing_path_is_refused_unless_overwrite(bag: Path, tmp_path: Path) -> None:
-    with pytest.raises(UserError, match='--overwrite'):
-        EstimateBagWriter(bag, NAMES)
-    assert len(messages(bag)) > 100
-    with EstimateBagWriter(bag, NAMES, overwrite=True) as writer:
-        writer.clear_stuck(STAMP)
-    assert len(messages(bag)) == 2
-
-
-def test_overwrite_never_deletes_what_is_no_bag(tmp_path: Path) -> None:
-    home = tmp_path / 'home'
-    home.mkdir()
-    (home / 'thesis.tex').write_text('years of work')
-    with pytest.raises(UserError, match=r'holds thesis\.tex .* so it is not overwritten'):
-        EstimateBagWriter(home, NAMES, overwrite=True)
-    with pytest.raises(UserError, match='is not a folder'):
-        EstimateBagWriter(home / 'thesis.tex', NAMES, overwrite=True)
-    assert (home / 'thesis.tex').read_text() == 'years of work'
-
-
 def test_a_reset_clears_the_stuck_warning(tmp_path: Path) -> None:
     path = tmp_path / 'reset'
     stuck = next(estimates for estimates in sets() if estimates.stuck)

@@ -76,15 +76,6 @@ def test_a_disk_without_room_for_one_chunk_keeps_nothing(tmp_path: Path) -> None
     assert not list(tmp_path.iterdir())
 
 
-def test_a_full_disk_is_found_before_anything_is_computed(tmp_path: Path, capsys: Any) -> None:
-    with largest_file(1000):
-        assert main(['evaluate', '--kinds', 'climb', '-o', str(tmp_path / 'out.md')]) == 2
-    said = capsys.readouterr()
-    assert 'cannot be written' in said.err
-    assert 'drive' not in said.out + said.err
-    assert not list(tmp_path.iterdir())
-
-
 def test_a_disk_that_is_full_at_the_end_only(tmp_path: Path, monkeypatch: Any) -> None:
     """The last chunk does not fit when the bag is closed."""
     from rosbags.rosbag2.storage_mcap import McapWriter
@@ -196,22 +187,3 @@ def test_a_disk_that_fills_up_at_any_file_leaves_the_earlier_output(
             assert 'No space left' in told
         else:
             assert everything(out).keys() == before.keys()
-
-
-@pytest.mark.slow
-def test_full_disk_of_the_real_command(
-    make_bag: Any, make_drive: Any, rover: Any, tmp_path: Path, capsys: Any
-) -> None:
-    """A drive of a minute and a half onto a disk with room for little more than a megabyte."""
-    rover.write(tmp_path / 'rover.yaml')
-    bag = make_bag(messages=make_drive(900), name='long')
-    out = tmp_path / 'out'
-    with largest_file(1_200_000):
-        command = ['replay', str(bag), '--config', str(tmp_path / 'rover.yaml'), '-o', str(out)]
-        assert main(command) == 2
-    said = capsys.readouterr().err
-    assert 'cannot be written (File too large)' in said
-    assert said.count('\n') == 1
-    with open_bag(out) as opened:
-        assert opened.message_count > 1000
-        assert not opened.notes

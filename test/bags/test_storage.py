@@ -102,58 +102,6 @@ def test_truncated_mcap_gives_the_messages_before_the_cut(
         assert 'whole messages recovered' in bag.notes[0]
 
 
-def test_truncated_mcap_in_its_folder(make_bag: Any, whole: list[RawMessage]) -> None:
-    folder = make_bag()
-    (file,) = folder.glob('*.mcap')
-    file.write_bytes(file.read_bytes()[: file.stat().st_size // 2])
-    found = contents(folder)
-    assert 0 < len(found) < len(whole)
-    assert found == whole[: len(found)]
-
-
-def test_damaged_chunk_is_left_out_and_said(
-    tmp_path: Path, drive: Any, whole: list[RawMessage]
-) -> None:
-    """A compressed bag of several chunks with rubbish in one: the others are read."""
-    from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
-
-    from wheel_terra_estimator.bags.message_types import jazzy_types
-
-    store = jazzy_types()
-    writer = Writer(tmp_path / 'bag', version=9, storage_plugin=StoragePlugin.MCAP)
-    writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
-    with writer:
-        kind = 'sensor_msgs/msg/JointState'
-        connection = writer.add_connection('/joint_states', kind, typestore=store)
-        joints = [(m, t) for topic, m, t in drive if topic == '/joint_states']
-        for number in range(9000):  # about 3 MB, a chunk is closed at 1 MB
-            message, _ = joints[number % len(joints)]
-            writer.write(connection, 1000 + number, store.serialize_cdr(message, kind))
-    (file,) = (tmp_path / 'bag').glob('*.mcap')
-    content = bytearray(file.read_bytes())
-    magic = [i for i in range(len(content)) if content[i : i + 4] == b'\x28\xb5\x2f\xfd']
-    assert len(magic) >= 2
-    for offset in range(20, 60):
-        content[magic[1] + offset] ^= 0xFF
-    file.write_bytes(content)
-    with open_bag(file) as bag:
-        times = [m.log_time for m in bag.messages(('/joint_states',))]
-        assert bag.notes
-    assert times == sorted(set(times))
-    assert 3000 < len(times) < 9000
-    assert times[0] == 1000
-
-
-def test_recording_without_index_is_read(make_bag: Any, whole: list[RawMessage]) -> None:
-    """What a recorder that was killed leaves: all chunks, no summary, no metadata."""
-    folder = make_bag()
-    (file,) = folder.glob('*.mcap')
-    (folder / 'metadata.yaml').unlink()
-    content = file.read_bytes()
-    file.write_bytes(content[: content.rindex(b'serialized_metadata') - 40])
-    assert contents(folder) == whole
-
-
 @pytest.mark.parametrize(
     ('name', 'content', 'words'),
     [

@@ -12,28 +12,6 @@ import pytest
 
 from wheel_terra_estimator.cli.main import main
 from wheel_terra_estimator.configuration import reader
-from wheel_terra_estimator.output_folder import new_folder
-
-
-@pytest.mark.parametrize(
-    ('remap', 'words'),
-    [
-        ('referenc_odom:=/odom', 'nearest: reference_odom'),
-        ('reference_odom=/odom', 'FROM:=TO'),
-        ('reference_odom:=visual', 'topic /visual is not in the bag'),
-    ],
-)
-def test_remaps_are_checked(
-    make_bag: Any, rover: Any, tmp_path: Path, capsys: Any, remap: str, words: str
-) -> None:
-    rover.write(tmp_path / 'rover.yaml')
-    arguments = ['diagnose', str(make_bag()), '-o', str(tmp_path / 'out')]
-    arguments += ['--config', str(tmp_path / 'rover.yaml'), '--remap', remap]
-    assert main(arguments) == 2
-    said = capsys.readouterr().err
-    assert words in said
-    assert said.count('\n') == 1
-    assert not (tmp_path / 'out').exists()
 
 
 def test_packed_recording_is_a_recording(tmp_path: Path, capsys: Any) -> None:
@@ -44,50 +22,10 @@ def test_packed_recording_is_a_recording(tmp_path: Path, capsys: Any) -> None:
     assert 'cannot be unpacked' in capsys.readouterr().err
 
 
-@pytest.mark.parametrize(
-    ('files', 'words'),
-    [
-        (('thesis.tex',), 'thesis.tex'),
-        (('photo.png',), 'photo.png'),
-        (('report.json', 'notes.txt'), 'notes.txt'),
-    ],
-)
-def test_overwrite_never_deletes_what_is_no_diagnosis(
-    tmp_path: Path, capsys: Any, files: tuple[str, ...], words: str
-) -> None:
-    home = tmp_path / 'home'
-    home.mkdir()
-    for name in files:
-        (home / name).write_text('years of work')
-    assert main(['diagnose', 'table.csv', '-o', str(home), '--overwrite']) == 2
-    assert words in capsys.readouterr().err
-    assert sorted(entry.name for entry in home.iterdir()) == sorted(files)
-    # A folder of an earlier diagnosis is no obstacle, so the table is what is complained about.
-    earlier = tmp_path / 'earlier'
-    with new_folder(earlier) as folder:
-        for name in ('report.json', 'model.yaml', 'report.html', 'where.png'):
-            (folder / name).write_text('')
-    assert main(['diagnose', 'table.csv', '-o', str(earlier), '--overwrite']) == 2
-    assert 'table.csv' in capsys.readouterr().err
-
-
 def _table(path: Path) -> str:
     rows = [f'{0.05 + 0.1 * i:.2f},80,{0.01 + 0.001 * i},{5 * i},{1.0 + 0.5 * i}' for i in range(8)]
     path.write_text('slip,normal_load,sinkage,drawbar_pull,torque\n' + '\n'.join(rows))
     return str(path)
-
-
-def test_an_output_that_cannot_be_written_is_said_before_any_work(
-    tmp_path: Path, capsys: Any, monkeypatch: Any
-) -> None:
-    from wheel_terra_estimator.discrepancy import workflow
-
-    monkeypatch.setattr(workflow, 'diagnose', lambda *_: pytest.fail('work before the check'))
-    (tmp_path / 'file').write_text('in the way')
-    command = ['diagnose', _table(tmp_path / 'rig.csv'), '--config', 'hit_wh1']
-    assert main([*command, '-o', str(tmp_path / 'file' / 'out')]) == 2
-    said = capsys.readouterr().err
-    assert 'cannot be written' in said and said.count('\n') == 1
 
 
 def test_remap_is_for_bags(tmp_path: Path, capsys: Any) -> None:
@@ -100,19 +38,6 @@ def test_smoothing_is_for_bags(tmp_path: Path, capsys: Any) -> None:
     command = ['diagnose', _table(tmp_path / 'rig.csv'), '-o', str(tmp_path / 'out')]
     assert main([*command, '--smooth']) == 2
     assert '--smooth: goes with a bag' in capsys.readouterr().err
-
-
-def test_wheel_of_another_model_file(tmp_path: Path, capsys: Any) -> None:
-    table = tmp_path / 'rig.csv'
-    _table(table)
-    lines = table.read_text().splitlines()
-    wide = [lines[0] + ',wheel_radius', *(f'{line},0.5' for line in lines[1:])]
-    table.write_text('\n'.join(wide))
-    command = ['diagnose', str(table), '-o', str(tmp_path / 'out'), '--config', 'hit_wh1']
-    assert main(command) == 2
-    said = capsys.readouterr().err
-    assert 'line 2, column wheel_radius: 0.5 m' in said and 'wheels.radius' in said
-    assert not (tmp_path / 'out').exists()
 
 
 def test_a_soil_that_nobody_stated_is_said(tmp_path: Path, capsys: Any) -> None:

@@ -117,16 +117,6 @@ def test_rim_speeds_and_positions_of_a_log(tmp_path, reference, sense):
     np.testing.assert_allclose(middle, 0.5 + 0.2 * np.arange(middle.size), atol=1e-6)
 
 
-def test_half_a_position_is_told(tmp_path, capsys):
-    columns = {
-        'time': {'column': 't'},
-        'joint_states': {'left': {'velocity': {'column': 'v'}}},
-        'reference_odom': {'latitude': {'column': 'v', 'unit': 'deg'}},
-    }
-    assert converted(tmp_path, columns, ['t,v', '1,1']) == 2
-    assert 'latitude and longitude' in capsys.readouterr().err
-
-
 def test_an_imu_that_says_it_has_no_accelerometer(tmp_path):
     with BagFile(tmp_path / 'bag', {'/imu/data': 'sensor_msgs/msg/Imu'}) as bag:
         for stamp in range(10**9, 4 * 10**9, 10**8):

@@ -51,16 +51,6 @@ def test_a_mistyped_option_gets_the_nearest(capsys):
     assert "no option '--confg'; did you mean '--config'?" in said
 
 
-def test_a_mistyped_choice_gets_the_nearest(capsys):
-    _, said = complaint(capsys, 'predict', '--method', 'quadratur')
-    assert "did you mean 'quadrature'?" in said
-
-
-def test_one_argument_too_many(capsys):
-    _, said = complaint(capsys, 'replay', 'bag', 'other', 'third', '--nonsense')
-    assert 'wheel-terra replay' in said
-
-
 @pytest.fixture
 def broken(monkeypatch):
     """A command that fails as told."""
@@ -101,17 +91,6 @@ def test_debug_shows_the_traceback(broken, arguments):
     broken(ZeroDivisionError('oh'))
     with pytest.raises(ZeroDivisionError):
         main.main(arguments)
-
-
-def test_red_on_a_terminal_only(broken, monkeypatch, capsys):
-    broken(UserError('no'))
-    monkeypatch.setattr(main.sys.stderr, 'isatty', lambda: True, raising=False)
-    monkeypatch.delenv('NO_COLOR', raising=False)
-    main.main(['broken'])
-    assert capsys.readouterr().err.startswith('\033[31m')
-    monkeypatch.setenv('NO_COLOR', '1')
-    main.main(['broken'])
-    assert '\033' not in capsys.readouterr().err
 
 
 def examples():
@@ -163,24 +142,6 @@ def test_completion_in_bash(line, wanted):
     done = subprocess.run(['bash', '-c', script], capture_output=True, text=True, check=True)
     assert done.stdout.split() == wanted
     assert not done.stderr
-
-
-def test_help_is_short_and_whole():
-    for name, parser in main.sub_parsers().items():
-        short, whole = parser.format_help(), parser.format_help(whole=True)
-        options = [
-            a.option_strings[-1]
-            for part in parser.groups().values()
-            for a in part
-            if a.option_strings
-        ]
-        if not parser._subparsers:
-            assert all(option in whole for option in options), name
-            assert '--help-all' in short or short == whole, name
-            assert short.count('\n') < 70, name
-    replay = main.sub_parsers()['replay'].format_help()
-    assert [title for title in ('inputs', 'model', 'output') if f'\n{title}:\n' in replay]
-    assert '\n  --most-held' not in replay
 
 
 def test_the_page_of_commands_is_that_of_the_parsers():

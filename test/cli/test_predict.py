@@ -40,16 +40,6 @@ def test_the_table_is_the_model(capsys: pytest.CaptureFixture[str]) -> None:
         assert got[name] == pytest.approx(getattr(answer, name), rel=1e-7, abs=1e-9)
 
 
-def test_an_effect_of_the_command_line_acts(capsys: pytest.CaptureFixture[str]) -> None:
-    arguments = [*BASE, '--slip', '0.5', '--load', '80']
-    assert main(arguments) == 0
-    without = table(capsys.readouterr().out)
-    assert main([*arguments, '-p', 'effects.sinkage_offset.enabled:=true',
-                 '-p', 'effects.sinkage_offset.offset:=0.004']) == 0  # fmt: skip
-    offset = table(capsys.readouterr().out)
-    assert offset['sinkage'] - without['sinkage'] == pytest.approx(0.004)
-
-
 def test_text_angles_and_closed_form(capsys: pytest.CaptureFixture[str]) -> None:
     assert main([*BASE, '--slip', '0.2,0.6', '--table', 'text', '--angles']) == 0
     text = capsys.readouterr().out

@@ -137,16 +137,6 @@ def test_existing_output_is_refused_unless_overwrite(
     assert report.read_text() == 'mine'
 
 
-def test_the_bag_that_is_read_is_never_overwritten(
-    make_bag: Any, config: list[str], capsys: Any
-) -> None:
-    bag = make_bag()
-    assert main(['replay', str(bag), *config, '-o', str(bag), '--overwrite']) == 2
-    assert 'which the command reads' in capsys.readouterr().err
-    with open_bag(bag) as opened:
-        assert opened.message_count == 84
-
-
 @pytest.mark.parametrize(
     ('extra', 'words'),
     [
@@ -239,19 +229,6 @@ def test_measured_recordings_with_a_rover_file_and_remaps(
     assert all(np.isfinite(values).all() for values in history.values.values())
     # Each FrostyBoy event ends immobilised; the Pathfinder drive is on firm ground.
     assert bool(history.warnings) == (rover_name == 'frostyboy')
-
-
-@pytest.mark.slow
-@pytest.mark.shared
-def test_measured_recording_with_odometry_in_place_of_joint_states(
-    shared: Path, tmp_path: Path
-) -> None:
-    out = tmp_path / 'out'
-    bag = str(shared / 'bags' / 'frostyboy_event_1_4_mcap')
-    command = ['replay', bag, '--config', 'frostyboy', *REAL, '-p', 'wheel_odometry:=odom']
-    assert main([*command, '-o', str(out)]) == 0
-    with open_bag(out) as opened:
-        assert read_estimates(opened).stamp.size == 252
 
 
 def test_slip_on_slopes_is_in_the_table_as_it_was_published_last(

@@ -335,15 +335,6 @@ def test_shipped_files_of_an_installation(tmp_path, monkeypatch):
     assert shipped.configuration_folder() == beside
 
 
-def test_every_shipped_rover_loads():
-    rovers = [name for name in shipped.files() if name.startswith('rovers/')]
-    assert len(rovers) >= 15
-    for name in rovers:
-        c = reader.load([name])
-        assert c.rover.name and 'rover.mass' in c.stated
-        assert shipped.find(name).read_text().startswith('# ')
-
-
 @pytest.mark.shared
 def test_rovers_of_the_shipped_files_against_the_sources():
     """Numbers of the slope paper's table 1, read again."""

@@ -8,7 +8,7 @@ import csv
 
 import numpy as np
 import pytest
-from test_workflow import SHARE, make, settings
+from test_workflow import make
 
 from wheel_terra_estimator.cli.main import main
 from wheel_terra_estimator.configuration import reader
@@ -16,9 +16,7 @@ from wheel_terra_estimator.discrepancy import workflow
 from wheel_terra_estimator.discrepancy.report.model_file import corrected, write_model
 from wheel_terra_estimator.discrepancy.tables.checks import check_table
 from wheel_terra_estimator.discrepancy.workflow import Options, diagnose
-from wheel_terra_lab.trials.designs import random_rows, random_soil
 from wheel_terra_lab.trials.forms import FORMS
-from wheel_terra_lab.trials.hidden import LISTED, OUTSIDE
 from wheel_terra_lab.trials.truth import solve
 
 QUANTITIES = ('sinkage', 'drawbar_pull', 'torque')
@@ -99,27 +97,6 @@ def test_an_effect_that_is_on_in_the_wrong_form_is_opened_again(tmp_path):
         for rows, said in ((configured, gap.before), (corrected_rows, gap.fitted)):
             error = np.sqrt(np.mean((rows[:, q] - table[quantity]) ** 2))
             assert error == pytest.approx(said, rel=2e-3)
-
-
-def test_a_stranger_beside_the_right_form_is_no_other_form():
-    """A form that is free would take it up, were the form that is on not a rival."""
-    rng = np.random.default_rng(51_006)
-    soil = random_soil(rng)
-    rows = random_rows('sweep40', rng, soil)
-    right, hump = LISTED['slip_sinkage_exponent'], OUTSIDE['hump']
-    size = right.typical(rows, soil)
-    hidden = right.make(size, 0.5, rows, soil)
-    law = hump.make(1.5 * hump.typical(rows, soil), 0.5, rows, soil)
-    out, table = solve(rows, soil, (hidden, law)), dict(rows)
-    for quantity, share in SHARE.items():
-        std = share * np.ptp(solve(rows, soil, (hidden,))[quantity])
-        table[quantity] = out[quantity] + std * rng.standard_normal(len(out[quantity]))
-        table[f'{quantity}_std'] = np.full(len(out[quantity]), std)
-    prefix = 'effects.slip_sinkage_exponent'
-    values = settings(soil, rows, **{f'{prefix}.enabled': True, f'{prefix}.n1': float(size)})
-    found = diagnose(check_table('t.csv', table), reader.from_parameters(values, complete=False))
-    assert 'were tried' in found.not_tried['slip_sinkage_exponent']
-    assert found.verdict in ('unexplained', 'undecided')
 
 
 def with_errors(table, factors, zeros):

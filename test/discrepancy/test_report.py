@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import base64
 import re
 import struct
 import zlib
@@ -22,7 +21,7 @@ from wheel_terra_estimator.discrepancy.assessment.gaps import _cell_noise, _shri
 from wheel_terra_estimator.discrepancy.numbers import number
 from wheel_terra_estimator.discrepancy.report import page as page_module
 from wheel_terra_estimator.discrepancy.report.model_file import write_model
-from wheel_terra_estimator.discrepancy.report.page import SOIL_WORDS, _cards, write_report
+from wheel_terra_estimator.discrepancy.report.page import SOIL_WORDS, write_report
 from wheel_terra_estimator.discrepancy.result import QuantityGap
 from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES
 from wheel_terra_lab.studies.campaigns import Plan, make_campaign, scoring
@@ -143,27 +142,6 @@ def test_every_picture_is_in_the_page_and_beside_it(page):
         assert width > 600 and height > 250 and levels > 100, f'{name} looks empty'
 
 
-POINT = 96.0 / 72.0  # [px]
-PHONE = 346.0  # [px], what a page leaves a figure on a phone of 390
-SMALLEST_TEXT = 11.0  # [px]
-
-
-def test_pictures_for_a_phone_are_as_narrow_with_text_that_can_be_read(page):
-    parsed, _ = page
-    narrow = 0
-    pictures = [source for source in parsed.sources if source.startswith('data:')]
-    for source in pictures:
-        drawn = base64.b64decode(source.partition('base64,')[2]).decode()
-        width = POINT * float(re.search(r'<svg [^>]*width="([\d.]+)pt"', drawn)[1])
-        sizes = [float(size) for size in re.findall(r'font(?:-size)?: ([\d.]+)px', drawn)]
-        assert sizes
-        if width < 500.0:
-            narrow += 1
-            assert width <= PHONE
-            assert POINT * min(sizes) >= SMALLEST_TEXT
-    assert narrow == len(pictures) / 2
-
-
 def test_numbers_are_those_of_the_diagnosis(page, named):
     parsed, _ = page
     assert named.sentence.replace('+-', '±') in re.sub(r'\s+', ' ', parsed.text)
@@ -232,21 +210,10 @@ def test_every_kind_of_diagnosis_has_a_report(plan, tmp_path, undrawn):
         assert not any(row and row[0].strip() == 'torque [N m]' for row in parsed.rows)
 
 
-def test_unexplained_says_so(named, tmp_path, same_pictures):
-    odd = replace(named, verdict='unexplained', effects=(), sentence='None of the known effects.')
-    parsed = Page(write_report(odd, tmp_path).read_text(encoding='utf-8'))
-    assert 'Unexplained. None of the known effects.' in re.sub(r'\s+', ' ', parsed.text)
-    assert 'What was added' not in parsed.text
-
-
 def test_names_from_the_table_cannot_break_the_page(named, tmp_path, same_pictures):
     table = replace(named.table, name='<b>&"x".csv')
     parsed = Page(write_report(replace(named, table=table), tmp_path).read_text(encoding='utf-8'))
     assert '<b>&"x".csv' in parsed.text
-
-
-def test_global_picture_settings_stay(written):
-    assert dict(mpl.rcParams) == written[2]
 
 
 @pytest.mark.parametrize(
@@ -265,63 +232,6 @@ def test_soil_pulls_are_in_the_deviations_that_were_stated(named):
     assert shift.prior_std == pytest.approx(stated)
     assert shift.pull == pytest.approx((shift.after - shift.before) / stated, rel=1e-6)
     assert shift.before == pytest.approx(flat['soil.sinkage_exponent'])
-
-
-def test_cards_show_what_the_soil_does_and_what_the_effect_does(page, named):
-    parsed, _ = page
-    name = max(named.gap, key=lambda q: named.gap[q].refit / named.gap[q].noise)
-    gap, scale = named.gap[name], 1e3 if name == 'sinkage' else 1.0
-    three = ' → '.join(number(scale * x, 2) for x in (gap.before, gap.refit, gap.after))
-    assert three in parsed.text
-    closed = [g.shrink for g in named.gap.values() if g.shrink is not None]
-    assert closed, 'an effect of 12 noise deviations leaves a gap to be closed'
-    shown = re.search(r'([\d to-]+) %of the gap above the noise', parsed.text)[1]
-    assert f'{100 * min(closed):.0f}' in shown
-
-
-def test_curves_only_where_slip_was_swept(tmp_path, undrawn, monkeypatch):
-    """Scattered inputs make no curves, and the page does without the picture."""
-    monkeypatch.setattr(page_module.pictures, 'colour_inputs', lambda _: [])
-    scattered = campaign_diagnosis(5, 'full56')
-    write_report(scattered, tmp_path)
-    assert not (tmp_path / 'curves_over_slip.png').exists()
-    assert (tmp_path / 'measured_against_model.png').exists()
-
-
-def test_unexplained_scatter_is_not_called_a_misfit_of_nothing():
-    from types import SimpleNamespace
-
-    from wheel_terra_estimator.discrepancy.report.words import sentence
-    from wheel_terra_estimator.discrepancy.selection.remainder import Remainder
-
-    def said(amplitude):
-        left = Remainder(1.0, 1.0, amplitude, 1e-6, pull=0.0)
-        return sentence(SimpleNamespace(word='unexplained'), (), 1e-6, left, 0.0)
-
-    assert '12 % of the range' in said(0.12)
-    assert '0 %' not in said(0.001) and 'scatter' in said(0.001)
-
-
-def test_legends_stay_inside_the_picture(named):
-    """Six sweeps in a picture of one panel need several lines of legend."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-
-    from wheel_terra_estimator.discrepancy.report import pictures as pictures
-
-    alone = named.table.measured.copy()
-    alone[:, 1:] = np.nan
-    pull_only = replace(named, table=replace(named.table, measured=alone))
-    for figure in (
-        pictures.curves_over_slip(named),
-        pictures.curves_over_slip(pull_only),
-        pictures.measured_against_model(pull_only),
-        pictures.residuals(pull_only, 'slope'),
-    ):
-        canvas = FigureCanvasAgg(figure)
-        canvas.draw()
-        for legend in figure.legends:
-            box = legend.get_window_extent(canvas.get_renderer())
-            assert box.x1 <= figure.bbox.x1 and box.y0 > figure.axes[0].bbox.y1
 
 
 def test_the_gap_is_the_error_on_unseen_rows_and_its_share_above_the_noise(named):
@@ -347,18 +257,6 @@ def test_the_gap_is_the_error_on_unseen_rows_and_its_share_above_the_noise(named
     assert any(item.shrink is not None for item in named.gap.values())
 
 
-def test_what_the_confidence_follows_from_is_of_the_gap_and_of_the_signature(named):
-    """How far the name worsens a quantity, and how much of it lies where nothing was off."""
-    features = named.effects[0].features
-    change = named.curves.after - named.curves.refit
-    gaps = list(named.gap.values())
-    worse = [(g.after**2 - g.refit**2) / g.noise**2 for g in gaps]
-    assert features['worse'] == pytest.approx(max(0.0, *worse), rel=1e-6)
-    sizes = [np.mean(change[:, q] ** 2) / g.noise**2 for q, g in enumerate(gaps)]
-    idle = [size for size, g in zip(sizes, gaps, strict=True) if g.refit < 1.2 * g.noise]
-    assert features['idle'] == pytest.approx(sum(idle) / sum(sizes), rel=1e-6)
-
-
 @pytest.mark.parametrize(
     ('refit', 'after', 'share'),
     [(5.0, 1.0, 1.0), (5.0, 2.0, 0.5), (5.0, 5.0, 0.0), (1.2, 1.0, None), (5.0, 0.5, 1.0)],
@@ -366,16 +264,6 @@ def test_what_the_confidence_follows_from_is_of_the_gap_and_of_the_signature(nam
 def test_share_of_the_gap_that_closed(refit, after, share):
     """Squares above a noise of 1; what is hardly above it says nothing."""
     assert _shrink(refit, after, 1.0) == (None if share is None else pytest.approx(share))
-
-
-def test_two_shares_of_the_gap_that_closed_are_shown_as_percentages(named):
-    gap = dict(named.gap)
-    gap['sinkage'] = replace(gap['sinkage'], shrink=0.25)
-    gap['torque'] = replace(gap['torque'], shrink=0.5)
-    gap['drawbar_pull'] = replace(gap['drawbar_pull'], shrink=None)
-    shown = {card['label']: card['value'] for card in _cards(replace(named, gap=gap))}
-    (closed,) = (shown[label] for label in shown if label.startswith('of the gap above the noise'))
-    assert closed == '25 to 50 %'
 
 
 def test_how_far_a_name_worsens_a_quantity_is_in_squares_of_its_noise(monkeypatch):

@@ -12,9 +12,7 @@ import pytest
 from scipy.stats import chi2, kstest, multivariate_normal
 
 from wheel_terra_estimator.discrepancy.assessment import held_out
-from wheel_terra_estimator.discrepancy.assessment import next_measurement as proposals
 from wheel_terra_estimator.discrepancy.assessment.along import changed_stretch
-from wheel_terra_estimator.discrepancy.assessment.next_measurement import _menu
 from wheel_terra_estimator.discrepancy.assessment.where import locate
 from wheel_terra_estimator.discrepancy.fitting import noise, outliers
 from wheel_terra_estimator.discrepancy.fitting.coordinates import (
@@ -52,7 +50,6 @@ from wheel_terra_estimator.terramechanics.wheel import Wheel
 
 SOIL = Soil(15600.0, 2.4e6, 1.1, 250.0, np.radians(31.9), 0.011, 0.4, -0.2)
 WHEEL = Wheel(0.157, 0.165, 0.01, 30.0, 0.002)
-NO_FLOOR = (Floor((0.0,) * 4, 0.0, False),)
 KNOWN = np.full(3, np.inf)
 
 
@@ -381,27 +378,6 @@ def test_where_the_misfit_sits_is_told_only_beyond_chance(forward, setting):
     assert sum(w.sentence == 'no region stands out from the noise' for w in clean) >= 20
 
 
-def test_rows_that_a_laboratory_could_add_are_what_they_are_called(forward, setting):
-    blocks = dict(_menu(SimpleNamespace(forward=forward)))
-    radius, width, lug = WHEEL.radius, WHEEL.width, WHEEL.lug_height
-    load = float(np.median(forward.points.normal_load))
-    expected = {
-        'three times the load': (radius, width, lug, 3.0 * load),
-        'a third of the load': (radius, width, lug, load / 3.0),
-        'a wheel of 0.6 times the radius': (0.6 * radius, width, lug, load),
-        'a wheel of twice the width': (radius, 2.0 * width, lug, load),
-        'the wheel without lugs': (radius, width, 0.0, load),
-        'lugs 1.6 times as high': (radius, width, 1.6 * lug, load),
-        'the same rows again': (radius, width, lug, load),
-    }
-    for name, numbers in expected.items():
-        block = blocks[name]
-        found = (*(getattr(block.wheel, k) for k in ('radius', 'width', 'lug_height')),)
-        assert (*found, block.normal_load) == pytest.approx(numbers), name
-    assert (blocks['braking rows, slip -0.3 to -0.02'].slip < 0.0).all()
-    assert np.degrees(blocks['a slope of 12 degrees'].slope) == pytest.approx(12.0)
-
-
 def test_soil_that_changes_along_the_way_is_told_when_the_choice_of_the_stretch_is_paid_for(
     forward, setting
 ):
@@ -446,21 +422,6 @@ def test_a_rival_explains_more_than_an_empty_place():
     )
     total = np.full(4, 1.0)  # alike otherwise
     assert set(_rivals(selection, total, ('lug_support',), 'lug_support')) == {'multipass'}
-
-
-def test_no_row_is_proposed_in_which_the_wheel_sinks_beyond_three_fifths_of_its_radius(monkeypatch):
-    radius = WHEEL.radius
-    shallow, deep = (OperatingPoints(np.array([s]), 60.0, WHEEL) for s in (0.1, 0.9))
-    outputs = [np.full((2, 1, 3), share * radius) for share in (0.5, 0.7)]
-    monkeypatch.setattr(proposals, '_menu', lambda _: [('shallow', shallow), ('deep', deep)])
-    monkeypatch.setattr(
-        proposals, '_predicted', lambda *_: [(values, [None, None]) for values in outputs]
-    )
-    monkeypatch.setattr(proposals, '_with_rows', lambda *_: 5.0)
-    monkeypatch.setattr(proposals, '_distance', lambda *_: 1.0)
-    chosen, rival = (SimpleNamespace(names=(name,)) for name in ('multipass', 'cohesion'))
-    found = proposals.propose(None, chosen, [rival], np.ones(3))
-    assert [block.what for block in found] == ['shallow']
 
 
 def test_an_error_that_a_good_model_may_have_is_smaller_than_one_that_asks_for_a_name():

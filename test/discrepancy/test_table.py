@@ -101,15 +101,6 @@ def test_capitals_units_and_semicolons_are_read_with_a_note(tmp_path):
     assert any("'sinkage [mm]' as sinkage (times 0.001)" in note for note in found.notes)
 
 
-def test_all_faults_of_a_header_come_in_one_line(tmp_path):
-    with pytest.raises(UserError) as caught:
-        read_table(write(tmp_path, 'slip,slip,Fz,sinkage [furlong],DP\n' + '\n'.join(lines())))
-    message = str(caught.value)
-    assert '\n' not in message
-    for part in ('twice', "'Fz' (normal_load [N]", 'furlong', 'mm'):
-        assert part in message, message
-
-
 def test_a_table_laid_on_its_side_is_refused_at_once(tmp_path):
     path = tmp_path / 't.csv'
     path.write_text(','.join(f'c{i}' for i in range(200_000)) + '\n1\n')

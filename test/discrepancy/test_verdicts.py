@@ -10,9 +10,6 @@ from test_workflow import make, run
 
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.discrepancy import decision
-from wheel_terra_estimator.discrepancy.assessment.gaps import channels_off
-from wheel_terra_estimator.discrepancy.report.words import sentence
-from wheel_terra_estimator.discrepancy.result import QuantityGap
 from wheel_terra_estimator.discrepancy.tables.averaging import together
 from wheel_terra_estimator.discrepancy.tables.checks import check_table
 from wheel_terra_estimator.discrepancy.workflow import Options, diagnose, operating_points
@@ -81,44 +78,6 @@ def test_a_channel_that_is_off_on_unseen_rows_does_not_agree():
     item = found.to_dict()
     assert item['verdict'] in ('undecided', 'unexplained')
     assert item['floor'] >= 0.0
-
-
-def test_undecided_says_channel_size_and_what_comes_nearest():
-    class Word:
-        word = 'undecided'
-
-    gap = {
-        'sinkage': QuantityGap(0.005, 0.004, 0.004, 0.0005, limit=0.002),
-        'torque': QuantityGap(0.5, 0.1, 0.1, 0.1, limit=0.3),
-    }
-    assert channels_off(gap) == ('sinkage',)
-    text = sentence(Word, (), 0.1, None, 0.0, None, gap, ('lug_digging', 'hard_layer'))
-    for part in ('sinkage is off by 4 mm', 'permit 2', 'lug_digging, hard_layer'):
-        assert part in text
-    assert 'torque' not in text
-
-
-def test_agreement_states_the_floor_that_it_needed():
-    table, values, *_ = make('lugs48')
-    found = run(table, values)
-    assert found.verdict == 'agrees'
-    assert 'model-error floor' in found.sentence
-    table, values, *_ = make('lugs48', structure=0.02)
-    found = run(table, values)
-    if found.verdict == 'agrees':
-        assert f'{100 * found.floor:.1f} %' in found.sentence
-
-
-def test_a_gap_is_stated_against_the_noise_and_the_floor_apart():
-    """Whatever the floor, what stays above the noise counts as open."""
-    table, values, *_ = make('lugs48', ('slip_sinkage_exponent',), structure=0.03)
-    found = run(table, values)
-    assert found.verdict == 'named'
-    for gap in found.gap.values():
-        if gap.shrink is not None:
-            open_before = gap.refit**2 - gap.noise**2
-            open_after = max(gap.after**2 - gap.noise**2, 0.0)
-            assert gap.shrink == pytest.approx(1.0 - np.sqrt(open_after / open_before), abs=1e-9)
 
 
 def test_pulls_of_the_other_sign_are_refused_with_the_cure():

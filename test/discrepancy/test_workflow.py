@@ -170,22 +170,6 @@ def test_the_whole_set_of_ding_s_wheel_is_found_in_one_run():
         assert gap.after < 1.3 * gap.noise < gap.refit
 
 
-@pytest.mark.slow
-def test_as_many_effects_as_the_rows_carry():
-    """Four at once, two of them of the instruments: all are found, none is false."""
-    hidden = (
-        'slip_sinkage_exponent',
-        'drivetrain_friction',
-        'sinkage_offset',
-        'wheel_radius_bias',
-    )
-    table, values, *_ = make('lugs48', hidden, 2.0)
-    found = run(table, values)
-    assert {effect.name for effect in found.effects} == set(hidden)
-    for gap in found.gap.values():
-        assert gap.after < 1.4 * gap.noise
-
-
 def test_forms_share_the_weight_of_their_effect():
     alone = log_prior(('cohesion',), ('cohesion', 'multipass'))
     assert log_prior(('cohesion',), ('cohesion', 'multipass', 'multipass:rut')) == alone
@@ -245,19 +229,6 @@ def test_soil_that_is_said_to_be_uncertain_is_no_finding():
     assert pull({**wrong, 'soil.frictional_modulus_std': std}) < 0.5 * pull(wrong)
 
 
-def test_words_of_a_misfit_of_both_signs():
-    table, values, *_ = make('lugs48', ('soil_mound',), 2.0)
-    where = run(table, values).where
-    assert np.sign(where.mean) == np.sign(where.mean_in_noise_std)
-    noisy = dict(table)
-    for key in OUTPUTS:
-        turn = np.where(np.arange(len(table[key])) % 2, 1.0, -1.0)
-        noisy[key] = table[key] + 12.0 * table[f'{key}_std'] * turn
-    found = run(noisy, values, options=Options(effects=('soil_mound', 'cohesion')))
-    assert 'of both signs' in found.where.sentence
-    assert 'too scattered' in found.sentence or found.verdict != 'agrees'
-
-
 def test_what_the_columns_cannot_show_is_not_visible():
     table, values, *_ = make('basic16')
     for key in ('sinkage', 'sinkage_std'):
@@ -268,12 +239,6 @@ def test_what_the_columns_cannot_show_is_not_visible():
     assert {'lug_digging', 'lug_support', 'sinkage_offset', 'hard_layer'} <= hidden  # no sinkage
     assert 'bulldozing' not in hidden
     assert set(report['gap']) == {'drawbar_pull', 'torque'}
-
-
-def test_two_effects_are_both_found():
-    table, values, *_ = make('lugs48', ('drivetrain_friction', 'lug_digging'), 2.0)
-    diagnosis = run(table, values)
-    assert {effect.name for effect in diagnosis.effects} == {'drivetrain_friction', 'lug_digging'}
 
 
 @pytest.fixture(scope='module')

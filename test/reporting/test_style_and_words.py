@@ -16,7 +16,6 @@ from wheel_terra_estimator.reporting.html import picture, render
 from wheel_terra_estimator.reporting.style import (
     DARK,
     INK,
-    LINE_COLOURS,
     for_dark_pages,
     picture_style,
     thin,
@@ -125,49 +124,6 @@ def test_classes_differ_in_grey_and_darker_is_worse() -> None:
     assert (np.diff(dark) > 12.0).all(), dark
 
 
-RED_BLIND = (
-    (0.152286, 1.052583, -0.204868),
-    (0.114503, 0.786281, 0.099216),
-    (-0.003882, -0.048116, 1.051998),
-)
-GREEN_BLIND = (
-    (0.367322, 0.860646, -0.227968),
-    (0.280085, 0.672501, 0.047413),
-    (-0.011820, 0.042940, 0.968881),
-)
-"""Linear sRGB as dichromats see it (Machado, Oliveira, Fernandes 2009, severity 1)."""
-TO_XYZ = ((0.41246, 0.35758, 0.18044), (0.21267, 0.71515, 0.07218), (0.01933, 0.11919, 0.95030))
-WHITE = (0.95047, 1.0, 1.08883)
-
-
-def linear(colour: str) -> np.ndarray:
-    channels = np.array([int(colour[i : i + 2], 16) / 255.0 for i in (1, 3, 5)])
-    return np.where(channels <= 0.04045, channels / 12.92, ((channels + 0.055) / 1.055) ** 2.4)
-
-
-def lab(rgb: np.ndarray) -> np.ndarray:
-    """Return CIE L*a*b* of linear sRGB, (k, 3)."""
-    xyz = rgb @ np.transpose(TO_XYZ) / WHITE
-    f = np.where(xyz > 216 / 24389, np.cbrt(xyz), (24389 / 27 * xyz + 16) / 116)
-    return np.column_stack(
-        [116 * f[:, 1] - 16, 500 * (f[:, 0] - f[:, 1]), 200 * (f[:, 1] - f[:, 2])]
-    )
-
-
-@pytest.mark.parametrize('dark', [False, True], ids=['light', 'dark'])
-def test_six_wheels_are_six_colours_for_every_eye(dark: bool) -> None:
-    colours = [DARK[c] if dark else c for c in LINE_COLOURS[:6]]
-    seen = np.array([linear(c) for c in colours])
-    for eye in (np.eye(3), RED_BLIND, GREEN_BLIND):
-        places = lab(np.clip(seen @ np.transpose(eye), 0.0, 1.0))
-        apart = np.linalg.norm(places[:, None] - places, axis=2)[np.triu_indices(6, 1)]
-        assert apart.min() > 23.0
-    page = linear('#1a2128' if dark else '#ffffff') @ TO_XYZ[1]
-    levels = seen @ TO_XYZ[1]
-    contrast = (np.maximum(levels, page) + 0.05) / (np.minimum(levels, page) + 0.05)
-    assert contrast.min() >= 3.0
-
-
 def test_what_is_beyond_the_border_is_not_known() -> None:
     values = {
         'slip': np.array([[1.0], [0.2], [0.3]]),
@@ -207,18 +163,3 @@ def test_pictures_follow_the_dark_mode_of_the_reader() -> None:
     texts = re.findall(r'<text style="([^"]*)"', drawn)
     assert texts
     assert all('fill: ' in style for style in texts)  # black by default would vanish
-
-
-def test_every_figure_is_drawn_in_the_one_style() -> None:
-    """Who makes a matplotlib figure takes the style of the reports; no other style is set."""
-    from pathlib import Path
-
-    root = Path(__file__).resolve().parents[2]
-    makers = []
-    for folder in ('wheel_terra_estimator', 'wheel_terra_lab', 'tools'):
-        for path in sorted((root / folder).rglob('*.py')):
-            text = path.read_text(encoding='utf-8')
-            if 'figsize=' in text:
-                makers.append(path.name)
-                assert 'picture_style' in text, f'{path}: draw within reporting.style.picture_style'
-    assert {'pictures.py', 'predict.py'} <= set(makers)

@@ -2,9 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The node as other nodes see it."""
 
-import signal
-import time
-
 import pytest
 
 ROVER = ['--ros-args', '--params-file']
@@ -103,26 +100,6 @@ class TestOneNode:
         until(lambda: direction)
         assert [m.data for m in direction] == [0]
 
-    def test_parameters_are_described_and_read_only(self, listener):
-        from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
-        from rcl_interfaces.srv import DescribeParameters, SetParameters
-
-        node, until = listener
-        describe = node.create_client(DescribeParameters, f'{NODE}/describe_parameters')
-        change = node.create_client(SetParameters, f'{NODE}/set_parameters')
-        until(lambda: describe.service_is_ready() and change.service_is_ready())
-        future = describe.call_async(DescribeParameters.Request(names=['rover.mass']))
-        until(future.done)
-        (descriptor,) = future.result().descriptors
-        assert '[kg]' in descriptor.description
-        value = ParameterValue(type=ParameterType.PARAMETER_DOUBLE, double_value=1.0)
-        request = SetParameters.Request(parameters=[Parameter(name='rover.mass', value=value)])
-        future = change.call_async(request)
-        until(future.done)
-        (result,) = future.result().results
-        assert not result.successful
-        assert 'read-only' in result.reason
-
     def test_messages_that_give_no_estimate_are_explained(self, listener):
         from diagnostic_msgs.msg import DiagnosticArray
         from sensor_msgs.msg import JointState
@@ -138,63 +115,6 @@ class TestOneNode:
         mast = wheel_message(['mast'], 100.0)
         until(lambda: said_after(mast, 'it but mast; wheels.names: front_left_wheel_joint'))
         until(lambda: said_after(wheel_message(['front_left_wheel_joint'], 0.0), 'stamp is zero'))
-
-
-def test_set_of_a_message_reset_and_a_clean_end(start_interpreter, parameters, listener):
-    from sensor_msgs.msg import JointState
-    from std_msgs.msg import UInt8MultiArray
-    from std_srvs.srv import Trigger
-
-    from wheel_terra_estimator.configuration import reader
-
-    names = reader.load(['pathfinder']).wheels.names
-    node, until = listener
-    process = start_interpreter('estimator_node', *ROVER, parameters)
-    slip = hear(node, JointState, f'{NODE}/slip')
-    classes = hear(node, UInt8MultiArray, f'{NODE}/slip_class')
-    wheels = node.create_publisher(JointState, 'joint_states', 10)
-    client = node.create_client(Trigger, f'{NODE}/reset')
-    until(lambda: wheels.get_subscription_count() and client.service_is_ready())
-    until(
-        lambda: (
-            node.count_publishers(f'{NODE}/slip_class') and node.count_publishers(f'{NODE}/slip')
-        )
-    )
-    sent = 0
-
-    def send_and_hear(count):
-        nonlocal sent
-        while len(slip) < count or len(classes) < count:
-            wheels.publish(wheel_message(names[::-1], 100.0 + 0.1 * sent))
-            sent += 1
-            assert sent < 100
-            # Inputs are best effort, and discovery may not be over: what is lost is sent anew.
-            seen, patience = len(slip), time.monotonic() + 1.0
-            until(
-                lambda seen=seen, patience=patience: (
-                    len(classes) >= len(slip) > seen or time.monotonic() > patience
-                )
-            )
-
-    send_and_hear(12)
-    last, kinds = slip[-1], classes[-1]
-    assert list(last.name) == list(names), "always in the configuration's order"
-    assert last.header.frame_id == 'base_link'
-    assert len(last.position) == len(last.velocity) == len(last.effort) == len(names)
-    layout = kinds.layout
-    assert (layout.dim[0].label, layout.dim[0].size, layout.dim[0].stride, layout.data_offset) == (
-        'wheel',
-        len(names),
-        len(names),
-        0,
-    )
-    future = client.call_async(Trigger.Request())
-    until(future.done)
-    assert future.result().success
-    send_and_hear(len(slip) + 3)
-    status, said = process.stop(signal.SIGINT)
-    assert status == 0, said
-    assert 'Traceback' not in said
 
 
 def test_publisher_of_another_type_or_quality_is_named(start, parameters, listener):

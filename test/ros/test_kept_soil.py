@@ -16,7 +16,6 @@ from wheel_terra_estimator import output_folder
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.configuration.soil_file import HEADER, StuckState, write_values
 from wheel_terra_estimator.errors import UserError
-from wheel_terra_estimator.ros import arrival_log, kept_soil
 from wheel_terra_estimator.ros.arrival_log import ArrivalLog, why_no_arrival_log
 from wheel_terra_estimator.ros.kept_soil import KeptSoil
 
@@ -172,18 +171,6 @@ def test_the_folder_is_on_the_disk_behind_each_rename(tmp_path, monkeypatch):
         assert tmp_path.stat().st_ino in synced[file:]
 
 
-def test_names_of_temporary_files_do_not_follow_from_the_process(tmp_path, monkeypatch):
-    """Containers have each a process 1."""
-    seen = []
-    monkeypatch.setattr(output_folder, '_sync', lambda path: seen.append(path))
-    for _ in range(2):
-        kept = KeptSoil(tmp_path / 's.yaml')
-        kept.save(LEARNED, STUCK)
-        kept.close()
-    partial = [path for path in seen if path != tmp_path]
-    assert len(set(partial)) == len(partial) == 4
-
-
 @pytest.mark.parametrize('place', ['missing/s.yaml', '/proc/s.yaml'])
 def test_a_place_that_takes_no_file_is_told_at_the_start(
     start, parameters, listener, place, tmp_path
@@ -245,31 +232,3 @@ def test_a_damaged_state_is_told_and_the_soil_is_kept_all_the_same(tmp_path):
         kept.save(LEARNED, STUCK)
     assert path.exists()
     assert json.loads(state.read_text()) == ['no state']
-
-
-def test_every_file_of_the_nodes_was_decided_on_by_the_one_function(
-    tmp_path, monkeypatch, listener
-):
-    """Soil and warning of the estimator, its arrival log, the stop of the limiter."""
-    from rclpy.parameter import Parameter
-
-    from wheel_terra_estimator.ros.limiter_node import TractionLimiter
-
-    asked = set()
-
-    def ask(path, *arguments, decide=output_folder.check_target, **options):
-        decide(path, *arguments, **options)
-        asked.add(path)
-
-    for module in (output_folder, kept_soil, arrival_log):
-        monkeypatch.setattr(module, 'check_target', ask)
-    kept = KeptSoil(tmp_path / 's.yaml')
-    kept.save(LEARNED, STUCK)
-    kept.close()
-    ArrivalLog(str(tmp_path / 'arrival.txt'), (), print).close()
-    stop = Parameter('state_file', value=str(tmp_path / 'limiter.json'))
-    TractionLimiter(context=listener[0].context, parameter_overrides=[stop]).destroy_node()
-    written = {path for path in tmp_path.iterdir() if path.suffix != '.lock'}
-    assert asked == written == {
-        tmp_path / name for name in ('s.yaml', 's.yaml.state.json', 'arrival.txt', 'limiter.json')
-    }  # fmt: skip

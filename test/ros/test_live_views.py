@@ -73,20 +73,6 @@ def test_wrenches_and_markers_hold_the_estimates(start, listener, tmp_path):
     assert {m.header.frame_id for m in markers} == {'base_link'}
 
 
-def test_nothing_of_it_by_default(start, listener, tmp_path):
-    from sensor_msgs.msg import JointState
-
-    path = tmp_path / 'rover.yaml'
-    reader.load(['pathfinder']).write(path)
-    node, until = listener
-    publisher = node.create_publisher(JointState, 'joint_states', 10)
-    start('estimator_node', '--ros-args', '--params-file', str(path))
-    until(publisher.get_subscription_count)
-    until(lambda: node.count_publishers(f'{NODE}/slip'))
-    topics = [name for name, _ in node.get_topic_names_and_types()]
-    assert not [name for name in topics if '/wrench' in name or name.endswith('/markers')]
-
-
 @pytest.mark.parametrize(
     ('names', 'topics'),
     [

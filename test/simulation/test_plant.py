@@ -175,13 +175,6 @@ def test_the_path_closes_on_a_turn_in_place(plant: MakePlant) -> None:
     assert (outward[[0, 2, 4]] < 0).all()
 
 
-def test_less_gravity_less_sinkage(plant: MakePlant) -> None:
-    earth = drive(plant(), 12.0)
-    moon = drive(plant(rover('rover.gravity:=1.62')), 12.0)
-    assert (moon.sinkage < 0.5 * earth.sinkage).all()
-    assert moon.normal_load.sum() == pytest.approx(180.0 * 1.62, rel=1e-6)
-
-
 def test_a_shorter_step_gives_the_same_drive(monkeypatch: pytest.MonkeyPatch) -> None:
     configuration = rover()
     ends = []

@@ -33,16 +33,6 @@ def test_the_kinds_of_drives_are_there() -> None:
     } <= set(NAMES)
 
 
-@pytest.mark.parametrize('name', NAMES)
-def test_shipped_scenarios_load(name: str) -> None:
-    scenario = scenarios.load(name)
-    assert scenario.description
-    assert scenario.duration > 60.0
-    assert scenario.variation.stiffness == pytest.approx(0.2)
-    # The estimator is not told the truth.
-    assert scenario.truth.effects != scenario.configuration.effects
-
-
 @pytest.mark.parametrize(
     ('changes', 'words'),
     [
