@@ -23,7 +23,7 @@ from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.terramechanics.model import WheelSoilModel
 from wheel_terra_lab.studies.campaigns.groups import GROUPS
 from wheel_terra_lab.studies.campaigns.scoring import diagnose as diagnose_campaign
-from wheel_terra_lab.trials.campaign import make_campaign
+from wheel_terra_lab.trials.campaign import Plan, make_campaign
 from wheel_terra_lab.trials.designs import random_rows, random_soil
 from wheel_terra_lab.trials.hidden import LISTED, OUTSIDE, SmoothError
 from wheel_terra_lab.trials.truth import OUTPUTS, TrueSoil, solve
@@ -264,6 +264,18 @@ def test_next_measurement_would_part_the_rivals(same_lugs):
     best = max((p for p in proposals if p.rows), key=lambda p: p.distance_then)
     assert 'lugs' in best.what  # none at all, or higher ones: the load they carry or the sensor
     assert best.distance_then > 2.0 * best.distance_now
+
+
+def test_where_the_verdict_is_open_the_soil_goes_where_the_rows_pull_it():
+    """Side drag pulls the soil far: however the fit gets there, it ends at the same errors."""
+    plan = Plan(hide='outside', noise='mixed', names=('side_drag',), least=8.0)
+    campaign = make_campaign(50037, 'sweep40', plan)
+    columns, values = campaign.table, campaign.settings()
+    open_one = run(columns, values)
+    soil_alone = run(columns, values, options=Options(effects=(), floor=0.0))
+    assert open_one.verdict == 'unexplained'
+    for quantity, gap in open_one.gap.items():
+        assert gap.fitted == pytest.approx(soil_alone.gap[quantity].fitted, rel=0.01)
 
 
 def test_torn_sheet_is_unexplained():

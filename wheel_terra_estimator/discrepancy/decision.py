@@ -46,6 +46,7 @@ IndexArray = NDArray[np.intp]
 
 _USUAL_PULL = 2.5  # stated deviations: farther than that a pull makes a name less sure
 _AT_NOISE = 1.2  # times the noise: a quantity that was never off
+_LONG = 40  # iterations of a fit that may have to go far
 _MOST_TRIED = 3  # doubtful names, after which none is given
 # A name is given where it, or one of those that the rows cannot tell from it, is more likely right
 # than not; below the second figure a law has to do worse than the name.
@@ -191,9 +192,12 @@ def _left_open(
         return decision
     law = laws.beside(decision, decision.left.only_far)
     # Estimated noise may be next to nothing beside a few smooth rows.
-    exact = 'estimated' not in findings.noise.origin.values()
-    variance = findings.setting.problem.variance(0.0 if exact else FIT_FLOOR)
-    plain = _predicted(table, both, findings, [findings.nothing], variance, 0.0, allowed_error)
+    setting, exact = findings.setting, 'estimated' not in findings.noise.origin.values()
+    variance = setting.problem.variance(0.0 if exact else FIT_FLOOR)
+    nothing = findings.nothing
+    # Far from the configured soil, and without a floor, the fit goes along a bent valley.
+    nothing = setting.fit([()], [nothing.u], nothing.angle, variance, _LONG)[0]
+    plain = _predicted(table, both, findings, [nothing], variance, 0.0, allowed_error)
     return replace(decision, proposal=law, **plain)
 
 

@@ -127,6 +127,9 @@ def diagnose(
         for name, forms in _other_forms(forward, chosen).items():
             not_tried[name] += '; its other forms, in its place, were tried'
             rest = tuple(c for c in nuisance if effect_of(c.owner) != name)
+            alone = search(both, forward.without(name), rest, forms, floors)
+            if set(alone.selection.explanations[0].names) <= forward.base_effects.keys():
+                continue  # no other form fits better than its own, or than none
             again = decided(forward.without(name), rest, forms)
             new = [naming.key for naming in again.names if naming.key not in forward.base_effects]
             # Its own form, free as well, is a rival: what both explain is no other form.

@@ -103,10 +103,14 @@ class Forward:
     ) -> tuple[Contact, Terms]:
         """Return contacts of shape (C, N) from C sets of values."""
         keys = {c.key: c for h in hypotheses for c in h}
-        stacked = {}
-        for key, coordinate in keys.items():
-            fill = self._resting_value(coordinate)
-            stacked[key] = np.array([c.get(key, fill) for c in columns])[:, None]
+        resting = np.array([self._resting_value(c) for c in keys.values()])
+        table = np.repeat(resting[:, None], len(columns), axis=1)
+        place = {key: k for k, key in enumerate(keys)}
+        given = [(place[key], k, x) for k, c in enumerate(columns) for key, x in c.items()]
+        if given:
+            at, of, values = zip(*given, strict=True)
+            table[at, of] = values
+        stacked = dict(zip(keys, table[:, :, None], strict=True))
         one = np.ones((len(columns), 1))
         soil = {name: getattr(self.soil, name) * one for name in SOIL_NUMBERS}
         for key, values in stacked.items():
@@ -124,15 +128,15 @@ class Forward:
         names.update(dict.fromkeys(c.owner for c in keys.values() if c.owner != 'soil'))
         settings: dict[str, dict[str, Any]] = {}
         for name in names:
-            resting = {**self.catalogue[name].defaults(), **self.base_effects.get(name, {})}
+            setting = {**self.catalogue[name].defaults(), **self.base_effects.get(name, {})}
             for c in keys.values():  # terms of a sparse law have no defaults
                 if c.owner == name:
-                    resting.setdefault(c.name, c.neutral)
+                    setting.setdefault(c.name, c.neutral)
             settings[name] = {
                 p: self._where_active(name, p, stacked[f'{name}.{p}'])
                 if f'{name}.{p}' in stacked
                 else value * one
-                for p, value in resting.items()
+                for p, value in setting.items()
             }
         terms = Terms(settings)
         return build_contact(self.points, soil, self.soil.pressure_law, terms), terms

@@ -13,6 +13,7 @@ import math
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TypeAlias
 
 import numpy as np
@@ -152,13 +153,17 @@ def log_prior(names: Sequence[str], visible: Iterable[str]) -> float:
     visible : iterable of str
         All effects and forms that compete.
     """
-    forms = Counter(effect_of(key) for key in visible)
-    count = len(names)
+    forms, count = _forms(tuple(visible)), len(names)
     if count == 0:
         return math.log(PRIOR_NOTHING)
     prior = PRIOR_ONE if count == 1 else PRIOR_TWO * PRIOR_MORE ** (count - 2)
     prior /= max(math.comb(len(forms), count), 1)
     return math.log(prior) - sum(math.log(max(forms[effect_of(key)], 1)) for key in names)
+
+
+@lru_cache(maxsize=8)
+def _forms(visible: tuple[str, ...]) -> Counter[str]:
+    return Counter(map(effect_of, visible))
 
 
 def weigh(
