@@ -15,9 +15,11 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.output_folder import working_folder
 from wheel_terra_lab.jobs import ResultFile, run_jobs
 from wheel_terra_lab.soilbin import snapshots
+from wheel_terra_lab.soilbin.bookkeeping import STATE
 from wheel_terra_lab.soilbin.case import Case, to_dict
 from wheel_terra_lab.soilbin.launch import CaseFailedError, run_case
 from wheel_terra_lab.soilbin.output import WORK
@@ -57,6 +59,10 @@ def run_job(job: Job, work: str, cache: str) -> dict[str, object]:
         _keep_series(folder / 'series.npy', Path(work).parent / SERIES_FOLDER / f'{job.key}.npy')
     except CaseFailedError as error:
         row = {'stopped': str(error)}
+    except UserError:
+        if not any(folder.rglob(STATE)):  # nothing for --resume
+            shutil.rmtree(folder, ignore_errors=True)
+        raise
     shutil.rmtree(folder, ignore_errors=True)
     row = dict(job.labels) | {'key': job.key} | row
     return {name: _text(value) for name, value in row.items()}

@@ -206,6 +206,10 @@ def test_engine_absent_or_failing_gives_one_line(tmp_path, monkeypatch, capsys, 
     assert len(said) == 1
     assert words in said[0]
     assert not output.exists()  # the next try does not end with "exists already"
+    study_of = ['reproduce', 'nakashima', '--figure', '8', '--run', '--no-cache', '--jobs', '1']
+    if engine is FAKE_ABSENT:
+        assert main([*study_of, '-o', str(output)]) == 2
+        assert words in capsys.readouterr().err and not output.exists()
 
 
 @pytest.mark.parametrize(
