@@ -88,21 +88,6 @@ def test_a_cluster_without_workers_is_said_and_given_up(
     assert said.count(f'start one with: dask worker {cluster.scheduler_address}') == 1
 
 
-def test_a_scheduler_that_goes_away_is_said(monkeypatch: Any) -> None:
-    distributed = pytest.importorskip('dask.distributed')
-    monkeypatch.setattr(scheduler, 'CONNECT_TIMEOUT', 60)
-    monkeypatch.setattr(scheduler, 'LOOK', 1)
-    monkeypatch.setattr(scheduler, 'WORKER_TIMEOUT', 1)
-    with distributed.LocalCluster(
-        n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None
-    ) as cluster:
-        outcomes = finished(time.sleep, [0.0, 3.0], address=cluster.scheduler_address)
-        assert next(outcomes) == (0, None)
-        cluster.close()
-        with pytest.raises(UserError, match='1 of 2 tasks are done'):
-            next(outcomes)
-
-
 def test_an_empty_address_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit):
         main(['replay', 'a', 'b', '-o', 'c', '--scheduler', ''])

@@ -152,16 +152,6 @@ def test_estimates_come_back_as_they_went(bag: Path) -> None:
         np.testing.assert_array_equal(stored.values[name], values, err_msg=name)
 
 
-def test_bag_is_closed_and_readable_after_a_failure(tmp_path: Path) -> None:
-    path = tmp_path / 'broken_off'
-    with pytest.raises(KeyboardInterrupt), EstimateBagWriter(path, NAMES) as writer:
-        writer.clear_stuck(STAMP)
-        writer.add(sets()[0], STAMP)
-        raise KeyboardInterrupt
-    assert (path / 'metadata.yaml').exists()
-    assert sum(topic.endswith('/slip') for _, topic, _ in messages(path)) == 1
-
-
 def test_a_reset_clears_the_stuck_warning(tmp_path: Path) -> None:
     path = tmp_path / 'reset'
     stuck = next(estimates for estimates in sets() if estimates.stuck)

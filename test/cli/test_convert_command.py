@@ -123,13 +123,3 @@ def test_a_cell_that_is_no_number(files, capsys):
     (files / 'log.csv').write_text('\n'.join([HEADER, ROWS[0], ROWS[1].replace('30', 'abc')]))
     assert main(command(files)) == 2
     assert "log.csv, line 3, column rpm_fl: 'abc' is not a number" in capsys.readouterr().err
-
-
-def test_the_example_is_plain_yaml(files):
-    assert set(yaml.safe_load((files / 'map.yaml').read_text())) == {
-        'time',
-        'joint_states',
-        'imu/data',
-        'sinkage',
-        'reference_odom',
-    }

@@ -11,16 +11,9 @@ import pytest
 from document_effects import as_markdown
 
 from wheel_terra_estimator.cli.main import main
-from wheel_terra_estimator.terramechanics import effects as catalogue_module
 from wheel_terra_estimator.terramechanics.effects import catalogue
 
 ROOT = Path(__file__).resolve().parents[2]
-
-
-@pytest.fixture(autouse=True)
-def _forget_registered():
-    yield
-    catalogue_module._registered.clear()
 
 
 def test_text_names_every_effect_and_parameter(capsys: pytest.CaptureFixture[str]) -> None:
@@ -50,20 +43,6 @@ def test_one_effect_and_a_misspelt_one(capsys: pytest.CaptureFixture[str]) -> No
     assert text.startswith('soil_mound') and 'lug_digging' not in text
     assert main(['effects', 'soil_mund']) == 2
     assert "did you mean 'soil_mound'?" in capsys.readouterr().err
-
-
-def test_a_user_s_file_is_listed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    path = tmp_path / 'own.py'
-    path.write_text(
-        'from wheel_terra_estimator.terramechanics.effects import Effect, EffectParameter\n'
-        'def term(contact, p, maths):\n    contact.torque = contact.torque + p.a\n'
-        "E = Effect('gears', 'worn gears', 'T += a',\n"
-        "    (EffectParameter('a', 'N m', 0.1, 0.0, 1.0, 0.1, 'half_normal', 'loss'),),\n"
-        "    frozenset({'torque'}), 'any', 'test', on_outputs=term)\n"
-    )
-    assert main(['effects', '--load', str(path)]) == 0
-    assert 'worn gears' in capsys.readouterr().out
-    assert main(['effects', '--load', str(tmp_path / 'none.py')]) == 2
 
 
 def test_the_page_and_its_pictures_are_up_to_date() -> None:

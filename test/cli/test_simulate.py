@@ -105,16 +105,6 @@ def test_bad_arguments(
     assert not list(tmp_path.iterdir())
 
 
-def test_an_earlier_bag_is_kept_unless_overwrite(
-    bag_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    arguments = ['simulate', '--duration', '1', '-o', str(bag_path)]
-    before = sorted((p.name, p.stat().st_mtime_ns) for p in bag_path.iterdir())
-    assert main(arguments) == 2
-    assert '--overwrite' in capsys.readouterr().err
-    assert sorted((p.name, p.stat().st_mtime_ns) for p in bag_path.iterdir()) == before
-
-
 def test_list_names_the_shipped_scenarios(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(['simulate', '--list']) == 0
     assert 'climb_soft_patch' in capsys.readouterr().out

@@ -377,21 +377,6 @@ def test_a_written_model_is_read_back(tmp_path):
     assert part.stated == set(keys) and part.provenance == words
 
 
-@pytest.mark.parametrize(
-    ('lists', 'said'),
-    [
-        ((['torque'], ['one', 'slip'], [0.1]), 'state as many of each'),
-        ((['torque'] * 2, ['one'] * 2, [0.1, 0.2]), 'twice'),
-    ],
-)
-def test_a_law_whose_lists_do_not_fit_is_refused(lists, said):
-    names = ('targets', 'features', 'coefficients')
-    values = {f'effects.learned_closure.{n}': v for n, v in zip(names, lists, strict=True)}
-    values['effects.learned_closure.enabled'] = True
-    message = complaint(reader.from_parameters, values, complete=False)
-    assert 'effects.learned_closure.targets' in message and said in message
-
-
 @pytest.mark.ros
 def test_every_shipped_file_and_a_written_one_are_loaded_by_ros(tmp_path):
     rclpy = pytest.importorskip('rclpy')

@@ -59,6 +59,7 @@ def test_values(text, value):
     assert type(read) is type(value)
 
 
+@settings(max_examples=30)  # each is drawn in a tenth of a second
 @given(st.from_regex(r'[+-]?(0[xX])?[0-9a-fA-F_.]{0,30}([eEpP][+-]?[0-9]{1,9})?', fullmatch=True))
 def test_whatever_looks_like_a_number_has_a_value(text):
     ros_yaml.plain_scalar(text)
@@ -199,10 +200,3 @@ def test_a_file_of_keys_alone_is_one_of_ros(tmp_path):
     ros.write_text('/**:\n  ros__parameters:\n' + textwrap.indent(text, '    '))
     assert ros_yaml.read(plain) == ros_yaml.read(ros)
     assert ros_yaml.read(plain)['soil.cohesion'] == 8  # numbers as ROS reads them
-
-
-@pytest.mark.parametrize('value', [math.inf, -math.inf, 1.8e6, 0.1, -3, True, 'yes', 'a "b"\n'])
-def test_a_written_value_is_read_as_it_was(value):
-    read = ros_yaml.parse_value(ros_yaml.format_value(value), 'test')
-    assert read == value
-    assert type(read) is type(value)

@@ -91,13 +91,3 @@ def test_the_term_is_the_formula_in_its_symbol():
     assert plain.drawbar_pull - rubbing.drawbar_pull == pytest.approx(drag, rel=1e-6)
     assert rubbing.torque - plain.torque == pytest.approx(0.157 * drag, rel=1e-6)
     assert rubbing.sinkage == pytest.approx(plain.sinkage, rel=1e-9)
-
-
-def test_a_broken_file_is_one_line(rubbing_table, tmp_path, capsys):
-    folder, _ = rubbing_table
-    broken = tmp_path / 'broken.py'
-    broken.write_text('import nothing_of_that_name\n')
-    command = ['diagnose', str(folder / 'rig.csv'), '--config', str(folder / 'rig.yaml')]
-    assert main([*command, '-o', str(folder / 'x'), '--effects', str(broken)]) == 2
-    message = capsys.readouterr().err
-    assert 'broken.py' in message and message.count('\n') == 1

@@ -236,15 +236,6 @@ def test_lists_that_make_no_law(lists, part):
         reader.from_parameters({'effects.learned_closure.enabled': True, **law}, complete=False)
 
 
-def test_an_open_verdict_says_what_the_law_leaves_and_what_would_settle_it(speedy):
-    from wheel_terra_estimator.discrepancy.report.words import in_words
-
-    _, _, found = speedy
-    said = in_words(found)
-    assert any('with the proposed law' in line for line in said['shrank'])
-    assert any('angular velocity would confirm' in line for line in said['next'])
-
-
 def test_a_law_says_effects_only_where_all_of_its_terms_are_some():
     def law(*terms):
         targets, features = zip(*(term.split('_by_') for term in terms), strict=True)

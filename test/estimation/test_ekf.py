@@ -97,12 +97,6 @@ def test_covariance_stays_symmetric_and_positive():
     assert day(600, every=20) > -1e-15
 
 
-@pytest.mark.slow
-@pytest.mark.timeout(0)
-def test_covariance_stays_symmetric_and_positive_for_a_day_at_10_hz():
-    assert day(864000) > -1e-15
-
-
 @pytest.mark.filterwarnings('error')
 def test_readings_of_any_size_bring_no_warning_and_no_restart():
     kalman, _ = make(4)

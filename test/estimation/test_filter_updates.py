@@ -269,27 +269,31 @@ def test_a_wheel_far_from_the_configured_soil_is_believed_by_its_second_reading(
     assert found == [0.01, pytest.approx(0.1, abs=0.002)]
 
 
-def relaxed(parts, ekf, seconds, loads=None, reference_known=True, speed=0.05, start=None):
-    process = SinkageProcess(parts.rover, parts.layout, parts.models, 0.0)
-    loads = loads or WheelLoads(parts.rover).state.load
+def sinkage_predicted(parts, x, loads=None, angle=NAN, angle_std=0.0, reference_known=True):
+    """Return the prediction over a tenth of a second, and the travel."""
+    prediction = Prediction.unchanged(x)
+    travel = SinkageProcess(parts.rover, parts.layout, parts.models, angle_std).predict(
+        prediction,
+        x,
+        0.1,
+        rims=FORWARD,
+        loads=loads or WheelLoads(parts.rover).state.load,
+        yaw_rate=0.0,
+        headings=straight_headings(parts.rover),
+        leaving_angles=(angle,) * 6,
+        reference_known=reference_known,
+    )
+    return prediction, travel
+
+
+def relaxed(parts, ekf, seconds, reference_known=True, speed=0.05, start=None):
     x, travel = ekf.mean.copy(), 0.0
     x[SPEED] = speed
     if start is not None:
         x[parts.layout.sinkage] = start
     for _ in range(round(10 * seconds)):
-        prediction = Prediction.unchanged(x)
-        travel += process.predict(
-            prediction,
-            x,
-            0.1,
-            rims=FORWARD,
-            loads=loads,
-            yaw_rate=0.0,
-            headings=straight_headings(parts.rover),
-            leaving_angles=(NAN,) * 6,
-            reference_known=reference_known,
-        )
-        x = prediction.mean
+        prediction, way = sinkage_predicted(parts, x, reference_known=reference_known)
+        x, travel = prediction.mean, travel + way
     return x[parts.layout.sinkage], travel, prediction
 
 
@@ -307,18 +311,7 @@ def test_the_error_of_a_measured_leaving_angle_loosens_the_sinkage(parts, ekf):
     part, std = parts.layout.sinkage, 0.01
 
     def predicted(angle, angle_std):
-        prediction = Prediction.unchanged(ekf.mean)
-        SinkageProcess(parts.rover, parts.layout, parts.models, angle_std).predict(
-            prediction,
-            ekf.mean,
-            0.1,
-            rims=FORWARD,
-            loads=WheelLoads(parts.rover).state.load,
-            yaw_rate=0.0,
-            headings=straight_headings(parts.rover),
-            leaving_angles=(angle,) * 6,
-            reference_known=True,
-        )
+        prediction, _ = sinkage_predicted(parts, ekf.mean, angle=angle, angle_std=angle_std)
         return prediction.mean[part], np.diagonal(prediction.Q)[part]
 
     here, sure = predicted(-0.2, 0.0)
@@ -374,19 +367,21 @@ def test_softer_ground_is_weaker_ground_where_no_torque_says_how_weak(parts):
 # -- Torque and balance -----------------------------------------------------------------------
 
 
-def forces(parts, ekf):
-    linearisation = Linearisation(parts.rover, parts.layout, parts.models, 0.05)
-    loads = WheelLoads(parts.rover).state.load
-    found = linearisation.update(
-        ekf.mean,
+def linearised(parts, x, loads, angle=NAN, angle_std=0.05):
+    return Linearisation(parts.rover, parts.layout, parts.models, angle_std).update(
+        x,
         turns=(True,) * 6,
         yaw_rate=0.0,
         headings=straight_headings(parts.rover),
         rims=FORWARD,
         loads=loads,
-        leaving_angles=(NAN,) * 6,
+        leaving_angles=(angle,) * 6,
     )
-    return found, loads
+
+
+def forces(parts, ekf):
+    loads = WheelLoads(parts.rover).state.load
+    return linearised(parts, ekf.mean, loads), loads
 
 
 def torque_rows(parts, ekf, excess, doubt=0.0, repeats=1.0):
@@ -428,18 +423,7 @@ def test_the_zero_of_a_torque_sensor_is_told_from_the_soil_by_the_load(parts, ek
     strong[SHEAR_STRENGTH] = 0.1  # the soil is stronger than the file says
     for _ in range(300):
         loads = tuple((level * (0.3 + 1.4 * rng.random(6))).tolist())
-        found, true = (
-            Linearisation(parts.rover, parts.layout, parts.models, 0.0).update(
-                x,
-                turns=(True,) * 6,
-                yaw_rate=0.0,
-                headings=straight_headings(parts.rover),
-                rims=FORWARD,
-                loads=loads,
-                leaving_angles=(NAN,) * 6,
-            )
-            for x in (ekf.mean, strong)
-        )
+        found, true = (linearised(parts, x, loads) for x in (ekf.mean, strong))
         torque = true.torque + np.array([zero, -zero, 0.0, 0.0, 0.0, 0.0])
         rows = update.update(
             ekf,
@@ -461,15 +445,7 @@ def test_the_error_of_a_measured_leaving_angle_weakens_torque_and_balance(parts,
     balance = ForceBalance(parts.configuration, parts.rover, parts.sensors, parts.layout)
     variances, torques, pulls = [], [], []
     for std, angle in ((1e-9, -0.2), (0.05, -0.2), (1e-9, -0.25), (0.05, NAN), (1e-9, NAN)):
-        found = Linearisation(parts.rover, parts.layout, parts.models, std).update(
-            ekf.mean,
-            turns=(True,) * 6,
-            yaw_rate=0.0,
-            headings=straight_headings(parts.rover),
-            rims=FORWARD,
-            loads=loads,
-            leaving_angles=(angle,) * 6,
-        )
+        found = linearised(parts, ekf.mean, loads, angle, std)
         given = {'model_variance': (0.0,) * 6, 'repeats': 1.0}
         noise = parts.sensors.torque_std**2
         rows = TorqueUpdate(parts.configuration, parts.rover, parts.layout).update(
@@ -590,19 +566,7 @@ def test_the_jacobian_of_a_settled_sinkage_is_its_derivative(parts, ekf, entry):
         x = ekf.mean.copy()
         x[SPEED], x[part] = 0.04, settled
         x[column] += step
-        prediction = Prediction.unchanged(x)
-        SinkageProcess(parts.rover, parts.layout, parts.models, 0.0).predict(
-            prediction,
-            x,
-            0.1,
-            rims=FORWARD,
-            loads=WheelLoads(parts.rover).state.load,
-            yaw_rate=0.0,
-            headings=straight_headings(parts.rover),
-            leaving_angles=(NAN,) * 6,
-            reference_known=True,
-        )
-        return prediction
+        return sinkage_predicted(parts, x)[0]
 
     step = {'sinkage': 1e-4, 'speed': 1e-4}.get(entry, 1e-3)
     difference = (predicted(step).mean - predicted(-step).mean)[part.start] / (2.0 * step)

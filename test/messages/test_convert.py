@@ -102,15 +102,6 @@ def test_unknown_rate_of_a_named_wheel_is_counted(converter: InputConverter, fac
     assert sum(converter.rejected.values()) == 1
 
 
-def test_publisher_that_invents_names_does_no_harm(converter: InputConverter, factory: Any) -> None:
-    for count in range(150):
-        names = ('left', f'invented_{count}')
-        message = factory.joint_state(
-            factory.header(STAMP), names, velocity=(1.0, 2.0), effort=(3.0, 4.0)
-        )
-        assert converter.convert('joint_states', message).torque[0] == 3.0
-
-
 def test_odometry_gives_each_wheel_its_own_rim_speed(rover: Any, factory: Any) -> None:
     converter = InputConverter(input_layout(rover.replace({'wheel_odometry': 'odom'})))
     twist = factory.twist_with_covariance(1.0, 0.5, np.zeros(36))

@@ -197,23 +197,6 @@ def test_entrapment_needs_a_second_and_clears_after_three() -> None:
 
 
 @pytest.mark.slow
-def test_the_soft_patch_entraps() -> None:
-    truth = simulate(load('climb_soft_patch'), 5, 98.0).truth
-    median = np.nanmedian(truth.slip[10:], axis=1)
-    assert truth.stuck[-1]
-    assert truth.sinkage[-1].max() > 2.0 * truth.sinkage[100].max()
-    high = np.flatnonzero(median > 0.6)[0]
-    assert truth.stamp[truth.stuck][0] - truth.stamp[10 + high] > 3e9
-
-
-@pytest.mark.slow
-def test_the_descent_skids() -> None:
-    truth = simulate(load('downhill_skid'), 0, 35.0).truth
-    assert np.nanmedian(truth.slip[-1]) < -0.03
-    assert not truth.stuck.any()
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize('name', sorted(shipped_scenarios()))
 def test_scenarios_do_what_they_say(name: str) -> None:
     entraps = {'climb_soft_patch', 'slow_entrapment', 'stalling_drives'}

@@ -16,23 +16,6 @@ from wheel_terra_estimator.simulation import scenario as scenarios
 NAMES = sorted(scenarios.shipped_scenarios())
 
 
-def test_the_kinds_of_drives_are_there() -> None:
-    assert {
-        'firm_drive',
-        'climb_soft_patch',
-        'stop_and_go',
-        'turns',
-        'downhill_skid',
-        'near_stuck_recovery',
-        'low_gravity',
-        'free_spinning_wheel',
-        'stalled_wheel',
-        'changing_soil',
-        'sensor_faults',
-        'reverse',
-    } <= set(NAMES)
-
-
 @pytest.mark.parametrize(
     ('changes', 'words'),
     [
