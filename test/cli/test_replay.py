@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import itertools
+import json
 import re
 import signal
 from pathlib import Path
@@ -69,6 +70,26 @@ def test_same_input_gives_the_same_bytes(make_bag: Any, config: list[str], tmp_p
         (file,) = (tmp_path / name / 'out').glob('*.mcap')
         found.append(file.read_bytes())
     assert found[0] == found[1]
+
+
+def test_manoeuvres_that_would_teach_more_are_in_json_terminal_and_report(
+    make_bag: Any, config: list[str], tmp_path: Path, capsys: Any, monkeypatch: Any
+) -> None:
+    from wheel_terra_estimator.simulation import manoeuvres
+
+    monkeypatch.setattr(manoeuvres, 'DURATION', 3.0)
+    bag, page = str(make_bag()), tmp_path / 'report.html'
+    assert main(['replay', bag, *config, '--json']) == 0
+    assert {row['manoeuvre'] for row in json.loads(capsys.readouterr().out)['taught']} == {None}
+    assert main(['replay', bag, *config, '--manoeuvres', '--json']) == 0
+    told = json.loads(capsys.readouterr().out)['taught']
+    assert all((row['manoeuvre'] is None) == (row['verdict'] == 'learned') for row in told)
+    assert all(bool(row['manoeuvre']) == (row['promised_std'] is not None) for row in told)
+    assert main(['replay', bag, *config, '--manoeuvres', '--report', str(page)]) == 0
+    assert 'nothing this rover can drive would teach effects.' in capsys.readouterr().out
+    assert 'nothing this rover can drive: a plate or shear test' in page.read_text()
+    assert main(['replay', bag, bag, *config, '--manoeuvres', '-o', str(tmp_path / 'out')]) == 2
+    assert '--manoeuvres: belongs to one recording' in capsys.readouterr().err
 
 
 def test_what_was_learned_is_a_further_config_of_every_command(

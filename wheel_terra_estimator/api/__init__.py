@@ -17,13 +17,14 @@ True
 """
 
 from wheel_terra_estimator import __version__
-from wheel_terra_estimator.api.drives import estimate, simulate, smooth
+from wheel_terra_estimator.api.drives import estimate, simulate, smooth, taught
 from wheel_terra_estimator.api.models import Curve, Model
 from wheel_terra_estimator.api.pictures import plot_curve, plot_diagnosis, plot_estimates
 from wheel_terra_estimator.api.soils import Soil
 from wheel_terra_estimator.api.tables import corrected_model, diagnose
 from wheel_terra_estimator.discrepancy.result import Diagnosis
 from wheel_terra_estimator.errors import ConfigurationWarning, UserError
+from wheel_terra_estimator.estimation.taught import Taught
 from wheel_terra_estimator.simulation.drive import SimulatedDrive
 from wheel_terra_estimator.simulation.truth import TruthTable
 from wheel_terra_estimator.terramechanics.wheel import Wheel
@@ -35,6 +36,7 @@ __all__ = [
     'Model',
     'SimulatedDrive',
     'Soil',
+    'Taught',
     'TruthTable',
     'UserError',
     'Wheel',
@@ -47,4 +49,5 @@ __all__ = [
     'plot_estimates',
     'simulate',
     'smooth',
+    'taught',
 ]

@@ -22,11 +22,14 @@ from wheel_terra_estimator.estimation.measurements import (
     SinkageReading,
     WheelOdometry,
 )
+from wheel_terra_estimator.estimation.taught import Taught
 from wheel_terra_estimator.frames import Columns, columns_of, to_frame
 from wheel_terra_estimator.simulation.drive import SimulatedDrive
 
 if TYPE_CHECKING:
     from pandas import DataFrame
+
+    from wheel_terra_estimator.estimation.core import EstimatorCore
 
 FloatArray = NDArray[np.float64]
 
@@ -176,6 +179,48 @@ def simulate(
     return result
 
 
+def taught(
+    drive: Any,
+    rover: str | Path | Sequence[str | Path] | Configuration | None = None,
+    *,
+    parameters: Sequence[str] = (),
+    remaps: Mapping[str, str] | None = None,
+    manoeuvres: bool = False,
+) -> tuple[Taught, ...]:
+    """Run the estimator over a drive and return what that taught of soil and sensors.
+
+    Parameters
+    ----------
+    drive, rover, parameters, remaps
+        As of `estimate`.
+    manoeuvres : bool
+        Whether the short drive that would teach most of each parameter not learned is looked for,
+        by simulation: ten seconds.
+
+    Returns
+    -------
+    tuple of Taught
+        ``name``, ``unit`` of the deviations, ``prior_std``, ``std``, ``bits`` gained, ``verdict``
+        ('learned', 'assumed', 'confounded'), ``confounded_with``; ``manoeuvre`` ('': none would
+        teach it) and ``promised_std`` after it.
+
+    Examples
+    --------
+    >>> rows = taught(simulate('firm_drive', seed=1, duration=3.0))
+    >>> {row.verdict for row in rows} <= {'learned', 'assumed', 'confounded'}
+    True
+    """
+    configuration, inputs = _inputs(drive, rover, parameters)
+    if isinstance(inputs, Path):
+        return tuple(_replayed(inputs, configuration, remaps or {}, manoeuvres=manoeuvres).taught)
+    history, core = _estimated(inputs, configuration, smoothed=False)
+    if not manoeuvres:
+        return tuple(core.taught())
+    from wheel_terra_estimator.bags.replay import further
+
+    return further(core, configuration, history)
+
+
 def _run(
     drive: Any,
     rover: str | Path | Sequence[str | Path] | Configuration | None,
@@ -184,18 +229,30 @@ def _run(
     as_frame: bool,
     smoothed: bool,
 ) -> DataFrame | Columns:
+    configuration, inputs = _inputs(drive, rover, parameters)
+    if isinstance(inputs, Path):
+        history = _replayed(inputs, configuration, remaps or {}, smooth=smoothed).history
+    else:
+        history, _ = _estimated(inputs, configuration, smoothed)
+    return _result(history, as_frame)
+
+
+def _inputs(
+    drive: Any,
+    rover: str | Path | Sequence[str | Path] | Configuration | None,
+    parameters: Sequence[str],
+) -> tuple[Configuration, Path | Iterable[Measurement]]:
+    """Return the configuration, and the path of a bag or the measurements."""
     if isinstance(drive, SimulatedDrive):
         configuration = drive.configuration if rover is None else _rover(rover, parameters)
-        measurements: Iterable[Measurement] = (a.measurement for a in drive.arrivals)
-    else:
-        if rover is None:
-            raise UserError("rover is missing; name its configuration files, such as ['my_rover']")
-        configuration = _rover(rover, parameters)
-        if isinstance(drive, str | Path):
-            return _result(_replayed(Path(drive), configuration, remaps or {}, smoothed), as_frame)
-        rows = columns_of(drive, 'drive')
-        measurements = _measurements(rows, configuration.wheels.names)
-    return _result(_estimated(measurements, configuration, smoothed), as_frame)
+        return configuration, (a.measurement for a in drive.arrivals)
+    if rover is None:
+        raise UserError("rover is missing; name its configuration files, such as ['my_rover']")
+    configuration = _rover(rover, parameters)
+    if isinstance(drive, str | Path):
+        return configuration, Path(drive)
+    rows = columns_of(drive, 'drive')
+    return configuration, _measurements(rows, configuration.wheels.names)
 
 
 def _rover(
@@ -210,18 +267,18 @@ def _rover(
 
 
 def _replayed(
-    path: Path, configuration: Configuration, remaps: Mapping[str, str], smoothed: bool
+    path: Path, configuration: Configuration, remaps: Mapping[str, str], **options: Any
 ) -> Any:
     from wheel_terra_estimator.bags.replay import replay
     from wheel_terra_estimator.bags.storage import open_bag
 
     with open_bag(path) as bag:
-        return replay(bag, configuration, remaps, smooth=smoothed).history
+        return replay(bag, configuration, remaps, **options)
 
 
 def _estimated(
     measurements: Iterable[Measurement], configuration: Configuration, smoothed: bool
-) -> Any:
+) -> tuple[Any, EstimatorCore]:
     from wheel_terra_estimator.bags.history import HistoryRecorder
     from wheel_terra_estimator.checks.input_judge import InputJudge
     from wheel_terra_estimator.estimation.core import EstimatorCore
@@ -240,7 +297,7 @@ def _estimated(
     if smoother:
         for kept in smoother.sets():
             recorder.add(kept.estimates)
-    return recorder.history()
+    return recorder.history(), core
 
 
 def _result(history: Any, as_frame: bool) -> DataFrame | Columns:

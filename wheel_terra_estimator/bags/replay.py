@@ -16,6 +16,8 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
+import numpy as np
+
 from wheel_terra_estimator.bags.history import EstimateHistory, HistoryRecorder
 from wheel_terra_estimator.bags.reader import MeasurementReader
 from wheel_terra_estimator.bags.smoothing import Event, smoothed
@@ -25,6 +27,7 @@ from wheel_terra_estimator.bags.track import Track, TrackRecorder, read_odometry
 from wheel_terra_estimator.bags.writer import EstimateBagWriter
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.estimation.core import EstimatorCore
 from wheel_terra_estimator.estimation.smoothing.smoother import DriveSmoother
 from wheel_terra_estimator.estimation.taught import Taught
 from wheel_terra_estimator.input_file import read_text
@@ -75,6 +78,7 @@ def replay(
     progress: bool = True,
     smooth: bool = False,
     odometry: str = '',
+    manoeuvres: bool = False,
 ) -> Replay:
     """Run the estimator over an open bag.
 
@@ -100,6 +104,8 @@ def replay(
         Whether the estimates are those of the fixed-interval smoother.
     odometry : str
         Topic of the bag whose positions the track has; empty: it is reckoned.
+    manoeuvres : bool
+        Whether the manoeuvres that would teach more are looked for: ten seconds.
 
     Raises
     ------
@@ -142,8 +148,9 @@ def replay(
                 writer.clear_stuck(event.log_time)
             else:
                 writer.add(event.estimates, event.log_time, event.statuses)
+    history, core = recorder.history(), pipeline.core
     return Replay(
-        history=recorder.history(),
+        history=history,
         topics=reader.topics,
         heard=pipeline.received,
         rejected=reader.rejected + pipeline.rejected,
@@ -153,10 +160,32 @@ def replay(
             *_notes(bag, reader, pipeline, interrupted.is_set()),
         ),
         interrupted=interrupted.is_set(),
-        learned=pipeline.core.learned(),
-        taught=pipeline.core.taught(),
+        learned=core.learned(),
+        taught=further(core, configuration, history) if manoeuvres else core.taught(),
         filtered=filtered() if filtered is not None else None,
         track=tracker.track(places),
+    )
+
+
+def further(
+    core: EstimatorCore, configuration: Configuration, history: EstimateHistory
+) -> tuple[Taught, ...]:
+    """Return what a drive has taught, with the manoeuvres that would teach more."""
+    taught, posterior = core.taught(), core.posterior()
+    speeds = np.abs(history.forward_velocity)
+    moving = speeds[speeds > configuration.rest_speed]
+    if posterior is None or not moving.size:
+        return taught
+    from wheel_terra_estimator.simulation.manoeuvres import SENSORS, with_manoeuvres
+
+    health = core.health()
+    return with_manoeuvres(
+        taught,
+        configuration,
+        posterior,
+        soil=core.learned(),
+        speed=float(np.median(moving)),
+        sensors=[name for name in SENSORS if f'nis_{name}' in health],
     )
 
 

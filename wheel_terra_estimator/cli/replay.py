@@ -102,6 +102,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help='estimates of the fixed-interval smoother, which knows the whole drive at each of its '
         'instants; warnings stay as they were given live',
     )
+    parser.add_argument(
+        '--manoeuvres',
+        action='store_true',
+        help='say which short drive would teach most of each parameter that this one has not '
+        'taught: simulates nine of them (ten seconds); of one recording',
+    )
     parser.add_argument('--json', action='store_true', help='print the summary as JSON')
     parser.add_argument(
         '--report',
@@ -158,6 +164,7 @@ def _run_one(arguments: argparse.Namespace) -> int:
         limits=bag_limits.from_arguments(arguments),
         smooth=arguments.smooth,
         odometry=arguments.track_odometry,
+        manoeuvres=arguments.manoeuvres,
         on_checked=print_findings,
     )
     if arguments.json:
@@ -256,11 +263,12 @@ def _run_several(arguments: argparse.Namespace) -> int:
         raise UserError('several recordings need a folder for their outputs: add -o DIR')
     if arguments.arrival:
         raise UserError('--arrival: belongs to one recording; replay that one by itself')
-    for option, path in (
+    for option, given in (
         ('--save-soil', arguments.save_soil),
         ('--slip-on-slope', arguments.slip_on_slope),
+        ('--manoeuvres', arguments.manoeuvres),
     ):
-        if path:
+        if given:
             raise UserError(f'{option}: belongs to one recording; replay that one by itself')
     if arguments.report:
         check_page(arguments.report)

@@ -51,6 +51,11 @@ _COMMON = (
     ('accelerometer bias', 'm/s^2', GRAVITY_BIAS),
 )
 """Name, unit of the deviations, entry of the state; the friction angle by its tangent."""
+_ON_THE_BENCH = {
+    'soil.': ': a plate or shear test',
+    'torque zero': ': read it with the wheel off the ground',
+}
+"""What else would teach it, by a part of the name."""
 _SAME_FACTOR = {'soil.cohesion': _STRENGTH, 'soil.cohesive_modulus': _STIFFNESS}
 """What the filter scales by one factor with another parameter, and so never tells from it."""
 
@@ -66,6 +71,9 @@ class Taught:
     bits: float  # gained, not below 0
     verdict: str  # LEARNED, ASSUMED or CONFOUNDED
     confounded_with: str = ''
+    manoeuvre: str | None = None
+    """That would teach it best; '' = none that was tried would, None = not asked."""
+    promised_std: float | None = None  # after the manoeuvre
 
     def in_words(self) -> str:
         """Return the verdict for a reader."""
@@ -74,6 +82,20 @@ class Taught:
         if self.verdict == CONFOUNDED:
             return f'not told apart from {self.confounded_with}'
         return 'assumed, not learned'
+
+    def cure_in_words(self) -> str:
+        """Return what would teach it; empty where it was learned, or nobody asked."""
+        if self.manoeuvre is None:
+            return ''
+        if self.manoeuvre and self.promised_std is not None:
+            return f'{self.manoeuvre} ({self.with_unit(self.promised_std)})'
+        bench = next((cure for key, cure in _ON_THE_BENCH.items() if key in self.name), '')
+        return f'nothing this rover can drive{bench}'
+
+    def with_unit(self, std: float) -> str:
+        """Return a deviation for a reader."""
+        relative = self.unit == RELATIVE
+        return f'{100.0 * std:.2g} %' if relative else f'{std:.2g} {self.unit}'.rstrip(' -')
 
 
 def with_model_errors(covariance: FloatArray, layout: StateLayout) -> FloatArray:

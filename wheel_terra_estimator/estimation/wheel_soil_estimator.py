@@ -34,13 +34,14 @@ from wheel_terra_estimator.estimation.contacts.turning import Turning, sides_opp
 from wheel_terra_estimator.estimation.contacts.unloaded_wheels import UnloadedWheels
 from wheel_terra_estimator.estimation.contacts.wheel_models import WheelModels, WheelState
 from wheel_terra_estimator.estimation.estimates import EstimateSet
-from wheel_terra_estimator.estimation.filter.ekf import FloatArray, Row
+from wheel_terra_estimator.estimation.filter.ekf import FilterMemory, FloatArray, Row
 from wheel_terra_estimator.estimation.filter.force_balance import (
     ForceBalance,
     SumOfPulls,
     rut_tilt,
 )
 from wheel_terra_estimator.estimation.filter.initial_state import (
+    PriorTuning,
     gravity_bias_std,
     initial_filter,
     layout_of,
@@ -290,6 +291,16 @@ class WheelSoilEstimator:
             self._zero_velocity.keep_zero_of(gyro)
             self._reference.keep_count(rejected[0])
             self._sinkage.keep_count(rejected[1])
+
+    def posterior(self) -> FilterMemory:
+        """Return state and covariance of the filter, for `start_from`."""
+        return self._ekf.snapshot()
+
+    def start_from(self, posterior: FilterMemory) -> None:
+        """Start from what another drive on the same soil left of soil and biases."""
+        whole = PriorTuning(kept_share=1.0)
+        start = with_soil_of(posterior, self._ekf.snapshot(), self._layout, whole)
+        self._ekf.start_from(start)
 
     def snapshot(self) -> tuple[Any, ...]:
         """Return what `restore` needs to come back to this state."""

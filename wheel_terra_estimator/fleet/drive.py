@@ -90,6 +90,7 @@ def replay_drive(
     limits: Limits = LIMITS,
     smooth: bool = False,
     odometry: str = '',
+    manoeuvres: bool = False,
     on_checked: Callable[[CheckReport], None] = lambda checked: None,
 ) -> Drive:
     """Check a recording, run the estimator over it and sum it up.
@@ -98,7 +99,8 @@ def replay_drive(
     ----------
     path : Path
         rosbag2 folder or file.
-    configuration, remaps, output, overwrite, arrival, every_set, progress, smooth, odometry
+    configuration, remaps, output, overwrite, arrival, every_set, progress, smooth, odometry, \
+manoeuvres
         See `bags.replay.replay`.
     limits : Limits
         What of the recording is unpacked and held.
@@ -124,6 +126,7 @@ def replay_drive(
             progress=progress,
             smooth=smooth,
             odometry=odometry,
+            manoeuvres=manoeuvres,
         )
         truth = read_truth(bag, remaps, configuration)
     # A truth that the estimator was given as its reference is none to judge it by.

@@ -13,7 +13,7 @@ from wheel_terra_estimator.bags.track import Track
 from wheel_terra_estimator.bags.truth import Truth
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.estimates import SlipClass
-from wheel_terra_estimator.estimation.taught import RELATIVE, Taught
+from wheel_terra_estimator.estimation.taught import Taught
 from wheel_terra_estimator.output_folder import new_file
 from wheel_terra_estimator.reporting import track_picture, truth_scores
 from wheel_terra_estimator.reporting.drive_figure import drive_figure, way_figure
@@ -100,13 +100,12 @@ def write_replay_report(
 
 
 def _taught_row(row: Taught) -> dict[str, str]:
-    relative = row.unit == RELATIVE
-    scale, unit = (100.0, ' %') if relative else (1.0, f' {row.unit}'.rstrip(' -'))
     return {
         'name': row.name,
-        'prior': f'{scale * row.prior_std:.2g}{unit}',
-        'std': f'{scale * row.std:.2g}{unit}',
+        'prior': row.with_unit(row.prior_std),
+        'std': row.with_unit(row.std),
         'words': row.in_words(),
+        'cure': row.cure_in_words(),
     }
 
 

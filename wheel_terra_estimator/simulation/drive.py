@@ -73,6 +73,8 @@ class Drive:
         Its sensors.
     configuration : Configuration
         What is true of rover and base soil in this drive.
+    soil_factors : dict of str to float
+        On the base soil, as drawn, by name of `SOIL_QUANTITIES` [-].
     speed_factor : float
         Factor on the commands of the scenario, as drawn [-].
     step_length : float
@@ -95,6 +97,7 @@ class Drive:
             return float(np.exp(deviation * np.clip(variation.standard_normal(), -2.5, 2.5)))
 
         soil = {name: factor(getattr(draw, name)) for name in SOIL_QUANTITIES}
+        self.soil_factors = soil
         patches = [
             Patch(
                 p.start,

@@ -56,6 +56,11 @@ class SensorSuite:
         Source of all errors.
     faults : sequence of Fault
         Planned and drawn faults.
+
+    Attributes
+    ----------
+    torque_zero : numpy.ndarray
+        (n,) zeros of the torques, as drawn [N m].
     """
 
     def __init__(
@@ -70,7 +75,7 @@ class SensorSuite:
         self._faults = faults
         n = configuration.wheels.count
         self._scale = scale = scenario.sensors.noise
-        self._torque_zero = scale * figures.torque_zero_std * random.standard_normal(n)
+        self.torque_zero = scale * figures.torque_zero_std * random.standard_normal(n)
         # One current sensor type, one motor constant: most of the gain error is common.
         gain = 0.8 * random.standard_normal() + 0.6 * random.standard_normal(n)
         self._torque_gain = np.maximum(1.0 + scale * figures.torque_gain_std * gain, LEAST_GAIN)
@@ -146,7 +151,7 @@ class SensorSuite:
         # The mean rate of the period is that of its middle; drives report a filtered value too.
         rate = rate + self._scale * self._figures.wheel_rate_std * noise[0]
         torque = _between(before.torque, truth.torque, part)
-        torque = self._torque_gain * torque + self._torque_zero
+        torque = self._torque_gain * torque + self.torque_zero
         torque += self._scale * self._figures.torque_std * noise[1]
         if (wheels := self._failed('torque_spikes', time)) is not None:
             spikes = wheels & (self._random.uniform(size=n) < 0.1)

@@ -114,6 +114,11 @@ class GatedFilter:
             self.tape.cut()
         self.restore(self._start)
 
+    def start_from(self, start: FilterMemory) -> None:
+        """Take another start, for this run and those that begin anew."""
+        self._start = start
+        self.reset()
+
     @property
     def mean(self) -> FloatArray:
         """(n,) state."""

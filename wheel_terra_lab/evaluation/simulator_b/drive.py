@@ -56,6 +56,7 @@ class RivalDrive:
     truth: Truth
     draw: Draw
     course: Course
+    sensors: SensorSet
 
 
 def simulate(kind: str, seed: int, duration: float | None = None) -> RivalDrive:
@@ -80,7 +81,7 @@ def simulate(kind: str, seed: int, duration: float | None = None) -> RivalDrive:
     arrivals = measure(generator, course, sensors, draw.speed)
     configuration = draw.configuration(_sensor_keys(generator, sensors, draw))
     truth = _truth(course, truth_rows, sensors, draw)
-    return RivalDrive(configuration, arrivals, truth, draw, course)
+    return RivalDrive(configuration, arrivals, truth, draw, course, sensors)
 
 
 def _world(generator: np.random.Generator, plan: Kind, draw: Draw, length: float) -> World:

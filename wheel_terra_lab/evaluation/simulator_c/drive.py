@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_lab.evaluation.simulator_c.dynamics import STEP, Course, Motion, drive
+from wheel_terra_lab.evaluation.simulator_c.ground import Ground
 from wheel_terra_lab.evaluation.simulator_c.plans import (
     ENTRAPMENTS,
     KINDS,
@@ -27,6 +28,7 @@ from wheel_terra_lab.evaluation.simulator_c.rover import FAMILIES, Rover, draw_r
 from wheel_terra_lab.evaluation.simulator_c.rover_file import configuration_of
 from wheel_terra_lab.evaluation.simulator_c.sensors import (
     Arrival,
+    Instruments,
     Sensing,
     draw_instruments,
     sampled,
@@ -69,6 +71,8 @@ class SimulatedDrive:
     truth: Truth
     course: Course
     rover: Rover
+    soil: Ground  # without its patches
+    instruments: Instruments
 
 
 def simulate(kind: str, seed: int, duration: float | None = None) -> SimulatedDrive:
@@ -97,7 +101,8 @@ def simulate(kind: str, seed: int, duration: float | None = None) -> SimulatedDr
         _generator(kind, seed, 'file'), plan, rover, instruments, site.base
     )
     truth = truth_of(course, configuration, sensing.odometry_stamps)
-    return SimulatedDrive(configuration, sensing.arrivals(), truth, course, rover)
+    arrivals = sensing.arrivals()
+    return SimulatedDrive(configuration, arrivals, truth, course, rover, site.base, instruments)
 
 
 def _generator(kind: str, seed: int, what: str, again: int = 0) -> np.random.Generator:
