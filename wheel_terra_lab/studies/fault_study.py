@@ -558,13 +558,15 @@ def cases(texts: list[str], seeds: list[int]) -> Iterator[Case]:
             yield Case(recording_of(drive, f'{text} {seed}'), drive.configuration)
 
 
-def scored(case: Case, seed: int, table: dict[str, Counter[str]]) -> None:
+def scored(case: Case, seed: int, table: dict[str, Counter[str]], word: str) -> None:
     """Print what is found in a case without a fault, and what is wrong; count the rest."""
     before = check_recording(case.recording, case.rover)
     for finding in before.findings:
         print(f'without a fault: {case.recording.name}: {finding}', flush=True)
     table['(without a fault)']['found' if before.findings else 'silent'] += 1
     for place, fault in enumerate(FAULTS):
+        if word not in fault.name:
+            continue
         faulty = fault.put(case, np.random.default_rng([seed, place]))
         if faulty is None:
             continue
@@ -581,10 +583,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.partition('\n')[0])
     parser.add_argument('cases', nargs='+', metavar='CASE', help='A:kind, or BAG=CONFIG')
     parser.add_argument('--seeds', nargs='+', type=int, default=[1])
+    parser.add_argument('--faults', default='', metavar='WORD', help='only those with this word')
     arguments = parser.parse_args()
     table = {name: Counter[str]() for name in ('(without a fault)', *(f.name for f in FAULTS))}
     for number, case in enumerate(cases(arguments.cases, arguments.seeds)):
-        scored(case, arguments.seeds[0] + number, table)
+        scored(case, arguments.seeds[0] + number, table, arguments.faults)
     print_table(table)
 
 
