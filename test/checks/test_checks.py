@@ -25,6 +25,9 @@ def checked(configuration=None, whole=WHOLE, **changes):
     return check_recording(replace(whole, **changes), configuration or rolling.rover())
 
 
+SERIES = 'stamp', 'log_time', 'velocity', 'yaw_rate', 'variance'
+
+
 def only(report, kind, wheel=None):
     assert kinds(report) == {(kind, wheel)}, [str(f) for f in report.findings]
     return report.findings[0]
@@ -179,6 +182,19 @@ def test_a_variance_of_zero_is_right_where_the_rover_file_states_what_is_seen():
     assert not [f for f in told.findings if f.kind == 'covariance']
     far = check_recording(recording, rolling.rover(**{'sensors.reference_std': 0.5}))
     assert [f for f in far.findings if f.kind == 'covariance']
+
+
+def test_a_rover_that_starts_and_stops_between_references_scatters_no_reference():
+    drive = rolling.ten_minute_drive(turns=False)
+    speed = 0.15 + 0.15 * np.sin(2.0 * np.pi / 3.0 * drive.time)
+    recording = rolling.recording(replace(drive, speed=speed, slope=0.0 * speed))
+    every = slice(0, None, 4)  # about one a second: the speed changes by 0.2 m/s between two
+    rare = {f: getattr(recording.reference, f)[every] for f in SERIES}
+    told = check_recording(
+        replace(recording, reference=replace(recording.reference, **rare)), rolling.rover()
+    )
+    assert not [f for f in told.findings if f.kind == 'covariance']
+    assert 0.007 < told.figures['reference.noise_m_s'] < 0.03  # true: 0.01; speeds differ by 0.2
 
 
 def test_sinkage():

@@ -158,7 +158,8 @@ def _covariance(
     evidence: Evidence, forward: FloatArray, reference: VelocitySeries
 ) -> list[Outcome]:
     """Compare the stated variance with the scatter of the velocity."""
-    noise = bend_noise(forward)
+    rim = np.nan_to_num(evidence.rim_at(reference.stamp, evidence.rim, AROUND))
+    noise = min(bend_noise(forward), bend_noise(forward - rim))  # wheels start and stop as well
     evidence.figures['reference.noise_m_s'] = float(f'{noise:.3g}')
     stated = reference.variance[np.isfinite(reference.variance)]
     usual = math.sqrt(max(float(np.median(stated)), 0.0)) if stated.size else 0.0
