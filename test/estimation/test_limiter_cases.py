@@ -156,6 +156,7 @@ def test_release_opens_a_crawl_of_ten_seconds():
     rover.stuck()
     rover.state, words = after_release(rover.state, rover.now)
     assert words.startswith('still stuck') and '10 s' in words
+    assert rover.command(0.1).reason.endswith('0.30 for 10 s more')
     assert rover.drive(9.9, 0.1, slip=0.95, slip_class=3, travel=0.0)[:2] == (0.3, 'released')
     assert rover.drive(0.2, 0.1, slip=0.95, slip_class=3, travel=0.0)[:2] == (0.0, 'stuck')
 

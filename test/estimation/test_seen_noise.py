@@ -124,6 +124,13 @@ def test_a_vibrating_rover_is_told_in_words(noise):
     assert 'sensors.specific_force_std: 0.' in words
 
 
+def test_a_reference_that_is_off_by_a_constant_is_not_noisy_for_it(noise):
+    rng, std = np.random.default_rng(9), noise.stated['reference']
+    for i in range(600):
+        noise.compare_reference(float(i), 5.0 * std + std * rng.normal(), std**2, 1e-9 * std**2)
+    assert noise.seen('reference') == pytest.approx(std, rel=0.3)
+
+
 @pytest.mark.parametrize(('share', 'told'), [(1.0, False), (0.1, True)])
 def test_a_reference_is_held_against_its_own_covariance(noise, share, told):
     rng, std = np.random.default_rng(7), 20.0 * noise.stated['reference']

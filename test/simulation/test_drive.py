@@ -164,6 +164,20 @@ def test_wheel_faults_concern_their_wheel() -> None:
     assert truth.normal_load[-1, 1] < 0.1 * truth.normal_load[-1].mean()
 
 
+def test_a_weak_drive_ends_at_a_quarter_of_its_torque_and_a_coasting_one_has_none() -> None:
+    faults = {
+        'faults.kind': ['weak', 'coasting'],
+        'faults.wheel': ['front_left', 'front_right'],
+        'faults.start': [0.0, 0.0],
+        'faults.end': [99.0, 99.0],
+    }
+    limits = [f'wheels.torque_limit:={[40.0] * 6}']
+    hill = EXACT | faults | {'slope.angle_deg': [8.0], 'duration': 6.0}
+    torque = simulate(load(hill, parameters=limits)).truth.torque[-1]
+    assert torque[:2] == pytest.approx([10.0, 0.0], abs=0.05)
+    assert (torque[2:] > 11.0).all()
+
+
 def test_closed_loop_steps_and_profile_agree() -> None:
     scenario = load('firm_drive')
     whole = simulate(scenario, 5, 3.0)

@@ -162,11 +162,11 @@ def test_the_direction_is_that_of_the_rims_that_led_in_and_stays_until_it_clears
 
     assert drive(0.2, -0.05, 20.0, 0.0).direction == 0, 'none while it is not stuck'
     assert drive(0.97, 0.05, 20.0, 20.0).direction == ahead
-    assert drive(0.97, 0.0, 600.0, 40.0).direction == ahead, 'rest changes nothing'
-    backing = drive(0.97, -0.05, 20.0, 640.0)
+    assert drive(0.97, 0.0, 60.0, 40.0).direction == ahead, 'rest changes nothing'
+    backing = drive(0.97, -0.05, 20.0, 100.0)
     assert backing.stuck and backing.direction == ahead, 'nor does digging on the way out'
-    assert drive(0.1, -0.05, 20.0, 660.0).direction == 0
-    assert drive(0.97, -0.05, 20.0, 680.0).direction == -ahead, 'a new one is its own'
+    assert drive(0.1, -0.05, 20.0, 120.0).direction == 0
+    assert drive(0.97, -0.05, 20.0, 140.0).direction == -ahead, 'a new one is its own'
 
 
 def stalling(before, seconds):
