@@ -109,6 +109,7 @@ def search(
     reasons = {name: unavailable(effect, table, lug_height) for name, effect in effects.items()}
     possible = {name: effect for name, effect in effects.items() if not reasons[name]}
     findings = None
+    apart = [{cell[:2] for cell in outliers}]
     for turn in range(_PASSES):
         problem, observed = builder.build(noise.std, outliers)
         nothing = _fit_nothing(builder.forward, problem, observed, nuisance, nothing)
@@ -141,9 +142,10 @@ def search(
         if turn == _PASSES - 1:
             break
         again = _outliers_of_best(builder, noise, selection)
-        if {cell[:2] for cell in again} == {cell[:2] for cell in outliers}:
-            break
+        if {cell[:2] for cell in again} in apart:
+            break  # the same cells as before, or as once before: they would go round
         outliers = again
+        apart.append({cell[:2] for cell in outliers})
         noise = builder.estimate(noise, selection.explanations[0].fitted, outliers)
     assert findings is not None
     return findings
