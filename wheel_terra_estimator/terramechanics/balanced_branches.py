@@ -19,7 +19,7 @@ _STEP = 1e-6
 
 
 def balanced_forces(
-    contact: Contact, shift: float, by_speed: Direction, by_depth: Direction
+    contact: Contact[float], shift: float, by_speed: Direction, by_depth: Direction
 ) -> tuple[float, float, tuple[float, ...], tuple[float, ...]]:
     """Torque and pull whose normal stress carries ``contact.normal_load``, angles given.
 

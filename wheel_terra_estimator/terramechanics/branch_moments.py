@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wheel_terra_estimator.terramechanics.contact import Contact
+from wheel_terra_estimator.terramechanics.maths import Maths, Quantity
 
 # Skid beyond pure rolling, v/(w R) - 1, from which and over which the nodes take over from the
 # centroid; below the first, one place per side is within 1.3 % of the load.
@@ -33,7 +34,7 @@ _NODES = tuple(
 )
 
 
-def branch_moments(exponent: Any, skew: Any) -> tuple[Any, Any]:
+def branch_moments(exponent: Quantity, skew: Quantity) -> tuple[Any, Any]:
     """Area and centroid of the stress on one side of its peak, both as shares.
 
     For small angles the stress is [v (1 + q (1 - v))]^N of its peak, with v = 0 at the edge of
@@ -58,7 +59,7 @@ def branch_moments(exponent: Any, skew: Any) -> tuple[Any, Any]:
     return area, first / area
 
 
-def moment_spread(exponent: Any) -> Any:
+def moment_spread(exponent: Quantity) -> Any:
     """Variance of v under the stress v^N: (N + 1)/((N + 2)^2 (N + 3))."""
     second = exponent + 2.0
     return (exponent + 1.0) / (second * second * (exponent + 3.0))
@@ -91,7 +92,11 @@ class BranchForces:
     )  # fmt: skip
 
     def __init__(
-        self, contact: Contact, peak_share: Any, leaving_share: Any, maths: Any = np
+        self,
+        contact: Contact[Quantity],
+        peak_share: Quantity,
+        leaving_share: Quantity,
+        maths: Maths = np,
     ) -> None:
         self._maths = maths
         self._sin, self._sqrt = maths.sin, maths.sqrt
@@ -164,7 +169,9 @@ class BranchForces:
             setattr(part, name, chosen(getattr(self, name)))
         return part
 
-    def _mobilised(self, angle: Any, top: Any, front: Any, rear: Any, cos_rear: Any) -> Any:
+    def _mobilised(
+        self, angle: Quantity, top: Quantity, front: Quantity, rear: Quantity, cos_rear: Quantity
+    ) -> Any:
         """Return mean mobilised shares [-]: friction in front and behind, cohesion likewise.
 
         Given are the sines of the entrance angle and of the places of both centroids.
@@ -204,7 +211,7 @@ class BranchForces:
             share_rear, even_rear = share_rear * sign_rear, even_rear * sign_rear
         return share_front, share_rear, even_front, even_rear
 
-    def load(self, angle: Any) -> Any:
+    def load(self, angle: Quantity) -> Any:
         """Vertical force at an entrance angle [N]: as ``forces``, half as long."""
         if self._skidding:
             return self.forces(angle)[0]
@@ -228,7 +235,7 @@ class BranchForces:
         ) * sin(self._middle_rear * angle)
         return self._width * angle * (peak * stressed + sticking)
 
-    def forces(self, angle: Any) -> tuple[Any, Any, Any]:
+    def forces(self, angle: Quantity) -> tuple[Any, Any, Any]:
         """Load [N], pull [N] and torque [N m] at an entrance angle."""
         sin, sqrt, square = self._sin, self._sqrt, angle * angle
         top, front, rear = sin(angle), sin(self._place_front * angle), sin(self._place_rear * angle)
@@ -285,11 +292,11 @@ class BranchForces:
             r[rows] += skid[rows] * (s - r[rows])
         return rolling
 
-    def lateral_force(self, angle: Any) -> Any:
+    def lateral_force(self, angle: Quantity) -> Any:
         """Force of the soil under the rim at an entrance angle, positive left [N]."""
         return self._node_forces(angle)[3]
 
-    def _node_forces(self, angle: Any) -> tuple[Any, Any, Any, Any]:
+    def _node_forces(self, angle: Quantity) -> tuple[Any, Any, Any, Any]:
         """Load, pull, torque and lateral force from nodes on either side of the peak."""
         maths, sin, sqrt = self._maths, self._sin, self._sqrt
         R, roll = self._shear_radius, self._roll
@@ -330,7 +337,7 @@ class BranchForces:
         size = self._width * angle
         return size * load, size * pull, size * R * torque, size * lateral
 
-    def small_angle(self, load: Any) -> Any:
+    def small_angle(self, load: Quantity) -> Any:
         """Entrance angle at which the normal stress alone carries a load, for small angles.
 
         1 to 5 % from the balance: a start, not an answer.

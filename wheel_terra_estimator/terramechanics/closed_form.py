@@ -23,6 +23,7 @@ import numpy as np
 from wheel_terra_estimator.terramechanics import stresses
 from wheel_terra_estimator.terramechanics.branch_moments import BranchForces
 from wheel_terra_estimator.terramechanics.contact import Contact
+from wheel_terra_estimator.terramechanics.maths import Maths, Quantity
 from wheel_terra_estimator.terramechanics.terms import PEAK_MARGIN, Terms
 
 # Stress that effects add (a hard layer) is integrated with Gauss's four points per side.
@@ -33,7 +34,7 @@ _POINTS, _WEIGHTS = (
 
 
 def coefficients(
-    entrance_angle: Any, peak_angle: Any, leaving_angle: Any, maths: Any = np
+    entrance_angle: Quantity, peak_angle: Quantity, leaving_angle: Quantity, maths: Maths = np
 ) -> tuple[Any, Any, Any]:
     """Integrals A, B, C of a unit triangle times cos t, sin t and 1 over the contact.
 
@@ -47,7 +48,7 @@ def coefficients(
     return a, b, 0.5 * (entrance_angle - leaving_angle)
 
 
-def peak_stresses(contact: Contact, terms: Terms, maths: Any = np) -> tuple[Any, Any]:
+def peak_stresses(contact: Contact[Any], terms: Terms, maths: Maths = np) -> tuple[Any, Any]:
     """Normal and shear stress at the peak angle, effects included [Pa]."""
     peak = contact.peak_angle
     contact.angle = peak
@@ -57,7 +58,9 @@ def peak_stresses(contact: Contact, terms: Terms, maths: Any = np) -> tuple[Any,
     return sigma, stresses.shear_stress(contact, peak, sigma, maths)
 
 
-def triangle_forces(contact: Contact, terms: Terms, maths: Any = np) -> tuple[Any, Any, Any]:
+def triangle_forces(
+    contact: Contact[Quantity], terms: Terms, maths: Maths = np
+) -> tuple[Quantity, Quantity, Quantity]:
     """Load [N], pull [N] and torque [N m] of triangular stresses, angles given.
 
     W = b (r A sigma_m + R B tau_m), F = b (R A tau_m - r B sigma_m), T = b R^2 C tau_m.
@@ -70,7 +73,9 @@ def triangle_forces(contact: Contact, terms: Terms, maths: Any = np) -> tuple[An
     return load, pull, width * R * R * c * tau
 
 
-def forces(contact: Contact, terms: Terms, maths: Any = np) -> tuple[Any, Any, Any]:
+def forces(
+    contact: Contact[Quantity], terms: Terms, maths: Maths = np
+) -> tuple[Quantity, Quantity, Quantity]:
     """Load [N], pull [N] and torque [N m] from branch moments, angles given."""
     t1 = contact.entrance_angle
     form = BranchForces(contact, contact.peak_angle / t1, contact.leaving_angle / t1, maths)
@@ -81,7 +86,7 @@ def forces(contact: Contact, terms: Terms, maths: Any = np) -> tuple[Any, Any, A
     return result
 
 
-def lateral_force(contact: Contact, terms: Terms, maths: Any = np) -> Any:
+def lateral_force(contact: Contact[Quantity], terms: Terms, maths: Maths = np) -> Quantity:
     """Force of the soil under the rim on the wheel, positive left [N], angles given."""
     t1 = contact.entrance_angle
     if contact.straight:
@@ -93,7 +98,7 @@ def lateral_force(contact: Contact, terms: Terms, maths: Any = np) -> Any:
     return force
 
 
-def triangle_lateral_force(contact: Contact, terms: Terms, maths: Any = np) -> Any:
+def triangle_lateral_force(contact: Contact[Quantity], terms: Terms, maths: Maths = np) -> Quantity:
     """Return the same from triangular stresses: b R C tau_y of the peak angle [N]."""
     if contact.straight:
         return 0.0 * contact.entrance_angle
@@ -109,7 +114,7 @@ def angles_in_proportion(terms: Terms) -> bool:
     return not (terms.stages['on_contact'] or terms.stages['on_normal_stress'])
 
 
-def proportional_forces(contact: Contact, maths: Any = np) -> BranchForces:
+def proportional_forces(contact: Contact[Quantity], maths: Maths = np) -> BranchForces:
     """Forces for all entrance angles at once, peak and leaving angle in proportion to them."""
     leaving = contact.leaving_ratio
     margin = PEAK_MARGIN * (1.0 - leaving)
@@ -117,7 +122,7 @@ def proportional_forces(contact: Contact, maths: Any = np) -> BranchForces:
     return BranchForces(contact, peak, leaving, maths)
 
 
-def _added_stress_forces(contact: Contact, terms: Terms, maths: Any) -> tuple[Any, ...]:
+def _added_stress_forces(contact: Contact[Quantity], terms: Terms, maths: Maths) -> tuple[Any, ...]:
     """Load, pull, torque, lateral force of what effects add to the normal stress, friction too."""
     t1, tm, t2 = contact.entrance_angle, contact.peak_angle, contact.leaving_angle
     R = contact.shear_radius

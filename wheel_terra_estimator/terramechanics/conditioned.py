@@ -330,7 +330,7 @@ class ConditionedForces:
         torque, pull, _, _ = balanced_forces(contact, shift, _NOWHERE, _NOWHERE)
         return (torque - base[0]) / step, (pull - base[1]) / step
 
-    def _place(self, contact: Contact, angle: float, leaving: float | None) -> None:
+    def _place(self, contact: Contact[float], angle: float, leaving: float | None) -> None:
         """Set the angles, as `_set_angles` without the rates."""
         if self._proportional and leaving is None:
             _set_shares(contact, angle)
@@ -338,7 +338,7 @@ class ConditionedForces:
             set_angles(contact, angle, leaving, self._terms, ScalarMaths)
 
     def _set_angles(
-        self, contact: Contact, angle: float, leaving: float | None
+        self, contact: Contact[float], angle: float, leaving: float | None
     ) -> tuple[float, float]:
         """Set the angles; return the rates of peak and leaving angle by the entrance angle."""
         if self._proportional and leaving is None:
@@ -368,7 +368,7 @@ class ConditionedForces:
             return 0.5 * math.pi, True
         return math.acos(cosine), False
 
-    def _depth(self, contact: Contact, sinkage: float) -> float:
+    def _depth(self, contact: Contact[float], sinkage: float) -> float:
         """Depth of the stressed contact for a sinkage as read: the terms on it undone."""
         contact.sinkage = 0.0
         for term, parameters in self._on_sinkage:
@@ -430,7 +430,7 @@ class ConditionedForces:
 
 def _contacts(
     wheel: Wheel, soil: Soil, slip_radius: str, gravity: float
-) -> list[tuple[Contact, float]]:
+) -> list[tuple[Contact[float], float]]:
     """Return, per wheel, a contact with its geometry filled in and its slip radius [m]."""
     if slip_radius not in ('lug_tip', 'rim'):
         raise ValueError(f"slip radius is {slip_radius!r}; allowed is 'lug_tip' or 'rim'")
@@ -455,7 +455,7 @@ def _contacts(
     return contacts
 
 
-def _set_shares(contact: Contact, angle: float) -> tuple[float, float]:
+def _set_shares(contact: Contact[float], angle: float) -> tuple[float, float]:
     """Set peak and leaving angle in proportion to the entrance angle; return the two shares."""
     leaving = contact.leaving_ratio
     margin = PEAK_MARGIN * (1.0 - leaving)

@@ -5,11 +5,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Generic, TypeVar
+
+from wheel_terra_estimator.terramechanics.maths import Maths, Quantity
+
+Q = TypeVar('Q')
 
 
 @dataclass(slots=True)
-class Contact:
+class Contact(Generic[Q]):
     """Quantities of a contact, in the order in which they come to be known.
 
     Each is a float or an array of a common shape; in the quadrature, `angle` and `normal_stress`
@@ -20,58 +24,59 @@ class Contact:
     """
 
     # Motion and load as recorded.
-    slip: Any  # s [-]
-    velocity_ratio: Any  # v/w [m]
-    normal_load: Any  # load that the soil has to carry [N]
-    stated_load: Any  # load as recorded [N]
-    slope: Any  # [rad]
-    gravity: Any  # [m/s^2]
-    rim_speed: Any  # |r w| [m/s], nan when not recorded
-    direction: Any  # +1 forward, -1 reverse
-    pass_number: Any  # 1, 2, ...
+    slip: Q  # s [-]
+    velocity_ratio: Q  # v/w [m]
+    normal_load: Q  # load that the soil has to carry [N]
+    stated_load: Q  # load as recorded [N]
+    slope: Q  # [rad]
+    gravity: Q  # [m/s^2]
+    rim_speed: Q  # |r w| [m/s], nan when not recorded
+    direction: Q  # +1 forward, -1 reverse
+    pass_number: Q  # 1, 2, ...
     # Wheel.
-    radius: Any  # r [m]
-    width: Any  # b [m]
-    lug_height: Any  # h [m]
-    lug_count: Any
-    lug_thickness: Any  # [m]
-    shear_radius: Any  # R [m]
+    radius: Q  # r [m]
+    width: Q  # b [m]
+    lug_height: Q  # h [m]
+    lug_count: Q
+    lug_thickness: Q  # [m]
+    shear_radius: Q  # R [m]
     # Soil.
-    bearing_modulus: Any  # pressure at the reference depth [Pa]
-    reference_depth: Any  # 1 m (Bekker) or the width (Reece) [m]
-    sinkage_exponent: Any  # N [-]
-    cohesion: Any  # c [Pa]
-    tan_friction: Any  # tan(phi) [-]
-    shear_modulus: Any  # K [m]
-    peak_ratio: Any  # peak angle over entrance angle [-]
-    leaving_ratio: Any  # leaving angle over entrance angle [-]
-    density: Any  # [kg/m^3]
+    bearing_modulus: Q  # pressure at the reference depth [Pa]
+    reference_depth: Q  # 1 m (Bekker) or the width (Reece) [m]
+    sinkage_exponent: Q  # N [-]
+    cohesion: Q  # c [Pa]
+    tan_friction: Q  # tan(phi) [-]
+    shear_modulus: Q  # K [m]
+    peak_ratio: Q  # peak angle over entrance angle [-]
+    leaving_ratio: Q  # leaving angle over entrance angle [-]
+    density: Q  # [kg/m^3]
     # Contact.
-    entrance_angle: Any = 0.0  # t1 [rad]
-    peak_angle: Any = 0.0  # tm [rad]
-    leaving_angle: Any = 0.0  # t2 [rad]
+    entrance_angle: Q | float = 0.0  # t1 [rad]
+    peak_angle: Q | float = 0.0  # tm [rad]
+    leaving_angle: Q | float = 0.0  # t2 [rad]
     # Stress at one or more angles.
-    angle: Any = 0.0  # t [rad]
-    normal_stress: Any = 0.0  # sigma [Pa]
+    angle: Q | float = 0.0  # t [rad]
+    normal_stress: Q | float = 0.0  # sigma [Pa]
     # Outputs, as an instrument would read them.
-    sinkage: Any = 0.0  # [m]
-    drawbar_pull: Any = 0.0  # [N]
-    lateral_force: Any = 0.0  # [N], positive left
-    torque: Any = 0.0  # [N m]
+    sinkage: Q | float = 0.0  # [m]
+    drawbar_pull: Q | float = 0.0  # [N]
+    lateral_force: Q | float = 0.0  # [N], positive left
+    torque: Q | float = 0.0  # [N m]
     # Wheel as built, whatever the effects make of `radius`: resets and arms refer to it.
-    rim_radius: Any = 0.0  # [m]
+    rim_radius: Q | float = 0.0  # [m]
     # Sideways motion; the float 0.0 where no wheel slides sideways.
-    lateral_ratio: Any = 0.0  # v_y/w [m], positive left
+    lateral_ratio: Q | float = 0.0  # v_y/w [m], positive left
 
     @property
     def straight(self) -> bool:
         """Whether no wheel slides sideways: lateral force is zero and need not be worked out."""
         return isinstance(self.lateral_ratio, float) and self.lateral_ratio == 0.0
 
-    def heading(self, maths: Any) -> tuple[Any, Any]:
+    def heading(self, maths: Maths) -> tuple[Quantity, Quantity]:
         """Cosine and sine (positive left) of the slip angle, from the two speeds of the hub [-]."""
         if self.straight:
             return 1.0, 0.0
-        forward, aside = self.velocity_ratio, self.lateral_ratio
+        forward: Any = self.velocity_ratio
+        aside: Any = self.lateral_ratio
         speed = maths.maximum(maths.sqrt(forward * forward + aside * aside), 1e-300)
         return forward / speed, aside / speed

@@ -4,11 +4,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from wheel_terra_estimator.terramechanics.checks import check_range
+from wheel_terra_estimator.terramechanics.maths import Quantity
+from wheel_terra_estimator.terramechanics.wheel import Wheel
 
 # Below the first slip nothing is dug beyond the steady sinkage, at the second all of it.
 DIGGING_SLIP = (0.85, 1.0)
@@ -20,13 +20,13 @@ DIGGING_EFFICIENCY = 0.05
 SMOOTH_BAND = 0.02
 
 
-def digging_share(slip: Any) -> Any:
+def digging_share(slip: Quantity) -> Quantity:
     """Share of full digging at a slip ratio: 0 up to 0.85, 1 at 1, a straight line between [-]."""
     start, full = DIGGING_SLIP
     return np.clip((np.asarray(slip) - start) / (full - start), 0.0, 1.0)
 
 
-def digging_per_turn(wheel: Any, efficiency: float = DIGGING_EFFICIENCY) -> Any:
+def digging_per_turn(wheel: Wheel, efficiency: float = DIGGING_EFFICIENCY) -> Quantity:
     """Depth gained per turn of a wheel that spins on the spot [m].
 
     Every lug that passes throws out a share of a layer of its height: efficiency h n, or a thin
@@ -38,8 +38,11 @@ def digging_per_turn(wheel: Any, efficiency: float = DIGGING_EFFICIENCY) -> Any:
 
 
 def digging_rate(
-    slip: Any, wheel: Any, angular_velocity: Any, efficiency: float = DIGGING_EFFICIENCY
-) -> Any:
+    slip: Quantity,
+    wheel: Wheel,
+    angular_velocity: Quantity,
+    efficiency: float = DIGGING_EFFICIENCY,
+) -> Quantity:
     """Rate at which a driving wheel digs itself in, beyond its steady sinkage [m/s].
 
     Parameters

@@ -7,15 +7,18 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from wheel_terra_estimator.terramechanics.maths import ScalarMaths
+from wheel_terra_estimator.terramechanics.maths import Maths, Quantity, ScalarMaths
 
 # A locked wheel (s = -1) has v/w without bound; this floor on 1 + s keeps it finite, with a shear
 # that is saturated long before.
 _LOCKED = 1e-6
 
 
-def slip_ratio(speed: Any, rim_speed: Any, rest_speed: float = 2e-3) -> Any:
+def slip_ratio(
+    speed: Quantity, rim_speed: Quantity, rest_speed: float = 2e-3
+) -> NDArray[np.float64]:
     """Slip ratio s of a wheel from its ground speed and its rim speed.
 
     Driving (``|v| <= |r w|``): s = 1 - v/(r w). Braking or skidding: s = r w/v - 1. Symmetric in
@@ -45,14 +48,14 @@ def slip_ratio(speed: Any, rim_speed: Any, rest_speed: float = 2e-3) -> Any:
     return np.clip(np.where(turning | moving, slip, np.nan), -1.0, 1.0)
 
 
-def speed_ratio(slip: Any, maths: Any = np) -> Any:
+def speed_ratio(slip: Quantity, maths: Maths = np) -> Any:
     """Return v/(r w) for a slip ratio (scalars with `maths=ScalarMaths`) [-]."""
     driving = 1.0 - slip
     braking = 1.0 / maths.maximum(1.0 + slip, _LOCKED)
     return maths.where(slip >= 0.0, driving, braking)
 
 
-def slip_of_speed_ratio(ratio: Any, maths: Any = np) -> Any:
+def slip_of_speed_ratio(ratio: Quantity, maths: Maths = np) -> Any:
     """Return the slip ratio for u = v/(r w); the inverse of `speed_ratio` for u >= 0 [-]."""
     if maths is ScalarMaths:  # what the filter asks for most often, and nothing is worked out twice
         if ratio <= 1.0:
@@ -64,13 +67,13 @@ def slip_of_speed_ratio(ratio: Any, maths: Any = np) -> Any:
 
 
 def shear_displacement(
-    angle: Any,
-    entrance_angle: Any,
-    shear_radius: Any,
-    velocity_ratio: Any,
-    maths: Any = np,
-    sine: Any = None,
-) -> Any:
+    angle: Quantity,
+    entrance_angle: Quantity,
+    shear_radius: Quantity,
+    velocity_ratio: Quantity,
+    maths: Maths = np,
+    sine: Quantity | None = None,
+) -> Quantity:
     """Shear displacement j = R (t1 - t) - (v/w)(sin t1 - sin t) [m].
 
     Ding et al. 2010 eq. 14 (doi 10.1007/s11771-010-0021-7), with v/w so that slip radius and

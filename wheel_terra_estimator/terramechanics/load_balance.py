@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from wheel_terra_estimator.terramechanics.branch_moments import BranchForces
 from wheel_terra_estimator.terramechanics.contact import Contact
+from wheel_terra_estimator.terramechanics.maths import Quantity
 
 FloatArray = NDArray[np.float64]
 
@@ -26,7 +27,7 @@ _STEP = 1e-6
 _REST = 1e-10
 
 
-def explicit_entrance_angle(contact: Contact) -> FloatArray:
+def explicit_entrance_angle(contact: Contact[Quantity]) -> FloatArray:
     """First guess from the normal stress alone, small angles, triangular stress (10 to 20 %)."""
     n = contact.sinkage_exponent
     rise = 0.5 * contact.radius * np.maximum(1.0 - contact.peak_ratio**2, 0.05)

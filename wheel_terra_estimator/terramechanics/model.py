@@ -21,6 +21,7 @@ from wheel_terra_estimator.terramechanics.load_balance import (
     explicit_entrance_angle,
     solve_entrance_angle,
 )
+from wheel_terra_estimator.terramechanics.maths import Quantity
 from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
 from wheel_terra_estimator.terramechanics.soil import Soil
 from wheel_terra_estimator.terramechanics.terms import (
@@ -150,7 +151,7 @@ class WheelSoilModel:
                 f'normal load is {load[worst]:g} N (entry {worst}); this soil carries at most '
                 f'about {limit:.3g} N at a sinkage of one radius'
             )
-        outputs: Sequence[Any]
+        outputs: Sequence[Quantity]
         if explicit:
             set_angles(contact, angle, None, terms)
             contact.lateral_force = self._lateral_force(contact, terms)
@@ -161,7 +162,7 @@ class WheelSoilModel:
             _, *outputs = self._response(contact, angle, points, terms)
         return self._pack(contact, points, angle, carries, outputs)
 
-    def _check(self, contact: Contact) -> None:
+    def _check(self, contact: Contact[Quantity]) -> None:
         """Complain of what effects, or the width, made of the soil."""
         law = 'kc/b + kphi' if self.soil.pressure_law == 'bekker' else "c kc' + rho g b kphi'"
         check_range(f'bearing modulus {law}', contact.bearing_modulus, 0.0, open_lower=True)
@@ -224,7 +225,7 @@ class WheelSoilModel:
         return state, np.moveaxis(total, 0, -1)
 
     def _entrance_angle(
-        self, contact: Contact, load: FloatArray, points: OperatingPoints, terms: Terms
+        self, contact: Contact[Quantity], load: FloatArray, points: OperatingPoints, terms: Terms
     ) -> tuple[FloatArray, NDArray[np.bool_]]:
         start = explicit_entrance_angle(contact)
 
@@ -234,14 +235,14 @@ class WheelSoilModel:
 
         return solve_entrance_angle(carried, load, start)
 
-    def _forces(self, contact: Contact, terms: Terms) -> tuple[Any, Any, Any]:
+    def _forces(self, contact: Contact[Quantity], terms: Terms) -> tuple[Any, Any, Any]:
         if self.method == 'quadrature':
             return quadrature.forces(contact, terms, self.nodes)
         if self.method == 'closed_form':
             return closed_form.forces(contact, terms)
         return closed_form.triangle_forces(contact, terms)
 
-    def _lateral_force(self, contact: Contact, terms: Terms) -> Any:
+    def _lateral_force(self, contact: Contact[Quantity], terms: Terms) -> Quantity:
         if self.method == 'quadrature':
             return quadrature.lateral_force(contact, terms, self.nodes)
         if self.method == 'closed_form':
@@ -249,8 +250,8 @@ class WheelSoilModel:
         return closed_form.triangle_lateral_force(contact, terms)
 
     def _response(
-        self, contact: Contact, angle: FloatArray, points: OperatingPoints, terms: Terms
-    ) -> tuple[Any, Any, Any, Any]:
+        self, contact: Contact[Quantity], angle: FloatArray, points: OperatingPoints, terms: Terms
+    ) -> tuple[Quantity, Quantity, Quantity, Quantity]:
         """Balance W(t1) - load, and the three outputs, at given entrance angles."""
         set_angles(contact, angle, points.leaving_angle, terms)
         load, pull, torque = self._forces(contact, terms)
@@ -258,8 +259,12 @@ class WheelSoilModel:
 
     @staticmethod
     def _outputs(
-        contact: Contact, angle: FloatArray, pull: Any, torque: Any, terms: Terms
-    ) -> tuple[Any, Any, Any]:
+        contact: Contact[Quantity],
+        angle: FloatArray,
+        pull: Quantity,
+        torque: Quantity,
+        terms: Terms,
+    ) -> tuple[Quantity, Quantity, Quantity]:
         """Sinkage, pull and torque as the instruments read them."""
         contact.sinkage = contact.radius * (1.0 - np.cos(angle))
         contact.drawbar_pull = contact.direction * pull
@@ -269,11 +274,11 @@ class WheelSoilModel:
 
     @staticmethod
     def _pack(
-        contact: Contact,
+        contact: Contact[Quantity],
         points: OperatingPoints,
         angle: FloatArray,
         carries: NDArray[np.bool_],
-        outputs: Sequence[Any],
+        outputs: Sequence[Quantity],
     ) -> SteadyState:
         flags = np.where(carries, 0, OVERLOADED)
         weakened = (np.asarray(contact.cohesion) < 0.0) | (np.asarray(contact.tan_friction) < 0.0)
@@ -329,7 +334,9 @@ class _Batch:
             else:
                 raise ValueError(f'no derivative by {name!r}: not a parameter of the model')
 
-    def _perturb(self, index: int, value: Any, step: float, lower: float, upper: float) -> Any:
+    def _perturb(
+        self, index: int, value: Quantity, step: float, lower: float, upper: float
+    ) -> FloatArray:
         """Return `value` for all rows, raised in one row and lowered in its partner."""
         value = np.asarray(value, float)
         if value.ndim < 2:

@@ -5,11 +5,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from wheel_terra_estimator.terramechanics.checks import check_range, common_length, numbers
+from wheel_terra_estimator.terramechanics.maths import Quantity
 from wheel_terra_estimator.terramechanics.wheel import Wheel
 
 STANDARD_GRAVITY = 9.80665  # [m/s^2]
@@ -49,17 +49,17 @@ class OperatingPoints:
         from slip and slip angle, (1 - s) tan(slip angle), which says nothing near 90 degrees.
     """
 
-    slip: Any
-    normal_load: Any
+    slip: Quantity
+    normal_load: Quantity
     wheel: Wheel
-    slope: Any = 0.0
+    slope: Quantity = 0.0
     slip_radius: str = 'lug_tip'
-    gravity: Any = STANDARD_GRAVITY
-    angular_velocity: Any = np.nan
-    pass_number: Any = 1
-    leaving_angle: Any = np.nan
-    slip_angle: Any = 0.0
-    lateral_speed_ratio: Any = np.nan
+    gravity: Quantity = STANDARD_GRAVITY
+    angular_velocity: Quantity = np.nan
+    pass_number: Quantity = 1
+    leaving_angle: Quantity = np.nan
+    slip_angle: Quantity = 0.0
+    lateral_speed_ratio: Quantity = np.nan
 
     def __post_init__(self) -> None:
         if self.slip_radius not in SLIP_RADII:
@@ -90,4 +90,4 @@ class OperatingPoints:
         check_range('lateral speed ratio', self.lateral_speed_ratio, allow_nan=True)
 
     def __len__(self) -> int:
-        return int(self.slip.shape[0])
+        return int(np.shape(self.slip)[0])

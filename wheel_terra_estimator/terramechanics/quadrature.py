@@ -5,13 +5,13 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wheel_terra_estimator.terramechanics import stresses
 from wheel_terra_estimator.terramechanics.contact import Contact
+from wheel_terra_estimator.terramechanics.maths import Quantity
 from wheel_terra_estimator.terramechanics.terms import Terms
 
 # Nodes per side. Worst of 20,000 contacts: below 1e-4 of the load driving, 1.3e-3 skidding, where a
@@ -28,7 +28,9 @@ def _rule(nodes: int, dimensions: int) -> tuple[NDArray[np.float64], NDArray[np.
     return (x * x).reshape(shape), (2.0 * x * w).reshape(shape)
 
 
-def forces(contact: Contact, terms: Terms, nodes: int = NODES) -> tuple[Any, Any, Any]:
+def forces(
+    contact: Contact[Quantity], terms: Terms, nodes: int = NODES
+) -> tuple[Quantity, Quantity, Quantity]:
     """Vertical force, longitudinal force and torque on the wheel, angles given.
 
     Ding et al. 2010 eq. 19 (doi 10.1007/s11771-010-0021-7) for the load, the same integrals for
@@ -51,7 +53,7 @@ def forces(contact: Contact, terms: Terms, nodes: int = NODES) -> tuple[Any, Any
     return load, pull, width * contact.shear_radius * np.add.reduce(shear)
 
 
-def lateral_force(contact: Contact, terms: Terms, nodes: int = NODES) -> Any:
+def lateral_force(contact: Contact[Quantity], terms: Terms, nodes: int = NODES) -> Quantity:
     """Force of the soil under the rim on the wheel, positive left [N], angles given.
 
     Ishigami et al. 2007 (doi 10.1002/rob.20187), without the flank: F_y = b R Int tau_y.
@@ -64,7 +66,9 @@ def lateral_force(contact: Contact, terms: Terms, nodes: int = NODES) -> Any:
     return contact.width * contact.shear_radius * np.add.reduce(across * weight)
 
 
-def _stressed(contact: Contact, terms: Terms, nodes: int) -> tuple[Any, Any, Any]:
+def _stressed(
+    contact: Contact[Quantity], terms: Terms, nodes: int
+) -> tuple[Quantity, Quantity, Quantity]:
     """Set angle and normal stress of the nodes; return their weights [rad], cosines and sines."""
     t1, tm, t2 = contact.entrance_angle, contact.peak_angle, contact.leaving_angle
     front, rear = t1 - tm, tm - t2

@@ -126,7 +126,7 @@ def rover_climb(
         np.where(known[:, None], column.reshape(loads.shape), np.nan)
         for column in (state.sinkage, state.drawbar_pull, state.torque)
     )
-    radius = (each.tip_radius if slip_radius == 'lug_tip' else each.radius).reshape(loads.shape)
+    radius = np.reshape(each.tip_radius if slip_radius == 'lug_tip' else each.radius, loads.shape)
     ratio = np.where(slip >= 0.0, 1.0 - slip, 1.0 / (1.0 + slip))  # v/(r w)
     power = (torque / radius).sum(axis=1) / (weight * ratio)
     return RoverSlopeState(slopes, slip, loads, sinkage, drawbar_pull, torque, power)

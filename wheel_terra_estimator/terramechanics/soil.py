@@ -5,11 +5,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from wheel_terra_estimator.terramechanics.checks import check_range
+from wheel_terra_estimator.terramechanics.maths import Quantity
 
 PRESSURE_LAWS = ('bekker', 'reece')
 
@@ -45,15 +45,15 @@ class Soil:
         ``bekker`` or ``reece``; says how the two moduli are read.
     """
 
-    cohesive_modulus: Any
-    frictional_modulus: Any
-    sinkage_exponent: Any
-    cohesion: Any
-    friction_angle: Any
-    shear_modulus: Any
-    peak_stress_ratio: Any = 0.4
-    leaving_angle_ratio: Any = 0.0
-    density: Any = 1600.0
+    cohesive_modulus: Quantity
+    frictional_modulus: Quantity
+    sinkage_exponent: Quantity
+    cohesion: Quantity
+    friction_angle: Quantity
+    shear_modulus: Quantity
+    peak_stress_ratio: Quantity = 0.4
+    leaving_angle_ratio: Quantity = 0.0
+    density: Quantity = 1600.0
     pressure_law: str = 'bekker'
 
     def __post_init__(self) -> None:

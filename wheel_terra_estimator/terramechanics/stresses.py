@@ -10,29 +10,34 @@ import numpy as np
 
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.kinematics import shear_displacement
+from wheel_terra_estimator.terramechanics.maths import Maths, Quantity
 
 _NO_DISPLACEMENT = 1e-300  # [m]; keeps the direction of none finite
 
 
-def bekker_modulus(cohesive: Any, frictional: Any, width: Any) -> Any:
+def bekker_modulus(cohesive: Quantity, frictional: Quantity, width: Quantity) -> Quantity:
     """Pressure at 1 m depth, kc/b + kphi [Pa], for p = (kc/b + kphi) (z/1 m)^n (Bekker 1969)."""
     return cohesive / width + frictional
 
 
 def reece_modulus(
-    cohesive: Any, frictional: Any, width: Any, cohesion: Any, weight_density: Any
-) -> Any:
+    cohesive: Quantity,
+    frictional: Quantity,
+    width: Quantity,
+    cohesion: Quantity,
+    weight_density: Quantity,
+) -> Quantity:
     """Pressure at a depth of one width, c kc' + rho g b kphi' [Pa], for p = k (z/b)^n (Reece)."""
     return cohesion * cohesive + weight_density * width * frictional
 
 
 def bearing_law(
     pressure_law: str,
-    cohesive: Any,
-    frictional: Any,
-    width: Any,
-    cohesion: Any,
-    weight_density: Any,
+    cohesive: Quantity,
+    frictional: Quantity,
+    width: Quantity,
+    cohesion: Quantity,
+    weight_density: Quantity,
 ) -> tuple[Any, Any]:
     """Pressure at the reference depth [Pa], and that depth [m], of a law of ``Soil``."""
     if pressure_law == 'reece':
@@ -41,8 +46,13 @@ def bearing_law(
 
 
 def rolling_sinkage(
-    load: Any, radius: Any, width: Any, modulus: Any, exponent: Any, maths: Any = np
-) -> Any:
+    load: Quantity,
+    radius: Quantity,
+    width: Quantity,
+    modulus: Quantity,
+    exponent: Quantity,
+    maths: Maths = np,
+) -> Quantity:
     """Sinkage of a towed rigid wheel without slip [m] (Bekker 1969).
 
     z = [3 W / ((3 - n) b k sqrt(D))]^(2/(2n+1)); small sinkage, n below 1.3, stress in front only.
@@ -52,7 +62,9 @@ def rolling_sinkage(
     return (3.0 * load / force) ** (2.0 / (2.0 * exponent + 1.0))
 
 
-def front_stress(contact: Contact, angle: Any, maths: Any = np, cosine: Any = None) -> Any:
+def front_stress(
+    contact: Contact[Quantity], angle: Quantity, maths: Maths = np, cosine: Quantity | None = None
+) -> Quantity:
     """Normal stress ahead of its peak, k [(r/z0)(cos t - cos t1)]^N [Pa].
 
     Wong and Reece 1967; Ding et al. 2010 eq. 17 (doi 10.1007/s11771-010-0021-7). ``cosine`` of the
@@ -64,15 +76,15 @@ def front_stress(contact: Contact, angle: Any, maths: Any = np, cosine: Any = No
     return contact.bearing_modulus * relative**contact.sinkage_exponent
 
 
-def mobilised_share(displacement: Any, shear_modulus: Any, maths: Any = np) -> Any:
+def mobilised_share(displacement: Quantity, shear_modulus: Quantity, maths: Maths = np) -> Quantity:
     """Signed share of the shear strength, sgn(j) (1 - exp(-|j|/K)) (Janosi and Hanamoto) [-]."""
     share = -maths.expm1(-maths.abs(displacement) / shear_modulus)
     return maths.where(displacement >= 0.0, share, -share)
 
 
 def mobilised_shares(
-    contact: Contact, angle: Any, maths: Any = np, sine: Any = None
-) -> tuple[Any, Any]:
+    contact: Contact[Quantity], angle: Quantity, maths: Maths = np, sine: Quantity | None = None
+) -> tuple[Quantity, Quantity]:
     """Signed shares of the shear strength along the wheel (forward) and across it (left) [-].
 
     Across, the soil is displaced by j_y = (v_y/w)(t1 - t), which is R (1 - s)(t1 - t) tan(beta) of
@@ -94,8 +106,12 @@ def mobilised_shares(
 
 
 def shear_stress(
-    contact: Contact, angle: Any, normal_stress: Any, maths: Any = np, sine: Any = None
-) -> Any:
+    contact: Contact[Quantity],
+    angle: Quantity,
+    normal_stress: Quantity,
+    maths: Maths = np,
+    sine: Quantity | None = None,
+) -> Quantity:
     """Shear stress along the wheel (c + sigma tan phi) sgn(j) (1 - exp(-|j|/K)) [Pa].
 
     Janosi and Hanamoto 1961; Ding et al. 2010 eq. 18 (doi 10.1007/s11771-010-0021-7); less where

@@ -21,6 +21,7 @@ from wheel_terra_estimator.terramechanics.effects.base import (
     Term,
 )
 from wheel_terra_estimator.terramechanics.kinematics import speed_ratio
+from wheel_terra_estimator.terramechanics.maths import Maths, Quantity
 from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
 from wheel_terra_estimator.terramechanics.soil import Soil
 
@@ -54,7 +55,7 @@ class Terms:
                 if (term := getattr(effect, stage)) is not None
             ]
 
-    def apply(self, stage: str, contact: Contact, maths: Any = np) -> None:
+    def apply(self, stage: str, contact: Contact[Any], maths: Maths = np) -> None:
         """Run all terms of a stage on the contact."""
         for term, parameters in self.stages[stage]:
             term(contact, parameters, maths)
@@ -62,7 +63,7 @@ class Terms:
 
 def build_contact(
     points: OperatingPoints, soil: Mapping[str, Any], pressure_law: str, terms: Terms
-) -> Contact:
+) -> Contact[Quantity]:
     """Return the contacts before the load balance, with stage ``on_inputs`` done.
 
     Parameters
@@ -118,10 +119,10 @@ def build_contact(
     return contact
 
 
-def _lateral_ratio(points: OperatingPoints, contact: Contact) -> Any:
+def _lateral_ratio(points: OperatingPoints, contact: Contact[Quantity]) -> Quantity:
     """Return v_y/w [m], positive left; the float 0.0 where no wheel slides sideways."""
     stated = ~np.isnan(points.lateral_speed_ratio)
-    if not (points.slip_angle.any() or stated.any()):
+    if not (np.any(points.slip_angle) or np.any(stated)):
         return 0.0
     # In reverse v/w stays positive: left is left whichever way the wheel rolls.
     ratio = contact.velocity_ratio * np.copysign(np.tan(points.slip_angle), points.slip_angle)
@@ -131,7 +132,11 @@ def _lateral_ratio(points: OperatingPoints, contact: Contact) -> Any:
 
 
 def set_angles(
-    contact: Contact, entrance_angle: Any, measured_leaving: Any, terms: Terms, maths: Any = np
+    contact: Contact[Any],
+    entrance_angle: Quantity,
+    measured_leaving: Quantity | None,
+    terms: Terms,
+    maths: Maths = np,
 ) -> None:
     """Set entrance, leaving and peak angle; a measured leaving angle overrides the law."""
     contact.entrance_angle = entrance_angle

@@ -9,6 +9,7 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 from wheel_terra_estimator.terramechanics.checks import check_range
+from wheel_terra_estimator.terramechanics.maths import Quantity
 
 
 @dataclass(frozen=True)
@@ -31,11 +32,11 @@ class Wheel:
         Thickness of a lug along the circumference [m].
     """
 
-    radius: Any
-    width: Any
-    lug_height: Any = 0.0
-    lug_count: Any = 0
-    lug_thickness: Any = 0.0
+    radius: Quantity
+    width: Quantity
+    lug_height: Quantity = 0.0
+    lug_count: Quantity = 0
+    lug_thickness: Quantity = 0.0
 
     def __post_init__(self) -> None:
         check_range('wheel radius', self.radius, 0.0, unit='m', open_lower=True)
@@ -45,7 +46,7 @@ class Wheel:
         check_range('lug thickness', self.lug_thickness, 0.0, unit='m')
 
     @property
-    def tip_radius(self) -> Any:
+    def tip_radius(self) -> Quantity:
         """Radius of the lug tips, r + h [m]."""
         return self.radius + self.lug_height
 

@@ -32,13 +32,13 @@ def smooth_wheel(
     from scipy.integrate import quad
     from scipy.optimize import brentq
 
-    stiffness = soil.cohesive_modulus / width + soil.frictional_modulus
-    exponent = soil.sinkage_exponent
+    stiffness = float(soil.cohesive_modulus / width + soil.frictional_modulus)
+    exponent = float(soil.sinkage_exponent)
     tan_friction = math.tan(soil.friction_angle)
 
     def stresses(angle: float, entrance: float) -> tuple[float, float]:
-        peak = soil.peak_stress_ratio * entrance
-        leaving = soil.leaving_angle_ratio * entrance
+        peak = float(soil.peak_stress_ratio) * entrance
+        leaving = float(soil.leaving_angle_ratio) * entrance
         mirrored = angle
         if angle < peak:
             mirrored = entrance - (angle - leaving) / (peak - leaving) * (entrance - peak)
@@ -47,8 +47,8 @@ def smooth_wheel(
         sheared = radius * (
             entrance - angle - (1.0 - slip) * (math.sin(entrance) - math.sin(angle))
         )
-        strength = soil.cohesion + normal * tan_friction
-        return normal, strength * (1.0 - math.exp(-sheared / soil.shear_modulus))
+        strength = float(soil.cohesion) + normal * tan_friction
+        return normal, strength * (1.0 - math.exp(-sheared / float(soil.shear_modulus)))
 
     def integral(entrance: float, part: Any) -> float:
         ends = (soil.leaving_angle_ratio * entrance, entrance)

@@ -11,6 +11,7 @@ from types import SimpleNamespace
 from typing import Any, TypeAlias
 
 from wheel_terra_estimator.terramechanics.contact import Contact
+from wheel_terra_estimator.terramechanics.maths import Maths, Quantity
 
 OUTPUTS = ('sinkage', 'drawbar_pull', 'torque')
 TOUCHABLE = (*OUTPUTS, 'lateral_force')
@@ -19,7 +20,7 @@ STAGES = ('on_inputs', 'on_contact', 'on_normal_stress', 'on_outputs')
 
 # A term changes the contact in place; `parameters.kd` is the value of the parameter ``kd``;
 # `maths` is numpy or ScalarMaths.
-Term: TypeAlias = Callable[[Contact, SimpleNamespace, Any], None]
+Term: TypeAlias = Callable[[Contact[Any], SimpleNamespace, Maths], None]
 REFERENCE_PRESSURE = 3000.0  # [Pa]; 80 N on 165 mm x 157 mm, the wheel of Ding et al. 2010
 # Effect name -> parameter -> value; ``form`` names the form where it is not the first one.
 EffectSettings: TypeAlias = Mapping[str, Mapping[str, Any]]
@@ -253,7 +254,7 @@ class Effect:
         }
 
 
-def relative_pressure(contact: Contact) -> Any:
+def relative_pressure(contact: Contact[Quantity]) -> Quantity:
     """Mean pressure W/(b r) over `REFERENCE_PRESSURE` [-]: what grows with the load."""
     return contact.normal_load / (contact.width * contact.rim_radius * REFERENCE_PRESSURE)
 

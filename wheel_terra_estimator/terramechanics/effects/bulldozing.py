@@ -5,15 +5,15 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import Any
 
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter, Form
+from wheel_terra_estimator.terramechanics.maths import Maths, Quantity
 
 _LEAST_FRICTION = 0.02  # tan(phi); Terzaghi's factors divide by it
 
 
-def wedge_resistance(contact: Contact, depth: Any, maths: Any) -> Any:
+def wedge_resistance(contact: Contact[Quantity], depth: Quantity, maths: Maths) -> Quantity:
     """Passive resistance of soil to an upright wall, per width [N/m] (Hegedus 1960).
 
     D1 (c h + D2 rho g h^2/2) at the depth h [m] of its foot.
@@ -27,7 +27,7 @@ def wedge_resistance(contact: Contact, depth: Any, maths: Any) -> Any:
     return d1 * (contact.cohesion * depth + 0.5 * d2 * weight * depth**2)
 
 
-def _blade(contact: Contact, maths: Any) -> Any:
+def _blade(contact: Contact[Quantity], maths: Maths) -> Quantity:
     """Width of the wheel as a plate across its motion, its share along the wheel [m].
 
     b without sideways motion, none at a slip angle of 90 degrees.
@@ -36,13 +36,13 @@ def _blade(contact: Contact, maths: Any) -> Any:
     return (contact.width * cosine + 2.0 * contact.rim_radius * maths.abs(sine)) * cosine
 
 
-def _push(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
+def _push(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
     depth = contact.radius * (1.0 - maths.cos(contact.entrance_angle))
     resistance = _blade(contact, maths) * wedge_resistance(contact, depth, maths)
     contact.drawbar_pull = contact.drawbar_pull - contact.direction * p.kb * resistance
 
 
-def _earth_pressure(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
+def _earth_pressure(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
     friction = maths.arctan(maths.maximum(contact.tan_friction, _LEAST_FRICTION))
     tan, cos = maths.tan(friction), maths.cos(friction)
     half = 0.25 * maths.pi + 0.5 * friction

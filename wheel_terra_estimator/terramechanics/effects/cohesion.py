@@ -5,13 +5,13 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import Any
 
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter
+from wheel_terra_estimator.terramechanics.maths import Maths, Quantity
 
 
-def _cohesion(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
+def _cohesion(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
     contact.cohesion = contact.cohesion + p.delta
 
 

@@ -5,22 +5,22 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import Any
 
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter, Form
+from wheel_terra_estimator.terramechanics.maths import Maths, Quantity
 
 
-def _friction(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
+def _friction(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
     contact.torque = contact.torque + contact.direction * p.torque
 
 
-def _in_proportion(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
+def _in_proportion(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
     lost = p.share * maths.abs(contact.torque)
     contact.torque = contact.torque + contact.direction * lost
 
 
-def _viscous(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
+def _viscous(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
     known = contact.rim_speed > 0.0  # not where it is nan
     rate = maths.where(known, contact.rim_speed, 0.0) / contact.rim_radius
     contact.torque = contact.torque + contact.direction * p.damping * rate

@@ -5,30 +5,32 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import Any
 
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter, Form
+from wheel_terra_estimator.terramechanics.maths import Maths, Quantity
 
 
-def _thrust(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
+def _thrust(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
     slip = maths.maximum(contact.slip, 0.0)
     passive = _passive_coefficient(contact, maths)
     _push(contact, p.share, (passive - 1.0) * slip, slip, maths)
 
 
-def _textbook(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
+def _textbook(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
     slip = maths.maximum(contact.slip, 0.0)
     _push(contact, p.share, _passive_coefficient(contact, maths), slip, maths)
 
 
-def _passive_coefficient(contact: Contact, maths: Any) -> Any:
+def _passive_coefficient(contact: Contact[Quantity], maths: Maths) -> Quantity:
     """Rankine's Np = tan^2(pi/4 + phi/2) [-]."""
     friction = maths.arctan(contact.tan_friction)
     return maths.tan(0.25 * maths.pi + 0.5 * friction) ** 2
 
 
-def _push(contact: Contact, share: float, of_surcharge: Any, slip: Any, maths: Any) -> None:
+def _push(
+    contact: Contact[Quantity], share: float, of_surcharge: Quantity, slip: Quantity, maths: Maths
+) -> None:
     """Add the thrust of the lugs in the contact, with the given factor on the surcharge q h."""
     span = contact.entrance_angle - contact.leaving_angle
     engaged = contact.lug_count * span / (2.0 * maths.pi)

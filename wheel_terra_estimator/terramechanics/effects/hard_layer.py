@@ -5,26 +5,28 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import Any
 
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter, Form
+from wheel_terra_estimator.terramechanics.maths import Maths, Quantity
 
 _BLEND = 0.001  # [m]; the layer comes in over a millimetre, so that derivatives exist
 
 
-def _layer(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
+def _layer(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
     contact.normal_stress = contact.normal_stress + _support(contact, contact.angle, p, maths)
 
 
-def _bearing(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
+def _bearing(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
     t1, tm, t2 = contact.entrance_angle, contact.peak_angle, contact.leaving_angle
     mirrored = t1 - (contact.angle - t2) * (t1 - tm) / (tm - t2)
     angle = maths.where(contact.angle >= tm, contact.angle, mirrored)
     contact.normal_stress = contact.normal_stress + _support(contact, angle, p, maths)
 
 
-def _support(contact: Contact, angle: Any, p: SimpleNamespace, maths: Any) -> Any:
+def _support(
+    contact: Contact[Quantity], angle: Quantity, p: SimpleNamespace, maths: Maths
+) -> Quantity:
     """Stress that the layer adds where the rim is as deep as at an angle [Pa]."""
     depth = contact.radius * (maths.cos(angle) - maths.cos(contact.entrance_angle))
     inside = maths.maximum(depth - p.depth, 0.0)

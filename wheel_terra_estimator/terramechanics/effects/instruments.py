@@ -6,17 +6,17 @@ from __future__ import annotations
 
 from functools import partial
 from types import SimpleNamespace
-from typing import Any
 
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter
+from wheel_terra_estimator.terramechanics.maths import Maths, Quantity
 
 
-def _gain(quantity: str, contact: Contact, p: SimpleNamespace, maths: Any) -> None:
+def _gain(quantity: str, contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
     setattr(contact, quantity, getattr(contact, quantity) * (1.0 + p.gain))
 
 
-def _offset(quantity: str, contact: Contact, p: SimpleNamespace, maths: Any) -> None:
+def _offset(quantity: str, contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
     setattr(contact, quantity, getattr(contact, quantity) + p.offset)
 
 

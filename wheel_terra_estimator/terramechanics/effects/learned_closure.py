@@ -20,6 +20,7 @@ from typing import Any
 
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects.base import OUTPUTS, Effect, EffectParameter
+from wheel_terra_estimator.terramechanics.maths import Maths, Quantity
 
 NAME = 'learned_closure'
 REFERENCE_SPEED = 0.05  # rim speed at which the feature rim_speed is 0 [m/s]
@@ -76,7 +77,7 @@ class Feature:
         Names of the two features that a product multiplies.
     """
 
-    value: Callable[[Contact, Any], Any]
+    value: Callable[[Contact[Quantity], Maths], Quantity]
     spread: float
     columns: tuple[str, ...]
     meaning: str
@@ -99,15 +100,15 @@ TARGETS: Mapping[str, Target] = {
 }
 
 
-def _over(onset: float) -> Callable[[Contact, Any], Any]:
-    def excess(contact: Contact, maths: Any) -> Any:
+def _over(onset: float) -> Callable[[Contact[Quantity], Maths], Quantity]:
+    def excess(contact: Contact[Quantity], maths: Maths) -> Quantity:
         return maths.maximum(maths.abs(contact.slip) - onset, 0.0)
 
     return excess
 
 
-def _near(middle: float) -> Callable[[Contact, Any], Any]:
-    def band(contact: Contact, maths: Any) -> Any:
+def _near(middle: float) -> Callable[[Contact[Quantity], Maths], Quantity]:
+    def band(contact: Contact[Quantity], maths: Maths) -> Quantity:
         away = (maths.abs(contact.slip) - middle) / _BAND
         inside = maths.maximum(1.0 - away * away, 0.0)
         return inside * inside
@@ -115,23 +116,23 @@ def _near(middle: float) -> Callable[[Contact, Any], Any]:
     return band
 
 
-def _weight(contact: Contact) -> Any:
+def _weight(contact: Contact[Quantity]) -> Quantity:
     """Weight of soil of the wheel's size, rho g b r^2 [N]: what loads are compared with."""
     return contact.density * contact.gravity * contact.width * contact.radius * contact.radius
 
 
-def _load(contact: Contact, maths: Any) -> Any:
+def _load(contact: Contact[Quantity], maths: Maths) -> Quantity:
     share = contact.stated_load / _weight(contact)
     return maths.log(maths.maximum(share, _LEAST)) / maths.log(10.0)
 
 
-def _rim_speed(contact: Contact, maths: Any) -> Any:
+def _rim_speed(contact: Contact[Quantity], maths: Maths) -> Quantity:
     speed = maths.maximum(contact.rim_speed / REFERENCE_SPEED, 1e-3)
     decades = maths.log(speed) / maths.log(10.0)
     return maths.where(maths.isnan(contact.rim_speed), 0.0, decades)
 
 
-def _torque_squared(contact: Contact, maths: Any) -> Any:
+def _torque_squared(contact: Contact[Quantity], maths: Maths) -> Quantity:
     lever = maths.maximum(contact.stated_load * contact.radius, _LEAST)
     square = contact.torque * maths.abs(contact.torque) * contact.direction
     return square / (lever * _weight(contact) * contact.radius)
@@ -252,7 +253,7 @@ def coefficients_of(
 
 
 def changes(
-    contact: Contact, p: SimpleNamespace, maths: Any, targets: Iterable[str]
+    contact: Contact[Quantity], p: SimpleNamespace, maths: Maths, targets: Iterable[str]
 ) -> dict[str, Any]:
     """Return target -> bounded change x' for those targets that the law has."""
     total: dict[str, Any] = {}
@@ -270,7 +271,7 @@ def changes(
 _BEFORE = tuple(name for name in TARGETS if name not in OUTPUTS)
 
 
-def _change_closures(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
+def _change_closures(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
     for target, x in changes(contact, p, maths, _BEFORE).items():
         if target == 'bearing_pressure':
             contact.bearing_modulus = contact.bearing_modulus * maths.exp(x)
@@ -290,7 +291,7 @@ def _change_closures(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
             contact.shear_radius = contact.shear_radius * maths.exp(x)
 
 
-def _change_outputs(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
+def _change_outputs(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
     for target, x in changes(contact, p, maths, OUTPUTS).items():
         if target == 'sinkage':
             contact.sinkage = contact.sinkage + x * contact.radius

@@ -5,13 +5,13 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import Any
 
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter
+from wheel_terra_estimator.terramechanics.maths import Maths, Quantity
 
 
-def _radius(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
+def _radius(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
     contact.shear_radius = contact.shear_radius + p.lam * contact.lug_height
 
 

@@ -5,18 +5,18 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import Any
 
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter, Form
+from wheel_terra_estimator.terramechanics.maths import Maths, Quantity
 
 
-def _support(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
+def _support(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
     lifted = maths.where(contact.lug_height > 0.0, p.dz4, 0.0)
     contact.sinkage = contact.sinkage - lifted
 
 
-def _by_height(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
+def _by_height(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
     high = maths.maximum(contact.lug_height - p.free_height, 0.0)
     contact.sinkage = contact.sinkage - p.share * high
 

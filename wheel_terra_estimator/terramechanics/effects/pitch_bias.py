@@ -5,13 +5,13 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import Any
 
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter
+from wheel_terra_estimator.terramechanics.maths import Maths, Quantity
 
 
-def _tilt(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
+def _tilt(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
     contact.drawbar_pull = contact.drawbar_pull + contact.stated_load * maths.sin(p.bias)
 
 

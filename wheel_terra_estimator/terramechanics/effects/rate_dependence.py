@@ -5,15 +5,15 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import Any
 
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter
+from wheel_terra_estimator.terramechanics.maths import Maths, Quantity
 
 REFERENCE_SPEED = 0.05  # [m/s]; rover speed, below which Ding et al. 2010 saw no influence
 
 
-def _rate(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
+def _rate(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
     known = contact.rim_speed > 1e-4
     speed = maths.where(known, contact.rim_speed, REFERENCE_SPEED)
     decades = maths.log(speed / REFERENCE_SPEED)

@@ -5,13 +5,13 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import Any
 
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter
+from wheel_terra_estimator.terramechanics.maths import Maths, Quantity
 
 
-def _slide(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
+def _slide(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
     bare = maths.exp(-contact.lug_height / p.ring_height)
     contact.tan_friction = contact.tan_friction * (1.0 - p.loss * bare)
 

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import Any
 
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects.base import (
@@ -14,13 +13,14 @@ from wheel_terra_estimator.terramechanics.effects.base import (
     Form,
     relative_pressure,
 )
+from wheel_terra_estimator.terramechanics.maths import Maths, Quantity
 
 
-def _factor(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
+def _factor(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
     contact.shear_modulus = contact.shear_modulus * maths.exp(p.log_factor)
 
 
-def _with_pressure(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
+def _with_pressure(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
     growth = maths.exp(p.growth * maths.log(relative_pressure(contact)))
     contact.shear_modulus = contact.shear_modulus * growth
 

@@ -5,13 +5,13 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter, Form
 from wheel_terra_estimator.terramechanics.effects.bulldozing import wedge_resistance
+from wheel_terra_estimator.terramechanics.maths import Maths, Quantity
 from wheel_terra_estimator.terramechanics.stresses import mobilised_share
 
 # Gauss's nodes and weights on (0, 1), over the flank in the soil.
@@ -22,7 +22,7 @@ _NODES = tuple(
 _CENTRE = 2.0 / 3.0  # distance from the hub at which soil rubs on the flank, share of the radius
 
 
-def _push_aside(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
+def _push_aside(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
     if contact.straight:
         return
     t1, r = contact.entrance_angle, contact.radius
@@ -39,7 +39,7 @@ def _push_aside(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
     contact.lateral_force = contact.lateral_force - p.ks * span * force
 
 
-def _plate(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
+def _plate(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
     if contact.straight:
         return
     t1, t2, r = contact.entrance_angle, contact.leaving_angle, contact.radius

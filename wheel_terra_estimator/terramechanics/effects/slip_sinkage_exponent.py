@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import Any
 
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects.base import (
@@ -15,9 +14,10 @@ from wheel_terra_estimator.terramechanics.effects.base import (
     relative_pressure,
 )
 from wheel_terra_estimator.terramechanics.kinematics import speed_ratio
+from wheel_terra_estimator.terramechanics.maths import Maths, Quantity
 
 
-def _sliding(contact: Contact, maths: Any) -> Any:
+def _sliding(contact: Contact[Quantity], maths: Maths) -> Quantity:
     """Speed of the rim through the soil over the faster of rim and hub; |s| without side slip."""
     if contact.straight:
         return maths.abs(contact.slip)
@@ -27,7 +27,7 @@ def _sliding(contact: Contact, maths: Any) -> Any:
     return maths.sqrt(back * back + aside * aside) / fastest
 
 
-def _exponent(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
+def _exponent(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
     skid = maths.maximum(-contact.slip, 0.0)
     growth = p.n1 * _sliding(contact, maths) + p.n2 * skid
     contact.sinkage_exponent = contact.sinkage_exponent + growth
@@ -39,7 +39,7 @@ def _exponent(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
         contact.bearing_modulus = contact.bearing_modulus * (1.0 - p.side * share * share)
 
 
-def _lyasko(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
+def _lyasko(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
     slip = _sliding(contact, maths)
     gain = 1.0 + p.gain * ((1.0 + slip) / (1.0 - 0.5 * slip) - 1.0)
     # The load grows with k z^(N + 1/2): this modulus gives the sinkage `gain` times as much.
@@ -47,7 +47,7 @@ def _lyasko(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
     contact.bearing_modulus = contact.bearing_modulus * weaker
 
 
-def _with_load(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
+def _with_load(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
     growth = p.nw * maths.log(relative_pressure(contact)) + p.n1 * _sliding(contact, maths)
     contact.sinkage_exponent = contact.sinkage_exponent + growth
 

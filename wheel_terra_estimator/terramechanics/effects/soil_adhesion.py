@@ -5,22 +5,22 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import Any
 
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter, Form
+from wheel_terra_estimator.terramechanics.maths import Maths, Quantity
 
 
-def _layer(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
+def _layer(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
     contact.radius = contact.radius + p.thickness
     contact.shear_radius = contact.shear_radius + p.thickness
 
 
-def _below_the_rim(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
+def _below_the_rim(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
     contact.sinkage = contact.sinkage - p.thickness
 
 
-def _tension(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
+def _tension(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
     rear = maths.minimum(contact.leaving_angle, -_LEAST_ANGLE)
     share = maths.maximum(contact.angle / rear, 0.0)
     contact.normal_stress = contact.normal_stress - p.tension * share

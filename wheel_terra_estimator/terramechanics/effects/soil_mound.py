@@ -5,22 +5,22 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import Any
 
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter, Form
+from wheel_terra_estimator.terramechanics.maths import Maths, Quantity
 
 SMALLEST_ROOM = 1e-12
 """Height left below the hub over r [-]; contact that leaves above the hub has none."""
 
 
-def _mound(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
+def _mound(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
     """Raise the rear contact height by kappa z ((s - onset)+/(1 - onset))^2."""
     excess = maths.maximum(contact.slip - p.onset, 0.0) / (1.0 - p.onset)
     _raise(contact, p.kappa * excess * excess * (1.0 - maths.cos(contact.entrance_angle)), maths)
 
 
-def _conveyed(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
+def _conveyed(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
     """Raise the rear contact height by kappa z (q/(q + z))^2, q conveyed per unit of advance."""
     depth = 1.0 - maths.cos(contact.entrance_angle)  # over r
     slip = maths.maximum(contact.slip, 0.0)
@@ -30,7 +30,7 @@ def _conveyed(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
     _raise(contact, p.kappa * share * share * depth, maths)
 
 
-def _raise(contact: Contact, rise: Any, maths: Any) -> None:
+def _raise(contact: Contact[Quantity], rise: Quantity, maths: Maths) -> None:
     """Raise the rear contact by a height over r, below the hub."""
     # 1 - cos is the contact height over r. The slope of a circle is steeper the higher one gets, so
     # the height saturates below the hub (1 - exp keeps it smooth).

@@ -5,13 +5,13 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import Any
 
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter
+from wheel_terra_estimator.terramechanics.maths import Maths, Quantity
 
 
-def _carry(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
+def _carry(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
     slip = maths.maximum(contact.slip, 0.0)
     layer = p.fill * contact.lug_height * slip
     weight = contact.density * contact.gravity * contact.width * layer  # per rim travel

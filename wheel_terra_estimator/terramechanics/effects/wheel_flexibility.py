@@ -5,16 +5,16 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import Any
 
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter
+from wheel_terra_estimator.terramechanics.maths import Maths, Quantity
 from wheel_terra_estimator.terramechanics.stresses import rolling_sinkage
 
 _LEAST = 1e-9  # keeps a wheel without load free of divisions by zero [m]
 
 
-def _widening(contact: Contact, p: SimpleNamespace, maths: Any) -> Any:
+def _widening(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> Quantity:
     """Circle of the same chord over the rim, r*/r = 1 + f/z0; nothing of the contact's shape."""
     modulus = maths.maximum(contact.bearing_modulus, 1.0) / (
         contact.reference_depth**contact.sinkage_exponent
@@ -30,7 +30,7 @@ def _widening(contact: Contact, p: SimpleNamespace, maths: Any) -> Any:
     return 1.0 + p.compliance * contact.normal_load / maths.maximum(sinkage, _LEAST)
 
 
-def _flatten(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
+def _flatten(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
     """Widen the contact."""
     flatter = _widening(contact, p, maths)
     contact.radius = contact.radius * flatter
@@ -39,7 +39,7 @@ def _flatten(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
     contact.velocity_ratio = contact.velocity_ratio * flatter
 
 
-def _arm(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
+def _arm(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
     """Keep the arm of the shear at the height of the hub."""
     contact.torque = contact.torque / _widening(contact, p, maths)
 

@@ -5,14 +5,14 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import Any
 
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter
 from wheel_terra_estimator.terramechanics.kinematics import slip_of_speed_ratio, speed_ratio
+from wheel_terra_estimator.terramechanics.maths import Maths, Quantity
 
 
-def _bias(contact: Contact, p: SimpleNamespace, maths: Any) -> None:
+def _bias(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
     scale = 1.0 + p.bias
     contact.velocity_ratio = contact.velocity_ratio / scale
     ratio = speed_ratio(contact.slip, maths) / scale
