@@ -59,3 +59,12 @@ def test_the_estimator_has_learned_nothing_before_it_drives():
     assert all(row.verdict != LEARNED and row.bits == 0.0 for row in rows.values())
     assert rows['soil.cohesion'].confounded_with == 'soil.friction_angle_deg'
     assert rows['soil.cohesive_modulus'].confounded_with == 'soil.frictional_modulus'
+
+
+def test_what_no_drive_tells_apart_is_never_learned():
+    parameters = [Parameter('a', '-', np.ones(1), like='b')]
+    row = Teaching(parameters, np.eye(1)).judged(np.array([[0.01]]))[0]
+    assert (row.verdict, row.bits, row.std, row.confounded_with) == (CONFOUNDED, 0.0, 1.0, 'b')
+    names = [row.name for row in WheelSoilEstimator(reader.load(SAND)).taught()
+             if row.confounded_with == 'soil.friction_angle_deg']  # fmt: skip
+    assert any(name.startswith('torque zero of') for name in names)

@@ -202,21 +202,39 @@ class SidewaysMotion(Component[SidewaysState]):
         var_aside = variance + turning * x * x
         var_along = var_forward * cosine**2 + var_aside * sine**2
         var_across = var_forward * sine**2 + var_aside * cosine**2
-        square = np.maximum(along**2 + across**2, rover.rest_speed**2)
-        angle_std = np.sqrt(along**2 * var_across + across**2 * var_along) / square
+        angle = np.arctan2(across, along)
+        angle_std = _angle_std(along, across, np.sqrt(var_along), np.sqrt(var_across))
         forces = np.array(wheel_forces(rover, given, velocity, tuning))
         _, std = _felt_force(rover, given, tuning)
         loads = np.array(given.loads)
         shared = std * loads / max(float(loads.sum()), 1e-9)
         force_std = np.hypot(tuning.force_share * np.abs(forces), shared)
         return Sideways(
-            _floats(np.arctan2(across, along)),
+            _floats(angle),
             _floats(np.minimum(angle_std, UNKNOWN_ANGLE_STD)),
             _floats(forces),
             _floats(np.maximum(force_std, 1e-3)),
             float(velocity),
             max(variance, 1e-12),
         )
+
+
+def _angle_std(
+    along: FloatArray, across: FloatArray, along_std: FloatArray, across_std: FloatArray
+) -> FloatArray:
+    """Return the deviation of the direction of two speeds: one deviation to either side of each.
+
+    Not by derivatives: where a speed is known no better than its size, those at the mean are small.
+    """
+    here = np.arctan2(across, along)
+    there = (
+        np.arctan2(across + across_std, along),
+        np.arctan2(across - across_std, along),
+        np.arctan2(across, along + along_std),
+        np.arctan2(across, along - along_std),
+    )
+    apart = [(angle - here + np.pi) % (2.0 * np.pi) - np.pi for angle in there]
+    return np.asarray(np.sqrt(0.5 * sum(step**2 for step in apart)))
 
 
 def _floats(values: FloatArray) -> Floats:
@@ -270,8 +288,9 @@ def model_speed(
     free = float(brentq(total, -reach, reach, xtol=tolerance))
     ends = total(reach), total(-reach)  # the greatest forces to the right and to the left
     if not ends[0] < felt < ends[1]:
-        lateral = reach if felt <= ends[0] else -reach
-        return lateral, reach**2  # more than this soil gives: sliding without bound
+        # More than this soil gives: sliding, anywhere up to the bound.
+        lateral = 0.5 * math.copysign(reach, -felt)
+        return lateral, lateral**2
     lateral = float(brentq(lambda v: total(v) - felt, -reach, reach, xtol=tolerance))
     step = 0.02 * pace
     stiffness = (total(lateral - step) - total(lateral + step)) / (2.0 * step)
