@@ -95,15 +95,13 @@ def _lugs(model: Model) -> list[Statement]:
         ours = crossover(model, low, high)
         holds, why = within(ding_curves.CROSSING, ours, CROSSING_SHARE)
         more, deeper = 1e3 * (SUPPORT[high] - SUPPORT[low]), 1e3 * (high - low)
-        why += (
-            ''
-            if holds
-            else (
-                f'; h s - dz4 crosses at {more:g}/{deeper:g} whatever the soil, later where '
-                f'the rim matters; {ding_curves.CROSSING:g} asks for supports '
+        if not holds:
+            why += (
+                f'; with the printed h s - dz4 the two cross at {more:g}/{deeper:g} = '
+                f'{more / deeper:.2f} on any soil, but for friction on the rim; '
+                f'{ding_curves.CROSSING:g} asks for supports dz4 that are '
                 f'{ding_curves.CROSSING * deeper:g} mm apart, printed are {more:g}'
             )
-        )
         what = f'slip above which {1e3 * high:.0f} mm lugs sink more than {1e3 * low:.0f} mm'
         found.append(Statement('figure 4', what, 'about 0.4', f'{ours:.2f}', holds, why))
     curves = [sinkage(model, 'Wh3', height) for height in LUGS]
