@@ -21,11 +21,6 @@ from wheel_terra_estimator.errors import UserError
 def worker_pool(processes: int) -> Iterator[ProcessPoolExecutor]:
     """Yield a pool of processes; after an error in the block its workers are stopped at once.
 
-    Parameters
-    ----------
-    processes : int
-        Number of workers.
-
     Raises
     ------
     UserError

@@ -189,13 +189,7 @@ class EstimateHistory:
 class HistoryRecorder:
     """Collects estimate sets into an `EstimateHistory`.
 
-    Parameters
-    ----------
-    names : sequence of str
-        Wheel names.
-    most : int, optional
-        Greatest number of sets that are kept (see `ThinnedRows`); the figures count all.
-        Default: all are kept.
+    Of a long drive at most ``most`` sets are kept (see `ThinnedRows`); the figures count all.
     """
 
     def __init__(self, names: Sequence[str], most: int | None = None) -> None:
@@ -250,14 +244,7 @@ def stuck_reason(reasons: Sequence[str]) -> str:
 
 
 def read_estimates(bag: Bag, namespace: str = f'/{NODE}') -> EstimateHistory:
-    """Read the estimates out of a bag of the node's outputs.
-
-    Parameters
-    ----------
-    bag : Bag
-        Open recording.
-    namespace : str
-        Where the private topics lie.
+    """Read the estimates out of a bag of the node's outputs below a namespace.
 
     Raises
     ------

@@ -79,16 +79,8 @@ def read_series(
 ) -> Recording:
     """Read the input topics of an open bag.
 
-    Parameters
-    ----------
-    bag : Bag
-        The recording.
-    remaps : mapping of str to str
-        Estimator's topic to the bag's.
-    name : str
-        What reports call the recording.
-    most : int
-        Messages of a topic that are kept; the rest of a longer recording is not looked at.
+    Of a topic at most ``most`` messages are kept, its beginning; ``name`` is what reports call the
+    recording, ``remaps`` are the estimator's topics to the bag's.
     """
     chosen = choose_topics(bag, remaps)
     by_topic = {topic: own for own, topic in chosen.items()}

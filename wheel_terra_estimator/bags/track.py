@@ -77,13 +77,7 @@ class Track:
 
 
 class TrackRecorder:
-    """Collects a track from sets and attitudes.
-
-    Parameters
-    ----------
-    configuration : Configuration
-        The soil that the learned one is compared with.
-    """
+    """Collects a track from sets and attitudes; soil learned is compared with soil configured."""
 
     def __init__(self, configuration: Configuration) -> None:
         soil = configuration.soil

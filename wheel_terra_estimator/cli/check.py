@@ -32,9 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     configuration_reader.add_arguments(parser)
     bag_arguments.add_arguments(parser)
     parser.add_argument('--json', action='store_true', help='print findings and figures as JSON')
-    parser.add_argument(
-        '--report', action=Output, type=Path, metavar='F.html', help='page to be kept or sent'
-    )
+    parser.add_argument('--report', action=Output, metavar='F.html', help='page to be kept or sent')
     parser.add_argument('--overwrite', action='store_true', help='replace an earlier report')
 
 

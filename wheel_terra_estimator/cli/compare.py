@@ -23,9 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('second', type=Path, metavar='B', help='bag of estimates of the same drive')
     parser.add_argument('--truth', type=Path, metavar='BAG', help='recording with ground truth')
     parser.add_argument('--json', action='store_true', help='print the differences as JSON')
-    parser.add_argument(
-        '--report', action=Output, type=Path, metavar='F.html', help='page with both overlaid'
-    )
+    parser.add_argument('--report', action=Output, metavar='F.html', help='page with both overlaid')
     bag_limits.add_arguments(parser)
     parser.add_argument('--overwrite', action='store_true', help='replace an earlier report')
 

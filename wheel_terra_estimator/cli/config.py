@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
 from wheel_terra_estimator.cli.outputs import Output
 
@@ -32,9 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         'views', help='write layouts of PlotJuggler and Foxglove for the wheels of a rover file'
     )
     views.add_argument('name', metavar='ROVER', help='rover file, or bare name of a shipped one')
-    views.add_argument(
-        '-o', dest='output', action=Output, type=Path, required=True, metavar='F', help=_VIEWS
-    )
+    views.add_argument('-o', dest='output', action=Output, required=True, metavar='F', help=_VIEWS)
     views.add_argument('--overwrite', action='store_true', help='replace earlier files')
 
 

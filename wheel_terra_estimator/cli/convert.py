@@ -23,7 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--columns', type=Path, metavar='MAP.yaml', help='which column is what (see --example)'
     )
     parser.add_argument(
-        '-o', dest='output', action=Output, type=Path, metavar='DIR', help='rosbag2 folder (MCAP)'
+        '-o', dest='output', action=Output, metavar='DIR', help='rosbag2 folder (MCAP)'
     )
     parser.add_argument('--example', action='store_true', help='print a map of columns and stop')
     parser.add_argument('--overwrite', action='store_true', help='replace an earlier output')

@@ -75,7 +75,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '-o',
         dest='output',
         action=Output,
-        type=Path,
         default=Path('demo_output'),
         metavar='DIR',
         help='folder for estimates, reports and pictures (default demo_output)',

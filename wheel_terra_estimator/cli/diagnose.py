@@ -44,7 +44,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '-o',
         '--output',
         action=Output,
-        type=Path,
         required=True,
         metavar='DIR',
         help='folder to be written',

@@ -31,7 +31,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '-o',
         dest='output',
         action=Output,
-        type=Path,
         metavar='F',
         required=True,
         help='rover file to be written; views for PlotJuggler and Foxglove are written beside it',

@@ -22,6 +22,9 @@ from wheel_terra_estimator.output_folder import refuse_inputs
 class Output(argparse.Action):
     """An option that names a file or folder to be written."""
 
+    def __init__(self, *names: Any, **settings: Any) -> None:
+        super().__init__(*names, **{'type': Path, **settings})
+
     def __call__(
         self,
         parser: argparse.ArgumentParser,

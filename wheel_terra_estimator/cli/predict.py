@@ -116,7 +116,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '-o',
         dest='output',
         action=Output,
-        type=Path,
         metavar='FILE',
         help='write a picture (.png, .svg, .pdf) or a table (.csv) instead',
     )

@@ -45,7 +45,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '-o',
         dest='output',
         action=Output,
-        type=Path,
         metavar='DIR',
         help='rosbag2 folder (MCAP) for the estimates, under the names that the node has; with '
         'several recordings a folder of such folders, with summary.csv and summary.html',
@@ -53,7 +52,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--table',
         action=Output,
-        type=Path,
         metavar='F.csv|F.parquet',
         help='table of the estimates, one row per set and wheel, units in the header; with several '
         'recordings a name, for one in the folder of each',
@@ -61,7 +59,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--track',
         action=Output,
-        type=Path,
         metavar='F.csv|F.geojson',
         help='map of the drive: position, slip, class, sinkage, pull margin and learned soil along '
         'the way, units in the header; with several recordings a name, for one in the folder of '
@@ -83,7 +80,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--save-soil',
         action=Output,
-        type=Path,
         metavar='F.yaml',
         help='parameter file with the soil and the sensor biases that were learned, a further '
         '--config for the next drive of this rover; of one recording',
@@ -91,7 +87,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--slip-on-slope',
         action=Output,
-        type=Path,
         metavar='F.csv',
         help='slip expected on slopes of -20 to 30 degrees on this soil with this rover, with its '
         'deviation and the probability of entrapment, as learned by the end; of one recording',
@@ -112,7 +107,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--report',
         action=Output,
-        type=Path,
         metavar='F.html',
         help='report with pictures; with several recordings a name, for one in the folder of each',
     )

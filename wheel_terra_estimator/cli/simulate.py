@@ -45,7 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--duration', type=float, metavar='S', help="length of the drive in place of the scenario's"
     )
     parser.add_argument(
-        '-o', dest='output', action=Output, type=Path, metavar='DIR', help='rosbag2 folder (MCAP)'
+        '-o', dest='output', action=Output, metavar='DIR', help='rosbag2 folder (MCAP)'
     )
     configuration_reader.add_arguments(parser)
     parser.add_argument(

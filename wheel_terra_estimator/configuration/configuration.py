@@ -218,14 +218,8 @@ class Configuration:
     def write(self, path: str | Path, keys: Iterable[str] | None = None, comment: str = '') -> None:
         """Write a parameter file that the commands and the node accept.
 
-        Parameters
-        ----------
-        path : str or pathlib.Path
-            File to be written.
-        keys : iterable of str, optional
-            Canonical keys to be written, in this order; default: all that were stated.
-        comment : str
-            Lines at the top of the file.
+        ``keys`` are canonical, written in this order; default: all that were stated. ``comment``
+        goes to the top.
         """
         chosen = [key for key in self._values if key in self.stated] if keys is None else keys
         ros_yaml.write(Path(path), {key: self._values[key] for key in chosen}, comment)

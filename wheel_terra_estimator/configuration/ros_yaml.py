@@ -80,11 +80,6 @@ _RosLoader.add_constructor('tag:yaml.org,2002:map', _construct_mapping)
 def plain_scalar(text: str) -> Scalar | _Null:
     """Return the value that ROS gives to an unquoted scalar.
 
-    Parameters
-    ----------
-    text : str
-        The scalar as it stands in the file.
-
     Returns
     -------
     bool, int, float or str
@@ -127,15 +122,7 @@ def _in_range(read: Callable[[str], float], text: str) -> float | str:
 
 
 def parse_value(text: str, source: str) -> Value:
-    """Return the value of ``text`` as it would be read behind a key.
-
-    Parameters
-    ----------
-    text : str
-        Right-hand side of ``NAME:=VALUE``.
-    source : str
-        What the error message names.
-    """
+    """Return the value of ``text`` as it would be read behind a key; errors name ``source``."""
     try:
         value = bounded_yaml.load(text, _RosLoader)
     except yaml.YAMLError as error:
@@ -204,17 +191,7 @@ def flatten(parameters: Mapping[str, Any], source: str, prefix: str = '') -> dic
 
 
 def write(path: Path, values: Mapping[str, Value], comment: str = '') -> None:
-    """Write a parameter file for any node name, with a comment on top.
-
-    Parameters
-    ----------
-    path : pathlib.Path
-        The file to be written.
-    values : mapping
-        Dotted key -> scalar or flat list of one type.
-    comment : str
-        Text of the comment, any number of lines.
-    """
+    """Write a parameter file for any node name, with a comment on top."""
     lines = [f'# {line}'.rstrip() for line in comment.splitlines()]
     lines += ['/**:', '  ros__parameters:']
     lines += [f'    {key}: {format_value(value)}' for key, value in values.items()]

@@ -267,13 +267,7 @@ def _behind_string(data: bytes, at: int) -> int:
 
 
 class JointStatePacker:
-    """Packs the JointStates of one frame: what does not change from one to the next only once.
-
-    Parameters
-    ----------
-    frame : str
-        Frame of the headers.
-    """
+    """Packs the JointStates of one frame: what does not change from one to the next only once."""
 
     def __init__(self, frame: str) -> None:
         self._frame = _string(frame)

@@ -111,25 +111,7 @@ def summarise(
     border: Border | None = None,
     taught: Sequence[Taught] = (),
 ) -> DriveSummary:
-    """Sum a drive up.
-
-    Parameters
-    ----------
-    title : str
-        Name of the recording.
-    history : EstimateHistory
-        The estimates.
-    topics, counts : mapping
-        Input topic of the estimator -> topic in the bag, number of messages heard.
-    rejected : mapping
-        (input topic, reason) -> number of rejections.
-    notes : sequence of str
-        What else the reader should know.
-    border : Border, optional
-        Beyond which standard deviations slip and sinkage are not known.
-    taught : sequence of Taught, optional
-        What the drive has taught of soil and sensors.
-    """
+    """Sum a drive up; ``topics`` and ``counts`` go by input topic, ``rejected`` by reason, too."""
     border = border or Border()
     figures = history.figures()
     begin = int(history.stamp[0]) if history.stamp.size else 0

@@ -113,17 +113,7 @@ def _figures(row: DriveRow) -> list[Any]:
 
 
 def write_summary_page(rows: Sequence[DriveRow], path: Path, report: str = '') -> None:
-    """Write the page over all drives.
-
-    Parameters
-    ----------
-    rows : sequence of DriveRow
-        One per recording.
-    path : Path
-        HTML file in the folder that holds the folders of the drives.
-    report : str, optional
-        Name of the report in the folder of each drive, to be linked.
-    """
+    """Write the page over all drives; ``report``: name of the report in the folder of each."""
     drives = [row for row in rows if not row.error]
     warned = sum(bool(row.stuck_warnings) for row in drives)
     page = render(

@@ -45,26 +45,8 @@ def write_replay_report(
 ) -> None:
     """Write the report of a drive.
 
-    Parameters
-    ----------
-    path : Path
-        HTML file to be written.
-    summary, history : DriveSummary, EstimateHistory
-        What happened.
-    truth : Truth or None
-        Drawn beside the estimates where it is known.
-    configuration : Configuration
-        Listed at the end, with the sources of the effects in it.
-    overwrite : bool
-        Whether an earlier report is replaced.
-    findings : sequence, optional
-        What a check of the recording found (``words``, ``wheel``, ``cure``), shown at the top.
-    errors : TruthErrors, optional
-        How far the estimates are from a truth that may judge them.
-    filtered, filter_errors : EstimateHistory, TruthErrors, optional
-        What the filter said, where the estimates are those of the smoother: both are shown.
-    track : Track, optional
-        Where the rover was.
+    ``errors`` are those against a truth that may judge the estimates; ``filtered`` and
+    ``filter_errors`` are of the filter, where the estimates are those of the smoother.
     """
     from wheel_terra_estimator.terramechanics.effects import catalogue
 

@@ -27,19 +27,7 @@ class Table:
 def write_tables(
     path: Path, title: str, verdict: str, tone: str, tables: Sequence[Table], overwrite: bool
 ) -> None:
-    """Write the page; ``tone`` is ``good``, ``warn`` or ``bad``; tables without a row are left out.
-
-    Parameters
-    ----------
-    path : Path
-        HTML file.
-    title, verdict, tone : str
-        Heading, and the sentence below it with its colour.
-    tables : sequence of Table
-        What follows.
-    overwrite : bool
-        Whether an earlier page is replaced.
-    """
+    """Write the page; ``tone``: ``good``, ``warn`` or ``bad``; tables without rows are left out."""
     shown = [table for table in tables if table.rows]
     page = render('tables.html', title=title, verdict=verdict, tone=tone, tables=shown)
     with new_file(path, overwrite) as fresh:

@@ -18,12 +18,7 @@ _TAKEN = (errno.EWOULDBLOCK, errno.EACCES, errno.EAGAIN)  # by another process
 class FileClaim:
     """The right of one node to write to a file: it holds the lock beside it (``.NAME.lock``).
 
-    Parameters
-    ----------
-    path : Path
-        The file.
-    parameter : str
-        That names it.
+    ``parameter`` is the one that names the file.
     """
 
     def __init__(self, path: Path, parameter: str) -> None:

@@ -65,15 +65,7 @@ def topic_names(names: Sequence[str]) -> list[str]:
 
 
 class LiveViews:
-    """Publishes ``~/wrench/<wheel>`` and ``~/markers``, as far as they are asked for.
-
-    Parameters
-    ----------
-    node : Node
-        Owner of the publishers.
-    configuration : Configuration
-        ``wheels.wrench_frame``, ``publish_markers``, and where the wheels are.
-    """
+    """Publishes ``~/wrench/<wheel>`` and ``~/markers``, as far as they are asked for."""
 
     def __init__(self, node: Node, configuration: Configuration) -> None:
         self._node = node

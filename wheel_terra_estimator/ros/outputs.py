@@ -33,15 +33,7 @@ NO_EVENTS = PublisherEventCallbacks(use_default_callbacks=False)
 
 
 class EstimatePublisher:
-    """Publishes estimate sets on the private topics of a node, and its diagnostics.
-
-    Parameters
-    ----------
-    node : Node
-        Owner of the publishers.
-    names : tuple of str
-        Wheel names.
-    """
+    """Publishes estimate sets on the private topics of a node, and its diagnostics."""
 
     def __init__(self, node: Node, names: tuple[str, ...]) -> None:
         self._node = node

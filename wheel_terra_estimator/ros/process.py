@@ -45,12 +45,7 @@ class _Signals:
 def run_node(make: Callable[[], Callable[[], Node]], args: list[str] | None = None) -> int:
     """Make a node and serve it until it is told to stop; return the exit status.
 
-    Parameters
-    ----------
-    make : callable
-        Imports what is needed and returns what makes the node.
-    args : list of str, optional
-        Arguments of ROS; default: those of the process.
+    ``make`` imports what is needed and returns what makes the node.
     """
     gc.disable()  # until the node stands: what is made so far lives as long as it does
     signals = _Signals() if threading.current_thread() is threading.main_thread() else None

@@ -224,17 +224,7 @@ class Drive:
 
 
 def simulate(scenario: Scenario, seed: int = 0, duration: float | None = None) -> SimulatedDrive:
-    """Run a scenario.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        See ``scenario.load``.
-    seed : int
-        Decides all random quantities.
-    duration : float, optional
-        In place of the scenario's [s].
-    """
+    """Run a scenario; the seed decides all random quantities, ``duration`` [s] replaces its own."""
     return Drive(scenario, seed).run(duration)
 
 

@@ -46,16 +46,7 @@ class Arrival(NamedTuple):
 
 
 class SensorSuite:
-    """All sensors of a rover.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        Which sensors there are and how they fail.
-    random : numpy.random.Generator
-        Source of all errors.
-    faults : sequence of Fault
-        Planned and drawn faults.
+    """All sensors of a rover, and how they fail; ``random`` is the source of all errors.
 
     Attributes
     ----------

@@ -29,9 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='F.json',
         help='output of an earlier --json on this machine, compared by the ratios',
     )
-    parser.add_argument(
-        '--report', action=Output, type=Path, metavar='F.html', help='page with the figures'
-    )
+    parser.add_argument('--report', action=Output, metavar='F.html', help='page with the figures')
     parser.add_argument('--overwrite', action='store_true', help='replace an earlier report')
 
 

@@ -93,7 +93,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '-o',
         dest='output',
         action=Output,
-        type=Path,
         metavar='F.md|F.html|DIR',
         help='write the tables, as a page where the name ends in .html; with --hours a folder',
     )

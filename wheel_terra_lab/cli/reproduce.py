@@ -45,7 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='N',
         help='drawn contacts on which quadrature and closed form are judged (default 20000)',
     )
-    parser.add_argument('-o', dest='output', action=Output, type=Path, required=True, metavar='DIR')
+    parser.add_argument('-o', dest='output', action=Output, required=True, metavar='DIR')
     parser.add_argument('--overwrite', action='store_true', help='replace an output folder')
     parser.add_argument(
         '--part',

@@ -36,7 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='FILE',
         help='case, wheel or grain files (path or shipped name)',
     )
-    one.add_argument('-o', '--output', action=Output, type=Path, required=True, metavar='DIR')
+    one.add_argument('-o', '--output', action=Output, required=True, metavar='DIR')
     one.add_argument('--overwrite', action='store_true', help='replace an output folder')
     one.add_argument('--resume', action='store_true', help='go on with an interrupted run')
     one.add_argument(
@@ -58,16 +58,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
     text = 'virtual measurements for diagnose: pull sweep or slip sweep'
     study = actions.add_parser('rows', help=text, description=text)
-    study.add_argument('-o', '--output', action=Output, type=Path, required=True, metavar='DIR')
+    study.add_argument('-o', '--output', action=Output, required=True, metavar='DIR')
     study.add_argument('--overwrite', action='store_true', help='start the study in DIR anew')
     study.add_argument('--sweep', choices=('pull', 'slip'), required=True)
     add_study_arguments(study)
 
 
 def _cache(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        '--cache', action=Output, type=Path, metavar='DIR', help='where settled beds are kept'
-    )
+    parser.add_argument('--cache', action=Output, metavar='DIR', help='where settled beds are kept')
     parser.add_argument('--no-cache', action='store_true', help='settle every bed anew')
 
 
