@@ -194,3 +194,24 @@ def test_a_rover_climbs_on_all_its_wheels(
     assert (tmp_path / 'climb.png').stat().st_size > 5000
     assert main([*rover, '--load', '80']) == 2
     assert main([*rover, '--slip', '0.2']) == 2
+
+
+def test_laws(capsys: pytest.CaptureFixture[str]) -> None:
+    smooth = ('predict', '--config', 'hit_wh3', '--config', 'hit_fit', '--slip', '-0.4:0.9:5')
+    assert main([*smooth, '--law', 'bekker_wong_janosi']) == 0
+    closed = capsys.readouterr().out
+    assert main([*smooth, '--method', 'closed_form']) == 0
+    assert capsys.readouterr().out == closed  # the same law under its other name
+    assert main([*smooth, '--law', 'resistive_force', '--angles']) == 0
+    printed = capsys.readouterr()
+    assert 'slip_sinkage_exponent' in printed.err and 'left out' in printed.err
+    rows = table(printed.out)
+    assert rows['sinkage'] == pytest.approx(0.1574 * (1.0 - np.cos(rows['entrance_angle'])))
+    for more, word in (
+        (['--method', 'closed_form'], 'leave --method'),
+        (['--slip-angle', '0.2'], 'plane of the wheel'),
+    ):
+        assert main([*smooth, '--law', 'resistive_force', *more]) == 2
+        assert word in capsys.readouterr().err
+    assert main([*smooth[:-2], '--law', 'wong_reece', '--climb', 'wheel']) == 2
+    assert '--law' in capsys.readouterr().err

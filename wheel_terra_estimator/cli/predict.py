@@ -25,6 +25,12 @@ from wheel_terra_estimator.discrepancy.tables.steady_table import INPUT_UNITS
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.frames import unit_of
 from wheel_terra_estimator.output_folder import check_file, new_file
+from wheel_terra_estimator.terramechanics.contact_law import (
+    LAWS,
+    RESISTIVE_FORCE,
+    ContactLaw,
+    contact_law,
+)
 from wheel_terra_estimator.terramechanics.model import METHODS, OVERLOADED, WheelSoilModel
 from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
 from wheel_terra_estimator.terramechanics.wheel import Wheel
@@ -37,6 +43,7 @@ FloatArray = NDArray[np.float64]
 EXAMPLES = (
     'wheel-terra predict --config hit_wh3 --config hit_fit --slip 0:0.6:13 --load 80',
     'wheel-terra predict --config hit_wh3 --config dlr_mss -o curves.png',
+    'wheel-terra predict --config hit_wh3 --config hit_fit --law wong_reece',
     'wheel-terra predict --config generic_six_wheel --config test_sand --climb rover',
 )
 DEFAULT_SLIP = '0:0.9:19'
@@ -96,6 +103,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--method', choices=METHODS, default='quadrature', help='how the contact is integrated'
     )
     parser.add_argument(
+        '--law',
+        choices=LAWS,
+        help='another law of the contact (see models/laws); pressures are the same at the width of '
+        'the wheel',
+    )
+    parser.add_argument(
         '--table',
         choices=('csv', 'text'),
         default='csv',
@@ -136,9 +149,7 @@ def run(arguments: argparse.Namespace) -> int:
         return 0
     columns = _points(arguments, configuration)
     try:
-        model = WheelSoilModel(
-            configuration.soil, configuration.effects, arguments.method, strict=False
-        )
+        model = _model(arguments, configuration)
         points = OperatingPoints(
             slip=columns['slip'],
             normal_load=columns['normal_load'],
@@ -196,13 +207,29 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
+def _model(arguments: argparse.Namespace, configuration: Configuration) -> ContactLaw:
+    soil, effects = configuration.soil, configuration.effects
+    if arguments.law is None:
+        return WheelSoilModel(soil, effects, arguments.method, strict=False)
+    if arguments.method != METHODS[0]:
+        raise UserError(f'--law {arguments.law} says how the contact is integrated; leave --method')
+    if arguments.law == RESISTIVE_FORCE and effects:
+        print(
+            f'wheel-terra predict: the law {RESISTIVE_FORCE} has no effects; left out: '
+            f'{", ".join(effects)}',
+            file=sys.stderr,
+        )
+    width = float(configuration.wheels.width[_wheel_index(arguments, configuration)])
+    return contact_law(arguments.law, soil, effects, width, strict=False)
+
+
 def _climb(arguments: argparse.Namespace, configuration: Configuration) -> dict[str, FloatArray]:
     """Return the rows of free travel; say which slopes are too steep."""
     aside = arguments.slip_angle or arguments.angles or arguments.noise is not None
-    if arguments.slip or arguments.points or aside:
+    if arguments.slip or arguments.points or arguments.law or aside:
         raise UserError(
-            '--climb finds the slip of each slope; leave --slip, --slip-angle, --points, --angles, '
-            '--noise'
+            '--climb finds the slip of each slope; leave --slip, --slip-angle, --points, --law, '
+            '--angles, --noise'
         )
     if arguments.load and arguments.climb == 'rover':
         raise UserError('--climb rover takes the loads from rover.mass; leave --load')
@@ -401,7 +428,7 @@ def _write_text(columns: Mapping[str, FloatArray], stream: Any) -> None:
 def _title(arguments: argparse.Namespace, configuration: Configuration) -> str:
     name = str(configuration.flat().get('soil.name') or 'soil as configured')
     effects = ', '.join(configuration.effects) or 'none'
-    return f'{name}; effects: {effects}; {arguments.method}'
+    return f'{name}; effects: {effects}; {arguments.law or arguments.method}'
 
 
 def _draw(columns: Mapping[str, FloatArray], path: Path, title: str) -> None:

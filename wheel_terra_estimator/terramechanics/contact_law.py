@@ -1,0 +1,92 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Rival laws of the wheel-soil contact: operating points in, sinkage and forces out."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Protocol
+
+import numpy as np
+
+from wheel_terra_estimator.terramechanics.effects import EffectSettings
+from wheel_terra_estimator.terramechanics.model import SteadyState, WheelSoilModel
+from wheel_terra_estimator.terramechanics.operating_points import STANDARD_GRAVITY, OperatingPoints
+from wheel_terra_estimator.terramechanics.resistive_force import ResistiveForce, stress_maps
+from wheel_terra_estimator.terramechanics.soil import Soil
+from wheel_terra_estimator.terramechanics.stresses import bearing_law
+
+BEKKER_WONG_JANOSI, WONG_REECE, RESISTIVE_FORCE = (
+    'bekker_wong_janosi',
+    'wong_reece',
+    'resistive_force',
+)
+LAWS = (BEKKER_WONG_JANOSI, WONG_REECE, RESISTIVE_FORCE)
+# Shift of the peak stress with slip where none is configured; loose sand (Wong and Reece 1967).
+PEAK_SHIFT = 0.32
+PLATE_DEPTH = 0.02  # at which the resistive stress is that of the soil's plate test [m]
+
+
+class ContactLaw(Protocol):
+    """A law of the contact; ``WheelSoilModel`` and ``ResistiveForce`` are two."""
+
+    def steady_state(self, points: OperatingPoints) -> SteadyState:
+        """Solve the load balance and return sinkage, drawbar pull, lateral force and torque."""
+
+
+def contact_law(
+    name: str, soil: Soil, effects: EffectSettings, width: float, *, strict: bool = True
+) -> ContactLaw:
+    """Return a law for the soil as configured.
+
+    Parameters
+    ----------
+    name : str
+        One of ``LAWS``.
+    soil : Soil
+        Floats.
+    effects : mapping
+        Switched-on effects, a ``learned_closure`` among them; ``resistive_force`` has none.
+    width : float
+        Width at which the laws have the same pressure [m]: where ``wong_reece`` takes over Bekker's
+        moduli, and of the plate that ``resistive_force`` takes its scale from.
+
+    Raises
+    ------
+    ValueError
+        For an unknown name.
+    """
+    if name == BEKKER_WONG_JANOSI:
+        return WheelSoilModel(soil, effects, 'closed_form', strict=strict)
+    if name == WONG_REECE:
+        shifted = effects
+        if 'stress_peak_shift' not in {key.partition(':')[0] for key in effects}:
+            shifted = {**effects, 'stress_peak_shift': {'c2': PEAK_SHIFT}}
+        return WheelSoilModel(reece_soil(soil, width), shifted, 'quadrature', strict=strict)
+    if name == RESISTIVE_FORCE:
+        return ResistiveForce(plate_scale(soil, width), strict=strict)
+    raise ValueError(f'contact law is {name!r}; allowed is one of {LAWS}')
+
+
+def reece_soil(soil: Soil, width: float) -> Soil:
+    """Return the soil with Reece's pressure c kc' + rho g b kphi', the same at this width [m]."""
+    if soil.pressure_law == 'reece':
+        return soil
+    pressure = bearing_law('bekker', soil.cohesive_modulus, soil.frictional_modulus, width, 0, 0)[0]
+    modulus = pressure * width**soil.sinkage_exponent / (soil.density * STANDARD_GRAVITY * width)
+    return replace(soil, cohesive_modulus=0.0, frictional_modulus=modulus, pressure_law='reece')
+
+
+def plate_scale(soil: Soil, width: float) -> float:
+    """Scale of the resistive stress with which a flat plate meets the soil's pressure [-]."""
+    modulus, depth = bearing_law(
+        soil.pressure_law,
+        soil.cohesive_modulus,
+        soil.frictional_modulus,
+        width,
+        soil.cohesion,
+        soil.density * STANDARD_GRAVITY,
+    )
+    pressure = modulus * (PLATE_DEPTH / depth) ** soil.sinkage_exponent
+    generic = 1e6 * float(stress_maps(0.0, 0.5 * np.pi)[0]) * PLATE_DEPTH
+    return float(pressure) / generic

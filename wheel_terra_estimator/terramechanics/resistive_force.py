@@ -1,0 +1,135 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Resistive force theory of a wheel in the plane: one scale is all it knows of a soil.
+
+Each small plate of the wheel meets a stress that grows with its depth and depends on its tilt and
+on the direction in which it moves, as if the others were not there (Li, Zhang and Goldman 2013,
+Science 339:1408, doi 10.1126/science.1229163). Dry grains without cohesion, slow motion.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wheel_terra_estimator.terramechanics.checks import check_range
+from wheel_terra_estimator.terramechanics.kinematics import speed_ratio
+from wheel_terra_estimator.terramechanics.load_balance import solve_entrance_angle
+from wheel_terra_estimator.terramechanics.model import OUTSIDE_VALIDITY, OVERLOADED, SteadyState
+from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
+
+FloatArray = NDArray[np.float64]
+
+# Generic Fourier coefficients of the stress per depth [N/cm^3] (the paper's supplement, table S3).
+_A00, _A10, _B11, _B01, _B_11 = 0.206, 0.169, 0.212, 0.358, 0.055
+_C11, _C01, _C_11, _D10 = -0.124, 0.253, 0.007, 0.088
+_PER_CUBIC_METRE = 1e6  # [N/m^3] per [N/cm^3]
+_NODES = 24  # on the rim
+_START = 0.3  # first guess of the entrance angle [rad]
+
+
+def stress_maps(tilt: Any, direction: Any) -> tuple[Any, Any]:
+    """Vertical and horizontal stress per depth on a plate of the generic medium [N/cm^3].
+
+    Parameters
+    ----------
+    tilt : array_like
+        Of the plate from the horizontal, positive where it rises towards +x [rad].
+    direction : array_like
+        Of its motion, from +x, positive downwards, in [-pi, pi] [rad].
+
+    Returns
+    -------
+    tuple of numpy.ndarray
+        The upward stress, and the one towards -x (against a motion towards +x).
+    """
+    # The maps are measured for motion towards +x; the other half is its mirror image.
+    back = np.cos(direction) < 0.0
+    sign = np.where(back, -1.0, 1.0)
+    tilt, direction = sign * tilt, np.where(back, np.pi - np.asarray(direction), direction)
+    ahead, behind = 2.0 * tilt + direction, direction - 2.0 * tilt
+    up = _A00 + _A10 * np.cos(2.0 * tilt) + _B11 * np.sin(ahead) + _B01 * np.sin(direction)
+    along = _C11 * np.cos(ahead) + _C01 * np.cos(direction) + _C_11 * np.cos(behind)
+    return up + _B_11 * np.sin(behind), sign * (along + _D10 * np.sin(2.0 * tilt))
+
+
+class ResistiveForce:
+    """Steady wheel-soil contact by resistive force theory.
+
+    The leading side of the rim carries. Lugs are left out, and a wheel that has some is outside the
+    validity: thirty plates summed as the theory has it, each in the wake of the last, pull more
+    than the load (HIT wheel, lugs of 10 mm).
+
+    Parameters
+    ----------
+    scale : float
+        Stress over that of the generic medium [-].
+    strict : bool
+        True: a soil that cannot carry the load raises ``ValueError``; False: the point is clamped
+        at a sinkage of one radius and flagged.
+    """
+
+    def __init__(self, scale: float, *, strict: bool = True) -> None:
+        check_range('scale of the resistive stress', scale, 0.0, open_lower=True)
+        self.scale, self.strict = scale, strict
+
+    def steady_state(self, points: OperatingPoints) -> SteadyState:
+        """Solve the load balance and return sinkage, drawbar pull and torque.
+
+        Raises
+        ------
+        ValueError
+            Where a wheel slides sideways, the slip refers to a shear radius (this law has none), or
+            `strict` and the soil cannot carry a load.
+        """
+        if points.slip_angle.any() or np.nan_to_num(points.lateral_speed_ratio).any():
+            raise ValueError(
+                'the law resistive_force holds in the plane of the wheel; leave the slip angle at 0'
+            )
+        if points.slip_radius == 'shear':
+            raise ValueError("the law resistive_force has no shear radius; slip_radius 'rim'")
+        load = points.normal_load
+        angle, carries = solve_entrance_angle(
+            lambda angles: self.forces(points, angles)[0], load, np.full(len(points), _START)
+        )
+        if self.strict and not carries.all():
+            worst = int(np.flatnonzero(~carries)[0])
+            raise ValueError(f'normal load is {load[worst]:g} N (entry {worst}): too much to carry')
+        _, pull, torque = self.forces(points, angle)
+        direction = np.where(points.angular_velocity < 0.0, -1.0, 1.0)
+        none = np.zeros(len(points))
+        flags = np.where(carries, 0, OVERLOADED)
+        outside = (np.abs(points.slip) > 0.95) | (np.asarray(points.wheel.lug_height) > 0.0)
+        flags = flags + np.where(outside, OUTSIDE_VALIDITY, 0)
+        return SteadyState(
+            np.asarray(points.wheel.radius) * (1.0 - np.cos(angle)),
+            direction * pull,
+            direction * torque,
+            angle,
+            none,
+            none,
+            none,
+            flags,
+        )
+
+    def forces(
+        self, points: OperatingPoints, entrance_angle: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Load [N], pull [N] and torque [N m] at given entrance angles (..., N) [rad]."""
+        wheel = points.wheel
+        radius, height = np.asarray(wheel.radius, float), np.asarray(wheel.lug_height, float)
+        slip_radius = radius + (height if points.slip_radius == 'lug_tip' else 0.0)
+        hub = speed_ratio(points.slip) * slip_radius  # v/w [m]
+        x, w = np.polynomial.legendre.leggauss(_NODES)
+        x, w = (v.reshape(-1, *(1,) * entrance_angle.ndim) for v in (0.5 * (x + 1.0), 0.5 * w))
+        angle = entrance_angle * x
+        cosine, sine = np.cos(angle), np.sin(angle)
+        up, against = stress_maps(angle, np.arctan2(radius * sine, hub - radius * cosine))
+        amount = radius * (cosine - np.cos(entrance_angle)) * (entrance_angle * w * radius)
+        factor = self.scale * _PER_CUBIC_METRE * np.asarray(wheel.width, float)
+        load = np.add.reduce(up * amount)
+        pull = -np.add.reduce(against * amount)
+        torque = radius * np.add.reduce((up * sine - against * cosine) * amount)
+        return factor * load, factor * pull, factor * torque
