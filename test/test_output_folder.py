@@ -64,6 +64,17 @@ def test_overwrite_replaces_what_was_listed_and_nothing_else(tmp_path: Path) -> 
     assert [p.name for p in tmp_path.iterdir()] == ['out']
 
 
+def test_a_file_of_others_in_an_output_within_an_output_is_left_alone(
+    tmp_path: Path,
+) -> None:
+    out = tmp_path / 'out'
+    with working_folder(out, False, False, ['inner/']):
+        write(out / 'inner')
+    (out / 'inner' / 'thesis.md').write_text('years of work')
+    with pytest.raises(UserError, match=r'thesis\.md, which this program did not write'):
+        write(out, overwrite=True)
+
+
 @pytest.mark.parametrize('foreign', ['summary.json', 'report.json', 'x.mcap', 'notes.md', 'deep/'])
 def test_a_folder_without_our_list_is_never_overwritten(tmp_path: Path, foreign: str) -> None:
     out = tmp_path / 'out'

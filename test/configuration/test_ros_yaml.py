@@ -133,7 +133,7 @@ wheel_terra_estimator:
     [
         ('', 'no parameters'),
         ('- 1', 'no parameters'),
-        ('a: [1, 2', 'not valid YAML: line'),
+        ('a: 1\nb: ]', 'not valid YAML: line 2: '),
         ('/**: {wheels: {radius: 1}}', "no 'ros__parameters:'"),
         ('wheel_terra_estimator: {rover.mass: 1}', "no 'ros__parameters:'"),
         ('[1, 2]', 'no parameters'),

@@ -286,6 +286,7 @@ def test_torn_sheet_is_unexplained():
     diagnosis = run(table, values)
     assert diagnosis.verdict == 'unexplained' or all(e.remainder for e in diagnosis.effects)
     assert diagnosis.where.quantity == 'torque'
+    assert diagnosis.to_dict()['where']['unit'] == 'N m'
     # The structural error that is left is the noise-free misfit, within its band.
     left, torque = diagnosis.structural_error, QUANTITIES.index('torque')
     model = table['torque'] - left.residual[:, torque]

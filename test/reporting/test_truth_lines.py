@@ -4,7 +4,12 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
+import pytest
+
 from wheel_terra_estimator.estimation.judgement.entrapment import Outcome, Verdict
+from wheel_terra_estimator.reporting.replay_report import _tone
 from wheel_terra_estimator.reporting.truth_scores import TruthErrors, as_lines
 
 
@@ -20,3 +25,13 @@ def test_a_warning_without_its_slip_is_said() -> None:
     assert 'at 16.0 s: late, 0.5 s after the rover was entrapped' in lines[-3]
     assert 'at 40.0 s: a near miss, the median slip passed 0.75, no entrapment' in lines[-2]
     assert 'at 80.0 s: false, the median slip did not pass 0.75 within 20 s' in lines[-1]
+
+
+@pytest.mark.parametrize(
+    ('high', 'stuck', 'tone'), [(0.0, 0.0, 'good'), (2.0, 0.0, 'warn'), (0.0, 5.0, 'warn')]
+)
+def test_a_drive_with_high_slip_or_stuck_wheels_is_shown_as_a_warning(
+    high: float, stuck: float, tone: str
+) -> None:
+    wheels = [SimpleNamespace(seconds={'high': high, 'stuck': stuck})]
+    assert _tone(SimpleNamespace(wheels=wheels)) == tone

@@ -90,6 +90,16 @@ def test_a_parked_rover_stays_where_it_is(plant: MakePlant) -> None:
     assert truth.drawbar_pull.sum() == pytest.approx(expected, rel=2e-3)
 
 
+def test_a_rover_parked_on_a_kink_is_held_against_the_slope_under_each_wheel(
+    plant: MakePlant,
+) -> None:
+    kink = {'slope_position': np.array([0.1, 0.3]), 'slope_angle': np.radians([0.0, 12.0])}
+    truth = drive(plant(**kink), 8.0, forward=0.0)
+    under_front = truth.normal_load[:2].sum()  # hubs at 0.61, 0 and -0.61 m
+    expected = under_front * np.sin(np.radians(12.0))
+    assert truth.drawbar_pull.sum() == pytest.approx(expected, rel=0.03)
+
+
 def test_accelerometer_at_rest_shows_the_attitude_of_the_chassis(plant: MakePlant) -> None:
     truth = drive(plant(slope_deg=10.0, side_deg=6.0), 5.0, forward=0.0)
     assert np.linalg.norm(truth.specific_force) == pytest.approx(G, rel=1e-3)
