@@ -23,7 +23,7 @@ from wheel_terra_estimator.bags.writer import DIAGNOSTICS
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.estimation.estimates import EstimateSet, SlipClass, SlipOnSlope
 from wheel_terra_estimator.messages.cdr import DamagedMessageError
-from wheel_terra_estimator.messages.convert import JOINT_STATE, OUTPUT_TYPES, stamp_of
+from wheel_terra_estimator.messages.convert import JOINT_OUTPUTS, OUTPUT_TYPES, stamp_of
 from wheel_terra_estimator.messages.diagnostics import NODE
 
 FloatArray = NDArray[np.float64]
@@ -47,17 +47,15 @@ WHEEL_FIELDS = (
 LONGEST_STEP = 1.0
 """A longer pause between sets, or a step back of the clock, is no time in any class [s]."""
 
-_TOPIC_FIELDS = {
-    'slip': ('slip', 'slip_velocity', 'drawbar_pull'),
-    'slip_stddev': ('slip_std', None, 'drawbar_pull_std'),
-    'sinkage': ('sinkage', None, 'normal_load'),
-    'sinkage_stddev': ('sinkage_std', None, None),
-    'mobility': ('rim_travel_left', None, 'pull_margin'),
-    'slip_angle': ('slip_angle', None, 'lateral_force'),
-    'slip_angle_stddev': ('slip_angle_std', None, None),
-}
 _SIDEWAYS = {'slip_angle': 'angle', 'slip_angle_std': 'angle_std', 'lateral_force': 'force'}
 """Quantities of `WHEEL_FIELDS` -> fields of `Sideways`; recordings of old have none of them."""
+_OWN_NAMES = {f'sideways_known.{field}': name for name, field in _SIDEWAYS.items()}
+_TOPIC_FIELDS = {
+    topic: names
+    for topic, fields in JOINT_OUTPUTS.items()
+    if not set(WHEEL_FIELDS).isdisjoint(names := [_OWN_NAMES.get(f, f) for f in fields])
+}
+"""Topic -> quantities that are its position, velocity and effort."""
 
 
 _ROW = np.full(256, list(SlipClass).index(SlipClass.UNKNOWN), dtype=np.intp)
@@ -281,7 +279,7 @@ class _EstimateMessages:
 
     def add(self, topic: str, message: Any, log_time: int) -> None:
         """Take in a message; of private topics the last part of the name."""
-        if topic in _TOPIC_FIELDS and OUTPUT_TYPES[topic] == JOINT_STATE:
+        if topic in _TOPIC_FIELDS:
             self._add_joints(topic, message, log_time)
         elif topic == 'slip_class' and self._latest:
             self._latest['slip_class'] = message.data
@@ -297,8 +295,7 @@ class _EstimateMessages:
     def _add_joints(self, topic: str, message: Any, log_time: int) -> None:
         row = self._sets.setdefault(stamp_of(message), {})
         columns = (message.position, message.velocity, message.effort)
-        fields = zip(_TOPIC_FIELDS[topic], columns, strict=True)
-        row.update((name, values) for name, values in fields if name)
+        row.update(zip(_TOPIC_FIELDS[topic], columns, strict=True))
         if topic == 'slip':
             self._names, self._latest = tuple(message.name), row
             row['log_time'] = log_time
