@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
 from wheel_terra_estimator.estimation.core import EstimatorCore
@@ -52,14 +51,14 @@ def test_the_promise_is_what_a_filter_that_drives_it_ends_with(driven):
     # Another seed is another noise: deviations hardly hang on it.
     row = max(chosen, key=lambda row: row.std / row.promised_std)
     driven_one = LEVEL if row.manoeuvre.endswith('level') else STOPS
-    loaded = scenario.load(driven_one.keys(configuration, 0.05))
+    loaded = scenario.load(driven_one.keys(0.05))
     drive = simulate(replace(loaded, configuration=configuration, truth=configuration), seed=5)
     assert after(drive, core.posterior())[row.name].std == pytest.approx(row.promised_std, rel=0.2)
 
 
 def test_a_filter_that_starts_from_a_posterior_knows_what_that_knew(driven):
     configuration, core = driven
-    drive = simulate(scenario.load(LEVEL.keys(configuration, 0.05)), duration=0.2)
+    drive = simulate(scenario.load(LEVEL.keys(0.05)), duration=0.2)
     then = after(replace(drive, scenario=replace(drive.scenario, configuration=configuration)),
                  core.posterior())  # fmt: skip
     for row in core.taught():
@@ -91,8 +90,7 @@ def test_words_name_the_manoeuvre_or_the_bench():
 
 
 def test_commands_are_shares_of_time_and_speed():
-    configuration = scenario.load('firm_drive').configuration
-    loaded = scenario.load(MANOEUVRES[-1].keys(configuration, 0.1))
-    outer = np.abs(configuration.wheels.y).max()
-    assert loaded.profile.at(3.0).turn_rate * outer == pytest.approx(0.1)
-    assert loaded.profile.at(3.0).forward == 0.0
+    profile = scenario.load(STOPS.keys(0.1)).profile
+    times = (0.1, 0.35, 0.5, 0.75, 0.9)
+    speeds = [profile.at(share * manoeuvres.DURATION).forward for share in times]
+    assert speeds == pytest.approx([0.1, 0.0, 0.1, 0.0, 0.1])

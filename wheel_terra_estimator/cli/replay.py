@@ -101,7 +101,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--manoeuvres',
         action='store_true',
         help='say which short drive would teach most of each parameter that this one has not '
-        'taught: simulates nine of them (ten seconds); of one recording',
+        'taught: simulates eight of them (ten seconds); of one recording',
     )
     parser.add_argument('--json', action='store_true', help='print the summary as JSON')
     parser.add_argument(

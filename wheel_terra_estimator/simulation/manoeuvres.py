@@ -29,11 +29,13 @@ WORTH = 0.85
 """Share of the present deviation that a manoeuvre must promise at most [-]: a quarter of a bit."""
 HIGHEST_SLIP, DEEPEST = 0.6, 0.5
 """Slip [-] and sinkage [radius] of a simulated wheel above which a manoeuvre is not proposed."""
+LEAST_ACCELERATION = 0.1
+"""Of the rims [m/s^2]; faster rovers take a second to their speed."""
 
 
 @dataclass(frozen=True)
 class Manoeuvre:
-    """A short drive, straight but for the turn in place.
+    """A short straight drive.
 
     Attributes
     ----------
@@ -43,19 +45,17 @@ class Manoeuvre:
         Uphill positive [deg].
     time : tuple of float
         Knots of the command, as shares of the duration.
-    forward, turn : tuple of float
-        Speed of the body and of its outer wheels by turning there, over that of the drive.
+    forward : tuple of float
+        Speed there, over that of the drive.
     """
 
     words: str
     slope: float = 0.0
     time: tuple[float, ...] = (0.0,)
     forward: tuple[float, ...] = (1.0,)
-    turn: tuple[float, ...] = (0.0,)
 
-    def keys(self, configuration: Configuration, speed: float) -> dict[str, Any]:
+    def keys(self, speed: float) -> dict[str, Any]:
         """Return command and slope as keys of a scenario, for a rover at a `speed` [m/s]."""
-        outer = float(np.abs(configuration.wheels.y).max(initial=0.0)) or 1.0
         return {
             'description': self.words,
             'duration': DURATION,
@@ -63,7 +63,7 @@ class Manoeuvre:
             'slope.angle_deg': [self.slope],
             'drive.time': [DURATION * share for share in self.time],
             'drive.forward': [speed * share for share in self.forward],
-            'drive.turn_rate': [speed * share / outer for share in self.turn],
+            'drive.acceleration': max(speed, LEAST_ACCELERATION),
         }
 
 
@@ -76,12 +76,9 @@ MANOEUVRES = (
     Manoeuvre('{distance} up 10 degrees', 10.0),
     Manoeuvre('{distance} up 15 degrees', 15.0),
     Manoeuvre('{distance} down 10 degrees', -10.0),
-    Manoeuvre(
-        '{distance} at full and at half speed', 0.0, (0.0, 0.5, 0.52), (1.0, 1.0, 0.5), (0.0,)
-    ),
+    Manoeuvre('{distance} at full and at half speed', 0.0, (0.0, 0.5, 0.52), (1.0, 1.0, 0.5)),
     Manoeuvre('stop and start twice within {distance}', 0.0, _STOPS, _AND_GOES),
     Manoeuvre('{distance} forth and back', 0.0, (0.0, 0.45, 0.5, 0.55), (1.0, 1.0, 0.0, -1.0)),
-    Manoeuvre('a turn in place', 0.0, (0.0,), (0.0,), (1.0,)),
 )
 
 
@@ -120,7 +117,7 @@ def with_manoeuvres(
     there = {f'sensors.{name}': name in sensors for name in SENSORS}
     promised = []
     for manoeuvre in candidates:
-        keys = scenario.load({**manoeuvre.keys(configuration, speed), **there})
+        keys = scenario.load({**manoeuvre.keys(speed), **there})
         drive = simulate(replace(keys, configuration=configuration, truth=truth))
         if _is_safe(drive):
             promised.append((_in_words(manoeuvre, drive), after(drive, posterior)))

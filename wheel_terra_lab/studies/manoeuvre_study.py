@@ -89,7 +89,7 @@ def cases(seed: int) -> list[Case]:
     best = min(rows, key=_share)
     words = best.manoeuvre or ''
     driven = next(m for m in tried if _same(m, words))
-    keys = {**driven.keys(drawn.configuration, SPEED), 'variation.speed': 0.0}
+    keys = {**driven.keys(SPEED), 'variation.speed': 0.0}
     then = after(simulate(_scenario({**kind, **keys}, seed), seed), posterior)
     return [
         Case(seed, r.name, words, r.std, r.promised_std or 0.0, then[r.name].std, r is best)
