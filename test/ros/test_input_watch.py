@@ -21,6 +21,13 @@ def test_rate_age_and_silence_after_three_periods():
     assert ('reference_odom', 'silent for 6.1 s') in watch.faults(104.1)
 
 
+def test_the_rate_of_the_first_messages_is_that_of_their_mean_gap():
+    watch = InputWatch()
+    for now in (0.0, 0.1, 0.4, 0.6):
+        watch.heard('sinkage', now, 0.0, None)
+    assert watch.values(0.6)['sinkage_rate_Hz'] == pytest.approx(3 / 0.6)
+
+
 def test_loss_by_the_publishers_own_count_is_told_whatever_comes_next():
     watch = InputWatch()
     for number in (1, 2, 5, 6, 1, 2):  # three to four are missing, then the publisher restarts
