@@ -149,7 +149,7 @@ def run(arguments: argparse.Namespace) -> int:
         return 0
     columns = _points(arguments, configuration)
     try:
-        model = _model(arguments, configuration)
+        model = _model(arguments, configuration, float(columns['wheel_width'][0]))
         points = OperatingPoints(
             slip=columns['slip'],
             normal_load=columns['normal_load'],
@@ -207,7 +207,7 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _model(arguments: argparse.Namespace, configuration: Configuration) -> ContactLaw:
+def _model(arguments: argparse.Namespace, configuration: Configuration, width: float) -> ContactLaw:
     soil, effects = configuration.soil, configuration.effects
     if arguments.law is None:
         return WheelSoilModel(soil, effects, arguments.method, strict=False)
@@ -219,7 +219,8 @@ def _model(arguments: argparse.Namespace, configuration: Configuration) -> Conta
             f'{", ".join(effects)}',
             file=sys.stderr,
         )
-    width = float(configuration.wheels.width[_wheel_index(arguments, configuration)])
+    if 'wheels.width' in configuration.stated:
+        width = float(configuration.wheels.width[_wheel_index(arguments, configuration)])
     return contact_law(arguments.law, soil, effects, width, strict=False)
 
 

@@ -84,13 +84,13 @@ class ResistiveForce:
             Where a wheel slides sideways, the slip refers to a shear radius (this law has none), or
             `strict` and the soil cannot carry a load.
         """
-        if points.slip_angle.any() or np.nan_to_num(points.lateral_speed_ratio).any():
+        if np.any(points.slip_angle) or np.nan_to_num(points.lateral_speed_ratio).any():
             raise ValueError(
                 'the law resistive_force holds in the plane of the wheel; leave the slip angle at 0'
             )
         if points.slip_radius == 'shear':
             raise ValueError("the law resistive_force has no shear radius; slip_radius 'rim'")
-        load = points.normal_load
+        load = np.asarray(points.normal_load, float)
         angle, carries = solve_entrance_angle(
             lambda angles: self.forces(points, angles)[0], load, np.full(len(points), _START)
         )
