@@ -45,6 +45,7 @@ def test_what_compare_refuses(tmp_path, capsys):
     for arguments, word in (
         (['--laws', path, 'bag'], 'takes a table'),
         (['bag'], 'two bags'),
+        (['bag', 'bag', '--config', 'hit_fit'], 'belongs to --laws'),
     ):
         assert main(['compare', *arguments]) == 2
         assert word in capsys.readouterr().err

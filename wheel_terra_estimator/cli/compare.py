@@ -53,6 +53,8 @@ def run(arguments: argparse.Namespace) -> int:
         return 0
     if arguments.second is None:
         raise UserError('give two bags of estimates, or --laws with a table')
+    if arguments.config:
+        raise UserError('--config belongs to --laws; bags of estimates bring their own')
     from wheel_terra_estimator.bags.history import read_estimates
     from wheel_terra_estimator.bags.storage import open_bag
     from wheel_terra_estimator.bags.truth import read_simulated_truth
