@@ -19,7 +19,6 @@ from wheel_terra_estimator.discrepancy.assessment.order import changes_along_row
 from wheel_terra_estimator.discrepancy.assessment.structural_error import structural_error
 from wheel_terra_estimator.discrepancy.assessment.where import locate
 from wheel_terra_estimator.discrepancy.decision import Decision, known_alike
-from wheel_terra_estimator.discrepancy.fitting.coordinates import WIDENING
 from wheel_terra_estimator.discrepancy.fitting.evidence import log_sum
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
 from wheel_terra_estimator.discrepancy.report import words
@@ -315,11 +314,11 @@ def _shifts(
             SoilShift(
                 c.name if c.owner == 'soil' else f'effects.{c.key}',
                 float(c.value(0.0)),
-                c.deviation(0.0, 1.0 / WIDENING),
+                c.deviation(0.0, 1.0 / c.stated),
                 refit[c.key],
                 float(c.value(u)),
                 c.deviation(u, float(np.sqrt(covariance[index, index]))),
-                WIDENING * u,
+                c.stated * u,
                 c.unit,
                 c.source,
             )

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtrc  # scipy.stats takes longer to load than a diagnosis
 
-from wheel_terra_estimator.discrepancy.fitting.coordinates import WIDENING
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
 
 FloatArray = NDArray[np.float64]
@@ -35,7 +34,7 @@ def pulls(fitted: Fit) -> dict[str, float]:
     Soil numbers and parameters of effects that are on: a fit may hide what is missing in either.
     """
     return {
-        c.key: WIDENING * float(u)
+        c.key: c.stated * float(u)
         for c, u in zip(fitted.coordinates, fitted.u, strict=True)
         if c.role == 'believed'
     }
