@@ -4,12 +4,14 @@
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import rolling_rover as rolling
 
 from wheel_terra_estimator.checks.calibration import as_file, calibrate
+from wheel_terra_estimator.checks.imu import gross_tilt
 from wheel_terra_estimator.checks.run import check_recording, examine
 from wheel_terra_estimator.configuration import reader
 
@@ -44,6 +46,26 @@ def test_a_wrong_sinkage_moves_the_radius_by_no_more_than_its_deviation(factor):
     calibration, _ = calibrated(sinkage=replace(sinkage, sinkage=factor * sinkage.sinkage))
     radius = next(c for c in calibration.changes if c.key == 'wheels.radius')
     assert radius.after[0] == pytest.approx(rolling.RADIUS, rel=0.02)
+
+
+@pytest.mark.parametrize('slope', [-0.3, 0.0, 0.3])
+def test_an_imu_on_its_back_on_a_slope_keeps_the_slope(slope):
+    """About y, half a turn would turn the gyro and the slope round as well."""
+    true = rolling.GRAVITY * np.array([np.sin(slope), 0.0, np.cos(slope)])
+    read = np.tile(true * [1.0, -1.0, -1.0], (50, 1))
+    np.testing.assert_allclose(gross_tilt(SimpleNamespace(force=read)) @ read[0], true, atol=1e-9)
+
+
+def test_skidding_downhill_is_no_larger_radius():
+    """Wheels in soft ground turn slower than the rover slides on their way down."""
+    drive = rolling.ten_minute_drive(turns=False)
+    ahead = np.interp(drive.time, [0.0, 15.0, 16.0], [0.0, 0.0, 0.3])
+    slope = -0.1 + 0.05 * np.sin(0.05 * drive.time)
+    down = rolling.recording(replace(drive, speed=ahead, slope=slope))
+    soft = replace(down.sinkage, sinkage=down.sinkage.sinkage + 0.02)
+    faster = replace(down.reference, velocity=1.12 * down.reference.velocity)
+    told = calibrate(replace(down, reference=faster, sinkage=soft), rolling.rover())
+    assert not [change for change in told.changes if change.key == 'wheels.radius']
 
 
 def test_the_gravity_of_another_planet_is_mended():

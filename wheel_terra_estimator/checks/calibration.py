@@ -27,7 +27,7 @@ NOISE_STD = 0.1
 LEAST_SURE = 0.8
 """Confidence from which a cure is written [-]."""
 CLEAR = 2.0
-"""Deviations by which a zero is off, from which it is written [-]."""
+"""Deviations by which a number is off, from which another is written [-]."""
 BLUNT_REFERENCE = 0.005
 """Deviation of the radius by the noise of the reference alone, as a share, that is told [-]."""
 
@@ -134,7 +134,7 @@ def _mounting(changes: _Changes, evidence: Evidence) -> None:
     rotation, std, source = evidence.rotation, None, 'mean specific force'
     tilt = imu.small_tilt(evidence)
     if tilt is not None and tilt.std < imu.EVEN_GROUND_STD:
-        if tilt.sigmas > 1.0:
+        if tilt.sigmas > CLEAR:
             rotation = tilt.taken_off(rotation)
         std = math.degrees(tilt.std)
         source = f'specific force over {tilt.turn:.0f} rad of turning, slope taken off'
@@ -194,7 +194,7 @@ def _radius(changes: _Changes, evidence: Evidence, report: CheckReport) -> Evide
     if isinstance(told, NotChecked) or rival:
         return evidence
     ratio, radius = told.ratio, float(np.mean(evidence.facts.radius))
-    if ratio.sigmas_from(1.0) < 1.0 and not found:
+    if ratio.sigmas_from(1.0) < CLEAR and not found:
         return evidence
     rolling = evidence.facts.radius * ratio.value
     lugs = configuration.wheels.slip_radius - configuration.wheels.radius
@@ -239,7 +239,7 @@ def _friction(changes: _Changes, evidence: Evidence, report: CheckReport) -> Non
 
 def _track(changes: _Changes, evidence: Evidence) -> None:
     told = None if geometry.skids(evidence) else geometry.track_ratio(evidence)
-    if isinstance(told, geometry.Told) and told.ratio.sigmas_from(1.0) > 1.0:
+    if isinstance(told, geometry.Told) and told.ratio.sigmas_from(1.0) > CLEAR:
         lateral = evidence.facts.lateral
         std = float(np.abs(lateral).max()) * told.ratio.std
         source = 'gyro against the difference of the sides in turns'

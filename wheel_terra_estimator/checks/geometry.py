@@ -184,7 +184,9 @@ def _without_slip(evidence: Evidence, speeds: _Speeds, plain: Estimate) -> Estim
     else:
         return NotChecked('radius', 'no torque: a ratio of speeds may be slip')
     depth = _depth(evidence).value
-    if plain.value < 1.0 and depth > SOFT_DEPTH:
+    middle = float(np.median(demand)) + resistance.value
+    as_slip = (plain.value < 1.0) == (middle >= 0.0)  # downhill wheels skid: faster than the rims
+    if as_slip and depth > SOFT_DEPTH:
         return NotChecked(
             'radius',
             f'soft ground (sinkage {depth:.2f} of the radius): a ratio of speeds may be slip; '
@@ -195,13 +197,12 @@ def _without_slip(evidence: Evidence, speeds: _Speeds, plain: Estimate) -> Estim
     seen = Estimate(-both[1].value / both[0].value, both[1].std)
     weight = SLOPE_OF_SLIP.std**2 / (SLOPE_OF_SLIP.std**2 + seen.std**2)
     slope = max(weight * seen.value + (1.0 - weight) * SLOPE_OF_SLIP.value, 0.0)
-    if plain.value < 1.0 and weight < LEAST_SEEN:
+    if as_slip and weight < LEAST_SEEN:
         return NotChecked(
             'radius',
             'no slopes tell the slip of this ground, and a ratio of speeds may be slip; drive up '
             'and down a slope, or measure ten metres with a tape',
         )
-    middle = float(np.median(demand)) + resistance.value
     slip, skid = slope * middle, slope * resistance.value
     if slip > FIRM_SLIP:
         return NotChecked(

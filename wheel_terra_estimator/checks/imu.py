@@ -298,8 +298,8 @@ def gross_tilt(evidence: Evidence) -> FloatArray | None:
         return None
     axis = np.cross(up, [0.0, 0.0, 1.0])
     sine = float(np.linalg.norm(axis))
-    if sine < 0.15 and up[2] < 0.0:
-        return np.diag([1.0, -1.0, -1.0])  # half a turn is one about x
+    if up[2] < -math.cos(UPSIDE_TILT):
+        return np.diag([1.0, -1.0, -1.0])  # half a turn is one about x; what is left is a slope
     angle = math.atan2(sine, float(up[2]))
     return np.asarray(Rotation.from_rotvec(angle * axis / max(sine, 1e-9)).as_matrix())
 
