@@ -85,6 +85,18 @@ def test_each_kind_of_reading(rover):
         np.testing.assert_allclose(getattr(again, field), getattr(reading, field), atol=1e-12)
 
 
+def test_an_imu_off_the_middle_feels_what_the_middle_does(rover):
+    """A rover turns on the spot at 0.5 rad/s: half a metre ahead 0.125 m/s^2 pull towards it."""
+    placed = SensorErrors(rover.replace({**STATED, 'sensors.imu_position': [0.5, 0.0, 0.3]}))
+    true = InertialReading(START, np.array([0.0, 0.0, 9.81]), np.array([0.0, 0.0, 0.5]), None)
+    felt = replace(true, specific_force=np.array([-0.125, 0.0, 9.81]))
+    back = placed.corrected(misread(felt))
+    np.testing.assert_allclose(back.specific_force, true.specific_force, atol=1e-12)
+    np.testing.assert_allclose(back.angular_rate, true.angular_rate, atol=1e-12)
+    read = placed.as_read(true)
+    np.testing.assert_allclose(read.specific_force, misread(felt).specific_force, atol=1e-12)
+
+
 def test_what_the_checks_are_to_refuse_is_left_to_them(rover):
     configuration = rover.replace(STATED)
     core = EstimatorCore(configuration)

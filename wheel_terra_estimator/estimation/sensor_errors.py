@@ -55,8 +55,8 @@ class SensorErrors:
     ----------
     configuration : Configuration
         ``sensors.torque_zero`` [N m], ``torque_gain`` [-], ``sinkage_zero`` [m], ``sinkage_gain``
-        [-], ``specific_force_bias`` [m/s^2], ``angular_rate_bias`` [rad/s] and the
-        ``*_stamp_offset`` [s].
+        [-], ``specific_force_bias`` [m/s^2], ``angular_rate_bias`` [rad/s], ``imu_position`` [m]
+        and the ``*_stamp_offset`` [s].
     """
 
     def __init__(self, configuration: Configuration) -> None:
@@ -66,7 +66,9 @@ class SensorErrors:
         self.sinkage = LinearErrors(sensors.sinkage_zero, sensors.sinkage_gain)
         self.specific_force_bias: FloatArray = sensors.specific_force_bias
         self.angular_rate_bias: FloatArray = sensors.angular_rate_bias
-        self._biased = bool(self.specific_force_bias.any() or self.angular_rate_bias.any())
+        self._imu_position: FloatArray = sensors.imu_position
+        inertial = self.specific_force_bias, self.angular_rate_bias, self._imu_position
+        self._none_inertial = not any(values.any() for values in inertial)
         self._late: dict[type, int] = {
             WheelOdometry: round(sensors.wheel_odometry_stamp_offset * 1e9),
             InertialReading: round(sensors.imu_stamp_offset * 1e9),
@@ -90,7 +92,7 @@ class SensorErrors:
                 return measurement
             return replace(measurement, sinkage=self.sinkage.true(measurement.sinkage))
         if isinstance(measurement, InertialReading):
-            return self._with_bias(measurement, -1.0)
+            return self._inertial(measurement, -1.0)
         return measurement
 
     def as_read(self, measurement: Measurement) -> Measurement:
@@ -101,7 +103,7 @@ class SensorErrors:
         if isinstance(measurement, SinkageReading) and not self.sinkage.none:
             return replace(measurement, sinkage=self.sinkage.reading(measurement.sinkage))
         if isinstance(measurement, InertialReading):
-            return self._with_bias(measurement, 1.0)
+            return self._inertial(measurement, 1.0)
         return measurement
 
     def _stamped(self, measurement: Measurement, sign: int) -> Measurement:
@@ -110,11 +112,12 @@ class SensorErrors:
             return measurement
         return replace(measurement, stamp=measurement.stamp + sign * late)
 
-    def _with_bias(self, reading: InertialReading, sign: float) -> InertialReading:
-        if not self._biased or not np.any(reading.specific_force):
+    def _inertial(self, reading: InertialReading, sign: float) -> InertialReading:
+        """Take off (sign -1) or put on biases and the centripetal acceleration w x (w x r)."""
+        if self._none_inertial or not np.any(reading.specific_force):
             return reading
-        return replace(
-            reading,
-            specific_force=reading.specific_force + sign * self.specific_force_bias,
-            angular_rate=reading.angular_rate + sign * self.angular_rate_bias,
-        )
+        told = reading.angular_rate + sign * self.angular_rate_bias
+        rate = told if sign < 0.0 else reading.angular_rate  # the true one
+        felt = np.cross(rate, np.cross(rate, self._imu_position))
+        force = reading.specific_force + sign * (self.specific_force_bias + np.nan_to_num(felt))
+        return replace(reading, specific_force=force, angular_rate=told)
