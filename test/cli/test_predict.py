@@ -215,3 +215,34 @@ def test_laws(capsys: pytest.CaptureFixture[str]) -> None:
         assert word in capsys.readouterr().err
     assert main([*smooth[:-2], '--law', 'wong_reece', '--climb', 'wheel']) == 2
     assert '--law' in capsys.readouterr().err
+
+
+def test_the_law_of_the_configuration(capsys: pytest.CaptureFixture[str]) -> None:
+    rows = ('predict', '--config', 'hit_wh3', '--config', 'hit_fit', '--slip', '-0.4:0.9:5')
+    # On the Moon too the pressures are the same at the width of the wheel.
+    moon = [*rows, '-p', 'rover.gravity:=1.62', '-p', 'effects.stress_peak_shift.enabled:=true']
+    key = ['-p', 'rover.contact_law:=wong_reece']
+    assert main([*moon, *key]) == 0
+    configured = capsys.readouterr().out
+    assert main([*moon, '--law', 'wong_reece']) == 0
+    assert capsys.readouterr().out == configured
+    assert main(moon) == 0
+    reece, bekker = table(configured), table(capsys.readouterr().out)
+    # The exponent grows with slip, from the depth of the width in one, from 1 m in the other.
+    assert reece['sinkage'][1] != pytest.approx(bekker['sinkage'][1], rel=1e-3)
+    straight = ['-p', 'effects.slip_sinkage_exponent.enabled:=false']
+    assert main([*moon, *straight, *key]) == 0
+    reece = table(capsys.readouterr().out)
+    assert main([*moon, *straight]) == 0
+    bekker = table(capsys.readouterr().out)
+    assert reece['sinkage'] == pytest.approx(bekker['sinkage'], rel=1e-4)
+    assert main([*rows, '--law', 'bekker_wong_janosi']) == 0
+    named = capsys.readouterr().out
+    assert main([*rows, *key, '--law', 'bekker_wong_janosi']) == 0
+    assert capsys.readouterr().out == named
+    assert main([*rows[:-2], *key, '--climb', 'wheel']) == 2
+    assert 'rover.contact_law' in capsys.readouterr().err
+    assert main([*rows, '-p', 'rover.contact_law:=wong']) == 2
+    assert (
+        "rover.contact_law: 'wong' is unknown, nearest is 'wong_reece'" in capsys.readouterr().err
+    )

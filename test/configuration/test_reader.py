@@ -6,6 +6,7 @@ import argparse
 import copy
 import math
 import pickle
+import warnings
 from array import array
 from pathlib import Path
 
@@ -20,6 +21,7 @@ from wheel_terra_estimator.configuration.parameters import (
     declared,
 )
 from wheel_terra_estimator.errors import ConfigurationWarning, UserError
+from wheel_terra_estimator.terramechanics.contact_law import LAWS
 from wheel_terra_estimator.terramechanics.effects import catalogue
 
 ROVER = {
@@ -67,6 +69,18 @@ def test_a_retired_key_is_left_out_and_said(tmp_path):
     ]
     assert read.rover.name == 'mine'
     assert 'filter.demand_walk' not in read.flat()
+
+
+def test_contact_laws_are_those_of_the_physics():
+    key = 'rover.contact_law'
+    assert next(p for p in DECLARED if p.key == key).choices == LAWS
+    law, effect = f'{key}:=resistive_force', 'effects.stress_peak_shift.enabled:=true'
+    with pytest.warns(ConfigurationWarning, match=f'{key}: .* left out: stress_peak_shift'):
+        reader.load([], [law, effect], complete=False)
+    with warnings.catch_warnings():
+        warnings.simplefilter('error')
+        reader.load([], [law], complete=False)
+        reader.load([], [f'{key}:=wong_reece', effect], complete=False)
 
 
 @pytest.mark.parametrize('parameter', DECLARED, ids=lambda p: p.key)

@@ -5,8 +5,8 @@
 from dataclasses import dataclass
 
 from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.estimation.contacts.contact_models import contact_models
 from wheel_terra_estimator.estimation.contacts.loads import WheelLoads
-from wheel_terra_estimator.estimation.contacts.wheel_models import WheelModels
 from wheel_terra_estimator.estimation.filter.initial_state import initial_filter, layout_of
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
 
@@ -23,7 +23,7 @@ class Parts:
         self.rover = Rover.from_configuration(self.configuration)
         self.sensors = SensorFigures.from_configuration(self.configuration)
         self.layout = layout_of(self.rover, self.sensors)
-        self.models = WheelModels(self.configuration)
+        self.models = contact_models(self.configuration)
 
     def filter(self):
         """Return a filter at the start of a run."""

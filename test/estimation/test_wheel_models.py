@@ -6,23 +6,32 @@ import numpy as np
 import pytest
 
 from wheel_terra_estimator.configuration import reader
-from wheel_terra_estimator.estimation.contacts.wheel_models import WheelModels, WheelState
+from wheel_terra_estimator.estimation.contacts.contact_models import contact_models
+from wheel_terra_estimator.estimation.contacts.wheel_models import WheelState
+from wheel_terra_estimator.terramechanics.conditioned import ConditionedForces
+from wheel_terra_estimator.terramechanics.contact_law import LAWS, contact_law
 from wheel_terra_estimator.terramechanics.model import WheelSoilModel
 from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
 from wheel_terra_estimator.terramechanics.wheel import Wheel
 
+KEYS = ['effects.lug_digging.enabled:=true', 'effects.slip_sinkage_exponent.enabled:=true']
 
-@pytest.fixture(scope='module')
-def rover():
+
+def rover_with(law):
+    keys = KEYS if law != 'resistive_force' else []
     return reader.load(
-        ['generic_six_wheel', 'dry_sand_ding2015'],
-        ['effects.lug_digging.enabled:=true', 'effects.slip_sinkage_exponent.enabled:=true'],
+        ['generic_six_wheel', 'dry_sand_ding2015'], [f'rover.contact_law:={law}', *keys]
     )
+
+
+@pytest.fixture(scope='module', params=LAWS)
+def rover(request):
+    return rover_with(request.param)
 
 
 @pytest.fixture(scope='module')
 def models(rover):
-    return WheelModels(rover)
+    return contact_models(rover)
 
 
 def forces(models, ratio=0.7, z=0.02, load=290.0, a=0.1, k=-0.2, centroid=0.02, mound=0.3):
@@ -54,7 +63,11 @@ def test_agrees_with_the_quadrature_at_its_own_steady_state(rover, models, slip)
     )
     load = 290.0
     points = OperatingPoints(slip=np.array([slip]), normal_load=np.array([load]), wheel=wheel)
-    truth = WheelSoilModel(rover.soil, rover.effects).steady_state(points)
+    law = rover.rover.contact_law
+    truth = WheelSoilModel(rover.soil, rover.effects)
+    if law != LAWS[0]:
+        truth = contact_law(law, rover.soil, rover.effects, float(wheel.width))
+    truth = truth.steady_state(points)
     z = float(truth.sinkage[0])
     state = WheelState(1.0 - slip, z, load, 0.0, 0.0)
     answer = models.forces(0, state)
@@ -62,17 +75,50 @@ def test_agrees_with_the_quadrature_at_its_own_steady_state(rover, models, slip)
     assert answer.pull == pytest.approx(truth.drawbar_pull[0], abs=0.02 * load)
     bearing = models.bearing(0, state)
     assert bearing.load == pytest.approx(load, rel=0.15)
+    # What the filter takes for the rate of ln(load) by ln(sinkage) and by the exponent.
+    deeper = models.bearing(0, state._replace(sinkage=1.001 * z))
+    assert np.log(deeper.load / bearing.load) / np.log(1.001) == pytest.approx(
+        bearing.exponent + 0.5, rel=0.3
+    )
+    softer = models.bearing(0, state._replace(slip_sinkage=1e-4))
+    assert np.log(softer.load / bearing.load) == pytest.approx(
+        1e-4 * slip * bearing.log_depth, rel=0.15
+    )
+    firmer = models.bearing(0, state._replace(stiffness=0.1))
+    assert firmer.load == pytest.approx(np.exp(0.1) * bearing.load, rel=0.15)
+    slower = models.bearing_and_slower(0, state, 0.01)
+    assert slower[0] == bearing
+    assert slower[1] == models.bearing(0, state._replace(speed_ratio=0.99 - slip))
+
+
+def test_the_default_is_the_closed_form_of_the_configured_soil():
+    rover = rover_with(LAWS[0])
+    assert reader.load(['generic_six_wheel']).rover.contact_law == LAWS[0]
+    wheels = rover.wheels
+    plain = ConditionedForces(wheels.wheel, rover.soil, rover.effects, 'lug_tip')
+    soil = rover.soil.cohesion, np.tan(rover.soil.friction_angle)
+    expected = plain.forces(0, 0.7, 0.02, 290.0, *soil, rover.soil.shear_modulus)
+    answer = contact_models(rover).forces(0, WheelState(0.7, 0.02, 290.0, 0.0, 0.0))
+    assert (answer.torque, answer.pull) == (expected.torque, expected.drawbar_pull)
+
+
+def test_strength_of_the_resistive_force_is_friction_at_the_rim():
+    models = contact_models(rover_with('resistive_force'))
+    pulls = [forces(models, a=a).pull for a in (-0.5, 0.0, 0.5)]
+    torques = [forces(models, a=a).torque for a in (-0.5, 0.0, 0.5)]
+    assert pulls[0] < pulls[1] < pulls[2] and torques[0] < torques[1] < torques[2]
+    assert forces(models, k=0.0) == forces(models, k=-0.7)
 
 
 @pytest.mark.parametrize('enabled', ['true', 'false'])
 def test_the_onset_of_the_mound_is_that_of_the_configuration(enabled):
     keys = [f'effects.soil_mound.enabled:={enabled}', 'effects.soil_mound.onset:=0.7']
-    late = WheelModels(reader.load(['generic_six_wheel', 'dry_sand_ding2015'], keys))
+    late = contact_models(reader.load(['generic_six_wheel', 'dry_sand_ding2015'], keys))
     for ratio, pushes in ((0.5, False), (0.31, False), (0.29, True), (0.1, True)):
         without, pushed = (forces(late, ratio=ratio, mound=m) for m in (0.0, 0.5))
         assert (pushed.pull > without.pull) is pushes, ratio
     # At slip 1 the mound is whole, wherever it began.
-    early = WheelModels(reader.load(['generic_six_wheel', 'dry_sand_ding2015'], keys[:1]))
+    early = contact_models(reader.load(['generic_six_wheel', 'dry_sand_ding2015'], keys[:1]))
     if enabled == 'false':
         assert forces(late, ratio=0.0).pull == pytest.approx(forces(early, ratio=0.0).pull)
 

@@ -21,6 +21,7 @@ from wheel_terra_estimator.estimation.measurements import (
 from wheel_terra_estimator.estimation.wheel_soil_estimator import WheelSoilEstimator
 from wheel_terra_estimator.simulation.drive import simulate
 from wheel_terra_estimator.simulation.scenario import load
+from wheel_terra_estimator.terramechanics.contact_law import LAWS
 from wheel_terra_lab.evaluation import kinds
 from wheel_terra_lab.evaluation.runner import inputs_of_mode
 
@@ -120,6 +121,20 @@ def test_missing_inputs_widen_the_deviations_and_are_said(climbed):
         assert getattr(poor, field).mean() > getattr(full, field).mean()
     assert 'orientation' in climbed['no_orientation'][-1].faults
     assert 'orientation' not in full.faults
+
+
+@pytest.mark.parametrize('law', LAWS)
+def test_each_contact_law_follows_a_climb_with_a_reference(climb, climbed, law):
+    configuration = climb.configuration.replace({'rover.contact_law': law})
+    sets = estimate(climb, estimator=WheelSoilEstimator(configuration))
+    slip = np.array([s.slip for s in sets])
+    same = np.array_equal(slip, [s.slip for s in climbed['reference']])
+    assert same is (law == LAWS[0])  # the default
+    truth = climb.truth
+    assert last(slip) == pytest.approx(last(truth.slip), abs=0.08)
+    load = truth.normal_load.mean()
+    pull = last([s.drawbar_pull for s in sets])
+    assert pull == pytest.approx(last(truth.drawbar_pull), abs=0.05 * load)
 
 
 def test_snapshot_comes_back_to_the_bit(climb):

@@ -26,6 +26,7 @@ from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.frames import unit_of
 from wheel_terra_estimator.output_folder import check_file, new_file
 from wheel_terra_estimator.terramechanics.contact_law import (
+    BEKKER_WONG_JANOSI,
     LAWS,
     RESISTIVE_FORCE,
     ContactLaw,
@@ -105,8 +106,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--law',
         choices=LAWS,
-        help='another law of the contact (see models/laws); pressures are the same at the width of '
-        'the wheel',
+        help='law of the contact (see models/laws) in place of rover.contact_law; pressures are '
+        'the same at the width of the wheel',
     )
     parser.add_argument(
         '--table',
@@ -208,12 +209,15 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _model(arguments: argparse.Namespace, configuration: Configuration, width: float) -> ContactLaw:
-    soil, effects = configuration.soil, configuration.effects
-    if arguments.law is None:
+    soil, effects, rover = configuration.soil, configuration.effects, configuration.rover
+    law = arguments.law
+    if law is None and rover.contact_law != BEKKER_WONG_JANOSI:
+        law = rover.contact_law
+    if law is None:
         return WheelSoilModel(soil, effects, arguments.method, strict=False)
     if arguments.method != METHODS[0]:
-        raise UserError(f'--law {arguments.law} says how the contact is integrated; leave --method')
-    if arguments.law == RESISTIVE_FORCE and effects:
+        raise UserError(f'the law {law} says how the contact is integrated; leave --method')
+    if arguments.law == RESISTIVE_FORCE != rover.contact_law and effects:
         print(
             f'wheel-terra predict: the law {RESISTIVE_FORCE} has no effects; left out: '
             f'{", ".join(effects)}',
@@ -221,7 +225,8 @@ def _model(arguments: argparse.Namespace, configuration: Configuration, width: f
         )
     if 'wheels.width' in configuration.stated:
         width = float(configuration.wheels.width[_wheel_index(arguments, configuration)])
-    return contact_law(arguments.law, soil, effects, width, strict=False)
+    gravity = float(rover.gravity)
+    return contact_law(law, soil, effects, width, gravity=gravity, strict=False)
 
 
 def _climb(arguments: argparse.Namespace, configuration: Configuration) -> dict[str, FloatArray]:
@@ -231,6 +236,11 @@ def _climb(arguments: argparse.Namespace, configuration: Configuration) -> dict[
         raise UserError(
             '--climb finds the slip of each slope; leave --slip, --slip-angle, --points, --law, '
             '--angles, --noise'
+        )
+    if configuration.rover.contact_law != BEKKER_WONG_JANOSI:
+        raise UserError(
+            f'rover.contact_law: --climb knows {BEKKER_WONG_JANOSI} alone; add '
+            f'-p rover.contact_law:={BEKKER_WONG_JANOSI}'
         )
     if arguments.load and arguments.climb == 'rover':
         raise UserError('--climb rover takes the loads from rover.mass; leave --load')

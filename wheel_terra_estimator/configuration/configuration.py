@@ -120,6 +120,7 @@ class Rover(Section):
     bogie_pivot: FloatArray  # x, z [m]
     bogie_wheels: str  # front, rear
     load_std: float
+    contact_law: str  # see terramechanics/contact_law.py
 
     def __init__(self, values: Mapping[str, Value]) -> None:
         super().__init__(values, 'rover.')

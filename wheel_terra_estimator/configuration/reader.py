@@ -27,6 +27,7 @@ from wheel_terra_estimator.configuration.parameters import (
 from wheel_terra_estimator.configuration.ros_yaml import Value
 from wheel_terra_estimator.configuration.soil_units import doubtful_units
 from wheel_terra_estimator.errors import ConfigurationWarning, UserError
+from wheel_terra_estimator.terramechanics.contact_law import RESISTIVE_FORCE
 from wheel_terra_estimator.terramechanics.effects.base import Effect
 
 # Parameters that every ROS node has; they may stand in the same file.
@@ -183,6 +184,11 @@ def _checked(
     configuration = Configuration.from_values(values, stated)
     for key, words in doubtful_units(configuration.soil, stated):
         _warn(f'{stated[key][1]}: {words}')
+    if configuration.rover.contact_law == RESISTIVE_FORCE and configuration.effects:
+        _warn(
+            f'{stated["rover.contact_law"][1]}: rover.contact_law: {RESISTIVE_FORCE} has no '
+            f'effects; left out: {", ".join(configuration.effects)}'
+        )
     return configuration
 
 

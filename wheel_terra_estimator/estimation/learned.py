@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.estimation.contacts.contact_models import contact_models
 from wheel_terra_estimator.estimation.contacts.steepest_climb import Climbed
 from wheel_terra_estimator.estimation.contacts.usual_slip import steady_pull
 from wheel_terra_estimator.estimation.contacts.wheel_models import WheelModels
@@ -144,7 +145,7 @@ class Learned:
 
     @cached_property
     def _models(self) -> tuple[WheelModels, Rover]:
-        return WheelModels(self._configuration), Rover.from_configuration(self._configuration)
+        return contact_models(self._configuration), Rover.from_configuration(self._configuration)
 
     def _force_bias(self, mean: FloatArray) -> float:
         """Return the part of the state's bias that is the accelerometer's [m/s^2].

@@ -17,6 +17,7 @@ import numpy as np
 
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.contacts.contact_age import ContactAge
+from wheel_terra_estimator.estimation.contacts.contact_models import contact_models
 from wheel_terra_estimator.estimation.contacts.demand import Demand
 from wheel_terra_estimator.estimation.contacts.linearisation import (
     ContactForces,
@@ -32,7 +33,7 @@ from wheel_terra_estimator.estimation.contacts.steepest_climb import SteepestCli
 from wheel_terra_estimator.estimation.contacts.steering import Steering
 from wheel_terra_estimator.estimation.contacts.turning import Turning, sides_oppose
 from wheel_terra_estimator.estimation.contacts.unloaded_wheels import UnloadedWheels
-from wheel_terra_estimator.estimation.contacts.wheel_models import WheelModels, WheelState
+from wheel_terra_estimator.estimation.contacts.wheel_models import WheelState
 from wheel_terra_estimator.estimation.estimates import EstimateSet
 from wheel_terra_estimator.estimation.filter.ekf import FilterMemory, FloatArray, Row
 from wheel_terra_estimator.estimation.filter.force_balance import (
@@ -179,7 +180,7 @@ class WheelSoilEstimator:
         sensors = SensorFigures.from_configuration(configuration)
         self._sensors = sensors
         self._layout = layout = layout_of(rover, sensors)
-        models = WheelModels(configuration)
+        models = contact_models(configuration)
         # Readings between two cycles.
         self._inertial = InertialInput(rover.gravity, given=configuration.stated)
         self._wheels = WheelOdometryInput(rover, sensors)

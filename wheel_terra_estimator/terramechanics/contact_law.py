@@ -35,7 +35,13 @@ class ContactLaw(Protocol):
 
 
 def contact_law(
-    name: str, soil: Soil, effects: EffectSettings, width: float, *, strict: bool = True
+    name: str,
+    soil: Soil,
+    effects: EffectSettings,
+    width: float,
+    *,
+    gravity: float = STANDARD_GRAVITY,
+    strict: bool = True,
 ) -> ContactLaw:
     """Return a law for the soil as configured.
 
@@ -50,6 +56,8 @@ def contact_law(
     width : float
         Width at which the laws have the same pressure [m]: where ``wong_reece`` takes over Bekker's
         moduli, and of the plate that ``resistive_force`` takes its scale from.
+    gravity : float
+        At which the soil's numbers hold [m/s^2].
 
     Raises
     ------
@@ -59,25 +67,30 @@ def contact_law(
     if name == BEKKER_WONG_JANOSI:
         return WheelSoilModel(soil, effects, 'closed_form', strict=strict)
     if name == WONG_REECE:
-        shifted = effects
-        if 'stress_peak_shift' not in {key.partition(':')[0] for key in effects}:
-            shifted = {**effects, 'stress_peak_shift': {'c2': PEAK_SHIFT}}
-        return WheelSoilModel(reece_soil(soil, width), shifted, 'quadrature', strict=strict)
+        reece = reece_soil(soil, width, gravity)
+        return WheelSoilModel(reece, reece_effects(effects), 'quadrature', strict=strict)
     if name == RESISTIVE_FORCE:
-        return ResistiveForce(plate_scale(soil, width), strict=strict)
+        return ResistiveForce(plate_scale(soil, width, gravity), strict=strict)
     raise ValueError(f'contact law is {name!r}; allowed is one of {LAWS}')
 
 
-def reece_soil(soil: Soil, width: float) -> Soil:
+def reece_effects(effects: EffectSettings) -> EffectSettings:
+    """Return the effects with the shift of the peak stress on, Wong and Reece's where it is off."""
+    if 'stress_peak_shift' in {key.partition(':')[0] for key in effects}:
+        return effects
+    return {**effects, 'stress_peak_shift': {'c2': PEAK_SHIFT, 'skid': 0.0}}
+
+
+def reece_soil(soil: Soil, width: float, gravity: float = STANDARD_GRAVITY) -> Soil:
     """Return the soil with Reece's pressure c kc' + rho g b kphi', the same at this width [m]."""
     if soil.pressure_law == 'reece':
         return soil
     pressure = bearing_law('bekker', soil.cohesive_modulus, soil.frictional_modulus, width, 0, 0)[0]
-    modulus = pressure * width**soil.sinkage_exponent / (soil.density * STANDARD_GRAVITY * width)
+    modulus = pressure * width**soil.sinkage_exponent / (soil.density * gravity * width)
     return replace(soil, cohesive_modulus=0.0, frictional_modulus=modulus, pressure_law='reece')
 
 
-def plate_scale(soil: Soil, width: float) -> float:
+def plate_scale(soil: Soil, width: float, gravity: float = STANDARD_GRAVITY) -> float:
     """Scale of the resistive stress with which a flat plate meets the soil's pressure [-]."""
     modulus, depth = bearing_law(
         soil.pressure_law,
@@ -85,7 +98,7 @@ def plate_scale(soil: Soil, width: float) -> float:
         soil.frictional_modulus,
         width,
         soil.cohesion,
-        soil.density * STANDARD_GRAVITY,
+        soil.density * gravity,
     )
     pressure = modulus * (PLATE_DEPTH / depth) ** soil.sinkage_exponent
     generic = 1e6 * float(stress_maps(0.0, 0.5 * np.pi)[0]) * PLATE_DEPTH

@@ -25,7 +25,7 @@ FloatArray = NDArray[np.float64]
 # Generic Fourier coefficients of the stress per depth [N/cm^3] (the paper's supplement, table S3).
 _A00, _A10, _B11, _B01, _B_11 = 0.206, 0.169, 0.212, 0.358, 0.055
 _C11, _C01, _C_11, _D10 = -0.124, 0.253, 0.007, 0.088
-_PER_CUBIC_METRE = 1e6  # [N/m^3] per [N/cm^3]
+PER_CUBIC_METRE = 1e6  # [N/m^3] per [N/cm^3]
 _NODES = 24  # on the rim
 _START = 0.3  # first guess of the entrance angle [rad]
 
@@ -121,15 +121,38 @@ class ResistiveForce:
         wheel = points.wheel
         radius, height = np.asarray(wheel.radius, float), np.asarray(wheel.lug_height, float)
         slip_radius = radius + (height if points.slip_radius == 'lug_tip' else 0.0)
-        hub = speed_ratio(points.slip) * slip_radius  # v/w [m]
-        x, w = np.polynomial.legendre.leggauss(_NODES)
-        x, w = (v.reshape(-1, *(1,) * entrance_angle.ndim) for v in (0.5 * (x + 1.0), 0.5 * w))
-        angle = entrance_angle * x
-        cosine, sine = np.cos(angle), np.sin(angle)
-        up, against = stress_maps(angle, np.arctan2(radius * sine, hub - radius * cosine))
-        amount = radius * (cosine - np.cos(entrance_angle)) * (entrance_angle * w * radius)
-        factor = self.scale * _PER_CUBIC_METRE * np.asarray(wheel.width, float)
-        load = np.add.reduce(up * amount)
-        pull = -np.add.reduce(against * amount)
-        torque = radius * np.add.reduce((up * sine - against * cosine) * amount)
-        return factor * load, factor * pull, factor * torque
+        beyond = speed_ratio(points.slip) * slip_radius / radius - 1.0
+        lift, push_back, rub_up, rub_ahead, turn = np.moveaxis(
+            rim_integrals(np.arctan2(beyond, entrance_angle), entrance_angle), -1, 0
+        )
+        factor = self.scale * PER_CUBIC_METRE * np.asarray(wheel.width, float) * radius**2
+        return factor * (lift + rub_up), factor * (rub_ahead - push_back), factor * radius * turn
+
+
+def rim_integrals(motion: FloatArray, entrance_angle: FloatArray) -> FloatArray:
+    """Integrate the generic stress over the leading side of a rim of radius 1 m and width 1 m.
+
+    Parameters
+    ----------
+    motion : numpy.ndarray
+        Angle whose tangent is (v/(r w) - 1) over the entrance angle [rad].
+    entrance_angle : numpy.ndarray
+        [rad].
+
+    Returns
+    -------
+    numpy.ndarray
+        (..., 5): lift of the stress normal to the rim and what it pushes back; lift, push ahead
+        and torque of the tangential stress [N/cm^3].
+    """
+    x, w = np.polynomial.legendre.leggauss(_NODES)
+    motion, whole = (v[..., None] for v in np.broadcast_arrays(motion, entrance_angle))
+    angle = whole * 0.5 * (x + 1.0)
+    cosine, sine = np.cos(angle), np.sin(angle)
+    # Velocity of a plate, ahead and down, both times cos(motion).
+    ahead = np.cos(motion) * (1.0 - cosine) + whole * np.sin(motion)
+    up, against = stress_maps(angle, np.arctan2(np.cos(motion) * sine, ahead))
+    depth = (cosine - np.cos(whole)) * (whole * 0.5 * w)
+    normal, along = (up * cosine + against * sine) * depth, (up * sine - against * cosine) * depth
+    parts = normal * cosine, normal * sine, along * sine, along * cosine, along
+    return np.stack([part.sum(-1) for part in parts], -1)

@@ -9,6 +9,7 @@ from bisect import bisect_left
 from functools import cached_property
 
 from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.estimation.contacts.contact_models import contact_models
 from wheel_terra_estimator.estimation.contacts.wheel_models import WheelModels, WheelState
 from wheel_terra_estimator.estimation.rover import Rover
 
@@ -55,7 +56,7 @@ class UsualSlip:
     @cached_property
     def curve(self) -> tuple[list[float], list[float]]:
         """Pull over load and slip, both increasing, up to the greatest pull."""
-        models, rover = WheelModels(self._configuration), self._rover
+        models, rover = contact_models(self._configuration), self._rover
         pulls: list[float] = []
         slips: list[float] = []
         for slip in _SLIPS:

@@ -21,8 +21,10 @@ from wheel_terra_estimator.estimation.scalars import clipped
 from wheel_terra_estimator.terramechanics.closed_form import coefficients, peak_stresses
 from wheel_terra_estimator.terramechanics.conditioned import SMALLEST_ANGLE, ConditionedForces
 from wheel_terra_estimator.terramechanics.contact import Contact
+from wheel_terra_estimator.terramechanics.effects import EffectSettings
 from wheel_terra_estimator.terramechanics.kinematics import slip_of_speed_ratio
 from wheel_terra_estimator.terramechanics.maths import ScalarMaths
+from wheel_terra_estimator.terramechanics.soil import Soil
 from wheel_terra_estimator.terramechanics.stresses import bearing_law
 from wheel_terra_estimator.terramechanics.terms import Terms, set_angles
 
@@ -32,7 +34,7 @@ _NOT_IN_FILTER = frozenset({'slope_gravity', 'pitch_bias', 'pull_zero', 'pull_ga
 _CONTACT_INPUTS = tuple(f.name for f in fields(Contact) if f.default is MISSING)
 _LEAST_BEARING = 0.05  # of the normal stress's part: cohesion alone carries no wheel
 _Soil = tuple[float, float, float, float]
-_MOST_RATIO = 3.0
+MOST_RATIO = 3.0
 """v/(r w) beyond which the shear is saturated: more changes nothing [-]."""
 _LEAST_SINKAGE = 1e-4  # [m]
 _MOST_SINKAGE = 0.95  # of the radius: the bearing law ends at the hub
@@ -82,12 +84,14 @@ class WheelModels:
     Parameters
     ----------
     configuration : Configuration
-        Soil, wheels, effects.
+        Wheels.
+    soil, effects
+        As the contact law takes them; see `contact_models`.
     """
 
-    def __init__(self, configuration: Configuration) -> None:
-        soil, wheels = configuration.soil, configuration.wheels
-        effects = {k: v for k, v in configuration.effects.items() if k not in _NOT_IN_FILTER}
+    def __init__(self, configuration: Configuration, soil: Soil, effects: EffectSettings) -> None:
+        wheels = configuration.wheels
+        effects = {k: v for k, v in effects.items() if k not in _NOT_IN_FILTER}
         gravity = float(configuration.rover.gravity)
         self._forces = ConditionedForces(
             wheels.wheel, soil, effects, configuration.slip_radius, gravity
@@ -154,7 +158,7 @@ class WheelModels:
         cohesion, friction = self._cohesion * factor, self._tan_friction * factor
         shear_modulus = self._shear_modulus * math.exp(modulus)
         span = self._mound_span
-        within = clipped(ratio, 0.0, _MOST_RATIO)
+        within = clipped(ratio, 0.0, MOST_RATIO)
         high, depth, angle = self._contact(wheel, within, sinkage)
         shift = centroid - mound * high * high
         by_depth = shift / (self._radius[wheel] * math.sin(angle)) if depth == sinkage else 0.0
@@ -188,7 +192,7 @@ class WheelModels:
     def pull(self, wheel: int, state: WheelState) -> float:
         """Return the pull of `forces` alone [N], at half the cost."""
         _, cohesion, friction, shear_modulus = self._soil_under(wheel, state)
-        within = clipped(state.speed_ratio, 0.0, _MOST_RATIO)
+        within = clipped(state.speed_ratio, 0.0, MOST_RATIO)
         high, _, angle = self._contact(wheel, within, state.sinkage)
         return self._forces.forces(
             wheel,
@@ -249,7 +253,7 @@ class WheelModels:
         c, m = self._contacts[wheel], ScalarMaths
         slip = slip_of_speed_ratio(ratio, m)
         c.slip = slip
-        c.velocity_ratio = clipped(ratio, 0.0, _MOST_RATIO) * self._slip_radius[wheel]
+        c.velocity_ratio = clipped(ratio, 0.0, MOST_RATIO) * self._slip_radius[wheel]
         c.normal_load = c.stated_load = load
         c.rim_speed = math.nan
         c.radius = c.shear_radius = c.rim_radius
