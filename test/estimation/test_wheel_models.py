@@ -17,16 +17,33 @@ from wheel_terra_estimator.terramechanics.wheel import Wheel
 KEYS = ['effects.lug_digging.enabled:=true', 'effects.slip_sinkage_exponent.enabled:=true']
 
 
-def rover_with(law):
-    keys = KEYS if law != 'resistive_force' else []
-    return reader.load(
-        ['generic_six_wheel', 'dry_sand_ding2015'], [f'rover.contact_law:={law}', *keys]
-    )
+LEARNED = 'effects.learned_closure'  # as the proposal.yaml of a diagnosis states it
+PROPOSAL = [
+    f'{LEARNED}.enabled:=true',
+    f'{LEARNED}.targets:=[torque, exponent, drawbar_pull]',
+    f'{LEARNED}.features:=[slip, slip, one]',
+    f'{LEARNED}.coefficients:=[0.05, 0.4, -0.03]',
+]
 
 
-@pytest.fixture(scope='module', params=LAWS)
+def rover_with(law, keys):
+    law = f'rover.contact_law:={law}'
+    return reader.load(['generic_six_wheel', 'dry_sand_ding2015'], [law, *keys])
+
+
+@pytest.fixture(
+    scope='module',
+    params=[
+        (LAWS[0], KEYS),
+        (LAWS[1], KEYS),
+        (LAWS[0], PROPOSAL),
+        (LAWS[1], PROPOSAL),
+        (LAWS[2], []),
+    ],
+    ids=lambda param: f'{param[0]}-{len(param[1])}',
+)
 def rover(request):
-    return rover_with(request.param)
+    return rover_with(*request.param)
 
 
 @pytest.fixture(scope='module')
@@ -92,7 +109,7 @@ def test_agrees_with_the_quadrature_at_its_own_steady_state(rover, models, slip)
 
 
 def test_the_default_is_the_closed_form_of_the_configured_soil():
-    rover = rover_with(LAWS[0])
+    rover = rover_with(LAWS[0], KEYS)
     assert reader.load(['generic_six_wheel']).rover.contact_law == LAWS[0]
     wheels = rover.wheels
     plain = ConditionedForces(wheels.wheel, rover.soil, rover.effects, 'lug_tip')
@@ -103,7 +120,7 @@ def test_the_default_is_the_closed_form_of_the_configured_soil():
 
 
 def test_strength_of_the_resistive_force_is_friction_at_the_rim():
-    models = contact_models(rover_with('resistive_force'))
+    models = contact_models(rover_with('resistive_force', []))
     pulls = [forces(models, a=a).pull for a in (-0.5, 0.0, 0.5)]
     torques = [forces(models, a=a).torque for a in (-0.5, 0.0, 0.5)]
     assert pulls[0] < pulls[1] < pulls[2] and torques[0] < torques[1] < torques[2]

@@ -180,16 +180,18 @@ def test_a_proposed_law_is_a_further_file_and_an_integer_may_stand_for_a_number(
 
     node, until = listener
     further = ['--params-file', proposal, '-p', 'rover.mass:=20', '-p', 'use_sim_time:=true']
+    further += ['-p', 'rover.contact_law:=wong_reece']
     start('estimator_node', *ROVER, parameters, *further)
     stuck = hear(node, Bool, f'{NODE}/stuck', latched())
     until(lambda: stuck)
     get = node.create_client(GetParameters, f'{NODE}/get_parameters')
     until(get.service_is_ready)
     law = 'effects.learned_closure'
-    names = [f'{law}.enabled', f'{law}.targets', f'{law}.coefficients']
+    names = [f'{law}.enabled', f'{law}.targets', f'{law}.coefficients', 'rover.contact_law']
     future = get.call_async(GetParameters.Request(names=names))
     until(future.done)
-    enabled, targets, coefficients = future.result().values
+    enabled, targets, coefficients, contact_law = future.result().values
     assert enabled.bool_value
     assert list(targets.string_array_value) == ['torque', 'exponent']
     assert list(coefficients.double_array_value) == [0.05, 0.4]
+    assert contact_law.string_value == 'wong_reece'
