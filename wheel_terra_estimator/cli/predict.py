@@ -55,6 +55,13 @@ MOST_POINTS = 100_000
 INPUTS = (*INPUT_UNITS, 'leaving_angle')
 OUTPUTS = ('sinkage', 'drawbar_pull', 'torque')
 SIDEWAYS = 'lateral_force'  # beside them where a wheel slides sideways
+CURVES = {
+    'normal_load': '{:g} N',
+    'slope': 'slope {:g} rad',
+    'slip_angle': 'slip angle {:.3g} rad',
+    'slip': 'slip {:g}',
+}
+"""How a picture names its curves, by what they are not drawn over."""
 ANGLES = ('entrance_angle', 'peak_stress_angle', 'leaving_angle')
 PICTURES = ('.png', '.svg', '.pdf')
 
@@ -452,16 +459,24 @@ def _draw(columns: Mapping[str, FloatArray], path: Path, title: str) -> None:
     if SIDEWAYS in columns:
         labels.append(('lateral force [N]', 1.0))
         names.append(SIDEWAYS)
+    # Over the slip or, where there is but one, over what else varies.
+    varied = [
+        name
+        for name in ('slip', 'slip_angle', *CURVES)
+        if name in columns and np.ptp(columns[name])
+    ]
+    across = varied[0] if varied else 'slip'
     with picture_style():
         figure = Figure(figsize=(3.2 * len(names), 3.4))
         axes = figure.subplots(1, len(names))
-        for index, (label, rows) in enumerate(_groups(columns)):
-            order = np.argsort(rows['slip'], kind='stable')
-            colour = LINE_COLOURS[index % len(LINE_COLOURS)]
+        for index, (label, rows) in enumerate(_groups(columns, across)):
+            order = np.argsort(rows[across], kind='stable')
+            colour, marker = LINE_COLOURS[index % len(LINE_COLOURS)], '' if len(order) > 1 else 'o'
             for axis, name, (_, scale) in zip(axes, names, labels, strict=True):
-                axis.plot(rows['slip'][order], scale * rows[name][order], color=colour, label=label)
+                x, y = rows[across][order], scale * rows[name][order]
+                axis.plot(x, y, marker=marker, color=colour, label=label)
         for axis, (text, _) in zip(axes, labels, strict=True):
-            axis.set_xlabel('slip [-]')
+            axis.set_xlabel(f'{across.replace("_", " ")} [{unit_of(across)}]')
             axis.set_ylabel(text)
         axes[0].invert_yaxis()
         axes[0].legend()
@@ -496,14 +511,15 @@ def _draw_climb(columns: Mapping[str, FloatArray], path: Path, title: str) -> No
         figure.savefig(path, dpi=110)
 
 
-def _groups(columns: Mapping[str, FloatArray]) -> Sequence[tuple[str, Mapping[str, FloatArray]]]:
-    """Split the rows into one curve per combination of load, slope and slip angle."""
-    aside = columns.get('slip_angle', np.zeros_like(columns['slip']))
-    keys = np.stack([columns['normal_load'], columns['slope'], aside], axis=1)
+def _groups(
+    columns: Mapping[str, FloatArray], across: str
+) -> Sequence[tuple[str, Mapping[str, FloatArray]]]:
+    """Split the rows into one curve over `across` per combination of the other inputs."""
+    names = [name for name in CURVES if name in columns and name != across and columns[name].any()]
+    keys = np.stack([columns[name] for name in names], axis=1)
     found = []
-    for load, slope, angle in np.unique(keys, axis=0):
-        rows = (keys == (load, slope, angle)).all(axis=1)
-        label = f'{load:g} N' + (f', slope {slope:g} rad' if np.ptp(keys[:, 1]) else '')
-        label += f', slip angle {angle:.3g} rad' if aside.any() else ''
-        found.append((label, {name: values[rows] for name, values in columns.items()}))
+    for values in np.unique(keys, axis=0):
+        rows = (keys == values).all(axis=1)
+        label = ', '.join(CURVES[name].format(v) for name, v in zip(names, values, strict=True))
+        found.append((label, {name: column[rows] for name, column in columns.items()}))
     return found
