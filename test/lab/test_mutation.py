@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Tests of a mutant run on the mutated copy, not on what the study itself has imported."""
+"""Tests of a mutant run on the mutated copy; only a test that fails because of it catches it."""
 
 from __future__ import annotations
 
@@ -11,20 +11,44 @@ import pytest
 from wheel_terra_lab.studies.mutation import PACKAGE, Mutant, verdict
 
 TEXT = 'HALF = 1 / 2\n'
+TEST = """import pytest
+
+from {package}.errors import HALF
 
 
-@pytest.mark.parametrize(('asked', 'said'), [('== 0.5', 'caught'), ('> 0.0', 'survived')])
-def test_a_mutant_is_caught_by_a_test_that_fails_on_it(
-    tmp_path: Path, asked: str, said: str
+@pytest.fixture
+def sound():
+    assert {fixture}
+
+
+def test_half(sound):
+    assert {asked}
+"""
+
+
+@pytest.mark.parametrize(
+    ('asked', 'fixture', 'file', 'said'),
+    [
+        ('HALF == 0.5', 'True', 'test_half.py', 'caught'),
+        ('HALF > 0.0', 'True', 'test_half.py', 'survived'),
+        ('HALF == 0.7', 'True', 'test_half.py', 'error'),  # fails without the mutant, too
+        ('True', 'HALF == 0.5', 'test_half.py', 'error'),  # no test of its own failed
+        ('True', 'True', 'test_import.py', 'error'),
+        ('True', 'True', 'test_gone.py', 'error'),
+    ],
+)
+def test_a_mutant_is_caught_by_a_test_that_fails_because_of_it(
+    tmp_path: Path, asked: str, fixture: str, file: str, said: str
 ) -> None:
-    file = tmp_path / PACKAGE / 'errors.py'  # a module that the study has loaded itself
-    file.parent.mkdir()
-    (file.parent / '__init__.py').write_text('')
-    file.write_text(TEXT)
-    test = f'from {PACKAGE}.errors import HALF\n\n\ndef test_half():\n    assert HALF {asked}\n'
+    module = tmp_path / PACKAGE / 'errors.py'  # a module that the study has loaded itself
+    module.parent.mkdir()
+    (module.parent / '__init__.py').write_text('')
+    module.write_text(TEXT)
+    test = TEST.format(asked=asked, fixture=fixture, package=PACKAGE)
     (tmp_path / 'test_half.py').write_text(test)
+    (tmp_path / 'test_import.py').write_text('import nothing_of_this_name')
     (tmp_path / 'pytest.ini').write_text('[pytest]\n')
     at = TEXT.index('/')
     mutant = Mutant(f'{PACKAGE}/errors.py', 1, 'sign', at, at + 1, '/', '*')
-    assert verdict(mutant, tmp_path, ['test_half.py']) == said
-    assert file.read_text() == TEXT
+    assert verdict(mutant, tmp_path, [file]) == said
+    assert module.read_text() == TEXT

@@ -9,8 +9,10 @@
 Each mutant is made in a copy of the package, and on the copy run those tests that call the mutated
 function (any function of the file, where it stands outside of one), the cheapest first, until one
 fails or `TESTS_LIMIT` seconds of tests are spent. Mutants are spread over the files by their number
-of places; the same seed gives the same ones. `again` judges the survivors once more, after tests
-were added (make a new map before).
+of places; the same seed gives the same ones. Caught is what makes a test fail that passes without
+it, or hangs; what ends the run otherwise (an import that breaks, a fixture, a test that is gone)
+is an error, counted apart. `again` judges all but the caught once more, after tests were added
+(make a new map before).
 """
 
 from __future__ import annotations
@@ -24,6 +26,7 @@ import py_compile
 import random
 import resource
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -63,7 +66,7 @@ PYTEST = (sys.executable, '-m', 'pytest', '-q', '-n', '0')
 _COMPARISONS = {'<': '>=', '<=': '>', '>': '<=', '>=': '<', '==': '!=', '!=': '=='}
 _SIGNS = {'+': '-', '-': '+', '*': '/', '/': '*', '**': '*'}
 _LOGIC = {'and': 'or', 'or': 'and'}
-_CAUGHT, _SURVIVED = 'caught', 'survived'
+_CAUGHT, _SURVIVED, _ERROR = 'caught', 'survived', 'error'
 _KEY = ('file', 'start', 'new', 'test')
 
 
@@ -260,27 +263,55 @@ def verdict(mutant: Mutant, copy: Path, tests: list[str]) -> str:
     text = target.read_text(encoding='utf-8')  # of the copy: ROOT may be edited meanwhile
     target.write_text(text[: mutant.start] + mutant.new + text[mutant.end :], encoding='utf-8')
     try:
-        child = os.fork()  # the libraries are there already
-        if child == 0:
-            _run_tests(copy, tests)
-        return _SURVIVED if os.waitpid(child, 0)[1] == 0 else _CAUGHT
+        status, failed = _forked(copy, tests)
     finally:
         target.write_text(text, encoding='utf-8')
+    if status == -signal.SIGXCPU:
+        return _CAUGHT
+    if status == pytest.ExitCode.OK:
+        return _SURVIVED
+    sound = status == pytest.ExitCode.TESTS_FAILED and failed
+    return _CAUGHT if sound and _forked(copy, [failed])[0] == pytest.ExitCode.OK else _ERROR
 
 
-def _run_tests(copy: Path, tests: list[str]) -> None:
+def _forked(copy: Path, tests: list[str]) -> tuple[int, str]:
+    """Run tests on the copy: status of pytest (or minus a signal), and the test that failed."""
+    outcome, told = os.pipe()
+    child = os.fork()  # the libraries are there already
+    if child == 0:
+        _run_tests(copy, tests, told)
+    os.close(told)
+    with os.fdopen(outcome) as stream:
+        failed = stream.read()
+    return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), failed
+
+
+class _Failure:
+    """Plugin of pytest: tells the test whose own lines failed, not its fixtures."""
+
+    def __init__(self, told: int) -> None:
+        self._told = told
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        if report.failed and report.when == 'call':
+            os.write(self._told, report.nodeid.encode())
+
+
+def _run_tests(copy: Path, tests: list[str], told: int) -> None:
     """Run tests on the copy and end the process with their status."""
-    status = 1
+    status = int(pytest.ExitCode.INTERNAL_ERROR)
     try:
-        resource.setrlimit(resource.RLIMIT_CPU, (TIME_LIMIT, TIME_LIMIT))
+        resource.setrlimit(resource.RLIMIT_CPU, (TIME_LIMIT, TIME_LIMIT + 1))
         os.chdir(copy)
+        sys.dont_write_bytecode = True  # of a mutant: it could be taken for the mended file
         sys.path.insert(0, str(copy))
         for name in [n for n in sys.modules if n.partition('.')[0] in OURS]:
             del sys.modules[name]  # what this study needs of them: the tests take the copy's
         nowhere = os.open(os.devnull, os.O_RDWR)
         for stream in (0, 1, 2):
             os.dup2(nowhere, stream)
-        status = int(pytest.main(['-q', '-x', '-p', 'no:cacheprovider', *tests]))
+        words = ['-q', '-x', '-p', 'no:cacheprovider', *tests]
+        status = int(pytest.main(words, plugins=[_Failure(told)]))
     finally:
         os._exit(status)
 
@@ -293,17 +324,17 @@ def run(arguments: argparse.Namespace) -> None:
 
 
 def again(arguments: argparse.Namespace) -> None:
-    """Judge the survivors of a file once more; what is caught now is noted as caught."""
+    """Judge what a file has not as caught once more; the later verdict counts."""
     rows = list(_read(arguments.file))
     fields = Mutant.__dataclass_fields__
     survivors = [
-        Mutant(**{key: row[key] for key in fields}) for row in rows if row['verdict'] == _SURVIVED
+        Mutant(**{key: row[key] for key in fields}) for row in rows if row['verdict'] != _CAUGHT
     ]
     for mutant in survivors:
         text = (ROOT / mutant.file).read_text(encoding='utf-8')
         if text[mutant.start : mutant.end] != mutant.old:
             sys.exit(f'{mutant.file} has changed since; run it anew')
-    judge(survivors, arguments)  # the later verdict counts
+    judge(survivors, arguments)
 
 
 def judge(mutants: list[Mutant], arguments: argparse.Namespace) -> None:
@@ -320,7 +351,8 @@ def judge(mutants: list[Mutant], arguments: argparse.Namespace) -> None:
         _link_neighbours(Path(folder))
         # By content, not by time: a mutant is written and mended within a second.
         mode = py_compile.PycInvalidationMode.CHECKED_HASH
-        compileall.compile_dir(copy / PACKAGE, quiet=1, invalidation_mode=mode)
+        for package in OURS:
+            compileall.compile_dir(copy / package, quiet=1, invalidation_mode=mode)
         for number, mutant in enumerate(mutants, 1):
             row = {**asdict(mutant), 'verdict': verdict(mutant, copy, call_map.tests(mutant))}
             results.add(row)
@@ -335,8 +367,9 @@ def _link_neighbours(folder: Path) -> None:
 
 
 def show(arguments: argparse.Namespace) -> None:
-    """Print the share caught by folder and kind, and the survivors."""
-    rows = list(_read(arguments.file))
+    """Print the share caught by folder and kind, the survivors, the errors."""
+    everything = list(_read(arguments.file))
+    rows = [row for row in everything if row['verdict'] != _ERROR]
     for name, key in (
         ('folder', lambda r: Path(r['file']).parts[1]),
         ('kind', lambda r: r['kind']),
@@ -347,7 +380,13 @@ def show(arguments: argparse.Namespace) -> None:
     survivors = [row for row in rows if row['verdict'] == _SURVIVED]
     share = 1.0 - len(survivors) / max(len(rows), 1)
     print(f'caught: {share:.0%} of {len(rows)}; survivors:')
-    for row in sorted(survivors, key=lambda r: (r['file'], r['line'])):
+    _list(survivors)
+    print(f'errors, not counted: {len(everything) - len(rows)}')
+    _list([row for row in everything if row['verdict'] == _ERROR])
+
+
+def _list(rows: list[dict[str, Any]]) -> None:
+    for row in sorted(rows, key=lambda r: (r['file'], r['line'])):
         print(f'  {_words(row)}')
 
 
@@ -372,14 +411,14 @@ def main() -> None:
     runs.add_argument('--count', type=int, default=240)
     runs.add_argument('--seed', type=int, default=1)
     runs.set_defaults(command=run)
-    repeats = commands.add_parser('again', help='judge the survivors once more')
+    repeats = commands.add_parser('again', help='judge what is not caught once more')
     repeats.set_defaults(command=again)
     for command in (maps, runs, repeats):
         command.add_argument('file', type=Path)
         command.add_argument('--folders', nargs='+', default=list(FOLDERS))
     for command in (runs, repeats):
         command.add_argument('--map', type=Path, required=True, help='file that `map` wrote')
-    shows = commands.add_parser('show', help='share caught, and survivors')
+    shows = commands.add_parser('show', help='share caught, survivors, errors')
     shows.add_argument('file', type=Path)
     shows.set_defaults(command=show)
     arguments = parser.parse_args()
