@@ -17,6 +17,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from math import isnan
 from typing import NamedTuple
 
@@ -204,7 +205,8 @@ class SidewaysMotion(Component[SidewaysState]):
         var_across = var_forward * sine**2 + var_aside * cosine**2
         angle = np.arctan2(across, along)
         angle_std = _angle_std(along, across, np.sqrt(var_along), np.sqrt(var_across))
-        forces = np.array(wheel_forces(rover, given, velocity, tuning))
+        contacts = _contacts(rover, given, tuning)
+        forces = np.array(_wheel_forces(contacts, velocity, rover.rest_speed, given.shear_modulus))
         _, std = _felt_force(rover, given, tuning)
         loads = np.array(given.loads)
         shared = std * loads / max(float(loads.sum()), 1e-9)
@@ -241,30 +243,56 @@ def _floats(values: FloatArray) -> Floats:
     return tuple(values.tolist())
 
 
-def wheel_forces(
-    rover: SidewaysRover, given: SidewaysInputs, lateral: float, tuning: SidewaysTuning
-) -> list[float]:
-    """Return the lateral force of each wheel, positive left [N], at a lateral speed [m/s]."""
+class _Contact(NamedTuple):
+    """A wheel, its motion but for the lateral speed of the body, and its soil."""
+
+    sine: float  # of the steering angle
+    cosine: float
+    forward: float  # speed of the hub along x of the body [m/s]
+    turning: float  # its speed along y by the yaw rate [m/s]
+    rim: float  # [m/s], nan = unknown
+    radius: float  # [m]
+    swept: float  # by the rim since the soil met it [rad]
+    covered: float  # by the hub, over the radius
+    strength: float  # greatest force [N]
+
+
+def _contacts(
+    rover: SidewaysRover, given: SidewaysInputs, tuning: SidewaysTuning
+) -> list[_Contact]:
     found = []
     for i, (rim, angle, load) in enumerate(
         zip(given.rims, given.steering, given.loads, strict=True)
     ):
-        sine, cosine = math.sin(angle), math.cos(angle)
+        radius = rover.radius[i]
+        depth = min(max(given.sinkage[i], 1e-4) / radius, 1.0)
+        entry = math.acos(1.0 - depth)
+        swept = tuning.contact_share * entry
+        covered = math.sin(entry) - math.sin(entry - swept)
+        strength = given.tan_friction * load
+        strength += given.cohesion * rover.width[i] * radius * entry
         forward = given.speed - given.yaw_rate * rover.lateral[i]
-        aside = lateral + given.yaw_rate * rover.longitudinal[i]
+        turning = given.yaw_rate * rover.longitudinal[i]
+        sine, cosine = math.sin(angle), math.cos(angle)
+        found.append(
+            _Contact(sine, cosine, forward, turning, rim, radius, swept, covered, strength)
+        )
+    return found
+
+
+def _wheel_forces(
+    contacts: Sequence[_Contact], lateral: float, rest_speed: float, shear_modulus: float
+) -> list[float]:
+    """Return the lateral force of each wheel, positive left [N], at a lateral speed [m/s]."""
+    found = []
+    for sine, cosine, forward, turning, rim, radius, swept, covered, strength in contacts:
+        aside = lateral + turning
         along, across = forward * cosine + aside * sine, aside * cosine - forward * sine
         turned = along if isnan(rim) else rim
-        fastest = max(abs(turned), math.hypot(along, across), rover.rest_speed)
-        depth = min(max(given.sinkage[i], 1e-4) / rover.radius[i], 1.0)
-        entry = math.acos(1.0 - depth)
-        swept = tuning.contact_share * entry  # by the rim since the soil met it
-        covered = math.sin(entry) - math.sin(entry - swept)  # by the hub, over the radius
-        scale = rover.radius[i] / fastest
+        scale = radius / max(abs(turned), math.hypot(along, across), rest_speed)
         back, aside = scale * (turned * swept - along * covered), scale * across * swept
         displacement = max(math.hypot(back, aside), 1e-12)
-        strength = given.tan_friction * load
-        strength += given.cohesion * rover.width[i] * rover.radius[i] * entry
-        share = -math.expm1(-displacement / given.shear_modulus)
+        share = -math.expm1(-displacement / shear_modulus)
         found.append(-strength * share * aside / displacement)
     return found
 
@@ -275,11 +303,12 @@ def model_speed(
     """Return the lateral speed of the body by forces alone [m/s], and its variance."""
     from scipy.optimize import brentq  # late: messages and help ask only for the types above
 
-    cosine = [math.cos(angle) for angle in given.steering]
+    contacts = _contacts(rover, given, tuning)
 
+    @cache  # each bracket is asked for four times
     def total(lateral: float) -> float:
-        forces = wheel_forces(rover, given, lateral, tuning)
-        return sum(f * c for f, c in zip(forces, cosine, strict=True))
+        forces = _wheel_forces(contacts, lateral, rover.rest_speed, given.shear_modulus)
+        return sum(f * contact.cosine for f, contact in zip(forces, contacts, strict=True))
 
     pace = _pace(rover, given)
     felt, felt_std = _felt_force(rover, given, tuning)
