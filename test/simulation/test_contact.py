@@ -4,11 +4,15 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from wheel_terra_estimator.simulation.contact import ContactModel, SoilForces
+from wheel_terra_estimator.simulation.contact_laws import contact_of
 from wheel_terra_estimator.simulation.terrain import SOIL_QUANTITIES
+from wheel_terra_estimator.terramechanics.contact_law import LAWS, contact_law
 from wheel_terra_estimator.terramechanics.model import WheelSoilModel
 from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
 from wheel_terra_estimator.terramechanics.soil import Soil
@@ -134,3 +138,28 @@ def test_bad_geometry_and_effects_are_refused() -> None:
     wheel = Wheel(np.array([0.2]), np.array([0.1]))
     with pytest.raises(ValueError, match='not in the catalogue'):
         ContactModel(wheel, SOIL, wheel.radius, {'magic': {}}, 9.81)
+
+
+@pytest.mark.parametrize('law', LAWS)
+def test_the_ground_of_each_contact_law_is_that_law(law: str) -> None:
+    random = np.random.default_rng(9)
+    count = 60
+    radius = random.uniform(0.08, 0.25, count)
+    wheel = Wheel(radius=radius, width=np.full(count, 0.12))
+    slip = random.uniform(-0.4, 0.9, count)
+    load = 6e3 * radius * 0.12 * random.uniform(0.5, 1.5, count)
+    steady = contact_law(law, SOIL, {}, 0.12).steady_state(OperatingPoints(slip, load, wheel))
+    rover = SimpleNamespace(contact_law=law, gravity=9.80665)
+    wheels = SimpleNamespace(wheel=wheel, width=wheel.width, slip_radius=radius)
+    ground = contact_of(SimpleNamespace(wheels=wheels, soil=SOIL, effects={}, rover=rover))
+    forces = answer(ground, steady.sinkage, slip, load)
+    # The closed form of the default law is within 1 % of the load.
+    tolerance = 0.01 if law == LAWS[0] else 2e-3
+    np.testing.assert_allclose(forces.support_ratio, 1.0, atol=2.0 * tolerance)
+    np.testing.assert_allclose(forces.pull / load, steady.drawbar_pull / load, atol=tolerance)
+    arm = load * radius
+    np.testing.assert_allclose(forces.torque / arm, steady.torque / arm, atol=tolerance)
+    sideways = answer(ground, steady.sinkage, slip, load, side_slip=0.2)
+    assert (sideways.side_force > 0.0).all()
+    firm = answer(ground, steady.sinkage, slip, load, stiffness=2.0)
+    np.testing.assert_allclose(firm.support_ratio, 0.5 * forces.support_ratio, rtol=0.05)

@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.simulation.commands import Command
-from wheel_terra_estimator.simulation.contact import ContactModel, SoilForces
+from wheel_terra_estimator.simulation.contact import SoilForces
+from wheel_terra_estimator.simulation.contact_laws import contact_of
 from wheel_terra_estimator.simulation.contact_memory import ContactMemory, Shear
 from wheel_terra_estimator.simulation.drives import Drives
 from wheel_terra_estimator.simulation.steering import SteeringDrives
@@ -101,13 +102,7 @@ class RoverPlant:
         self._drives = drives
         self._gravity, self._mass = rover.gravity, rover.mass
         self._rest_speed = configuration.rest_speed
-        self._contact = ContactModel(
-            wheels.wheel,
-            configuration.soil,
-            wheels.slip_radius,
-            configuration.effects,
-            rover.gravity,
-        )
+        self._contact = contact_of(configuration)
         self._memory = ContactMemory(wheels.wheel, wheels.slip_radius, dig_efficiency)
         self._suspension: Suspension = suspension_of(configuration)
         length = float(np.ptp(wheels.x)) + 2.0 * float(wheels.radius.max())
