@@ -54,3 +54,24 @@ def test_what_compare_refuses(tmp_path, capsys):
     (tmp_path / 'aside.csv').write_text('\n'.join(aside) + '\n')
     assert main(['compare', '--laws', str(tmp_path / 'aside.csv'), *ROVER]) == 2
     assert 'without slip angle' in capsys.readouterr().err
+
+
+def test_diagnose_says_what_another_law_leaves(tmp_path, capsys):
+    path = table(tmp_path / 'rows.csv', 'resistive_force')
+    assert main(['diagnose', path, *ROVER, '-o', str(tmp_path / 'out')]) == 0
+    said = capsys.readouterr().out
+    report = json.loads((tmp_path / 'out' / 'report.json').read_text())
+    assert report['verdict'] != 'agrees'
+    found = report['contact_laws']
+    assert list(found) == ['wong_reece', 'resistive_force']
+    # The rows are those of the law; the others, with all their numbers free, come not as near.
+    assert found['resistive_force']['misfit'] < 0.7 * found['wong_reece']['misfit'] < 0.7
+    assert found['resistive_force']['log_evidence'] > 5.0
+    line = next(row for row in said.splitlines() if 'Contact law' in row).strip()
+    assert f'resistive_force leaves {found["resistive_force"]["misfit"]:.2f}' in line
+    assert line in (tmp_path / 'out' / 'report.html').read_text()
+    # On rows of the model itself nothing is missing, and no law is told.
+    path = table(tmp_path / 'own.csv', 'bekker_wong_janosi')
+    assert main(['diagnose', path, *ROVER, '--no-pictures', '-o', str(tmp_path / 'own')]) == 0
+    assert 'Contact law' not in capsys.readouterr().out
+    assert json.loads((tmp_path / 'own' / 'report.json').read_text())['contact_laws'] == {}

@@ -16,6 +16,7 @@ from scipy.special import gammaln
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.configuration.readings import Readings
 from wheel_terra_estimator.discrepancy.fitting.coordinates import Coordinate
+from wheel_terra_estimator.discrepancy.result import Diagnosis, OtherLaw
 from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES, SteadyTable
 from wheel_terra_estimator.discrepancy.workflow import nuisance_coordinates, operating_points
 from wheel_terra_estimator.errors import UserError
@@ -77,17 +78,46 @@ def rank_laws(table: SteadyTable, configuration: Configuration) -> list[RankedLa
     UserError
         If fewer than four rows are without slip angle, or the wheel is stated nowhere.
     """
-    aside = np.nan_to_num(table.columns.get('slip_angle', np.zeros(len(table))))
-    table = table.select(np.abs(aside) <= STRAIGHT)
+    table = _straight(table)
     if len(table) < _FEWEST_ROWS:
         raise UserError(
             f'{table.name}: {len(table)} rows without slip angle; the laws are compared on '
             f'{_FEWEST_ROWS} or more'
         )
-    columns = {k: v for k, v in table.columns.items() if k != 'slip_angle'}
-    table = replace(table, columns=columns)
     fits = [_Fit(name, table, configuration) for name in LAWS]
     return sorted((fit.ranked() for fit in fits), key=lambda law: -law.log_evidence)
+
+
+def _straight(table: SteadyTable) -> SteadyTable:
+    """Return the rows without slip angle."""
+    aside = np.nan_to_num(table.columns.get('slip_angle', np.zeros(len(table))))
+    table = table.select(np.abs(aside) <= STRAIGHT)
+    columns = {k: v for k, v in table.columns.items() if k != 'slip_angle'}
+    return replace(table, columns=columns)
+
+
+def with_other_laws(diagnosis: Diagnosis) -> Diagnosis:
+    """Return a diagnosis that says what each other law leaves of its table, no effect added.
+
+    Nothing where the model agrees, or fewer than four rows are without slip angle.
+    """
+    table = _straight(diagnosis.table)
+    if diagnosis.verdict == 'agrees' or len(table) < _FEWEST_ROWS:
+        return diagnosis
+    everything = np.ones(len(table), bool)
+    evidence, misfit = {}, {}
+    for law in LAWS:
+        fit = _Fit(law, table, diagnosis.configuration)
+        u, jacobian, size = fit.fit(everything)
+        evidence[law] = fit.log_evidence(u, jacobian, size)
+        left = (fit.measured - fit.outputs(u)) / fit.usual
+        misfit[law] = float(np.sqrt(np.nanmean(left**2)))
+    own = LAWS[0]
+    found = {
+        law: OtherLaw(evidence[law] - evidence[own], misfit[law] / max(misfit[own], 1e-12))
+        for law in LAWS[1:]
+    }
+    return replace(diagnosis, contact_laws=found)
 
 
 class _Fit:
@@ -142,7 +172,7 @@ class _Fit:
         return RankedLaw(
             self.name,
             len(u),
-            self._log_evidence(u, jacobian, misfit),
+            self.log_evidence(u, jacobian, misfit),
             found,
             self.errors(lambda rows: self.fit(~rows)[0], by_load),
             self.errors(lambda rows: self.fit(~rows)[0], _wheels(self.points)),
@@ -181,7 +211,7 @@ class _Fit:
             misfit = np.sqrt((self.usual**2 + (left**2).sum(axis=0)) / (1.0 + known.sum(axis=0)))
         return u, jacobian, misfit
 
-    def _log_evidence(self, u: FloatArray, jacobian: FloatArray, misfit: FloatArray) -> float:
+    def log_evidence(self, u: FloatArray, jacobian: FloatArray, misfit: FloatArray) -> float:
         """Laplace's method; each quantity's misfit is integrated out (Student's t of all cells)."""
         count = np.isfinite(self.measured).sum(axis=0)
         square = (1.0 + count) * misfit**2  # of the prior's cell and the others

@@ -14,7 +14,7 @@ import numpy as np
 from wheel_terra_estimator.discrepancy.numbers import SHOWN, amount, number, percent
 from wheel_terra_estimator.discrepancy.report import pictures as pictures
 from wheel_terra_estimator.discrepancy.report.model_file import corrected
-from wheel_terra_estimator.discrepancy.report.words import in_words, soil_line
+from wheel_terra_estimator.discrepancy.report.words import in_words, law_line, soil_line
 from wheel_terra_estimator.discrepancy.result import Diagnosis, FittedParameter, NextMeasurement
 from wheel_terra_estimator.discrepancy.selection.remainder import FARTHEST_PULL
 from wheel_terra_estimator.reporting.html import picture, render, write_page
@@ -71,6 +71,7 @@ def write_report(diagnosis: Diagnosis, folder: str | Path) -> Path:
         sources=[(pictures.words(name), known[name].source) for name in used if name in known],
         sentence=diagnosis.sentence.replace('+-', '±'),
         soil_line=soil_line(diagnosis),
+        law_line=law_line(diagnosis),
         where=_where(diagnosis),
         soil_words=SOIL_WORDS,
         far=FARTHEST_PULL,

@@ -137,6 +137,15 @@ def soil_line(diagnosis: Diagnosis) -> str:
     return f'{_farthest(diagnosis.moved)}; deviations of the soil from: {sources}.'
 
 
+def law_line(diagnosis: Diagnosis) -> str:
+    """Return what the other contact laws leave of the table; empty where they were not fitted."""
+    found = [
+        f'{name} leaves {number(law.misfit, 2)} of the misfit ({law.log_evidence:+.1f} ln evidence)'
+        for name, law in diagnosis.contact_laws.items()
+    ]
+    return f'Contact law, soil refitted and no effect added: {", ".join(found)}' if found else ''
+
+
 def _farthest(shifts: Iterable[SoilShift]) -> str:
     return f'Number that moved most: {moved(max(shifts, key=lambda shift: abs(shift.pull)))}'
 
