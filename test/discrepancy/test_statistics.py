@@ -429,6 +429,9 @@ def test_an_error_that_a_good_model_may_have_is_smaller_than_one_that_asks_for_a
     allowed = [floor for floor in floors if not floor.unexplained]
     everywhere = [f for f in floors if f.unexplained and len(set(f.amplitude)) == 1]
     assert max(f.largest for f in allowed) < min(f.largest for f in everywhere)
+    # In all quantities, in sinkage or pull or torque alone, or in all but sinkage.
+    misfits = {tuple(np.flatnonzero(f.amplitude).tolist()) for f in floors if f.unexplained}
+    assert misfits == {(0, 1, 2, 3), (0,), (1,), (2,), (1, 2, 3)}
     # Whatever the user allows, the priors are probabilities.
     for greatest in (None, 0.0, 0.02, 0.2):
         total = sum(np.exp(floor.log_prior) for floor in default_floors(greatest))

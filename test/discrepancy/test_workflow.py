@@ -8,12 +8,14 @@ import dataclasses
 import functools
 import json
 import re
+from collections import Counter
 
 import numpy as np
 import pytest
 
 from wheel_terra_estimator.cli.main import main
 from wheel_terra_estimator.configuration import reader
+from wheel_terra_estimator.discrepancy.assessment import next_measurement
 from wheel_terra_estimator.discrepancy.report.model_file import write_model
 from wheel_terra_estimator.discrepancy.selection.weights import log_prior
 from wheel_terra_estimator.discrepancy.tables.checks import check_table
@@ -264,6 +266,14 @@ def test_next_measurement_would_part_the_rivals(same_lugs):
     best = max((p for p in proposals if p.rows), key=lambda p: p.distance_then)
     assert 'lugs' in best.what  # none at all, or higher ones: the load they carry or the sensor
     assert best.distance_then > 2.0 * best.distance_now
+
+
+def test_three_measurements_are_proposed_however_many_are_worth_it(monkeypatch):
+    for limit in ('_WORTH', '_MORE'):
+        monkeypatch.setattr(next_measurement, limit, 0.0)
+    table, values, *_ = make('sweep40', ('lug_support',), 1.5)
+    proposals = run(table, values).next_measurement
+    assert set(Counter(p.separates for p in proposals if p.rows).values()) == {3}
 
 
 def test_where_the_verdict_is_open_the_soil_goes_where_the_rows_pull_it():

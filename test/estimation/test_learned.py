@@ -74,6 +74,10 @@ def test_soil_is_that_of_the_topic_and_its_deviations_hold_elsewhere(drive, driv
     assert learned[deviation(key)] >= 0.999 * std[key]  # the moduli: no more than stated before
     assert std[key] < 0.9 * start[key]  # something was learned
     phi = np.radians(last[key])
+    configured = drive.configuration.soil  # cohesion and tangent are scaled by one factor
+    scale = np.tan(phi) / np.tan(float(configured.friction_angle))
+    assert last['soil.cohesion'] == pytest.approx(scale * float(configured.cohesion))
+    assert abs(scale - 1.0) > 0.01
     of_tangent = np.radians(learned[deviation(key)]) / (np.sin(phi) * np.cos(phi))
     assert 0.1 <= of_tangent <= 0.2  # sand from place to place: 12 %
 

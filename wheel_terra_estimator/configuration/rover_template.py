@@ -32,7 +32,7 @@ class RoverSketch:
     y: Sequence[float]  # [m]
     z: Sequence[float]  # [m]
     mass: float  # [kg]
-    centre_of_gravity: Sequence[float] = (0.0, 0.0, 0.0)  # [m]
+    centre_of_gravity: Sequence[float]  # [m]
     direction: Sequence[int] = ()
     steering_joints: Sequence[str] = ()  # that steer each wheel, '' = not steered
     guessed: frozenset[str] = field(default_factory=frozenset)

@@ -3,6 +3,7 @@
 """Stuck warning on made-up courses of slip: early where it digs, silent where it does not."""
 
 import math
+import re
 
 import pytest
 
@@ -355,8 +356,9 @@ def test_the_words_say_what_is_seen_and_what_to_do():
         speed = 0.05 * (1.0 - slip)
         found.append(judge(monitor, 0.1 * i, speed, True, wheels))
     reason = next(a.reason for a in found if a.stuck)
-    assert 'median slip 0.' in reason and '% likely, most wheels sink ' in reason
-    assert reason.endswith(' cm per metre of rim travel; stop, back out')
+    assert 'median slip 0.' in reason
+    # 4 cm per metre, approached from below.
+    assert re.search(r'% likely, most wheels sink [34] cm per metre of rim travel; stop, ', reason)
     # Nothing is said of what is not known, and no number of nothing.
     plain = next(a.reason for a in course([[wheel(0.95)] * 6] * 100) if a.stuck)
     assert plain.endswith('; stop, back out')
