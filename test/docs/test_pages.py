@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -30,6 +31,13 @@ def entries(tree: Any, depth: int = 0) -> Iterator[tuple[str, int]]:
     else:
         for item in tree.values():
             yield from entries(item, depth + 1)
+
+
+def test_notebooks_are_kept_without_output():
+    assert len(NOTEBOOKS) == 4
+    for path in DOCS.rglob('*.ipynb'):
+        cells = json.loads(path.read_text(encoding='utf-8'))['cells']
+        assert not any(cell.get('outputs') for cell in cells), path.name
 
 
 def test_every_page_is_within_two_clicks():

@@ -276,28 +276,27 @@ def verdict(mutant: Mutant, copy: Path, tests: list[str]) -> str:
 
 def _forked(copy: Path, tests: list[str]) -> tuple[int, str]:
     """Run tests on the copy: status of pytest (or minus a signal), and the test that failed."""
-    outcome, told = os.pipe()
+    note = copy / 'failed_test'
+    note.unlink(missing_ok=True)
     child = os.fork()  # the libraries are there already
     if child == 0:
-        _run_tests(copy, tests, told)
-    os.close(told)
-    with os.fdopen(outcome) as stream:
-        failed = stream.read()
-    return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), failed
+        _run_tests(copy, tests, note)
+    status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+    return status, note.read_text(encoding='utf-8') if note.exists() else ''
 
 
 class _Failure:
-    """Plugin of pytest: tells the test whose own lines failed, not its fixtures."""
+    """Plugin of pytest: notes the test whose own lines failed, not its fixtures."""
 
-    def __init__(self, told: int) -> None:
-        self._told = told
+    def __init__(self, note: Path) -> None:
+        self._note = note
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         if report.failed and report.when == 'call':
-            os.write(self._told, report.nodeid.encode())
+            self._note.write_text(report.nodeid, encoding='utf-8')
 
 
-def _run_tests(copy: Path, tests: list[str], told: int) -> None:
+def _run_tests(copy: Path, tests: list[str], note: Path) -> None:
     """Run tests on the copy and end the process with their status."""
     status = int(pytest.ExitCode.INTERNAL_ERROR)
     try:
@@ -311,7 +310,7 @@ def _run_tests(copy: Path, tests: list[str], told: int) -> None:
         for stream in (0, 1, 2):
             os.dup2(nowhere, stream)
         words = ['-q', '-x', '-p', 'no:cacheprovider', *tests]
-        status = int(pytest.main(words, plugins=[_Failure(told)]))
+        status = int(pytest.main(words, plugins=[_Failure(note)]))
     finally:
         os._exit(status)
 

@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.integrate import quad
@@ -14,6 +16,8 @@ from wheel_terra_estimator.terramechanics.operating_points import OperatingPoint
 from wheel_terra_estimator.terramechanics.soil import Soil
 from wheel_terra_estimator.terramechanics.wheel import Wheel
 from wheel_terra_lab.studies.campaigns import DESIGNS, Plan, make_campaign
+from wheel_terra_lab.studies.campaigns.groups import GROUPS
+from wheel_terra_lab.studies.diagnosis_score import beyond_the_others
 from wheel_terra_lab.trials.designs import random_rows, random_soil
 from wheel_terra_lab.trials.forms import FORMS
 from wheel_terra_lab.trials.hidden import LISTED, OTHER, OUTSIDE, SmoothError
@@ -249,3 +253,12 @@ def test_a_structural_error_is_smooth_and_of_the_stated_share():
     order = np.lexsort((rows['slip'], rows['normal_load']))
     alike = np.corrcoef(np.transpose(draws))[order[0]][order]
     assert alike[1] > 0.8 > alike[-1]
+
+
+def test_what_anybody_could_tell_of_a_set_agrees_with_the_refits():
+    """Alone an effect stands as far as the nonlinear refit of the soil says; twice, nowhere."""
+    campaign = make_campaign(3, 'basic16', replace(GROUPS['one'].plan, names=('pull_gain',)))
+    effect = campaign.effects[0]
+    (alone,) = beyond_the_others(campaign)
+    assert alone == pytest.approx(campaign.distances[0], rel=0.1)
+    assert max(beyond_the_others(replace(campaign, effects=(effect, effect)))) < 0.05 * alone
