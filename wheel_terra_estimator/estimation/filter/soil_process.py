@@ -39,6 +39,10 @@ class SoilTuning:
     own_stiffness_walk: float = 0.3  # of each wheel [ln]
     soft_is_weak: float = 0.7
     """Correlation of a wheel's own stiffness and strength."""
+    common_error_length: float = 5.0
+    """Travel [m] over which the error of the shear model that all wheels share changes: it is the
+    law's, not the place's. What a wheel has of its own changes over ``filter.shear_error_length``.
+    Tuned on seeds 1001 (simulators A, B) and 5003 (C)."""
     strength_spread: float = 2.0
     """How much more the strength differs from wheel to wheel than what torque shows as errors of
     the shear model."""
@@ -59,8 +63,9 @@ class SoilProcess:
         self._walk = float(configuration.filter.soil_walk) ** 2
         self._error_length = float(configuration.filter.shear_error_length)
         self._error_variance = priors.shear_error_std**2
-        self._error_covariance = priors.shear_error_covariance(n)
         self._each = np.eye(n)
+        self._mean = np.full((n, n), 1.0 / n)
+        self._mean_variance = self._error_variance + n * priors.shear_error_common_std**2
         self._stiffness = tuning.stiffness_walk**2 + self._each * tuning.own_stiffness_walk**2
 
     def predict(
@@ -88,12 +93,14 @@ class SoilProcess:
         k, e = layout.stiffness, layout.shear_error
         Q[k, k] = self._stiffness * walk
         hold = math.exp(-travel / self._error_length)
-        mean[e] *= hold
-        F[e, e] *= hold
-        Q[e, e] = self._error_covariance * (1.0 - hold * hold)
+        common = math.exp(-travel / tuning.common_error_length)
+        mean[e] = hold * mean[e] + (common - hold) * mean[e].mean()
+        F[e, e] = hold * self._each + (common - hold) * self._mean
+        own = self._error_variance * (1.0 - hold * hold)
+        shared = self._mean_variance * (1.0 - common * common)
+        Q[e, e] = own * self._each + (shared - own) * self._mean
         if not torque_known:
             # Softer ground is weaker ground: where no torque says how weak, the sinkage does.
-            fresh = (1.0 - hold * hold) * self._error_variance
-            Q[e, e] += (tuning.strength_spread**2 - 1.0) * fresh * self._each
-            both = tuning.own_stiffness_walk * math.sqrt(walk * fresh) * tuning.strength_spread
+            Q[e, e] += (tuning.strength_spread**2 - 1.0) * own * self._each
+            both = tuning.own_stiffness_walk * math.sqrt(walk * own) * tuning.strength_spread
             Q[k, e] = Q[e, k] = tuning.soft_is_weak * both * self._each
