@@ -349,9 +349,19 @@ def test_soil_walks_with_travel_and_is_learned_with_a_reference_only(parts):
         assert known.Q[index, index] == pytest.approx(std**2 * 0.5)
         assert blind.Q[index, index] == 0.0
     assert known.mean[SHEAR_STRENGTH] == pytest.approx(np.exp(-0.5 / 100.0))
-    hold = np.exp(-0.5 / 0.5)
+
+
+def test_what_all_wheels_share_of_the_shear_error_lasts_longer_than_what_one_has(parts):
     e = parts.layout.shear_error
-    assert np.diagonal(known.F)[e] == pytest.approx([hold] * 6)
+    prediction = soil_noise(parts, reference_known=True, torque_known=True)
+    F, Q = prediction.F[e, e], prediction.Q[e, e]
+    alternating = np.array([1.0, -1.0] * 3)
+    assert F @ np.ones(6) == pytest.approx(np.exp(-0.5 / 5.0) * np.ones(6))
+    assert F @ alternating == pytest.approx(np.exp(-0.5 / 0.5) * alternating)
+    assert prediction.mean[e] == pytest.approx(F @ np.ones(6))
+    gain = parts.configuration.sensors.torque_gain_std
+    stationary = (0.05**2 + gain**2) * np.eye(6) + 0.12**2
+    assert F @ stationary @ F.T + Q == pytest.approx(stationary)
 
 
 def test_softer_ground_is_weaker_ground_where_no_torque_says_how_weak(parts):

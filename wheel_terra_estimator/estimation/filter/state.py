@@ -26,7 +26,8 @@ slip_per_demand  -      Slip for each share of the load that the ground asks alo
                         no soil file knows.
 sinkage (n)      m      Rim below the surface.
 stiffness (n)    ln     Factor on the bearing modulus, per wheel: wheels enter a patch one by one.
-shear_error (n)  ln     Error of the shear model, per wheel, first-order Gauss-Markov over travel.
+shear_error (n)  ln     Error of the shear model, per wheel, first-order Gauss-Markov over travel:
+                        a wheel's own changes with the place, what all share is the law's.
                         It makes ten equal residuals at constant slip one piece of information,
                         and carries what torque says of a wheel's pull in another soil.
 torque_zero (n)  N m    Zero of each torque sensor, constant. Seen where loads and slip change:
