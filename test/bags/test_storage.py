@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 import yaml
 
+from wheel_terra_estimator.bags.salvage.mcap_file import McapFile
 from wheel_terra_estimator.bags.salvage.raw_messages import RawMessage
 from wheel_terra_estimator.bags.storage import open_bag
 from wheel_terra_estimator.errors import UserError
@@ -52,6 +53,13 @@ def test_folder_single_file_and_folder_without_metadata_are_the_same(
     with open_bag(folder) as bag:
         assert list(bag.messages(tuple(bag.topics))) == whole
         assert 'metadata.yaml is missing' in bag.notes[0]
+
+
+def test_a_sound_file_is_read_by_its_index(
+    make_bag: Any, whole: list[RawMessage], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(McapFile, '_survey', lambda _: pytest.fail('read from front to end'))
+    assert contents(make_bag()) == whole
 
 
 def test_unreadable_metadata_is_set_aside(make_bag: Any, whole: list[RawMessage]) -> None:

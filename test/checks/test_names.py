@@ -7,7 +7,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from wheel_terra_estimator.checks.names import check_wheel_names
+from wheel_terra_estimator.checks.names import _pairs, check_wheel_names
 from wheel_terra_estimator.checks.rover_facts import from_configuration
 from wheel_terra_estimator.checks.series import JointSeries, Recording
 from wheel_terra_estimator.configuration import reader
@@ -29,3 +29,8 @@ def test_joints_that_steer(stated: bool) -> None:
     cures = [str(outcome.cure) for outcome in outcomes]
     told = f'wheels.steering_joints: {STEERED}'
     assert cures == ([] if stated else [told])
+
+
+def test_names_that_are_like_none_are_taken_in_the_usual_order() -> None:
+    assert _pairs(['fore', 'hind'], ['m1', 'm2']) == {'fore': 'm1', 'hind': 'm2'}
+    assert _pairs(['fore', 'hind'], ['m1', 'm2', 'm3']) == {}

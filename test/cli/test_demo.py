@@ -16,6 +16,9 @@ def test_a_node_that_is_not_found_does_not_end_the_demo(monkeypatch, tmp_path, c
     ran = []
 
     def run(command, environment):
+        if command[1] == 'diagnose':
+            assert all(Path(command[i]).is_file() for i in (3, 5))
+            return demo.Part(0, 'table\n')
         live = command[0].endswith('live_drive')
         ran.append((Path(command[1 if live else 2]).name, live, environment['ROS_DOMAIN_ID']))
         return demo.Part(demo.NODE_NOT_FOUND if live else 0, f'{ran[-1][0]} ran\n')
@@ -23,7 +26,6 @@ def test_a_node_that_is_not_found_does_not_end_the_demo(monkeypatch, tmp_path, c
     monkeypatch.setattr(importlib.util, 'find_spec', lambda name: name)
     monkeypatch.setattr(demo, '_run', run)
     monkeypatch.setattr(demo, '_outcome', lambda drive, output: 'replayed')
-    monkeypatch.setattr(demo, '_trial', lambda folder: demo.Part(0, 'table\n'))
     monkeypatch.setattr(demo, '_named', lambda folder: 'named')
     assert main.main(['demo', '-o', str(tmp_path / 'out')]) == 0
     assert {(name, live) for name, live, _ in ran} == {

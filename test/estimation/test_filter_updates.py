@@ -601,3 +601,14 @@ def test_a_stiffer_soil_has_both_moduli_of_sinkage_larger_by_the_same_factor():
     for name in ('soil.cohesive_modulus', 'soil.frictional_modulus'):
         assert ratio[name] == pytest.approx(2.0)
     assert ratio['soil.shear_modulus'] == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize('entry', [SHEAR_STRENGTH, SHEAR_MODULUS])
+def test_the_deviation_of_what_was_learned_is_half_of_what_two_of_the_state_change(parts, entry):
+    outputs = Outputs(parts.configuration, parts.rover, parts.sensors, parts.layout)
+    std, step = 0.02, np.zeros(parts.layout.size)
+    step[entry] = std
+    covariance = np.diag(step**2)
+    above, below = (outputs.learned_soil(sign * step, covariance)[1] for sign in (1.0, -1.0))
+    stated = outputs.learned_soil(0.0 * step, covariance)[2]
+    assert stated == pytest.approx(0.5 * (above - below), rel=1e-3)

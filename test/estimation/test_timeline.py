@@ -3,6 +3,7 @@
 """Rules of stamps, order and lateness, on an estimator that notices every lapse."""
 
 import math
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -21,7 +22,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from wheel_terra_estimator.estimation.estimates import SlipClass
-from wheel_terra_estimator.estimation.measurements import WheelOdometry
+from wheel_terra_estimator.estimation.measurements import (
+    InertialReading,
+    ReferenceVelocity,
+    WheelOdometry,
+)
 from wheel_terra_estimator.estimation.timing.clock_watch import ClockWatch
 from wheel_terra_estimator.estimation.timing.input_checks import (
     CHANNELS,
@@ -30,6 +35,7 @@ from wheel_terra_estimator.estimation.timing.input_checks import (
     WHEEL_ODOMETRY,
 )
 from wheel_terra_estimator.estimation.timing.lag import LONGEST_HOLD, LagLearner
+from wheel_terra_estimator.estimation.timing.merging import same
 
 
 def times(sets):
@@ -61,6 +67,15 @@ def test_a_set_comes_at_once_and_holds_all_inputs_up_to_its_stamp():
     (estimates,) = core.add(odometry(0.1, rate=1.0))
     expected = (2.0 * 1.3 * math.exp(-0.05) + 3.0 * 1.3) * math.exp(-0.05) + 2.2
     assert math.isclose(estimates.forward_velocity, expected, rel_tol=1e-12)
+
+
+def test_a_reading_with_other_numbers_is_another_one():
+    speed = ReferenceVelocity(5, 0.1, 1e-6)
+    assert same(speed, replace(speed)) and not same(speed, replace(speed, forward=0.2))
+    felt = InertialReading(5, np.full(3, np.nan), np.zeros(3), None)
+    assert same(felt, replace(felt, specific_force=np.full(3, np.nan)))
+    assert not same(felt, replace(felt, angular_rate=np.ones(3)))
+    assert not same(felt, replace(felt, orientation=np.zeros(4)))
 
 
 def test_equal_stamps_are_merged_whatever_came_first():
