@@ -78,15 +78,6 @@ def test_late_inputs_end_in_the_same_bits(rover, seed):
     assert ends[0] == ends[1]
 
 
-def test_replaying_the_order_of_arrival_gives_the_same_bits(rover):
-    stream = drive(7)
-    runs = []
-    for _ in range(2):
-        core = EstimatorCore(rover)
-        runs.append([bits(s) for m in stream for s in core.add(m)])
-    assert runs[0] == runs[1]
-
-
 def test_after_a_reset_nothing_is_left(rover):
     core = EstimatorCore(rover)
     for m in drive(1):

@@ -6,21 +6,13 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from test_estimator_node import wheel_message
 
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.estimation.estimates import SlipClass
 
 NODE = '/wheel_terra_estimator'
 STEP = 0.1  # [s] between two messages
-
-
-def wheel_message(names, seconds):
-    from sensor_msgs.msg import JointState
-
-    message = JointState(name=list(names), velocity=[1.0] * len(names))
-    message.header.stamp.sec = int(seconds)
-    message.header.stamp.nanosec = round((seconds % 1.0) * 1e9)
-    return message
 
 
 def test_wrenches_and_markers_hold_the_estimates(start, listener, tmp_path):

@@ -83,11 +83,6 @@ def test_one_spinning_wheel_raises_nothing():
     assert first(course(rows)) is None
 
 
-def test_braking_and_locked_wheels_raise_nothing():
-    rows = [[wheel(-0.95, rim=0.005)] * 6 for _ in range(300)]
-    assert first(course(rows)) is None
-
-
 def test_spin_in_place_slip_raises_nothing_by_its_trend():
     monitor = StuckMonitor()
     found = [
