@@ -20,6 +20,7 @@ from wheel_terra_estimator.bags.salvage.raw_messages import RawMessage
 from wheel_terra_estimator.bags.storage import open_bag
 from wheel_terra_estimator.cli.main import main
 from wheel_terra_estimator.errors import UserError
+from wheel_terra_lab.studies.fuzzing import sqlite_maker
 from wheel_terra_lab.studies.fuzzing.mcap_maker import Layout, Sample, make
 
 DEMO = next(Path(__file__).resolve().parents[2].glob('**/demo/entrapment'), Path('absent'))
@@ -265,24 +266,8 @@ def test_metadata_that_lie_are_set_aside_and_said(make_bag: Any, old: str, new: 
 
 
 def big_sqlite(tmp_path: Path, count: int = 4000) -> tuple[Path, list[RawMessage]]:
-    path = tmp_path / 'a.db3'
-    with sqlite3.connect(path) as connection:
-        connection.executescript(
-            'CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT, type TEXT,'
-            ' serialization_format TEXT, offered_qos_profiles TEXT);'
-            'CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER, timestamp INTEGER,'
-            ' data BLOB); CREATE INDEX timestamp_idx ON messages (timestamp ASC);'
-        )
-        for number, (topic, kind) in enumerate(TYPES.items(), start=1):
-            connection.execute(
-                'INSERT INTO topics VALUES(?,?,?,?,?)', (number, topic, kind, '', '')
-            )
-        found = samples(count)
-        connection.executemany(
-            'INSERT INTO messages(topic_id, timestamp, data) VALUES(?,?,?)',
-            [(1 + list(TYPES).index(s.topic), s.log_time, s.data) for s in found],
-        )
-    connection.close()
+    path, found = tmp_path / 'a.db3', samples(count)
+    sqlite_maker.write(path, found, TYPES)
     return path, [RawMessage(*s) for s in found]
 
 
