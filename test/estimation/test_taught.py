@@ -9,12 +9,14 @@ import pytest
 from parts import SAND
 
 from wheel_terra_estimator.configuration import reader
+from wheel_terra_estimator.estimation.filter.state import SHEAR_STRENGTH, StateLayout
 from wheel_terra_estimator.estimation.taught import (
     ASSUMED,
     CONFOUNDED,
     LEARNED,
     Parameter,
     Teaching,
+    with_model_errors,
 )
 from wheel_terra_estimator.estimation.wheel_soil_estimator import WheelSoilEstimator
 
@@ -65,6 +67,19 @@ def test_what_no_drive_tells_apart_is_never_learned():
     parameters = [Parameter('a', '-', np.ones(1), like='b')]
     row = Teaching(parameters, np.eye(1)).judged(np.array([[0.01]]))[0]
     assert (row.verdict, row.bits, row.std, row.confounded_with) == (CONFOUNDED, 0.0, 1.0, 'b')
-    names = [row.name for row in WheelSoilEstimator(reader.load(SAND)).taught()
-             if row.confounded_with == 'soil.friction_angle_deg']  # fmt: skip
-    assert any(name.startswith('torque zero of') for name in names)
+    rows = {row.name: row for row in WheelSoilEstimator(reader.load(SAND)).taught()}
+    assert rows['torque zeros'].confounded_with == 'soil.friction_angle_deg'
+
+
+def test_a_number_that_was_moved_far_is_believed_less():
+    layout = StateLayout(2)
+    mean, known = np.zeros(layout.size), np.zeros((layout.size, layout.size))
+    near = with_model_errors(mean, known, layout)
+    mean[SHEAR_STRENGTH], mean[layout.stiffness] = -0.5, (1.0, 0.0)
+    far = with_model_errors(mean, known, layout)
+    assert near[SHEAR_STRENGTH, SHEAR_STRENGTH] == pytest.approx(0.05**2)
+    assert far[SHEAR_STRENGTH, SHEAR_STRENGTH] == pytest.approx(0.05**2 + 0.2**2)
+    average = np.full(2, 0.5)  # moved by 0.5: 0.2 of error, common to both wheels
+    for P, error in ((near, 0.0), (far, 0.2)):
+        variance = average @ P[layout.stiffness, layout.stiffness] @ average
+        assert variance == pytest.approx(0.25**2 + error**2)

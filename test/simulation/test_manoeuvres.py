@@ -85,8 +85,8 @@ def test_words_name_the_manoeuvre_or_the_bench():
     assert found.cure_in_words() == '1 m on the level (12 %)'
     words = replace(row, manoeuvre='').cure_in_words()
     assert words == 'nothing this rover can drive: a plate or shear test'
-    zero = Taught('torque zero of fl', 'N m', 0.3, 0.3, 0.0, ASSUMED, manoeuvre='')
-    assert zero.cure_in_words().endswith('read it with the wheel off the ground')
+    zero = Taught('torque zeros', 'N m', 0.3, 0.3, 0.0, ASSUMED, manoeuvre='')
+    assert zero.cure_in_words().endswith('read them with the wheels off the ground')
 
 
 def test_commands_are_shares_of_time_and_speed():

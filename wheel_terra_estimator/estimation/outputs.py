@@ -109,7 +109,7 @@ class Outputs:
         slip_velocity, slip_velocity_std = self._slip_velocity(given)
         variance = np.diagonal(given.covariance)[layout.sinkage]
         sinkage_std = np.sqrt(np.maximum(variance, 0.0) + self._sinkage_zero**2)
-        soil_covariance = with_model_errors(given.covariance, layout)
+        soil_covariance = with_model_errors(given.mean, given.covariance, layout)
         names, soil, soil_std = self.learned_soil(given.mean, soil_covariance)
         load_std, pull_std = self._force_deviations(given)
         ahead = given.assessment.wheels or (_NOTHING_AHEAD,) * n

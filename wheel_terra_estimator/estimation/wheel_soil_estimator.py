@@ -232,8 +232,7 @@ class WheelSoilEstimator:
         self._learned = Learned(
             configuration, layout, self._ekf.covariance, self._outputs.learned_soil
         )
-        wheels = configuration.wheels.names
-        self._teaching = Teaching.of_filter(layout, wheels, self._ekf.covariance)
+        self._teaching = Teaching.of_filter(layout, self._ekf.covariance)
         self._clock = _Clock()
         self._parts: tuple[Part, ...] = (
             self._inertial,
@@ -859,7 +858,8 @@ class WheelSoilEstimator:
 
     def taught(self) -> tuple[Taught, ...]:
         """Return what the drive has taught of each parameter so far."""
-        return self._teaching.judged(with_model_errors(self._ekf.covariance, self._layout))
+        ekf = self._ekf
+        return self._teaching.judged(with_model_errors(ekf.mean, ekf.covariance, self._layout))
 
     def health(self) -> dict[str, Any]:
         """Return counters and consistency figures for diagnostics."""
