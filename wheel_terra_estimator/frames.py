@@ -30,7 +30,9 @@ SI_UNITS: Mapping[str, str] = {
     'rim_travel_left': 'm',
     **dict.fromkeys(('specific_force', 'gravity'), 'm/s^2'),
     **dict.fromkeys(('sinkage', 'wheel_radius', 'wheel_width', 'lug_height'), 'm'),
-    **dict.fromkeys(('forward_velocity', 'slip_velocity', 'sinkage_rate'), 'm/s'),
+    **dict.fromkeys(
+        ('forward_velocity', 'lateral_velocity', 'slip_velocity', 'sinkage_rate'), 'm/s'
+    ),
     'reference_velocity': 'm/s',
     **dict.fromkeys(('slope', 'heading', 'steering', 'slip_angle'), 'rad'),
     **dict.fromkeys(('entrance_angle', 'peak_stress_angle', 'leaving_angle'), 'rad'),

@@ -151,7 +151,7 @@ def test_slip_angles_of_simulated_drives_lie_within_their_deviations(name, side)
             if truth.time > 4.0 and np.hypot(forward, aside).min() > 0.02:
                 error = e.sideways.angle - np.arctan2(aside, forward) + truth.steering
                 errors.append(np.array([error, e.sideways.angle_std]))
-                forces.append([e.sideways.force - truth.side_force, e.sideways.force_std])
+                forces.append([e.sideways.force - truth.lateral_force, e.sideways.force_std])
     (error, std), (off, off_std) = (np.swapaxes(np.array(x), 0, 1) for x in (errors, forces))
     assert len(error) > 100
     assert np.sqrt(np.mean(error**2)) < math.radians(5.0)

@@ -170,7 +170,7 @@ def test_left_mirrors_right_and_scrub_slows_the_turn(plant: MakePlant) -> None:
     right = drive(plant(), 8.0, turn=-0.05)
     mirror = [1, 0, 3, 2, 5, 4]
     np.testing.assert_allclose(left.slip[mirror], right.slip, atol=1e-5)
-    np.testing.assert_allclose(left.side_force[mirror], -right.side_force, atol=1e-2)
+    np.testing.assert_allclose(left.lateral_force[mirror], -right.lateral_force, atol=1e-2)
     assert 0.0 < left.yaw_rate < 0.05
     # The outer wheels pull, the inner ones hold back: that turns against the scrub.
     assert left.drawbar_pull[1] > left.drawbar_pull[0]
@@ -246,8 +246,8 @@ def test_a_steered_rover_turns_about_its_middle_axle_without_scrub(plant: MakePl
 def test_the_forces_of_steered_wheels_add_up_in_the_body(plant: MakePlant) -> None:
     truth = drive(plant(rover(f'wheels.steering_joints:={CORNERS}')), 12.0, 0.05, 0.03)
     cosine, sine = np.cos(truth.steering), np.sin(truth.steering)
-    along = (truth.drawbar_pull * cosine - truth.side_force * sine).sum()
-    across = (truth.drawbar_pull * sine + truth.side_force * cosine).sum()
+    along = (truth.drawbar_pull * cosine - truth.lateral_force * sine).sum()
+    across = (truth.drawbar_pull * sine + truth.lateral_force * cosine).sum()
     mass = rover().rover.mass
     # A steady circle: the soil turns the speed, and holds nothing else.
     assert across == pytest.approx(mass * truth.yaw_rate * truth.forward_velocity, abs=1.0)

@@ -42,12 +42,18 @@ WHEEL_FIELDS = (
     'slip_angle',
     'slip_angle_std',
     'lateral_force',
+    'lateral_force_std',
 )
 
 LONGEST_STEP = 1.0
 """A longer pause between sets, or a step back of the clock, is no time in any class [s]."""
 
-_SIDEWAYS = {'slip_angle': 'angle', 'slip_angle_std': 'angle_std', 'lateral_force': 'force'}
+_SIDEWAYS = {
+    'slip_angle': 'angle',
+    'slip_angle_std': 'angle_std',
+    'lateral_force': 'force',
+    'lateral_force_std': 'force_std',
+}
 """Quantities of `WHEEL_FIELDS` -> fields of `Sideways`; recordings of old have none of them."""
 _OWN_NAMES = {f'sideways_known.{field}': name for name, field in _SIDEWAYS.items()}
 _TOPIC_FIELDS = {

@@ -31,7 +31,7 @@ from wheel_terra_estimator.simulation.drive import SimulatedDrive
 TRUTH = '/ground_truth'
 TRUTH_TOPICS = {
     f'{TRUTH}/{name}': OUTPUT_TYPES[name]
-    for name in ('slip', 'sinkage', 'slip_class', 'stuck', 'twist')
+    for name in ('slip', 'sinkage', 'slip_angle', 'slip_class', 'stuck', 'twist')
 }
 
 
@@ -176,6 +176,7 @@ class _TruthSender:
         columns = {
             'slip': (self._slip, truth.slip_velocity[row], truth.drawbar_pull[row]),
             'sinkage': (truth.sinkage[row], truth.sinkage_rate[row], truth.normal_load[row]),
+            'slip_angle': (truth.slip_angle[row], (), truth.lateral_force[row]),
         }
         for name, fields in columns.items():
             self._bag.write(
@@ -188,6 +189,7 @@ class _TruthSender:
             float(truth.yaw_rate[row]),
             np.zeros((6, 6)),
         )
+        twist.twist.twist.linear.y = float(truth.lateral_velocity[row])
         self._bag.write(f'{TRUTH}/twist', twist, stamp)
         stuck = bool(truth.stuck[row])
         if stuck != self._stuck:

@@ -30,6 +30,7 @@ BODY_VELOCITY = '/truth/odometry'
 _TYPES = {
     '/ground_truth/slip': JOINT_STATE,
     '/ground_truth/sinkage': JOINT_STATE,
+    '/ground_truth/slip_angle': JOINT_STATE,
     '/ground_truth/twist': TWIST,
     BODY_VELOCITY: ODOMETRY,
 }
@@ -57,6 +58,8 @@ class Truth:
     slip: WheelTruth | None
     sinkage: WheelTruth | None
     drawbar_pull: WheelTruth | None
+    slip_angle: WheelTruth | None = None
+    lateral_force: WheelTruth | None = None
 
 
 class _Values(NamedTuple):
@@ -98,16 +101,20 @@ def read_simulated_truth(bag: Bag, names: tuple[str, ...]) -> Truth | None:
             {
                 '/ground_truth/slip': both,
                 '/ground_truth/sinkage': depth,
+                '/ground_truth/slip_angle': both,
                 '/ground_truth/twist': _Values(_forward, 1),
             },
         )
-        slips = found['/ground_truth/slip']
+        slips, aside = found['/ground_truth/slip'], found['/ground_truth/slip_angle']
+        angle = np.unwrap(aside.value[:, :wheels], axis=0)  # to be interpolated
         return Truth(
             source='/ground_truth',
             velocity=found['/ground_truth/twist'].known(),
             slip=WheelTruth(slips.stamp, slips.value[:, :wheels]).known(),
             sinkage=found['/ground_truth/sinkage'].known(),
             drawbar_pull=WheelTruth(slips.stamp, slips.value[:, wheels:]).known(),
+            slip_angle=WheelTruth(aside.stamp, angle).known(),
+            lateral_force=WheelTruth(aside.stamp, aside.value[:, wheels:]).known(),
         )
     if BODY_VELOCITY in bag.topics:
         velocity = _body_velocity(bag)

@@ -38,9 +38,9 @@ class WarningSpan:
 class WheelSummary:
     """Figures of one wheel; ``seconds`` and ``shares`` by name of the slip class.
 
-    ``slip`` (of |slip|) and ``sinkage`` [m] are percentiles 5 and 95, of a long drive over the sets
-    that were kept; ``sinkage_std`` is its median deviation. They and the extremes are None where
-    slip or sinkage was never known.
+    ``slip`` (of |slip|), ``sinkage`` [m] and ``slip_angle`` [rad] are percentiles 5 and 95, of a
+    long drive over the sets that were kept; ``sinkage_std`` and ``slip_angle_std`` are median
+    deviations. They and the extremes are None where slip or sinkage was never known.
     """
 
     name: str
@@ -55,6 +55,8 @@ class WheelSummary:
     slip: tuple[float, float] | None = field(default=None, compare=False)
     sinkage: tuple[float, float] | None = field(default=None, compare=False)
     sinkage_std: float | None = field(default=None, compare=False)
+    slip_angle: tuple[float, float] | None = field(default=None, compare=False)
+    slip_angle_std: float | None = field(default=None, compare=False)
 
 
 @dataclass(frozen=True)
@@ -154,6 +156,7 @@ def _wheels(history: EstimateHistory, border: Border) -> tuple[WheelSummary, ...
     total = np.maximum(sum(times.values()), 1e-9)
     slips = np.abs(known(history, 'slip', border))
     sinkages = known(history, 'sinkage', border)
+    angles = np.where(np.isnan(slips), np.nan, history.values['slip_angle'])
     limits = np.broadcast_to(border.sinkage, len(history.names))
     result = []
     for i, name in enumerate(short_names(history.names)):
@@ -177,14 +180,19 @@ def _wheels(history: EstimateHistory, border: Border) -> tuple[WheelSummary, ...
                 max_lateral_force=float(figures.max_lateral_force[i]),
                 slip=slip,
                 sinkage=sinkage,
-                sinkage_std=_median_std(history, sinkages[:, i], i) if sinkage else None,
+                sinkage_std=_median_std(history, 'sinkage', sinkages, i),
+                slip_angle=_percentiles(angles[:, i]),
+                slip_angle_std=_median_std(history, 'slip_angle', angles, i),
             )
         )
     return tuple(result)
 
 
-def _median_std(history: EstimateHistory, sinkage: NDArray[np.float64], wheel: int) -> float:
-    return float(np.median(history.values['sinkage_std'][np.isfinite(sinkage), wheel]))
+def _median_std(
+    history: EstimateHistory, quantity: str, values: NDArray[np.float64], wheel: int
+) -> float | None:
+    there = history.values[f'{quantity}_std'][np.isfinite(values[:, wheel]), wheel]
+    return float(np.median(there)) if there.size else None
 
 
 def _percentiles(values: NDArray[np.float64]) -> tuple[float, float] | None:
@@ -214,6 +222,14 @@ def sinkages(wheel: WheelSummary, plus_minus: str = '±') -> str:
     if wheel.sinkage_std is None:
         return ends
     return f'{ends} {plus_minus} {1e3 * wheel.sinkage_std:.0f}'
+
+
+def slip_angles(wheel: WheelSummary) -> str:
+    """Return the percentiles of the slip angle of a wheel with its median deviation [deg]."""
+    if wheel.slip_angle_std is None:
+        return NOT_KNOWN
+    scale = 180.0 / np.pi
+    return f'{spread(wheel.slip_angle, ".0f", scale)} ± {scale * wheel.slip_angle_std:.0f}'
 
 
 def deepest(wheel: WheelSummary, plus_minus: str = '±') -> str:

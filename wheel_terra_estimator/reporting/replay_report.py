@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -23,6 +24,7 @@ from wheel_terra_estimator.reporting.drive_summary import (
     deepest,
     shown,
     sinkages,
+    slip_angles,
     spread,
 )
 from wheel_terra_estimator.reporting.html import render, write_page
@@ -92,7 +94,9 @@ def _taught_row(row: Taught) -> dict[str, str]:
 
 
 def _error_row(error: QuantityError) -> dict[str, str]:
-    scale, unit = (1e3, 'mm') if error.unit == 'm' else (1.0, error.unit)
+    scale, unit = {'m': (1e3, 'mm'), 'rad': (180.0 / math.pi, 'deg')}.get(
+        error.unit, (1.0, error.unit)
+    )
     return {
         'quantity': f'{error.name.replace("_", " ")} [{unit}]',
         'rms': f'{scale * error.rms:.3g}',
@@ -143,6 +147,7 @@ def _wheel_row(wheel: Any) -> dict[str, Any]:
             ('max', deepest(wheel)),
             ('mean pull [N]', f'{wheel.mean_pull:.1f}'),
             ('least margin [N]', f'{wheel.least_margin:.1f}'),
+            ('slip angle [deg]', slip_angles(wheel)),
             ('max lateral force [N]', f'{wheel.max_lateral_force:.0f}'),
         ],
     }

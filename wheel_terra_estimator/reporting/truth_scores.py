@@ -36,6 +36,8 @@ COMPARED = (
     ('sinkage', 'sinkage', 'm'),
     ('drawbar_pull', 'drawbar_pull', 'N'),
     ('velocity', 'forward_velocity', 'm/s'),
+    ('slip_angle', 'slip_angle', 'rad'),
+    ('lateral_force', 'lateral_force', 'N'),
 )
 """Field of a `Truth`, name of the quantity, unit."""
 
@@ -92,9 +94,12 @@ def truth_errors(
         if true is None or not true.stamp.size:
             continue
         there = at_stamps(true, history.stamp)
-        rows = np.isfinite(there) & (classed if name == 'slip' else True)
+        rows = np.isfinite(there) & (classed if name in ('slip', 'slip_angle') else True)
+        error = seen - there
+        if unit == 'rad':
+            error = (error + np.pi) % (2.0 * np.pi) - np.pi
         if rows.any():
-            quantities.append(_error(name, unit, (seen - there)[rows], std[rows]))
+            quantities.append(_error(name, unit, error[rows], std[rows]))
     slip = None if truth.slip is None else at_stamps(truth.slip, history.stamp)
     entrapped = None if slip is None else _entrapped(history, slip)
     return TruthErrors(

@@ -151,14 +151,15 @@ class RoverPlant:
         wheels, memory, forces = self._wheels, self._memory, self._forces
         forward, lateral, turning = (float(speed) for speed in self._speeds)
         rim = self._rate * wheels.slip_radius
-        along = np.einsum('jn,j->n', self._lever[0], self._speeds)
+        along, across = (np.einsum('jn,j->n', lever, self._speeds) for lever in self._lever)
         return Truth(
             time=self._time,
             slip=np.asarray(slip_ratio(along, rim, self._rest_speed)),
             slip_velocity=rim - along,
             steering=self._steering.angle,
             drawbar_pull=forces.pull,
-            side_force=forces.side_force,
+            lateral_force=forces.side_force,
+            slip_angle=np.arctan2(across, along),
             normal_load=self._carried,
             sinkage=memory.sinkage,
             sinkage_rate=memory.sinkage_rate,

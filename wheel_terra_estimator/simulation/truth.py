@@ -31,7 +31,8 @@ class Truth:
     slip: FloatArray
     slip_velocity: FloatArray  # r w - v
     drawbar_pull: FloatArray
-    side_force: FloatArray
+    lateral_force: FloatArray  # positive left [N]
+    slip_angle: FloatArray  # [rad]
     normal_load: FloatArray
     sinkage: FloatArray
     sinkage_rate: FloatArray
@@ -61,13 +62,14 @@ class TruthTable:
     stamp : numpy.ndarray
         (k,) [ns].
     slip, slip_velocity, drawbar_pull, normal_load, sinkage, sinkage_rate, torque, wheel_rate
+    slip_angle, lateral_force
         (k, n), as in ``Truth``; ``slip`` is nan at rest.
     slip_class : numpy.ndarray
         (k, n) slip class without hysteresis, 255 at rest.
     stuck : numpy.ndarray
         (k,) bool: median abs(slip) of the turning wheels above 0.9 for 1 s; clears after 3 s below
         0.6.
-    forward_velocity, yaw_rate, slope : numpy.ndarray
+    forward_velocity, lateral_velocity, yaw_rate, slope : numpy.ndarray
         (k,).
     position : numpy.ndarray
         (k, 3) x, y, heading.
@@ -84,9 +86,12 @@ class TruthTable:
     sinkage_rate: FloatArray
     torque: FloatArray
     wheel_rate: FloatArray
+    slip_angle: FloatArray
+    lateral_force: FloatArray
     slip_class: NDArray[np.uint8]
     stuck: NDArray[np.bool_]
     forward_velocity: FloatArray
+    lateral_velocity: FloatArray
     yaw_rate: FloatArray
     slope: FloatArray
     position: FloatArray
@@ -120,7 +125,7 @@ class TruthTable:
         """Return a DataFrame (needs pandas): columns and index as those of ``api.estimate``.
 
         ``<quantity>.<wheel>``, ``position.x``, ``position.y``, ``heading``, ``forward_velocity``,
-        ``yaw_rate``, ``slope`` and ``stuck``; units are in ``attrs['units']``.
+        ``lateral_velocity``, ``yaw_rate``, ``slope`` and ``stuck``; units: ``attrs['units']``.
         """
         columns: Columns = {'stamp': self.stamp, 'time': (self.stamp - self.stamp[:1]) * 1e-9}
         for f in fields(self):
