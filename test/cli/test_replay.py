@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 from wheel_terra_estimator.bags.bag_file import BagFile
+from wheel_terra_estimator.bags.drive_laws import DriveLaw, as_text
 from wheel_terra_estimator.bags.history import EstimateHistory, read_estimates
 from wheel_terra_estimator.bags.message_types import topic_messages
 from wheel_terra_estimator.bags.storage import open_bag
@@ -268,3 +269,24 @@ def test_slip_on_slopes_is_in_the_table_as_it_was_published_last(
     assert tuple(told[-1].name) == tuple(f'slope_{slope:.0f}deg' for slope in found[:, 0])
     columns = (told[-1].position, told[-1].effort, told[-1].velocity)
     np.testing.assert_allclose(found[:, 1:], np.array(columns).T, rtol=1e-5, atol=1e-9)
+
+
+def test_laws_are_ranked_by_a_drive(tmp_path, make_bag, drive, rover, capsys):
+    ground = 'rover.contact_law:=resistive_force'
+    bag = str(tmp_path / 'climb')
+    simulated = ['simulate', '--scenario', 'firm_drive', '--duration', '6', '-p', ground]
+    assert main([*simulated, '-o', bag]) == 0
+    told = capsys.readouterr().out.rpartition('estimates: ')[2]
+    known = [part for part in told.split()[3:] if part not in ('-p', ground)]
+    assert main(['compare', '--laws', bag, *known, '--json']) == 0
+    ranked = json.loads(capsys.readouterr().out)
+    assert ranked[0]['name'] == 'resistive_force'
+    assert len(ranked) == 3 and len({law['readings'] for law in ranked}) == 1
+    assert ranked[0]['log_likelihood'] - ranked[1]['log_likelihood'] > 20.0
+    text = as_text([DriveLaw('first', 210.0, 90), DriveLaw('second', 190.46, 90)])
+    assert text.splitlines()[2:] == ['| first | 0.0 | 90 |', '| second | -19.5 | 90 |']
+    # Without a reference velocity each law has a slip that suits it.
+    rover.write(tmp_path / 'rover.yaml')
+    blind = make_bag(messages=[row for row in drive if 'reference' not in row[0]])
+    assert main(['compare', '--laws', str(blind), '--config', str(tmp_path / 'rover.yaml')]) == 2
+    assert 'no reference velocity' in capsys.readouterr().err

@@ -43,9 +43,10 @@ def test_the_law_that_made_the_rows_is_first(law, tmp_path, capsys):
 def test_what_compare_refuses(tmp_path, capsys):
     path = table(tmp_path / 'rows.csv', 'wong_reece')
     for arguments, word in (
-        (['--laws', path, 'bag'], 'takes a table'),
+        (['--laws', path, 'bag'], 'takes one table'),
         (['bag'], 'two bags'),
-        (['bag', 'bag', '--config', 'hit_fit'], 'belongs to --laws'),
+        (['bag', 'bag', '--config', 'hit_fit'], 'belong to --laws'),
+        (['bag', 'bag', '--remap', '/a:=/b'], 'belong to --laws'),
     ):
         assert main(['compare', *arguments]) == 2
         assert word in capsys.readouterr().err

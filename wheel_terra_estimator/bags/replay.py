@@ -131,14 +131,14 @@ def replay(
             )
             writer.state_origin(configuration, bag.path.resolve().name)
         interrupted = stack.enter_context(_until_interrupted())
-        events = _events(messages, pipeline, interrupted)
+        heard = events(messages, pipeline, interrupted)
         filtered = None
         if smoother is not None:
             live = HistoryRecorder(pipeline.names, most)
-            events = smoothed(events, smoother, live, pipeline.diagnostics)
+            heard = smoothed(heard, smoother, live, pipeline.diagnostics)
             filtered = live.history
         recorder = HistoryRecorder(pipeline.names, most)
-        for event in events:
+        for event in heard:
             if event.estimates is not None:
                 recorder.add(event.estimates)
                 tracker.add(event.estimates)
@@ -189,7 +189,7 @@ def further(
     )
 
 
-def _events(
+def events(
     messages: Iterator[tuple[int, str, Any]], pipeline: Pipeline, interrupted: threading.Event
 ) -> Iterator[Event]:
     """Yield the sets of a drive, and where the node says that there is no warning."""

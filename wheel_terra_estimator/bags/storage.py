@@ -30,6 +30,11 @@ from wheel_terra_estimator.input_file import check_regular
 STORAGE_SUFFIXES = ('.mcap', '.db3', '.mcap.zstd', '.db3.zstd')
 
 
+def is_bag(path: Path) -> bool:
+    """Return whether a path names a recording, and no table."""
+    return path.is_dir() or path.name.endswith(STORAGE_SUFFIXES)
+
+
 class _Source(Protocol):
     topics: list[Topic]
     losses: Losses

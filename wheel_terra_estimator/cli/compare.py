@@ -7,8 +7,10 @@ from __future__ import annotations
 import argparse
 import json
 from pathlib import Path
+from typing import Any
 
 from wheel_terra_estimator.bags import limits as bag_limits
+from wheel_terra_estimator.cli import bag_arguments
 from wheel_terra_estimator.cli.outputs import Output
 from wheel_terra_estimator.configuration import reader as configuration_reader
 
@@ -16,6 +18,7 @@ EXAMPLES = (
     'wheel-terra compare estimates_a estimates_b',
     'wheel-terra compare estimates_a estimates_b --truth my_drive --report compare.html',
     'wheel-terra compare --laws rows.csv --config my_rover.yaml --config hit_fit',
+    'wheel-terra compare --laws my_drive --config my_rover.yaml --config hit_fit',
 )
 
 
@@ -30,14 +33,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--laws',
         type=Path,
-        metavar='F.csv',
+        metavar='F.csv|BAG',
         help='instead of two bags: which law of the contact (predict --law) a table of steady '
-        'measurements speaks for, by evidence, with errors on loads and wheels held out',
+        'measurements speaks for, by evidence, with errors on loads and wheels held out; or a '
+        'recording of a drive, by the likelihood of its readings in a replay with each law',
     )
     parser.add_argument('--truth', type=Path, metavar='BAG', help='recording with ground truth')
     parser.add_argument('--json', action='store_true', help='print the differences as JSON')
     parser.add_argument('--report', action=Output, metavar='F.html', help='page with both overlaid')
-    bag_limits.add_arguments(parser)
+    bag_arguments.add_arguments(parser, 'for --laws with a recording: ')
     parser.add_argument('--overwrite', action='store_true', help='replace an earlier report')
     configuration_reader.add_arguments(parser)
 
@@ -48,13 +52,15 @@ def run(arguments: argparse.Namespace) -> int:
 
     if arguments.laws:
         if arguments.first or arguments.truth or arguments.report:
-            raise UserError('--laws takes a table; leave the bags, --truth and --report')
+            raise UserError(
+                '--laws takes one table or recording; leave the bags, --truth and --report'
+            )
         _rank_laws(arguments)
         return 0
     if arguments.second is None:
-        raise UserError('give two bags of estimates, or --laws with a table')
-    if arguments.config:
-        raise UserError('--config belongs to --laws; bags of estimates bring their own')
+        raise UserError('give two bags of estimates, or --laws with a table or a recording')
+    if arguments.config or arguments.remap:
+        raise UserError('--config and --remap belong to --laws; bags of estimates bring their own')
     from wheel_terra_estimator.bags.history import read_estimates
     from wheel_terra_estimator.bags.storage import open_bag
     from wheel_terra_estimator.bags.truth import read_simulated_truth
@@ -106,9 +112,29 @@ def run(arguments: argparse.Namespace) -> int:
 def _rank_laws(arguments: argparse.Namespace) -> None:
     from dataclasses import asdict
 
+    from wheel_terra_estimator.bags.storage import is_bag
+
+    laws, text = (_of_drive if is_bag(arguments.laws) else _of_table)(arguments)
+    print(json.dumps([asdict(law) for law in laws], indent=2) if arguments.json else text)
+
+
+def _of_table(arguments: argparse.Namespace) -> tuple[list[Any], str]:
+    """Return the laws in their order, and as text."""
     from wheel_terra_estimator.discrepancy.law_ranking import as_text, rank_laws
     from wheel_terra_estimator.discrepancy.tables.parsing import read_table
 
     configuration = configuration_reader.from_arguments(arguments, complete=False)
     laws = rank_laws(read_table(arguments.laws), configuration)
-    print(json.dumps([asdict(law) for law in laws], indent=2) if arguments.json else as_text(laws))
+    return laws, as_text(laws)
+
+
+def _of_drive(arguments: argparse.Namespace) -> tuple[list[Any], str]:
+    """Return the laws in their order, and as text with the notes of the recording."""
+    from wheel_terra_estimator.bags.drive_laws import as_text, rank_laws
+    from wheel_terra_estimator.bags.reader import parse_remaps
+    from wheel_terra_estimator.bags.storage import open_bag
+
+    configuration = configuration_reader.from_arguments(arguments)
+    with open_bag(arguments.laws, bag_limits.from_arguments(arguments)) as bag:
+        laws = rank_laws(bag, configuration, parse_remaps(arguments.remap))
+        return laws, '\n'.join([as_text(laws), *(f'note: {note}' for note in bag.notes)])

@@ -134,6 +134,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the command."""
+    from wheel_terra_estimator.bags.storage import is_bag
     from wheel_terra_estimator.discrepancy.report.model_file import write_files
 
     output: Path = arguments.output
@@ -149,7 +150,7 @@ def run(arguments: argparse.Namespace) -> int:
             f'--soil-known-to {arguments.soil_known_to:g}: must be a share above 0, at most 2'
         )
     given = [*arguments.data, *([arguments.reference] if arguments.reference else [])]
-    if not any(map(_is_bag, given)):
+    if not any(map(is_bag, given)):
         if arguments.remap:
             raise UserError(
                 f'--remap {arguments.remap[0]}: renames topics of a bag, but {given[0]} is a '
@@ -292,15 +293,11 @@ def _with_effect_file(diagnosis: Diagnosis, own: dict[str, Path]) -> Diagnosis:
     return replace(diagnosis, configuration=configuration)
 
 
-def _is_bag(path: Path) -> bool:
-    from wheel_terra_estimator.bags.storage import STORAGE_SUFFIXES
-
-    return path.is_dir() or path.name.endswith(STORAGE_SUFFIXES)
-
-
 def _read(path: Path, arguments: argparse.Namespace, configuration: Configuration) -> SteadyTable:
     """Read a table, or extract the steady windows of a drive."""
-    if _is_bag(path):
+    from wheel_terra_estimator.bags.storage import is_bag
+
+    if is_bag(path):
         from wheel_terra_estimator.bags.reader import parse_remaps
         from wheel_terra_estimator.discrepancy.drives.windows import rows_from_bag
 

@@ -48,6 +48,7 @@ from wheel_terra_estimator.estimation.filter.initial_state import (
     layout_of,
     with_soil_of,
 )
+from wheel_terra_estimator.estimation.filter.likelihood import Likelihood
 from wheel_terra_estimator.estimation.filter.observability import considered_entries
 from wheel_terra_estimator.estimation.filter.prediction import Prediction
 from wheel_terra_estimator.estimation.filter.reference import ReferenceUpdate
@@ -172,9 +173,16 @@ class WheelSoilEstimator:
         Rover, soil, sensors, tuning.
     tape : Tape, optional
         Keeps what a smoother needs.
+    likelihood : Likelihood, optional
+        Sums up how likely the readings were.
     """
 
-    def __init__(self, configuration: Configuration, tape: Tape | None = None) -> None:
+    def __init__(
+        self,
+        configuration: Configuration,
+        tape: Tape | None = None,
+        likelihood: Likelihood | None = None,
+    ) -> None:
         self._configuration = configuration
         self._rover = rover = Rover.from_configuration(configuration)
         sensors = SensorFigures.from_configuration(configuration)
@@ -268,6 +276,9 @@ class WheelSoilEstimator:
         if tape is not None:
             self._ekf.tape = tape
             self._parts += (tape,)
+        if likelihood is not None:
+            self._ekf.likelihood = likelihood
+            self._parts += (likelihood,)
 
     @property
     def bounds(self) -> tuple[FloatArray, FloatArray]:

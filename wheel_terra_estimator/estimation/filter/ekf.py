@@ -19,6 +19,7 @@ from filterpy.kalman import ExtendedKalmanFilter
 from numpy.typing import NDArray
 from scipy.linalg.lapack import dposv
 
+from wheel_terra_estimator.estimation.filter.likelihood import Likelihood
 from wheel_terra_estimator.estimation.smoothing.tape import Gaussian, Tape
 
 FloatArray = NDArray[np.float64]
@@ -89,6 +90,8 @@ class GatedFilter:
     ----------
     tape : Tape or None
         Keeps the transitions of the state for a smoother.
+    likelihood : Likelihood or None
+        Sums up how likely the innovations were.
     """
 
     def __init__(
@@ -102,6 +105,7 @@ class GatedFilter:
         self._lower, self._upper = lower, upper
         self.restarts = 0
         self.tape: Tape | None = None
+        self.likelihood: Likelihood | None = None
 
     @property
     def bounds(self) -> tuple[FloatArray, FloatArray]:
@@ -165,6 +169,8 @@ class GatedFilter:
         share = np.maximum(noise * scale * scale, _LEAST_SHARE)
         ekf = self._ekf
         ekf.fuse(residual * scale, H * column, HP * column, share, considered)
+        if self.likelihood is not None:
+            self.likelihood.add(ekf.y, ekf.S, scale)
         ekf.P = 0.5 * (ekf.P + ekf.P.T)
         self._keep_sound()
 
