@@ -163,7 +163,7 @@ def test_the_way_before_a_reversal_knows_nothing_of_the_way_back():
     scenario = load(
         {
             'configuration': ['generic_six_wheel', 'hit_lss1'],
-            'duration': 16.0,
+            'duration': 12.0,
             'slope.angle_deg': [6.0],
             'drive.time': [0.0, 8.0, 9.0],
             'drive.forward': [0.05, 0.05, -0.05],
