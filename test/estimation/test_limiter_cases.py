@@ -76,6 +76,17 @@ class Rover:
         return decide(self.state, self.now, (forward, 0.0, 0.0, 0.0, 0.0, turn), self.tuning).scale
 
 
+def test_an_unknown_direction_opens_both_ways_but_one_at_a_time():
+    rover = Rover()
+    rover.stuck(direction=0)
+    assert rover.command(0.1).scale == 0.3
+    rover.command(0.1)
+    assert rover.command(-0.1).scale == 0.0
+    found = [rover.command(-0.1).scale for _ in range(30)]
+    assert found.index(0.3) * STEP == pytest.approx(1.0, abs=2 * STEP)
+    assert set(found[found.index(0.3) :]) == {0.3}
+
+
 # -- Stop -----------------------------------------------------------------------------------------
 
 
