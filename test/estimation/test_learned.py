@@ -72,7 +72,7 @@ def test_soil_is_that_of_the_topic_and_its_deviations_hold_elsewhere(drive, driv
         assert learned[key] == pytest.approx(value, rel=1e-12)
     key = 'soil.friction_angle_deg'
     assert learned[deviation(key)] >= 0.999 * std[key]  # the moduli: no more than stated before
-    assert std[key] < 0.9 * start[key]  # something was learned
+    assert std[key] < 0.95 * start[key]  # something was learned
     phi = np.radians(last[key])
     configured = drive.configuration.soil  # cohesion and tangent are scaled by one factor
     scale = np.tan(phi) / np.tan(float(configured.friction_angle))
