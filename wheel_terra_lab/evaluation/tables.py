@@ -319,7 +319,10 @@ def _foresight(drives: Sequence[DriveScore]) -> list[str]:
         (name, f'{value:.4f}', f'{low:.4f} to {high:.4f}')
         for name, (value, low, high) in found.items()
     ]
-    rows.append(('the share of events, always', f'{share * (1.0 - share):.4f}', '-'))
+    climatology = share * (1.0 - share)
+    rows.append(('the share of events, always', f'{climatology:.4f}', '-'))
+    if climatology > 0.0:
+        rows.append(('probability over that', f'{found["probability"][0] / climatology:.2f}', '-'))
     bins = [(f'{said:.2f}', f'{came:.2f}', str(count)) for count, said, came in reliability(data)]
     return [
         '\nProbability of an entrapment (median slip above 0.9 for a second, within horizon or '

@@ -15,6 +15,7 @@ from wheel_terra_lab.evaluation.foresight import (
     reliability,
     reliability_error,
 )
+from wheel_terra_lab.evaluation.tables import _foresight
 
 STEP = 0.1
 
@@ -70,3 +71,13 @@ def test_a_calibrated_probability_is_reliable_and_beats_a_warning():
     assert found['difference'][2] < 0.0
     low = Foresight(np.full(100, 0.1), np.zeros(100), np.ones(100))
     assert reliability_error(low) == pytest.approx(0.9)
+
+
+def test_the_report_sets_the_probability_over_the_share_of_events():
+    """Half of the rows come; said with 0.8 and 0.2: 0.04 over 0.25."""
+    came = np.array([1.0, 0.0] * 50)
+    data = Foresight(np.where(came > 0.0, 0.8, 0.2), came, came)
+    said = '\n'.join(_foresight([SimpleNamespace(foresight=data)]))
+    assert '| probability over that | 0.16 |' in said
+    data = Foresight(data.probability, came, np.zeros(came.size))
+    assert 'over that' not in '\n'.join(_foresight([SimpleNamespace(foresight=data)]))
