@@ -40,6 +40,26 @@ def test_wheels_backwards_in_turns_on_the_spot_are_found_all_the_same(wheels):
     assert 'on the other half' in finding.words
 
 
+@pytest.mark.parametrize('what', ['wheels', 'reference', 'both torque and reference'])
+def test_slopes_tell_whether_wheels_or_reference_run_backwards(what):
+    """A drive without turns, starts or stops: only the torque uphill says which way it goes."""
+    time = np.arange(0.0, 120.0, 1.0 / rolling.RATE)
+    hill = np.interp(time, [20, 30, 60, 70, 90], [0, 0.12, 0.12, -0.05, 0])
+    whole = rolling.recording(rolling.Motion(time, 0.0 * time + 0.25, 0.0 * time, hill))
+    joints, reference = whole.joints, whole.reference
+    if what == 'wheels':
+        joints = replace(joints, rate=-joints.rate, torque=-joints.torque)
+    else:
+        reference = replace(reference, velocity=-reference.velocity)
+    if 'torque' in what:
+        joints = replace(joints, torque=-joints.torque)
+    recording = replace(whole, joints=joints, reference=reference)
+    cures = [f.cure for f in check_recording(recording, rolling.rover()).findings]
+    backwards, negated = 'wheels.direction: [-1, -1, -1, -1]', 'negate twist.linear.x'
+    assert (backwards in cures) is (what != 'reference')
+    assert any(negated in cure for cure in cures) is (what != 'wheels')
+
+
 @pytest.mark.parametrize('factor', [0.9, 1.12])
 def test_a_scale_of_the_reference_is_no_radius(factor):
     """Where the rover turns without skid the gyro tells them apart; else both are named."""

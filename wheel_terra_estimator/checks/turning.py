@@ -30,6 +30,7 @@ from wheel_terra_estimator.checks.statistics import (
     moving_mean,
     robust_std,
 )
+from wheel_terra_estimator.checks.torque import heading_of_torque
 from wheel_terra_estimator.checks.trial import Trial, halves, worst
 
 FloatArray = NDArray[np.float64]
@@ -394,7 +395,19 @@ def _told_direction(evidence: Evidence, signs: FloatArray) -> _Told:
             yaw = yaw_of_motion(*felt)
             if yaw is not None and abs(math.cos(yaw.value)) > CLEAR_DIRECTION:
                 by_force = math.cos(yaw.value)
+        if by_force is None:
+            by_force = _climbs(evidence.with_rate(evidence.rate * signs, evidence.torque * signs))
     return _Told(by_reference, by_force)
+
+
+def _climbs(evidence: Evidence) -> float | None:
+    """Return the agreement of the drive torques with the slopes they carry the rover up or down."""
+    if not np.nansum(evidence.torque * evidence.rate) > 0.0:
+        return None  # the torques count the other way
+    uphill = heading_of_torque(evidence)
+    if uphill is None or abs(math.cos(uphill.value)) <= CLEAR_DIRECTION:
+        return None
+    return math.cos(uphill.value)
 
 
 def _directions(evidence: Evidence, signs: FloatArray) -> str:
