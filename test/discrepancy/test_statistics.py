@@ -74,6 +74,14 @@ def setting(forward):
     return soil, truth, std, inputs, np.ptp(truth, axis=0)
 
 
+@pytest.mark.parametrize(
+    ('source', 'pascal'), [('', 0.2 * 250 + 10), ('published', 0.5 * 250 + 50), ('proxy', 175.0)]
+)
+def test_cohesion_is_known_to_a_share_and_some_pascal(source, pascal):
+    """As docs/diagnose.md has it; a share that is taken for pascals holds it fast."""
+    assert deviations(SOIL, {}, source)['cohesion'].value == pytest.approx(pascal)
+
+
 def test_batched_model_is_the_package_model(forward):
     """Outputs and Jacobians against terramechanics, one hypothesis at a time, other steps."""
     soil = soil_coordinates(SOIL, deviations(SOIL, {}))

@@ -76,9 +76,8 @@ def deviations(
         elif field in stated:
             found[name] = Deviation(_of_stated(soil, name, stated[field]), 'stated')
         else:
-            value = (
-                usual if isinstance(usual, float) else usual[0] * float(soil.cohesion) + usual[1]
-            )
+            part = usual * float(soil.cohesion) + _COHESION_FLOOR[source]
+            value = part if name == 'cohesion' else usual
             found[name] = Deviation(value, f'class of source: {_class(name, source)}')
     return found
 
