@@ -7,6 +7,7 @@ from __future__ import annotations
 import csv
 import math
 import re
+from codecs import BOM_UTF16_BE, BOM_UTF16_LE
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -72,10 +73,13 @@ def open_csv(path: Path, largest: int | None = None) -> Iterator[CsvFile]:
     check_size(path, largest)
     try:
         with path.open('rb') as file:
-            if file.read(4) == b'PK\x03\x04':
-                raise UserError(
-                    f'{path}: a spreadsheet or archive, not text; export the table as CSV'
-                )
+            head = file.read(4)
+        if head == b'PK\x03\x04':
+            raise UserError(f'{path}: a spreadsheet or archive, not text; export the table as CSV')
+        if head.startswith((BOM_UTF16_LE, BOM_UTF16_BE)):
+            raise UserError(
+                f'{path}: text in UTF-16; save it as CSV (UTF-8), or: iconv -f utf-16 -t utf-8'
+            )
         with path.open(newline='', encoding='utf-8-sig') as text:
             first = text.readline()
             stated = _STATED_DELIMITER.fullmatch(first)

@@ -44,9 +44,15 @@ def test_remapped_topics(make_bag: Any, rover: Any, drive: Any) -> None:
 def test_missing_wheel_odometry_says_which_and_what_is_there(
     make_bag: Any, rover: Any, drive: Any
 ) -> None:
+    others = [row for row in drive if row[0] != '/joint_states']
+    sinkage = [('/sinkage', *row[1:]) for row in drive if row[0] == '/joint_states']
     bag = make_bag(
-        messages=[row for row in drive if row[0] != '/joint_states'],
-        topics={'/imu/data': 'sensor_msgs/msg/Imu', '/reference_odom': 'nav_msgs/msg/Odometry'},
+        messages=others + sinkage,  # joint states that are none of the wheels'
+        topics={
+            '/imu/data': 'sensor_msgs/msg/Imu',
+            '/reference_odom': 'nav_msgs/msg/Odometry',
+            '/sinkage': 'sensor_msgs/msg/JointState',
+        },
     )
     with pytest.raises(UserError) as error:
         list(read(bag, {}, rover))

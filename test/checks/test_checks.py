@@ -244,6 +244,21 @@ def test_transport():
     only(checked(joints=zero), 'order')
 
 
+def test_drives_that_send_a_message_each_repeat_no_stamp():
+    joints = WHOLE.joints
+    wheels = len(joints.names)
+    own = np.tile(np.eye(wheels, dtype=bool), (joints.stamp.size, 1))
+    each = {
+        'stamp': np.repeat(joints.stamp, wheels),
+        'log_time': np.repeat(joints.log_time, wheels),
+        'rate': np.where(own, np.repeat(joints.rate, wheels, axis=0), np.nan),
+        'torque': np.where(own, np.repeat(joints.torque, wheels, axis=0), np.nan),
+    }
+    assert not kinds(checked(joints=replace(joints, **each)))
+    again = {key: np.repeat(getattr(joints, key), 2, axis=0) for key in each}
+    only(checked(joints=replace(joints, **again)), 'order')
+
+
 def test_without_a_rover_file_signs_are_found_all_the_same():
     flip = np.array([1.0, 1.0, 1.0, -1.0])
     joints = replace(WHOLE.joints, rate=WHOLE.joints.rate * flip, torque=WHOLE.joints.torque * flip)

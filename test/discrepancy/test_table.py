@@ -83,6 +83,14 @@ def test_columns_misspelt_or_missing(tmp_path, header, parts):
     assert all(part in message for part in parts), message
 
 
+@pytest.mark.parametrize('encoding', ['utf-16', 'utf-16-be'])
+def test_a_spreadsheets_unicode_text_is_told_with_its_own_cure(tmp_path, encoding):
+    path = tmp_path / 'table.csv'
+    path.write_bytes(('\ufeff' * (encoding != 'utf-16') + HEADER + '\n').encode(encoding))
+    with pytest.raises(UserError, match='iconv -f utf-16 -t utf-8'):
+        read_table(path)
+
+
 def test_capitals_units_and_semicolons_are_read_with_a_note(tmp_path):
     plain = read_table(write(tmp_path, HEADER + '\n' + '\n'.join(lines())))
     table = rows()

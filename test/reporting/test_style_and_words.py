@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import re
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,7 +12,12 @@ import pytest
 
 from wheel_terra_estimator.estimation.estimates import SlipClass
 from wheel_terra_estimator.reporting.drive_style import CLASS_COLOURS, Border, known
-from wheel_terra_estimator.reporting.drive_summary import short_names
+from wheel_terra_estimator.reporting.drive_summary import (
+    DriveSummary,
+    WheelSummary,
+    as_text,
+    short_names,
+)
 from wheel_terra_estimator.reporting.html import picture, render
 from wheel_terra_estimator.reporting.style import (
     DARK,
@@ -50,6 +56,19 @@ def test_short_names() -> None:
     assert short_names(['wheel_1', 'wheel_2']) == ['wheel_1', 'wheel_2']
     assert short_names(['wheel', 'wheel']) == ['wheel', 'wheel']
     assert short_names(['only_wheel']) == ['only_wheel']
+
+
+def test_figures_of_any_size_stand_apart() -> None:
+    seconds = {c.name.lower(): 86400.0 for c in SlipClass}
+    wheel = WheelSummary(
+        'a', seconds, seconds, 0.95, 0.19, 0.13, 0, 0, 0, (0.4, 0.6), (0.1, 0.16), 0.09
+    )
+    lines = as_text(DriveSummary('', 86400.0, 1, (wheel,), (), (), ())).splitlines()
+    titles, row = (line for line in lines if line.startswith(('  time in', '  a ')))
+    cells = re.split(' {3,}', row.strip())
+    assert cells[1:] == ['86400.0'] * 5 + ['0.40 to 0.60', '0.95', '100 to 160 +- 90', '190 +- 130']
+    assert len(re.split(' {3,}', titles.strip())) == len(cells)
+    assert len(titles) == len(row)
 
 
 def test_the_same_picture_is_the_same_text_and_no_setting_stays() -> None:

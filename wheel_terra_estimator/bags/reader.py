@@ -150,6 +150,7 @@ class MeasurementReader:
     def _advice(self, name: str) -> str:
         """Say what is there and how to use it."""
         there = self.bag.topics.values()
+        others = {f'/{other}' for other in INPUT_TYPES if other != name}
         listed = ', '.join(f'{topic.name} ({topic.type})' for topic in there)
         fitting = [
             topic.name
@@ -157,6 +158,7 @@ class MeasurementReader:
             if topic.type == INPUT_TYPES[name]
             and topic.message_count
             and not topic.name.startswith(NO_INPUTS)
+            and topic.name not in others
         ]
         cure = f'name the right one with --remap {name}:={fitting[0] if fitting else "/TOPIC"}'
         if name == 'joint_states' and not fitting:

@@ -217,9 +217,9 @@ def _notes(
     yield from bag.notes
     counters = pipeline.counters()
     if restarts := counters.get('filter_restarts', 0):
-        yield f'the filter failed and was started anew {restarts} times; please report this drive'
+        yield f'the filter failed and was started anew {_times(restarts)}; please report this drive'
     if steps := counters.get('clock_steps_back', 0):
-        yield f'the clock stepped back {steps} times; the estimates start anew there'
+        yield f'the clock stepped back {_times(steps)}; the estimates start anew there'
     yield from reader.notes
     used = set(reader.topics.values())
     unknown = [
@@ -236,6 +236,10 @@ def _notes(
     if unknown:
         count = sum(topic.message_count for topic in unknown)
         yield f'{count} messages not used, on {", ".join(topic.name for topic in unknown)}'
+
+
+def _times(count: int) -> str:
+    return 'once' if count == 1 else f'{count} times'
 
 
 def _in_order_of(arrival: Path, reader: MeasurementReader) -> Iterator[tuple[int, str, Any]]:

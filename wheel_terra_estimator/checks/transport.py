@@ -8,10 +8,11 @@ import math
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from wheel_terra_estimator.checks.faults import found, of_offset
 from wheel_terra_estimator.checks.finding import Outcome
-from wheel_terra_estimator.checks.series import Channel, Recording
+from wheel_terra_estimator.checks.series import Channel, JointSeries, Recording, SinkageSeries
 from wheel_terra_estimator.checks.statistics import robust_std
 from wheel_terra_estimator.configuration.configuration import Configuration
 
@@ -71,13 +72,14 @@ def _jitter(channel: Channel) -> float:
 
 
 def _order(channel: Channel, most_back: float) -> list[Outcome]:
-    zero = float(np.mean(channel.stamp <= 0))
-    stamps = channel.stamp[channel.stamp > 0]
-    step = np.diff(stamps) * 1e-9
+    stamped = channel.stamp > 0
+    zero = float(np.mean(~stamped))
+    step = np.diff(channel.stamp[stamped]) * 1e-9
     forward = step[step > 0]
     period = float(np.median(forward)) if forward.size else 0.0
     back = float(np.mean(step < -period)) if step.size else 0.0
-    repeated = float(np.mean(step == 0.0)) if step.size else 0.0
+    again = (step == 0.0) & _of_one_joint(channel)[stamped][1:]
+    repeated = float(np.mean(again)) if step.size else 0.0
     far = int(np.sum(step < -FAR_BACK))
     words = []
     if zero > 0.01:
@@ -91,6 +93,17 @@ def _order(channel: Channel, most_back: float) -> list[Outcome]:
     if not words:
         return []
     return [found('order', channel.topic, 0.99, how='; '.join(words))]
+
+
+def _of_one_joint(channel: Channel) -> NDArray[np.bool_]:
+    """Return which messages (k,) hold a joint that the one before holds too.
+
+    Drives that send a message each, all of one instant, repeat no stamp.
+    """
+    if not isinstance(channel, JointSeries | SinkageSeries):
+        return np.ones(channel.stamp.size, dtype=bool)
+    there = np.isfinite(channel.rate if isinstance(channel, JointSeries) else channel.sinkage)
+    return np.r_[True, np.any(there[1:] & there[:-1], axis=1)]
 
 
 def _drop_outs(name: str, channel: Channel, figures: dict[str, Any]) -> list[Outcome]:

@@ -258,21 +258,24 @@ def as_text(summary: DriveSummary) -> str:
         lines.append(f'  STUCK from {warning.start:.1f} s to {end}{reason}')
         lines += [f'    {warning.later}'] if warning.later else []
     if summary.wheels:
-        width = max(len('time in class [s]'), *(len(wheel.name) for wheel in summary.wheels))
         classes = [c.name.lower() for c in SlipClass]
-        lines += [
-            '',
-            f'  {"time in class [s]":{width}}'
-            + ''.join(f'{c:>10}' for c in classes)
-            + '  |slip| 5 to 95 %       max    sinkage [mm]        max',
+        table = [['time in class [s]', *classes, '|slip| 5 to 95 %', 'max', 'sinkage [mm]', 'max']]
+        table += [
+            [
+                wheel.name,
+                *(f'{wheel.seconds[c]:.1f}' for c in classes),
+                spread(wheel.slip, '.2f'),
+                shown(wheel.max_slip, '.2f'),
+                sinkages(wheel, '+-'),
+                deepest(wheel, '+-'),
+            ]
+            for wheel in summary.wheels
         ]
-        for wheel in summary.wheels:
-            lines.append(
-                f'  {wheel.name:{width}}'
-                + ''.join(f'{wheel.seconds[c]:10.1f}' for c in classes)
-                + f'{spread(wheel.slip, ".2f"):>17}{shown(wheel.max_slip, ".2f"):>10}'
-                + f'{sinkages(wheel, "+-"):>16}{deepest(wheel, "+-"):>11}'
-            )
+        first, *others = (max(map(len, column)) for column in zip(*table, strict=True))
+        lines.append('')
+        for name, *cells in table:
+            right = (f'{c:>{width}}' for c, width in zip(cells, others, strict=True))
+            lines.append('   '.join([f'  {name:{first}}', *right]))
     heard = [
         row.name if row.topic == f'/{row.name}' else f'{row.name} ({row.topic})'
         for row in summary.messages
