@@ -97,6 +97,9 @@ def test_life_cycle_services_and_live_parameters(start, parameters, listener, tm
 
     assert state() == 'unconfigured'
     assert not call(node, until, Trigger, 'reset', Trigger.Request()).success
+    for transition in (Transition.TRANSITION_ACTIVATE, Transition.TRANSITION_CLEANUP, 250):
+        assert not change(transition)
+    assert state() == 'unconfigured'
     refused = set_parameter('rover.mass', -5.0)
     assert not refused.successful and 'rover.mass' in refused.reason
     assert set_parameter('rover.mass', 120.0).successful
@@ -106,6 +109,7 @@ def test_life_cycle_services_and_live_parameters(start, parameters, listener, tm
     assert all(s.level == STALE for s in said[-1].status)
     assert not slip, 'configured, not active: the filter goes on, nothing is published'
     assert change(Transition.TRANSITION_ACTIVATE)
+    assert not change(Transition.TRANSITION_CONFIGURE), 'as a manager does that knows no autostart'
     drive(lambda: len(slip) > 2)
     # The filter had gone on: stamps do not begin anew.
     assert slip[0].header.stamp.sec + 1e-9 * slip[0].header.stamp.nanosec > 100.0
@@ -139,6 +143,7 @@ def test_life_cycle_services_and_live_parameters(start, parameters, listener, tm
     assert change(Transition.TRANSITION_CONFIGURE)
     status, words = process.stop(signal.SIGTERM)
     assert status == 0 and 'Traceback' not in words, words
+    assert 'no transition 1 from active; with a life cycle manager set autostart to false' in words
 
 
 def test_a_warning_and_the_soil_stand_over_a_restart(start, parameters, listener, tmp_path):

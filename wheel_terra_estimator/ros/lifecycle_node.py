@@ -138,6 +138,8 @@ class EstimatorNode(LifecycleNode):
         self.create_service(Trigger, '~/reset', self._reset)
         self.create_service(Trigger, '~/save_soil', self._save_soil)
         self.create_service(SetBool, '~/set_enabled', self._set_enabled)
+        change = self._service_change_state
+        change.callback = partial(self._change_state, change.callback)
         self.add_on_set_parameters_callback(self._on_parameters)
         if self._given.get('autostart', True) is not False:
             self._configure()
@@ -145,6 +147,20 @@ class EstimatorNode(LifecycleNode):
             self.trigger_activate()
 
     # -- Life cycle -----------------------------------------------------------------------------
+
+    def _change_state(self, usual: Callable[[Any, Any], Any], request: Any, response: Any) -> Any:
+        """Refuse a transition that the state does not have; rclpy lets it end the process."""
+        try:
+            return usual(request, response)
+        except RuntimeError:  # rcl's own is one
+            transition = request.transition
+            _, state = self._state_machine.current_state
+            self.get_logger().error(
+                f'life cycle: no transition {transition.label or transition.id} from {state}; '
+                'with a life cycle manager set autostart to false'
+            )
+            response.success = False
+            return response
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Check the parameters and begin to listen; refuse with the reason."""
