@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from wheel_terra_estimator.bags.reader import MeasurementReader
-from wheel_terra_estimator.bags.simulated_drive import TRUTH_TOPICS
+from wheel_terra_estimator.bags.simulated_drive import TRUTH_TOPICS, write_simulated_drive
 from wheel_terra_estimator.bags.storage import open_bag
 from wheel_terra_estimator.bags.truth import read_truth
 from wheel_terra_estimator.cli.main import main
@@ -58,12 +58,22 @@ def test_truth_in_the_bag_is_that_of_the_drive(bag_path: Path) -> None:
         classes = list(bag.messages(('/ground_truth/slip_class',)))
     assert truth is not None
     np.testing.assert_array_equal(truth.slip.stamp, drive.truth.stamp)
-    known = ~np.isnan(drive.truth.slip)
-    np.testing.assert_array_equal(truth.slip.value[known], drive.truth.slip[known])
+    np.testing.assert_array_equal(truth.slip.value, drive.truth.slip)
     np.testing.assert_array_equal(truth.sinkage.value, drive.truth.sinkage)
     np.testing.assert_array_equal(truth.drawbar_pull.value, drive.truth.drawbar_pull)
-    assert np.isfinite(truth.slip.value).all()
     assert len(classes) == len(drive.truth.stamp)
+
+
+def test_true_slip_of_wheels_at_rest_is_unknown(tmp_path: Path) -> None:
+    """About a standing side a rover can be entrapped: only the wheels that turn say so."""
+    pivot = {'drive.forward': [0.025], 'drive.turn_rate': [-0.05], 'duration': 2.0}
+    drive = simulate(load({'configuration': ['generic_six_wheel', 'test_sand'], **pivot}))
+    write_simulated_drive(drive, tmp_path / 'bag')
+    with open_bag(tmp_path / 'bag') as bag:
+        truth = read_truth(bag, {}, drive.configuration)
+    assert truth is not None
+    assert np.isnan(truth.slip.value[-1]).tolist() == 3 * [False, True]
+    np.testing.assert_array_equal(truth.slip.value, drive.truth.slip)
 
 
 def test_log_times_are_arrivals(bag_path: Path) -> None:
