@@ -88,7 +88,8 @@ def test_bombs_in_recordings(tmp_path: Path, size: int) -> None:
         assert said.count('\n') == 1, said
         assert str(path) in said
         assert used < 10.0  # with the imports, on a machine that does other things
-        assert peak < 2**18 + 0.75 * size / 2**10
+        mapped = size if 'db3' in path.name else 0  # pages of the file: the machine takes them back
+        assert peak < 2**18 + (mapped + 0.75 * size) / 2**10
 
 
 @pytest.fixture
