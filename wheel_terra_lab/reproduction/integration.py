@@ -8,13 +8,19 @@ from typing import Any
 
 import numpy as np
 
+from wheel_terra_estimator.configuration import reader
+from wheel_terra_estimator.configuration.shipped import configuration_folder
 from wheel_terra_estimator.terramechanics import closed_form, quadrature
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
-from wheel_terra_estimator.terramechanics.terms import Terms, build_contact, set_angles
+from wheel_terra_estimator.terramechanics.terms import (
+    SOIL_NUMBERS,
+    Terms,
+    build_contact,
+    set_angles,
+)
 from wheel_terra_estimator.terramechanics.wheel import Wheel
 from wheel_terra_lab.reproduction.statement import Statement
-from wheel_terra_lab.studies.model_validation import closed_forms
 from wheel_terra_lab.studies.model_validation.fitting import FloatArray
 
 REFERENCE_SHARE = 1e-4  # of the load: where the quadrature is called reference
@@ -64,9 +70,25 @@ def _drawn(count: int, slips: tuple[float, float]) -> tuple[Contact, Terms]:
     wheel = Wheel(radius, radius * random.uniform(0.5, 1.5, count))
     points = OperatingPoints(random.uniform(*slips, count), 1.0, wheel, slip_radius='rim')
     terms = Terms({})
-    contact = build_contact(points, closed_forms.named_soil(random, count), 'bekker', terms)
+    contact = build_contact(points, _named_soil(random, count), 'bekker', terms)
     set_angles(contact, random.uniform(0.15, 1.0, count), None, terms)
     return contact, terms
+
+
+def _named_soil(random: np.random.Generator, count: int) -> dict[str, FloatArray]:
+    """Draw shipped soils in Bekker form, every number +-30 %."""
+    named = []
+    for path in sorted((configuration_folder() / 'soils').glob('*.yaml')):
+        soil = reader.load([path], complete=False).soil
+        if soil.pressure_law == 'bekker' and not path.stem.endswith('_fit'):
+            named.append({name: float(getattr(soil, name)) for name in SOIL_NUMBERS})
+    drawn = random.integers(len(named), size=count)
+    soils = {
+        name: np.array([named[k][name] for k in drawn]) * random.uniform(0.7, 1.3, count)
+        for name in SOIL_NUMBERS
+    }
+    soils['friction_angle'] = np.minimum(soils['friction_angle'], np.radians(55.0))
+    return soils
 
 
 def _reference(contact: Contact, terms: Terms) -> tuple[int, float, tuple[FloatArray, FloatArray]]:

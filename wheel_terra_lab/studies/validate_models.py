@@ -1,10 +1,10 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Write a page with pictures: the wheel-soil models against truth and measurement.
+"""Write a page with pictures: the wheel-soil models against measured wheels.
 
     python -m wheel_terra_lab.studies.validate_models -o DIR [--shared ../shared] [--only ...]
 
-Needs the folder with measured data; takes about two minutes. What follows from it is said in
+Needs the folder with measured data; takes about a minute. What follows from it is said in
 ``docs/models/validation.md``, which shows some of the pictures.
 """
 
@@ -17,7 +17,6 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 SECTIONS = (
-    'closed_forms',
     'hit_wheels',
     'grc3_wheel',
     'cmu_wheel',

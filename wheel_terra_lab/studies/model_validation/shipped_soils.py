@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Print the fitted numbers of config/soils/{hit,kls1,cmu_sand,grc3}_fit.yaml, with deviations.
 
-    python -m model_validation.shipped_soils ../shared      (in the folder tools)
+    python -m wheel_terra_lab.studies.model_validation.shipped_soils ../shared
 
 Fitted to all rows (a wheel that is locked aside), where the validation page fits every second one
 of CMU and GRC-3.
