@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The node as other nodes see it."""
 
+import signal
+
 import pytest
 
 ROVER = ['--ros-args', '--params-file']
@@ -136,6 +138,28 @@ def test_publisher_of_another_type_or_quality_is_named(start, parameters, listen
 
     until(lambda: said('geometry_msgs/msg/Twist comes there, needed is sensor_msgs/msg/JointState'))
     until(lambda: said('/reference_odom: a publisher offers another RELIABILITY'))
+
+
+def test_wheel_rates_that_nobody_sends_are_told_with_their_topic(start, parameters, listener):
+    from diagnostic_msgs.msg import DiagnosticArray
+    from sensor_msgs.msg import Imu
+
+    node, until = listener
+    diagnostics = hear(node, DiagnosticArray, '/diagnostics')
+    imu = node.create_publisher(Imu, 'imu/data', 10)
+    process = start('estimator_node', *ROVER, parameters, '-r', 'joint_states:=/drive/joints')
+    message = Imu()
+    message.linear_acceleration.z = 9.81
+
+    def said(words):
+        message.header.stamp.sec += 1
+        imu.publish(message)
+        return any(words in m.status[0].message for m in diagnostics)
+
+    until(
+        lambda: said('wheel rates unknown') and said('/drive/joints: never heard (no publishers)')
+    )
+    assert 'listening to /drive/joints, /imu/data' in process.stop(signal.SIGTERM)[1]
 
 
 @pytest.mark.parametrize(

@@ -130,5 +130,5 @@ def test_a_node_without_inputs_waits_at_first_and_warns_then(drive):
     process.send_signal(signal.SIGINT)
     said, _ = process.communicate(60.0)
     waits, _, warns = said.partition('[WARN]')
-    assert 'waiting for joint_states, imu/data' in waits
+    assert 'waiting for /joint_states, /imu/data' in waits
     assert 'never heard' in warns

@@ -202,6 +202,7 @@ def test_a_stop_waits_for_no_disk_and_a_rival_of_the_estimator_is_told(
         ('critical_slip:=0.1', 'must be below'),
         ('creep_scale:=.nan', 'out of range'),
         ('stamped:=7', 'stamped'),
+        ('creep:=0.5', "the nearest known one is 'creep_scale'"),
     ],
 )
 def test_what_cannot_be_used_is_refused_at_the_start(start, parameters, parameter, said):

@@ -155,9 +155,10 @@ class EstimatorNode(LifecycleNode):
         except RuntimeError:  # rcl's own is one
             transition = request.transition
             _, state = self._state_machine.current_state
+            alone = self._given.get('autostart', True) is not False
+            cure = '; with a life cycle manager set autostart to false' if alone else ''
             self.get_logger().error(
-                f'life cycle: no transition {transition.label or transition.id} from {state}; '
-                'with a life cycle manager set autostart to false'
+                f'life cycle: no transition {transition.label or transition.id} from {state}{cure}'
             )
             response.success = False
             return response
@@ -252,9 +253,9 @@ class EstimatorNode(LifecycleNode):
         if self._said_ready or self._pipeline is None:
             return
         self._said_ready = True
+        topics = (self.resolve_topic_name(topic) for topic in self._subscriptions_made)
         self.get_logger().info(
-            f'ready: {len(self._pipeline.names)} wheels, '
-            f'listening to {", ".join(self._pipeline.converter.layout.topics)}'
+            f'ready: {len(self._pipeline.names)} wheels, listening to {", ".join(topics)}'
         )
 
     def _release(self) -> None:
@@ -523,6 +524,10 @@ class EstimatorNode(LifecycleNode):
         now = self._seconds()
         faults = self._watch_inputs.faults(now)
         faults += [(self.resolve_topic_name(t), words) for t, words in self._incompatible.items()]
+        wheels = self._pipeline.converter.layout.wheel_odometry if self._pipeline else ''
+        if wheels and self._watch_inputs.age(wheels, now) is None and self._latest is not None:
+            words = f'never heard ({self._publishers_in_words(wheels)})'
+            faults.append((self.resolve_topic_name(wheels), words))
         if self._same_name:
             words = f'another node is called /{self._full_name}: both publish estimates'
             faults.append(('name', words))
@@ -553,7 +558,7 @@ class EstimatorNode(LifecycleNode):
         assert self._pipeline is not None
         topics = self._pipeline.converter.layout.topics
         if self._latest is None and now - self._started < START:
-            return f'waiting for {", ".join(topics)}'
+            return f'waiting for {", ".join(map(self.resolve_topic_name, topics))}'
         words = []
         for topic in topics:
             name = self.resolve_topic_name(topic)

@@ -56,6 +56,7 @@ class TractionLimiter(Node):
         self._stamped = bool(self._declare('stamped', True, 'TwistStamped rather than Twist'))
         words = 'file that keeps a stop over a restart of this node; empty: none does'
         name = str(self._declare('state_file', '', words))
+        self._refuse_unknown()
         self._file = Path(name).expanduser() if name else None
         self._claim = FileClaim(self._file, 'state_file') if self._file else None
         self._unkept = ''  # why the state is not in its file
@@ -256,6 +257,23 @@ class TractionLimiter(Node):
         """Return a parameter that is read at start."""
         descriptor = ParameterDescriptor(description=meaning, read_only=True, **bounds)
         return self.declare_parameter(name, default, descriptor).value
+
+    def _refuse_unknown(self) -> None:
+        """Refuse what neither this node nor the estimator has: a file may hold both under /**."""
+        # Private in rclpy, but what nobody declares is kept nowhere else.
+        unknown = set(self._parameter_overrides) - set(self.get_parameters_by_prefix(''))
+        if not unknown:
+            return
+        from wheel_terra_estimator.configuration.parameters import by_spelling, declared, nearest
+        from wheel_terra_estimator.configuration.reader import STANDARD_PREFIXES
+
+        for key in sorted(unknown - set(by_spelling(declared()))):
+            if key.startswith(STANDARD_PREFIXES):
+                continue
+            raise UserError(
+                f"unknown parameter '{key}'; the nearest known one is "
+                f"'{nearest(key, self.get_parameters_by_prefix(''))}'"
+            )
 
     def _number(self, parameter: Field[float]) -> float:
         """Return a number of the tuning; an integer will do."""
