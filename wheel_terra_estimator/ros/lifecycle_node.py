@@ -522,7 +522,10 @@ class EstimatorNode(LifecycleNode):
     def _transport_faults(self) -> list[tuple[str, str]]:
         """Return what is wrong with the transport, and what was lost since this was last asked."""
         now = self._seconds()
-        faults = self._watch_inputs.faults(now)
+        faults = [
+            (self.resolve_topic_name(name) if name in MESSAGE_TYPES else name, words)
+            for name, words in self._watch_inputs.faults(now)
+        ]
         faults += [(self.resolve_topic_name(t), words) for t, words in self._incompatible.items()]
         wheels = self._pipeline.converter.layout.wheel_odometry if self._pipeline else ''
         if wheels and self._watch_inputs.age(wheels, now) is None and self._latest is not None:
@@ -565,7 +568,7 @@ class EstimatorNode(LifecycleNode):
             age = self._watch_inputs.age(topic, now)
             if age is None:
                 words.append(f'{name}: never heard ({self._publishers_in_words(topic)})')
-            elif age > SILENCE:
+            elif age > SILENCE and not self._watch_inputs.is_silent(topic, now):  # told as a fault
                 words.append(f'{name}: silent for {age:.0f} s')
         for (topic, reason), count in self._pipeline.rejected.items():
             reason = self._pipeline.converter.in_words(topic, reason)
@@ -578,7 +581,7 @@ class EstimatorNode(LifecycleNode):
         others = sorted(set(types) - {INPUT_TYPES[topic]})
         if others:
             return f'{", ".join(others)} comes there, needed is {INPUT_TYPES[topic]}'
-        return f'{len(types) or "no"} publishers'
+        return '1 publisher' if len(types) == 1 else f'{len(types) or "no"} publishers'
 
     # -- Parameters -----------------------------------------------------------------------------
 
