@@ -135,7 +135,14 @@ def test_pulling_away_from_rest_is_no_stall():
     monitor = StuckMonitor()
     slow, quick = ([wheel(0.1, rim=k * i, torque=0.95) for i in range(9)] for k in (0.1, 0.2))
     rows = [[a] * 2 + [b] * 2 for a, b in zip(slow, quick, strict=True)]
+    rows[0] = [w._replace(known=False) for w in rows[0]]
     assert not any(judge(monitor, 0.1 * i, 0.1 * i, False, w).stuck for i, w in enumerate(rows))
+
+
+def test_wheels_held_in_the_first_set_raise_it_at_once():
+    """Where a recording begins shortly before the entrapment, no rest and no start was seen."""
+    rows = [[wheel(0.1, rim=0.5, torque=0.95)] * 2 + [wheel(0.1, rim=1.0, torque=0.95)] * 2] * 9
+    assert first(course(rows)) == pytest.approx(0.2)
 
 
 def test_travel_left_shrinks_to_nothing_where_wheels_dig():

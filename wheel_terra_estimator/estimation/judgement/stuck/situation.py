@@ -221,7 +221,8 @@ def observe(memory: Memory, time: float, motion: RoverMotion, tuning: SituationT
         # Behind a spin one side stands for a moment and pulls away the other way round.
         started = time if moves else NAN
     elif isnan(started):
-        started = time
+        # Nobody has seen wheels pull away that turn in the first set.
+        started = -math.inf if isnan(memory.time) else time
     rolled = memory.rolled + now.fastest * dt if moves else 0.0
     # Wheels settle into their ruts after a start; those that turn on the spot dig by command.
     fresh = motion.turning or rolled < tuning.start_travel
