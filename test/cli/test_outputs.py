@@ -165,7 +165,7 @@ REFUSED = {
     'soilbin run': 'soilbin run {bad} -o',
     'soilbin rows': 'soilbin rows --no-cache --sweep pull --scheduler {silent} -o',
     'reproduce': 'reproduce nakashima --run --no-cache --scheduler {silent} -o',
-    'evaluate': 'evaluate --hours 1 --kinds climb --first-seed -1 -o',
+    'evaluate': 'evaluate --kinds climb --first-seed -1 -o',
     'demo': 'demo --no-node -o',
     'bench': 'bench --against {table} --report',
 }

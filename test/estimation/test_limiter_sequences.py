@@ -13,7 +13,7 @@ import os
 from itertools import product
 
 import pytest
-from hypothesis import HealthCheck, Phase, settings
+from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import (
     RuleBasedStateMachine,
@@ -27,7 +27,6 @@ from hypothesis.stateful import (
 from wheel_terra_estimator.estimation import traction_limiter as limiter
 from wheel_terra_estimator.estimation.traction_law import LimiterTuning
 from wheel_terra_estimator.estimation.traction_limiter import (
-    INTERLOCK,
     Estimates,
     Event,
     Interlock,
@@ -308,18 +307,3 @@ def run(sequences, **more):
 )
 def test_no_sequence_of_events_breaks_an_invariant(sequences):
     run(sequences)
-
-
-@pytest.mark.parametrize(
-    ('event', 'state', 'wrong'),
-    [
-        (Event.BEGUN, Interlock.STUCK, Interlock.FREE),  # a restart of the estimator opens
-        # A stop never ends by motion out: rare, found behind a thousand sequences.
-        pytest.param(Event.OUT, Interlock.STOPPED, Interlock.STOPPED, marks=pytest.mark.slow),
-        (Event.STOP, Interlock.FREE, Interlock.FREE),  # a stop is not latched
-    ],
-)
-def test_a_wrong_entry_of_the_table_is_found(monkeypatch, event, state, wrong):
-    monkeypatch.setitem(INTERLOCK[event], state, wrong)
-    with pytest.raises(AssertionError):
-        run(5 * SEQUENCES, phases=[Phase.generate], derandomize=True)

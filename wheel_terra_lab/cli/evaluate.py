@@ -21,7 +21,7 @@ EXAMPLES = (
     'wheel-terra evaluate --kinds climb turns --seeds 4',
     'wheel-terra evaluate --rover my_rover.yaml --kinds climb scenarios/slow_entrapment --seeds 2',
     'wheel-terra evaluate --limiter --seeds 10 -o limiter.md',
-    'wheel-terra evaluate --hours 10 --simulator A B --kinds firm --modes reference -o firm',
+    'wheel-terra evaluate --simulator A B --kinds firm --modes reference --seeds 50 -o firm.md',
 )
 
 
@@ -93,20 +93,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '-o',
         dest='output',
         action=Output,
-        metavar='F.md|F.html|DIR',
-        help='write the tables, as a page where the name ends in .html; with --hours a folder',
-    )
-    parser.add_argument(
-        '--hours',
-        type=float,
-        metavar='N',
-        help='drives of the --kinds, seed after seed, until so many hours are driven in each mode; '
-        '-o DIR keeps a line of JSON per drive (an hour takes about three minutes)',
-    )
-    parser.add_argument(
-        '--resume',
-        action='store_true',
-        help='go on with an interrupted --hours behind its last line',
+        metavar='F.md|F.html',
+        help='write the tables, as a page where the name ends in .html',
     )
     parser.add_argument('--overwrite', action='store_true', help='replace an earlier output')
 
@@ -117,10 +105,6 @@ def run(arguments: argparse.Namespace) -> int:
     from wheel_terra_estimator.reporting.tables_page import write_tables
     from wheel_terra_lab.evaluation import tables
 
-    if arguments.hours is not None:
-        return _drive_for_hours(arguments)
-    if arguments.resume:
-        raise UserError('--resume goes with --hours')
     if arguments.rover and (arguments.measured or arguments.limiter):
         raise UserError('--rover goes with simulated kinds, not with --measured or --limiter')
     if arguments.output:
@@ -213,38 +197,6 @@ def _simulated(arguments: argparse.Namespace) -> _Told:
         [score.health for score in results.drives],
         status=INTERRUPTED if results.interrupted else 0,
     )
-
-
-def _drive_for_hours(arguments: argparse.Namespace) -> int:
-    """Run drives of some kinds for so many hours, or go on with them."""
-    from wheel_terra_lab.evaluation import many_drives, runner
-
-    if any((arguments.measured, arguments.limiter, arguments.rover)):
-        raise UserError('--hours goes with neither --measured nor --limiter nor --rover')
-    if not arguments.kinds or arguments.output is None:
-        raise UserError('--hours needs --kinds, and -o DIR, where its figures are kept')
-    if not arguments.hours > 0.0:
-        raise UserError(f'--hours {arguments.hours:g}: must be above 0')
-    chosen = _chosen(arguments.simulator, arguments.kinds)
-    _check_names(arguments.modes, runner.MODES, 'mode')
-    smoothed = [mode for mode in arguments.modes if mode.startswith(runner.SMOOTHED)]
-    if smoothed:
-        raise UserError(f'--hours does not go with the mode {smoothed[0]}')
-    try:
-        rows = many_drives.drive_kinds_for_hours(
-            arguments.output,
-            arguments.hours,
-            chosen,
-            arguments.modes,
-            _seeds(arguments).start,
-            resume=arguments.resume,
-            overwrite=arguments.overwrite,
-        )
-    except KeyboardInterrupt:
-        print('interrupted; the same command with --resume goes on')
-        return INTERRUPTED
-    print(many_drives.report(rows))
-    return FILTER_FAILED if any(row['filter_restarts'] for row in rows) else 0
 
 
 def _chosen(names: Sequence[str], kinds: list[str] | None) -> list[tuple[str, str]]:
