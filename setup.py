@@ -118,6 +118,7 @@ setup(
             'pytest-timeout>=2.1',
             'pytest-rerunfailures>=14.0',
             'hypothesis>=6.80',
+            'pandas>=2.0',
             'ruff>=0.6',
             'mypy>=1.8',
             'types-PyYAML',

@@ -61,7 +61,7 @@ class StuckState(NamedTuple):
     """What the monitor remembers."""
 
     memory: Memory = Memory()
-    since: tuple[float, float] = (NAN, NAN)  # when each sign came [s], nan = it is not there
+    since: tuple[float, ...] = (NAN, NAN)  # when each sign came [s], nan = it is not there
     stuck: bool = False
     reason: str = ''
     direction: int = 0
@@ -91,16 +91,15 @@ class StuckMonitor(Component[StuckState]):
         slips = motion.slip_told and situation.fastest > 0.0 and not situation.braked
         likely = ahead.probability > settings.threshold or _digs(situation)
         there = slips and likely, situation.standing
-        first, second = (
+        since = tuple(
             (time if isnan(begun) else begun) if sign else NAN
             for sign, begun in zip(there, old.since, strict=True)
         )
         holds = SINKING_HOLD if situation.digging > _SINKING else HOLD, STANDING_HOLD
         held = [
-            time - begun >= hold - _TIME_ROUNDING
-            for begun, hold in zip((first, second), holds, strict=True)
+            time - begun >= hold - _TIME_ROUNDING for begun, hold in zip(since, holds, strict=True)
         ]
-        state = old._replace(memory=situation.memory, since=(first, second), clear_since=NAN)
+        state = old._replace(memory=situation.memory, since=since, clear_since=NAN)
         if any(held) and not old.stuck:
             memory = situation.memory
             one_way = time - memory.way_since >= SINKING_HOLD - _TIME_ROUNDING
@@ -108,9 +107,9 @@ class StuckMonitor(Component[StuckState]):
             reason = _in_words(situation, ahead, settings, standing=not held[0])
             state = state._replace(stuck=True, reason=reason, direction=direction)
         elif old.stuck and not any(there) and situation.slip_magnitude < settings.clear_slip:
-            since = time if isnan(old.clear_since) else old.clear_since
-            free = time - since >= settings.clear_time
-            state = StuckState(situation.memory) if free else state._replace(clear_since=since)
+            clear = time if isnan(old.clear_since) else old.clear_since
+            free = time - clear >= settings.clear_time
+            state = StuckState(situation.memory) if free else state._replace(clear_since=clear)
         self.state = state
         return StuckAssessment(
             state.stuck,
