@@ -15,12 +15,20 @@ from wheel_terra_estimator.estimation.contacts.demand import Demand
 from wheel_terra_estimator.estimation.contacts.linearisation import Linearisation
 from wheel_terra_estimator.estimation.contacts.loads import LoadState, WheelLoads
 from wheel_terra_estimator.estimation.contacts.pulls import PullEvidence, Pulls
+from wheel_terra_estimator.estimation.contacts.ruts import Ruts
 from wheel_terra_estimator.estimation.contacts.stationary_wheels import StationaryWheels
 from wheel_terra_estimator.estimation.contacts.steering import headings, straight_headings
 from wheel_terra_estimator.estimation.contacts.turning import Turning, sides_oppose
 from wheel_terra_estimator.estimation.contacts.unloaded_wheels import UnloadedWheels
 from wheel_terra_estimator.estimation.filter.force_balance import SumOfPulls
-from wheel_terra_estimator.estimation.filter.state import SHEAR_STRENGTH, SPEED
+from wheel_terra_estimator.estimation.filter.state import (
+    CENTROID,
+    RUT_SHARE,
+    SHEAR_MODULUS,
+    SHEAR_RADIUS,
+    SHEAR_STRENGTH,
+    SPEED,
+)
 from wheel_terra_estimator.estimation.inputs.inertial import InertialWindow
 
 NAN = float('nan')
@@ -306,41 +314,117 @@ def test_torque_over_radius_is_the_pull_of_a_wheel_that_holds_a_standing_rover(p
 # -- Linearisation ----------------------------------------------------------------------------
 
 
-def forces_at(parts, slip, strength=0.0):
-    ekf, linearisation = (
-        parts.filter(),
-        Linearisation(parts.rover, parts.layout, parts.models, 0.05),
-    )
-    ekf.mean[SPEED] = (1.0 - slip) * 0.05
-    ekf.mean[SHEAR_STRENGTH] = strength
+RUTS = (0.0, 0.0, 0.02, 0.02, 0.025, 0.2)  # the last one deeper than its wheel stands
+
+
+def forces_at(parts, ruts=RUTS, **moved):
+    """Return the forces at slip 0.3 and sinkages of 3 cm, state entries moved by so much."""
+    ekf, layout = parts.filter(), parts.layout
+    linearisation = Linearisation(parts.rover, layout, parts.models, 0.05)
+    x = ekf.mean
+    x[SPEED], x[layout.sinkage], x[RUT_SHARE] = 0.7 * 0.05, 0.03, 0.5
+    for name, change in moved.items():
+        x[ENTRIES[name](layout)] += change
     loads = WheelLoads(parts.rover).state.load
-    turns = linearisation.turning(FORWARD, loads)
     for _ in range(100):  # the slopes are means over a second
         forces = linearisation.update(
-            ekf.mean,
-            turns=turns,
+            x,
+            turns=linearisation.turning(FORWARD, loads),
             yaw_rate=0.0,
             headings=straight_headings(parts.rover),
             rims=FORWARD,
             loads=loads,
             leaving_angles=(NAN,) * 6,
+            ruts=ruts,
         )
-    return forces, loads
+    return forces
 
 
-def test_rows_are_the_derivatives_of_torque_and_pull(parts):
-    here, _ = forces_at(parts, 0.3)
-    there, _ = forces_at(parts, 0.3, strength=0.01)
-    column = SHEAR_STRENGTH
-    assert here.torque_rows[:, column] == pytest.approx(
-        (there.torque - here.torque) / 0.01, rel=0.05
-    )
-    faster, _ = forces_at(parts, 0.29)
-    by_speed = (faster.pull - here.pull) / (0.01 * 0.05)
-    assert here.pull_rows[:, SPEED] == pytest.approx(by_speed, rel=0.05)
+ENTRIES = {
+    'speed': lambda layout: SPEED,
+    'strength': lambda layout: SHEAR_STRENGTH,
+    'modulus': lambda layout: SHEAR_MODULUS,
+    'centroid': lambda layout: CENTROID,
+    'rut_share': lambda layout: RUT_SHARE,
+    'shear_radius': lambda layout: SHEAR_RADIUS,
+    'sinkage': lambda layout: range(layout.size)[layout.sinkage],
+}
+
+
+@pytest.mark.parametrize(
+    ('name', 'step'), [(n, 1e-5 if n in {'speed', 'sinkage'} else 1e-3) for n in ENTRIES]
+)
+def test_rows_are_the_derivatives_of_torque_and_pull(parts, name, step):
+    here = forces_at(parts)
+    up, down = (forces_at(parts, **{name: side * step}) for side in (1.0, -1.0))
+    columns = np.zeros(parts.layout.size)
+    columns[ENTRIES[name](parts.layout)] = 1.0
+    for rows, more, less in (
+        (here.torque_rows, up.torque, down.torque),
+        (here.pull_rows, up.pull, down.pull),
+    ):
+        slopes = (more - less) / (2.0 * step)
+        assert rows @ columns == pytest.approx(slopes, rel=0.02, abs=1e-3 * abs(slopes).max())
     pulls, torques = here.moved_to(here.state)
     assert pulls == pytest.approx(here.pull)
     assert torques == pytest.approx(here.torque)
+
+
+def test_a_wheel_in_a_rut_has_the_contact_of_one_that_stands_so_much_higher(parts):
+    in_rut = forces_at(parts, ruts=(0.02,) * 6)
+    higher = forces_at(parts, ruts=(0.0,) * 6, sinkage=-0.5 * 0.02)
+    assert in_rut.torque == pytest.approx(higher.torque)
+    assert in_rut.pull == pytest.approx(higher.pull)
+
+
+# -- Ruts -------------------------------------------------------------------------------------
+
+DEPTHS = (0.02, 0.02, 0.03, 0.03, 0.04, 0.04)  # of the front, middle and rear axle
+
+
+def test_wheels_meet_the_ruts_of_those_before_them(parts):
+    ruts = Ruts(parts.rover)
+    ruts.advance(0.01, 1.0, DEPTHS, 0.0)
+    assert ruts.state.depth == (0.0, 0.0, 0.02, 0.02, 0.03, 0.03)
+    for _ in range(1000):  # the front axle comes to firm ground; the others follow
+        ruts.advance(0.01, 1.0, (0.0,) * 6, 0.0)
+    assert ruts.state.depth == pytest.approx((0.0,) * 6, abs=1e-3)
+
+
+def test_ruts_come_a_wheelbase_later(parts):
+    """The mean of the delay is the way from wheel to wheel."""
+    ruts, rover = Ruts(parts.rover), parts.rover
+    ruts.advance(0.0, 1.0, DEPTHS, 0.0)
+    step, met = 0.005, []
+    for _ in range(2000):
+        ruts.advance(step, 1.0, (0.0, 0.0, *DEPTHS[2:]), 0.0)
+        met.append(ruts.state.depth[2] / DEPTHS[0])
+    assert sum(met) * step == pytest.approx(rover.longitudinal[0] - rover.longitudinal[2], rel=0.02)
+
+
+def test_in_a_turn_wheels_run_beside_the_ruts(parts):
+    ruts, rover = Ruts(parts.rover), parts.rover
+    reach = abs(rover.longitudinal[2] ** 2 - rover.longitudinal[0] ** 2)
+    width = rover.width[2]
+    # Paths about one centre lie (x_1^2 - x_2^2) / (2 R) apart: here half a width.
+    ruts.advance(0.01, 1.0, DEPTHS, width / reach)
+    assert ruts.state.depth[2] == pytest.approx(0.5 * DEPTHS[0], rel=0.01)
+    ruts = Ruts(parts.rover)
+    ruts.advance(0.01, 1.0, DEPTHS, 3.0 * width / reach)
+    assert ruts.state.depth[2] == 0.0
+
+
+def test_behind_a_reversal_all_wheels_roll_in_ruts_at_first(parts):
+    ruts = Ruts(parts.rover)
+    for _ in range(100):
+        ruts.advance(0.01, 1.0, DEPTHS, 0.0)
+    ruts.advance(0.01, -1.0, DEPTHS, 0.0)
+    assert ruts.state.depth == DEPTHS
+    for _ in range(1000):
+        ruts.advance(0.01, -1.0, DEPTHS, 0.0)
+    # The rear axle leads over virgin ground.
+    behind = (DEPTHS[2], DEPTHS[2], DEPTHS[4], DEPTHS[4], 0.0, 0.0)
+    assert ruts.state.depth == pytest.approx(behind, abs=1e-3)
 
 
 # -- Pulls ------------------------------------------------------------------------------------
@@ -370,7 +454,7 @@ def test_the_residual_of_the_sum_is_distributed_as_least_squares_does(parts):
 def published_pull(parts, excess, lateral_motion=0.0):
     """Pulls after 40 cycles in which all torques read `excess` more than the model."""
     pulls = Pulls(parts.rover, parts.sensors, (300.0,) * 6)
-    forces, loads = forces_at(parts, 0.3)
+    forces, loads = forces_at(parts), WheelLoads(parts.rover).state.load
     ekf = parts.filter()
     ekf.mean[:] = forces.state
     for _ in range(40):

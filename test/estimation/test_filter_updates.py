@@ -23,6 +23,7 @@ from wheel_terra_estimator.estimation.filter.sinkage_process import SinkageProce
 from wheel_terra_estimator.estimation.filter.soil_process import SoilProcess
 from wheel_terra_estimator.estimation.filter.state import (
     SHEAR_MODULUS,
+    SHEAR_RADIUS,
     SHEAR_STRENGTH,
     SLIP_SINKAGE,
     SPEED,
@@ -386,6 +387,7 @@ def linearised(parts, x, loads, angle=NAN, angle_std=0.05):
         rims=FORWARD,
         loads=loads,
         leaving_angles=(angle,) * 6,
+        ruts=(0.0,) * 6,
     )
 
 
@@ -531,7 +533,12 @@ def test_what_is_not_seen_is_considered_and_not_learned(parts):
     assert entries() == set()
     assert entries(settled=False) == entries(opposes_rims=True) == {SPEED}
     zeros = range(layout.size)[layout.torque_zero]
-    assert entries(reference_known=False) == {SHEAR_STRENGTH, SHEAR_MODULUS, *zeros}
+    assert entries(reference_known=False) == {
+        SHEAR_STRENGTH,
+        SHEAR_MODULUS,
+        SHEAR_RADIUS,
+        *zeros,
+    }
     one = entries(unread=[2])
     assert one == {layout.sinkage.start + 2, layout.stiffness.start + 2}
     assert SLIP_SINKAGE in entries(unread=list(range(6)))

@@ -19,6 +19,7 @@ _LEAST_LOW_RIM = 0.005
 _LOW_RIM_OVER_REST = 3.0
 _SKID_LENGTH = 0.3
 """Length between the axles over the track above which turning is skidding."""
+_SAME_AXLE = 1e-3  # [m]
 _CONTACT_SHARE = 0.5
 """Contact length over the rim radius: an entrance angle of 30 degrees, as of rovers in sand."""
 
@@ -51,6 +52,10 @@ class Rover:
     """Travel after which a contact is new all along, and its shear that of the model [m]."""
     skids: bool
     """Whether it has to skid to turn: wheels in several rows, none of which steers."""
+    width: tuple[float, ...]  # [m]
+    leader: tuple[int | None, ...]
+    """Next wheel before each in the same rut, None = none."""
+    leader_in_reverse: tuple[int | None, ...]
     curvature_length: float
     """Half the distance between the first and the last axle [m]."""
 
@@ -82,6 +87,9 @@ class Rover:
             low_rim=max(_LOW_RIM_OVER_REST * rest_speed, _LEAST_LOW_RIM),
             contact_length=_CONTACT_SHARE * min(_floats(wheels.radius)),
             skids=not any(wheels.steered) and np.ptp(x) > _SKID_LENGTH * np.ptp(wheels.y),
+            width=_floats(wheels.width),
+            leader=_leaders(x, wheels.y, wheels.width),
+            leader_in_reverse=_leaders(-x, wheels.y, wheels.width),
             curvature_length=0.5 * (max(_floats(x)) - min(_floats(x))),
         )
 
@@ -129,6 +137,15 @@ class SensorFigures:
 
 def _floats(values: np.ndarray) -> tuple[float, ...]:
     return tuple(float(value) for value in values)
+
+
+def _leaders(x: np.ndarray, y: np.ndarray, width: np.ndarray) -> tuple[int | None, ...]:
+    """Return the next wheel before each whose rut it meets, driving towards +x."""
+    found: list[int | None] = []
+    for i, half in enumerate(0.5 * width):
+        before = np.flatnonzero((x > x[i] + _SAME_AXLE) & (np.abs(y - y[i]) < half))
+        found.append(int(before[np.argmin(x[before])]) if len(before) else None)
+    return tuple(found)
 
 
 def _load_distribution(configuration: Configuration) -> LoadDistribution:

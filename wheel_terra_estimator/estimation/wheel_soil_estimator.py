@@ -25,6 +25,7 @@ from wheel_terra_estimator.estimation.contacts.linearisation import (
 )
 from wheel_terra_estimator.estimation.contacts.loads import LoadState, WheelLoads
 from wheel_terra_estimator.estimation.contacts.pulls import PullEvidence, Pulls
+from wheel_terra_estimator.estimation.contacts.ruts import Ruts, contact_depths, curvature_of
 from wheel_terra_estimator.estimation.contacts.stationary_wheels import (
     StationaryPull,
     StationaryWheels,
@@ -61,6 +62,7 @@ from wheel_terra_estimator.estimation.filter.state import (
     CENTROID,
     GRAVITY_BIAS,
     MOUND,
+    RUT_SHARE,
     SHEAR_MODULUS,
     SHEAR_STRENGTH,
     SPEED,
@@ -212,6 +214,7 @@ class WheelSoilEstimator:
         self._loads = WheelLoads(rover)
         level = self._loads.state.load
         self._contact_age = ContactAge(rover)
+        self._ruts = Ruts(rover)
         self._unloaded = UnloadedWheels(rover, sensors)
         self._demand = Demand()
         self._climb = SteepestClimb()
@@ -252,6 +255,7 @@ class WheelSoilEstimator:
             self._turning,
             self._loads,
             self._contact_age,
+            self._ruts,
             self._unloaded,
             self._demand,
             self._climb,
@@ -549,6 +553,7 @@ class WheelSoilEstimator:
                 reference_known=cycle.reference_known,
             )
             self._contact_age.advance(travel)
+            self._note_ruts(cycle.dt)
             if travel > 0.0:
                 self._soil_process.predict(
                     prediction,
@@ -566,6 +571,17 @@ class WheelSoilEstimator:
         """
         told = self._reference.known(time) or self._wheels.torque_known(time)
         return window if told else InertialWindow()
+
+    def _note_ruts(self, dt: float) -> None:
+        """Note how deep the ground is pressed that the wheels meet, after `dt` [s]."""
+        x = self._ekf.mean
+        speed = float(x[SPEED])
+        self._ruts.advance(
+            abs(speed) * dt,
+            self._contact_age.state.direction,
+            tuple(x[self._layout.sinkage].tolist()),
+            curvature_of(speed, self._turning.state.yaw_rate),
+        )
 
     def _fuse_reference(self, cycle: _Cycle, reference: ReferenceVelocity) -> None:
         """Fuse a reference velocity."""
@@ -613,6 +629,7 @@ class WheelSoilEstimator:
             rims=cycle.rims,
             loads=loads,
             leaving_angles=cycle.leaving_angles,
+            ruts=self._ruts.state.depth,
         )
         stationary = self._stationary_pulls(cycle)
         start = self._contact_age.shear_variance
@@ -738,7 +755,9 @@ class WheelSoilEstimator:
         x, layout = self._ekf.mean, self._layout
         common = float(x[SHEAR_MODULUS]), float(x[CENTROID]), float(x[MOUND])
         strengths = (x[SHEAR_STRENGTH] + x[layout.shear_error]).tolist()
-        sinkages = x[layout.sinkage].tolist()
+        sinkages = contact_depths(
+            x[layout.sinkage].tolist(), self._ruts.state.depth, float(x[RUT_SHARE])
+        )
         return [
             WheelState(1.0, sinkage, load, strength, *common)
             for sinkage, load, strength in zip(sinkages, loads.load, strengths, strict=True)

@@ -21,7 +21,9 @@ from wheel_terra_estimator.estimation.contacts.wheel_models import (
 from wheel_terra_estimator.estimation.filter.state import (
     CENTROID,
     MOUND,
+    RUT_SHARE,
     SHEAR_MODULUS,
+    SHEAR_RADIUS,
     SHEAR_STRENGTH,
     SPEED,
     StateLayout,
@@ -51,6 +53,17 @@ class SlopeState(NamedTuple):
 
     torque: tuple[Floats | None, ...]
     pull: tuple[Floats | None, ...]
+
+
+class _Contact(NamedTuple):
+    """How the state enters the contact of a wheel."""
+
+    wheel: int
+    direction: float
+    by_speed: float  # v / rim speed by the body's speed [s/m]
+    by_shear_radius: float  # v / rim speed by it [-]
+    by_sinkage: float  # depth of the contact by the sinkage [-]
+    by_rut_share: float  # the same by the share of the rut that stays [m]
 
 
 class ContactForces(NamedTuple):
@@ -120,6 +133,7 @@ class Linearisation(Component[SlopeState]):
         rims: Floats,
         loads: Floats,
         leaving_angles: Floats,
+        ruts: Floats,
     ) -> ContactForces:
         """Work out the forces of the wheels that turn at a state `x` (size,).
 
@@ -135,6 +149,8 @@ class Linearisation(Component[SlopeState]):
             Of the wheels.
         rims, loads, leaving_angles : tuple of float
             Of each wheel [m/s], [N], [rad]; nan = unknown.
+        ruts : tuple of float
+            That each wheel meets [m].
         """
         rover, layout = self._rover, self._layout
         pull, torque, pull_noise, torque_noise = np.zeros((4, rover.wheel_count))
@@ -142,16 +158,19 @@ class Linearisation(Component[SlopeState]):
         torque_slopes, pull_slopes = list(self.state.torque), list(self.state.pull)
         entries = x.tolist()
         speed, strength, modulus = entries[SPEED], entries[SHEAR_STRENGTH], entries[SHEAR_MODULUS]
-        centroid, mound = entries[CENTROID], entries[MOUND]
+        centroid, mound, rut_share = entries[CENTROID], entries[MOUND], entries[RUT_SHARE]
+        sheared = 1.0 - entries[SHEAR_RADIUS]
         sinkage, error = entries[layout.sinkage], entries[layout.shear_error]
         for i in range(rover.wheel_count):
             if not turns[i]:
                 continue
             rim = abs(rims[i])
             direction = 1.0 if rims[i] > 0.0 else -1.0
+            # No wheel stands higher than the rut that it meets.
+            rut = min(ruts[i], max(sinkage[i], 0.0))
             wheel = WheelState(
-                speed_ratio=direction * headings.speed(i, speed, yaw_rate) / rim,
-                sinkage=sinkage[i],
+                speed_ratio=sheared * direction * headings.speed(i, speed, yaw_rate) / rim,
+                sinkage=sinkage[i] - rut_share * rut,
                 load=loads[i],
                 strength=strength + error[i],
                 shear_modulus=modulus,
@@ -168,9 +187,12 @@ class Linearisation(Component[SlopeState]):
             torque_slopes[i], pull_slopes[i] = by_torque, by_pull = self.smoothed(
                 torque_slopes[i], pull_slopes[i], forces, moment
             )
-            by_speed = headings.by_speed[i] / rim
-            self._fill(rows[0, i], i, by_pull, direction, by_speed)
-            self._fill(rows[1, i], i, by_torque, direction, by_speed)
+            by_speed = sheared * headings.by_speed[i] / rim
+            by_radius = -wheel.speed_ratio / sheared
+            by_sinkage = 1.0 - rut_share if rut < ruts[i] else 1.0
+            contact = _Contact(i, direction, by_speed, by_radius, by_sinkage, -rut)
+            self._fill(rows[0, i], contact, by_pull)
+            self._fill(rows[1, i], contact, by_torque)
         self.state = SlopeState(tuple(torque_slopes), tuple(pull_slopes))
         return ContactForces(x.copy(), pull, torque, rows[0], rows[1], pull_noise, torque_noise)
 
@@ -201,22 +223,19 @@ class Linearisation(Component[SlopeState]):
             return (torque[0], *forces.d_torque[1:]), (pull[0], *forces.d_pull[1:])
         return torque, pull
 
-    def _fill(
-        self, row: FloatArray, wheel: int, slopes: Floats, direction: float, by_speed: float
-    ) -> None:
-        """Write the derivatives of a wheel's force into its row of the Jacobian.
-
-        `by_speed` is the derivative of its v / rim speed by the body's speed [s/m].
-        """
-        layout = self._layout
-        by_ratio, by_sinkage, by_strength, by_modulus, by_centroid, by_mound = slopes
+    def _fill(self, row: FloatArray, contact: _Contact, slopes: Floats) -> None:
+        """Write the derivatives of a wheel's force into its row of the Jacobian."""
+        layout, (wheel, direction) = self._layout, contact[:2]
+        by_ratio, by_depth, by_strength, by_modulus, by_centroid, by_mound = slopes
         # The ratio is that of the direction of rolling: the two signs cancel.
-        row[SPEED] = by_ratio * by_speed
-        row[layout.sinkage.start + wheel] = direction * by_sinkage
+        row[SPEED] = by_ratio * contact.by_speed
+        row[layout.sinkage.start + wheel] = direction * by_depth * contact.by_sinkage
         row[SHEAR_STRENGTH] = row[layout.shear_error.start + wheel] = direction * by_strength
         row[SHEAR_MODULUS] = direction * by_modulus
         row[CENTROID] = direction * by_centroid
         row[MOUND] = direction * by_mound
+        row[RUT_SHARE] = direction * by_depth * contact.by_rut_share
+        row[SHEAR_RADIUS] = direction * by_ratio * contact.by_shear_radius
 
 
 def smoothed_slopes(old: Floats | None, new: Floats, keep: float) -> Floats:

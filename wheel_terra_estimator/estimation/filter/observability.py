@@ -12,6 +12,7 @@ from collections.abc import Sequence
 
 from wheel_terra_estimator.estimation.filter.state import (
     SHEAR_MODULUS,
+    SHEAR_RADIUS,
     SHEAR_STRENGTH,
     SLIP_SINKAGE,
     SPEED,
@@ -48,7 +49,7 @@ def considered_entries(
     if not settled or opposes_rims:
         entries.append(SPEED)
     if not reference_known:
-        entries += [SHEAR_STRENGTH, SHEAR_MODULUS]
+        entries += [SHEAR_STRENGTH, SHEAR_MODULUS, SHEAR_RADIUS]
         entries += range(layout.size)[layout.torque_zero]
     for part in (layout.sinkage, layout.stiffness):
         entries += [part.start + i for i in unread]

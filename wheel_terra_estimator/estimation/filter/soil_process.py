@@ -10,12 +10,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from wheel_terra_estimator.configuration.configuration import Configuration
-from wheel_terra_estimator.estimation.filter.initial_state import SoilPriors
+from wheel_terra_estimator.estimation.filter.initial_state import PriorTuning, SoilPriors
 from wheel_terra_estimator.estimation.filter.prediction import Prediction
 from wheel_terra_estimator.estimation.filter.state import (
     CENTROID,
     MOUND,
+    RUT_SHARE,
     SHEAR_MODULUS,
+    SHEAR_RADIUS,
     SHEAR_STRENGTH,
     SLIP_SINKAGE,
     StateLayout,
@@ -35,6 +37,9 @@ class SoilTuning:
     slip_sinkage_walk: float = 0.05
     centroid_walk: float = 0.05
     mound_walk: float = 0.05
+    rut_share_walk: float = 0.02
+    shear_radius_length: float = 20.0
+    """Travel [m] over which the radius at which soil is sheared changes."""
     stiffness_walk: float = 0.15  # of all wheels together [ln]
     own_stiffness_walk: float = 0.3  # of each wheel [ln]
     soft_is_weak: float = 0.7
@@ -63,6 +68,7 @@ class SoilProcess:
         self._walk = float(configuration.filter.soil_walk) ** 2
         self._error_length = float(configuration.filter.shear_error_length)
         self._error_variance = priors.shear_error_std**2
+        self._shear_radius_variance = PriorTuning().shear_radius_std ** 2
         self._each = np.eye(n)
         self._mean = np.full((n, n), 1.0 / n)
         self._mean_variance = self._error_variance + n * priors.shear_error_common_std**2
@@ -90,6 +96,11 @@ class SoilProcess:
             F[index, index] = forget
             Q[index, index] = std**2 * rate
         Q[MOUND, MOUND] = tuning.mound_walk**2 * walk
+        Q[RUT_SHARE, RUT_SHARE] = tuning.rut_share_walk**2 * walk
+        keep = math.exp(-travel / tuning.shear_radius_length)
+        mean[SHEAR_RADIUS] *= keep
+        F[SHEAR_RADIUS, SHEAR_RADIUS] = keep
+        Q[SHEAR_RADIUS, SHEAR_RADIUS] = self._shear_radius_variance * (1.0 - keep * keep)
         k, e = layout.stiffness, layout.shear_error
         Q[k, k] = self._stiffness * walk
         hold = math.exp(-travel / self._error_length)

@@ -32,6 +32,12 @@ shear_error (n)  ln     Error of the shear model, per wheel, first-order Gauss-M
                         and carries what torque says of a wheel's pull in another soil.
 torque_zero (n)  N m    Zero of each torque sensor, constant. Seen where loads and slip change:
                         the soil's share of a torque goes with the load, the zero does not.
+rut_share        -      Share of the rut of the wheel before that stays pressed: a wheel which
+                        follows begins there (multi-pass), so that its contact is shorter than its
+                        sinkage below the undisturbed surface says. Seen as axles differ.
+shear_radius     -      By which share soil is sheared beyond what the slip says: the radius of the
+                        shear is not that of the slip, and a measured traction curve seldom begins
+                        at the origin. Gauss-Markov over travel.
 reference_error  m/s    Only with ``sensors.reference_wander_std``: what lasts of the error of the
                         reference velocity, first-order Gauss-Markov over time. Fifty readings of a
                         satellite receiver that is off by 3 cm/s are off by 3 cm/s.
@@ -59,8 +65,10 @@ FloatArray = NDArray[np.float64]
     CENTROID,
     MOUND,
     SLIP_PER_DEMAND,
-) = range(8)
-_COMMON = 8
+    RUT_SHARE,
+    SHEAR_RADIUS,
+) = range(10)
+_COMMON = 10
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,87 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""How deep the ground before each wheel has been pressed by the wheel before it.
+
+Sinkage is measured from the undisturbed surface; a wheel that follows another one begins at the
+bottom of its rut. How much of that rut stays is learned (``RUT_SHARE`` of the state).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from wheel_terra_estimator.estimation.component import Component
+from wheel_terra_estimator.estimation.rover import Rover
+
+Floats = tuple[float, ...]
+_LEAST_SPEED = 1e-3  # [m/s], for the curvature of the path
+_LEAST_WAY = 1e-3  # [m], of a rover with one axle
+
+
+class RutState(NamedTuple):
+    """What the wheels meet."""
+
+    depth: Floats  # of the wheel before, where this one rolls; 0 on virgin ground [m]
+    direction: float = 0.0  # of the drive: 1, -1, 0 = none yet
+
+
+class Ruts(Component[RutState]):
+    """Follows the depth of the ruts that the wheels meet.
+
+    Parameters
+    ----------
+    rover : Rover
+        Which wheels follow which, and how far behind.
+    """
+
+    def __init__(self, rover: Rover) -> None:
+        super().__init__(RutState((0.0,) * rover.wheel_count))
+        self._rover = rover
+
+    def advance(self, travel: float, direction: float, sinkage: Floats, curvature: float) -> None:
+        """Take the travel of a cycle.
+
+        Parameters
+        ----------
+        travel : float
+            Of the body [m].
+        direction : float
+            Of the drive: 1, -1, 0 = none yet.
+        sinkage : tuple of float
+            Of each wheel [m].
+        curvature : float
+            Of the path [1/m].
+        """
+        if direction == 0.0:
+            return
+        before, rover = self.state, self._rover
+        if before.direction not in (direction, 0.0):
+            # What a wheel meets on the way back was last pressed by itself, or by one as deep.
+            self.state = RutState(sinkage, direction)
+            return
+        depths = []
+        for i, leader in enumerate(rover.leader if direction > 0.0 else rover.leader_in_reverse):
+            rut, way = 0.0, 2.0 * rover.curvature_length  # virgin ground, once the rover is past
+            if leader is not None:
+                ahead, here = rover.longitudinal[leader], rover.longitudinal[i]
+                # Wheels that turn about one centre run beside the ruts of those before them.
+                beside = 0.5 * abs(curvature * (ahead**2 - here**2)) / rover.width[i]
+                rut, way = sinkage[leader] * max(1.0 - beside, 0.0), abs(ahead - here)
+            gain = -math.expm1(-travel / max(way, _LEAST_WAY)) if before.direction else 1.0
+            depths.append(before.depth[i] + gain * (rut - before.depth[i]))
+        self.state = RutState(tuple(depths), direction)
+
+
+def contact_depths(sinkage: Sequence[float], ruts: Floats, share: float) -> list[float]:
+    """Return how deep wheels stand below the ground that they meet [m].
+
+    `share` is that of the rut which stays pressed; no wheel stands higher than its rut.
+    """
+    return [z - share * min(rut, max(z, 0.0)) for z, rut in zip(sinkage, ruts, strict=True)]
+
+
+def curvature_of(speed: float, yaw_rate: float) -> float:
+    """Return the curvature of the path [1/m] at a speed [m/s] and a yaw rate [rad/s]."""
+    return yaw_rate / max(abs(speed), _LEAST_SPEED)
