@@ -230,8 +230,9 @@ def test_locked_wheel_is_dragged_along():
         },
     )
     sets, truth = estimate(run), run.truth
-    pull, true_pull = sets[-10].drawbar_pull, truth.drawbar_pull[-10]
-    load = truth.normal_load[-10]
+    # Once the body stands as well the wheel is dragged no more, and its pull is hardly seen.
+    pull, true_pull = sets[-15].drawbar_pull, truth.drawbar_pull[-15]
+    load = truth.normal_load[-15]
     assert true_pull[5] < -0.3 * load[5]
     assert pull == pytest.approx(true_pull, abs=0.12 * load.mean())
 

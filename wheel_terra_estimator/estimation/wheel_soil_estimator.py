@@ -851,7 +851,7 @@ class WheelSoilEstimator:
             sinkage=len(self._sinkage.unread(time)) == self._rover.wheel_count,
             acceleration=not silent and time - inertial.force_time > self._rover.silence,
             angular_rate=not silent and time - inertial.rate_time > self._rover.silence,
-            reference=not self._reference.known(time),
+            reference=not self._reference.fresh(time),
         )
         return self._outputs.estimate_set(self._sources(), missing)
 

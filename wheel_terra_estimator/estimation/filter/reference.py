@@ -30,7 +30,7 @@ it by chance, from 5 to 0.05 % [-]."""
 class ReferenceTuning:
     """Tuned on simulated drives, seeds 1000 to 1019, and the nine snow immobilisations."""
 
-    known_time: float = 20.0
+    known_time: float = 5.0
     """Age [s] up to which a reference tells slip and soil apart; after that the soil is held."""
     fresh_time: float = 10.0
     """Age [s] up to which the speed rests on more than a guess, for the stuck warning."""
