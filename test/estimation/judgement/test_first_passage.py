@@ -19,7 +19,6 @@ from wheel_terra_estimator.estimation.judgement.stuck.settings import StuckSetti
 from wheel_terra_estimator.estimation.judgement.stuck.situation import (
     Memory,
     RoverMotion,
-    SituationTuning,
     WheelMotion,
     driving_share,
     observe,
@@ -38,7 +37,7 @@ def followed(motions):
     """Return the situation at the end of motions that are 0.1 s apart."""
     memory = Memory()
     for i, there in enumerate(motions):
-        found = observe(memory, 0.1 * i, there, SituationTuning())
+        found = observe(memory, 0.1 * i, there)
         memory = found.memory
     return found
 

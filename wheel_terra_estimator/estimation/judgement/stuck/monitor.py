@@ -25,7 +25,6 @@ from wheel_terra_estimator.estimation.judgement.stuck.situation import (
     Memory,
     RoverMotion,
     Situation,
-    SituationTuning,
     observe,
 )
 from wheel_terra_estimator.estimation.scalars import NAN
@@ -42,7 +41,7 @@ _DIGGING_SLIP, _SURE_STD = 0.8, 0.25
 _SURE = 2.0  # deviations within which a rover stands by its reference
 _AT_LIMIT = 0.2  # of the torque limit: farther above it the unit is wrong
 _TIME_ROUNDING = 1e-9  # [s]
-_SETTINGS, _TUNING = StuckSettings(), SituationTuning()
+_SETTINGS = StuckSettings()
 
 
 class StuckAssessment(NamedTuple):
@@ -77,16 +76,14 @@ class StuckMonitor(Component[StuckState]):
         The parameters.
     """
 
-    def __init__(
-        self, settings: StuckSettings = _SETTINGS, tuning: SituationTuning = _TUNING
-    ) -> None:
+    def __init__(self, settings: StuckSettings = _SETTINGS) -> None:
         super().__init__(StuckState())
-        self._settings, self._tuning, self._passage = settings, tuning, FirstPassage()
+        self._settings, self._passage = settings, FirstPassage()
 
     def update(self, time: float, motion: RoverMotion) -> StuckAssessment:
         """Judge the motion of the rover at a time [s]."""
         old, settings = self.state, self._settings
-        situation = observe(old.memory, time, motion, self._tuning)
+        situation = observe(old.memory, time, motion)
         ahead = outlook(situation, self._passage, settings)
         slips = motion.slip_told and situation.fastest > 0.0 and not situation.braked
         likely = ahead.probability > settings.threshold or _digs(situation)

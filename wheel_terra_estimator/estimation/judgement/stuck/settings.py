@@ -4,13 +4,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from wheel_terra_estimator.configuration.configuration import Configuration
 
 
-@dataclass(frozen=True)
-class StuckSettings:
+class StuckSettings(NamedTuple):
     """The keys ``filter.stuck_*``."""
 
     horizon: float = 15.0  # [s]
@@ -22,11 +21,6 @@ class StuckSettings:
     @classmethod
     def from_configuration(cls, configuration: Configuration) -> StuckSettings:
         """Take them from a configuration."""
-        figures = configuration.filter
         return cls(
-            horizon=float(figures.stuck_horizon),
-            travel=float(figures.stuck_travel),
-            threshold=float(figures.stuck_threshold),
-            clear_slip=float(figures.stuck_clear_slip),
-            clear_time=float(figures.stuck_clear_time),
+            **{name: float(getattr(configuration.filter, f'stuck_{name}')) for name in cls._fields}
         )

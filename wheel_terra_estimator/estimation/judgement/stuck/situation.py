@@ -12,6 +12,22 @@ from typing import NamedTuple
 
 from wheel_terra_estimator.estimation.scalars import NAN, gain_of, median
 
+# Set on simulators A, B and C and nine snow immobilisations.
+_START_TIME = 1.0  # [s] after the wheels begin to turn: pulling away looks like a stall
+_START_TRAVEL = 0.25  # [m] of rim travel in which slip and sinkage settle after a start
+_STALL_RATIO = 0.6  # of the fastest rim speed: a wheel below it hardly turns
+_RUT_LENGTH = 0.08  # [m] of rim travel over which the growth of the sinkage is taken
+_DIGS, _DIGS_AT = 0.02, 0.2
+"""Sinkage gained over rim travel [m/m], and slip, above which a wheel digs in."""
+_DEEP = 0.4
+"""Sinkage over the radius from which a wheel does not climb out: its entrance angle is 53 degrees
+there, and the normal stress, centred at about half of it, leans back by 27 degrees, as much as the
+friction of loose soil pulls forward."""
+_CRUISE_TIME = 5.0  # [s] in which the speed before is forgotten
+_SLOWED = 0.2  # of the rim speed: more is missing where wheels are held, or stopped
+_NEAR_LIMIT = 0.7
+"""Of the torque limit: below it nothing holds the wheels, above it nobody stops them."""
+
 
 class WheelMotion(NamedTuple):
     """What the warning needs of one wheel."""
@@ -50,26 +66,6 @@ class RoverMotion(NamedTuple):
     """Sharply: slip that comes from turning says nothing of what is ahead."""
 
 
-@dataclass(frozen=True)
-class SituationTuning:
-    """How the rover is observed; set on simulators A, B and C and nine snow immobilisations."""
-
-    start_time: float = 1.0  # [s] after the wheels begin to turn: pulling away looks like a stall
-    start_travel: float = 0.25  # [m] of rim travel in which slip and sinkage settle after a start
-    stall_ratio: float = 0.6  # of the fastest rim speed: a wheel below it hardly turns
-    rut_length: float = 0.08  # [m] of rim travel over which the growth of the sinkage is taken
-    digs: float = 0.02  # sinkage gained over rim travel by a wheel that digs in [m/m]
-    digging_slip: float = 0.2  # at least, of such a wheel
-    deep: float = 0.4
-    """Sinkage over the radius from which a wheel does not climb out: its entrance angle is 53
-    degrees there, and the normal stress, centred at about half of it, leans back by 27 degrees, as
-    much as the friction of loose soil pulls forward."""
-    cruise_time: float = 5.0  # [s] in which the speed before is forgotten
-    slowed: float = 0.2  # of the rim speed: more is missing where wheels are held, or stopped
-    near_limit: float = 0.7
-    """Of the torque limit: below it nothing holds the wheels, above it nobody stops them."""
-
-
 class Memory(NamedTuple):
     """What is remembered from update to update."""
 
@@ -88,7 +84,6 @@ class Situation:
 
     motion: RoverMotion
     memory: Memory
-    tuning: SituationTuning
 
     @cached_property
     def moving(self) -> tuple[WheelMotion, ...]:
@@ -123,14 +118,9 @@ class Situation:
         return median([w.slip_std for w in self.moving]) if self.moving else 1.0
 
     @property
-    def pulled_away(self) -> bool:
-        """Whether the start is over, as far as torques tell."""
-        return self.memory.time - self.memory.started >= self.tuning.start_time
-
-    @property
     def settled(self) -> bool:
         """Whether the start is over, as far as slip and sinkage tell."""
-        return self.memory.rolled > self.tuning.start_travel
+        return self.memory.rolled > _START_TRAVEL
 
     @cached_property
     def digging(self) -> float:
@@ -146,7 +136,7 @@ class Situation:
     def growths(self) -> tuple[float, ...]:
         """Sinkage gained over rim travel by each wheel [m/m]."""
         return tuple(
-            (wheel.sinkage - rut) / self.tuning.rut_length
+            (wheel.sinkage - rut) / _RUT_LENGTH
             for wheel, rut in zip(self.motion.wheels, self.memory.ruts, strict=True)
         )
 
@@ -156,10 +146,9 @@ class Situation:
 
         It sinks as it turns, as over its last travel; infinite where it does not.
         """
-        t = self.tuning
         return tuple(
-            max(t.deep * wheel.radius - wheel.sinkage, 0.0) / growth
-            if self.settled and wheel.known and growth > t.digs and wheel.slip > t.digging_slip
+            max(_DEEP * wheel.radius - wheel.sinkage, 0.0) / growth
+            if self.settled and wheel.known and growth > _DIGS and wheel.slip > _DIGS_AT
             else math.inf
             for wheel, growth in zip(self.motion.wheels, self.growths, strict=True)
         )
@@ -184,26 +173,26 @@ class Situation:
         if self.motion.turning or self.fastest <= 0.0:
             return False
         lag = 1.0 - self.rim / self.fastest
-        return self._held(self.strain) and max(self.slowing, lag) > self.tuning.slowed
+        return self._held(self.strain) and max(self.slowing, lag) > _SLOWED
 
     @cached_property
     def stalled(self) -> tuple[bool, ...]:
         """Wheels that pull near their limit and hardly turn while another turns."""
         return tuple(
             [
-                abs(w.rim_speed) < self.tuning.stall_ratio * self.fastest
-                and self._held(w.torque_share)
+                abs(w.rim_speed) < _STALL_RATIO * self.fastest and self._held(w.torque_share)
                 for w in self.motion.wheels
             ]
         )
 
     def _held(self, strain: float) -> bool:
-        return self.pulled_away and strain > self.tuning.near_limit
+        pulled_away = self.memory.time - self.memory.started >= _START_TIME
+        return pulled_away and strain > _NEAR_LIMIT
 
     @property
     def braked(self) -> bool:
         """Whether the wheels are being stopped: a reference stands half a second before them."""
-        return self.slowing > self.tuning.slowed and self.strain < self.tuning.near_limit
+        return self.slowing > _SLOWED and self.strain < _NEAR_LIMIT
 
     @property
     def slip_magnitude(self) -> float:
@@ -211,10 +200,10 @@ class Situation:
         return median([abs(w.slip) for w in self.moving]) if self.moving else NAN
 
 
-def observe(memory: Memory, time: float, motion: RoverMotion, tuning: SituationTuning) -> Situation:
+def observe(memory: Memory, time: float, motion: RoverMotion) -> Situation:
     """Return the situation at a time [s], with the memory that it leaves."""
     dt = 0.0 if isnan(memory.time) else max(time - memory.time, 0.0)
-    now = Situation(motion, memory, tuning)
+    now = Situation(motion, memory)
     moves, rim = bool(now.moving), now.rim
     started = memory.started
     if not moves or motion.turning:
@@ -225,13 +214,13 @@ def observe(memory: Memory, time: float, motion: RoverMotion, tuning: SituationT
         started = -math.inf if isnan(memory.time) else time
     rolled = memory.rolled + now.fastest * dt if moves else 0.0
     # Wheels settle into their ruts after a start; those that turn on the spot dig by command.
-    fresh = motion.turning or rolled < tuning.start_travel
+    fresh = motion.turning or rolled < _START_TRAVEL
     ruts = memory.ruts or tuple([w.sinkage for w in motion.wheels])
     way = memory.way
     if moves:
         forward = sum([1 if w.rim_speed > 0.0 else -1 for w in now.moving])
         way = (forward > 0) - (forward < 0)
-    kept = 1.0 if motion.turning else math.exp(-dt / tuning.cruise_time)
+    kept = 1.0 if motion.turning else math.exp(-dt / _CRUISE_TIME)
     return Situation(
         motion,
         Memory(
@@ -243,12 +232,11 @@ def observe(memory: Memory, time: float, motion: RoverMotion, tuning: SituationT
                 [
                     w.sinkage
                     if fresh
-                    else rut + gain_of(abs(w.rim_speed) * dt, tuning.rut_length) * (w.sinkage - rut)
+                    else rut + gain_of(abs(w.rim_speed) * dt, _RUT_LENGTH) * (w.sinkage - rut)
                     for w, rut in zip(motion.wheels, ruts, strict=True)
                 ]
             ),
             way=way,
             way_since=memory.way_since if way == memory.way else time,
         ),
-        tuning,
     )
