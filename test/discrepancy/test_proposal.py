@@ -14,7 +14,7 @@ from test_workflow import make, run
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.discrepancy.proposal import find, words
 from wheel_terra_estimator.discrepancy.report.model_file import write_proposal
-from wheel_terra_estimator.discrepancy.result import as_json
+from wheel_terra_estimator.discrepancy.result import LeftOut, as_json
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.terramechanics.conditioned import ConditionedForces
 from wheel_terra_estimator.terramechanics.effects.learned_closure import (
@@ -256,3 +256,14 @@ def test_a_change_is_said_in_the_units_of_the_rows():
     assert words._size('drawbar_pull', 0.1, table, at) == '20 N (50 % of its mean)'
     assert words._size('torque', 0.1, table, at) == '4 N m (20 % of its mean)'
     assert words._size('sinkage', 0.1, table, at) == '20 mm (100 % of its mean)'
+
+
+@pytest.mark.parametrize(('lost', 'closed'), [(1.6, 1.0 - np.sqrt(7.6 / 15.0)), (1.9, 0.0)])
+def test_a_law_that_worsens_a_quantity_has_to_gain_five_times_that(lost, closed):
+    """In squared noise: pull goes from 10 to 1, sinkage from 7 by what is lost."""
+    gap = {name: SimpleNamespace(noise=2.0) for name in ('drawbar_pull', 'sinkage')}
+    left = {
+        'drawbar_pull': LeftOut(2.0 * np.sqrt(10.0), 2.0),
+        'sinkage': LeftOut(2.0 * np.sqrt(7.0), 2.0 * np.sqrt(7.0 + lost)),
+    }
+    assert find._closed({'load': left}, gap) == pytest.approx(closed)

@@ -67,6 +67,13 @@ def test_lead_of_a_warning_and_one_that_was_wrong():
     assert '3.0 s before the rover was entrapped' in as_lines(errors)[-1]
 
 
+def test_a_set_is_stuck_while_a_warning_stands():
+    over = StuckWarning(int(STAMP[20]), int(STAMP[30]), '')
+    standing = StuckWarning(int(STAMP[90]), None, '')
+    found = history(np.zeros((100, 2)), warnings=(over, standing)).stuck
+    assert np.flatnonzero(found).tolist() == [*range(20, 30), *range(90, 100)]
+
+
 def test_comparison():
     first, second = history(np.zeros((100, 2))), history(np.zeros((100, 2)))
     second.values['sinkage'][7, 1] = 0.25

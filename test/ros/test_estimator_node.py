@@ -4,6 +4,7 @@
 
 import signal
 
+import numpy as np
 import pytest
 
 ROVER = ['--ros-args', '--params-file']
@@ -42,6 +43,23 @@ def hear(node, kind, topic, profile=10):
     heard = []
     node.create_subscription(kind, topic, heard.append, profile)
     return heard
+
+
+def test_tools_are_told_the_range_of_each_bounded_parameter():
+    from wheel_terra_estimator.configuration.parameters import declared
+    from wheel_terra_estimator.ros.parameters import _descriptor
+
+    told = {key: _descriptor(parameter) for key, parameter in declared().items()}
+    ranges = {
+        key: [(r.from_value, r.to_value) for r in (*d.floating_point_range, *d.integer_range)]
+        for key, d in told.items()
+    }
+    assert sum(map(bool, ranges.values())) > 5
+    for key, parameter in declared().items():
+        bounds = (parameter.lower, parameter.upper)
+        assert ranges[key] in ([], [bounds]), key
+        if not np.isfinite(bounds).all():
+            assert ranges[key] == []
 
 
 @pytest.mark.usefixtures('running_estimator')

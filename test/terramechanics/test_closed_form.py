@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,12 +14,12 @@ from scipy.integrate import quad
 from terra_tools import EFFECTS, SAND, WHEEL, points, random_cases, state
 
 from wheel_terra_estimator.terramechanics import closed_form
-from wheel_terra_estimator.terramechanics.conditioned import INPUTS, ConditionedForces
+from wheel_terra_estimator.terramechanics.conditioned import INPUTS, ConditionedForces, _set_shares
 from wheel_terra_estimator.terramechanics.maths import ScalarMaths
 from wheel_terra_estimator.terramechanics.model import WheelSoilModel
 from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
 from wheel_terra_estimator.terramechanics.soil import Soil
-from wheel_terra_estimator.terramechanics.terms import Terms, build_contact
+from wheel_terra_estimator.terramechanics.terms import Terms, build_contact, set_angles
 from wheel_terra_estimator.terramechanics.wheel import Wheel
 from wheel_terra_lab.terramechanics.decoupled_pull import decoupled_pull
 
@@ -255,3 +256,17 @@ def test_the_turn_from_rolling_to_skid_is_smooth() -> None:
     steps = np.diff(pull)
     assert (steps > 0.0).all()
     assert np.max(np.abs(np.diff(steps))) < 0.25 * np.max(steps)
+
+
+@pytest.mark.parametrize('peak', [-2.0, -0.3, 0.4, 2.0])
+def test_a_peak_beyond_the_contact_is_moved_into_it_alike_everywhere(peak: float) -> None:
+    """By a thousandth of the contact: in the filter's form as in the general one."""
+    contacts = [
+        SimpleNamespace(leaving_ratio=-0.3, peak_ratio=peak, entrance_angle=0.5) for _ in range(2)
+    ]
+    set_angles(contacts[0], 0.5, None, SimpleNamespace(apply=lambda *_: None))
+    _set_shares(contacts[1], 0.5)
+    expected = min(max(0.5 * peak, -0.15 + 0.65e-3), 0.5 - 0.65e-3)
+    for contact in contacts:
+        assert contact.peak_angle == pytest.approx(expected)
+        assert contact.leaving_angle == pytest.approx(-0.15)
