@@ -95,6 +95,17 @@ def test_the_scale_of_the_torques():
     assert abs(gain.after[0] - 1.2) < 2.0 * gain.std
 
 
+def test_zeros_of_the_torques_are_told_where_straights_are_driven_both_ways():
+    joints = rolling.recording().joints
+    zeros = np.linspace(-2.0, 2.0, joints.torque.shape[1])
+    before, after = (
+        next((c for c in calibrated(joints=j)[0].changes if c.key == 'sensors.torque_zero'), None)
+        for j in (joints, replace(joints, torque=joints.torque + zeros))
+    )
+    stood = 0.0 if before is None else np.array(before.after)
+    assert np.array(after.after) - stood == pytest.approx(zeros, abs=0.1)
+
+
 def test_the_written_gain_is_found_no_more(tmp_path):
     joints = rolling.recording().joints
     wrong = replace(rolling.recording(), joints=replace(joints, torque=1.4 * joints.torque))

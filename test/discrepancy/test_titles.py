@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import re
 
@@ -198,6 +199,8 @@ def test_a_map_of_columns(tmp_path, capsys):
     assert "'z [mm]' (sinkage [m], the depth of the rim" in said and "'Fx' (drawbar_pull" in said
     options = ['--columns', str(file), '--columns', 'torque=M [N mm]']
     assert main([*command, *output, *options, '--only', 'cohesion']) == 0
+    report = json.loads((tmp_path / 'out' / 'report.json').read_text())
+    assert {candidate['name'] for candidate in report['candidates']} == {'cohesion'}
 
 
 def check(table):
