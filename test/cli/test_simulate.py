@@ -9,13 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from wheel_terra_estimator.bags.message_types import topic_messages
 from wheel_terra_estimator.bags.reader import MeasurementReader
 from wheel_terra_estimator.bags.simulated_drive import TRUTH_TOPICS, write_simulated_drive
 from wheel_terra_estimator.bags.storage import open_bag
 from wheel_terra_estimator.bags.truth import read_truth
 from wheel_terra_estimator.cli.main import main
 from wheel_terra_estimator.estimation.measurements import WheelOdometry
-from wheel_terra_estimator.messages.convert import INPUT_TYPES, stamp_of
+from wheel_terra_estimator.messages.convert import INPUT_TYPES, JOINT_STATE, stamp_of
 from wheel_terra_estimator.simulation.drive import simulate
 from wheel_terra_estimator.simulation.scenario import load
 
@@ -71,6 +72,9 @@ def test_true_slip_of_wheels_at_rest_is_unknown(tmp_path: Path) -> None:
     write_simulated_drive(drive, tmp_path / 'bag')
     with open_bag(tmp_path / 'bag') as bag:
         truth = read_truth(bag, {}, drive.configuration)
+        unpack = topic_messages(JOINT_STATE).unpack
+        held = [unpack(data).position for _, _, data in bag.messages(('/ground_truth/slip',))]
+    assert np.isfinite(held).all()  # the contract: no output is ever nan
     assert truth is not None
     assert np.isnan(truth.slip.value[-1]).tolist() == 3 * [False, True]
     np.testing.assert_array_equal(truth.slip.value, drive.truth.slip)

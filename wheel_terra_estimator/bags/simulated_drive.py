@@ -151,13 +151,14 @@ class _Sender:
 
 
 class _TruthSender:
-    """The truth as messages; the slip of a wheel at rest is nan."""
+    """The truth as messages; slip at rest holds its last value, as the outputs do."""
 
     def __init__(self, bag: BagFile, drive: SimulatedDrive) -> None:
         self._bag = bag
         self._truth = drive.truth
         self._names = drive.configuration.wheels.names
         self._row = 0
+        self._slip = np.zeros(len(self._names))
         self._stuck: bool | None = None
 
     def write_until(self, time: int | None) -> None:
@@ -171,8 +172,9 @@ class _TruthSender:
         truth, make = self._truth, self._bag.messages
         stamp = int(truth.stamp[row])
         header = make.header(stamp)
+        self._slip = np.where(np.isnan(truth.slip[row]), self._slip, truth.slip[row])
         columns = {
-            'slip': (truth.slip[row], truth.slip_velocity[row], truth.drawbar_pull[row]),
+            'slip': (self._slip, truth.slip_velocity[row], truth.drawbar_pull[row]),
             'sinkage': (truth.sinkage[row], truth.sinkage_rate[row], truth.normal_load[row]),
             'slip_angle': (truth.slip_angle[row], (), truth.lateral_force[row]),
         }

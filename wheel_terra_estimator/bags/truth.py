@@ -18,10 +18,11 @@ from wheel_terra_estimator.bags.storage import Bag
 from wheel_terra_estimator.bags.thinning import ThinnedRows
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.contacts.steering import headings
+from wheel_terra_estimator.estimation.estimates import SlipClass
 from wheel_terra_estimator.estimation.measurements import InertialReading, WheelOdometry
 from wheel_terra_estimator.estimation.rover import Rover
 from wheel_terra_estimator.messages.cdr import TWIST, DamagedMessageError
-from wheel_terra_estimator.messages.convert import JOINT_STATE, ODOMETRY, stamp_of
+from wheel_terra_estimator.messages.convert import JOINT_STATE, ODOMETRY, OUTPUT_TYPES, stamp_of
 from wheel_terra_estimator.terramechanics.kinematics import slip_ratio
 
 FloatArray = NDArray[np.float64]
@@ -31,6 +32,7 @@ _TYPES = {
     '/ground_truth/slip': JOINT_STATE,
     '/ground_truth/sinkage': JOINT_STATE,
     '/ground_truth/slip_angle': JOINT_STATE,
+    '/ground_truth/slip_class': OUTPUT_TYPES['slip_class'],
     '/ground_truth/twist': TWIST,
     BODY_VELOCITY: ODOMETRY,
 }
@@ -102,6 +104,7 @@ def read_simulated_truth(bag: Bag, names: tuple[str, ...]) -> Truth | None:
                 '/ground_truth/slip': both,
                 '/ground_truth/sinkage': depth,
                 '/ground_truth/slip_angle': both,
+                '/ground_truth/slip_class': _Values(lambda m: [float(c) for c in m.data], wheels),
                 '/ground_truth/twist': _Values(_forward, 1),
             },
         )
@@ -110,7 +113,9 @@ def read_simulated_truth(bag: Bag, names: tuple[str, ...]) -> Truth | None:
         return Truth(
             source='/ground_truth',
             velocity=found['/ground_truth/twist'].known(),
-            slip=WheelTruth(slips.stamp, slips.value[:, :wheels]).known(),
+            slip=_of_turning_wheels(
+                WheelTruth(slips.stamp, slips.value[:, :wheels]), found['/ground_truth/slip_class']
+            ).known(),
             sinkage=found['/ground_truth/sinkage'].known(),
             drawbar_pull=WheelTruth(slips.stamp, slips.value[:, wheels:]).known(),
             slip_angle=WheelTruth(aside.stamp, angle).known(),
@@ -120,6 +125,16 @@ def read_simulated_truth(bag: Bag, names: tuple[str, ...]) -> Truth | None:
         velocity = _body_velocity(bag)
         return Truth(BODY_VELOCITY, velocity, None, None, None) if velocity.stamp.size else None
     return None
+
+
+def _of_turning_wheels(slip: WheelTruth, classes: WheelTruth) -> WheelTruth:
+    """Return slips without those that a wheel at rest holds: its class is unknown then."""
+    row = {stamp: i for i, stamp in enumerate(classes.stamp.tolist())}
+    value = slip.value.copy()
+    for i, stamp in enumerate(slip.stamp.tolist()):
+        if stamp in row:
+            value[i, classes.value[row[stamp]] == SlipClass.UNKNOWN] = np.nan
+    return WheelTruth(slip.stamp, value)
 
 
 def _body_velocity(bag: Bag) -> WheelTruth:
@@ -182,12 +197,14 @@ def _thinned(bag: Bag, wanted: Mapping[str, _Values]) -> dict[str, WheelTruth]:
     rows = {topic: ThinnedRows() for topic in wanted}
     unpack = {topic: topic_messages(_TYPES[topic]).unpack for topic in wanted}
     there = [t for t in wanted if t in bag.topics and bag.topics[t].type == _TYPES[t]]
-    for _, topic, data in bag.messages(there):
+    for time, topic, data in bag.messages(there):
         try:
             message = unpack[topic](data)
         except DamagedMessageError:
             continue
-        rows[topic].add(stamp_of(message), wanted[topic].of(message))
+        # A message without a header was logged at the stamp that it belongs to.
+        stamp = stamp_of(message) if hasattr(message, 'header') else time
+        rows[topic].add(stamp, wanted[topic].of(message))
     return {topic: _sorted(rows[topic], values.width) for topic, values in wanted.items()}
 
 
