@@ -63,6 +63,9 @@ LEAST_BACK_ROWS = 10
 """Rows of wheels turning back in the air that tell zero and friction apart."""
 RUTS = 0.3
 """Half of the difference of resistance one way and back over its mean, one deviation [-]."""
+RUT_TILT = 0.5
+"""Tilt of a digging body, nose up, over the square of the level traction, one deviation [rad]: ruts
+cost 0.6 sqrt(z/D) of the load (Bekker 1969), depths differ by a third of z over 3.5 radii."""
 LEAST_GAIN_ERROR = 0.15
 GAIN_SIGMAS = 4.0
 ZERO_FACTOR = 6.0
@@ -192,15 +195,14 @@ def _scale(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
 
 
 class _Slopes(NamedTuple):
-    """Thrust over mass times specific force: torque gain times true over stated mass; its trial."""
+    """Thrust over mass times specific force: torque gain times true over stated mass; its trial.
+
+    ``scatter`` is that of the specific force along the drive [m/s^2].
+    """
 
     gain: Estimate
     trial: Trial
-
-    @property
-    def useful(self) -> bool:
-        """Whether it tells more than that nothing is off."""
-        return self.gain.value > 0.0 and self.gain.sigmas_from(1.0) > 1.0
+    scatter: float
 
 
 def _slope_fit(evidence: Evidence) -> _Slopes | None:
@@ -214,7 +216,8 @@ def _slope_fit(evidence: Evidence) -> _Slopes | None:
     pushed = moving_mean(thrust(evidence), SMOOTH_ROWS)[rows]
     sense = np.sign(evidence.rim[rows])
     down, up = np.quantile(along * sense, (0.05, 0.95))
-    if float(np.std(along)) < LEAST_SLOPE_STD or max(down, -up) > -UP_AND_DOWN:
+    scatter = float(np.std(along))
+    if scatter < LEAST_SLOPE_STD or max(down, -up) > -UP_AND_DOWN:
         return None
     columns = [evidence.facts.mass * along, sense]
     if (sense > 0).any() and (sense < 0).any():
@@ -225,7 +228,7 @@ def _slope_fit(evidence: Evidence) -> _Slopes | None:
         1.0,
         (along - along.mean()) ** 2,
     )
-    return _Slopes(block_fit(design, pushed)[0], trial)
+    return _Slopes(block_fit(design, pushed)[0], trial, scatter)
 
 
 def whole_gain(evidence: Evidence, left: float) -> FloatArray:
@@ -263,8 +266,21 @@ def torque_gain(evidence: Evidence) -> _Slopes | NotChecked:
             'torque: its scale by one half of the drive does not fit the slopes of the other',
         )
     apart = min(0.5 * fit.trial.after, 1.0)
-    std = math.hypot(fit.gain.std, GAIN_MODEL_STD, apart)
-    return _Slopes(Estimate(fit.gain.value, std), fit.trial)
+    # A body that digs in reads uphill where thrust rises: slopes seem to cost less, never more.
+    tilt = RUT_TILT * traction**2 * evidence.facts.gravity / fit.scatter
+    std = math.hypot(fit.gain.std, GAIN_MODEL_STD, apart, tilt if fit.gain.value < 1.0 else 0.0)
+    return fit._replace(gain=Estimate(fit.gain.value, std))
+
+
+def sigmas_off(evidence: Evidence, gain: Estimate) -> float:
+    """Return by how many deviations a scale is beyond what the rover file leaves open.
+
+    From ``GAIN_SIGMAS`` on the mass may be wrong as well as the scale.
+    """
+    assert evidence.facts.configuration is not None
+    return Estimate(
+        gain.value, math.hypot(gain.std, evidence.facts.configuration.sensors.torque_gain_std)
+    ).sigmas_from(1.0)
 
 
 def _gain(evidence: Evidence) -> list[Outcome]:
@@ -277,11 +293,10 @@ def _gain(evidence: Evidence) -> list[Outcome]:
     evidence.figures['torque.gain_std'] = round(std, 4)
     if abs(gain - 1.0) < LEAST_GAIN_ERROR or gain <= 0.0:
         return []
-    stated = facts.configuration.sensors.torque_gain_std
-    sigmas = abs(gain - 1.0) / math.hypot(std, stated)
+    sigmas = sigmas_off(evidence, fit.gain)
     if sigmas < GAIN_SIGMAS:
         return _not_told(
-            f'torque: {gain:.2f} is within what the rover file leaves open ({stated:g})'
+            f'torque: {gain:.2f} +- {std:.2f} is within this and what the rover file leaves open'
         )
     whole = whole_gain(evidence, gain)
     middle, mass = float(np.mean(whole)), facts.mass * gain
