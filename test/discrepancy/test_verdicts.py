@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 from test_workflow import make, run
 
+from wheel_terra_estimator.cli.main import main
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.discrepancy import decision
 from wheel_terra_estimator.discrepancy.tables.averaging import together
 from wheel_terra_estimator.discrepancy.tables.checks import check_table
+from wheel_terra_estimator.discrepancy.tables.parsing import read_table
 from wheel_terra_estimator.discrepancy.workflow import Options, diagnose, operating_points
 from wheel_terra_estimator.errors import UserError
 from wheel_terra_estimator.terramechanics.effects import catalogue
@@ -106,6 +108,16 @@ def test_an_uncertain_leaving_angle_counts_as_noise():
     assert exact.gap_p_value < 1e-3 < honest.gap_p_value
     assert honest.verdict == 'agrees'
     assert honest.gap['torque'].noise > exact.gap['torque'].noise
+
+
+def test_the_models_own_rows_without_noise_agree(tmp_path):
+    """Beside next to no noise an evidence that cancels large numbers named a hard layer."""
+    rig, path = ['hit_wh1_lug10', 'hit_lss1'], tmp_path / 'own.csv'
+    told = [f'--config={name}' for name in rig]
+    sweep = ['--slip', '0.05:0.6:8', '--load', '35,70,105', '-o', str(path)]
+    assert main(['predict', *told, *sweep]) == 0
+    found = diagnose(read_table(path), reader.load(rig, complete=False))
+    assert (found.verdict, found.effects) == ('agrees', ())
 
 
 def test_two_tables_with_other_lugs_share_one_soil_and_tell_more():

@@ -97,10 +97,12 @@ def evidence(
     precision = information[None] + priors[:, None, :, None] * np.eye(len(fitted.u))
     covariance = np.asarray(np.linalg.inv(precision), dtype=float)
     mean = np.einsum('sfpq,fq->sfp', covariance, right)
+    # Not as a difference of two large numbers: beside next to no noise little of it would be right.
+    left = target - mean @ jacobian.T
     value = -0.5 * (
         np.log(variance).sum(axis=1)
-        + (target**2 / variance).sum(axis=1)
-        - (right * mean).sum(axis=2)
+        + (left**2 / variance).sum(axis=2)
+        + (priors[:, None] * mean**2).sum(axis=2)
         + np.linalg.slogdet(precision)[1]
         - np.log(priors).sum(axis=1)[:, None]
         + problem.size * np.log(2.0 * np.pi)
