@@ -88,13 +88,6 @@ def test_a_reference_whose_noise_alone_is_too_much_is_said():
     )
 
 
-def test_the_scale_of_the_torques():
-    joints = rolling.recording().joints
-    calibration, _ = calibrated(joints=replace(joints, torque=1.2 * joints.torque))
-    gain = next(c for c in calibration.changes if c.key == 'sensors.torque_gain')
-    assert abs(gain.after[0] - 1.2) < 2.0 * gain.std
-
-
 def test_zeros_of_the_torques_are_told_where_straights_are_driven_both_ways():
     joints = rolling.recording().joints
     zeros = np.linspace(-2.0, 2.0, joints.torque.shape[1])

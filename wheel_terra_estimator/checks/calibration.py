@@ -16,7 +16,6 @@ from wheel_terra_estimator.checks.evidence import Evidence
 from wheel_terra_estimator.checks.finding import CheckReport, Finding, NotChecked
 from wheel_terra_estimator.checks.run import examine
 from wheel_terra_estimator.checks.series import Recording
-from wheel_terra_estimator.checks.statistics import Estimate
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.configuration.ros_yaml import Value
 from wheel_terra_estimator.errors import UserError
@@ -29,8 +28,6 @@ LEAST_SURE = 0.8
 """Confidence from which a cure is written [-]."""
 CLEAR = 2.0
 """Deviations by which a number is off, from which another is written [-]."""
-GAIN_STD = 0.1
-"""Deviation of a scale of the torques that is written, at most [-]."""
 BLUNT_REFERENCE = 0.005
 """Deviation of the radius by the noise of the reference alone, as a share, that is told [-]."""
 
@@ -215,24 +212,12 @@ def _radius(changes: _Changes, evidence: Evidence, report: CheckReport) -> Evide
 def _torques(changes: _Changes, evidence: Evidence) -> None:
     if evidence.force is None:
         return
-    told = torque.torque_gain(evidence)
-    if not isinstance(told, NotChecked) and _scale_alone(told.gain, evidence):
-        whole = torque.whole_gain(evidence, told.gain.value)
-        std = float(np.max(whole)) * told.gain.std / told.gain.value
-        source = 'sum of T/r against mass times specific force on slopes; the mass taken as stated'
-        changes.add_with_deviation('sensors.torque_gain', whole.round(4).tolist(), std, source)
     zeros = torque.torque_zeros(evidence)
     if zeros is not None and any(zero.sigmas_from(0.0) > CLEAR for zero in zeros):
         zeros = torque.whole_zeros(evidence, zeros)
         after, std = [round(zero.value, 3) for zero in zeros], max(zero.std for zero in zeros)
         source = 'straight stretches driven both ways'
         changes.add_with_deviation('sensors.torque_zero', after, std, source)
-
-
-def _scale_alone(gain: Estimate, evidence: Evidence) -> bool:
-    """Whether a scale of the torques is known well, and not as likely a wrong mass."""
-    open_yet = torque.sigmas_off(evidence, gain) < torque.GAIN_SIGMAS
-    return open_yet and gain.std < GAIN_STD and gain.sigmas_from(1.0) > CLEAR
 
 
 def _friction(changes: _Changes, evidence: Evidence, report: CheckReport) -> None:

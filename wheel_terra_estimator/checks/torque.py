@@ -272,17 +272,6 @@ def torque_gain(evidence: Evidence) -> _Slopes | NotChecked:
     return fit._replace(gain=Estimate(fit.gain.value, std))
 
 
-def sigmas_off(evidence: Evidence, gain: Estimate) -> float:
-    """Return by how many deviations a scale is beyond what the rover file leaves open.
-
-    From ``GAIN_SIGMAS`` on the mass may be wrong as well as the scale.
-    """
-    assert evidence.facts.configuration is not None
-    return Estimate(
-        gain.value, math.hypot(gain.std, evidence.facts.configuration.sensors.torque_gain_std)
-    ).sigmas_from(1.0)
-
-
 def _gain(evidence: Evidence) -> list[Outcome]:
     facts, fit = evidence.facts, torque_gain(evidence)
     assert facts.configuration is not None
@@ -293,7 +282,8 @@ def _gain(evidence: Evidence) -> list[Outcome]:
     evidence.figures['torque.gain_std'] = round(std, 4)
     if abs(gain - 1.0) < LEAST_GAIN_ERROR or gain <= 0.0:
         return []
-    sigmas = sigmas_off(evidence, fit.gain)
+    open_yet = facts.configuration.sensors.torque_gain_std  # by the rover file
+    sigmas = Estimate(gain, math.hypot(std, open_yet)).sigmas_from(1.0)
     if sigmas < GAIN_SIGMAS:
         return _not_told(
             f'torque: {gain:.2f} +- {std:.2f} is within this and what the rover file leaves open'
