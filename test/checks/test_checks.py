@@ -12,6 +12,10 @@ import rolling_rover as rolling
 from wheel_terra_estimator.bags.bag_file import BagFile
 from wheel_terra_estimator.bags.series_reader import choose_topics
 from wheel_terra_estimator.bags.storage import open_bag
+from wheel_terra_estimator.checks.clocks import as_smooth
+from wheel_terra_estimator.checks.finding import Finding
+from wheel_terra_estimator.checks.imu import ImuState, check_imu
+from wheel_terra_estimator.checks.rover_facts import from_configuration
 from wheel_terra_estimator.checks.run import check_recording
 
 WHOLE = rolling.recording()
@@ -338,3 +342,61 @@ def test_even_times_over_stamps_that_jump():
         found = even_times(jumped, 0.05)
         assert found[-1] - found[0] == pytest.approx(59.9, abs=0.051)
     assert even_times(np.arange(0.0, 4e9, 3500.0), 0.05).size <= MOST_TIMES + 1
+
+
+@pytest.mark.parametrize('axis', [0, 1, 2])
+def test_orientations_tell_which_axis_of_the_gyro_is_reversed(axis):
+    """A body that rocks about one axis: its angle is the integral of its rate, in closed form."""
+    seconds = WHOLE.imu.seconds
+    about = np.eye(3)[axis]
+    rate = np.outer(0.2 * np.sin(0.5 * seconds), about)
+    half = 0.2 * (1.0 - np.cos(0.5 * seconds))  # of 0.4 (1 - cos t/2)
+    orientation = np.column_stack([np.outer(np.sin(half), about), np.cos(half)])
+    for factor in (1.0, -1.0, math.degrees(1.0), -math.degrees(1.0)):
+        recording = replace(
+            WHOLE, imu=replace(WHOLE.imu, rate=factor * rate, orientation=orientation)
+        )
+        told, mended = check_imu(
+            ImuState(recording, np.eye(3)), from_configuration(rolling.rover())
+        )
+        told = {finding.fault: finding for finding in told if isinstance(finding, Finding)}
+        assert ('gyro_reversed' in told) == (factor < 0.0)
+        assert ('gyro_degrees' in told) == (abs(factor) > 1.0)
+        assert factor > 0.0 or 0.95 < told['gyro_reversed'].confidence < 1.0
+        assert factor > 0.0 or f'.{"xyz"[axis]} ' in told['gyro_reversed'].words
+        np.testing.assert_allclose(mended.imu.rate, rate, atol=0.01)
+
+
+@pytest.mark.parametrize(
+    ('at_tips', 'reference'), [(0.0, 'rim'), (1.0, 'lug_tip'), (0.0, 'lug_tip')]
+)
+def test_a_wheel_with_lugs_rolls_on_the_radius_that_shears_the_soil(at_tips, reference):
+    """Lugs of 2 cm: where the soil shears at rim or tips, the rover rolls over just that radius."""
+    lug = 0.02
+    rolls = rolling.RADIUS + at_tips * lug
+    joints = replace(WHOLE.joints, rate=WHOLE.joints.rate * rolling.RADIUS / rolls)
+    stated = rolling.rover(**{
+        'wheels.lug_height': [lug] * 4,
+        'slip_radius': reference,
+        'effects.lug_shear_radius.enabled': True,
+        'effects.lug_shear_radius.lam': at_tips,
+    })  # fmt: skip
+    report = check_recording(replace(WHOLE, joints=joints), stated)
+    told = rolling.RADIUS + lug * (reference == 'lug_tip')
+    assert report.figures['rover.rolling_radius_m'] == pytest.approx(told, rel=0.005)
+
+
+@pytest.mark.parametrize('period', [0.25, 0.75, 2.5])
+def test_rims_are_as_smooth_as_a_straight_line_between_references(period):
+    """A kick at a stamp of the reference is a triangle between the stamps beside it."""
+    time = 0.05 * np.arange(400)
+    at = np.arange(0.0, 20.0, period)
+    kick = at[at.size // 2]
+    rim = np.where(np.abs(time - kick) < 0.01, 1.0, 0.0)
+    smooth, line = as_smooth(time, rim, at, np.where(at == kick, 1.0, 0.0))
+    base = min(period, 1.5)
+    np.testing.assert_allclose(line, np.maximum(1.0 - np.abs(time - kick) / period, 0.0), atol=1e-9)
+    triangle = np.maximum(1.0 - np.abs(time - kick) / base, 0.0) * 0.05 / base
+    # An even number of rows lies half a row to one side, twice.
+    either = [np.abs(smooth - np.roll(triangle, shift)).max() for shift in (-1, 0, 1)]
+    assert min(either) < 1e-9
