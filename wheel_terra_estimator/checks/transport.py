@@ -46,7 +46,9 @@ def check_transport(
             continue
         most_back = BACKWARD_SHARE if name in ('joints', 'imu') else 1.0  # others are fused late
         outcomes += _order(channel, most_back) or _drop_outs(name, channel, figures)
-        delays[name] = float(np.median(channel.log_time - channel.stamp)) * 1e-9
+        stamped = channel.stamp > 0
+        if stamped.any():
+            delays[name] = float(np.median((channel.log_time - channel.stamp)[stamped])) * 1e-9
     late: dict[str, float] = {}
     if 'joints' not in delays:
         return outcomes, late
