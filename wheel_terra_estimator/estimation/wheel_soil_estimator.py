@@ -68,7 +68,6 @@ from wheel_terra_estimator.estimation.filter.state import (
     SPEED,
 )
 from wheel_terra_estimator.estimation.filter.torque import TorqueUpdate
-from wheel_terra_estimator.estimation.filter.whiteness import Whiteness
 from wheel_terra_estimator.estimation.filter.zero_velocity import ZeroVelocityUpdate
 from wheel_terra_estimator.estimation.inputs.contact_sensors import (
     LeavingAngleInput,
@@ -232,7 +231,6 @@ class WheelSoilEstimator:
         self._sinkage = SinkageUpdate(configuration, layout)
         self._torque = TorqueUpdate(configuration, rover, layout)
         self._balance = ForceBalance(configuration, rover, sensors, layout)
-        self._whiteness = Whiteness()
         # What it means.
         self._slips = SlipJudge(rover, sensors)
         self._margin = PullMargin(rover.wheel_count, models)
@@ -269,7 +267,6 @@ class WheelSoilEstimator:
             self._sinkage,
             self._torque,
             self._balance,
-            self._whiteness,
             self._slips,
             self._margin,
             self._slopes,
@@ -401,7 +398,6 @@ class WheelSoilEstimator:
         rows = self._sinkage.update(
             ekf, time, self._sinkages.take(), self._noise.variance('sinkage')
         )
-        depths, torques = len(rows), 0
         self._find_unloaded(cycle)
         forces, total = None, None
         if cycle.still:
@@ -410,7 +406,6 @@ class WheelSoilEstimator:
             forces, total, force_rows = self._force_rows(cycle)
             if self._contact_age.settled or cycle.reference_known:
                 rows += force_rows
-                torques = len(force_rows) - (total is not None)
         considered = considered_entries(
             layout,
             reference_known=self._reference.known(time),
@@ -419,14 +414,6 @@ class WheelSoilEstimator:
             unread=self._sinkage.unread(time),
         )
         ekf.fuse(rows, considered)
-        if rows:
-            self._whiteness.follow(
-                time,
-                ekf.innovations,
-                sinkage=depths,
-                torque=torques,
-                balance=len(rows) - depths - torques,
-            )
 
         self._speed.end_cycle(time, ekf, cycle.unturned, settled=self._contact_age.settled)
         self._sinkage_process.end_cycle(ekf, sinkage_before, cycle.dt)
@@ -597,7 +584,6 @@ class WheelSoilEstimator:
             fastest_rim=self._wheels.fastest(),
             variance=noise,
         )
-        self._whiteness.follow(time, ekf.innovations, reference=1)
 
     def _find_unloaded(self, cycle: _Cycle) -> None:
         """Find wheels without load."""
@@ -907,7 +893,6 @@ class WheelSoilEstimator:
         ):
             if nis is not None:
                 report[f'nis_{channel}'] = round(nis, 3)
-        report |= self._whiteness.report()
         zero = self._zero_velocity.state.zero
         report['gyro_zero_yaw_rad_s'] = float(f'{zero.yaw:.3g}')
         report['accelerometer_bias_m_s2'] = float(f'{float(self._ekf.mean[GRAVITY_BIAS]):.3g}')

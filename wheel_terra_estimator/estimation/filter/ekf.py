@@ -133,11 +133,6 @@ class GatedFilter:
         """(n, n) covariance."""
         return self._ekf.P
 
-    @property
-    def innovations(self) -> FloatArray:
-        """(m,) innovations of the last update, each over its deviation."""
-        return self._ekf.y
-
     def predict(self, mean: FloatArray, transition: FloatArray, noise: FloatArray) -> None:
         """Go to a predicted mean with transition matrix F and process noise Q."""
         before = self._present()
