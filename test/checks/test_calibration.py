@@ -9,6 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import rolling_rover as rolling
+from scipy.spatial.transform import Rotation
 
 from wheel_terra_estimator.checks.calibration import as_file, calibrate
 from wheel_terra_estimator.checks.imu import gross_tilt
@@ -49,11 +50,20 @@ def test_a_wrong_sinkage_moves_the_radius_by_no_more_than_its_deviation(factor):
 
 
 @pytest.mark.parametrize('slope', [-0.3, 0.0, 0.3])
-def test_an_imu_on_its_back_on_a_slope_keeps_the_slope(slope):
+@pytest.mark.parametrize('mounted', [('x', 180), ('x', 90), ('x', -90), ('y', 90), ('y', -90)])
+def test_an_imu_on_its_back_or_side_on_a_slope_keeps_the_slope(slope, mounted):
     """About y, half a turn would turn the gyro and the slope round as well."""
-    true = rolling.GRAVITY * np.array([np.sin(slope), 0.0, np.cos(slope)])
-    read = np.tile(true * [1.0, -1.0, -1.0], (50, 1))
+    up = np.array([np.sin(slope), 0.5 * np.sin(slope), 0.0])
+    true = rolling.GRAVITY * np.append(up[:2], np.sqrt(1.0 - up @ up))
+    read = np.tile(Rotation.from_euler(*mounted, degrees=True).inv().apply(true), (50, 1))
     np.testing.assert_allclose(gross_tilt(SimpleNamespace(force=read)) @ read[0], true, atol=1e-9)
+
+
+def test_an_imu_mounted_at_45_degrees_is_brought_upright():
+    read = np.tile(rolling.GRAVITY * np.array([0.0, np.sqrt(0.5), np.sqrt(0.5)]), (50, 1))
+    np.testing.assert_allclose(
+        gross_tilt(SimpleNamespace(force=read)) @ read[0], [0.0, 0.0, rolling.GRAVITY], atol=1e-9
+    )
 
 
 def test_skidding_downhill_is_no_larger_radius():

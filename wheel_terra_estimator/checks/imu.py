@@ -51,6 +51,8 @@ UPRIGHT_SHARE = 0.5
 """Share of the mean specific force along z that gravity has on a rover [-]."""
 UPSIDE_TILT = math.radians(35.0)
 """Mean tilt that no rover drives at [rad]: the mounting is wrong, whatever the slope."""
+STEEPEST_MEAN = math.radians(20.0)
+"""Mean slope of a drive [rad]: what is within it of an axis is a quarter turn on a slope."""
 LEAST_SHOWN = 0.01
 """Change of an angle [deg] below which a cure leaves it out."""
 LEAST_MOUNTING = math.radians(1.5)
@@ -287,7 +289,10 @@ class Mounting:
 
 
 def gross_tilt(evidence: Evidence) -> FloatArray | None:
-    """Return the rotation that brings the mean specific force upright, if it is far from it."""
+    """Return the rotation that brings the mean specific force upright, if it is far from it.
+
+    By whole quarter turns where a slope explains what is left; else all of it is the mounting.
+    """
     from scipy.spatial.transform import Rotation  # heavy
 
     if evidence.force is None:
@@ -296,12 +301,16 @@ def gross_tilt(evidence: Evidence) -> FloatArray | None:
     up = up / max(float(np.linalg.norm(up)), 1e-9)
     if math.acos(float(np.clip(up[2], -1.0, 1.0))) < UPSIDE_TILT:
         return None
+    nearest = np.zeros(3)
+    nearest[np.argmax(np.abs(up))] = np.sign(up[np.argmax(np.abs(up))])
+    if math.acos(float(np.clip(up @ nearest, -1.0, 1.0))) < STEEPEST_MEAN:
+        up = nearest
+    if up[2] == -1.0:
+        return np.diag([1.0, -1.0, -1.0])  # about x: about y the slope would turn round as well
     axis = np.cross(up, [0.0, 0.0, 1.0])
     sine = float(np.linalg.norm(axis))
-    if up[2] < -math.cos(UPSIDE_TILT):
-        return np.diag([1.0, -1.0, -1.0])  # half a turn is one about x; what is left is a slope
-    angle = math.atan2(sine, float(up[2]))
-    return np.asarray(Rotation.from_rotvec(angle * axis / max(sine, 1e-9)).as_matrix())
+    turn = math.atan2(sine, float(up[2])) * axis / max(sine, 1e-9)
+    return np.asarray(Rotation.from_rotvec(turn).as_matrix())
 
 
 def gyro_bias(evidence: Evidence) -> tuple[FloatArray, FloatArray, str]:
@@ -420,7 +429,8 @@ def check_upside(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         return [], evidence
     mended, up = evidence.turned(fix @ evidence.rotation), np.median(evidence.force, axis=0)
     force = f'mean specific force ({up[0]:.2f}, {up[1]:.2f}, {up[2]:.2f}) m/s^2'
-    return [mounting_finding('imu_upside', evidence, mended, 0.3, 0.999, force=force)], mended
+    std = math.degrees(STEEPEST_MEAN) / 3.0
+    return [mounting_finding('imu_upside', evidence, mended, std, 0.999, force=force)], mended
 
 
 def check_tilt(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
