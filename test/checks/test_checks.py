@@ -58,6 +58,15 @@ def test_short_recordings_at_100_hz_are_checked_as_far_as_they_go(seconds, side)
     assert side < 0.0 or not report.findings, [str(f) for f in report.findings]
 
 
+def test_positions_in_place_of_rates():
+    joints = WHOLE.joints
+    dt = np.diff(joints.stamp, prepend=joints.stamp[0])[:, None] * 1e-9
+    way = np.cumsum(joints.rate * dt, axis=0)
+    for start in (0.0, 40.0):
+        finding = only(checked(joints=replace(joints, rate=start + way)), 'unit')
+        assert 'positions' in finding.words
+
+
 def test_one_wheel_backwards():
     joints = WHOLE.joints
     flip = np.array([1.0, 1.0, -1.0, 1.0])

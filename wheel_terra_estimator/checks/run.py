@@ -174,6 +174,7 @@ Check: TypeAlias = 'tuple[str, ModuleType, str]'
 AGAINST_EACH_OTHER: tuple[Check, ...] = (
     ('mounting', imu, 'check_upside'),
     ('missing_wheel', wheel_rates, 'check_dead_wheels'),
+    ('unit', wheel_rates, 'check_positions'),
     ('sign', turning, 'check_signs'),
     ('unit', turning, 'check_gyro_unit'),
     ('unit', wheel_rates, 'check_unit'),

@@ -15,7 +15,13 @@ from wheel_terra_estimator.checks.evidence import LEAST_MOVING_ROWS, Evidence, r
 from wheel_terra_estimator.checks.faults import RATE_UNITS
 from wheel_terra_estimator.checks.finding import NotChecked, Outcome
 from wheel_terra_estimator.checks.reference import LEAST_ROWS, ahead
-from wheel_terra_estimator.checks.statistics import bend_noise, correlation, robust_std, runs
+from wheel_terra_estimator.checks.statistics import (
+    bend_noise,
+    correlation,
+    moving_mean,
+    robust_std,
+    runs,
+)
 
 FloatArray = NDArray[np.float64]
 
@@ -29,6 +35,12 @@ ONLY_BY_SPEED = ('thousandths of rad/s',)
 """Units that a skidding rover's turns do not tell from counts of an encoder."""
 UNIT_BAND = (0.7, 1.25)
 """Ratio of speeds over the factor of its unit; slip makes it smaller, nothing larger [-]."""
+POSITION_TIME = 2.0
+"""Over which the change of a position is taken [s]."""
+POSITION_RATIO = (0.5, 5.0)
+"""Change of a position over the speed seen, with skid and slip in it [-]."""
+POSITION_SHARE = 0.8
+"""Share of a drive in which what changes is a position [-]."""
 FASTEST_RIM = 15.0
 """Rim speed that no rover of this kind drives [m/s]."""
 FROZEN_TIME = 5.0
@@ -132,6 +144,29 @@ def _held(evidence: Evidence, index: int, rows: Any) -> bool:
 
 
 # Units -------------------------------------------------------------------------------------------
+
+
+def check_positions(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
+    """Return rates that are positions, and the evidence with what these change by.
+
+    A position changes by the way that is driven; no rate changes by as much all the time.
+    """
+    facts, speed, rows = evidence.facts, evidence.reference_speed, evidence.rows_in(POSITION_TIME)
+    nothing = speed is None and evidence.gyro is None
+    if not facts.known or nothing or evidence.time.size < 2 * rows:
+        return [], evidence
+    seen = np.hypot(0.0 if speed is None else speed, evidence.yaw * np.abs(facts.lateral).max())
+    seen = moving_mean(seen, rows)[rows:]
+    spans = (evidence.time[rows:] - evidence.time[:-rows])[:, None]
+    change = (evidence.rate[rows:] - evidence.rate[:-rows]) / np.maximum(spans, 1e-9)
+    going = seen > 0.5 * max(float(np.quantile(seen, 0.9)), 1e-9)
+    ratio = row_medians(np.abs(change[going]) * evidence.radius) / seen[going]
+    share = float(np.mean((ratio > POSITION_RATIO[0]) & (ratio < POSITION_RATIO[1])))
+    if not share > POSITION_SHARE:
+        return [], evidence
+    ends = (rows // 2, rows - rows // 2), (0, 0)  # a change is that of the middle of its time
+    rate = np.pad(change, ends, mode='edge')
+    return [evidence.found('rate_positions', 0.97, share=100.0 * share)], evidence.with_rate(rate)
 
 
 def check_unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
