@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -188,26 +188,31 @@ class _Joints(_Collector):
     def __init__(self, topic: str) -> None:
         super().__init__(topic)
         self.names: dict[str, int] = {}
+        self._last_names: tuple[str, ...] = ()
 
     def row(self, message: Any) -> Any:
-        for name in message.name:
-            if len(self.names) < MOST_JOINTS:
-                self.names.setdefault(name, len(self.names))
-        return tuple(message.name), *self.fields(message)
+        names = tuple(message.name)
+        if names != self._last_names:
+            self._last_names = names
+            for name in names:
+                if len(self.names) < MOST_JOINTS:
+                    self.names.setdefault(name, len(self.names))
+        return names, *self.fields(message)
 
     def fields(self, message: Any) -> tuple[Any, ...]:
         return message.velocity, message.effort
 
     def table(self, column: int) -> Any:
         values = np.full((len(self.rows), len(self.names)), math.nan)
+        alike: defaultdict[tuple[str, ...], list[int]] = defaultdict(list)
         for index, row in enumerate(self.rows):
-            names, numbers = row[0], row[column]
-            if len(names) != len(numbers):
-                continue
-            for name, number in zip(names, numbers, strict=True):
-                place = self.names.get(name)
-                if place is not None:
-                    values[index, place] = number
+            if len(row[0]) == len(row[column]):
+                alike[row[0]].append(index)
+        for names, rows in alike.items():
+            known = [i for i, name in enumerate(names) if name in self.names]
+            places = [self.names[names[i]] for i in known]
+            numbers = np.array([self.rows[index][column] for index in rows])
+            values[np.ix_(rows, places)] = numbers[:, known]
         return credible(values)
 
     def series(self) -> Any:
