@@ -4,8 +4,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -174,39 +172,30 @@ def _cards(diagnosis: Diagnosis) -> list[dict[str, str]]:
     return cards
 
 
-Drawn = dict[str, str]
-"""A picture as addresses of images in the page: ``wide``, and ``narrow`` for a phone."""
-
-
 def _figures(folder: Path, diagnosis: Diagnosis) -> dict[str, Any]:
-    """Draw every picture that this diagnosis has; each is written as PNG and embedded twice."""
+    """Draw every picture that this diagnosis has; each is written as PNG and embedded."""
 
-    def keep(name: str, draw: Callable[[bool], Figure | None]) -> Drawn | None:
-        figure, narrow = draw(False), draw(True)
-        if figure is None or narrow is None:
+    def keep(name: str, figure: Figure | None) -> str | None:
+        if figure is None:
             return None
         figure.savefig(folder / f'{name}.png', dpi=_RESOLUTION, metadata={'Software': None})
-        return {'wide': picture(figure), 'narrow': picture(narrow)}
+        return picture(figure)
 
     proposed = next((m for m in diagnosis.next_measurement if m.rows is not None), None)
     residuals = [
         (
             pictures.words(name),
-            keep(f'residuals_by_{name}', partial(pictures.residuals, diagnosis, name)),
+            keep(f'residuals_by_{name}', pictures.residuals(diagnosis, name)),
         )
         for name in pictures.colour_inputs(diagnosis)
     ]
     return {
-        'curves': keep('curves_over_slip', partial(pictures.curves_over_slip, diagnosis)),
-        'parity': keep(
-            'measured_against_model', partial(pictures.measured_against_model, diagnosis)
-        ),
+        'curves': keep('curves_over_slip', pictures.curves_over_slip(diagnosis)),
+        'parity': keep('measured_against_model', pictures.measured_against_model(diagnosis)),
         'residuals': residuals,
-        'where': keep('where', partial(pictures.where_map, diagnosis)),
-        'structural_error': keep('structural_error', partial(pictures.structural_error, diagnosis)),
-        'rivals': keep('next_measurement', partial(pictures.rivals, proposed))
-        if proposed
-        else None,
+        'where': keep('where', pictures.where_map(diagnosis)),
+        'structural_error': keep('structural_error', pictures.structural_error(diagnosis)),
+        'rivals': keep('next_measurement', pictures.rivals(proposed)) if proposed else None,
         'rivals_title': proposed.what if proposed else '',
     }
 

@@ -1,9 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Pictures of a diagnosis. Every function returns a figure and leaves no global state behind.
-
-``narrow`` puts the panels under one another, at the width of a phone and with text at full size.
-"""
+"""Pictures of a diagnosis. Every function returns a figure and leaves no global state behind."""
 
 from __future__ import annotations
 
@@ -41,8 +38,8 @@ _SHAPES = 'os^Dv<'
 _MOST_CURVES = 6
 _LEGEND_LINE, _LEGEND_SIZE = 0.28, 8.5  # [inch], [points]
 _LEGEND_MARK, _LEGEND_LETTER = 0.45, 0.072  # [inch], of an entry, at the usual size
-_PHONE = 3.6  # width of a narrow figure [inch]
 _LEFT = 0.72  # room for the labels of an axis [inch]
+_BETWEEN_ROWS = 0.28  # of panels [inch]
 
 
 def words(name: str) -> str:
@@ -60,13 +57,13 @@ def label(name: str, unit: str) -> str:
     return words(name) if unit == '-' else f'{words(name)} [{unit}]'
 
 
-def measured_against_model(diagnosis: Diagnosis, narrow: bool = False) -> Figure:
+def measured_against_model(diagnosis: Diagnosis) -> Figure:
     """Draw measured over modelled values, before and after, one panel per quantity."""
     curves, table = diagnosis.curves, diagnosis.table
     with _style():
         names = ['as configured', _last(diagnosis)]
-        lines = _legend_lines(names, table.quantities, narrow)
-        figure, axes = _panels(1, table.quantities, height=2.7, legend=lines, narrow=narrow)
+        lines = _legend_lines(names, table.quantities)
+        figure, axes = _panels(1, table.quantities, height=2.7, legend=lines)
         for axis, q, scale in _each(axes, table.quantities, 'model [{}]', 'measured [{}]'):
             measured = scale * table.measured[:, q]
             good = np.isfinite(measured) & ~_set_apart(diagnosis, q)
@@ -89,7 +86,7 @@ def measured_against_model(diagnosis: Diagnosis, narrow: bool = False) -> Figure
     return figure
 
 
-def curves_over_slip(diagnosis: Diagnosis, narrow: bool = False) -> Figure | None:
+def curves_over_slip(diagnosis: Diagnosis) -> Figure | None:
     """Draw measurement and model over slip, one curve for each setting of the other inputs.
 
     None where the table has no sweeps of slip, or too many to be told apart.
@@ -103,10 +100,10 @@ def curves_over_slip(diagnosis: Diagnosis, narrow: bool = False) -> Figure | Non
     texts = [*([f'{", ".join(others)}:'] if others else []), *(text for text, _ in groups)]
     models = ['model as configured', f'model {_last(diagnosis)}']
     with _style():
-        below = _legend_lines(models, table.quantities, narrow)
-        lines_of_groups = _legend_lines(texts, table.quantities, narrow)
+        below = _legend_lines(models, table.quantities)
+        lines_of_groups = _legend_lines(texts, table.quantities)
         legend = below + lines_of_groups
-        figure, axes = _panels(1, table.quantities, height=3.0, legend=legend, narrow=narrow)
+        figure, axes = _panels(1, table.quantities, height=3.0, legend=legend)
         for axis, q, scale in _each(axes, table.quantities):
             kept = np.isfinite(table.measured[:, q]) & ~_set_apart(diagnosis, q)
             for (_, rows), colour, shape in zip(groups, _DISCRETE, _SHAPES, strict=False):
@@ -159,7 +156,7 @@ def _sweeps(diagnosis: Diagnosis) -> list[tuple[str, NDArray[np.intp]]]:
     return found if len(found) <= _MOST_CURVES and 2 * covered > len(table) else []
 
 
-def residuals(diagnosis: Diagnosis, colour_by: str, narrow: bool = False) -> Figure:
+def residuals(diagnosis: Diagnosis, colour_by: str) -> Figure:
     """Draw measured minus model against slip, coloured by an input, before and after.
 
     Columns: as configured, soil refitted, effect added (the same again where nothing was named).
@@ -177,7 +174,7 @@ def residuals(diagnosis: Diagnosis, colour_by: str, narrow: bool = False) -> Fig
     few = np.unique(np.round(colour[np.isfinite(colour)], 9))
     discrete = len(few) <= 5
     texts = [f'{words(colour_by)} {value:.3g} {unit}'.removesuffix(' -') for value in few]
-    lines = _legend_lines(texts, stages, narrow) if discrete else 0
+    lines = _legend_lines(texts, stages) if discrete else 0
     with _style():
         figure, axes = _panels(
             len(table.quantities),
@@ -186,7 +183,6 @@ def residuals(diagnosis: Diagnosis, colour_by: str, narrow: bool = False) -> Fig
             bar=not discrete,
             legend=lines,
             shared=True,
-            narrow=narrow,
         )
         drawn = None
         for row, name in zip(axes, table.quantities, strict=True):
@@ -211,11 +207,11 @@ def residuals(diagnosis: Diagnosis, colour_by: str, narrow: bool = False) -> Fig
                         vmax=np.nanmax(colour),
                     )
                 axis.plot(slip[outside], np.clip(residual[outside], -reach, reach), 'x', color=RED)
-                if narrow or name == table.quantities[0]:
+                if name == table.quantities[0]:
                     axis.set_title(title)
                 if name == table.quantities[-1]:
                     axis.set_xlabel('slip')
-                if narrow or axis is row[0]:
+                if axis is row[0]:
                     axis.set_ylabel(f'{words(name)} [{quantity_unit}]')
             row[0].set_ylim(-reach, reach)
         if discrete:
@@ -231,14 +227,14 @@ def residuals(diagnosis: Diagnosis, colour_by: str, narrow: bool = False) -> Fig
     return figure
 
 
-def where_map(diagnosis: Diagnosis, narrow: bool = False) -> Figure:
+def where_map(diagnosis: Diagnosis) -> Figure:
     """Draw where the soil-refitted model and the measurement disagree, for every quantity."""
     table, curves, where = diagnosis.table, diagnosis.curves, diagnosis.where
     second = next(iter(colour_inputs(diagnosis)), 'normal_load')
     factor, unit = shown_input(second)
     x, y = table.columns['slip'], factor * table.columns[second]
     with _style():
-        figure, axes = _panels(1, table.quantities, height=2.7, bar=True, narrow=narrow)
+        figure, axes = _panels(1, table.quantities, height=2.7, bar=True)
         drawn = None
         for axis, name in zip(axes[0], table.quantities, strict=True):
             q = QUANTITIES.index(name)
@@ -260,13 +256,12 @@ def where_map(diagnosis: Diagnosis, narrow: bool = False) -> Figure:
             axis.set(title=words(name) + share_text, xlabel='slip')
             if name == where.quantity:
                 _box(axis, diagnosis, second)
-        for axis in axes[0] if narrow else axes[0][:1]:
-            axis.set_ylabel(label(second, unit))
+        axes[0][0].set_ylabel(label(second, unit))
         _colour_bar(figure, drawn, 'measured minus model [s.d.]')
     return figure
 
 
-def structural_error(diagnosis: Diagnosis, narrow: bool = False) -> Figure | None:
+def structural_error(diagnosis: Diagnosis) -> Figure | None:
     """Draw what the last model leaves, and the smooth part of it, row by row over slip."""
     left, table = diagnosis.structural_error, diagnosis.table
     if left is None:
@@ -274,8 +269,8 @@ def structural_error(diagnosis: Diagnosis, narrow: bool = False) -> Figure | Non
     slip = table.columns['slip']
     with _style():
         names = ['measured minus model', 'smooth part, with two standard deviations']
-        lines = _legend_lines(names, table.quantities, narrow)
-        figure, axes = _panels(1, table.quantities, height=2.5, legend=lines, narrow=narrow)
+        lines = _legend_lines(names, table.quantities)
+        figure, axes = _panels(1, table.quantities, height=2.5, legend=lines)
         for axis, q, scale in _each(axes, table.quantities):
             inside = ~_set_apart(diagnosis, q)
             dots = axis.plot(
@@ -295,7 +290,7 @@ def structural_error(diagnosis: Diagnosis, narrow: bool = False) -> Figure | Non
     return figure
 
 
-def rivals(item: NextMeasurement, narrow: bool = False) -> Figure | None:
+def rivals(item: NextMeasurement) -> Figure | None:
     """Draw what the rivals predict on proposed rows, for the quantities in which they part."""
     if item.rows is None or len(item.predictions) < 2:
         return None
@@ -307,8 +302,8 @@ def rivals(item: NextMeasurement, narrow: bool = False) -> Figure | None:
         names = [words(rival) for rival in item.predictions]
         aside = any(np.asarray(values)[:, -1].any() for values in item.predictions.values())
         shown = QUANTITIES if aside else QUANTITIES[:-1]
-        lines = _legend_lines(names, shown, narrow)
-        figure, axes = _panels(1, shown, height=2.2, legend=lines, narrow=narrow)
+        lines = _legend_lines(names, shown)
+        figure, axes = _panels(1, shown, height=2.2, legend=lines)
         for axis, q, scale in _each(axes, shown, label(x_name, unit), 'predicted [{}]'):
             for (rival, values), colour, marker in zip(
                 item.predictions.items(), (BLUE, RED, GREEN, PURPLE), 'oDs^', strict=False
@@ -363,38 +358,28 @@ def _panels(
     bar: bool = False,
     legend: int = 0,
     shared: bool = False,
-    narrow: bool = False,
 ) -> tuple[Figure, Any]:
     """Return a figure with (rows, columns) axes, margins in inches.
 
     Fixed margins: a layout engine would draw every figure three times over. ``bar`` leaves room
     for a colour bar on the right, ``legend`` for so many lines above; ``shared``: the axes of a row
-    have the same y axis. A narrow figure has all panels under one another, row by row.
+    have the same y axis.
     """
     from matplotlib.figure import Figure
 
     count = len(columns)
     left, right = _LEFT, 0.95 if bar else 0.12
     top, bottom = 0.34 + _LEGEND_LINE * legend, 0.5
-    down, abreast = (rows * count, 1) if narrow else (rows, count)
     # Panels that share an axis stand closer, but not so close that the last label of one meets
     # the first of the next.
     between = 0.4 if shared else _LEFT
-    cell = _PHONE - left - right if narrow else _cell(count) + (0.32 if shared else 0.0)
-    width = left + right + abreast * cell + (abreast - 1) * between
-    gap = 0.72 if narrow else 0.28
-    total = top + bottom + down * height + (down - 1) * gap
+    cell = _cell(count) + (0.32 if shared else 0.0)
+    width = left + right + count * cell + (count - 1) * between
+    total = top + bottom + rows * height + (rows - 1) * _BETWEEN_ROWS
     figure = Figure(figsize=(width, total), layout='none')  # type: ignore[arg-type]
-    if narrow:
-        axes = np.empty((rows, count), dtype=object)
-        for i in range(down):
-            row = divmod(i, count)[0]
-            beside = axes[row, 0] if shared and i % count else None
-            axes.flat[i] = figure.add_subplot(down, 1, i + 1, sharey=beside)
-    else:
-        axes = figure.subplots(
-            rows, count, squeeze=False, sharex=shared, sharey='row' if shared else False
-        )
+    axes = figure.subplots(
+        rows, count, squeeze=False, sharex=shared, sharey='row' if shared else False
+    )
     for axis in axes.flat:
         axis.locator_params(nbins=5)
     figure.subplots_adjust(
@@ -403,7 +388,7 @@ def _panels(
         top=1 - top / total,
         bottom=bottom / total,
         wspace=between / cell,
-        hspace=gap / height,
+        hspace=_BETWEEN_ROWS / height,
     )
     return figure, axes
 
@@ -423,10 +408,10 @@ def _cell(count: int) -> float:
     return {1: 5.6, 2: 3.4}.get(count, 2.73)
 
 
-def _legend_lines(texts: Sequence[str], columns: Sequence[Any], narrow: bool) -> int:
+def _legend_lines(texts: Sequence[str], columns: Sequence[Any]) -> int:
     """Return how many lines a legend above so many panels takes, its text at full size."""
     count = len(columns)
-    room = _PHONE if narrow else count * (_cell(count) + _LEFT) - _LEFT
+    room = count * (_cell(count) + _LEFT) - _LEFT
     widest = max((_LEGEND_MARK + _LEGEND_LETTER * len(text) for text in texts), default=room)
     return -(-len(texts) // max(1, int(room / widest)))
 
@@ -434,7 +419,7 @@ def _legend_lines(texts: Sequence[str], columns: Sequence[Any], narrow: bool) ->
 def _legend(figure: Figure, handles: Any, labels: Any, *, below: int = 0, lines: int = 1) -> None:
     """Put a legend of so many lines above the panels, ``below`` lines from the top."""
     width, height = figure.get_size_inches()
-    left = 0.05 if width <= _PHONE else 0.6
+    left = 0.6
     figure.legend(
         handles,
         labels,
