@@ -199,7 +199,8 @@ class _MapReader:
         times = factor(si, entry.unit) if entry.unit else 1.0
         if times is None:
             known = ', '.join(UNITS[si])
-            raise UserError(f"{self.path}: {where}: unit '{entry.unit}' is none of {known}")
+            rim = ', nor m/s with radius: 0.15' if si == _SI['rate'] else ''
+            raise UserError(f"{self.path}: {where}: unit '{entry.unit}' is none of {known}{rim}")
         if entry.column not in self.header:
             raise UserError(
                 f"{self.table}: no column '{entry.column}' ({self.path}: {where}); nearest: "
