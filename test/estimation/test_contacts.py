@@ -11,6 +11,7 @@ from parts import SAND, Parts
 
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.estimation.contacts.contact_age import ContactAge, ContactAgeTuning
+from wheel_terra_estimator.estimation.contacts.demand import Demand
 from wheel_terra_estimator.estimation.contacts.linearisation import Linearisation
 from wheel_terra_estimator.estimation.contacts.loads import LoadState, WheelLoads
 from wheel_terra_estimator.estimation.contacts.pulls import PullEvidence, Pulls
@@ -206,6 +207,26 @@ def test_without_a_gyro_the_sides_tell_the_yaw_rate(parts):
     # With a gyro nothing but their changes count.
     turning.update(window(0.01), 0.1, 0.05, 0.06, straight, rims)
     assert turning.state.yaw_rate < 0.6 * 0.04
+
+
+# -- What the ground asks -----------------------------------------------------------------------
+
+
+def test_the_demand_gives_its_changes_and_nothing_but_them():
+    demand = Demand()
+    assert demand.update(0.05, 0.1, settled=True) == 0.0  # the level is no change
+    changes = [demand.update(0.15, 0.1, settled=True) for _ in range(40)]
+    assert changes[0] > changes[1] > 0.0
+    assert sum(changes) == pytest.approx(0.10, rel=1e-3)
+
+
+def test_a_start_is_no_change_of_the_demand():
+    demand = Demand()
+    demand.update(0.05, 0.1, settled=True)
+    assert demand.update(0.30, 0.1, settled=False) == 0.0
+    assert demand.update(0.30, 0.1, settled=True) == 0.0
+    assert demand.update(NAN, 0.1, settled=True) == 0.0
+    assert demand.state == 0.30
 
 
 # -- Wheels without load ----------------------------------------------------------------------

@@ -7,13 +7,14 @@ import pytest
 from parts import SAND, Parts
 
 from wheel_terra_estimator.configuration import reader
+from wheel_terra_estimator.estimation.filter.prediction import Prediction
 from wheel_terra_estimator.estimation.filter.speed_process import (
     RimSpeeds,
     SpeedProcess,
     SpeedStep,
     SpeedTuning,
 )
-from wheel_terra_estimator.estimation.filter.state import SPEED
+from wheel_terra_estimator.estimation.filter.state import SLIP_PER_DEMAND, SPEED
 from wheel_terra_estimator.estimation.inputs.inertial import InertialWindow
 from wheel_terra_estimator.estimation.inputs.stated_noise import StatedNoise
 
@@ -130,11 +131,41 @@ def test_combination_is_better_than_either():
     assert both < noise() ** 2 * 0.1
 
 
-@pytest.mark.parametrize(('before', 'behind'), [(0.8, 0.9), (1.2, 1.1), (-0.4, 0.3)])
-def test_a_reversal_begins_with_half_of_the_slip(before, behind):
-    made = process([0.05] * 6, ratio=before)
-    made.turn_back()
-    assert made.state.ratio == pytest.approx(behind)
+def test_a_rover_that_must_pull_more_slips_more_at_once():
+    """At a slip per demand of 2, a demand that grows by 0.05 takes a tenth of the rim speed."""
+    parts = Parts(reader.load(SAND))
+    made, mean = process([0.05] * 6), parts.filter().mean.copy()
+    mean[[SPEED, SLIP_PER_DEMAND]] = 0.04, 2.0
+    given = {'rim': 0.05, 'demand_change': 0.05}
+    climbing = Prediction.unchanged(mean)
+    made.predict(climbing, SpeedStep(1.0, 0.0, 0.0, 1e-9), 0.1, **given)
+    assert climbing.mean[SPEED] == pytest.approx(0.04 - 0.1 * 0.05)
+    assert climbing.F[SPEED, SLIP_PER_DEMAND] == pytest.approx(-0.05 * 0.05)
+    # Backwards the speed is negative, and loses as much of its size.
+    mean[SPEED] = -0.04
+    back = Prediction.unchanged(mean)
+    given['rim'] = -0.05
+    made.predict(back, SpeedStep(1.0, 0.0, 0.0, 1e-9), 0.1, **given)
+    assert back.mean[SPEED] == pytest.approx(-0.035)
+    # A speed that rests on the accelerometer alone is not changed by it.
+    alone = Prediction.unchanged(mean)
+    made.predict(alone, SpeedStep(1.0, 0.0, 0.0, 1e-9, wheel_weight=0.0), 0.1, **given)
+    assert alone.mean[SPEED] == -0.04
+
+
+def test_a_reversal_carries_the_slip_over_by_what_is_asked_less():
+    """Up a slope of 0.1 the slip is 0.2; down it, at a slip per demand of 1.5, it is -0.1.
+
+    It begins with half of that: ruts and shear form anew.
+    """
+    made, ekf = process([0.05] * 6, ratio=0.8), Parts(reader.load(SAND)).filter()
+    ekf.set(SLIP_PER_DEMAND, 1.5, 0.5**2)
+    made.turn_back(ekf, before=0.1, now=-0.1)
+    assert made.state.ratio == pytest.approx(1.05)
+    assert made.state.ratio_std == pytest.approx(np.hypot(0.1, 0.5 * 0.2))
+    # Up again, on a steeper slope: as on the way up before, and slip for what is asked more.
+    made.turn_back(ekf, before=-0.1, now=0.14)
+    assert made.state.ratio == pytest.approx(1.0 - 0.5 * (0.2 + 1.5 * 0.04))
 
 
 def test_a_start_goes_by_the_remembered_ratio_and_not_by_that_of_its_first_moment():

@@ -25,6 +25,7 @@ from wheel_terra_estimator.estimation.filter.state import (
     SHEAR_MODULUS,
     SHEAR_RADIUS,
     SHEAR_STRENGTH,
+    SLIP_PER_DEMAND,
     SLIP_SINKAGE,
     StateLayout,
 )
@@ -50,6 +51,7 @@ _COMMON = (
     ('effects.slip_sinkage_exponent.n1', '-', SLIP_SINKAGE),
     ('stress centroid', 'of the entrance angle', CENTROID),
     ('stress centroid at high slip', 'of the entrance angle', MOUND),
+    ('slip per traction coefficient', '-', SLIP_PER_DEMAND),
     ('share of a rut that stays', '-', RUT_SHARE),
     ('shear radius', 'of the slip radius', SHEAR_RADIUS),
     ('accelerometer bias', 'm/s^2', GRAVITY_BIAS),

@@ -18,6 +18,7 @@ import numpy as np
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.contacts.contact_age import ContactAge
 from wheel_terra_estimator.estimation.contacts.contact_models import contact_models
+from wheel_terra_estimator.estimation.contacts.demand import Demand
 from wheel_terra_estimator.estimation.contacts.linearisation import (
     ContactForces,
     Linearisation,
@@ -161,6 +162,7 @@ class _Cycle(NamedTuple):
     turns: tuple[bool, ...]
     """Wheels for which the contact models hold: they turn under a load."""
     reference_known: bool  # of late, before this cycle
+    demand_change: float  # by how much more the ground asks than at the last cycle [-]
 
 
 class WheelSoilEstimator:
@@ -213,6 +215,7 @@ class WheelSoilEstimator:
         self._contact_age = ContactAge(rover)
         self._ruts = Ruts(rover)
         self._unloaded = UnloadedWheels(rover, sensors)
+        self._demand = Demand()
         self._climb = SteepestClimb()
         angle_std = sensors.leaving_angle_std * self._leaving_angles.noise_share
         self._linearisation = Linearisation(rover, layout, models, angle_std)
@@ -252,6 +255,7 @@ class WheelSoilEstimator:
             self._contact_age,
             self._ruts,
             self._unloaded,
+            self._demand,
             self._climb,
             self._linearisation,
             self._pulls,
@@ -463,10 +467,11 @@ class WheelSoilEstimator:
             self._contact_age.state.direction * loads.slope_share if window.tells_force else NAN
         )
         if reverses:
-            speed.turn_back()
+            speed.turn_back(ekf, self._demand.state, demand)
             if self._tape is not None:
                 # The soil that was learned downhill is not that of the climb before it.
                 self._tape.cut()
+        demand_change = self._demand.update(demand, dt, settled=self._contact_age.settled)
         self._note_climb(demand, unturned.typical, dt, told=reference_known)
         speed.begin(ekf, unturned)
         speed.follow_sides(unturned, dt)
@@ -483,6 +488,7 @@ class WheelSoilEstimator:
             loads=loads,
             turns=self._linearisation.turning(rims, loads.load),
             reference_known=reference_known,
+            demand_change=demand_change,
         )
 
     def _note_climb(self, demand: float, rim: float, dt: float, *, told: bool) -> None:
@@ -510,7 +516,14 @@ class WheelSoilEstimator:
                 direction=self._contact_age.state.direction,
                 slope_share=cycle.loads.slope_share,
             )
-        self._speed.predict(prediction, step, cycle.dt, cycle.window.stated)
+        self._speed.predict(
+            prediction,
+            step,
+            cycle.dt,
+            rim=cycle.unturned.typical,
+            demand_change=cycle.demand_change if cycle.reference_known else 0.0,
+            stated=cycle.window.stated,
+        )
         self._reference.predict(prediction, cycle.dt)
         if not cycle.still and cycle.dt > 0.0:
             travel = self._sinkage_process.predict(
@@ -750,15 +763,14 @@ class WheelSoilEstimator:
         ]
         steady = self._contact_age.settled and lateral_motion <= _SHARP_TURN and bool(turning)
         told = time - inertial.force_time <= self._rover.silence
-        direction, loads = self._contact_age.state.direction, self._loads.state
         self._slopes.update(
             SlopeInstant(
                 time,
-                direction * loads.slope_share if told and loads.force_known else NAN,
+                self._demand.state if told else NAN,
                 median([wheel.slip for wheel, _ in turning]) if steady else 0.0,
                 median([wheel.std for wheel, _ in turning]) if steady else 1.0,
                 median([rim for _, rim in turning]) * since if steady and since > 0.0 else 0.0,
-                direction,
+                self._contact_age.state.direction,
             )
         )
 

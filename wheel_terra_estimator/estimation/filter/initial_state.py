@@ -22,6 +22,7 @@ from wheel_terra_estimator.estimation.filter.state import (
     SHEAR_MODULUS,
     SHEAR_RADIUS,
     SHEAR_STRENGTH,
+    SLIP_PER_DEMAND,
     SLIP_SINKAGE,
     SPEED,
     StateLayout,
@@ -44,6 +45,10 @@ class PriorTuning:
     centroid_std: float = 0.06  # [-]
     mound_mean: float = 0.05  # where the configured soil knows no mound [-]
     mound_std: float = 0.1
+    slip_per_demand_mean: float = 1.0
+    """Slip for each share of the load that is asked: the inverse slope of a traction curve. Wheels
+    have 0.5 on firm ground to 3 near the greatest pull (docs/models/validation.md)."""
+    slip_per_demand_std: float = 1.0
     rut_share_mean: float = 0.3
     rut_share_std: float = 0.4
     shear_radius_std: float = 0.03
@@ -72,6 +77,7 @@ class PriorTuning:
     most_mound: float = 0.6
     most_rut_share: float = 0.9  # soil springs back
     most_shear_radius: float = 0.3
+    most_slip_per_demand: float = 8.0  # near the top of the traction curve
     most_stiffness: float = 3.0  # [ln]
     most_shear_error: float = 1.5  # [ln]
     most_torque_zero: float = 1e4  # [N m]
@@ -182,6 +188,7 @@ def initial_filter(
         SLIP_SINKAGE: tuning.slip_sinkage_std,
         CENTROID: tuning.centroid_std,
         MOUND: tuning.mound_std,
+        SLIP_PER_DEMAND: tuning.slip_per_demand_std,
         RUT_SHARE: tuning.rut_share_std,
         SHEAR_RADIUS: tuning.shear_radius_std,
     }
@@ -190,6 +197,7 @@ def initial_filter(
         P[index, index] = std**2
     mean[MOUND] = 0.0 if 'soil_mound' in configuration.effects else tuning.mound_mean
     mean[RUT_SHARE] = tuning.rut_share_mean
+    mean[SLIP_PER_DEMAND] = tuning.slip_per_demand_mean
     z = [
         steady_sinkage(models, i, WheelState(1.0, 0.0, loads[i], 0.0, 0.0), rover.rim_radius[i])
         for i in range(n)
@@ -219,13 +227,14 @@ def bounds(
     upper[SLIP_SINKAGE] = tuning.most_slip_sinkage
     upper[[CENTROID, MOUND]] = tuning.most_centroid, tuning.most_mound
     upper[[RUT_SHARE, SHEAR_RADIUS]] = tuning.most_rut_share, tuning.most_shear_radius
+    upper[SLIP_PER_DEMAND] = tuning.most_slip_per_demand
     upper[layout.stiffness] = max(tuning.most_stiffness, most * priors.stiffness_std)
     upper[layout.shear_error] = tuning.most_shear_error
     upper[layout.torque_zero] = tuning.most_torque_zero
     if layout.reference_error is not None:
         upper[layout.reference_error] = tuning.most_speed
     lower = -upper
-    lower[RUT_SHARE] = 0.0
+    lower[[SLIP_PER_DEMAND, RUT_SHARE]] = 0.0
     # Ground may be harder than any soil. K of decimetres is none: it makes every slope a trap.
     lower[SHEAR_MODULUS] = -max(tuning.most_shear_modulus, most * priors.shear_modulus_std)
     upper[layout.sinkage] = rover.rim_radius
@@ -238,7 +247,7 @@ def with_soil_of(
 ) -> FilterMemory:
     """Return the start of a run that keeps soil and biases of an old one, widened."""
     kept = [GRAVITY_BIAS, SHEAR_STRENGTH, SHEAR_MODULUS, SLIP_SINKAGE, CENTROID, MOUND]
-    kept += [RUT_SHARE, SHEAR_RADIUS]
+    kept += [SLIP_PER_DEMAND, RUT_SHARE, SHEAR_RADIUS]
     kept += range(layout.size)[layout.stiffness]
     kept += range(layout.size)[layout.torque_zero]
     block = np.ix_(kept, kept)

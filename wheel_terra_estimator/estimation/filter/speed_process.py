@@ -5,8 +5,9 @@
 Two predictions of the change of speed over a step, each with its own variance, are combined by
 their inverse variances:
 
-* with the wheels: v / rim speed changes only with the terrain, by a random walk per rim travel.
-  Exact through ramps, stops and restarts of a slow rover; poor where a fast rover's wheels spin up.
+* with the wheels: v / rim speed changes only with the terrain: by what the ground asks more, times
+  the learned slip per demand, and by a random walk per rim travel. Exact through ramps, stops and
+  restarts of a slow rover; poor where a fast rover's wheels spin up.
 * with the accelerometer: dv = (f_x - g_x - bias) dt. Good for fractions of a second; its error per
   second is nothing to 1 m/s and everything to 5 cm/s.
 
@@ -27,7 +28,7 @@ from wheel_terra_estimator.estimation.contacts.steering import Headings
 from wheel_terra_estimator.estimation.contacts.usual_slip import UsualSlip
 from wheel_terra_estimator.estimation.filter.ekf import GatedFilter
 from wheel_terra_estimator.estimation.filter.prediction import Prediction
-from wheel_terra_estimator.estimation.filter.state import GRAVITY_BIAS, SPEED
+from wheel_terra_estimator.estimation.filter.state import GRAVITY_BIAS, SLIP_PER_DEMAND, SPEED
 from wheel_terra_estimator.estimation.inputs.inertial import InertialWindow
 from wheel_terra_estimator.estimation.inputs.stated_noise import NOTHING_STATED, StatedNoise
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
@@ -68,6 +69,8 @@ class SpeedTuning:
     """Random walk of v / rim speed at a start [1/sqrt(m)]: ruts form and the slip settles."""
     drag_walk: float = 0.6  # the same while a wheel is dragged
     start_walk_travel: float = 0.2  # [m] with which it decays
+    demand_error: float = 0.3  # of what the demand changes, over that change [-]
+    slip_per_demand_walk: float = 0.2  # [1/sqrt(m)]
     inflation_rate: float = 2.0
     """Process noise of a change of speed, over its square, per second [1/s]: it may come within
     half a second."""
@@ -97,6 +100,8 @@ class SpeedStep(NamedTuple):
     bias_gain: float
     constant: float
     variance: float
+    wheel_weight: float = 1.0
+    """Share of the prediction with the wheels in it."""
 
 
 class RimSpeeds(NamedTuple):
@@ -127,6 +132,14 @@ class RimSpeeds(NamedTuple):
         return bool(heard) and all(speed * rim < 0.0 for rim in heard)
 
 
+class PastDrive(NamedTuple):
+    """What is remembered of the last drive in a direction."""
+
+    ratio: float  # v / rim speed
+    ratio_std: float
+    demand: float  # what the ground asked, as a share of the load [-]; nan = unknown
+
+
 class SpeedState(NamedTuple):
     """What the prediction of the speed remembers."""
 
@@ -139,6 +152,7 @@ class SpeedState(NamedTuple):
     """Process-noise inflation: change of speed that changing contacts may bring [m/s]."""
     slow_rims: Floats = ()  # mean of `rims.each` over the last second [m/s]
     settled: bool = True  # the contacts were, at the last cycle
+    other_direction: PastDrive | None = None
 
 
 class AccelerationNoise(NamedTuple):
@@ -228,13 +242,38 @@ class SpeedProcess(Component[SpeedState]):
         apart = spread([now - old for old, now in zip(slow, rims.each, strict=True)])
         self.inflate(tuning.side_change * max(apart - self._rim_noise, 0.0))
 
-    def turn_back(self) -> None:
-        """Carry v / rim speed over to the other direction: it begins with a share of the slip."""
+    def turn_back(self, ekf: GatedFilter, before: float, now: float) -> None:
+        """Carry v / rim speed over to the other direction: up becomes down.
+
+        It is that of the last drive in this direction, else of the drive that ended. The slip
+        changes by the learned slip per demand times what is asked less (or more) than there, and
+        begins with a share of that.
+
+        Parameters
+        ----------
+        ekf : GatedFilter
+            Gives the slip per demand.
+        before, now : float
+            What the ground asked of the drive that ended, and asks of this one, as shares of the
+            load [-]; nan = unknown.
+        """
         state, tuning = self.state, self._tuning
-        ratio = 1.0 - tuning.reversed_slip_share * (1.0 - state.ratio)
+        ended = PastDrive(state.ratio, state.ratio_std, before)
+        known_one = state.other_direction or ended
+        change = now - known_one.demand
+        if isnan(change):
+            change = 0.0
+        slip = 1.0 - known_one.ratio + float(ekf.mean[SLIP_PER_DEMAND]) * change
+        ratio = 1.0 - tuning.reversed_slip_share * slip
+        gain_std = math.sqrt(float(ekf.covariance[SLIP_PER_DEMAND, SLIP_PER_DEMAND]))
         self.state = state._replace(
             ratio=clipped(ratio, tuning.least_reversed_ratio, tuning.most_reversed_ratio),
-            ratio_std=clipped(state.ratio_std, tuning.least_ratio_std, tuning.first_ratio_std),
+            ratio_std=clipped(
+                math.hypot(known_one.ratio_std, gain_std * change),
+                tuning.least_ratio_std,
+                tuning.first_ratio_std,
+            ),
+            other_direction=ended,
         )
 
     def follow_contacts(self, travel: float, *, dragging: bool) -> None:
@@ -283,9 +322,28 @@ class SpeedProcess(Component[SpeedState]):
         prediction: Prediction,
         step: SpeedStep,
         dt: float,
+        *,
+        rim: float,
+        demand_change: float,
         stated: StatedNoise = NOTHING_STATED,
     ) -> None:
-        """Add speed and gravity bias to a prediction over `dt` [s], by how the speed goes on."""
+        """Add speed, gravity bias and slip per demand to a prediction.
+
+        Parameters
+        ----------
+        prediction : Prediction
+            Is filled in.
+        step : SpeedStep
+            How the speed goes on.
+        dt : float
+            Length of the cycle [s].
+        rim : float
+            Typical rim speed [m/s]; nan = unknown.
+        demand_change : float
+            By how much more the ground asks, as a share of the load [-].
+        stated : StatedNoise
+            By the messages of the IMU.
+        """
         mean, F, Q = prediction
         mean[SPEED] = (
             step.speed_gain * mean[SPEED] + step.bias_gain * mean[GRAVITY_BIAS] + step.constant
@@ -294,6 +352,15 @@ class SpeedProcess(Component[SpeedState]):
         F[SPEED, GRAVITY_BIAS] = step.bias_gain
         Q[SPEED, SPEED] = step.variance
         Q[GRAVITY_BIAS, GRAVITY_BIAS] = self.acceleration_noise(stated).bias_walk * dt
+        if demand_change and not isnan(rim):
+            # v = (1 - s) rim, and ds = slip_per_demand times the change of the demand.
+            gain = -step.wheel_weight * rim * demand_change
+            lost = gain * float(mean[SLIP_PER_DEMAND])
+            mean[SPEED] += lost
+            F[SPEED, SLIP_PER_DEMAND] = gain
+            Q[SPEED, SPEED] += (self._tuning.demand_error * lost) ** 2
+            walk = self._tuning.slip_per_demand_walk**2
+            Q[SLIP_PER_DEMAND, SLIP_PER_DEMAND] = walk * abs(rim) * dt
 
     def by_wheels(self, dt: float, rims: RimSpeeds, inflation: float) -> SpeedStep:
         """Return the prediction with the wheels alone over `dt` [s]."""
@@ -332,6 +399,7 @@ class SpeedProcess(Component[SpeedState]):
             -(1.0 - weight) * dt,
             weight * step.constant + (1.0 - weight) * accelerated,
             step.variance * noise / (step.variance + noise),
+            weight,
         )
 
     def disagreement(self, rims: RimSpeeds) -> float:
@@ -379,7 +447,7 @@ class SpeedProcess(Component[SpeedState]):
         speed, variance = float(x[SPEED]), float(P[SPEED, SPEED])
         if self.since_cycle(time) < self._tuning.present:
             return speed, variance
-        a, b, constant, noise = self.step(time, rims, window, inflated=inflated)
+        a, b, constant, noise, _ = self.step(time, rims, window, inflated=inflated)
         carried = a * speed + b * float(x[GRAVITY_BIAS]) + constant
         return carried, (
             a * a * variance

@@ -20,6 +20,10 @@ centroid         -      Common shift of the centroid of the contact stress, as a
 mound            -      The part of that shift that comes with slip, (s - onset)+^2: soil piles up
                         behind the wheel and pushes it (the effect ``soil_mound``). Seen where slip
                         changes.
+slip_per_demand  -      Slip for each share of the load that the ground asks along the body: what a
+                        change of slope costs at once, before the next reference velocity tells.
+                        Learned from them, since it is the inverse slope of a traction curve that
+                        no soil file knows.
 sinkage (n)      m      Rim below the surface.
 stiffness (n)    ln     Factor on the bearing modulus, per wheel: wheels enter a patch one by one.
 shear_error (n)  ln     Error of the shear model, per wheel, first-order Gauss-Markov over travel:
@@ -60,10 +64,11 @@ FloatArray = NDArray[np.float64]
     SLIP_SINKAGE,
     CENTROID,
     MOUND,
+    SLIP_PER_DEMAND,
     RUT_SHARE,
     SHEAR_RADIUS,
-) = range(9)
-_COMMON = 9
+) = range(10)
+_COMMON = 10
 
 
 @dataclass(frozen=True)
