@@ -169,36 +169,26 @@ def new_folder(
     """
     check_target(path, overwrite, inputs, folder=True)
     path = _absolute(path)
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        _remove_left_behind(path)
-        beside = Path(tempfile.mkdtemp(dir=path.parent, prefix=f'.{path.name}.wheel-terra-'))
-        held = _hold(beside)
-    except OSError as error:
-        raise cannot_write(path, error) from None
     kept = False
     try:
-        fresh = beside / path.name
-        try:
-            fresh.mkdir()
-            yield fresh
-        except BaseException:
-            if keep_partial and not path.exists() and fresh.is_dir() and any(fresh.iterdir()):
-                with suppress(OSError):
-                    mark(fresh)
-                with suppress(OSError):
-                    fresh.rename(path)
-                    kept = True
-            raise
-        mark(fresh)
-        _put_in_place(fresh, path, beside)
+        with _beside(path) as beside:
+            fresh = beside / path.name
+            try:
+                fresh.mkdir()
+                yield fresh
+            except BaseException:
+                if keep_partial and not path.exists() and fresh.is_dir() and any(fresh.iterdir()):
+                    with suppress(OSError):
+                        mark(fresh)
+                    with suppress(OSError):
+                        fresh.rename(path)
+                        kept = True
+                raise
+            mark(fresh)
+            _put_in_place(fresh, path, beside)
     except OSError as error:
         words = '; what was written before is kept there' if kept else ''
         raise CannotWriteError(f'{cannot_write(path, error)}{words}') from None
-    finally:
-        shutil.rmtree(beside, ignore_errors=True)
-        if held is not None:
-            os.close(held)
 
 
 @contextmanager
@@ -220,25 +210,29 @@ def new_file(
     """
     check_target(path, overwrite, inputs, foreign=foreign)
     path = _absolute(path)
-    beside: Path | None = None
-    held: int | None = None
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        _remove_left_behind(path)
-        beside = Path(tempfile.mkdtemp(dir=path.parent, prefix=f'.{path.name}.wheel-terra-'))
-        held = _hold(beside)
-        yield beside / path.name
-        _sync(beside / path.name)
-        (beside / path.name).replace(path)
-        _sync(path.parent)
-        if (path.parent / MARKER).is_file():
-            listed = _listed(path.parent)
-            _write_marker(path.parent, {*listed, path.name})
+        with _beside(path) as beside:
+            yield beside / path.name
+            _sync(beside / path.name)
+            (beside / path.name).replace(path)
+            _sync(path.parent)
+            if (path.parent / MARKER).is_file():
+                _write_marker(path.parent, {*_listed(path.parent), path.name})
     except OSError as error:
         raise cannot_write(path, error) from None
+
+
+@contextmanager
+def _beside(path: Path) -> Iterator[Path]:
+    """Yield a hidden folder beside ``path`` that no other run removes and that goes at the end."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    _remove_left_behind(path)
+    beside = Path(tempfile.mkdtemp(dir=path.parent, prefix=f'.{path.name}.wheel-terra-'))
+    held = _hold(beside)
+    try:
+        yield beside
     finally:
-        if beside is not None:
-            shutil.rmtree(beside, ignore_errors=True)
+        shutil.rmtree(beside, ignore_errors=True)
         if held is not None:
             os.close(held)
 

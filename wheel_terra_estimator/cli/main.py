@@ -20,7 +20,7 @@ from typing import Any, NoReturn
 
 from wheel_terra_estimator import __version__
 from wheel_terra_estimator.cli import outputs
-from wheel_terra_estimator.cli.parser import UNUSABLE_INPUT, Parser, complain, suggestion
+from wheel_terra_estimator.cli.parser import UNUSABLE_INPUT, Parser, Printing, complain, suggestion
 from wheel_terra_estimator.cli.terminal import (
     discard_output,
     harmless_output,
@@ -87,13 +87,15 @@ def _parsers(needed: Container[str]) -> tuple[Parser, dict[str, Parser]]:
     parser.add_argument('--debug', action='store_true', help=DEBUG_HELP)
     parser.add_argument(
         '--print-completion',
-        action=_PrintCompletion,
+        action=Printing,
+        text=_completion,
         metavar='SHELL',
         help='print what completes commands and options in bash or zsh',
     )
     parser.add_argument(
         '--glossary',
-        action=_PrintGlossary,
+        action=Printing,
+        text=_glossary,
         nargs='?',
         const='',
         metavar='WORD',
@@ -159,42 +161,24 @@ def _add_arguments(parser: argparse.ArgumentParser, module: Any) -> None:
     parser.set_defaults(run=module.run)
 
 
-class _PrintGlossary(argparse.Action):
-    """Print what a word means, or all of them."""
+def _glossary(parser: argparse.ArgumentParser, word: str) -> str:
+    """What a word means, or all of them."""
+    from wheel_terra_estimator import glossary
 
-    def __call__(
-        self,
-        parser: argparse.ArgumentParser,
-        namespace: argparse.Namespace,
-        values: Any,
-        option_string: str | None = None,
-    ) -> None:
-        from wheel_terra_estimator import glossary
-
-        found = glossary.as_text(values or '')
-        if not found:
-            names = [term.term for term in glossary.terms()]
-            parser.error(f"--glossary: no word '{values}'; {suggestion(values, names)}")
-        print(found)
-        parser.exit()
+    found = glossary.as_text(word or '')
+    if not found:
+        names = [term.term for term in glossary.terms()]
+        parser.error(f"--glossary: no word '{word}'; {suggestion(word, names)}")
+    return f'{found}\n'
 
 
-class _PrintCompletion(argparse.Action):
-    """Print the shipped file that completes commands and options in a shell."""
+def _completion(parser: argparse.ArgumentParser, shell: str) -> str:
+    """The shipped file that completes commands and options in a shell."""
+    from wheel_terra_estimator.cli import completion
 
-    def __call__(
-        self,
-        parser: argparse.ArgumentParser,
-        namespace: argparse.Namespace,
-        values: Any,
-        option_string: str | None = None,
-    ) -> None:
-        from wheel_terra_estimator.cli import completion
-
-        if values not in completion.FILES:
-            parser.error(f'--print-completion: {suggestion(values, list(completion.FILES))}')
-        print(completion.path(values).read_text(encoding='utf-8'), end='')
-        parser.exit()
+    if shell not in completion.FILES:
+        parser.error(f'--print-completion: {suggestion(shell, list(completion.FILES))}')
+    return completion.path(shell).read_text(encoding='utf-8')
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -8,7 +8,7 @@ import argparse
 import difflib
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import Any, NoReturn
 
@@ -38,7 +38,8 @@ class Parser(argparse.ArgumentParser):
         super().__init__(**settings)
         self.add_argument(
             '--help-all',
-            action=_WholeHelp,
+            action=Printing,
+            text=_whole_help,
             nargs=0,
             default=argparse.SUPPRESS,
             help='show all options and exit',
@@ -91,7 +92,15 @@ class Parser(argparse.ArgumentParser):
         return formatter.format_help()
 
 
-class _WholeHelp(argparse.Action):
+class Printing(argparse.Action):
+    """An option that prints what ``text(parser, value)`` gives, and ends the program."""
+
+    def __init__(
+        self, *names: Any, text: Callable[[argparse.ArgumentParser, Any], str], **settings: Any
+    ) -> None:
+        super().__init__(*names, **settings)
+        self._text = text
+
     def __call__(
         self,
         parser: argparse.ArgumentParser,
@@ -99,8 +108,13 @@ class _WholeHelp(argparse.Action):
         values: Any,
         option_string: str | None = None,
     ) -> None:
-        print(parser.format_help(whole=True) if isinstance(parser, Parser) else '', end='')
+        """Print, and end."""
+        print(self._text(parser, values), end='')
         parser.exit()
+
+
+def _whole_help(parser: argparse.ArgumentParser, _: Any) -> str:
+    return parser.format_help(whole=True) if isinstance(parser, Parser) else ''
 
 
 def _group_of(action: argparse.Action) -> str:

@@ -1,6 +1,6 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Gain and zero errors of the readings: y (1 + gain) and y + offset."""
+"""Errors of the readings: y (1 + gain), y + offset, and W sin(bias) in the pull by attitude."""
 
 from __future__ import annotations
 
@@ -18,6 +18,10 @@ def _gain(quantity: str, contact: Contact[Quantity], p: SimpleNamespace, maths: 
 
 def _offset(quantity: str, contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
     setattr(contact, quantity, getattr(contact, quantity) + p.offset)
+
+
+def _tilt(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
+    contact.drawbar_pull = contact.drawbar_pull + contact.stated_load * maths.sin(p.bias)
 
 
 def _gain_of(
@@ -103,5 +107,22 @@ EFFECTS = (
         validity='constant over the table',
         source='instrument model',
         on_outputs=partial(_offset, 'sinkage'),
+    ),
+    Effect(
+        name='pitch_bias',
+        claim='attitude error; positive: it reads too nose-up, pull reads W sin(bias) too high',
+        symbol='F += W sin(bias)',
+        parameters=(
+            EffectParameter('bias', 'rad', 0.02, -0.3, 0.3, 0.03, 'normal', 'attitude error'),
+        ),
+        touches=frozenset({'drawbar_pull'}),
+        instrument=True,
+        confounded_with={
+            'slope_gravity': 'level rows, or the same slope driven both ways',
+            'bulldozing': 'three times the load or another wheel; a level check',
+        },
+        validity='constant over the table; does not change sign in reverse',
+        source='statics',
+        on_outputs=_tilt,
     ),
 )
