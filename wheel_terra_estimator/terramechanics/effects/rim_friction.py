@@ -41,7 +41,8 @@ EFFECT = Effect(
     needs=('lug_height',),
     confounded_with={'cohesion': 'a load series; a lugged wheel'},
     validity='metal rims in dry sand; the transition between smooth and lugged is assumed',
-    source='Ding et al. 2010 section 2.4 in words (metal-soil friction is below soil friction); '
+    source='Ding et al. 2010 section 2.4 in words (doi 10.1007/s11771-010-0021-7; metal-soil '
+    'friction is below soil friction); '
     'formula reconstructed',
     on_inputs=_slide,
 )
