@@ -48,8 +48,7 @@ def step(speed, before=0.05, now=0.05, inflation=0.0, window=None):
 
 
 def noise(parts_keys=()):
-    white = process([0.0] * 6, keys=parts_keys).acceleration_noise(StatedNoise())
-    return np.sqrt(white.force + white.attitude)
+    return process([0.0] * 6, keys=parts_keys).acceleration_noise(StatedNoise()).density
 
 
 def test_slow_rover_follows_its_wheels_through_a_ramp():
@@ -99,7 +98,7 @@ def test_wheels_that_disagree_leave_the_speed_to_the_accelerometer():
     apart = made.step(0.1, speeds([0.25, 0.25, 0.35, 0.35]), window, inflated=True)
     assert together.speed_gain * 0.1 + together.constant > 0.103
     assert apart.speed_gain * 0.1 + apart.constant == pytest.approx(0.1, abs=0.001)
-    assert apart.variance <= noise() ** 2 * 0.1
+    assert apart.variance <= made.acceleration_noise(StatedNoise()).density ** 2 * 0.1
 
 
 @pytest.mark.parametrize(
@@ -225,6 +224,20 @@ def test_without_a_reference_the_ratio_returns_to_the_usual_one_over_travel():
 @pytest.mark.parametrize('before', [0.0, 0.05])
 def test_wheels_alone_say_nothing_of_the_accelerometers_zero(before):
     assert process([before] * 6).by_wheels(0.1, speeds([0.06] * 6), 0.0).bias_gain == 0.0
+
+
+@pytest.mark.parametrize(
+    ('speed', 'kept'),
+    [(0.0, False), (0.8 * 0.06 * 0.95, True), (0.8 * 0.06 * 1.05, True), (0.4, True)],
+)
+def test_a_jolt_at_a_start_is_undone_and_nothing_else(speed, kept):
+    """Far from what the wheels say, by less than the accelerometer's noise: that is a jolt."""
+    made = process([0.06] * 6)
+    ekf = Parts(reader.load(SAND)).filter()
+    ekf.set(SPEED, speed, 1e-6)
+    made.undo_jolt(ekf, 0.06)
+    expected = speed if kept else 0.8 * 0.06
+    assert ekf.mean[SPEED] == pytest.approx(expected)
 
 
 def test_a_speed_is_known_no_better_than_a_set_of_soil_models():

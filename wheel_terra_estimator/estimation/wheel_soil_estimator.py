@@ -381,6 +381,8 @@ class WheelSoilEstimator:
         sinkage_before = ekf.mean[layout.sinkage].copy()
 
         self._predict(cycle)
+        if not cycle.reference_known and not self._contact_age.settled:
+            self._speed.undo_jolt(ekf, cycle.unturned.typical, cycle.window.stated)
 
         if reference is not None:
             self._fuse_reference(cycle, reference)

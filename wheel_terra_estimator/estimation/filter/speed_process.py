@@ -90,6 +90,10 @@ class SpeedTuning:
     usual_length: float = 1.5  # rim travel over which slip returns to it [m]
     least_usual_slip: float = -0.2
     most_usual_slip: float = 0.8
+    start_share: float = 0.5
+    """Of the usual speed: what is farther from it at a start without reference is a jolt."""
+    start_noise: float = 3.0
+    """Times the accelerometer's noise over a second: what is more is no jolt but a slide."""
     present: float = 1e-6  # [s]: a cycle no older is the present
 
 
@@ -161,6 +165,11 @@ class AccelerationNoise(NamedTuple):
     force: float  # of the accelerometer, density of white noise squared [(m/s^2)^2 s]
     attitude: float  # of gravity by errors of the attitude, the same
     bias_walk: float  # of what the bias changes, per second [(m/s^2)^2/s]
+
+    @property
+    def density(self) -> float:
+        """White noise density of accelerometer and attitude [m/s^2 sqrt(s)]."""
+        return math.sqrt(self.force + self.attitude)
 
 
 class SpeedProcess(Component[SpeedState]):
@@ -463,6 +472,20 @@ class SpeedProcess(Component[SpeedState]):
         if isnan(self.state.rims.typical) and not isnan(rims.typical):
             spread = max(self._tuning.first_sight_share * abs(rims.typical), self._rover.rest_speed)
             ekf.set(SPEED, self.state.ratio * rims.typical, spread * spread)
+
+    def undo_jolt(self, ekf: GatedFilter, rim: float, stated: StatedNoise = NOTHING_STATED) -> None:
+        """Let a rover that starts without a reference velocity roll as it did before.
+
+        A jolt of the accelerometer weighs much while the wheels turn slowly, and from a speed of
+        nothing the wheels' prediction, v' = v rim'/rim, goes on with nothing. A rover that slides,
+        or wheels that spin up at once, differ by more than the accelerometer's noise.
+        """
+        state, tuning = self.state, self._tuning
+        usual = state.ratio * rim
+        off = abs(float(ekf.mean[SPEED]) - usual)
+        noise = tuning.start_noise * self.acceleration_noise(stated).density
+        if abs(rim) > self._rover.low_rim and tuning.start_share * abs(usual) < off < noise:
+            ekf.set(SPEED, usual, (state.ratio_std * rim) ** 2)
 
     def keep_least_variance(self, ekf: GatedFilter, rims: Floats) -> None:
         """Keep a least slip deviation."""
