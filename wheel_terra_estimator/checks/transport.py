@@ -70,7 +70,8 @@ def check_transport(
 
 def _jitter(channel: Channel) -> float:
     """Return the deviation of the usual time from stamp to log time [s]."""
-    return robust_std(np.asarray((channel.log_time - channel.stamp) * 1e-9, dtype=np.float64))
+    late = (channel.log_time - channel.stamp)[channel.stamp > 0] * 1e-9
+    return robust_std(np.asarray(late, dtype=np.float64))
 
 
 def _order(channel: Channel, most_back: float) -> list[Outcome]:
