@@ -163,3 +163,46 @@ def assert_same(found: Any, message: Any) -> None:
 
 def plain(value: Any) -> Any:
     return value.item() if isinstance(value, np.generic) else value
+
+
+@pytest.mark.parametrize('name', ['joint_states', 'imu/data', 'odom'])
+@pytest.mark.parametrize('little', [True, False])
+def test_many_at_once_hold_what_each_alone_holds(
+    name: str, little: bool, factory: MessageFactory
+) -> None:
+    dice = random.Random(7)
+    kind = INPUT_TYPES[name]
+    data = []
+    for message in messages(factory, name, 300, dice):
+        whole = bytearray(factory.store.serialize_cdr(message, kind, little_endian=little))
+        if dice.random() < 0.2:
+            whole[dice.randrange(len(whole))] = dice.randrange(256)
+        data.append(bytes(whole))
+    found = {}
+    for alike in topic_messages(kind).unpack_alike(data):
+        for row, index in enumerate(alike.order.tolist()):
+            fields = [field[row].tolist() for field in alike.numbers]
+            found[index] = (int(alike.stamps[row]), alike.names, fields)
+    alone = {}
+    for index, whole in enumerate(data):
+        message = quickly(topic_messages(kind), whole)
+        if message is not None:
+            alone[index] = fields_of(message)
+    assert repr(sorted(found.items())) == repr(sorted(alone.items()))
+    assert len(found) > 250
+
+
+def fields_of(message: Any) -> tuple[int, tuple[str, ...], list[list[float]]]:
+    stamp = message.header.stamp.sec * 1_000_000_000 + message.header.stamp.nanosec
+    if hasattr(message, 'name'):
+        fields = [message.position, message.velocity, message.effort]
+        return stamp, tuple(message.name), [[float(v) for v in field] for field in fields]
+    if hasattr(message, 'twist'):
+        linear, angular = message.twist.twist.linear, message.twist.twist.angular
+        numbers = [linear.x, linear.y, linear.z, angular.x, angular.y, angular.z]
+        return stamp, (), [[float(v) for v in (*numbers, *message.twist.covariance)]]
+    q, w, f = message.orientation, message.angular_velocity, message.linear_acceleration
+    numbers = [q.x, q.y, q.z, q.w, *message.orientation_covariance]
+    numbers += [w.x, w.y, w.z, *message.angular_velocity_covariance]
+    numbers += [f.x, f.y, f.z, *message.linear_acceleration_covariance]
+    return stamp, (), [[float(v) for v in numbers]]

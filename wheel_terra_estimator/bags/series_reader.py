@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import math
-from collections import Counter, defaultdict
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -20,8 +20,8 @@ from wheel_terra_estimator.checks.series import (
     SinkageSeries,
     VelocitySeries,
 )
-from wheel_terra_estimator.messages.cdr import DamagedMessageError
-from wheel_terra_estimator.messages.convert import INPUT_TYPES, stamp_of
+from wheel_terra_estimator.messages.cdr import Alike
+from wheel_terra_estimator.messages.convert import INPUT_TYPES
 
 MOST_MESSAGES = 400_000
 """Messages of a topic that are kept; a longer recording is judged by its beginning."""
@@ -85,26 +85,21 @@ def read_series(
     chosen = choose_topics(bag, remaps)
     by_topic = {topic: own for own, topic in chosen.items()}
     collectors: dict[str, _Collector] = {
-        own: _COLLECTORS[own](topic) for own, topic in chosen.items() if own in _COLLECTORS
+        own: _COLLECTORS[own](topic, INPUT_TYPES[own])
+        for own, topic in chosen.items()
+        if own in _COLLECTORS
     }
-    unpack = {own: topic_messages(INPUT_TYPES[own]).unpack for own in collectors}
     shortened = False
-    garbage: Counter[str] = Counter()
     for log_time, topic, data in bag.messages([chosen[own] for own in collectors]):
-        own = by_topic[topic]
-        collector = collectors[own]
-        if len(collector.stamps) >= most:
+        collector = collectors[by_topic[topic]]
+        if len(collector.arrivals) >= most:
             shortened = True
-            continue
-        if len(data) > bag.limits.message:
-            continue
-        try:
-            message = unpack[own](data)
-        except DamagedMessageError:
-            garbage[topic] += 1
-            continue
-        collector.add(log_time, message)
-    if garbage or bag.damaged:
+        elif len(data) <= bag.limits.message:
+            collector.add(log_time, data)
+    for collector in collectors.values():
+        collector.unpack()
+    garbage = Counter({collector.topic: collector.damaged for collector in collectors.values()})
+    if garbage.total() or bag.damaged:
         for collector in collectors.values():
             garbage[collector.topic] += collector.leave_out_strays()
     left_out = [
@@ -113,7 +108,7 @@ def read_series(
 
     def made(own: str) -> Any:
         collector = collectors.get(own)
-        return collector.series() if collector and collector.stamps else None
+        return collector.series() if collector and collector.stamps.size else None
 
     return Recording(
         name=name,
@@ -134,6 +129,8 @@ _STRAY = 1e9
 """Stamps of a damaged recording that lie so far [ns] from where the others do are damaged."""
 _STRAYS = 0.2
 """Greatest share of such stamps that damage explains."""
+_AT_ONCE = 4096
+"""Messages that are unpacked together: what is held of the recording itself."""
 
 
 def credible(values: Any) -> Any:
@@ -143,35 +140,59 @@ def credible(values: Any) -> Any:
 
 
 class _Collector:
-    """Rows of one topic."""
+    """Numbers of one topic; `unpack` what was added before anything is read from it."""
 
-    def __init__(self, topic: str) -> None:
+    def __init__(self, topic: str, kind: str) -> None:
         self.topic = topic
-        self.stamps: list[int] = []
-        self.log_times: list[int] = []
-        self.rows: list[Any] = []
+        self.arrivals: list[int] = []
+        self._messages = topic_messages(kind)
+        self._waiting: list[bytes] = []
+        self._kept: list[Alike] = []
+        self.stamps = self.log_times = np.zeros(0, dtype=np.int64)
+        self._rows: list[Any] = []  # of each of `_kept`, their rows in the order of arrival
 
-    def add(self, log_time: int, message: Any) -> None:
-        self.stamps.append(stamp_of(message))
-        self.log_times.append(log_time)
-        self.rows.append(self.row(message))
+    def add(self, log_time: int, data: bytes) -> None:
+        self.arrivals.append(log_time)
+        self._waiting.append(data)
+        if len(self._waiting) == _AT_ONCE:
+            self._unpack_waiting()
+
+    def unpack(self) -> None:
+        """Unpack what waits and put everything into the order of arrival."""
+        self._unpack_waiting()
+        places = [np.zeros(0, dtype=np.int64), *(alike.order for alike in self._kept)]
+        stamps = [np.zeros(0, dtype=np.int64), *(alike.stamps for alike in self._kept)]
+        arrived = np.concatenate(places)
+        order = np.argsort(arrived)
+        self.stamps = np.concatenate(stamps)[order]
+        self.log_times = np.array(self.arrivals, dtype=np.int64)[arrived[order]]
+        self._rows = [np.searchsorted(arrived, index, sorter=order) for index in places[1:]]
+        self._sound = np.arange(len(order))
+
+    def _unpack_waiting(self) -> None:
+        first = len(self.arrivals) - len(self._waiting)
+        for alike in self._messages.unpack_alike(self._waiting):
+            self._kept.append(self.needed(alike._replace(order=first + alike.order)))
+        self._waiting = []
+
+    @property
+    def damaged(self) -> int:
+        """Messages that could not be read."""
+        return len(self.arrivals) - self.stamps.size
 
     def leave_out_strays(self) -> int:
         """Leave out what is stamped far from its log time, unless much is; return how many."""
-        stamps, log_times = (times.astype(float) for times in self.times)
-        delays = log_times - stamps
+        delays = self.log_times.astype(float) - self.stamps.astype(float)
         if not delays.size:
             return 0
         stray = np.abs(delays - np.median(delays)) > _STRAY
         if np.mean(stray) > _STRAYS:  # a clock that was set, not damage
             return 0
-        keep = np.flatnonzero(~stray).tolist()
-        self.stamps = [self.stamps[i] for i in keep]
-        self.log_times = [self.log_times[i] for i in keep]
-        self.rows = [self.rows[i] for i in keep]
+        self._sound = np.flatnonzero(~stray)
         return int(stray.sum())
 
-    def row(self, message: Any) -> Any:
+    def needed(self, alike: Alike) -> Alike:
+        """Return what is kept of messages."""
         raise NotImplementedError
 
     def series(self) -> Any:
@@ -179,79 +200,75 @@ class _Collector:
 
     @property
     def times(self) -> tuple[Any, Any]:
-        return np.array(self.stamps, dtype=np.int64), np.array(self.log_times, dtype=np.int64)
+        return self.stamps[self._sound], self.log_times[self._sound]
+
+    def table(self, field: int, columns: int) -> Any:
+        """Return a field of numbers in the order of arrival, (messages, columns)."""
+        values = np.full((self.stamps.size, columns), math.nan)
+        for alike, rows in zip(self._kept, self._rows, strict=True):
+            self.fill(values, rows, alike.names, alike.numbers[field])
+        return credible(values)[self._sound]
+
+    def fill(self, values: Any, rows: Any, names: tuple[str, ...], numbers: Any) -> None:
+        values[rows] = numbers
 
 
 class _Joints(_Collector):
     """Joint states, sorted by name."""
 
-    def __init__(self, topic: str) -> None:
-        super().__init__(topic)
+    def __init__(self, topic: str, kind: str) -> None:
+        super().__init__(topic, kind)
         self.names: dict[str, int] = {}
-        self._last_names: tuple[str, ...] = ()
 
-    def row(self, message: Any) -> Any:
-        names = tuple(message.name)
-        if names != self._last_names:
-            self._last_names = names
-            for name in names:
-                if len(self.names) < MOST_JOINTS:
-                    self.names.setdefault(name, len(self.names))
-        return names, *self.fields(message)
+    def needed(self, alike: Alike) -> Alike:
+        for name in alike.names:
+            if len(self.names) < MOST_JOINTS:
+                self.names.setdefault(name, len(self.names))
+        return alike
 
-    def fields(self, message: Any) -> tuple[Any, ...]:
-        return message.velocity, message.effort
-
-    def table(self, column: int) -> Any:
-        values = np.full((len(self.rows), len(self.names)), math.nan)
-        alike: defaultdict[tuple[str, ...], list[int]] = defaultdict(list)
-        for index, row in enumerate(self.rows):
-            if len(row[0]) == len(row[column]):
-                alike[row[0]].append(index)
-        for names, rows in alike.items():
+    def fill(self, values: Any, rows: Any, names: tuple[str, ...], numbers: Any) -> None:
+        if len(names) == numbers.shape[1]:
             known = [i for i, name in enumerate(names) if name in self.names]
             places = [self.names[names[i]] for i in known]
-            numbers = np.array([self.rows[index][column] for index in rows])
             values[np.ix_(rows, places)] = numbers[:, known]
-        return credible(values)
 
     def series(self) -> Any:
-        return JointSeries(self.topic, *self.times, tuple(self.names), self.table(1), self.table(2))
+        n = len(self.names)
+        return JointSeries(
+            self.topic, *self.times, tuple(self.names), self.table(1, n), self.table(2, n)
+        )
 
 
 class _Sinkage(_Joints):
-    def fields(self, message: Any) -> tuple[Any, ...]:
-        return (message.position,)
-
     def series(self) -> Any:
-        return SinkageSeries(self.topic, *self.times, tuple(self.names), self.table(1))
+        names = tuple(self.names)
+        return SinkageSeries(self.topic, *self.times, names, self.table(0, len(names)))
 
 
 class _Imu(_Collector):
-    def row(self, message: Any) -> Any:
-        f, w, q = message.linear_acceleration, message.angular_velocity, message.orientation
-        known = message.orientation_covariance[0] != -1.0
-        orientation = (q.x, q.y, q.z, q.w) if known else (math.nan,) * 4
-        force, rate = (f.x, f.y, f.z), (w.x, w.y, w.z)
-        if message.linear_acceleration_covariance[0] == -1.0:  # says that there is none
-            force = (math.nan,) * 3
-        if message.angular_velocity_covariance[0] == -1.0:
-            rate = (math.nan,) * 3
-        return (*force, *rate, *orientation)
+    def needed(self, alike: Alike) -> Alike:
+        (all_numbers,) = alike.numbers
+        fields = []
+        for at, count in ((25, 3), (13, 3), (0, 4)):  # specific force, angular rate, attitude
+            values = all_numbers[:, at : at + count].copy()
+            values[all_numbers[:, at + count] == -1.0] = math.nan  # its covariance: there is none
+            fields.append(values)
+        return alike._replace(numbers=(np.hstack(fields),))
 
     def series(self) -> Any:
-        table = credible(np.array(self.rows, dtype=float))
+        table = self.table(0, 10)
         return ImuSeries(self.topic, *self.times, table[:, :3], table[:, 3:6], table[:, 6:])
 
 
 class _Velocity(_Collector):
-    def row(self, message: Any) -> Any:
-        linear, angular = message.twist.twist.linear, message.twist.twist.angular
-        variance = min(float(message.twist.covariance[0]), 0.1 * LARGEST)
-        return (linear.x, linear.y, linear.z, angular.z, variance)
+    def needed(self, alike: Alike) -> Alike:
+        (twist,) = alike.numbers
+        values = twist[:, [0, 1, 2, 5, 6]]
+        np.minimum(values[:, 4], 0.1 * LARGEST, out=values[:, 4])
+        return alike._replace(numbers=(values,))
 
     def series(self) -> Any:
-        table = credible(np.array(self.rows, dtype=float))
+        table = self.table(0, 5)
         return VelocitySeries(self.topic, *self.times, table[:, :3], table[:, 3], table[:, 4])
 
 

@@ -5,22 +5,24 @@
 rclpy and rosbags unpack every field of a message. Of the messages that come a hundred times a
 second only some fields are used, and their names do not change from one to the next: where the
 beginning (frame and names) is byte by byte that of an earlier message that the library has
-unpacked, only the numbers are taken out. Everything else goes through the library: other types,
-big-endian or damaged messages.
+unpacked, only the numbers are taken out; of many messages of a recording all at once. Everything
+else goes through the library: other types, big-endian or damaged messages.
 """
 
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable, Sequence
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from wheel_terra_estimator.messages.convert import JOINT_STATE, ODOMETRY
+from wheel_terra_estimator.messages.convert import JOINT_STATE, ODOMETRY, stamp_of
 
 FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
 
 IMU = 'sensor_msgs/msg/Imu'
 TWIST = 'geometry_msgs/msg/TwistWithCovarianceStamped'
@@ -132,6 +134,19 @@ class _Beginning(NamedTuple):
     end: int
 
 
+class Alike(NamedTuple):
+    """Messages of a topic that differ in their stamps and numbers only.
+
+    Of a JointState the numbers are position, velocity and effort, of an Imu all 37, of a velocity
+    the 42 of its twist: each (messages, n), in the order of the message.
+    """
+
+    order: IntArray  # their places among the messages that were given
+    stamps: IntArray  # [ns]
+    names: tuple[str, ...]
+    numbers: tuple[FloatArray, ...]
+
+
 class TopicMessages:
     """Unpacks the messages of one topic.
 
@@ -144,6 +159,7 @@ class TopicMessages:
     """
 
     def __init__(self, kind: str, whole: Callable[[bytes], Any]) -> None:
+        self._kind = kind
         self._whole = whole
         quick: tuple[_Quick | None, bool, int] = _QUICK.get(kind, (None, False, 0))
         self._quick, self._names, self._strings = quick
@@ -158,13 +174,10 @@ class TopicMessages:
             The bytes are no message of the type.
         """
         quick = self._quick
-        if quick is not None and data[:2] == _LITTLE_ENDIAN:
-            for known in self._known:
-                if data.startswith(known.content, _AFTER_STAMP):
-                    message = quick(data, known)
-                    if message is not None:
-                        return message
-                    break
+        if quick is not None and (known := self._beginning(data)) is not None:
+            message = quick(data, known)
+            if message is not None:
+                return message
         try:
             message = self._whole(data)
         except Exception as error:  # the libraries let many kinds through on damaged bytes
@@ -172,6 +185,68 @@ class TopicMessages:
         if quick is not None and data[:2] == _LITTLE_ENDIAN:
             self._remember(data, message)
         return message
+
+    def unpack_alike(self, messages: Sequence[bytes]) -> Iterator[Alike]:
+        """Yield the numbers of messages, those that are alike together; damaged ones are left out.
+
+        For the types that are unpacked quickly.
+        """
+        by_length: defaultdict[int, list[int]] = defaultdict(list)
+        for index, data in enumerate(messages):
+            by_length[len(data)].append(index)
+        for left in by_length.values():
+            for _ in range(_MOST_BEGINNINGS):
+                if len(left) > 1 and (alike := self._like_first(messages, left)) is not None:
+                    yield alike
+                    left = np.setdiff1d(left, alike.order).tolist()
+            for index in left:
+                try:
+                    message = self.unpack(messages[index])
+                except DamagedMessageError:
+                    continue
+                yield _alone(index, message)
+
+    def _like_first(self, messages: Sequence[bytes], indices: Sequence[int]) -> Alike | None:
+        """Return which of some messages of equal length are like the first, if it is sound."""
+        first = messages[indices[0]]
+        try:
+            self.unpack(first)
+        except DamagedMessageError:
+            return None
+        known = self._beginning(first)
+        places = None if known is None else _places(self._kind, first, known)
+        if known is None or places is None:
+            return None
+        size = len(first)
+        table = np.frombuffer(b''.join(messages[i] for i in indices), np.uint8).reshape(-1, size)
+        fixed = np.ones(size, dtype=bool)
+        fixed[len(_LITTLE_ENDIAN) : _AFTER_STAMP] = False
+        if self._kind == ODOMETRY:  # its pose
+            fixed[known.end : places[0][0]] = False
+        for at, count in places:
+            fixed[at : at + 8 * count] = False
+        same = np.all(table[:, fixed] == table[0, fixed], axis=1)
+        table = table[same]
+        seconds = np.ascontiguousarray(table[:, _BODY : _BODY + 4]).view('<i4')[:, 0]
+        rest = np.ascontiguousarray(table[:, _BODY + 4 : _AFTER_STAMP]).view('<u4')[:, 0]
+        return Alike(
+            np.asarray(indices)[same],
+            seconds.astype(np.int64) * 1_000_000_000 + rest,
+            known.names,
+            tuple(
+                np.ascontiguousarray(table[:, at : at + 8 * count]).view('<f8')
+                if count
+                else np.zeros((len(table), 0))
+                for at, count in places
+            ),
+        )
+
+    def _beginning(self, data: bytes) -> _Beginning | None:
+        if data[:2] == _LITTLE_ENDIAN:
+            for known in self._known:
+                if data.startswith(known.content, _AFTER_STAMP):
+                    return known
+        return None
 
     def _remember(self, data: bytes, message: Any) -> None:
         """Remember the beginning of a message that is sound."""
@@ -189,9 +264,20 @@ class TopicMessages:
 
 
 def _joint_state(data: bytes, known: _Beginning) -> JointState | None:
+    places = _joint_places(data, known)
+    if places is None:
+        return None
+    fields = [
+        np.frombuffer(data, np.float64, count, at) if count else _NO_VALUES for at, count in places
+    ]
+    return JointState(_header(data), known.names, *fields)
+
+
+def _joint_places(data: bytes, known: _Beginning) -> list[tuple[int, int]] | None:
+    """Return where position, velocity and effort begin [byte], and how many numbers they have."""
     end = len(data)
     at = _aligned(known.end, 4)
-    fields = []
+    places = []
     for _ in range(3):
         if at + 4 > end:
             return None
@@ -201,13 +287,49 @@ def _joint_state(data: bytes, known: _Beginning) -> JointState | None:
             at += -(at - _BODY) % 8
             if at + 8 * count > end:
                 return None
-            fields.append(np.frombuffer(data, np.float64, count, at))
-            at += 8 * count
-        else:
-            fields.append(_NO_VALUES)
-    if end - at > _LONGEST_PADDING:
-        return None
-    return JointState(_header(data), known.names, *fields)
+        places.append((at, count))
+        at += 8 * count
+    return None if end - at > _LONGEST_PADDING else places
+
+
+def _places(kind: str, data: bytes, known: _Beginning) -> list[tuple[int, int]] | None:
+    """Return where the fields of numbers begin [byte], and how many numbers they have."""
+    if kind == JOINT_STATE:
+        return _joint_places(data, known)
+    at = _aligned(known.end, 8) + (_POSE if kind == ODOMETRY else 0)
+    size = (_IMU if kind == IMU else _TWIST).size
+    return [(at, size // 8)] if 0 <= len(data) - at - size <= _LONGEST_PADDING else None
+
+
+def _alone(index: int, message: Any) -> Alike:
+    """Return a message that is like no other."""
+    names: tuple[str, ...] = ()
+    fields: list[Any]
+    if hasattr(message, 'name'):
+        names = tuple(message.name)
+        fields = [message.position, message.velocity, message.effort]
+    elif hasattr(message, 'twist'):
+        twist = message.twist.twist
+        fields = [[*_xyz(twist.linear), *_xyz(twist.angular), *message.twist.covariance]]
+    else:
+        attitude = message.orientation
+        fields = [
+            [
+                *_xyz(attitude),
+                attitude.w,
+                *message.orientation_covariance,
+                *_xyz(message.angular_velocity),
+                *message.angular_velocity_covariance,
+                *_xyz(message.linear_acceleration),
+                *message.linear_acceleration_covariance,
+            ]
+        ]
+    numbers = tuple(np.array(field, dtype=np.float64)[np.newaxis] for field in fields)
+    return Alike(np.array([index]), np.array([stamp_of(message)]), names, numbers)
+
+
+def _xyz(vector: Any) -> tuple[float, float, float]:
+    return vector.x, vector.y, vector.z
 
 
 def _imu(data: bytes, known: _Beginning) -> Imu | None:
