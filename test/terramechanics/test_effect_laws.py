@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 from terra_tools import SAND, WHEEL, state
 
+from wheel_terra_estimator.terramechanics import effects
 from wheel_terra_estimator.terramechanics.conditioned import INPUTS, ConditionedForces
-from wheel_terra_estimator.terramechanics.effects import catalogue
+from wheel_terra_estimator.terramechanics.effects import Effect, EffectParameter, catalogue
 from wheel_terra_estimator.terramechanics.soil import Soil
 from wheel_terra_estimator.terramechanics.wheel import Wheel
 
@@ -161,3 +162,35 @@ def test_the_filter_s_forces_from_the_sinkage_agree_with_the_model(name: str, sl
         pull = (pairs[0].drawbar_pull - pairs[1].drawbar_pull) / (2.0 * step)
         assert forces.d_torque[column] == pytest.approx(torque, rel=2e-3, abs=1e-6 / step)
         assert forces.d_pull[column] == pytest.approx(pull, rel=2e-3, abs=1e-5 / step)
+
+
+LASTING = (
+    'width', 'lug_height', 'lug_count', 'lug_thickness', 'gravity', 'density', 'reference_depth',
+    'rim_speed', 'pass_number', 'slope', 'direction',
+)  # fmt: skip
+
+
+def test_a_term_may_change_what_stays_from_call_to_call(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Wheel, soil and motion are those of the call, however often the term has changed them."""
+
+    def halve(contact, p, maths) -> None:
+        seen.append([getattr(contact, name) for name in LASTING])
+        for name in LASTING:
+            setattr(contact, name, p.share * getattr(contact, name))
+
+    seen: list[list[float]] = []
+    share = EffectParameter('share', '-', 0.5, 0.0, 1.0, 0.5, 'normal', '', neutral=1.0)
+    effect = Effect(
+        'halved', '', '', (share,), frozenset({'torque'}), 'none', 'none', on_inputs=halve
+    )
+    monkeypatch.setattr(effects, '_registered', {'halved': effect})
+    forces = ConditionedForces(WHEEL, SAND, {'halved': {}})
+    seen.clear()
+    motion = {'rim_speed': 0.3, 'pass_number': 2.0, 'slope': 0.1, 'direction': -1.0}
+    for derivatives in (True, False, True):
+        given = (0.7, 0.01, 80.0, 500.0, TAN, 0.01)
+        forces.forces(0, *given, **motion, derivatives=derivatives)
+    wheel = (WHEEL.width, WHEEL.lug_height, WHEEL.lug_count, WHEEL.lug_thickness)
+    assert len(seen) > 3
+    for values in seen:
+        assert values == [*wheel, G, SAND.density, seen[0][6], *motion.values()]

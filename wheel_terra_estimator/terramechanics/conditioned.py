@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from copy import copy
 from dataclasses import astuple
+from operator import attrgetter
 from typing import NamedTuple
 
 import numpy as np
@@ -52,6 +53,15 @@ _FLOORS = (1.0, 1.0, 100.0, 0.1, 0.01)
 _BEHIND, _AHEAD = -0.5 * math.pi, 0.25 * math.pi  # of a measured leaving angle [rad]
 _NOWHERE = (0.0,) * 5  # rates that are not asked for
 _LARGEST_COSINE = math.cos(SMALLEST_ANGLE)
+_as_built = attrgetter(
+    'width',
+    'lug_height',
+    'lug_count',
+    'lug_thickness',
+    'gravity',
+    'density',
+    'reference_depth',
+)
 
 
 class Forces(NamedTuple):
@@ -120,6 +130,8 @@ class ConditionedForces:
         self._proportional = not self._terms.stages['on_contact']
         self._plain = self._proportional and not (self._on_inputs or self._on_sinkage)
         self._depth_of_reading = self._inverse_gain()
+        self._as_built = [_as_built(contact) for contact, _ in self._wheels]
+        self._motion = (0.0, 0.0, 0.0, 0.0)  # rim speed, pass, slope and direction of the call
         self._modulus = [contact.bearing_modulus for contact, _ in self._wheels]
         self._exponent = float(soil.sinkage_exponent)
         self._peak_ratio = float(soil.peak_stress_ratio)
@@ -185,8 +197,8 @@ class ConditionedForces:
             False leaves them out, at half the cost: the answer's are empty.
         """
         contact, slip_radius = self._wheels[index]
-        contact.rim_speed, contact.pass_number = rim_speed, pass_number
-        contact.slope, contact.direction = slope, direction
+        self._motion = motion = rim_speed, pass_number, slope, direction
+        contact.rim_speed, contact.pass_number, contact.slope, contact.direction = motion
         given: tuple[float, ...] = (
             speed_ratio, normal_load, cohesion, tan_friction, shear_modulus
         )  # fmt: skip
@@ -359,6 +371,17 @@ class ConditionedForces:
         contact.radius = contact.shear_radius = contact.rim_radius
         contact.sinkage_exponent, contact.bearing_modulus = self._exponent, self._modulus[index]
         contact.peak_ratio, contact.leaving_ratio = self._peak_ratio, self._leaving_ratio
+        if self._on_inputs:  # a term may have changed these in the call before
+            (
+                contact.width,
+                contact.lug_height,
+                contact.lug_count,
+                contact.lug_thickness,
+                contact.gravity,
+                contact.density,
+                contact.reference_depth,
+            ) = self._as_built[index]
+            contact.rim_speed, contact.pass_number, contact.slope, contact.direction = self._motion
         for term, parameters in self._on_inputs:
             term(contact, parameters, ScalarMaths)
         cosine = 1.0 - self._depth(contact, sinkage) / contact.radius
