@@ -60,7 +60,7 @@ class StuckState(NamedTuple):
     """What the monitor remembers."""
 
     memory: Memory = Memory()
-    since: tuple[float, ...] = (NAN, NAN)  # when each sign came [s], nan = it is not there
+    since: tuple[float, ...] = ()  # when each sign came [s], nan = it is not there
     stuck: bool = False
     reason: str = ''
     direction: int = 0
@@ -90,7 +90,7 @@ class StuckMonitor(Component[StuckState]):
         there = slips and likely, situation.standing
         since = tuple(
             (time if isnan(begun) else begun) if sign else NAN
-            for sign, begun in zip(there, old.since, strict=True)
+            for sign, begun in zip(there, old.since or (NAN,) * len(there), strict=True)
         )
         holds = SINKING_HOLD if situation.digging > _SINKING else HOLD, STANDING_HOLD
         held = [
@@ -101,7 +101,7 @@ class StuckMonitor(Component[StuckState]):
             memory = situation.memory
             one_way = time - memory.way_since >= SINKING_HOLD - _TIME_ROUNDING
             direction = memory.way if one_way else 0
-            reason = _in_words(situation, ahead, settings, standing=not held[0])
+            reason = _in_words(situation, ahead, settings, held)
             state = state._replace(stuck=True, reason=reason, direction=direction)
         elif old.stuck and not any(there) and situation.slip_magnitude < settings.clear_slip:
             clear = time if isnan(old.clear_since) else old.clear_since
@@ -132,9 +132,10 @@ def _confirmed(s: Situation) -> bool:
     return (s.motion.speed_known and still) or abs(s.strain - 1.0) < _AT_LIMIT
 
 
-def _in_words(s: Situation, ahead: Outlook, settings: StuckSettings, *, standing: bool) -> str:
+def _in_words(s: Situation, ahead: Outlook, settings: StuckSettings, held: list[bool]) -> str:
     """Return what is seen, how likely an entrapment is, and what to do."""
     count = sum(s.stalled)
+    standing = not held[0]
     if standing and count > 1:
         told = f'{count} wheels stalled near their torque limit'
     elif standing:
