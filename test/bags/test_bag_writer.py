@@ -19,6 +19,8 @@ from wheel_terra_estimator.bags.history import HistoryRecorder, read_estimates
 from wheel_terra_estimator.bags.storage import open_bag
 from wheel_terra_estimator.bags.writer import EstimateBagWriter
 from wheel_terra_estimator.errors import UserError
+from wheel_terra_estimator.estimation.estimates import SlipClass
+from wheel_terra_estimator.reporting.comparison import compare
 
 pytestmark = pytest.mark.usefixtures('library_metadata')
 
@@ -150,6 +152,30 @@ def test_estimates_come_back_as_they_went(bag: Path) -> None:
     np.testing.assert_array_equal(stored.forward_velocity, direct.forward_velocity)
     for name, values in direct.values.items():
         np.testing.assert_array_equal(stored.values[name], values, err_msg=name)
+
+
+def test_a_bag_of_some_outputs_gives_those(bag: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As ``ros2 bag record`` of some topics leaves it, or a version that knew fewer outputs."""
+    with open_bag(bag) as opened:
+        whole = read_estimates(opened)
+        every, left_out = opened.messages, ('/mobility', '/slip_angle', '/slip_class', '/twist')
+        monkeypatch.setattr(
+            opened,
+            'messages',
+            lambda topics: (m for m in every(topics) if not m.topic.endswith(left_out)),
+        )
+        some = read_estimates(opened)
+    np.testing.assert_array_equal(some.stamp, whole.stamp)
+    gone = ('rim_travel_left', 'pull_margin', 'slip_angle', 'lateral_force')
+    for name, values in whole.values.items():
+        told = np.full_like(values, np.nan) if name in gone else values
+        np.testing.assert_array_equal(some.values[name], told, err_msg=name)
+    assert (some.slip_class == SlipClass.UNKNOWN).all()
+    assert np.isnan(some.forward_velocity).all()
+    names = ('whole', 'some')
+    differences = compare(whole, some, names, None).differences
+    assert [d.name for d in differences] == ['slip', 'sinkage', 'drawbar_pull', 'normal_load']
+    assert all(d.rms == 0.0 for d in differences)
 
 
 def test_a_reset_clears_the_stuck_warning(tmp_path: Path) -> None:

@@ -54,7 +54,7 @@ _SIDEWAYS = {
     'lateral_force': 'force',
     'lateral_force_std': 'force_std',
 }
-"""Quantities of `WHEEL_FIELDS` -> fields of `Sideways`; recordings of old have none of them."""
+"""Quantities of `WHEEL_FIELDS` -> fields of `Sideways`."""
 _OWN_NAMES = {f'sideways_known.{field}': name for name, field in _SIDEWAYS.items()}
 _TOPIC_FIELDS = {
     topic: names
@@ -315,16 +315,21 @@ class _EstimateMessages:
             self._warnings[-1] = replace(self._warnings[-1], reason=words)
 
     def history(self) -> EstimateHistory:
-        """Return the sets that are whole."""
-        wanted = {*WHEEL_FIELDS, 'slip_class', 'forward_velocity'} - set(_SIDEWAYS)
+        """Return the sets that are whole; nan (class 255) for what no message of the bag told."""
+        told = set().union(*self._sets.values())
+        wanted = told.intersection((*WHEEL_FIELDS, 'slip_class', 'forward_velocity'))
         whole = {stamp: row for stamp, row in self._sets.items() if wanted <= row.keys()}
         shape = len(whole), len(self._names)
-        nothing = [0.0] * len(self._names)
+        nothing = [np.nan] * len(self._names)
+        unknown = {
+            **dict.fromkeys(WHEEL_FIELDS, nothing),
+            'slip_class': [SlipClass.UNKNOWN] * len(self._names),
+            'forward_velocity': np.nan,
+            'forward_velocity_std': np.nan,
+        }
 
         def column(name: str) -> NDArray[Any]:
-            if name in _SIDEWAYS:
-                return np.array([row.get(name, nothing) for row in whole.values()])
-            return np.array([row[name] for row in whole.values()])
+            return np.array([row.get(name, unknown[name]) for row in whole.values()])
 
         return EstimateHistory(
             names=self._names,

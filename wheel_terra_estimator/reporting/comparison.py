@@ -101,7 +101,12 @@ def compare(
             f'{names[1]}: no stamp in common with {names[0]}; compare estimates of one drive'
         )
     thresholds = np.array(declared()['filter.class_thresholds'].default, dtype=float)
-    differences = tuple(_difference(name, first, second, a, b) for name in COMPARED)
+    recorded = [
+        name
+        for name in COMPARED
+        if not any(np.isnan(run.values[name]).all() for run in (first, second))
+    ]
+    differences = tuple(_difference(name, first, second, a, b) for name in recorded)
     return Comparison(
         names=(names[0], names[1]),
         common=int(a.size),
