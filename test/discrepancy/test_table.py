@@ -60,6 +60,7 @@ def test_reads_numbers_gaps_and_extra_columns(tmp_path):
     [
         ('slip,normal_load,sinkage,drawbar_pul,torque', ('drawbar_pul', 'drawbar_pull?')),
         ('slip,normal_load,a,b,c', ('none of sinkage',)),
+        ('slip,normal_load,one,two,three', ('none of sinkage', 'add it, or', 'NAME=TITLE')),
         ('0.1,80,0.01,3,4', ('no header',)),
         ('slip,slip,sinkage,drawbar_pull,torque', ('twice',)),
         ('slip,Fz,sinkage,drawbar_pull,torque', ("no column 'normal_load'", "'Fz' (normal_load")),

@@ -342,12 +342,13 @@ class Header:
         missing = [f'no column {name!r}' for name in required if name not in self.names]
         if one_of and not set(one_of) & set(self.names):
             missing.append(f'none of {", ".join(one_of)}')
+        meant = [title for _, title in self.unused if _hint(title, self._free())[0]]
         if missing:
             faults.append(f'{" and ".join(missing)} among {", ".join(self.titles)}')
+            if not meant:
+                faults.append('add it, or say which title stands for it: --columns NAME=TITLE')
         if faults:
-            meant = [title for _, title in self.unused if _hint(title, self._free())[0]]
-            if meant:
-                faults.append(self._question(meant))
+            faults += [self._question(meant)] if meant else []
             raise UserError(f'{self.source}: {"; ".join(faults)}')
 
     def check_unused(self, hold_numbers: Sequence[int]) -> None:
