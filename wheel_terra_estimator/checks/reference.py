@@ -30,7 +30,7 @@ COVARIANCE_FACTOR = 6.0
 """Ratio of stated to seen standard deviation that makes a covariance a placeholder."""
 LEAST_STD = 1e-4
 """Standard deviation [m/s] that is proposed at least."""
-AHEAD = 0.5
+AHEAD = 0.3
 """Mean of the rims over the usual size of one, above which the rover goes ahead [-]."""
 LEAST_UNIT_RATIO = 1.3
 """Speed over rim speed below which it may be the radius, not the unit [-]."""

@@ -35,6 +35,8 @@ ONLY_BY_SPEED = ('thousandths of rad/s',)
 """Units that a skidding rover's turns do not tell from counts of an encoder."""
 UNIT_BAND = (0.7, 1.25)
 """Ratio of speeds over the factor of its unit; slip makes it smaller, nothing larger [-]."""
+LARGE_WHEEL = 0.3
+"""Radius above which the speed of a rim in m/s is too near to its rate in rad/s [m]."""
 POSITION_TIME = 2.0
 """Over which the change of a position is taken [s]."""
 POSITION_RATIO = (0.5, 5.0)
@@ -187,7 +189,9 @@ def check_unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
             return [NotChecked('unit', reason)], evidence
         ratio, how = math.pi / 30.0, f'rim speed above {FASTEST_RIM:.0f} m/s'
     usual = track is not None and turning.ordinary_track(track)
-    for unit, factor in RATE_UNITS.items():
+    units = {}
+    rim_unit = {} if usual else _rim_unit(float(np.nanmean(facts.radius)))
+    for unit, factor in {**RATE_UNITS, **rim_unit}.items():
         by_turn = track is not None and turning.ordinary_track(track * factor)
         by_turn &= unit not in ONLY_BY_SPEED
         told = by_turn and not usual
@@ -195,9 +199,18 @@ def check_unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
             told = UNIT_BAND[0] < ratio / factor < UNIT_BAND[1]
             told &= track is None or by_turn or not usual
         if told:
-            words = {'unit': unit, 'how': how if ratio else 'turns seen by the gyro'}
-            finding = evidence.found('rate_unit', 0.97, value=factor, **words)
-            return [finding], evidence.with_rate(evidence.rate * factor)
+            units[unit] = factor
+    if ratio is not None and units:
+        nearest = min(units, key=lambda unit: abs(math.log(ratio / units[unit])))
+        units = {nearest: units[nearest]}
+    if units:
+        told_by = how if ratio else 'turns seen by the gyro'
+        findings: list[Outcome] = [
+            evidence.found('rate_unit', 0.97 / len(units), value=factor, unit=unit, how=told_by)
+            for unit, factor in units.items()
+        ]
+        factor = math.nan if len(units) > 1 else next(iter(units.values()))
+        return findings, evidence.with_rate(evidence.rate * factor)
     if ratio is None and track is not None and abs(track) > MOST_TRACK:
         ratio, how = float(f'{USUAL_TRACK / abs(track):.1g}'), 'gyro in turns'
     if ratio is None or not 0.0 < ratio < MOST_COUNT:
@@ -206,6 +219,11 @@ def check_unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     told_of = {'times': 1.0 / ratio, 'counts': 2.0 * math.pi / ratio, 'how': how}
     finding = evidence.found('rate_counts', 0.9, value=value, **told_of)
     return [finding], evidence.with_rate(evidence.rate * ratio)
+
+
+def _rim_unit(radius: float) -> dict[str, float]:
+    """Return the speed of a rim as a unit; that of a large wheel is too near to rad/s."""
+    return {'metres per second of the rim': 1.0 / radius} if 0.0 < radius < LARGE_WHEEL else {}
 
 
 def _speed_ratio(evidence: Evidence) -> float | None:
