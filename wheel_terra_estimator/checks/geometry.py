@@ -25,6 +25,7 @@ from wheel_terra_estimator.checks.statistics import (
 )
 from wheel_terra_estimator.checks.torque import SOFT_TRACTION, thrust
 from wheel_terra_estimator.checks.trial import Trial, tried
+from wheel_terra_estimator.checks.wheel_rates import rounding
 
 FloatArray = NDArray[np.float64]
 
@@ -57,6 +58,9 @@ EVEN_SHARE = 0.25
 """Scatter of the ratio of speeds between them over its distance from 1, beyond which it is slip."""
 UNIFORM_STD = 1.0 / math.sqrt(12.0)
 """Standard deviation of what lies anywhere in an interval, as a share of its length [-]."""
+MOST_ROUNDING = 0.02
+"""Error of the mean rate by rounding, over the working rate, with which a scale is told [-]."""
+ROUNDED = 'rates are rounded to coarse steps, so their mean is off; publish more digits'
 CREDIBLE_STD = 0.05
 """Deviation of a ratio of radii that is still told [-]."""
 FIRM_SLIP = 0.12
@@ -115,6 +119,8 @@ def radius_ratio(evidence: Evidence) -> Told | NotChecked:
         return NotChecked('radius', 'no rover file')
     if 'wheels.rad_per_count' in figures:
         return NotChecked('radius', 'rates in counts: a radius looks like other counts per turn')
+    if rounding(evidence) > MOST_ROUNDING:
+        return NotChecked('radius', ROUNDED)
     rim = evidence.rim_at(reference.stamp, evidence.rim, AROUND)
     straight = evidence.rim_at(reference.stamp, evidence.straight.astype(float), AROUND)
     forward = reference.velocity[:, 0]
@@ -389,6 +395,8 @@ def check_track(evidence: Evidence) -> list[Outcome]:
     figures = evidence.figures
     if 'wheels.rad_per_count' in figures:
         return [NotChecked('track', 'rates in counts: a track looks like other counts per turn')]
+    if rounding(evidence) > MOST_ROUNDING:
+        return [NotChecked('track', ROUNDED)]
     told = track_ratio(evidence)
     if isinstance(told, NotChecked):
         return [told]
@@ -408,6 +416,16 @@ def check_track(evidence: Evidence) -> list[Outcome]:
         return []
     if not skids(evidence) and 'rover.speed_over_rim_speed' not in figures:
         ratio = Estimate(ratio.value, math.hypot(ratio.std, 0.03))
+    if skids(evidence):
+        return [
+            evidence.found(
+                'track_at_most',
+                confidence(ratio.sigmas_from(1.0)),
+                most=stated * ratio.value,
+                stated=stated,
+                trial=trial.words('off by', 'of the track'),
+            )
+        ]
     return [
         evidence.found(
             'track',

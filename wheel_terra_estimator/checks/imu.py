@@ -487,6 +487,8 @@ def check_noise_and_zero(evidence: Evidence) -> list[Outcome]:
         return []
     outcomes: list[Outcome] = []
     sensors = configuration.sensors
+    track = track_ratio(evidence) if evidence.facts.known else None
+    by_noise = track is None or not ordinary_track(track)  # else the turns tell the unit
     for values, key, unit in (
         (imu.force, 'specific_force_std', 'm/s^2'),
         (imu.rate, 'angular_rate_std', 'rad/s'),
@@ -496,10 +498,11 @@ def check_noise_and_zero(evidence: Evidence) -> list[Outcome]:
         noise = float(np.median([_upper_rms(column) for column in change.T]))
         stated = getattr(sensors, key)
         evidence.figures[f'imu.{key}'] = float(f'{noise:.3g}')
-        if values is imu.rate and DEGREES[0] < math.radians(noise) / stated < DEGREES[1]:
+        in_degrees = math.radians(noise) / stated if by_noise and values is imu.rate else 0.0
+        if DEGREES[0] < in_degrees < DEGREES[1]:
             told = {'times': noise / stated, 'how': 'noise of a gyro'}
             return [*outcomes, evidence.found('gyro_degrees', 0.8, value=math.radians(1), **told)]
-        if values is imu.rate and PERHAPS_DEGREES < math.radians(noise) / stated < DEGREES[0]:
+        if PERHAPS_DEGREES < in_degrees < DEGREES[0]:
             reason = f'gyro: noise of {noise:.2g}: vibration, or degrees per second; drive a circle'
             outcomes += [NotChecked(kind, reason) for kind in ('unit', 'noise')]
         elif noise > NOISE_FACTOR * stated:

@@ -49,6 +49,8 @@ FROZEN_TIME = 5.0
 """A rate that does not change in the last digit for this long [s] while the others do."""
 STEPS = 5.0
 """Change of the other rates at a steady speed over the least change of a wheel's own [-]."""
+SETTLING = 1.0
+"""Time after which wheels of one command have reached their speeds, some before others [s]."""
 FROZEN_CHANGE = 0.3
 """Change of the other rates meanwhile, as a share of the working rate; steps of coarse encoders are
 none."""
@@ -67,6 +69,8 @@ COUNTING_STD = 1.0 / math.sqrt(6.0)
 """Deviation of a rate from two counts, each off by up to one, as a share of a count [-]."""
 STEP_FACTOR = 1.0
 """Noise by the steps over the one stated, above which it matters [-]."""
+KEPT = 0.9
+"""Share of rates that repeat the one before, from which they are rounded, not counted [-]."""
 LEAST_STEP_SHARE = 0.02
 """Noise by the steps of an encoder that matters, as a share of the working rate."""
 MOST_STEPS = 200
@@ -104,18 +108,20 @@ def _frozen(evidence: Evidence, index: int, change: float, at_zero: bool) -> str
     rate, moving = evidence.rate, evidence.moving
     own, others = rate[:, index], np.delete(rate, index, axis=1)
     steps, longest = np.abs(np.diff(own)), 0.0
+    settling = evidence.rows_in(SETTLING)
     least = np.min(steps[steps > SAME_VALUE * evidence.working_rate], initial=np.inf)
     for start, end in runs(np.diff(own) == 0.0):
         lasts = (end - start) * evidence.period  # a gap is none
         if lasts < FROZEN_TIME or (own[start] == 0.0) != at_zero:
             continue
         stretch = slice(start, end + 1)
+        inside = others[start + settling : max(end + 1 - settling, start + settling + 1)]
         if at_zero:
             busy = row_medians(np.abs(others[stretch])) > LIVELY * evidence.working_rate
             lasts *= float(busy.mean())
             lively = lasts > FROZEN_TIME and not _held(evidence, index, np.r_[stretch][busy])
         else:
-            beside = np.nanmax(others[stretch], axis=0) - np.nanmin(others[stretch], axis=0)
+            beside = np.nanmax(inside, axis=0) - np.nanmin(inside, axis=0)
             steady = lasts > LONG_FROZEN_TIME and _repeats(others[stretch]) < 0.5
             steady &= bool(np.nanmedian(beside) > STEPS * least)
             lively = steady or float(np.mean(beside > change)) > 0.5
@@ -201,7 +207,8 @@ def check_unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         if told:
             units[unit] = factor
     if ratio is not None and units:
-        nearest = min(units, key=lambda unit: abs(math.log(ratio / units[unit])))
+        speeds = ratio
+        nearest = min(units, key=lambda unit: abs(math.log(speeds / units[unit])))
         units = {nearest: units[nearest]}
     if units:
         told_by = how if ratio else 'turns seen by the gyro'
@@ -298,6 +305,18 @@ def common_step(rate: FloatArray, time: FloatArray) -> float:
     """Return the usual step of the rates (k, n) of all wheels [rad/s]; 0 for none."""
     interval = _intervals(time)
     return float(np.median([rate_step(column, interval) for column in rate.T]))
+
+
+def rounding(evidence: Evidence) -> float:
+    """Return by how much the mean of the rates may be off, over the working rate [-].
+
+    Counts of an encoder come and go, so that their mean is right; a rate that a driver rounds is
+    the same all along.
+    """
+    rate = evidence.rate[evidence.moving]
+    if evidence.working_rate <= 0.0 or _repeats(rate) < KEPT:
+        return 0.0
+    return 0.5 * common_step(rate, evidence.time[evidence.moving]) / evidence.working_rate
 
 
 def rate_step(rate: FloatArray, interval: FloatArray) -> float:
