@@ -89,7 +89,8 @@ def test_swapped_sides_are_told_from_a_straight_drive():
     order = [1, 0, 3, 2]
     swapped = replace(joints, rate=joints.rate[:, order], torque=joints.torque[:, order])
     found = checked(joints=swapped).findings
-    assert 'swapped_sides' in {f.kind for f in found}
+    (sides,) = (f for f in found if f.kind == 'swapped_sides')
+    assert 'wheels.names: [front_right, front_left, rear_right, rear_left]' in sides.cure
     straight = rolling.recording(rolling.ten_minute_drive(turns=False))
     report = check_recording(straight, rolling.rover())
     assert 'drive a circle' in next(
@@ -173,6 +174,65 @@ def test_track_of_wheels_that_do_not_skid():
     configuration = rolling.rover(**{'wheels.y': [0.36, -0.36, 0.36, -0.36]})
     finding = only(checked(configuration), 'track')
     assert finding.value == pytest.approx(2.0 * rolling.HALF_TRACK, rel=0.02)
+
+
+def test_skidding_wheels_tell_only_the_most_that_a_track_can_be():
+    base = [0.4, 0.4, -0.4, -0.4]
+    wide = rolling.rover(**{'wheels.x': base, 'wheels.y': [0.6, -0.6, 0.6, -0.6]})
+    finding = only(checked(wide), 'track')
+    assert finding.parameter is None
+    most = float(finding.words.split('at most ')[1].split()[0])
+    assert most == pytest.approx(2.0 * rolling.HALF_TRACK, rel=0.02)
+
+
+def test_rounded_rates_are_neither_frozen_nor_another_radius():
+    step = 0.25 * np.nanmax(np.abs(WHOLE.joints.rate))
+    rounded = replace(WHOLE.joints, rate=step * np.round(WHOLE.joints.rate / step))
+    assert 'steps of' in only(checked(joints=rounded), 'noise').words
+
+
+def test_noise_of_a_gyro_is_no_unit_where_turns_agree():
+    noise = np.random.default_rng(3).normal(0.0, 0.1, WHOLE.imu.rate.shape)
+    report = checked(imu=replace(WHOLE.imu, rate=WHOLE.imu.rate + noise))
+    assert {f.kind for f in report.findings} == {'noise'}
+
+
+def test_negated_accelerometer_beside_a_gyro_that_is_right():
+    finding = only(checked(imu=replace(WHOLE.imu, force=-WHOLE.imu.force)), 'sign')
+    assert 'linear_acceleration' in finding.cure
+    turned = WHOLE.imu.force * [1.0, -1.0, -1.0], WHOLE.imu.rate * [1.0, -1.0, -1.0]
+    upside = checked(imu=replace(WHOLE.imu, force=turned[0], rate=turned[1]))
+    assert only(upside, 'mounting').value == pytest.approx(180.0)
+
+
+def test_a_clock_that_is_set_on_the_way_is_no_offset():
+    late = np.arange(WHOLE.joints.stamp.size) > 0.4 * WHOLE.joints.stamp.size
+    stamp = WHOLE.joints.stamp + np.where(late, 2_500_000_000, 0)
+    report = checked(joints=replace(WHOLE.joints, stamp=stamp))
+    assert 'order' in {f.kind for f in report.findings}
+    assert not any(f.parameter for f in report.findings), [str(f) for f in report.findings]
+
+
+def test_stamps_that_jitter_are_no_missing_messages():
+    jitter = np.random.default_rng(4).normal(0.0, 1.5, WHOLE.imu.stamp.size)
+    period = float(np.median(np.diff(WHOLE.imu.stamp)))
+    stamp = np.sort(WHOLE.imu.stamp + (period * jitter).astype(np.int64))
+    report = checked(imu=replace(WHOLE.imu, stamp=stamp))
+    assert 'drop_outs' not in {f.kind for f in report.findings}, report.findings
+
+
+def test_missing_messages_are_a_share_of_those_sent():
+    kept = np.random.default_rng(5).random(WHOLE.joints.stamp.size) > 0.25
+    joints = WHOLE.joints
+    thinned = replace(
+        joints,
+        stamp=joints.stamp[kept],
+        log_time=joints.log_time[kept],
+        rate=joints.rate[kept],
+        torque=joints.torque[kept],
+    )
+    words = next(f.words for f in checked(joints=thinned).findings if f.kind == 'drop_outs')
+    assert float(words.split(' % of')[0].split()[-1]) == pytest.approx(25.0, abs=2.0)
 
 
 def test_torque_scale_is_a_gain_or_a_mass():

@@ -76,6 +76,10 @@ PERHAPS_DEGREES = 0.15
 BIAS_FACTOR = 6.0
 """A bias above so many stated deviations is a finding."""
 LEAST_GYRO_BIAS = 0.004  # [rad/s]
+TILT_IS_MOUNTING = 0.95
+"""Probability that a tilt seen in circles is the mounting and not the accelerometer's zero [-]."""
+CLEAR_AGREEMENT = 0.8
+"""Correlation of gyro and wheels in turns that are the same way round [-]."""
 LEAST_WILD = 3
 MOST_WILD = 0.2
 """Share of wild samples beyond which it is not single ones: vibration, or another unit [-]."""
@@ -429,8 +433,19 @@ def check_upside(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         return [], evidence
     mended, up = evidence.turned(fix @ evidence.rotation), np.median(evidence.force, axis=0)
     force = f'mean specific force ({up[0]:.2f}, {up[1]:.2f}, {up[2]:.2f}) m/s^2'
+    if np.allclose(np.diag(fix), [1.0, -1.0, -1.0]) and _turns_upright(evidence):
+        told = evidence.found('force_reversed', 0.97, force=force)
+        return [told], replace(evidence, force=-evidence.force)
     std = math.degrees(STEEPEST_MEAN) / 3.0
     return [mounting_finding('imu_upside', evidence, mended, std, 0.999, force=force)], mended
+
+
+def _turns_upright(evidence: Evidence) -> bool:
+    """Return whether the gyro turns to the left where the wheels do: it is not upside down."""
+    rows = evidence.turning & np.isfinite(evidence.side_difference)
+    if evidence.gyro is None or rows.sum() < LEAST_MESSAGES:
+        return False
+    return correlation(evidence.gyro[rows, 2], evidence.side_difference[rows]) > CLEAR_AGREEMENT
 
 
 def check_tilt(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
@@ -451,8 +466,10 @@ def check_tilt(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     size = math.hypot(tilt.roll.value, tilt.pitch.value)
     if size < LEAST_MOUNTING or tilt.sigmas < 4.0:
         return [], evidence
-    mended, sure = evidence.turned(tilt.taken_off(evidence.rotation)), confidence(tilt.sigmas)
-    told = mounting_finding('imu_tilt', evidence, mended, std, sure, size=math.degrees(size))
+    mended = evidence.turned(tilt.taken_off(evidence.rotation))
+    sure = min(confidence(tilt.sigmas), TILT_IS_MOUNTING)
+    words = {'size': math.degrees(size), 'zero': math.sin(size) * evidence.facts.gravity}
+    told = mounting_finding('imu_tilt', evidence, mended, std, sure, **words)
     return [told], mended
 
 

@@ -22,6 +22,11 @@ GAP_PERIODS = 6.0
 """A gap also has to be longer than so many periods."""
 GAP_SHARE = 0.05
 """Share of missing messages of a stuttering channel."""
+SEVERAL = 10
+"""Messages over which a period is taken where stamps jitter."""
+OFF_PERIOD, REGULAR = 0.2, 0.6
+"""Distance of a step from a multiple of the period, as a share of it, and the share of steps nearer
+than that (0.4 by chance) below which stamps jitter [-]."""
 BACKWARD_SHARE = 0.05
 """Share of messages whose stamp lies before that of an earlier arrival by more than a period."""
 FAR_BACK = 1.0
@@ -52,6 +57,10 @@ def check_transport(
     late: dict[str, float] = {}
     if 'joints' not in delays:
         return outcomes, late
+    if recording.joints is not None and recording.imu is not None and 'imu' in delays:
+        shifted = _shifted(recording.joints, recording.imu)
+        if shifted:
+            return outcomes + shifted, late
     left = delays['joints'] - delays.get('imu', delays['joints'])
     if abs(left) > CLOCK_DIFFERENCE:
         # Stamps lie near their arrival: those that are farther off are wrong.
@@ -66,6 +75,21 @@ def check_transport(
         told = of_offset(name, value, std, 'log time: two clocks', configuration)
         outcomes.append(found(f'{name}_offset', channel.topic, 0.999, **told))
     return outcomes, late
+
+
+def _shifted(joints: Channel, imu: Channel) -> list[Outcome]:
+    """Return that one of two clocks runs apart from the other: no offset mends that."""
+    shifts = {}
+    for channel in (joints, imu):
+        late = (channel.log_time - channel.stamp)[channel.stamp > 0] * 1e-9
+        quarter = max(late.size // 4, 1)
+        shifts[channel.topic] = float(np.median(late[-quarter:]) - np.median(late[:quarter]))
+    of_joints, of_imu = shifts[joints.topic], shifts[imu.topic]
+    if abs(of_joints - of_imu) < CLOCK_DIFFERENCE:
+        return []
+    topic, shift = max(shifts.items(), key=lambda item: abs(item[1]))
+    how = f'its stamps shift by {-shift:.2g} s against log time: a clock is set, or drifts'
+    return [found('order', topic, 0.97, how=how)]
 
 
 def _jitter(channel: Channel) -> float:
@@ -111,13 +135,19 @@ def _of_one_joint(channel: Channel) -> NDArray[np.bool_]:
 
 def _drop_outs(name: str, channel: Channel, figures: dict[str, Any]) -> list[Outcome]:
     stamps = np.unique(channel.stamp[channel.stamp > 0]) * 1e-9
-    if stamps.size < 10:
+    if stamps.size <= SEVERAL:
         return []
     step = np.diff(stamps)
     period = float(np.median(step))
+    off = np.abs(step / period - np.round(step / period))
+    if np.mean(off < OFF_PERIOD) < REGULAR:
+        # Stamps that jitter: their neighbours say nothing of the period.
+        period = float(np.median(stamps[SEVERAL:] - stamps[:-SEVERAL])) / SEVERAL
     figures[f'{name}.rate_hz'] = round(1.0 / period, 3) if period > 0.0 else None
     gaps = step[step > max(LONGEST_GAP, GAP_PERIODS * period)]
-    missing = float(np.sum(step[step > 1.7 * period] / period - 1.0) / stamps.size)
+    lost = float(np.sum(step[step > 1.7 * period] / period - 1.0))
+    missing = min(lost, max((stamps[-1] - stamps[0]) / period + 1.0 - stamps.size, 0.0))
+    missing /= stamps.size + missing
     # Cameras lose single readings as a matter of course; the estimator needs neither all the time.
     if not gaps.size and not (name in ('joints', 'imu') and missing > GAP_SHARE):
         return []

@@ -24,6 +24,7 @@ from wheel_terra_estimator.checks.evidence import LEAST_MOVING_ROWS, Evidence, r
 from wheel_terra_estimator.checks.faults import LEAST_TURN_RATE, SKID_TRACKS
 from wheel_terra_estimator.checks.felt_motion import felt_motion, yaw_of_motion
 from wheel_terra_estimator.checks.finding import Finding, NotChecked, Outcome
+from wheel_terra_estimator.checks.rover_facts import RoverFacts
 from wheel_terra_estimator.checks.statistics import (
     confidence,
     correlation,
@@ -450,13 +451,26 @@ def _swapped(evidence: Evidence) -> list[Outcome]:
         'swapped_sides',
         0.97 if orientation_told else 0.5,
         rival='' if orientation_told else ', or the gyro counts yaw to the right',
-        names=', '.join(facts.names),
+        names=', '.join(_sides_exchanged(facts)),
         mirrored=f', or wheels.y: [{mirrored}]' if facts.known else '',
     )
     if orientation_told:
         return [sides]
     against = 'the wheels, or left and right wheels are swapped'
     return [sides, evidence.found('gyro_reversed', 0.5, value=-1.0, axis='z', against=against)]
+
+
+def _sides_exchanged(facts: RoverFacts) -> list[str]:
+    """Return the names with each left wheel in the place of the right one beside it."""
+    names = list(facts.names)
+    forward = np.zeros(len(names)) if facts.configuration is None else facts.configuration.wheels.x
+    left, right = (
+        sorted(np.flatnonzero(facts.side == side).tolist(), key=lambda i: -float(forward[i]))
+        for side in (1.0, -1.0)
+    )
+    for i, j in zip(left, right, strict=False):
+        names[i], names[j] = names[j], names[i]
+    return names
 
 
 def _exchanged(
