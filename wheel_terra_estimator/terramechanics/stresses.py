@@ -1,6 +1,9 @@
 # Copyright 2026 wheel_terra_estimator developers
 # SPDX-License-Identifier: Apache-2.0
-"""Stress laws under a rigid wheel: Bekker, Reece, Wong-Reece, Janosi-Hanamoto."""
+"""Stress laws under a rigid wheel: Bekker, Reece, Wong-Reece, Janosi-Hanamoto.
+
+Bekker 1969 (book), Janosi and Hanamoto 1961 (proceedings): no DOI.
+"""
 
 from __future__ import annotations
 
@@ -67,8 +70,8 @@ def front_stress(
 ) -> Quantity:
     """Normal stress ahead of its peak, k [(r/z0)(cos t - cos t1)]^N [Pa].
 
-    Wong and Reece 1967; Ding et al. 2010 eq. 17 (doi 10.1007/s11771-010-0021-7). ``cosine`` of the
-    angle, where it is known already.
+    Wong and Reece 1967 (doi 10.1016/0022-4898(67)90105-X); Ding et al. 2010 eq. 17
+    (doi 10.1007/s11771-010-0021-7). ``cosine`` of the angle, where it is known already.
     """
     cosine = maths.cos(angle) if cosine is None else cosine
     depth = contact.radius * (cosine - maths.cos(contact.entrance_angle))

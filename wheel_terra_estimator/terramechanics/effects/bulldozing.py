@@ -14,7 +14,7 @@ _LEAST_FRICTION = 0.02  # tan(phi); Terzaghi's factors divide by it
 
 
 def wedge_resistance(contact: Contact[Quantity], depth: Quantity, maths: Maths) -> Quantity:
-    """Passive resistance of soil to an upright wall, per width [N/m] (Hegedus 1960).
+    """Passive resistance of soil to an upright wall, per width [N/m] (Hegedus 1960, no DOI).
 
     D1 (c h + D2 rho g h^2/2) at the depth h [m] of its foot.
     """
@@ -77,7 +77,7 @@ EFFECT = Effect(
     confounded_with={'pitch_bias': 'three times the load or another wheel; a level check'},
     validity='sinkage below half the radius; the wedge is taken over the rim width, of a wheel '
     'that slides sideways over the width that rim and flank show to the motion',
-    source='Hegedus 1960 in the form of Ishigami et al. 2007 '
+    source='Hegedus 1960 (report, no DOI) in the form of Ishigami et al. 2007 '
     '(doi 10.1002/rob.20187; side force turned to the front)',
     on_outputs=_push,
     other_forms=(
@@ -88,8 +88,9 @@ EFFECT = Effect(
             'Kc = (Nc - tan phi) cos^2 phi, Kg = (2 Ng/tan phi + 1) cos^2 phi, a = (pi - t_1)/2',
             parameters=(_KB,),
             validity='friction angle 10 to 45 degrees; sinkage below half the radius',
-            source="Terzaghi's bearing factors in the bulldozing resistance of Bekker 1969 and the "
-            'passive resistance of Hettiaratchi and Reece 1974; Ng by the usual approximation',
+            source="Terzaghi's bearing factors in the bulldozing resistance of Bekker 1969 (book, "
+            'no DOI) and the passive resistance of Hettiaratchi and Reece 1974 '
+            '(doi 10.1680/geot.1974.24.3.289); Ng by the usual approximation',
             on_outputs=_earth_pressure,
         ),
     ),

@@ -38,7 +38,7 @@ EFFECT = Effect(
         'rim_friction': 'load series; rows with lugs high enough to hold a ring of soil',
     },
     validity='c + delta not below zero',
-    source='Mohr-Coulomb strength in Janosi and Hanamoto 1961; Ding et al. 2010 eq. 18 '
-    '(doi 10.1007/s11771-010-0021-7)',
+    source='Mohr-Coulomb strength in Janosi and Hanamoto 1961 (proceedings, no DOI); '
+    'Ding et al. 2010 eq. 18 (doi 10.1007/s11771-010-0021-7)',
     on_inputs=_cohesion,
 )

@@ -66,8 +66,8 @@ EFFECT = Effect(
     },
     incompatible_with=frozenset({'lug_shear_radius'}),
     validity='lugs far apart; counts the same thrust as a larger shear radius, hence not with it',
-    source='passive earth pressure on grousers (Bekker 1969), n_e lugs in the contact; after '
-    'literature read at second hand',
+    source='passive earth pressure on grousers (Bekker 1969, book, no DOI), n_e lugs in the '
+    'contact; after literature read at second hand',
     on_outputs=_thrust,
     other_forms=(
         Form(
@@ -77,8 +77,8 @@ EFFECT = Effect(
             parameters=(_SHARE,),
             validity='lugs far apart; counts the same thrust as a larger shear radius, hence not '
             'with it',
-            source='Bekker 1969 and Wong, Theory of Ground Vehicles: Rankine passive pressure with '
-            'surcharge q; n_e lugs in the contact of length L',
+            source='Bekker 1969 and Wong, Theory of Ground Vehicles (books, no DOI): Rankine '
+            'passive pressure with surcharge q; n_e lugs in the contact of length L',
             on_outputs=_textbook,
         ),
     ),

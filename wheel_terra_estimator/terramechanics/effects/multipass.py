@@ -65,7 +65,8 @@ EFFECT = Effect(
                 ),
             ),
             validity='the same rut, its walls not counted; soil that does not spring back',
-            source='Wong 1989, repetitive loading: at the depth of before, the pressure of before',
+            source='Wong 1989 (book, no DOI), repetitive loading: at the depth of before, the '
+            'pressure of before',
             on_normal_stress=_rut_stress,
             on_outputs=_rut_depth,
         ),

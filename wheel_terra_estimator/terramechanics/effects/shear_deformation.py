@@ -42,7 +42,7 @@ EFFECT = Effect(
         'cohesion': 'slip below 0.2, where K shows most',
     },
     validity='the same as a fitted soil.shear_modulus, hence not tried beside one',
-    source='Janosi and Hanamoto 1961',
+    source='Janosi and Hanamoto 1961 (proceedings, no DOI)',
     candidate=False,
     why_aside='the refitted soil.shear_modulus stands for it',
     on_inputs=_factor,
@@ -59,8 +59,8 @@ EFFECT = Effect(
             needs=('normal_load',),
             candidate=True,
             validity='pressures W/(b r) of 0.5 to 20 kPa; invisible at one load',
-            source='Wong, Theory of Ground Vehicles: K of some soils rises with normal pressure; '
-            'power law assumed',
+            source='Wong, Theory of Ground Vehicles (book, no DOI): K of some soils rises with '
+            'normal pressure; power law assumed',
             on_inputs=_with_pressure,
         ),
     ),

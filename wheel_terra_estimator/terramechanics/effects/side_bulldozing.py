@@ -83,7 +83,8 @@ EFFECT = Effect(
     needs=('slip_angle',),
     validity='flank smooth and upright, sinkage below half the radius; the share that the lateral '
     'displacement mobilises is taken as that of shear, so that no slip angle gives no force',
-    source='Ishigami et al. 2007 eq. 9 and 11 (doi 10.1002/rob.20187), resistance of Hegedus 1960',
+    source='Ishigami et al. 2007 eq. 9 and 11 (doi 10.1002/rob.20187), resistance of '
+    'Hegedus 1960 (report, no DOI)',
     on_outputs=_push_aside,
     other_forms=(
         Form(
@@ -97,8 +98,9 @@ EFFECT = Effect(
             needs=('slip_angle',),
             validity='slip angles to 90 degrees, sinkage below one radius; what friction on '
             'the flank carries of the load is left out',
-            source='own form: resistance of Hegedus 1960 on the outline of the flank, friction '
-            'against the motion of the flank past a rising wedge (docs/models/sideways.md)',
+            source='own form: resistance of Hegedus 1960 (report, no DOI) on the outline of the '
+            'flank, friction against the motion of the flank past a rising wedge '
+            '(docs/models/sideways.md)',
             on_outputs=_plate,
         ),
     ),

@@ -45,7 +45,7 @@ EFFECT = Effect(
         'sinkage_offset': 'pull and torque; the zero reading on a hard floor',
     },
     validity='an even layer; the recorded slip keeps the configured radius',
-    source='geometry of a coated wheel; sticking soil: Bekker 1969',
+    source='geometry of a coated wheel; sticking soil: Bekker 1969 (book, no DOI)',
     on_inputs=_layer,
     on_outputs=_below_the_rim,
     other_forms=(
@@ -67,7 +67,8 @@ EFFECT = Effect(
             ),
             validity='moist or fine soil; needs a leaving angle behind the hub; tension below the '
             'normal stress',
-            source='adhesion of soil to metal (Bekker 1969); growth to the leaving edge assumed',
+            source='adhesion of soil to metal (Bekker 1969, book, no DOI); growth to the leaving '
+            'edge assumed',
             candidate=False,
             why_aside='an uncertain leaving angle looks like it',
             on_normal_stress=_tension,

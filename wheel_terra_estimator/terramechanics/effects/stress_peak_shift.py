@@ -46,7 +46,8 @@ EFFECT = Effect(
         'slip_sinkage_exponent': 'high load, braking rows, slip near 0.9; stress cells in the rim',
     },
     validity='c1 + c2 s between 0 and 1; clamped inside the contact',
-    source='Wong and Reece 1967; Ding et al. 2010 section 3.1.1 (doi 10.1007/s11771-010-0021-7); '
+    source='Wong and Reece 1967 (doi 10.1016/0022-4898(67)90105-X); '
+    'Ding et al. 2010 section 3.1.1 (doi 10.1007/s11771-010-0021-7); '
     'skid: measured rows of a single wheel that brakes (docs/models/validation.md)',
     on_inputs=_shift,
     other_forms=(

@@ -63,7 +63,8 @@ EFFECT = Effect(
     'circle is that of the rigid wheel without slip; torque added by drive friction or by soil '
     'carried round takes the same arm (1 % of it off at most)',
     source='substitute circle of a flattened wheel (Bekker; Schmid 1995, J. Terramech. 32): the '
-    'chord that both circles share, 2 r (z + f) = 2 r* z; z0 after Bekker 1969',
+    'chord that both circles share, 2 r (z + f) = 2 r* z; z0 after Bekker 1969 (book, '
+    'no DOI)',
     on_inputs=_flatten,
     on_outputs=_arm,
 )
