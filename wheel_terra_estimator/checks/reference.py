@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +33,10 @@ LEAST_STD = 1e-4
 """Standard deviation [m/s] that is proposed at least."""
 AHEAD = 0.3
 """Mean of the rims over the usual size of one, above which the rover goes ahead [-]."""
+CLEAR_HEADING = 1.0
+"""Turn in which a frame of the world is told from one of the rover [rad]."""
+STEADY = 0.9
+"""Length of the mean direction of a velocity that keeps to a frame [-]."""
 LEAST_UNIT_RATIO = 1.3
 """Speed over rim speed below which it may be the radius, not the unit [-]."""
 MOSTLY = 0.4
@@ -77,26 +82,43 @@ def _frame(evidence: Evidence, reference: VelocitySeries) -> tuple[list[Outcome]
         velocity = np.column_stack([speed, 0.0 * speed, 0.0 * speed])
         return evidence.with_channel('reference', velocity=velocity)
 
-    if _turns_with_heading(evidence, reference, rim):
+    kept = _kept_direction(evidence, reference, rim)
+    if kept.turn > CLEAR_HEADING and kept.in_world > max(STEADY, kept.in_body + 0.1):
         return [evidence.found('reference_world', 0.95)], along_x(size * np.sign(rim))
+    if kept.in_body < STEADY:
+        reason = 'reference: its direction keeps neither to the rover nor to the world'
+        return [NotChecked('mounting', reason)], evidence
     along, across = correlation(rim, forward), correlation(rim, side)
     if abs(across) > 0.7 and abs(across) > abs(along):
         angle = math.degrees(math.atan2(across, along))
-        told = {'value': round(angle, 1), 'std': 5.0, 'turn': -angle}
-        return [evidence.found('reference_axis', 0.95, **told)], along_x(np.sign(across) * side)
+        told: dict[str, Any] = {'value': round(angle, 1), 'std': 5.0, 'turn': -angle, 'rival': ''}
+        sure = 0.95
+        if kept.turn < CLEAR_HEADING:
+            told['rival'], sure = ', or is given in the world frame: drive a circle', 0.6
+        return [evidence.found('reference_axis', sure, **told)], along_x(np.sign(across) * side)
     return [], evidence
 
 
-def _turns_with_heading(evidence: Evidence, reference: VelocitySeries, rim: FloatArray) -> bool:
+class _KeptDirection(NamedTuple):
+    """How steadily a velocity keeps to the rover and to the world [-], and how far that turned."""
+
+    in_body: float
+    in_world: float
+    turn: float  # [rad]
+
+
+def _kept_direction(
+    evidence: Evidence, reference: VelocitySeries, rim: FloatArray
+) -> _KeptDirection:
     heading = np.cumsum(evidence.yaw * np.diff(evidence.time, prepend=evidence.time[0]))
     psi = np.interp(evidence.seconds(reference), evidence.time, heading)
     moving = np.abs(rim) > 0.3 * np.quantile(np.abs(rim), 0.9)
-    if moving.sum() < 20 or np.ptp(psi[moving]) < 1.0:
-        return False
+    if moving.sum() < LEAST_ROWS:
+        return _KeptDirection(1.0, 0.0, 0.0)
     velocity = (reference.velocity[:, 0] + 1j * reference.velocity[:, 1])[moving]
     direction = velocity * np.sign(rim[moving]) / np.maximum(np.abs(velocity), 1e-9)
-    turning = abs((direction * np.exp(-1j * psi[moving])).mean())
-    return bool(turning > max(0.9, abs(direction.mean()) + 0.1))
+    in_world = abs((direction * np.exp(-1j * psi[moving])).mean())
+    return _KeptDirection(abs(direction.mean()), in_world, float(np.ptp(psi[moving])))
 
 
 def ahead(evidence: Evidence, series: VelocitySeries, share: float) -> tuple[FloatArray, Mask]:
@@ -122,11 +144,20 @@ def _unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     if rows.sum() < LEAST_ROWS:
         return [], evidence
     ratio = float(np.median(np.abs(reference.velocity[rows, 0]) / rim[rows]))
-    for unit, factor in KNOWN_UNITS.items():
-        if max(0.55 * factor, LEAST_UNIT_RATIO) < ratio < 1.25 * factor:
-            told = {'value': 1.0 / factor, 'ratio': ratio, 'unit': unit}
-            mended = evidence.with_channel('reference', velocity=reference.velocity / factor)
-            return [evidence.found('reference_unit', 0.9, **told)], mended
+    fitting = {
+        unit: factor
+        for unit, factor in KNOWN_UNITS.items()
+        if max(0.55 * factor, LEAST_UNIT_RATIO) < ratio < 1.25 * factor
+    }
+    if len(fitting) > 1:  # which of them, the slip hides
+        reason = (
+            f'reference: {ratio:.3g} times the rim speed: {" or ".join(fitting)}; drive on firm'
+        )
+        return [NotChecked('unit', reason)], evidence
+    for unit, factor in fitting.items():
+        told = {'value': 1.0 / factor, 'ratio': ratio, 'unit': unit}
+        mended = evidence.with_channel('reference', velocity=reference.velocity / factor)
+        return [evidence.found('reference_unit', 0.9, **told)], mended
     return [], evidence
 
 

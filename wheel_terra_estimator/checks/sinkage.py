@@ -107,12 +107,19 @@ def _unit(evidence: Evidence, table: FloatArray) -> tuple[list[Outcome], FloatAr
     stated = configuration.sensors.sinkage_std if configuration else 0.002
     noise = _reading_noise(table)
     level = float(np.nanmedian(np.abs(table)))
+    if not (level > DEEPEST * radius or noise > 0.2 * radius):
+        return [], table
+    off = {}
     for unit, factor in (('millimetres', 1e-3), ('centimetres', 1e-2)):
         # Both the depth and the noise have to fit the unit.
-        fits = 0.1 < noise * factor / max(stated, 1e-4) < 10.0 and level * factor < 0.8 * radius
-        if (level > DEEPEST * radius or noise > 0.2 * radius) and fits:
-            told = {'level': level, 'noise': noise, 'radius': radius, 'unit': unit}
-            return [evidence.found('sinkage_unit', 0.97, value=factor, **told)], table * factor
+        ratio = noise * factor / max(stated, 1e-4)
+        if 0.1 < ratio < 10.0 and level * factor < 0.8 * radius:
+            off[unit, factor] = abs(math.log(ratio))
+    if off:
+        unit, factor = min(off, key=lambda entry: off[entry])
+        told = {'level': level, 'noise': noise, 'radius': radius, 'unit': unit}
+        sure = 0.97 if len(off) == 1 else 0.8
+        return [evidence.found('sinkage_unit', sure, value=factor, **told)], table * factor
     return [], table
 
 

@@ -43,6 +43,10 @@ POSITION_RATIO = (0.5, 5.0)
 """Change of a position over the speed seen, with skid and slip in it [-]."""
 POSITION_SHARE = 0.8
 """Share of a drive in which what changes is a position [-]."""
+MOST_TURNED_BACK = 0.1
+"""Share of messages at which a position begins to fall or rise; noise does at every second [-]."""
+LEAST_UNIT_TRACK = 0.25
+"""Effective over stated track, below which it is another unit and not another track [-]."""
 FASTEST_RIM = 15.0
 """Rim speed that no rover of this kind drives [m/s]."""
 FROZEN_TIME = 5.0
@@ -170,7 +174,8 @@ def check_positions(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     going = seen > 0.5 * max(float(np.quantile(seen, 0.9)), 1e-9)
     ratio = row_medians(np.abs(change[going]) * evidence.radius) / seen[going]
     share = float(np.mean((ratio > POSITION_RATIO[0]) & (ratio < POSITION_RATIO[1])))
-    if not share > POSITION_SHARE:
+    turned_back = np.diff(np.sign(change[going]), axis=0) != 0.0
+    if not share > POSITION_SHARE or float(np.mean(turned_back)) > MOST_TURNED_BACK:
         return [], evidence
     ends = (rows // 2, rows - rows // 2), (0, 0)  # a change is that of the middle of its time
     rate = np.pad(change, ends, mode='edge')
@@ -210,6 +215,11 @@ def check_unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         speeds = ratio
         nearest = min(units, key=lambda unit: abs(math.log(speeds / units[unit])))
         units = {nearest: units[nearest]}
+    if units and ratio is None and LEAST_UNIT_TRACK < abs(track or 0.0) < 1.0:
+        reason = (
+            f'turns need {abs(track or 0.0):.2f} of the stated track: another unit or another track'
+        )
+        return [NotChecked('unit', f'wheel rates: {reason}; drive straight')], evidence
     if units:
         told_by = how if ratio else 'turns seen by the gyro'
         findings: list[Outcome] = [
