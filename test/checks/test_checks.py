@@ -109,17 +109,17 @@ def test_two_wheels_under_each_others_name():
     )
 
 
-@pytest.mark.parametrize('factor', [60.0 / (2.0 * math.pi), 180.0 / math.pi, rolling.RADIUS])
+@pytest.mark.parametrize('factor', [60.0 / (2.0 * math.pi), 180.0 / math.pi])
 def test_units_of_the_rates(factor):
     faster = replace(WHOLE.joints, rate=WHOLE.joints.rate * factor)
     finding = only(checked(joints=faster), 'unit')
     assert finding.value == pytest.approx(1.0 / factor)
 
 
-def test_rim_speed_and_revolutions_are_told_together_where_only_turns_tell():
-    report = checked(
-        joints=replace(WHOLE.joints, rate=WHOLE.joints.rate * rolling.RADIUS), reference=None
-    )
+@pytest.mark.parametrize('reference', [WHOLE.reference, None])
+def test_rim_speed_and_revolutions_that_are_near_are_told_together(reference):
+    slow = replace(WHOLE.joints, rate=WHOLE.joints.rate * rolling.RADIUS)
+    report = checked(joints=slow, reference=reference)
     units = [finding for finding in report.findings if finding.kind == 'unit']
     assert {round(finding.value, 3) for finding in units} == {
         round(2 * math.pi, 3),

@@ -37,6 +37,8 @@ CLEAR_HEADING = 1.0
 """Turn in which a frame of the world is told from one of the rover [rad]."""
 STEADY = 0.9
 """Length of the mean direction of a velocity that keeps to a frame [-]."""
+MOST_SLIPPING, WITHOUT_SLIP = 1.0 / 3.0, 0.06
+"""Speed over that without slip of a rover that slips much, and error of the ratio without slip."""
 LEAST_UNIT_RATIO = 1.3
 """Speed over rim speed below which it may be the radius, not the unit [-]."""
 MOSTLY = 0.4
@@ -83,7 +85,8 @@ def _frame(evidence: Evidence, reference: VelocitySeries) -> tuple[list[Outcome]
         return evidence.with_channel('reference', velocity=velocity)
 
     kept = _kept_direction(evidence, reference, rim)
-    if kept.turn > CLEAR_HEADING and kept.in_world > max(STEADY, kept.in_body + 0.1):
+    clear = kept.turn > CLEAR_HEADING
+    if clear and kept.in_world > max(STEADY, 0.5 * (1.0 + kept.in_body)):
         return [evidence.found('reference_world', 0.95)], along_x(size * np.sign(rim))
     if kept.in_body < STEADY:
         reason = 'reference: its direction keeps neither to the rover nor to the world'
@@ -93,7 +96,7 @@ def _frame(evidence: Evidence, reference: VelocitySeries) -> tuple[list[Outcome]
         angle = math.degrees(math.atan2(across, along))
         told: dict[str, Any] = {'value': round(angle, 1), 'std': 5.0, 'turn': -angle, 'rival': ''}
         sure = 0.95
-        if kept.turn < CLEAR_HEADING:
+        if not clear or kept.in_body < 0.5 * (1.0 + kept.in_world):
             told['rival'], sure = ', or is given in the world frame: drive a circle', 0.6
         return [evidence.found('reference_axis', sure, **told)], along_x(np.sign(across) * side)
     return [], evidence
@@ -147,13 +150,13 @@ def _unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     fitting = {
         unit: factor
         for unit, factor in KNOWN_UNITS.items()
-        if max(0.55 * factor, LEAST_UNIT_RATIO) < ratio < 1.25 * factor
+        if max(MOST_SLIPPING * factor, LEAST_UNIT_RATIO) < ratio < 1.25 * factor
     }
-    if len(fitting) > 1:  # which of them, the slip hides
-        reason = (
-            f'reference: {ratio:.3g} times the rim speed: {" or ".join(fitting)}; drive on firm'
-        )
-        return [NotChecked('unit', reason)], evidence
+    near = {unit: f for unit, f in fitting.items() if abs(ratio / f - 1.0) < WITHOUT_SLIP}
+    if len(fitting) > 1 and not near:  # which of them, the slip hides
+        reason = f'{ratio:.3g} times the rim speed: {" or ".join(fitting)}, or its scale'
+        return [NotChecked('unit', f'reference: {reason}; drive on firm ground')], evidence
+    fitting = near or fitting
     for unit, factor in fitting.items():
         told = {'value': 1.0 / factor, 'ratio': ratio, 'unit': unit}
         mended = evidence.with_channel('reference', velocity=reference.velocity / factor)

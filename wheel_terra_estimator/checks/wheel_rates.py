@@ -35,6 +35,10 @@ ONLY_BY_SPEED = ('thousandths of rad/s',)
 """Units that a skidding rover's turns do not tell from counts of an encoder."""
 UNIT_BAND = (0.7, 1.25)
 """Ratio of speeds over the factor of its unit; slip makes it smaller, nothing larger [-]."""
+TELLING = 0.15
+"""Difference of two units' distances from a ratio of speeds [ln] that tells them apart."""
+LEAST_ROLLING_TRACK = 0.9
+"""Effective over stated track of a rover whose rates are in rad/s; skidding makes it larger [-]."""
 LARGE_WHEEL = 0.3
 """Radius above which the speed of a rim in m/s is too near to its rate in rad/s [m]."""
 POSITION_TIME = 2.0
@@ -43,8 +47,8 @@ POSITION_RATIO = (0.5, 5.0)
 """Change of a position over the speed seen, with skid and slip in it [-]."""
 POSITION_SHARE = 0.8
 """Share of a drive in which what changes is a position [-]."""
-MOST_TURNED_BACK = 0.1
-"""Share of messages at which a position begins to fall or rise; noise does at every second [-]."""
+MOST_TURNED_BACK = 0.2
+"""How often a position begins to fall or rise; rates do at each change of the speed [1/s]."""
 LEAST_UNIT_TRACK = 0.25
 """Effective over stated track, below which it is another unit and not another track [-]."""
 FASTEST_RIM = 15.0
@@ -174,8 +178,8 @@ def check_positions(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     going = seen > 0.5 * max(float(np.quantile(seen, 0.9)), 1e-9)
     ratio = row_medians(np.abs(change[going]) * evidence.radius) / seen[going]
     share = float(np.mean((ratio > POSITION_RATIO[0]) & (ratio < POSITION_RATIO[1])))
-    turned_back = np.diff(np.sign(change[going]), axis=0) != 0.0
-    if not share > POSITION_SHARE or float(np.mean(turned_back)) > MOST_TURNED_BACK:
+    turned_back = float(np.mean(np.diff(np.sign(change[going]), axis=0) != 0.0))
+    if not share > POSITION_SHARE or turned_back / evidence.period > MOST_TURNED_BACK:
         return [], evidence
     ends = (rows // 2, rows - rows // 2), (0, 0)  # a change is that of the middle of its time
     rate = np.pad(change, ends, mode='edge')
@@ -201,7 +205,8 @@ def check_unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         ratio, how = math.pi / 30.0, f'rim speed above {FASTEST_RIM:.0f} m/s'
     usual = track is not None and turning.ordinary_track(track)
     units = {}
-    rim_unit = {} if usual else _rim_unit(float(np.nanmean(facts.radius)))
+    turns = track is not None and abs(track) > LEAST_ROLLING_TRACK  # as rad/s do
+    rim_unit = {} if turns else _rim_unit(float(np.nanmean(facts.radius)))
     for unit, factor in {**RATE_UNITS, **rim_unit}.items():
         by_turn = track is not None and turning.ordinary_track(track * factor)
         by_turn &= unit not in ONLY_BY_SPEED
@@ -212,9 +217,8 @@ def check_unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         if told:
             units[unit] = factor
     if ratio is not None and units:
-        speeds = ratio
-        nearest = min(units, key=lambda unit: abs(math.log(speeds / units[unit])))
-        units = {nearest: units[nearest]}
+        off = {unit: abs(math.log(ratio / factor)) for unit, factor in units.items()}
+        units = {unit: units[unit] for unit in units if off[unit] < min(off.values()) + TELLING}
     if units and ratio is None and LEAST_UNIT_TRACK < abs(track or 0.0) < 1.0:
         reason = (
             f'turns need {abs(track or 0.0):.2f} of the stated track: another unit or another track'
