@@ -523,6 +523,7 @@ def check_noise_and_zero(evidence: Evidence) -> list[Outcome]:
             reason = f'gyro: noise of {noise:.2g}: vibration, or degrees per second; drive a circle'
             outcomes += [NotChecked(kind, reason) for kind in ('unit', 'noise')]
         elif noise > NOISE_FACTOR * stated:
+            by_noise = False  # vibration, which a gyro has as well
             told = {'value': float(f'{noise:.2g}'), 'parameter': f'sensors.{key}', 'unit': unit}
             sure = confidence(noise / stated)
             outcomes.append(evidence.found('imu_noise', sure, noise=noise, stated=stated, **told))
