@@ -147,6 +147,7 @@ class Evidence:
         limit = max(REST_RATE * self.working_rate, noisy, 1e-9)
         still = (np.abs(mean) <= limit).all(axis=1)
         still &= np.abs(rate).max(axis=1) <= max(limit, 5.0 * noise)
+        still &= np.isfinite(self.rate).any(axis=1)
         still[: width - 1] = False
         return _shared(self._after(still, SHORTEST_REST))
 

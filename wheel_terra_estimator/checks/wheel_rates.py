@@ -57,6 +57,8 @@ FROZEN_TIME = 5.0
 """A rate that does not change in the last digit for this long [s] while the others do."""
 STEPS = 5.0
 """Change of the other rates at a steady speed over the least change of a wheel's own [-]."""
+COARSE = 0.1
+"""Step of the rates over the working rate, above which a rate that stays tells nothing [-]."""
 SETTLING = 1.0
 """Time after which wheels of one command have reached their speeds, some before others [s]."""
 FROZEN_CHANGE = 0.3
@@ -100,7 +102,8 @@ def check_dead_wheels(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     step = common_step(evidence.rate[moving], evidence.time[moving])
     change = max(FROZEN_CHANGE * evidence.working_rate, 1.5 * step)
     outcomes: list[Outcome] = []
-    for at_zero in (True, False):  # beside a dead wheel a steady one is no frozen one
+    rounded = step > COARSE * evidence.working_rate  # a steady rate then repeats itself
+    for at_zero in (True,) if rounded else (True, False):  # beside a dead one none is frozen
         mended = evidence.rate.copy()
         for index, name in enumerate(evidence.facts.names):
             how = _frozen(evidence, index, change, at_zero)
