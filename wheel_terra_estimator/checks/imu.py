@@ -25,7 +25,7 @@ from wheel_terra_estimator.checks.felt_motion import (
 )
 from wheel_terra_estimator.checks.finding import Finding, NotChecked, Outcome
 from wheel_terra_estimator.checks.rover_facts import RoverFacts
-from wheel_terra_estimator.checks.series import ImuSeries, Recording
+from wheel_terra_estimator.checks.series import ImuSeries, Recording, rows_of
 from wheel_terra_estimator.checks.statistics import (
     Estimate,
     block_fit,
@@ -92,7 +92,6 @@ FROZEN_SHARE = 0.3
 """Share of messages that repeat the one before."""
 MOUNTING = tuple(f'sensors.imu_mounting_{axis}_deg' for axis in ('roll', 'pitch', 'yaw'))
 """Parameters of the mounting."""
-IMU_ARRAYS = ('stamp', 'log_time', 'force', 'rate', 'orientation')
 FROZEN_TIME = 1.0
 """Time that no number of a running IMU stays the same [s]."""
 
@@ -114,7 +113,10 @@ class ImuState:
 
     def with_values(self, **values: FloatArray) -> ImuState:
         """Return the state with other messages."""
-        imu = replace(self.imu, **values)  # type: ignore[arg-type]
+        return self.with_imu(replace(self.imu, **values))  # type: ignore[arg-type]
+
+    def with_imu(self, imu: ImuSeries) -> ImuState:
+        """Return the state with another channel of the IMU."""
         return replace(self, recording=replace(self.recording, imu=imu))
 
     def found(self, key: str, sure: float, **told: Any) -> Finding:
@@ -180,7 +182,7 @@ def _frozen(state: ImuState) -> Judged:
         return [], state
     alive = ~np.concatenate([[False], same])
     if alive.sum() >= LEAST_MESSAGES:
-        state = state.with_values(**{name: getattr(imu, name)[alive] for name in IMU_ARRAYS})
+        state = state.with_imu(rows_of(imu, alive))
     return [state.found('sensor_frozen', 0.99, how=how)], state
 
 
@@ -191,9 +193,8 @@ def _wild(state: ImuState) -> Judged:
     wild = np.concatenate([[False], far]) & np.concatenate([far, [False]])
     if wild.sum() < LEAST_WILD or np.mean(wild) > MOST_WILD:
         return [], state
-    kept = {name: getattr(state.imu, name)[~wild] for name in IMU_ARRAYS}
     told = {'count': int(wild.sum()), 'share': 100.0 * np.mean(wild), 'most': float(force.max())}
-    return [state.found('imu_wild', 0.97, **told)], state.with_values(**kept)
+    return [state.found('imu_wild', 0.97, **told)], state.with_imu(rows_of(state.imu, ~wild))
 
 
 def _gravity(facts: RoverFacts, state: ImuState) -> Judged:

@@ -21,6 +21,7 @@ from wheel_terra_estimator.checks import (
     clocks,
     imu,
     reference,
+    repeats,
     rover_facts,
     sinkage,
     torque,
@@ -71,7 +72,9 @@ LEAST_SURE = 0.5
 WHILE_DRIVING: tuple[Check, ...] = (
     ('mounting', imu, 'check_upside'),
     ('missing_wheel', wheel_rates, 'check_dead_wheels'),
+    ('frozen', repeats, 'check_repeats'),
     ('sign', turning, 'check_signs'),
+    ('sign', reference, 'check_sense'),
     ('unit', turning, 'check_gyro_unit'),
     ('unit', wheel_rates, 'check_unit'),
     ('mounting', reference, 'check_frame'),

@@ -18,6 +18,10 @@ from wheel_terra_estimator.checks.statistics import bend_noise, correlation, rob
 FloatArray = NDArray[np.float64]
 
 LEAST_REFERENCES = 10
+ALIKE_BOTH_WAYS = 0.5
+"""Slower over faster of the speeds forward and back [-]."""
+SELDOM_NEGATIVE = 0.1
+"""Share of negative velocities of a speed that has no sign, by noise, at most [-]."""
 JUMP_FACTOR = 8.0
 """A velocity that leaves its neighbours by so many times the usual scatter is a jump."""
 JUMP_SHARE = 0.005
@@ -48,6 +52,25 @@ AROUND = 0.3
 LEAST_ROWS = 5
 """Velocities beside rims that a ratio needs."""
 KNOWN_UNITS = {'kilometres per hour': 3.6, 'millimetres per second': 1000.0, 'knots': 1.9438}
+
+
+def check_sense(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
+    """Return a reference that is positive both ways, and the evidence with that mended."""
+    reference = evidence.recording.reference
+    if reference is None or reference.stamp.size < LEAST_REFERENCES:
+        return [], evidence
+    rim = np.nan_to_num(evidence.rim_at(reference.stamp, evidence.rim, AROUND))
+    forward, least = reference.velocity[:, 0], 0.4 * float(np.quantile(np.abs(rim), 0.9))
+    ways = [forward[rim > least], forward[rim < -least]]
+    if min(way.size for way in ways) < LEAST_REFERENCES:
+        return [], evidence
+    usual = [float(np.median(way)) for way in ways]
+    against = [float(np.mean(way < 0.0)) for way in ways]
+    if min(usual) < ALIKE_BOTH_WAYS * max(usual) or max(against) > SELDOM_NEGATIVE:
+        return [], evidence
+    velocity = reference.velocity * np.where(rim < 0.0, -1.0, 1.0)[:, None]
+    mended = evidence.with_channel('reference', velocity=velocity)
+    return [evidence.found('reference_unsigned', 0.95)], mended
 
 
 def check_frame(evidence: Evidence) -> tuple[list[Outcome], Evidence]:

@@ -11,7 +11,7 @@ from __future__ import annotations
 import logging
 import warnings
 from collections.abc import Callable, Sequence
-from dataclasses import fields, replace
+from dataclasses import replace
 from types import ModuleType
 from typing import TypeAlias, TypeVar
 
@@ -24,6 +24,7 @@ from wheel_terra_estimator.checks import (
     imu,
     names,
     reference,
+    repeats,
     rover_facts,
     sinkage,
     torque,
@@ -35,13 +36,12 @@ from wheel_terra_estimator.checks.evidence import LEAST_MOVING_ROWS, Evidence, g
 from wheel_terra_estimator.checks.faults import RANK
 from wheel_terra_estimator.checks.finding import INTERNAL_ERROR, CheckReport, NotChecked, Outcome
 from wheel_terra_estimator.checks.rover_facts import RoverFacts
-from wheel_terra_estimator.checks.series import ImuSeries, Recording, VelocitySeries
+from wheel_terra_estimator.checks.series import Recording, Series, rows_of
 from wheel_terra_estimator.configuration.configuration import Configuration
 
 _LOGGER = logging.getLogger(__name__)
 Result = TypeVar('Result')
 Given = TypeVar('Given')
-Series = TypeVar('Series', ImuSeries, VelocitySeries)
 
 
 def check_recording(
@@ -174,8 +174,10 @@ Check: TypeAlias = 'tuple[str, ModuleType, str]'
 AGAINST_EACH_OTHER: tuple[Check, ...] = (
     ('mounting', imu, 'check_upside'),
     ('missing_wheel', wheel_rates, 'check_dead_wheels'),
+    ('frozen', repeats, 'check_repeats'),
     ('unit', wheel_rates, 'check_positions'),
     ('sign', turning, 'check_signs'),
+    ('sign', reference, 'check_sense'),
     ('unit', turning, 'check_gyro_unit'),
     ('unit', wheel_rates, 'check_unit'),
     ('noise', wheel_rates, 'check_noise'),
@@ -199,18 +201,16 @@ def _whole_rows(recording: Recording) -> Recording:
     if imu is not None:
         both = np.hstack([imu.force, imu.rate])
         there = np.isfinite(both).any(axis=0)  # a field may say that it is not there
-        imu = _rows(imu, np.isfinite(both[:, there]))
+        imu = _known(imu, np.isfinite(both[:, there]))
     if velocity is not None:
-        velocity = _rows(velocity, np.isfinite(velocity.velocity))
+        velocity = _known(velocity, np.isfinite(velocity.velocity))
     return replace(recording, imu=imu, reference=velocity)
 
 
-def _rows(series: Series, known: NDArray[np.bool_]) -> Series | None:
+def _known(series: Series, known: NDArray[np.bool_]) -> Series | None:
     """Return the rows of a channel in which all is known; None for none."""
-    kept = known.all(axis=1)
-    arrays = {f.name: getattr(series, f.name) for f in fields(series) if f.name != 'topic'}
-    rows = {name: values[kept] for name, values in arrays.items()}
-    return replace(series, **rows) if kept.any() else None
+    kept = np.asarray(known.all(axis=1))
+    return rows_of(series, kept) if kept.any() else None
 
 
 def configured_mounting(configuration: Configuration | None) -> NDArray[np.float64]:

@@ -7,7 +7,8 @@ Stamps and log times are integer nanoseconds; ``nan`` marks what a message did n
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +29,16 @@ class Channel:
     def seconds(self) -> FloatArray:
         """Stamps relative to the first one [s]."""
         return (self.stamp - self.stamp[:1].sum()) * 1e-9
+
+
+Series = TypeVar('Series', bound=Channel)
+
+
+def rows_of(series: Series, kept: NDArray[np.bool_]) -> Series:
+    """Return some messages (k,) of a channel."""
+    values = {f.name: getattr(series, f.name) for f in fields(series)}
+    arrays: dict[str, Any] = {k: v[kept] for k, v in values.items() if isinstance(v, np.ndarray)}
+    return replace(series, **arrays)
 
 
 @dataclass(frozen=True)

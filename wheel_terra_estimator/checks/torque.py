@@ -69,6 +69,9 @@ cost 0.6 sqrt(z/D) of the load (Bekker 1969), depths differ by a third of z over
 LEAST_GAIN_ERROR = 0.15
 GAIN_SIGMAS = 4.0
 ZERO_FACTOR = 6.0
+ZERO_SIGMAS = 5.0
+NO_SIGN = 0.3
+"""Resistance by the sense of motion over the mean both ways, of torques without a sign [-]."""
 
 
 def check_torque(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
@@ -79,6 +82,9 @@ def check_torque(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     if not np.nan_to_num(evidence.torque).any():
         blank = evidence.with_rate(evidence.rate, np.full_like(evidence.torque, np.nan))
         return [evidence.found('torque_placeholder', 0.99)], blank
+    unsigned = [] if evidence.force is None else _unsigned(evidence)
+    if unsigned:
+        return [*unsigned, *_not_told('a torque without a sign')], evidence
     outcomes, evidence = _signs(evidence)
     if not evidence.facts.known or evidence.force is None:
         return outcomes, evidence
@@ -305,6 +311,14 @@ def torque_zeros(evidence: Evidence) -> list[Estimate] | None:
 
     Ground that resists more one way than back, over the rover's own ruts, looks like a zero.
     """
+    fits = _both_ways(evidence)
+    if fits is None:
+        return None
+    return [Estimate(zero.value, math.hypot(zero.std, RUTS * back.value)) for zero, back in fits]
+
+
+def _both_ways(evidence: Evidence) -> list[tuple[Estimate, Estimate]] | None:
+    """Return zero and resistance of each torque on a straight; None unless driven both ways."""
     assert evidence.force is not None
     smooth = moving_mean(evidence.common_rate, evidence.rows_in(SETTLING))
     rows = evidence.straight & (np.abs(smooth) > 0.5 * evidence.working_rate)
@@ -314,11 +328,19 @@ def torque_zeros(evidence: Evidence) -> list[Estimate] | None:
     design = np.column_stack([np.ones(sense.size), sense, evidence.force[rows, 0]])
     if float(np.std(_smooth(evidence.force[rows, :1]))) < LEAST_SLOPE_STD:
         design = design[:, :2]
-    zeros = []
-    for i in range(len(evidence.facts.names)):
-        zero, resistance = block_fit(design, np.nan_to_num(evidence.torque[rows, i]))[:2]
-        zeros.append(Estimate(zero.value, math.hypot(zero.std, RUTS * resistance.value)))
-    return zeros
+    fits = [block_fit(design, np.nan_to_num(column)) for column in evidence.torque[rows].T]
+    return [(fit[0], fit[1]) for fit in fits]
+
+
+def _unsigned(evidence: Evidence) -> list[Outcome]:
+    """Return torques that are as large and positive when the wheels drive back."""
+    fits = _both_ways(evidence)
+    if fits is None or not all(
+        zero.value > ZERO_SIGMAS * zero.std and abs(resistance.value) < NO_SIGN * zero.value
+        for zero, resistance in fits
+    ):
+        return []
+    return [evidence.found('torque_unsigned', 0.9)]
 
 
 def drive_friction(evidence: Evidence) -> Estimate | NotChecked:
@@ -362,7 +384,7 @@ def _zeros(evidence: Evidence, zeros: list[Estimate] | None) -> list[Outcome]:
         zeros = [Estimate(float(value), max(spread, stated)) for value in level]
         where = 'standing'
     least = max(ZERO_FACTOR * stated, 0.5 * driving)
-    wrong = [i for i, z in enumerate(zeros) if abs(z.value) > max(least, 5.0 * z.std)]
+    wrong = [i for i, z in enumerate(zeros) if abs(z.value) > max(least, ZERO_SIGMAS * z.std)]
     if not wrong:
         return []
     whole = whole_zeros(evidence, zeros)

@@ -1,0 +1,90 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Readings that stay the same, and sizes without a sign, beside sound ones that look like them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import rolling_rover as rolling
+
+from wheel_terra_estimator.checks.run import check_recording
+
+
+def found(**changes):
+    whole = replace(rolling.recording(), **changes)
+    return check_recording(whole, rolling.rover()).findings
+
+
+def held(channel, field, since, until, column=...):
+    """A channel whose numbers stay for a while."""
+    seconds = channel.seconds
+    values = getattr(channel, field).copy()
+    rows = np.flatnonzero((seconds > since) & (seconds < until))
+    values[rows, column] = values[rows[0], column]
+    return replace(channel, **{field: values})
+
+
+WHOLE = rolling.recording()
+
+
+@pytest.mark.parametrize(
+    'name, field, column, key',
+    [
+        ('reference', 'velocity', ..., 'reference_frozen'),
+        ('joints', 'torque', 2, 'torque_frozen'),
+        ('sinkage', 'sinkage', 1, 'sinkage_frozen'),
+        ('imu', 'force', ..., 'sensor_frozen'),
+        ('imu', 'rate', ..., 'sensor_frozen'),
+    ],
+)
+def test_a_sensor_that_freezes_on_the_way(name, field, column, key):
+    (finding,) = found(**{name: held(getattr(WHOLE, name), field, 120.0, 160.0, column)})
+    assert finding.fault == key and finding.kind == 'frozen'
+    assert finding.wheel == (None if column is ... else rolling.NAMES[column])
+    seconds = float(finding.words.split('up to ')[1].split(' s')[0])
+    assert seconds == pytest.approx(40.0, abs=0.5)
+
+
+@pytest.mark.parametrize('name, field', [('reference', 'velocity'), ('sinkage', 'sinkage')])
+def test_nothing_is_frozen_while_the_rover_stands(name, field):
+    assert found(**{name: held(getattr(WHOLE, name), field, 0.0, 15.0)}) == []
+
+
+def test_rounded_readings_repeat_themselves():
+    coarse = {
+        'reference': ('velocity', 0.05),
+        'sinkage': ('sinkage', 0.005),
+        'joints': ('torque', 1.0),
+    }
+    changes = {
+        name: replace(
+            getattr(WHOLE, name),
+            **{field: step * np.round(getattr(getattr(WHOLE, name), field) / step)},
+        )
+        for name, (field, step) in coarse.items()
+    }
+    assert 'frozen' not in {f.kind for f in found(**changes)}
+
+
+def test_a_reference_of_zeros_is_a_placeholder():
+    none = replace(WHOLE.reference, velocity=0.0 * WHOLE.reference.velocity)
+    (finding,) = found(reference=none)
+    assert (finding.fault, finding.kind) == ('reference_zero', 'placeholder')
+
+
+def test_no_sinkage_is_read_on_firm_ground():
+    firm = replace(WHOLE.sinkage, sinkage=0.0 * WHOLE.sinkage.sinkage)
+    assert found(sinkage=firm) == []
+    dead = WHOLE.sinkage.sinkage.copy()
+    dead[:, 3] = 0.0
+    names = {(f.fault, f.wheel) for f in found(sinkage=replace(WHOLE.sinkage, sinkage=dead))}
+    assert ('sinkage_frozen', 'rear_right') in names
+
+
+def test_speed_and_torque_without_a_sign():
+    speed = replace(WHOLE.reference, velocity=np.abs(WHOLE.reference.velocity))
+    (finding,) = found(reference=speed)
+    assert finding.fault == 'reference_unsigned'
+    (finding,) = found(joints=replace(WHOLE.joints, torque=np.abs(WHOLE.joints.torque)))
+    assert finding.fault == 'torque_unsigned' and finding.kind == 'sign'

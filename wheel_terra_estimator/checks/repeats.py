@@ -1,0 +1,140 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Readings of a reference, a torque or a sinkage that stay the same while the wheels turn.
+
+A dead sensor, or a driver that repeats its last value, sends the same number to the last digit for
+far longer than the sensor itself ever does.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wheel_terra_estimator.checks.evidence import Evidence, Mask
+from wheel_terra_estimator.checks.finding import Outcome
+from wheel_terra_estimator.checks.series import SinkageSeries, rows_of
+from wheel_terra_estimator.checks.statistics import runs
+
+FloatArray = NDArray[np.float64]
+
+LEAST_TIME = 5.0
+"""Time of driving in which a reading that stays is frozen [s]."""
+LEAST_MESSAGES = 10
+"""Messages in which it stays, at least."""
+LONGER = 10.0
+"""So many times longer than the reading usually stays [-]: rounded ones repeat themselves."""
+MOSTLY = 0.8
+"""Share of such a stretch in which the wheels turn [-]."""
+CLEAR_SINKAGE = 0.005
+"""Median sinkage of the other wheels beside which none reads 0 all the time [m]."""
+
+
+def check_repeats(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
+    """Return readings that stay the same while driving, and the evidence without these."""
+    sinkage = evidence.recording.sinkage
+    deep = [] if sinkage is None else _sinkage(evidence, sinkage)
+    outcomes, evidence = _reference(evidence)
+    imu = evidence.recording.imu
+    if imu is not None and evidence.force is not None:
+        dead = stays(evidence, evidence.seconds(imu), imu.force)
+        if dead is not None:
+            how = f'linear_acceleration {dead.how}'
+            outcomes.append(evidence.found('sensor_frozen', 0.97, how=how))
+            evidence = replace(evidence, force=None)
+    if imu is not None and evidence.gyro is not None:
+        dead = stays(evidence, evidence.seconds(imu), imu.rate)
+        if dead is not None:
+            how = f'angular_velocity {dead.how}'
+            outcomes.append(evidence.found('sensor_frozen', 0.97, how=how))
+            evidence = replace(evidence, gyro=None)
+    torques, evidence = _torques(evidence)
+    return [*outcomes, *torques, *deep], evidence
+
+
+def _reference(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
+    reference = evidence.recording.reference
+    if reference is None:
+        return [], evidence
+    dead = stays(evidence, evidence.seconds(reference), reference.velocity)
+    if dead is None:
+        return [], evidence
+    left, told = None, evidence.found('reference_zero', 0.9)
+    if reference.velocity.any():
+        told = evidence.found('reference_frozen', 0.97, how=dead.how)
+        left = None if dead.rows.all() else rows_of(reference, ~dead.rows)
+    return [told], replace(evidence, recording=replace(evidence.recording, reference=left))
+
+
+def _torques(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
+    outcomes: list[Outcome] = []
+    torque = evidence.torque.copy()
+    greatest = float(np.nanmax(np.abs(torque), initial=0.0))
+    for i, name in enumerate(evidence.facts.names):
+        dead = stays(evidence, evidence.time, evidence.torque[:, i : i + 1])
+        if dead is not None and abs(dead.value) < greatest:  # else a drive at its limit
+            outcomes.append(evidence.found('torque_frozen', 0.97, wheel=name, how=dead.how))
+            torque[:, i] = np.nan
+    return outcomes, evidence.with_rate(evidence.rate, torque)
+
+
+def _sinkage(evidence: Evidence, sinkage: SinkageSeries) -> list[Outcome]:
+    """Return wheels whose sinkage stays the same; 0 is right on firm ground."""
+    outcomes: list[Outcome] = []
+    middle = np.nan_to_num(np.nanmedian(np.abs(sinkage.sinkage), axis=0))
+    for i, name in enumerate(sinkage.names):
+        others = float(np.median(np.delete(middle, i))) if middle.size > 1 else 0.0
+        dead = stays(evidence, evidence.seconds(sinkage), sinkage.sinkage[:, i : i + 1])
+        if dead is not None and (dead.value != 0.0 or others > CLEAR_SINKAGE):
+            outcomes.append(evidence.found('sinkage_frozen', 0.97, wheel=name, how=dead.how))
+    return outcomes
+
+
+class Stays(NamedTuple):
+    """Where a reading stays the same: rows (k,), the longest time [s], and its number there."""
+
+    rows: Mask
+    longest: float
+    value: float
+
+    @property
+    def how(self) -> str:
+        """In words."""
+        if self.rows.all():
+            return f'is {self.value:g} in every message while the wheels turn'
+        return f'stays the same to the last digit for up to {self.longest:.1f} s of driving'
+
+
+def stays(evidence: Evidence, time: FloatArray, values: FloatArray) -> Stays | None:
+    """Return where readings (k, p) at times (k,) [s] stay, all p of a row; None: nowhere.
+
+    A zero counts only where nothing else is ever read: a sensor may well read 0 for a while.
+    """
+    known = np.isfinite(values).all(axis=1)
+    if known.sum() < LEAST_MESSAGES:
+        return None
+    at, readings = time[known], values[known]
+    driving = np.interp(at, evidence.time, evidence.moving)
+    same = (np.diff(readings, axis=0) == 0.0).all(axis=1)
+    rows, longest, value = np.zeros(time.size, dtype=bool), 0.0, 0.0
+    for first, last in runs(same):
+        lasts = float(at[last] - at[first])
+        often = last - first >= max(
+            LEAST_MESSAGES, LONGER * _usual(np.delete(same, np.s_[first:last]))
+        )
+        live = not readings[first].any() and readings.any()
+        if live or not often or lasts < LEAST_TIME or driving[first:last].mean() < MOSTLY:
+            continue
+        rows[np.flatnonzero(known)[first : last + 1]] = True
+        if lasts > longest:
+            longest, value = lasts, float(readings[first, 0])
+    return Stays(rows, longest, value) if longest else None
+
+
+def _usual(same: Mask) -> float:
+    """Return over how many messages a reading stays, given (k - 1,) whether it repeats itself."""
+    changes = np.flatnonzero(~same)
+    return float(np.quantile(np.diff(changes), 0.9)) if changes.size > LEAST_MESSAGES else 1.0
