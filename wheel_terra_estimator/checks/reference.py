@@ -62,7 +62,7 @@ def check_sense(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     rim = np.nan_to_num(evidence.rim_at(reference.stamp, evidence.rim, AROUND))
     forward, least = reference.velocity[:, 0], 0.4 * float(np.quantile(np.abs(rim), 0.9))
     ways = [forward[rim > least], forward[rim < -least]]
-    if min(way.size for way in ways) < LEAST_REFERENCES:
+    if min(way.size for way in ways) < LEAST_ROWS:
         return [], evidence
     usual = [float(np.median(way)) for way in ways]
     against = [float(np.mean(way < 0.0)) for way in ways]

@@ -70,8 +70,7 @@ LEAST_GAIN_ERROR = 0.15
 GAIN_SIGMAS = 4.0
 ZERO_FACTOR = 6.0
 ZERO_SIGMAS = 5.0
-NO_SIGN = 0.3
-"""Resistance by the sense of motion over the mean both ways, of torques without a sign [-]."""
+MEAN_SIGMAS = 2.0
 
 
 def check_torque(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
@@ -333,11 +332,10 @@ def _both_ways(evidence: Evidence) -> list[tuple[Estimate, Estimate]] | None:
 
 
 def _unsigned(evidence: Evidence) -> list[Outcome]:
-    """Return torques that are as large and positive when the wheels drive back."""
+    """Return torques whose mean both ways exceeds what the sense of motion changes, all wheels."""
     fits = _both_ways(evidence)
     if fits is None or not all(
-        zero.value > ZERO_SIGMAS * zero.std and abs(resistance.value) < NO_SIGN * zero.value
-        for zero, resistance in fits
+        zero.value > max(MEAN_SIGMAS * zero.std, abs(resistance.value)) for zero, resistance in fits
     ):
         return []
     return [evidence.found('torque_unsigned', 0.9)]

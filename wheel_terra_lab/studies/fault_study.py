@@ -4,7 +4,7 @@
 
 python -m wheel_terra_lab.studies.fault_study B:turns C:firm drive=my_rover.yaml --seeds 7001 7002
 
-A case is KIND of a simulator or BAG=CONFIG (several files with a +). Fifty-three kinds of fault are
+A case is KIND of a simulator or BAG=CONFIG (several files with a +). Sixty kinds of fault are
 put into the readings of each, or into its rover file; wheel, size, sign and time are drawn by the
 seed. What was found without the fault is left out. A fault counts as
 
@@ -248,6 +248,40 @@ def _frozen(at_zero: bool) -> Put:
     return put
 
 
+def _held(channel: str, field: str, one_wheel: bool) -> Put:
+    """Let a sensor repeat its last value for a stretch in which the rover drives."""
+
+    def put(case: Case, random: Random) -> Faulty | None:
+        series, joints = getattr(case.recording, channel), case.recording.joints
+        wheel = int(random.integers(len(case.names)))
+        if series is None or joints is None or not np.nan_to_num(getattr(series, field)).any():
+            return None
+        size = np.median(np.abs(np.nan_to_num(joints.rate)), axis=1)
+        held = np.flatnonzero(_stretch(series.seconds, random, 20.0))
+        driven = np.interp(series.stamp[held], joints.stamp, size) > 0.3 * size.max()
+        if held.size < 20 or driven.mean() < 0.9:
+            return None
+        values = getattr(series, field).copy()
+        column = series.names.index(case.names[wheel]) if one_wheel else slice(None)
+        values[held, column] = values[held[0], column]
+        return Faulty(case.having(channel, **{field: values}), (wheel,) if one_wheel else ())
+
+    return put
+
+
+def _unsigned(channel: str, field: str) -> Put:
+    def put(case: Case, random: Random) -> Faulty | None:
+        series = getattr(case.recording, channel)
+        if series is None or not np.nan_to_num(getattr(series, field)).any():
+            return None
+        direction = case.rover.wheels.direction if field == 'torque' else 1.0
+        values = direction * np.abs(getattr(series, field))
+        back = np.mean(np.nan_to_num(getattr(series, field) * direction) < 0.0)
+        return Faulty(case.having(channel, **{field: values})) if back > 0.1 else None
+
+    return put
+
+
 def _imu_frozen(case: Case, random: Random) -> Faulty | None:
     imu = case.recording.imu
     if imu is None:
@@ -417,6 +451,13 @@ FAULTS = (
     Fault('rates in counts', ('unit',), _scaled('joints', 'rate', 4096.0 / 2.0 / math.pi)),
     Fault('a frozen rate', ('frozen',), _frozen(False)),
     Fault('a dead encoder', ('frozen',), _frozen(True)),
+    Fault('a frozen reference', ('frozen',), _held('reference', 'velocity', False)),
+    Fault('a frozen torque', ('frozen',), _held('joints', 'torque', True)),
+    Fault('a frozen sinkage', ('frozen',), _held('sinkage', 'sinkage', True)),
+    Fault('a frozen accelerometer', ('frozen',), _held('imu', 'force', False)),
+    Fault('a reference of zeros', ('placeholder',), _scaled('reference', 'velocity', 0.0)),
+    Fault('a speed without a sign', ('sign',), _unsigned('reference', 'velocity')),
+    Fault('torques without a sign', ('sign',), _unsigned('joints', 'torque')),
     Fault('noisy rates', ('noise',), _noise(0.5, 'joints', 'rate')),
     Fault('coarse encoders', ('noise',), _counted),
     Fault('gaps of the rates', ('drop_outs',), _without('joints', False)),
