@@ -704,13 +704,12 @@ class WheelSoilEstimator:
                 WheelMotion(
                     wheel.slip,
                     wheel.std,
-                    0.0 if isnan(rim) else rim,
+                    rim,
                     abs(rim) > rover.rest_speed and not wheel.resting,
                     # A wheel that stands is held, or dragged, in the direction of the others.
                     driving_share(torque, limit, rim if abs(rim) > rover.rest_speed else onward),
                     sinkage[i],
                     rover.rim_radius[i],
-                    rate_told=not isnan(rim),
                 )
             )
         loads = self._loads.state
@@ -720,9 +719,6 @@ class WheelSoilEstimator:
                 speed,
                 self._reference.fresh(time),
                 tuple(seen),
-                slip_told=self._reference.known(time)
-                or wheels.torque_known(time)
-                or len(self._sinkage.unread(time)) < rover.wheel_count,
                 turning=motion.lateral_motion > _SHARP_TURN
                 or sides_oppose(rims, body.headings.by_yaw_rate),
             ),

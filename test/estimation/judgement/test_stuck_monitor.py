@@ -123,26 +123,24 @@ def test_a_side_that_turns_round_behind_a_spin_is_no_stall(spinning):
     before = [wheel(0.5, rim=-0.045 if spinning else 0.045, torque=0.3), right] * 3
     found = [
         judge(monitor, 0.1 * i, 0.0 if spinning else 0.045, True, before, turning=spinning)
-        for i in range(40)
+        for i in range(80)
     ]
     assert first(found) is None
     held = [wheel(0.2, rim=0.003, torque=0.9), right] * 3
-    found = [judge(monitor, 4.0 + 0.1 * i, 0.012, True, held) for i in range(6)]
+    found = [judge(monitor, 8.0 + 0.1 * i, 0.012, True, held) for i in range(6)]
     assert found[-1].stuck is not spinning
 
 
-def test_pulling_away_from_rest_is_no_stall():
-    monitor = StuckMonitor()
-    slow, quick = ([wheel(0.1, rim=k * i, torque=0.95) for i in range(9)] for k in (0.1, 0.2))
-    rows = [[a] * 2 + [b] * 2 for a, b in zip(slow, quick, strict=True)]
-    rows[0] = [w._replace(known=False) for w in rows[0]]
-    assert not any(judge(monitor, 0.1 * i, 0.1 * i, False, w).stuck for i, w in enumerate(rows))
+def held_from_the_start(ahead):
+    """Half of the wheels turn half as fast, near their limit; return the travel at the warning."""
+    rows = [[wheel(0.1, rim=0.05, torque=0.95)] * 2 + [wheel(0.1, rim=0.1, torque=0.95)] * 2] * 60
+    rows[:1] = [[wheel(0.0, rim=0.0, known=False)] * 4] * ahead
+    return 0.1 * (first(course(rows)) - 0.1 * ahead)
 
 
-def test_wheels_held_in_the_first_set_raise_it_at_once():
-    """Where a recording begins shortly before the entrapment, no rest and no start was seen."""
-    rows = [[wheel(0.1, rim=0.5, torque=0.95)] * 2 + [wheel(0.1, rim=1.0, torque=0.95)] * 2] * 9
-    assert first(course(rows)) == pytest.approx(0.2)
+@pytest.mark.parametrize('rest', [1, 20])
+def test_pulling_away_is_no_stall_until_the_wheels_have_rolled(rest):
+    assert 0.25 < held_from_the_start(rest) < 0.3
 
 
 def test_travel_left_shrinks_to_nothing_where_wheels_dig():
@@ -242,7 +240,7 @@ def test_drives_that_give_way_near_their_limit_raise_it_without_any_speed():
 
 def test_a_wheel_that_sends_nothing_for_a_while_changes_nothing():
     """What a wheel does that tells no rate is not known: the trend of the others is followed."""
-    silent = wheel(0.0, rim=0.0, known=False)._replace(rate_told=False)
+    silent = wheel(0.0, rim=math.nan, known=False)
     slips = [0.2] * 100 + [min(0.2 + 0.1 * 0.1 * i, 0.7) for i in range(80)]
     rows = [[wheel(s)] * 5 + [silent if i // 7 % 2 else wheel(s)] for i, s in enumerate(slips)]
     assert first(course(rows)) == pytest.approx(first(course([[wheel(s)] * 6 for s in slips])))
@@ -330,17 +328,6 @@ def test_a_sign_that_is_there_keeps_the_warning():
     free = [judge(monitor, 15.0 + 0.1 * i, 0.0, False, cruise) for i in range(60)]
     cleared = next(i for i, a in enumerate(free) if not a.stuck)
     assert 30 <= cleared <= 32
-
-
-def test_an_accelerometer_alone_raises_nothing():
-    """Slip without reference, torque or sinkage may be the drift of an accelerometer."""
-    for told in (True, False):
-        monitor = StuckMonitor()
-        found = [
-            judge(monitor, 0.1 * i, 0.0, False, [wheel(0.98)] * 6, slip_told=told)
-            for i in range(200)
-        ]
-        assert (first(found) is not None) == told
 
 
 def test_a_wheel_whose_slip_is_not_known_or_brakes_has_no_entrapment_in_sight():

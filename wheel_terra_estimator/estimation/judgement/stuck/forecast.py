@@ -16,8 +16,6 @@ from wheel_terra_estimator.estimation.scalars import median
 
 LONGEST_TIME = 600.0
 """Time to entrapment that is said where none is in sight [s]."""
-_LEAST_RIM = 1e-3
-"""Rim speed [m/s] below which no time is foreseen."""
 
 
 class WheelForecast(NamedTuple):
@@ -57,7 +55,7 @@ def outlook(s: Situation, passage: FirstPassage, settings: StuckSettings) -> Out
             if course[-1] > 0.5:
                 left = min(left, float(np.interp(0.5, course, TRAVELS)))
             if left < NO_ENTRAPMENT_IN_SIGHT:
-                time = min(left / max(abs(wheel.rim_speed), _LEAST_RIM), LONGEST_TIME)
+                time = min(left / abs(wheel.rim_speed), LONGEST_TIME)
             found.append(WheelForecast(likely, time, left))
     telling = [
         ahead.probability

@@ -19,9 +19,11 @@ from wheel_terra_estimator.estimation.judgement.stuck.forecast import (
     WheelForecast,
     outlook,
 )
-from wheel_terra_estimator.estimation.judgement.stuck.passage import FirstPassage
+from wheel_terra_estimator.estimation.judgement.stuck.passage import FirstPassage, SlipProcess
 from wheel_terra_estimator.estimation.judgement.stuck.settings import StuckSettings
 from wheel_terra_estimator.estimation.judgement.stuck.situation import (
+    DIGS,
+    NEAR_LIMIT,
     Memory,
     RoverMotion,
     Situation,
@@ -31,16 +33,11 @@ from wheel_terra_estimator.estimation.scalars import NAN
 
 ADVICE = 'stop, back out'
 """What to do where wheels dig themselves in: they climb their own ruts better than fresh soil."""
-HOLD, SINKING_HOLD, STANDING_HOLD = 1.0, 0.5, 0.2
-"""Times [s] for which the signs must be there: slip, slip of wheels that sink, standing (two
-readings of wheel odometry). Where the rover stops, a reference stands up to 0.9 s before the wheels
-do, and none of them sinks."""
-_SINKING = 0.01  # sinkage gained over rim travel by most wheels [m/m]
-_DIGGING_SLIP, _SURE_STD = 0.8, 0.25
-"""Median slip above which a rover that drives on digs itself in, and how well it must be known."""
-_SURE = 2.0  # deviations within which a rover stands by its reference
-_AT_LIMIT = 0.2  # of the torque limit: farther above it the unit is wrong
-_TIME_ROUNDING = 1e-9  # [s]
+HOLD, SINKING_HOLD, STANDING_HOLD = 0.95, 0.45, 0.15
+"""Times [s] that a sign must exceed, half a cycle short of 1, 0.5 and 0.2 s: slip, slip of wheels
+that sink, standing (two readings of wheel odometry). Where the rover stops, a reference stands up
+to 0.9 s before the wheels do, and none of them sinks."""
+_DIGGING_SLIP = 0.8  # median slip above which a rover that drives on digs itself in
 _SETTINGS = StuckSettings()
 
 
@@ -60,7 +57,7 @@ class StuckState(NamedTuple):
     """What the monitor remembers."""
 
     memory: Memory = Memory()
-    since: tuple[float, ...] = ()  # when each sign came [s], nan = it is not there
+    since: tuple[float, ...] = (NAN, NAN)  # when each sign came [s], nan = it is not there
     stuck: bool = False
     reason: str = ''
     direction: int = 0
@@ -85,22 +82,18 @@ class StuckMonitor(Component[StuckState]):
         old, settings = self.state, self._settings
         situation = observe(old.memory, time, motion)
         ahead = outlook(situation, self._passage, settings)
-        slips = motion.slip_told and situation.fastest > 0.0 and not situation.braked
         likely = ahead.probability > settings.threshold or _digs(situation)
-        there = slips and likely, situation.standing
+        there = likely and not situation.braked, situation.standing
         since = tuple(
             (time if isnan(begun) else begun) if sign else NAN
-            for sign, begun in zip(there, old.since or (NAN,) * len(there), strict=True)
+            for sign, begun in zip(there, old.since, strict=True)
         )
-        holds = SINKING_HOLD if situation.digging > _SINKING else HOLD, STANDING_HOLD
-        held = [
-            time - begun >= hold - _TIME_ROUNDING for begun, hold in zip(since, holds, strict=True)
-        ]
+        holds = SINKING_HOLD if situation.digging > DIGS else HOLD, STANDING_HOLD
+        held = [time - begun > hold for begun, hold in zip(since, holds, strict=True)]
         state = old._replace(memory=situation.memory, since=since, clear_since=NAN)
         if any(held) and not old.stuck:
             memory = situation.memory
-            one_way = time - memory.way_since >= SINKING_HOLD - _TIME_ROUNDING
-            direction = memory.way if one_way else 0
+            direction = memory.way if time - memory.way_since > SINKING_HOLD else 0
             reason = _in_words(situation, ahead, settings, held)
             state = state._replace(stuck=True, reason=reason, direction=direction)
         elif old.stuck and not any(there) and situation.slip_magnitude < settings.clear_slip:
@@ -119,7 +112,7 @@ class StuckMonitor(Component[StuckState]):
 
 
 def _digs(s: Situation) -> bool:
-    return s.settled and s.slip > _DIGGING_SLIP and s.slip_std < _SURE_STD
+    return s.settled and s.slip > _DIGGING_SLIP and s.slip_std < SlipProcess.usual_std
 
 
 def _confirmed(s: Situation) -> bool:
@@ -128,17 +121,16 @@ def _confirmed(s: Situation) -> bool:
     In a wrong unit rim speeds make a slip near 1 of any speed, but no speed of zero; torques are
     then far beyond their limit.
     """
-    still = abs(s.motion.speed) < _SURE * s.slip_std * s.fastest
-    return (s.motion.speed_known and still) or abs(s.strain - 1.0) < _AT_LIMIT
+    still = abs(s.motion.speed) < s.slip_std * s.fastest
+    return (s.motion.speed_known and still) or NEAR_LIMIT < s.strain < 1.0 / NEAR_LIMIT
 
 
 def _in_words(s: Situation, ahead: Outlook, settings: StuckSettings, held: list[bool]) -> str:
     """Return what is seen, how likely an entrapment is, and what to do."""
     count = sum(s.stalled)
-    standing = not held[0]
-    if standing and count > 1:
+    if held[1] and count > 1:
         told = f'{count} wheels stalled near their torque limit'
-    elif standing:
+    elif held[1]:
         told = f'wheels slowed to {s.rim:.2f} m/s near their torque limit'
     elif s.slip > ENTRAPPED_SLIP:
         told = f'median slip {s.slip:.2f}: entrapment under way'

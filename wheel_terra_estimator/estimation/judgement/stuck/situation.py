@@ -10,14 +10,15 @@ from functools import cached_property
 from math import isnan
 from typing import NamedTuple
 
-from wheel_terra_estimator.estimation.scalars import NAN, gain_of, median
+from wheel_terra_estimator.estimation.scalars import NAN, gain_of, known, median
 
 # Set on simulators A, B and C and nine snow immobilisations.
-_START_TIME = 1.0  # [s] after the wheels begin to turn: pulling away looks like a stall
-_START_TRAVEL = 0.25  # [m] of rim travel in which slip and sinkage settle after a start
+_START_TRAVEL = (
+    0.25  # [m] of rim travel in which slip, sinkage, torque settle after a start or turn
+)
 _STALL_RATIO = 0.6  # of the fastest rim speed: a wheel below it hardly turns
 _RUT_LENGTH = 0.08  # [m] of rim travel over which the growth of the sinkage is taken
-_DIGS, _DIGS_AT = 0.02, 0.2
+DIGS, _DIGS_AT = 0.02, 0.2
 """Sinkage gained over rim travel [m/m], and slip, above which a wheel digs in."""
 _DEEP = 0.4
 """Sinkage over the radius from which a wheel does not climb out: its entrance angle is 53 degrees
@@ -25,7 +26,7 @@ there, and the normal stress, centred at about half of it, leans back by 27 degr
 friction of loose soil pulls forward."""
 _CRUISE_TIME = 5.0  # [s] in which the speed before is forgotten
 _SLOWED = 0.2  # of the rim speed: more is missing where wheels are held, or stopped
-_NEAR_LIMIT = 0.7
+NEAR_LIMIT = 0.7
 """Of the torque limit: below it nothing holds the wheels, above it nobody stops them."""
 
 
@@ -34,15 +35,13 @@ class WheelMotion(NamedTuple):
 
     slip: float
     slip_std: float
-    rim_speed: float  # [m/s], signed
+    rim_speed: float  # [m/s], signed; nan = no rate came of late
     known: bool  # a rate is known and the wheel is not at rest
     torque_share: float
     """Torque over its limit; negative where the soil turns or drags the wheel against its drive;
     nan = unknown."""
     sinkage: float  # [m]
     radius: float  # [m]
-    rate_told: bool = True
-    """Whether a rate came of late; without one the rim speed is 0."""
 
 
 def driving_share(torque: float, limit: float, rim_speed: float) -> float:
@@ -60,8 +59,6 @@ class RoverMotion(NamedTuple):
     speed_known: bool
     """Whether the speed rests on more than a guess."""
     wheels: tuple[WheelMotion, ...]
-    slip_told: bool = True
-    """Whether a reference, a torque or a sinkage tells of the slip, not an accelerometer alone."""
     turning: bool = False
     """Sharply: slip that comes from turning says nothing of what is ahead."""
 
@@ -70,8 +67,7 @@ class Memory(NamedTuple):
     """What is remembered from update to update."""
 
     time: float = NAN  # [s]
-    started: float = NAN  # since when the wheels turn [s], nan = they stand
-    rolled: float = 0.0  # rim travel since then [m]
+    rolled: float = 0.0  # rim travel since the wheels stood or turned the rover [m]
     cruise: float = 0.0  # typical rim speed, a lower one followed slowly [m/s]
     ruts: tuple[float, ...] = ()  # sinkage of each wheel, followed over its rim travel [m]
     way: int = 0  # of the rims: 1 forward, -1 backward, 0 both
@@ -98,19 +94,13 @@ class Situation:
     @cached_property
     def rim(self) -> float:
         """Typical rim speed, that of standing wheels included [m/s]."""
-        told = [abs(w.rim_speed) for w in self.motion.wheels if w.rate_told]
+        told = known([abs(w.rim_speed) for w in self.motion.wheels])
         return median(told) if told else 0.0
 
     @cached_property
     def slip(self) -> float:
-        """Typical slip; a stalled wheel counts as one that makes no way."""
-        slips = [w.slip for w in self.moving]
-        slips += [
-            1.0
-            for w, stands in zip(self.motion.wheels, self.stalled, strict=True)
-            if stands and not w.known
-        ]
-        return median(slips) if slips else 0.0
+        """Typical slip; 0 where no wheel tells."""
+        return median([w.slip for w in self.moving]) if self.moving else 0.0
 
     @cached_property
     def slip_std(self) -> float:
@@ -148,7 +138,7 @@ class Situation:
         """
         return tuple(
             max(_DEEP * wheel.radius - wheel.sinkage, 0.0) / growth
-            if self.settled and wheel.known and growth > _DIGS and wheel.slip > _DIGS_AT
+            if self.settled and wheel.known and growth > DIGS and wheel.slip > _DIGS_AT
             else math.inf
             for wheel, growth in zip(self.motion.wheels, self.growths, strict=True)
         )
@@ -163,36 +153,34 @@ class Situation:
         return shares[-2] if len(shares) > 1 else 0.0
 
     @cached_property
-    def slowing(self) -> float:
-        """What the typical rim speed lacks of that of the last seconds [-]."""
-        return 1.0 - self.rim / self.memory.cruise if self.memory.cruise > 0.0 else 0.0
+    def slowed(self) -> bool:
+        """Whether the wheels are slower than in the last seconds."""
+        return self.rim < (1.0 - _SLOWED) * self.memory.cruise
+
+    @property
+    def braked(self) -> bool:
+        """Whether the wheels are being stopped: a reference stands half a second before them."""
+        return self.slowed and self.strain < NEAR_LIMIT
 
     @cached_property
     def standing(self) -> bool:
         """Whether the rover stands for want of power, or is about to."""
-        if self.motion.turning or self.fastest <= 0.0:
-            return False
-        lag = 1.0 - self.rim / self.fastest
-        return self._held(self.strain) and max(self.slowing, lag) > _SLOWED
+        return self._held(self.strain) and (
+            self.slowed or self.rim < (1.0 - _SLOWED) * self.fastest
+        )
 
     @cached_property
     def stalled(self) -> tuple[bool, ...]:
         """Wheels that pull near their limit and hardly turn while another turns."""
         return tuple(
             [
-                abs(w.rim_speed) < _STALL_RATIO * self.fastest and self._held(w.torque_share)
+                self._held(w.torque_share) and abs(w.rim_speed) < _STALL_RATIO * self.fastest
                 for w in self.motion.wheels
             ]
         )
 
     def _held(self, strain: float) -> bool:
-        pulled_away = self.memory.time - self.memory.started >= _START_TIME
-        return pulled_away and strain > _NEAR_LIMIT
-
-    @property
-    def braked(self) -> bool:
-        """Whether the wheels are being stopped: a reference stands half a second before them."""
-        return self.slowing > _SLOWED and self.strain < _NEAR_LIMIT
+        return self.settled and strain > NEAR_LIMIT
 
     @property
     def slip_magnitude(self) -> float:
@@ -204,34 +192,27 @@ def observe(memory: Memory, time: float, motion: RoverMotion) -> Situation:
     """Return the situation at a time [s], with the memory that it leaves."""
     dt = 0.0 if isnan(memory.time) else max(time - memory.time, 0.0)
     now = Situation(motion, memory)
-    moves, rim = bool(now.moving), now.rim
-    started = memory.started
-    if not moves or motion.turning:
-        # Behind a spin one side stands for a moment and pulls away the other way round.
-        started = time if moves else NAN
-    elif isnan(started):
-        # Nobody has seen wheels pull away that turn in the first set.
-        started = -math.inf if isnan(memory.time) else time
-    rolled = memory.rolled + now.fastest * dt if moves else 0.0
+    moves = bool(now.moving)
     # Wheels settle into their ruts after a start; those that turn on the spot dig by command.
-    fresh = motion.turning or rolled < _START_TRAVEL
+    rolled = memory.rolled + now.fastest * dt if moves and not motion.turning else 0.0
+    fresh = rolled < _START_TRAVEL
     ruts = memory.ruts or tuple([w.sinkage for w in motion.wheels])
     way = memory.way
     if moves:
         forward = sum([1 if w.rim_speed > 0.0 else -1 for w in now.moving])
         way = (forward > 0) - (forward < 0)
-    kept = 1.0 if motion.turning else math.exp(-dt / _CRUISE_TIME)
     return Situation(
         motion,
         Memory(
             time=time,
-            started=started,
             rolled=rolled,
-            cruise=max(memory.cruise * kept, 0.0 if motion.turning else rim),
+            cruise=0.0
+            if motion.turning
+            else max(memory.cruise * math.exp(-dt / _CRUISE_TIME), now.rim),
             ruts=tuple(
                 [
                     w.sinkage
-                    if fresh
+                    if fresh or isnan(w.rim_speed)
                     else rut + gain_of(abs(w.rim_speed) * dt, _RUT_LENGTH) * (w.sinkage - rut)
                     for w, rut in zip(motion.wheels, ruts, strict=True)
                 ]
