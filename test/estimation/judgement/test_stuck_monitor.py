@@ -238,6 +238,23 @@ def test_drives_that_give_way_near_their_limit_raise_it_without_any_speed():
     assert 'torque limit' in found[-1].reason
 
 
+@pytest.mark.parametrize(('torque', 'held'), [(0.95, True), (0.4, False)])
+def test_wheels_that_slow_evenly_are_held_if_they_are_near_their_limit(torque, held):
+    rows = [[wheel(0.2, rim=1.8, torque=0.4)] * 4] * 50 + [[wheel(0.2, torque=torque)] * 4] * 10
+    found = course(rows)
+    assert not found[50].stuck and found[-1].stuck is held
+
+
+@pytest.mark.parametrize('silent', [0, 3])
+def test_silent_wheels_neither_stand_nor_hide_the_slip_of_the_others(silent):
+    mute = wheel(0.0, rim=math.nan, known=False, torque=0.95)
+    sound = [[wheel(0.1, torque=0.4)] * (6 - silent) + [mute] * silent] * 100
+    slips = [[wheel(0.95, torque=0.4)] * (6 - silent) + [mute] * silent] * 30
+    found = course(sound + slips)
+    assert not any(a.stuck for a in found[:100])
+    assert found[-1].stuck
+
+
 def test_a_wheel_that_sends_nothing_for_a_while_changes_nothing():
     """What a wheel does that tells no rate is not known: the trend of the others is followed."""
     silent = wheel(0.0, rim=math.nan, known=False)
