@@ -22,7 +22,6 @@ from wheel_terra_estimator.estimation.judgement.stuck.forecast import (
 from wheel_terra_estimator.estimation.judgement.stuck.passage import FirstPassage, SlipProcess
 from wheel_terra_estimator.estimation.judgement.stuck.settings import StuckSettings
 from wheel_terra_estimator.estimation.judgement.stuck.situation import (
-    DIGS,
     NEAR_LIMIT,
     Memory,
     RoverMotion,
@@ -37,6 +36,7 @@ HOLD, SINKING_HOLD, STANDING_HOLD = 0.95, 0.45, 0.15
 """Times [s] that a sign must exceed, half a cycle short of 1, 0.5 and 0.2 s: slip, slip of wheels
 that sink, standing (two readings of wheel odometry). Where the rover stops, a reference stands up
 to 0.9 s before the wheels do, and none of them sinks."""
+_SINKING = 0.01  # sinkage gained over rim travel by most wheels [m/m]
 _DIGGING_SLIP = 0.8  # median slip above which a rover that drives on digs itself in
 _SETTINGS = StuckSettings()
 
@@ -88,7 +88,7 @@ class StuckMonitor(Component[StuckState]):
             (time if isnan(begun) else begun) if sign else NAN
             for sign, begun in zip(there, old.since, strict=True)
         )
-        holds = SINKING_HOLD if situation.digging > DIGS else HOLD, STANDING_HOLD
+        holds = SINKING_HOLD if situation.digging > _SINKING else HOLD, STANDING_HOLD
         held = [time - begun > hold for begun, hold in zip(since, holds, strict=True)]
         state = old._replace(memory=situation.memory, since=since, clear_since=NAN)
         if any(held) and not old.stuck:

@@ -18,7 +18,7 @@ _START_TRAVEL = (
 )
 _STALL_RATIO = 0.6  # of the fastest rim speed: a wheel below it hardly turns
 _RUT_LENGTH = 0.08  # [m] of rim travel over which the growth of the sinkage is taken
-DIGS, _DIGS_AT = 0.02, 0.2
+_DIGS, _DIGS_AT = 0.02, 0.2
 """Sinkage gained over rim travel [m/m], and slip, above which a wheel digs in."""
 _DEEP = 0.4
 """Sinkage over the radius from which a wheel does not climb out: its entrance angle is 53 degrees
@@ -138,7 +138,7 @@ class Situation:
         """
         return tuple(
             max(_DEEP * wheel.radius - wheel.sinkage, 0.0) / growth
-            if self.settled and wheel.known and growth > DIGS and wheel.slip > _DIGS_AT
+            if self.settled and wheel.known and growth > _DIGS and wheel.slip > _DIGS_AT
             else math.inf
             for wheel, growth in zip(self.motion.wheels, self.growths, strict=True)
         )
