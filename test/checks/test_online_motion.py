@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 from wheel_terra_estimator.checks.online import OnlineChecks
 from wheel_terra_estimator.estimation.measurements import (
     InertialReading,
+    ReferenceVelocity,
     StepInputs,
     WheelOdometry,
 )
@@ -30,8 +31,10 @@ def motion():
 
 def told(recording, since=0.0):
     """Return {fault: seconds after a time at which it was told first} over a drive."""
-    joints, imu = recording.joints, recording.imu
+    joints, imu, reference = recording.joints, recording.imu, recording.reference
     inputs = {int(s): {} for s in np.union1d(joints.stamp, imu.stamp)}
+    for stamp, velocity in zip(reference.stamp, reference.velocity, strict=True):
+        inputs[int(stamp)]['reference'] = ReferenceVelocity(int(stamp), velocity[0], 1e-4)
     for stamp, rate, torque in zip(joints.stamp, joints.rate, joints.torque, strict=True):
         inputs[int(stamp)]['wheel_odometry'] = WheelOdometry(int(stamp), rate, torque)
     for stamp, force, rate in zip(imu.stamp, imu.force, imu.rate, strict=True):
@@ -82,3 +85,18 @@ def test_a_dead_encoder_and_a_dead_imu():
     force[at:], turning[at:] = force[at], turning[at]
     first = told(replace(whole, imu=replace(whole.imu, force=force, rate=turning)), since=24.0)
     assert set(first) == {'sensor_frozen'} and first['sensor_frozen'][0] < DRIVING
+
+
+def test_a_reference_and_a_torque_that_freeze():
+    whole = rolling.recording(motion())
+    since = 24.0
+    velocity, torque = whole.reference.velocity.copy(), whole.joints.torque.copy()
+    at = int(np.argmax(whole.reference.seconds > since))
+    velocity[at:] = velocity[at]
+    first = told(replace(whole, reference=replace(whole.reference, velocity=velocity)), since)
+    assert set(first) == {'reference_frozen'} and first['reference_frozen'][0] < DRIVING
+    at = int(np.argmax(whole.joints.seconds > since))
+    torque[at:, 2] = torque[at, 2]
+    first = told(replace(whole, joints=replace(whole.joints, torque=torque)), since)
+    assert set(first) == {'torque_frozen'} and first['torque_frozen'][0] < DRIVING
+    assert first['torque_frozen'][1].wheel == 'rear_left'
