@@ -78,6 +78,8 @@ BIAS_FACTOR = 6.0
 LEAST_GYRO_BIAS = 0.004  # [rad/s]
 TILT_IS_MOUNTING = 0.95
 """Probability that a tilt seen in circles is the mounting and not the accelerometer's zero [-]."""
+LEAST_TURNING = 10.0
+"""Time of turning [s] in which wheels that dig do not agree with a gyro by chance."""
 CLEAR_AGREEMENT = 0.8
 """Correlation of gyro and wheels in turns that are the same way round [-]."""
 LEAST_WILD = 3
@@ -444,7 +446,7 @@ def check_upside(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
 def _turns_upright(evidence: Evidence) -> bool:
     """Return whether the gyro turns to the left where the wheels do: it is not upside down."""
     rows = evidence.turning & np.isfinite(evidence.side_difference)
-    if evidence.gyro is None or rows.sum() < LEAST_MESSAGES:
+    if evidence.gyro is None or rows.sum() * evidence.period < LEAST_TURNING:
         return False
     return correlation(evidence.gyro[rows, 2], evidence.side_difference[rows]) > CLEAR_AGREEMENT
 

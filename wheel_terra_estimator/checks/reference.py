@@ -66,7 +66,7 @@ def check_sense(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         return [], evidence
     usual = [float(np.median(way)) for way in ways]
     against = [float(np.mean(way < 0.0)) for way in ways]
-    if min(usual) < ALIKE_BOTH_WAYS * max(usual) or max(against) > SELDOM_NEGATIVE:
+    if min(usual) <= ALIKE_BOTH_WAYS * max(usual) or max(against) > SELDOM_NEGATIVE:
         return [], evidence
     velocity = reference.velocity * np.where(rim < 0.0, -1.0, 1.0)[:, None]
     mended = evidence.with_channel('reference', velocity=velocity)

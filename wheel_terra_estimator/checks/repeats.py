@@ -59,14 +59,15 @@ def _reference(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     reference = evidence.recording.reference
     if reference is None:
         return [], evidence
-    dead = stays(evidence, evidence.seconds(reference), reference.velocity)
-    if dead is None:
-        return [], evidence
-    left, told = None, evidence.found('reference_zero', 0.9)
-    if reference.velocity.any():
-        told = evidence.found('reference_frozen', 0.97, how=dead.how)
+    left, told, driven = None, [], float(evidence.moving.sum()) * evidence.period
+    if not reference.velocity.any():
+        told = [evidence.found('reference_zero', 0.9)] if driven > LEAST_TIME else []
+    elif dead := stays(evidence, evidence.seconds(reference), reference.velocity):
+        told = [evidence.found('reference_frozen', 0.97, how=dead.how)]
         left = None if dead.rows.all() else rows_of(reference, ~dead.rows)
-    return [told], replace(evidence, recording=replace(evidence.recording, reference=left))
+    if not told:
+        return [], evidence
+    return [*told], replace(evidence, recording=replace(evidence.recording, reference=left))
 
 
 def _torques(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
