@@ -196,11 +196,9 @@ def test_the_slip_of_a_start_walks_farther():
     made = process([0.05] * 6)
     walks = []
     for travel in (0.0, 0.1, 10.0):
-        made.follow_contacts(travel, dragging=False)
+        made.follow_contacts(travel)
         walks.append(made.state.ratio_walk)
     assert walks == pytest.approx([0.6, 0.6 * np.exp(-0.5), 0.1])
-    made.follow_contacts(10.0, dragging=True)
-    assert made.state.ratio_walk == 0.6  # a locked wheel digs in
 
 
 def test_without_a_reference_the_ratio_returns_to_the_usual_one_over_travel():

@@ -630,13 +630,7 @@ class WheelSoilEstimator:
             model_variance=model_variance,
             repeats=repeats,
         )
-        self._speed.follow_contacts(
-            self._contact_age.state.travel,
-            dragging=any(
-                not turns and abs(rim) < self._rover.rest_speed
-                for turns, rim in zip(cycle.turns, cycle.rims, strict=True)
-            ),
-        )
+        self._speed.follow_contacts(self._contact_age.state.travel)
         if not cycle.window.readings:
             return forces, None, rows
         curvature = self._turning.curvature(float(ekf.mean[SPEED]))

@@ -67,7 +67,6 @@ class SpeedTuning:
     floor_walk: float = 1e-8  # [(m/s)^2/s]
     start_walk: float = 0.6
     """Random walk of v / rim speed at a start [1/sqrt(m)]: ruts form and the slip settles."""
-    drag_walk: float = 0.6  # the same while a wheel is dragged
     start_walk_travel: float = 0.2  # [m] with which it decays
     demand_error: float = 0.3  # of what the demand changes, over that change [-]
     slip_per_demand_walk: float = 0.2  # [1/sqrt(m)]
@@ -285,16 +284,10 @@ class SpeedProcess(Component[SpeedState]):
             other_direction=ended,
         )
 
-    def follow_contacts(self, travel: float, *, dragging: bool) -> None:
-        """Note how far the slip may walk.
-
-        After a start it walks farther, over some `travel` [m], and so it does while a wheel is
-        dragged, which digs in and asks more of the others.
-        """
-        tuning = self._tuning
-        start = tuning.start_walk * math.exp(-travel / tuning.start_walk_travel)
-        drag = tuning.drag_walk if dragging else 0.0
-        self.state = self.state._replace(ratio_walk=max(self._walk, start, drag))
+    def follow_contacts(self, travel: float) -> None:
+        """Note how far the slip may walk: farther after a start, over some `travel` [m]."""
+        start = self._tuning.start_walk * math.exp(-travel / self._tuning.start_walk_travel)
+        self.state = self.state._replace(ratio_walk=max(self._walk, start))
 
     # -- Prediction ------------------------------------------------------------------------------
 
