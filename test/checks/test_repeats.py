@@ -67,6 +67,24 @@ def test_rounded_readings_repeat_themselves():
     assert 'frozen' not in {f.kind for f in found(**changes)}
 
 
+def test_a_coarse_gyro_on_a_straight_and_a_simulation_without_noise():
+    coarse = replace(WHOLE.imu, rate=np.round(WHOLE.imu.rate, 1))
+    assert 'frozen' not in {f.kind for f in found(imu=coarse)}
+    motion = rolling.ten_minute_drive()
+    exact = replace(
+        WHOLE.reference,
+        velocity=np.column_stack([motion.speed[::5], 0 * motion.time[::5], 0 * motion.time[::5]]),
+    )
+    rates = (motion.speed[:, None] - motion.yaw_rate[:, None] * rover_y()) / rolling.RADIUS
+    joints = replace(WHOLE.joints, rate=rates)
+    assert 'frozen' not in {f.kind for f in found(reference=exact, joints=joints)}
+
+
+def rover_y():
+    """Places of the wheels beside the middle [m]."""
+    return np.array(rolling.rover().wheels.y)
+
+
 def test_a_reference_of_zeros_is_a_placeholder():
     none = replace(WHOLE.reference, velocity=0.0 * WHOLE.reference.velocity)
     (finding,) = found(reference=none)

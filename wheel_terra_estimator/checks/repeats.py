@@ -29,12 +29,19 @@ LONGER = 10.0
 """So many times longer than the reading usually stays [-]: rounded ones repeat themselves."""
 MOSTLY = 0.8
 """Share of such a stretch in which the wheels turn [-]."""
+FINE = 50
+"""Different readings of a sensor whose steps are not what makes it stay."""
+MOST_REPEATED = 0.5
+"""Share of wheel rates that repeat the one before, above which all is rounded, or free of noise."""
 CLEAR_SINKAGE = 0.005
 """Median sinkage of the other wheels beside which none reads 0 all the time [m]."""
 
 
 def check_repeats(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     """Return readings that stay the same while driving, and the evidence without these."""
+    change = np.diff(evidence.rate[evidence.moving], axis=0)
+    if not change.size or np.mean(change == 0.0) > MOST_REPEATED:
+        return [], evidence
     sinkage = evidence.recording.sinkage
     deep = [] if sinkage is None else _sinkage(evidence, sinkage)
     outcomes, evidence = _reference(evidence)
@@ -123,11 +130,15 @@ def stays(evidence: Evidence, time: FloatArray, values: FloatArray) -> Stays | N
     rows, longest, value = np.zeros(time.size, dtype=bool), 0.0, 0.0
     for first, last in runs(same):
         lasts = float(at[last] - at[first])
-        often = last - first >= max(
-            LEAST_MESSAGES, LONGER * _usual(np.delete(same, np.s_[first:last]))
-        )
         live = not readings[first].any() and readings.any()
-        if live or not often or lasts < LEAST_TIME or driving[first:last].mean() < MOSTLY:
+        if live or lasts < LEAST_TIME or driving[first:last].mean() < MOSTLY:
+            continue
+        usual = _usual(np.delete(same, np.s_[first:last]))
+        others = np.delete(readings, np.s_[first : last + 1], axis=0)
+        coarse = others.any() and max(np.unique(c).size for c in others.T) < min(
+            FINE, len(others) // 2
+        )
+        if coarse or last - first < max(LEAST_MESSAGES, LONGER * usual):
             continue
         rows[np.flatnonzero(known)[first : last + 1]] = True
         if lasts > longest:
