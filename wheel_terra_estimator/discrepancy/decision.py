@@ -105,14 +105,9 @@ class Decision:
 def decide(
     table: SteadyTable, both: SteadyTable, findings: Findings, allowed_error: float
 ) -> Decision:
-    """Decide what is reported.
+    """Decide what is reported of a table; ``both`` has the rows of a reference behind its own.
 
-    Parameters
-    ----------
-    table, both : SteadyTable
-        The rows under diagnosis, and with those of a reference behind them.
-    allowed_error : float
-        Model error that is no reason for doubt [share of the range].
+    ``allowed_error`` is the model error that is no reason for doubt [share of the range].
     """
     off, tried, doubtful = False, list[int](), tuple[Naming, ...]()
     everything = frozenset(range(len(findings.selection.explanations)))

@@ -40,30 +40,17 @@ _OUTPUTS = QUANTITIES[:3]
 
 @dataclass(frozen=True)
 class RankedLaw:
-    """What a table says of a law.
+    """What a table says of a law."""
 
-    Attributes
-    ----------
-    name : str
-        One of ``contact_law.LAWS``.
-    free : int
-        Parameters that were fitted.
-    log_evidence : float
-        Natural logarithm, with all rows [-].
-    fitted, by_load, by_wheel : dict
-        Quantity -> root mean square error on the rows of the fit, on loads and on wheels that the
-        fit had not seen [m, N, N m]; empty where the table has only one.
-    values : dict
-        Fitted parameter -> value [its unit].
-    """
-
-    name: str
-    free: int
-    log_evidence: float
+    name: str  # one of ``contact_law.LAWS``
+    free: int  # parameters that were fitted
+    log_evidence: float  # natural logarithm, with all rows [-]
+    # Quantity -> root mean square error on the rows of the fit, on loads and on wheels that the
+    # fit had not seen [m, N, N m]; empty where the table has only one
     fitted: dict[str, float]
     by_load: dict[str, float]
     by_wheel: dict[str, float]
-    values: dict[str, float]
+    values: dict[str, float]  # fitted parameter -> value [its unit]
 
 
 def rank_laws(table: SteadyTable, configuration: Configuration) -> list[RankedLaw]:

@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
 
 FloatArray = NDArray[np.float64]
-VERDICTS = ('agrees', 'named', 'unexplained', 'undecided')
 _ASIDE: Mapping[str, Any] = {'json': False}  # metadata of a field that is no part of report.json
 OPEN = ('unexplained', 'undecided')  # verdicts for which a law may be proposed
 
@@ -274,7 +273,7 @@ class Noise:
 class Diagnosis:
     """Everything a diagnosis found."""
 
-    verdict: str  # one of ``VERDICTS``
+    verdict: str  # ``agrees``, ``named``, ``unexplained`` or ``undecided``
     sentence: str  # the verdict for people, in one or two sentences
     table: SteadyTable = field(metadata=_ASIDE)
     configuration: Configuration = field(metadata=_ASIDE)

@@ -76,7 +76,7 @@ def diagnose(
     Parameters
     ----------
     table : SteadyTable
-        Checked rows (``table.read_table``).
+        Checked rows (``tables.parsing.read_table``).
     configuration : Configuration
         The model believed in: soil, effects that are on, the wheel where the table has none.
     reference : SteadyTable, optional

@@ -82,14 +82,7 @@ class DriveSeries:
 def collect(measurements: Iterable[Measurement], wheels: int, name: str) -> DriveSeries:
     """Sort the measurements of a drive into series.
 
-    Parameters
-    ----------
-    measurements : iterable of Measurement
-        In any order.
-    wheels : int
-        Number of wheels n.
-    name : str
-        Where they came from, for messages.
+    They come in any order; ``name`` says where from, for messages.
 
     Raises
     ------

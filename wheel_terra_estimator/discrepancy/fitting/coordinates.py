@@ -94,10 +94,7 @@ class Coordinate:
 def soil_coordinates(soil: Soil, known: Mapping[str, Deviation]) -> tuple[Coordinate, ...]:
     """Return the free soil parameters, centred on the configured soil.
 
-    Parameters
-    ----------
-    known : mapping
-        Name of the coordinate -> its deviation (``soil_deviations.deviations``).
+    ``known``: name of the coordinate -> its deviation (``soil_deviations.deviations``).
     """
 
     def make(

@@ -75,17 +75,8 @@ def fit(
 ) -> list[Fit]:
     """Fit all hypotheses; each has its own start and its own variance of the rotated axes.
 
-    Parameters
-    ----------
-    observed : numpy.ndarray
-        (m,) cells to be matched.
-    hypotheses : sequence of (names, coordinates)
-    starts : sequence of numpy.ndarray
-        (P,) start of each.
-    variances : sequence of numpy.ndarray
-        (m,) variance of the rotated axes for each.
-    angles : numpy.ndarray, optional
-        (B, N) entrance angles near the solution.
+    To be matched are the (m,) cells ``observed``. Each of the B hypotheses, (names, coordinates),
+    has a start (P,), a variance (m,) of the rotated axes, and entrance angles (N,) near its end.
     """
     count = len(hypotheses)
     limits = [bounds(coordinates) for _, coordinates in hypotheses]

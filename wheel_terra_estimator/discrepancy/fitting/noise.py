@@ -85,15 +85,7 @@ def estimate_noise(noise: Noise, fitted: Fit, problem: Problem, observed: FloatA
 
     The marginal likelihood of a Gaussian process (any amplitude) plus the soil's tangent space plus
     white noise is maximised over the noise of each quantity, so that effects do not pass for noise.
-
-    Parameters
-    ----------
-    fitted : Fit
-        For the tangent space.
-    problem : Problem
-        Built with ``noise``.
-    observed : numpy.ndarray
-        (m,) cells.
+    ``problem`` was built with ``noise``; ``observed`` are its (m,) cells.
     """
     unknown = [q for q in range(len(QUANTITIES)) if noise.origin.get(QUANTITIES[q]) == 'estimated']
     if not unknown:

@@ -39,18 +39,9 @@ def find_outliers(
     the cell that gains most from a twelve times larger noise is set apart. A hump or a ripple in
     slip that all loads share competes with outliers: the evidence says which of the two it is.
 
-    Parameters
-    ----------
-    problem : Problem
-        Built without any cell set apart.
-    fitted : Fit
-        Its linearisation.
-    variances : sequence of numpy.ndarray
-        (m,) of the rotated axes, for a structural error that is small and one that is large.
-    observed : numpy.ndarray
-        (m,) cells that the fit was asked to match.
-    narrow : numpy.ndarray
-        (N, N) correlation of features narrow in slip that rows share (see ``slip_features``).
+    ``problem`` has no cell set apart, and (m,) ``observed`` cells; ``variances``, (m,) each, of the
+    rotated axes are for a structural error that is small and one that is large; ``narrow`` (N, N)
+    comes from `slip_features`.
     """
     jacobian = problem.rotate(fitted.sensitivity) / np.sqrt(fitted.prior)
     target = observed - problem.flat(fitted.outputs) + fitted.sensitivity @ fitted.u

@@ -100,10 +100,7 @@ class CommonError:
 def kernel(inputs: FloatArray) -> FloatArray:
     """(N, N) correlation of a structural error between rows.
 
-    Parameters
-    ----------
-    inputs : numpy.ndarray
-        (N, d) inputs, each scaled to a range of 1; d may be 0.
+    The (N, d) inputs are each scaled to a range of 1; d may be 0.
     """
     if inputs.shape[1] == 0:
         return np.ones((len(inputs), len(inputs)))

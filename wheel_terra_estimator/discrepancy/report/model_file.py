@@ -114,13 +114,8 @@ def _sensor_keys(
 ) -> tuple[dict[str, object], tuple[str, ...]]:
     """Return the keys that say the same as the instrument effects of a model, and those effects.
 
-    Parameters
-    ----------
-    configuration : Configuration
-        With the effects on.
-    turning : float
-        +1 or -1: which way the wheel turned in all rows. 0: both ways; a constant friction, which
-        turns with the wheel, is then no zero of the reading and stays an effect.
+    ``turning`` is +1 or -1 where the wheel turned one way in all rows. 0: both ways; a constant
+    friction, which turns with the wheel, is then no zero of the reading and stays an effect.
     """
     effects, stds, sensors = configuration.effects, configuration.effects_std, configuration.sensors
     keys: dict[str, object] = {}

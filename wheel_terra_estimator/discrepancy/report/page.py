@@ -31,19 +31,9 @@ _TONES = {'agrees': 'good', 'named': 'warn', 'unexplained': 'bad', 'undecided': 
 
 
 def write_report(diagnosis: Diagnosis, folder: str | Path) -> Path:
-    """Write ``report.html`` with its pictures into a folder that exists.
+    """Write ``report.html`` into a folder that exists; return its path.
 
-    Parameters
-    ----------
-    diagnosis : Diagnosis
-        What was found.
-    folder : str or pathlib.Path
-        Pictures are written there as PNG files as well; the page itself needs none of them.
-
-    Returns
-    -------
-    pathlib.Path
-        The page.
+    Pictures are written there as PNG files as well; the page itself needs none of them.
     """
     folder = Path(folder)
     configuration, keys = corrected(diagnosis)

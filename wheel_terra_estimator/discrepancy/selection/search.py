@@ -79,13 +79,7 @@ def search(
     effects: Mapping[str, Effect],
     floors: tuple[Floor, ...],
 ) -> Findings:
-    """Find noise, outliers and the weights of all explanations of a table.
-
-    Parameters
-    ----------
-    effects : mapping
-        Effects that may be named.
-    """
+    """Find noise, outliers and the weights of all explanations by effects that may be named."""
     scale = _ranges(table)
     noise = noises.stated_noise(table, scale)
     builder = _Builder(table, forward, scale, noise.std)

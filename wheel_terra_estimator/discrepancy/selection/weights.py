@@ -144,14 +144,9 @@ class Selection:
 
 
 def log_prior(names: Sequence[str], visible: Iterable[str]) -> float:
-    """Return the log prior of a set of effects; the forms of an effect share its weight.
+    """Return the log prior of a set of effects among all ``visible`` effects and forms.
 
-    Parameters
-    ----------
-    names : sequence of str
-        Effects of the set, each in a form.
-    visible : iterable of str
-        All effects and forms that compete.
+    The forms of an effect share its weight.
     """
     forms, count = _forms(tuple(visible)), len(names)
     if count == 0:

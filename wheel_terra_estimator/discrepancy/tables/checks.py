@@ -302,10 +302,7 @@ def check_wheel_of_model(
 ) -> None:
     """Raise where the table names another wheel than the model file.
 
-    Parameters
-    ----------
-    radius, width : array_like
-        What the model file states of its wheels [m]; empty = nothing.
+    ``radius`` and ``width`` are what that file states of its wheels [m]; empty = nothing.
     """
     for column, stated in (('wheel_radius', radius), ('wheel_width', width)):
         if column not in table.columns or not len(stated):
@@ -352,10 +349,7 @@ def check_against_wheel(table: SteadyTable, radius: FloatArray, width: FloatArra
 def check_pull_against_model(table: SteadyTable, predicted: FloatArray) -> None:
     """Raise where the pulls have the other sign than any soil near the configured one gives.
 
-    Parameters
-    ----------
-    predicted : numpy.ndarray
-        (N,) pulls of the configured model [N].
+    ``predicted`` are the (N,) pulls of the configured model [N].
     """
     measured = table.measured[:, 1]
     here = np.isfinite(measured) & np.isfinite(predicted)

@@ -243,25 +243,9 @@ def _readings(title: str) -> Iterator[tuple[str, str]]:
 class Header:
     """What the titles of a table say, and what is wrong with them.
 
-    Parameters
-    ----------
-    source : str
-        What an error names.
-    titles : sequence of str
-        In the order of the table.
-    choice : Choice
-        What the user says of them.
-    wanted : sequence of str
-        Columns of ours that are read.
-
-    Attributes
-    ----------
-    columns : list of Column
-        Those that are read.
-    unused : list of (int, str)
-        Place and title of the others, but for those that the user leaves out.
-    notes : list of str
-        What is read otherwise than it stands there.
+    ``source`` is what an error names, ``wanted`` are columns of ours. Then ``columns`` are those
+    that are read, ``unused`` places and titles of the others (but for those that the user leaves
+    out), ``notes`` what is read otherwise than it stands there.
     """
 
     def __init__(
@@ -354,10 +338,7 @@ class Header:
     def check_unused(self, hold_numbers: Sequence[int]) -> None:
         """Raise for columns of numbers that are not used; note the others.
 
-        Parameters
-        ----------
-        hold_numbers : sequence of int
-            Places of unused columns with numbers that are not those of the rows.
+        ``hold_numbers``: places of unused columns with numbers that are not those of the rows.
         """
         asked = [
             title for place, title in self.unused if place in hold_numbers and not _harmless(title)

@@ -44,14 +44,8 @@ def read_table(path: str | Path, choice: Choice | None = None) -> SteadyTable:
     """Read and check a CSV file (header row, UTF-8).
 
     Capital letters, names of the field, units beside a name, and decimal commas where cells are
-    separated otherwise are read, with a note.
-
-    Parameters
-    ----------
-    path : str or Path
-        The file.
-    choice : Choice, optional
-        Which columns are used and which are not, where the titles do not say.
+    separated otherwise are read, with a note. ``choice`` says which columns are used and which are
+    not, where the titles do not.
 
     Raises
     ------
@@ -70,16 +64,8 @@ def read_columns(
 ) -> tuple[NDArray[np.intp], dict[str, FloatArray], list[str]]:
     """Return the lines of the rows, the wanted columns of a CSV file in SI, and notes.
 
-    Parameters
-    ----------
-    path : Path
-        The file.
-    choice : Choice
-        As for `read_table`.
-    wanted : sequence of str
-        Columns of ours that are read; the others are passed over.
-    one_of : sequence of str
-        Columns of which there has to be one, beside slip and normal load.
+    Of the columns ``one_of`` there has to be one, beside slip and normal load; columns that are not
+    wanted are passed over.
 
     Raises
     ------
@@ -108,22 +94,10 @@ def read_columns(
 
 
 def table_of(data: Any, name: str, choice: Choice | None = None) -> SteadyTable:
-    """Return a DataFrame, or a mapping of columns, read and checked as a CSV file is.
+    """Return a DataFrame, or a mapping of columns, read and checked as `read_table` does.
 
-    Parameters
-    ----------
-    data : DataFrame or mapping of str to array_like
-        The columns; its rows count from line 2, as below a header. ``attrs['units']`` of a
-        DataFrame has the units of columns that do not say them.
-    name : str
-        What messages call it.
-    choice : Choice, optional
-        As for `read_table`.
-
-    Raises
-    ------
-    UserError
-        As `read_table`.
+    Its rows count from line 2, as below a header; ``attrs['units']`` of a DataFrame has the units
+    of columns that do not say them. Messages call it ``name``.
     """
     units = units_in(data)
     columns = {
