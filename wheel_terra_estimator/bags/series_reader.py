@@ -234,9 +234,8 @@ class _Joints(_Collector):
 
     def series(self) -> Any:
         n = len(self.names)
-        return JointSeries(
-            self.topic, *self.times, tuple(self.names), self.table(1, n), self.table(2, n)
-        )
+        position, rate, torque = (self.table(field, n) for field in range(3))
+        return JointSeries(self.topic, *self.times, tuple(self.names), rate, torque, position)
 
 
 class _Sinkage(_Joints):

@@ -145,7 +145,10 @@ def _blamed(evidence: Evidence, lags: dict[str, Lag]) -> dict[str, Lag]:
     late = {name: told for name, told in lags.items() if _counts(evidence, name, told)}
     if len(late) == 2:
         imu, reference = late['imu'], late['reference']
-        if abs(imu.value - reference.value) < max(APART, 3.0 * (imu.std + reference.std)):
+        std = math.hypot(
+            _whole_std(evidence, 'imu', imu), _whole_std(evidence, 'reference', reference)
+        )
+        if abs(imu.value - reference.value) < max(APART, 3.0 * std):
             return {'wheel_odometry': imu.of_the_first()}
         return late
     for name, told in late.items():
@@ -166,8 +169,19 @@ def _by_arrival(evidence: Evidence, name: str, late: float) -> bool:
     return by_wheels < abs(own) + abs(others + late) - 0.5 * abs(late)
 
 
+def _whole_std(evidence: Evidence, name: str, told: Lag) -> float:
+    """Return the deviation of a lag [s]; between two messages nothing is known of a change."""
+    between = BETWEEN * max(evidence.period, _period(_channel(evidence, name)))
+    return math.hypot(told.std, between, LEAST_STD[told.by])
+
+
+def _channel(evidence: Evidence, name: str) -> Channel:
+    channel: Channel = getattr(evidence.recording, 'joints' if name == 'wheel_odometry' else name)
+    return channel
+
+
 def _outcome(evidence: Evidence, name: str, told: Lag) -> Outcome:
-    channel = getattr(evidence.recording, 'joints' if name == 'wheel_odometry' else name)
+    channel = _channel(evidence, name)
     if not told.steady:
         return NotChecked(
             'delay',
@@ -175,9 +189,7 @@ def _outcome(evidence: Evidence, name: str, told: Lag) -> Outcome:
             f'drive and {told.halves[1]:+.2f} s in the second: the clocks drift; synchronise them '
             '(chrony, PTP)',
         )
-    # Between two messages nothing is known of a change.
-    between = BETWEEN * max(evidence.period, _period(channel))
-    std = math.hypot(told.std, between, LEAST_STD[told.by])
+    std = _whole_std(evidence, name, told)
     against = told.by + told.trial.words('unlike part', '')
     told_of = of_offset(name, told.value, std, against, evidence.facts.configuration)
     return evidence.found(f'{name}_offset', 0.97, **told_of)

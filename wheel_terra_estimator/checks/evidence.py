@@ -66,6 +66,8 @@ class Evidence:
         (3, 3) from the IMU's frame into ``base_link``.
     figures : dict
         What the report shows beside findings; the checks write into it.
+    steering : numpy.ndarray
+        (k, n) steering angles, positive left [rad]; nan of a wheel that has none in the recording.
     """
 
     recording: Recording
@@ -77,6 +79,7 @@ class Evidence:
     gyro: FloatArray | None
     rotation: FloatArray
     figures: dict[str, Any]
+    steering: FloatArray
 
     def found(self, key: str, confidence: float, **told: Any) -> Finding:
         """Return a finding on the topic of its fault's channel; see `faults.found`."""
@@ -210,14 +213,22 @@ class Evidence:
         return np.where(np.isfinite(self.facts.radius), self.facts.radius, 1.0)
 
     @cached_property
+    def speed(self) -> FloatArray:
+        """Rim speeds along x (k, n) [m/s]; with radius 1 where it is not known.
+
+        Of a wheel that rolls where it is steered to, this is v_x - w_z y, as of one that is not.
+        """
+        return _shared(self.rate * self.radius * np.cos(np.nan_to_num(self.steering)))
+
+    @cached_property
     def rim(self) -> FloatArray:
-        """Mean rim speed of the wheels (k,) [m/s]; with radius 1 where it is not known."""
-        return _shared(_row_means(self.rate * self.radius))
+        """Mean rim speed of the wheels along x (k,) [m/s]."""
+        return _shared(_row_means(self.speed))
 
     @cached_property
     def side_difference(self) -> FloatArray:
         """Mean rim speed right minus left (k,) [m/s]; nan where the sides are not known."""
-        speed = self.rate * self.radius
+        speed = self.speed
         right, left = self.facts.side < 0, self.facts.side > 0
         if not right.any() or not left.any():
             return _shared(np.full(self.time.size, np.nan))
@@ -290,13 +301,19 @@ def gather(
     usable = np.flatnonzero(joints.stamp > 0)
     rows = usable[np.unique(joints.stamp[usable], return_index=True)[1]]
     time = (joints.stamp[rows] - joints.stamp[rows[0]]) * 1e-9
-    rate = np.full((time.size, len(facts.names)), np.nan)
-    torque = np.full_like(rate, np.nan)
+    rate, torque, steering = np.full((3, time.size, len(facts.names)), np.nan)
     for index, name in enumerate(facts.names):
         if name in joints.names:
             column = joints.names.index(name)
             rate[:, index] = facts.direction[index] * joints.rate[rows, column]
             torque[:, index] = facts.direction[index] * joints.torque[rows, column]
+    if facts.configuration is not None and joints.position is not None:
+        for index, name in enumerate(facts.configuration.wheels.steering_joints):
+            if name in joints.names:
+                angle = joints.position[rows, joints.names.index(name)]
+                known = np.isfinite(angle)
+                if known.any():
+                    steering[:, index] = np.interp(time, time[known], angle[known])
     errors = SensorErrors(facts.configuration) if facts.configuration is not None else None
     if errors is not None:
         torque = errors.torque.true(torque)
@@ -310,7 +327,7 @@ def gather(
         if errors is not None:
             force = force - errors.specific_force_bias
             gyro = gyro - errors.angular_rate_bias
-    return Evidence(recording, facts, time, rate, torque, force, gyro, rotation, figures)
+    return Evidence(recording, facts, time, rate, torque, force, gyro, rotation, figures, steering)
 
 
 def _shared(values: NDArray[Any]) -> NDArray[Any]:

@@ -76,6 +76,8 @@ DEEPEST = 0.3
 LEAST_DEPTHS = 50
 LEAST_REFERENCES = 12
 LEAST_TRACK_ERROR = 0.08
+STEERED_STD = 0.04
+"""Slip of steered wheels in curves, as a share of the track, one deviation [-]."""
 CLEAR_TURN = 0.95
 """Correlation of gyro and difference of the sides that a turn has [-]."""
 SKID_TRACK = 0.9
@@ -352,13 +354,15 @@ def _share_of_radius(evidence: Evidence, ratio: Estimate) -> float:
 
 
 def skids(evidence: Evidence) -> bool:
-    """Return whether wheels do not roll as the track says in turns: several rows, or steered."""
+    """Return whether wheels do not roll as the track says in turns: several rows not steered."""
     configuration = evidence.facts.configuration
     if configuration is None:
         return True
     wheels = configuration.wheels
-    steered = any(getattr(wheels, 'steering_joints', ()) or ())
-    return steered or float(np.ptp(wheels.x)) > 0.3 * float(np.ptp(wheels.y))
+    known = np.isfinite(evidence.steering).all(axis=0)
+    fixed = wheels.x[~known]
+    unknown = bool((np.array(wheels.steered) & ~known).any())
+    return unknown or float(np.ptp(fixed)) > 0.3 * float(np.ptp(wheels.y)) if fixed.size else False
 
 
 def stated_track(evidence: Evidence) -> float:
@@ -384,6 +388,8 @@ def track_ratio(evidence: Evidence) -> Told | NotChecked:
         return Estimate(slope.value / track, slope.std / abs(track))
 
     ratio = fitted(slice(None))
+    if np.isfinite(evidence.steering).any():  # they slip aside and along in curves
+        ratio = Estimate(ratio.value, math.hypot(ratio.std, STEERED_STD * ratio.value))
     trial = tried(lambda part: fitted(part).value, 1.0, yaw**2)
     if abs(ratio.value - 1.0) > LEAST_TRACK_ERROR and not trial.falls:
         return NotChecked('track', 'the turns of both halves of the drive need different tracks')

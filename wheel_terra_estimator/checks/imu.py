@@ -35,7 +35,7 @@ from wheel_terra_estimator.checks.statistics import (
     robust_std,
     runs,
 )
-from wheel_terra_estimator.checks.torque import heading_of_torque
+from wheel_terra_estimator.checks.torque import heading_of_torque, slope_on_the_level
 from wheel_terra_estimator.checks.trial import Trial, halves
 from wheel_terra_estimator.checks.turning import ordinary_track, track_ratio
 from wheel_terra_estimator.estimation.timing.input_checks import WILD_FORCE
@@ -57,6 +57,8 @@ LEAST_SHOWN = 0.01
 """Change of an angle [deg] below which a cure leaves it out."""
 LEAST_MOUNTING = math.radians(1.5)
 """Mounting errors below this [rad] are left to calibration."""
+LEAST_PITCH = math.radians(3.0)
+"""The same of a pitch that the torques tell [rad]."""
 LEAST_TURN = 4.5
 """Heading that a drive has to cover for the mounting to be told from a slope [rad]."""
 FLAT_TURN_STD = math.radians(0.1)
@@ -323,7 +325,9 @@ def gross_tilt(evidence: Evidence) -> FloatArray | None:
 def gyro_bias(evidence: Evidence) -> tuple[FloatArray, FloatArray, str]:
     """Return the gyro's bias (3,) [rad/s], its deviation, and where it was seen."""
     assert evidence.gyro is not None
-    rest = evidence.at_rest
+    imu = evidence.recording.imu
+    heard = evidence.time <= (0.0 if imu is None else evidence.seconds(imu).max())
+    rest = evidence.at_rest & heard  # behind its last message nothing is known
     rows = evidence.gyro[rest]
     if rest.sum() * evidence.period >= 3.0:
         spread = np.array([robust_std(column) for column in rows.T])
@@ -456,6 +460,14 @@ def check_tilt(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     if evidence.force is None:
         return [], evidence
     tilt = small_tilt(evidence)
+    pitch = slope_on_the_level(evidence) if tilt is None or tilt.std > EVEN_GROUND_STD else None
+    if pitch is not None and pitch.sigmas_from(0.0) > 4.0 and LEAST_PITCH < abs(pitch.value) < 0.5:
+        nothing = Estimate(0.0, pitch.std)
+        seen = Mounting(nothing, Estimate(-pitch.value, pitch.std), 0.0)
+        mended, std = evidence.turned(seen.taken_off(evidence.rotation)), math.degrees(pitch.std)
+        words = {'size': math.degrees(abs(pitch.value)), 'off': std}
+        told = mounting_finding('imu_pitch', evidence, mended, std, 0.8, **words)
+        return [told], mended
     if tilt is None:
         reason = 'no full circle in it: mounting not told from slope; drive a circle both ways'
         return [NotChecked('mounting', reason)], evidence

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from wheel_terra_estimator.checks import turning
 from wheel_terra_estimator.checks.evidence import Evidence, Mask
 from wheel_terra_estimator.checks.finding import NotChecked, Outcome
 from wheel_terra_estimator.checks.series import VelocitySeries
@@ -21,7 +22,7 @@ LEAST_REFERENCES = 10
 ALIKE_BOTH_WAYS = 0.5
 """Slower over faster of the speeds forward and back [-]."""
 SELDOM_NEGATIVE = 0.1
-"""Share of negative velocities of a speed that has no sign, by noise, at most [-]."""
+"""Share of negative speeds of what has no sign, by noise, at most [-]."""
 JUMP_FACTOR = 8.0
 """A velocity that leaves its neighbours by so many times the usual scatter is a jump."""
 JUMP_SHARE = 0.005
@@ -45,6 +46,10 @@ MOST_SLIPPING, WITHOUT_SLIP = 1.0 / 3.0, 0.06
 """Speed over that without slip of a rover that slips much, and error of the ratio without slip."""
 LEAST_UNIT_RATIO = 1.3
 """Speed over rim speed below which it may be the radius, not the unit [-]."""
+NO_SCALE = 30.0
+"""Speed over rim speed that is a unit, however much the rover slips [-]."""
+SLIPPING = 0.7
+"""Speed over that of the rims in firm ground, at least [-]."""
 MOSTLY = 0.4
 """Mean over median rim speed of wheels most of which turn one way [-]."""
 AROUND = 0.3
@@ -55,22 +60,44 @@ KNOWN_UNITS = {'kilometres per hour': 3.6, 'millimetres per second': 1000.0, 'kn
 
 
 def check_sense(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
-    """Return a reference that is positive both ways, and the evidence with that mended."""
+    """Return a reference or rates that are positive both ways, and the evidence mended."""
     reference = evidence.recording.reference
     if reference is None or reference.stamp.size < LEAST_REFERENCES:
         return [], evidence
     rim = np.nan_to_num(evidence.rim_at(reference.stamp, evidence.rim, AROUND))
-    forward, least = reference.velocity[:, 0], 0.4 * float(np.quantile(np.abs(rim), 0.9))
-    ways = [forward[rim > least], forward[rim < -least]]
+    forward = reference.velocity[:, 0]
+    least = 0.4 * float(np.quantile(np.abs(forward), 0.9))
+    if _without_sign(forward, rim):
+        velocity = reference.velocity * np.where(rim < 0.0, -1.0, 1.0)[:, None]
+        mended = evidence.with_channel('reference', velocity=velocity)
+        return [evidence.found('reference_unsigned', 0.95)], mended
+    ways = [way for way in (forward > least, forward < -least) if way.mean() > SELDOM_NEGATIVE]
+    followed = [
+        np.median(np.abs(forward[way] / np.maximum(np.abs(rim[way]), 1e-9))) for way in ways
+    ]
+    told = len(ways) == 2 and not _sideways(reference) and _without_sign(rim, forward)
+    if told and min(followed) > 0.5 and max(followed) < 2.0:
+        sense = np.sign(np.interp(evidence.time, evidence.seconds(reference), forward))
+        mended = evidence.with_rate(evidence.rate * sense[:, None])
+        return [evidence.found('rates_unsigned', 0.95)], mended
+    return [], evidence
+
+
+def _sideways(reference: VelocitySeries) -> bool:
+    """Return whether a velocity is not that along x of the rover alone."""
+    forward, side = reference.velocity[:, 0], np.abs(reference.velocity[:, 1])
+    return bool(np.quantile(side, 0.9) > 0.2 * np.median(np.hypot(forward, side)))
+
+
+def _without_sign(speed: FloatArray, other: FloatArray) -> bool:
+    """Return whether one speed is positive and much the same whichever way the other goes."""
+    least = 0.4 * float(np.quantile(np.abs(other), 0.9))
+    ways = [speed[other > least], speed[other < -least]]
     if min(way.size for way in ways) < LEAST_ROWS:
-        return [], evidence
+        return False
     usual = [float(np.median(way)) for way in ways]
     against = [float(np.mean(way < 0.0)) for way in ways]
-    if min(usual) <= ALIKE_BOTH_WAYS * max(usual) or max(against) > SELDOM_NEGATIVE:
-        return [], evidence
-    velocity = reference.velocity * np.where(rim < 0.0, -1.0, 1.0)[:, None]
-    mended = evidence.with_channel('reference', velocity=velocity)
-    return [evidence.found('reference_unsigned', 0.95)], mended
+    return min(usual) > ALIKE_BOTH_WAYS * max(usual) and max(against) <= SELDOM_NEGATIVE
 
 
 def check_frame(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
@@ -100,7 +127,7 @@ def _frame(evidence: Evidence, reference: VelocitySeries) -> tuple[list[Outcome]
     forward, side = reference.velocity[:, 0], reference.velocity[:, 1]
     rim = np.nan_to_num(evidence.rim_at(reference.stamp, evidence.rim, AROUND))
     size = np.hypot(forward, side)
-    if not np.any(side) or float(np.median(np.abs(side))) < 0.2 * float(np.median(size)):
+    if not _sideways(reference):
         return [], evidence
 
     def along_x(speed: FloatArray) -> Evidence:
@@ -170,11 +197,7 @@ def _unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     if rows.sum() < LEAST_ROWS:
         return [], evidence
     ratio = float(np.median(np.abs(reference.velocity[rows, 0]) / rim[rows]))
-    fitting = {
-        unit: factor
-        for unit, factor in KNOWN_UNITS.items()
-        if max(MOST_SLIPPING * factor, LEAST_UNIT_RATIO) < ratio < 1.25 * factor
-    }
+    fitting = reference_units(ratio)
     near = {unit: f for unit, f in fitting.items() if abs(ratio / f - 1.0) < WITHOUT_SLIP}
     if len(fitting) > 1 and not near:  # which of them, the slip hides
         reason = f'{ratio:.3g} times the rim speed: {" or ".join(fitting)}, or its scale'
@@ -183,8 +206,32 @@ def _unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     for unit, factor in fitting.items():
         told = {'value': 1.0 / factor, 'ratio': ratio, 'unit': unit}
         mended = evidence.with_channel('reference', velocity=reference.velocity / factor)
-        return [evidence.found('reference_unit', 0.9, **told)], mended
+        track = turning.track_ratio(evidence)
+        either = [] if track and turning.ordinary_track(track) else either_unit(evidence, ratio)
+        return either or [evidence.found('reference_unit', 0.9, **told)], mended
     return [], evidence
+
+
+def either_unit(evidence: Evidence, ratio: float | None) -> list[Outcome]:
+    """Return that rates in m/s of the rim or a reference of another unit give a ratio of speeds."""
+    radius, fitting = float(np.nanmean(evidence.facts.radius)), reference_units(ratio or 0.0)
+    if not fitting or ratio is None or not SLIPPING < ratio * radius < 1.25:
+        return []
+    unit, factor = next(iter(fitting.items()))
+    of_rims, how = 'metres per second of the rim', 'reference, or that is in ' + unit
+    return [
+        evidence.found('rate_unit', 0.45, value=1.0 / radius, unit=of_rims, how=how),
+        evidence.found('reference_unit', 0.45, value=1.0 / factor, ratio=ratio, unit=unit),
+    ]
+
+
+def reference_units(ratio: float) -> dict[str, float]:
+    """Return the units of a reference that a ratio of speeds may come from."""
+    return {
+        unit: factor
+        for unit, factor in KNOWN_UNITS.items()
+        if max(min(MOST_SLIPPING * factor, NO_SCALE), LEAST_UNIT_RATIO) < ratio < 1.25 * factor
+    }
 
 
 def _jumps(evidence: Evidence, reference: VelocitySeries) -> tuple[list[Outcome], FloatArray]:

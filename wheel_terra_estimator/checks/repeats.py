@@ -27,20 +27,21 @@ LEAST_MESSAGES = 10
 """Messages in which it stays, at least."""
 LONGER = 10.0
 """So many times longer than the reading usually stays [-]: rounded ones repeat themselves."""
-MOSTLY = 0.8
-"""Share of such a stretch in which the wheels turn [-]."""
 FINE = 50
 """Different readings of a sensor whose steps are not what makes it stay."""
 MOST_REPEATED = 0.5
 """Share of wheel rates that repeat the one before, above which all is rounded, or free of noise."""
+SELDOM = 0.1
+"""Share of readings that repeat the one before of a sensor with noise [-]."""
+CHANGES = 0.5
+"""Change of the rates over the working rate that all else then changes with [-]."""
 CLEAR_SINKAGE = 0.005
 """Median sinkage of the other wheels beside which none reads 0 all the time [m]."""
 
 
 def check_repeats(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     """Return readings that stay the same while driving, and the evidence without these."""
-    change = np.diff(evidence.rate[evidence.moving], axis=0)
-    if not change.size or np.mean(change == 0.0) > MOST_REPEATED:
+    if not evidence.moving.any():
         return [], evidence
     sinkage = evidence.recording.sinkage
     deep = [] if sinkage is None else _sinkage(evidence, sinkage)
@@ -126,19 +127,28 @@ def stays(evidence: Evidence, time: FloatArray, values: FloatArray) -> Stays | N
         return None
     at, readings = time[known], values[known]
     driving = np.interp(at, evidence.time, evidence.moving)
+    change = np.diff(evidence.rate[evidence.moving], axis=0)
+    rounded = change.size > 0 and np.mean(change == 0.0) > MOST_REPEATED
+    speed = np.interp(at, evidence.time, np.abs(evidence.common_rate))
     same = (np.diff(readings, axis=0) == 0.0).all(axis=1)
     rows, longest, value = np.zeros(time.size, dtype=bool), 0.0, 0.0
     for first, last in runs(same):
-        lasts = float(at[last] - at[first])
+        share = float(driving[first:last].mean())
+        lasts = share * float(at[last] - at[first])
         live = not readings[first].any() and readings.any()
-        if live or lasts < LEAST_TIME or driving[first:last].mean() < MOSTLY:
+        if live or lasts < LEAST_TIME:
             continue
-        usual = _usual(np.delete(same, np.s_[first:last]))
+        beside = np.delete(same, np.s_[first:last])
+        steady = np.ptp(speed[first:last]) < CHANGES * evidence.working_rate
+        noisy = 2 * beside.size > last - first and np.mean(beside) < SELDOM
+        if rounded and steady and not noisy:
+            continue
+        usual = _usual(beside)
         others = np.delete(readings, np.s_[first : last + 1], axis=0)
         coarse = others.any() and max(np.unique(c).size for c in others.T) < min(
             FINE, len(others) // 2
         )
-        if coarse or last - first < max(LEAST_MESSAGES, LONGER * usual):
+        if coarse or share * (last - first) < max(LEAST_MESSAGES, LONGER * usual):
             continue
         rows[np.flatnonzero(known)[first : last + 1]] = True
         if lasts > longest:

@@ -33,12 +33,20 @@ from wheel_terra_estimator.checks import (
     wheel_rates,
 )
 from wheel_terra_estimator.checks.evidence import LEAST_MOVING_ROWS, Evidence, gather
-from wheel_terra_estimator.checks.faults import RANK
-from wheel_terra_estimator.checks.finding import INTERNAL_ERROR, CheckReport, NotChecked, Outcome
+from wheel_terra_estimator.checks.faults import RANK, found
+from wheel_terra_estimator.checks.finding import (
+    INTERNAL_ERROR,
+    CheckReport,
+    Finding,
+    NotChecked,
+    Outcome,
+)
 from wheel_terra_estimator.checks.rover_facts import RoverFacts
 from wheel_terra_estimator.checks.series import Recording, Series, rows_of
 from wheel_terra_estimator.configuration.configuration import Configuration
 
+ORIENTATION = 'the orientation'
+"""What a gyro is said to turn against."""
 _LOGGER = logging.getLogger(__name__)
 Result = TypeVar('Result')
 Given = TypeVar('Given')
@@ -75,8 +83,19 @@ def examine(
         evidence = run_apart(
             report, 'sign', None, lambda: _examined(recording, configuration, remapped, report)
         )
+    report.findings = _one_cause(report.findings)
     report.findings.sort(key=lambda finding: RANK.get(finding.fault, 0))
     return report, evidence
+
+
+def _one_cause(findings: list[Finding]) -> list[Finding]:
+    """Name the orientation alone where gyro and wheels agree with each other, not with it."""
+    reversed_ = [f for f in findings if f.fault == 'gyro_reversed' and ORIENTATION in f.words]
+    swapped = [f for f in findings if f.fault == 'swapped_sides']
+    if not swapped or not any('.z' in f.words for f in reversed_):
+        return findings
+    told = found('orientation_frame', reversed_[0].topic, swapped[0].confidence)
+    return [*(f for f in findings if f not in reversed_ and f not in swapped), told]
 
 
 def run_apart(
@@ -159,7 +178,7 @@ def against_each_other(
     state = imu.ImuState(recording, configured_mounting(facts.configuration))
     state = mended('gravity', state, lambda: imu.check_imu(state, facts), 'check_imu')
     evidence = gather(state.recording, facts, state.rotation, mended.report.figures)
-    if evidence is None or evidence.time.size < LEAST_MOVING_ROWS:
+    if evidence is None or np.isfinite(evidence.rate).any(axis=1).sum() < LEAST_MOVING_ROWS:
         return None
     force = evidence.force if state.usable_force else None
     evidence = replace(evidence, force=force, gyro=evidence.gyro if state.usable_gyro else None)
@@ -176,6 +195,8 @@ AGAINST_EACH_OTHER: tuple[Check, ...] = (
     ('missing_wheel', wheel_rates, 'check_dead_wheels'),
     ('frozen', repeats, 'check_repeats'),
     ('unit', wheel_rates, 'check_positions'),
+    ('radius', wheel_rates, 'check_scales'),
+    ('sign', turning, 'check_steering'),
     ('sign', turning, 'check_signs'),
     ('sign', reference, 'check_sense'),
     ('unit', turning, 'check_gyro_unit'),

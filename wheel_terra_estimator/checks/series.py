@@ -43,11 +43,12 @@ def rows_of(series: Series, kept: NDArray[np.bool_]) -> Series:
 
 @dataclass(frozen=True)
 class JointSeries(Channel):
-    """Joint states: rate and effort of every joint that occurs, (k, n)."""
+    """Joint states: rate, effort and, where kept, position of every joint that occurs, (k, n)."""
 
     names: tuple[str, ...]
     rate: FloatArray
     torque: FloatArray
+    position: FloatArray | None = None
 
 
 @dataclass(frozen=True)

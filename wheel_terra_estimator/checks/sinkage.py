@@ -27,6 +27,8 @@ LEAST_READINGS = 50
 NOISE_FACTOR = 4.0
 BELOW_ZERO = 0.006
 """A median sinkage further above the ground than this [m] is no sinkage (lugs carry less)."""
+BURIED = 0.5
+"""Depth over radius that no drive has all the time [-]."""
 ALIKE_SHARE = 0.4
 """Share by which the offset of a wheel may change over a drive to count as its zero [-]."""
 DEEP_STD = 0.02
@@ -120,6 +122,9 @@ def _unit(evidence: Evidence, table: FloatArray) -> tuple[list[Outcome], FloatAr
         told = {'level': level, 'noise': noise, 'radius': radius, 'unit': unit}
         sure = 0.97 if len(off) == 1 else 0.8
         return [evidence.found('sinkage_unit', sure, value=factor, **told)], table * factor
+    if float(np.nanquantile(table, 0.02)) > BURIED * radius:
+        told = {'level': level, 'radius': radius, 'height': float(np.nanquantile(table, 0.98))}
+        return [evidence.found('sinkage_height', 0.8, **told)], table
     return [], table
 
 

@@ -41,7 +41,7 @@ WRONG_SIGN = -0.4
 """Correlation of torque and rate below which the sign is wrong."""
 MOST_TRACTION = 0.85
 """Sum of T/r over the weight that no soil gives on the level (tangent of 40 degrees)."""
-UNIT_TRACTION = 30.0
+UNIT_TRACTION = 15.0
 """The same, above which the torque is in N mm."""
 LEAST_TRACTION = 1e-3
 SOFT_TRACTION = 0.25
@@ -71,6 +71,8 @@ GAIN_SIGMAS = 4.0
 ZERO_FACTOR = 6.0
 ZERO_SIGMAS = 5.0
 MEAN_SIGMAS = 2.0
+UNSIGNED = 0.9
+"""Residual of torques without a sign over that of torques with one, at most, on slopes [-]."""
 
 
 def check_torque(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
@@ -310,13 +312,31 @@ def torque_zeros(evidence: Evidence) -> list[Estimate] | None:
 
     Ground that resists more one way than back, over the rover's own ruts, looks like a zero.
     """
-    fits = _both_ways(evidence)
+    fits = both_ways(evidence)
     if fits is None:
         return None
     return [Estimate(zero.value, math.hypot(zero.std, RUTS * back.value)) for zero, back in fits]
 
 
-def _both_ways(evidence: Evidence) -> list[tuple[Estimate, Estimate]] | None:
+def slope_on_the_level(evidence: Evidence) -> Estimate | None:
+    """Return the slope [rad] that the IMU sees and the torques of all wheels alike deny.
+
+    The zero of a torque is that of its wheel alone. None without drives both ways.
+    """
+    fits = both_ways(evidence) if evidence.force is not None else None
+    if fits is None or _unsigned(evidence):
+        return None
+    facts = evidence.facts
+    share = facts.mass * facts.gravity / len(fits) * facts.radius
+    seen = -np.array([zero.value for zero, _ in fits]) / share
+    resistance = float(np.mean([back.value for _, back in fits] / share))
+    alike = float(np.ptp(seen)) < ALIKE * abs(float(np.mean(seen)))
+    if not alike or resistance <= 0.0:
+        return None
+    return Estimate(float(np.mean(seen)), RUTS * resistance)
+
+
+def both_ways(evidence: Evidence) -> list[tuple[Estimate, Estimate]] | None:
     """Return zero and resistance of each torque on a straight; None unless driven both ways."""
     assert evidence.force is not None
     smooth = moving_mean(evidence.common_rate, evidence.rows_in(SETTLING))
@@ -324,21 +344,39 @@ def _both_ways(evidence: Evidence) -> list[tuple[Estimate, Estimate]] | None:
     sense = np.sign(smooth[rows])
     if min((sense > 0).sum(), (sense < 0).sum()) < 2 * LEAST_MOVING_ROWS:
         return None
-    design = np.column_stack([np.ones(sense.size), sense, evidence.force[rows, 0]])
-    if float(np.std(_smooth(evidence.force[rows, :1]))) < LEAST_SLOPE_STD:
-        design = design[:, :2]
+    slopes = evidence.force[rows, :2]  # along both axes: the IMU may be turned about z
+    slopes = slopes[:, np.std(_smooth(slopes), axis=0) >= LEAST_SLOPE_STD]
+    design = np.column_stack([np.ones(sense.size), sense, slopes])
     fits = [block_fit(design, np.nan_to_num(column)) for column in evidence.torque[rows].T]
     return [(fit[0], fit[1]) for fit in fits]
 
 
 def _unsigned(evidence: Evidence) -> list[Outcome]:
     """Return torques whose mean both ways exceeds what the sense of motion changes, all wheels."""
-    fits = _both_ways(evidence)
+    fits = both_ways(evidence)
+    if fits is not None and _follows_slopes(evidence):
+        return []
     if fits is None or not all(
         zero.value > max(MEAN_SIGMAS * zero.std, abs(resistance.value)) for zero, resistance in fits
     ):
         return []
     return [evidence.found('torque_unsigned', 0.9)]
+
+
+def _follows_slopes(evidence: Evidence) -> bool:
+    """Return whether thrust follows slopes as well as what they are along the drive."""
+    assert evidence.force is not None
+    rows = evidence.straight
+    sense, pushed = np.sign(evidence.rim[rows]), _smooth(thrust(evidence)[rows, None])
+    slopes = _smooth(evidence.force[rows, :2])
+    both = _smooth(np.column_stack([np.ones(sense.size), sense]))
+    against = _smooth(evidence.force[rows, :2] * sense[:, None])
+    left = [
+        float(np.linalg.norm(pushed - design @ np.linalg.lstsq(design, pushed, rcond=None)[0]))
+        for design in (np.hstack([both, slopes]), np.hstack([both, against]))
+    ]
+    sloped = float(np.std(slopes, axis=0).max()) >= LEAST_SLOPE_STD
+    return sloped and left[1] > UNSIGNED * left[0]
 
 
 def drive_friction(evidence: Evidence) -> Estimate | NotChecked:

@@ -39,6 +39,8 @@ Mask = NDArray[np.bool_]
 
 TRIAL_ROWS = 1000
 """Rows, spread over the drive, that hypotheses are compared on."""
+MOST_STEERING = 3.3
+"""Steering angle that no wheel has [rad]."""
 MOST_WHEELS = 10
 """Wheels for which all combinations of signs are tried."""
 LEAST_TURNING_ROWS = 40
@@ -215,7 +217,7 @@ def stretch_of(evidence: Evidence, there: NDArray[np.intp], rows: Mask) -> Turni
     sides = (lateral > 0.0).any() and (lateral < 0.0).any() and np.isfinite(lateral).all()
     if evidence.gyro is None or not sides:
         lateral = np.zeros(there.size)
-    speed = (evidence.rate * evidence.radius)[keep][:, there]
+    speed = evidence.speed[keep][:, there]
     return Turning(speed, evidence.yaw[keep], lateral, evidence.rested)
 
 
@@ -237,6 +239,31 @@ class _Chosen(NamedTuple):
     trial: str = ''
     sure: float = 0.99
     unlike: bool = False
+
+
+def check_steering(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
+    """Return steering angles of another unit or sign, and the evidence with these mended."""
+    steering, outcomes, joints = evidence.steering, list[Outcome](), evidence.facts
+    if not np.isfinite(steering).any():
+        return [], evidence
+    assert joints.configuration is not None
+    if float(np.nanmax(np.abs(steering))) > MOST_STEERING:
+        told = {'value': math.radians(1.0), 'most': float(np.nanmax(np.abs(steering)))}
+        outcomes.append(evidence.found('steering_degrees', 0.97, **told))
+        evidence = replace(evidence, steering=np.radians(steering))
+    along = evidence.speed * np.tan(np.nan_to_num(evidence.steering))  # w_z x
+    turn, rows = evidence.yaw[:, None] * joints.configuration.wheels.x, evidence.turning
+    track = track_ratio(evidence)
+    if track is None or track < 0.0 or rows.sum() < LEAST_TURNING_ROWS:
+        return outcomes, evidence
+    fits = [correlation(a, b) for a, b in zip(along[rows].T, turn[rows].T, strict=True)]
+    wrong = np.array(fits) < -LEAST_CORRELATION
+    if wrong.any():
+        wheel = ', '.join(name for name, w in zip(joints.names, wrong, strict=True) if w)
+        outcomes.append(evidence.found('steering_sign', 0.95, wheel=wheel, value=-1.0))
+        mended = np.where(wrong, -evidence.steering, evidence.steering)
+        evidence = replace(evidence, steering=mended)
+    return outcomes, evidence
 
 
 def check_signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
@@ -380,6 +407,8 @@ def _told_direction(evidence: Evidence, signs: FloatArray) -> _Told:
     if reference is not None:
         sense = np.sign(np.nan_to_num(evidence.rim_at(reference.stamp, speed, 0.3)))
         forward = np.nan_to_num(reference.velocity[:, 0])  # the faster, the more it tells
+        most = 2.0 * float(np.median(np.abs(forward[sense != 0.0]))) if sense.any() else 0.0
+        forward = np.clip(forward, -most, most)  # but for jumps
         fit = float(sense @ forward) / max(float(np.abs(forward).sum()), 1e-12)
         by_reference = fit if abs(fit) > SAME_SENSE else None
     if evidence.force is not None and evidence.time.size > 100:

@@ -12,9 +12,13 @@ from numpy.typing import NDArray
 
 from wheel_terra_estimator.checks import turning
 from wheel_terra_estimator.checks.evidence import LEAST_MOVING_ROWS, Evidence, row_medians
-from wheel_terra_estimator.checks.faults import RATE_UNITS
+from wheel_terra_estimator.checks.faults import RATE_UNITS, listed
 from wheel_terra_estimator.checks.finding import NotChecked, Outcome
-from wheel_terra_estimator.checks.reference import LEAST_ROWS, ahead
+from wheel_terra_estimator.checks.reference import (
+    LEAST_ROWS,
+    ahead,
+    either_unit,
+)
 from wheel_terra_estimator.checks.statistics import (
     bend_noise,
     correlation,
@@ -35,11 +39,13 @@ ONLY_BY_SPEED = ('thousandths of rad/s',)
 """Units that a skidding rover's turns do not tell from counts of an encoder."""
 UNIT_BAND = (0.7, 1.25)
 """Ratio of speeds over the factor of its unit; slip makes it smaller, nothing larger [-]."""
+LEAST_BAND, OUTRUN = 0.4, 1.05
+"""The same of units that may be counts as well: least, and most without doubt [-]."""
 TELLING = 0.15
 """Difference of two units' distances from a ratio of speeds [ln] that tells them apart."""
 LEAST_ROLLING_TRACK = 0.9
 """Effective over stated track of a rover whose rates are in rad/s; skidding makes it larger [-]."""
-LARGE_WHEEL = 0.3
+LARGE_WHEEL = 0.6
 """Radius above which the speed of a rim in m/s is too near to its rate in rad/s [m]."""
 POSITION_TIME = 2.0
 """Over which the change of a position is taken [s]."""
@@ -66,6 +72,10 @@ FROZEN_CHANGE = 0.3
 none."""
 LIVELY = 0.3
 """Rate of the other wheels beside which a wheel does not stand, over the working rate [-]."""
+SAME_SPEED = 0.05
+"""Speed of a side against the middle, as a share of it, in which all wheels roll alike [-]."""
+LEAST_ODD, MOST_ODD, ODD = 0.08, 0.35, 3.0
+"""Speed of an odd wheel over that of the others [ln]: least, most of a radius; over scatter [-]."""
 LONG_FROZEN_TIME = 10.0
 """The same at a steady speed, where a coarse encoder may repeat itself [s]."""
 HELD_TORQUE = 1.5
@@ -162,6 +172,38 @@ def _held(evidence: Evidence, index: int, rows: Any) -> bool:
     return bool(np.nanmedian(own) > HELD_TORQUE * max(float(np.nanmedian(others)), 1e-9))
 
 
+def check_scales(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
+    """Return wheels that turn faster or slower than all others all along, made alike."""
+    facts, speed = evidence.facts, np.abs(evidence.speed)
+    middle = row_medians(speed)
+    rows = evidence.steady & (middle > 0.5 * evidence.working_rate * np.nanmean(evidence.radius))
+    if evidence.gyro is not None:
+        rows &= np.abs(evidence.yaw) * np.abs(facts.lateral).max() < SAME_SPEED * middle
+    few = rows.sum() < 2 * LEAST_MOVING_ROWS or speed.shape[1] < 3
+    if few or facts.configuration is None:
+        return [], evidence
+    ratio = speed[rows] / middle[rows, None]
+    ratios = [np.nanmedian(part, axis=0) for part in (ratio, *np.array_split(ratio, 2))]
+    whole, first, second = (np.log(np.maximum(part, 1e-3)) for part in ratios)
+    outcomes, rate = list[Outcome](), evidence.rate.copy()
+    for i, name in enumerate(facts.names):
+        beside = max(float(np.nanmax(np.abs(np.delete(whole, i)))), abs(first[i] - second[i]))
+        if not abs(whole[i]) > max(LEAST_ODD, ODD * beside) or whole[i] < math.log(LIVELY):
+            continue
+        times = math.exp(whole[i])
+        rate[:, i] /= times
+        told = {'times': times, 'by': 1.0 / times}
+        if abs(whole[i]) > MOST_ODD:  # no wheel is so much larger
+            outcomes.append(evidence.found('wheel_counts', 0.95, wheel=name, **told))
+            continue
+        radii = facts.configuration.wheels.radius.copy()
+        radii[i] -= facts.radius[i] * (1.0 - told['by'])  # lugs stay
+        told['value'] = round(float(radii[i]), 5)
+        finding = evidence.found('wheel_scale', 0.9, wheel=name, radii=listed(radii), **told)
+        outcomes.append(finding)
+    return outcomes, evidence.with_rate(rate) if outcomes else evidence
+
+
 # Units -------------------------------------------------------------------------------------------
 
 
@@ -202,47 +244,72 @@ def check_unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
             ratio = float(np.median(np.abs(odometry.velocity[rows, 0]) / rim[rows]))
     track = turning.track_ratio(evidence)
     if ratio is None and track is None:
-        if evidence.working_rate * float(np.nanmean(facts.radius)) < FASTEST_RIM:
+        fastest = evidence.working_rate * float(np.nanmean(facts.radius))
+        how = f'rim speed above {FASTEST_RIM:.0f} m/s'
+        units = {u: f for u, f in RATE_UNITS.items() if fastest * f < FASTEST_RIM < fastest}
+        if not units:
             reason = 'wheel rates: neither reference nor turn in it; drive a circle'
             return [NotChecked('unit', reason)], evidence
-        ratio, how = math.pi / 30.0, f'rim speed above {FASTEST_RIM:.0f} m/s'
-    usual = track is not None and turning.ordinary_track(track)
-    units = {}
+        return _unit_findings(evidence, units, how)
     turns = track is not None and abs(track) > LEAST_ROLLING_TRACK  # as rad/s do
     rim_unit = {} if turns else _rim_unit(float(np.nanmean(facts.radius)))
-    for unit, factor in {**RATE_UNITS, **rim_unit}.items():
-        by_turn = track is not None and turning.ordinary_track(track * factor)
-        by_turn &= unit not in ONLY_BY_SPEED
-        told = by_turn and not usual
-        if ratio is not None:
-            told = UNIT_BAND[0] < ratio / factor < UNIT_BAND[1]
-            told &= track is None or by_turn or not usual
-        if told:
-            units[unit] = factor
-    if ratio is not None and units:
-        off = {unit: abs(math.log(ratio / factor)) for unit, factor in units.items()}
-        units = {unit: units[unit] for unit in units if off[unit] < min(off.values()) + TELLING}
+    units = _fitting_units(ratio, track, {**RATE_UNITS, **rim_unit})
     if units and ratio is None and LEAST_UNIT_TRACK < abs(track or 0.0) < 1.0:
         reason = (
             f'turns need {abs(track or 0.0):.2f} of the stated track: another unit or another track'
         )
         return [NotChecked('unit', f'wheel rates: {reason}; drive straight')], evidence
-    if units:
-        told_by = how if ratio else 'turns seen by the gyro'
-        findings: list[Outcome] = [
-            evidence.found('rate_unit', 0.97 / len(units), value=factor, unit=unit, how=told_by)
-            for unit, factor in units.items()
-        ]
-        factor = math.nan if len(units) > 1 else next(iter(units.values()))
-        return findings, evidence.with_rate(evidence.rate * factor)
+    doubtful = False  # no unit with a usual slip, and perhaps counts
+    if ratio is not None and ratio < MOST_COUNT and units:
+        doubtful = not UNIT_BAND[0] < ratio / min(units.values()) < OUTRUN
+    either = either_unit(evidence, ratio) if rim_unit and track is None else []
+    if either:
+        return either, evidence.with_rate(evidence.rate / float(np.nanmean(facts.radius)))
+    if units and not doubtful:
+        return _unit_findings(evidence, units, how if ratio else 'turns seen by the gyro')
     if ratio is None and track is not None and abs(track) > MOST_TRACK:
         ratio, how = float(f'{USUAL_TRACK / abs(track):.1g}'), 'gyro in turns'
     if ratio is None or not 0.0 < ratio < MOST_COUNT:
         return [], evidence
     evidence.figures['wheels.rad_per_count'] = value = float(f'{ratio:.4g}')
     told_of = {'times': 1.0 / ratio, 'counts': 2.0 * math.pi / ratio, 'how': how}
-    finding = evidence.found('rate_counts', 0.9, value=value, **told_of)
-    return [finding], evidence.with_rate(evidence.rate * ratio)
+    finding = evidence.found('rate_counts', 0.45 if units else 0.9, value=value, **told_of)
+    perhaps, _ = _unit_findings(evidence, units, how, 0.45)
+    return [*perhaps, finding], evidence.with_rate(evidence.rate * ratio)
+
+
+def _fitting_units(
+    ratio: float | None, track: float | None, known: dict[str, float]
+) -> dict[str, float]:
+    """Return the units that a ratio of speeds and the track of the turns may come from."""
+    usual = track is not None and turning.ordinary_track(track)
+    units = {}
+    for unit, factor in known.items():
+        by_turn = track is not None and turning.ordinary_track(track * factor)
+        by_turn &= unit not in ONLY_BY_SPEED
+        told = by_turn and not usual
+        if ratio is not None:
+            least = LEAST_BAND if factor < MOST_COUNT else UNIT_BAND[0]
+            told = least < ratio / factor < UNIT_BAND[1]
+            told &= track is None or by_turn or not usual
+        if told:
+            units[unit] = factor
+    if ratio is None or not units:
+        return units
+    off = {unit: abs(math.log(ratio / factor)) for unit, factor in units.items()}
+    return {unit: units[unit] for unit in units if off[unit] < min(off.values()) + TELLING}
+
+
+def _unit_findings(
+    evidence: Evidence, units: dict[str, float], how: str, sure: float = 0.97
+) -> tuple[list[Outcome], Evidence]:
+    """Return the units that rates may be in; rates stay unknown where there are several."""
+    findings: list[Outcome] = [
+        evidence.found('rate_unit', sure / len(units), value=factor, unit=unit, how=how)
+        for unit, factor in units.items()
+    ]
+    factor = math.nan if len(units) != 1 else next(iter(units.values()))
+    return findings, evidence.with_rate(evidence.rate * factor)
 
 
 def _rim_unit(radius: float) -> dict[str, float]:

@@ -1,0 +1,110 @@
+# Copyright 2026 wheel_terra_estimator developers
+# SPDX-License-Identifier: Apache-2.0
+"""Faults that look like others: the one behind what was seen is named, and it alone."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import rolling_rover as rolling
+from scipy.spatial.transform import Rotation
+
+from wheel_terra_estimator.checks.run import check_recording
+
+WHOLE = rolling.recording()
+
+
+def found(configuration=None, **changes):
+    whole = replace(WHOLE, **changes)
+    return check_recording(whole, configuration or rolling.rover()).findings
+
+
+def test_a_reference_that_freezes_before_a_stop_and_a_way_back():
+    velocity = WHOLE.reference.velocity.copy()
+    velocity[WHOLE.reference.seconds > 50.0] = velocity[WHOLE.reference.seconds > 50.0][0]
+    (finding,) = found(reference=replace(WHOLE.reference, velocity=velocity))
+    assert finding.fault == 'reference_frozen'
+
+
+def test_rates_without_a_sign():
+    (finding,) = found(joints=replace(WHOLE.joints, rate=np.abs(WHOLE.joints.rate)))
+    assert finding.fault == 'rates_unsigned'
+
+
+@pytest.mark.parametrize('times, fault', [(0.5, 'wheel_counts'), (1.2, 'wheel_scale')])
+def test_one_wheel_that_counts_otherwise(times, fault):
+    rate = WHOLE.joints.rate * [1.0, 1.0, times, 1.0]
+    (finding,) = found(joints=replace(WHOLE.joints, rate=rate))
+    assert (finding.fault, finding.wheel) == (fault, 'rear_left')
+    if fault == 'wheel_scale':
+        assert finding.value == pytest.approx(rolling.RADIUS / times, rel=0.01)
+
+
+def attitude(seconds):
+    """Attitude (k, 4) of the drive: heading and slope."""
+    motion = rolling.ten_minute_drive()
+    heading = np.cumsum(motion.yaw_rate) * np.gradient(motion.time)
+    angles = np.column_stack([heading, -motion.slope, 0.0 * heading])
+    at = np.column_stack([np.interp(seconds, motion.time, column) for column in angles.T])
+    noise = 0.002 * np.random.default_rng(1).standard_normal((seconds.size, 3))
+    return (Rotation.from_euler('ZYX', at) * Rotation.from_rotvec(noise)).as_quat()
+
+
+def test_an_orientation_of_a_world_with_z_down():
+    right = attitude(WHOLE.imu.seconds)
+    assert found(imu=replace(WHOLE.imu, orientation=right)) == []
+    down = Rotation.from_euler('x', math.pi)
+    wrong = (down * Rotation.from_quat(right) * down).as_quat()
+    (finding,) = found(imu=replace(WHOLE.imu, orientation=wrong))
+    assert finding.fault == 'orientation_frame'
+
+
+def test_a_pitch_of_the_imu_by_torques_that_drive_both_ways():
+    motion = rolling.ten_minute_drive(turns=False)
+    whole = rolling.recording(motion)
+    pitch = Rotation.from_euler('y', 7.0, degrees=True)  # the x axis points down
+    imu = replace(
+        whole.imu, force=pitch.inv().apply(whole.imu.force), rate=pitch.inv().apply(whole.imu.rate)
+    )
+    (finding,) = check_recording(replace(whole, imu=imu), rolling.rover()).findings
+    assert finding.parameter == 'sensors.imu_mounting_pitch_deg'
+    assert finding.value == pytest.approx(7.0, abs=1.5)
+
+
+JOINTS = ('front_left_steer', 'front_right_steer', 'rear_left_steer', 'rear_right_steer')
+
+
+def steered(change):
+    """A rover with four steered wheels, long beside its track, in circles; angles changed."""
+    motion, rover = rolling.ten_minute_drive(), rolling.rover(**{
+        'wheels.x': [0.6, 0.6, -0.6, -0.6], 'wheels.steering_joints': list(JOINTS),
+    })  # fmt: skip
+    along = motion.speed[:, None] - motion.yaw_rate[:, None] * rover.wheels.y
+    aside = motion.yaw_rate[:, None] * rover.wheels.x
+    angle = np.arctan2(aside, np.abs(along)) * np.sign(along)
+    noise = WHOLE.joints.rate - along / rolling.rolling_radius()  # what the recording adds
+    rate = np.hypot(along, aside) * np.sign(along) / rolling.rolling_radius() + noise
+    none = np.full_like(rate, np.nan)
+    joints = replace(
+        WHOLE.joints,
+        names=WHOLE.joints.names + JOINTS,
+        rate=np.hstack([rate, none]),
+        torque=np.hstack([WHOLE.joints.torque, none]),
+        position=np.hstack([none, change(angle)]),
+    )
+    return check_recording(replace(WHOLE, joints=joints), rover)
+
+
+@pytest.mark.parametrize(
+    'change, faults',
+    [
+        (lambda angle: angle, []),
+        (lambda angle: -angle, ['steering_sign']),
+        (np.degrees, ['steering_degrees']),
+    ],
+)
+def test_steered_wheels_roll_where_they_point(change, faults):
+    report = steered(change)
+    assert [finding.fault for finding in report.findings] == faults
+    assert report.figures['rover.effective_over_stated_track'] == pytest.approx(1.0, abs=0.02)
