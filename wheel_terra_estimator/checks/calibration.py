@@ -78,7 +78,7 @@ def calibrate(
         read_off = told.fault.endswith('_offset') or told.fault == 'planet'
         if read_off and told.parameter and told.value is not None:
             changes.add(told.parameter, told.value, told.std, told.words)
-    _mounting(changes, evidence)
+    _mounting(changes, evidence, report)
     _biases(changes, evidence)
     _noises_and_rates(changes, report)
     evidence = _radius(changes, evidence, report)
@@ -130,8 +130,10 @@ def _directions(changes: _Changes, report: CheckReport, configuration: Configura
     changes.add('wheels.direction', after, None, f'{told.wheel}: {told.words}')
 
 
-def _mounting(changes: _Changes, evidence: Evidence) -> None:
-    rotation, std, source = evidence.rotation, None, 'mean specific force'
+def _mounting(changes: _Changes, evidence: Evidence, report: CheckReport) -> None:
+    told = next((f for f in report.findings if f.parameter in imu.MOUNTING), None)
+    rotation, std = evidence.rotation, told.std if told is not None else None
+    source = told.words if told is not None else 'mean specific force'
     tilt = imu.small_tilt(evidence)
     if tilt is not None and tilt.std < imu.EVEN_GROUND_STD:
         if tilt.sigmas > CLEAR:
@@ -191,13 +193,16 @@ def _radius(changes: _Changes, evidence: Evidence, report: CheckReport) -> Evide
     told, names = geometry.radius_ratio(evidence), {finding.fault for finding in report.findings}
     rival = 'reference_scale' in names and 'radius' not in names
     found = not np.allclose(evidence.facts.radius, configuration.wheels.slip_radius)
+    lugs = configuration.wheels.slip_radius - configuration.wheels.radius
+    if found and (isinstance(told, NotChecked) or rival):
+        after = (evidence.facts.radius - lugs).round(5).tolist()
+        changes.add('wheels.radius', after, None, 'straight stretches against the other wheels')
     if isinstance(told, NotChecked) or rival:
         return evidence
     ratio, radius = told.ratio, float(np.mean(evidence.facts.radius))
     if ratio.sigmas_from(1.0) < CLEAR and not found:
         return evidence
     rolling = evidence.facts.radius * ratio.value
-    lugs = configuration.wheels.slip_radius - configuration.wheels.radius
     assert evidence.recording.reference is not None
     source = f'straight, steady, firm stretches against {evidence.recording.reference.topic}'
     if 'reference_scale' in names:

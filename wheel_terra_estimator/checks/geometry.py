@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from wheel_terra_estimator.checks import turning
 from wheel_terra_estimator.checks.evidence import Evidence, Mask
 from wheel_terra_estimator.checks.faults import LEAST_TURN_RATE, listed
 from wheel_terra_estimator.checks.finding import NotChecked, Outcome
@@ -383,8 +384,10 @@ def track_ratio(evidence: Evidence) -> Told | NotChecked:
         return NotChecked('track', 'no clear turn in it; drive a circle both ways')
     track = stated_track(evidence)
 
+    turns = np.column_stack([yaw, np.ones(yaw.size)])[:, : 1 if evidence.rested else 2]
+
     def fitted(part: slice) -> Estimate:
-        slope = block_fit(yaw[part, None], difference[part])[0]
+        slope = block_fit(turns[part], difference[part])[0]
         return Estimate(slope.value / track, slope.std / abs(track))
 
     ratio = fitted(slice(None))
@@ -422,6 +425,13 @@ def check_track(evidence: Evidence) -> list[Outcome]:
         return []
     if not skids(evidence) and 'rover.speed_over_rim_speed' not in figures:
         ratio = Estimate(ratio.value, math.hypot(ratio.std, 0.03))
+    rolling = figures.get('rover.speed_over_rim_speed', 1.0)
+    unlike = turning.unlike_in_turns(evidence)
+    if not skids(evidence) and (unlike or abs(ratio.value * rolling - 1.0) < LEAST_TRACK_ERROR):
+        reason = 'wheels do not roll alike in turns, whatever the track'
+        if not unlike:
+            reason = f'turns and straights both need {rolling:.2f} of the radius'
+        return [NotChecked(kind, reason) for kind in ('track', 'radius')]
     if skids(evidence):
         return [
             evidence.found(

@@ -196,7 +196,8 @@ def _unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     rim, rows = ahead(evidence, reference, 0.4)
     if rows.sum() < LEAST_ROWS:
         return [], evidence
-    ratio = float(np.median(np.abs(reference.velocity[rows, 0]) / rim[rows]))
+    sense = np.sign(evidence.rim_at(reference.stamp[rows], evidence.rim, AROUND))
+    ratio = float(np.median(sense * reference.velocity[rows, 0] / rim[rows]))
     fitting = reference_units(ratio)
     near = {unit: f for unit, f in fitting.items() if abs(ratio / f - 1.0) < WITHOUT_SLIP}
     if len(fitting) > 1 and not near:  # which of them, the slip hides
@@ -248,7 +249,8 @@ def _jumps(evidence: Evidence, reference: VelocitySeries) -> tuple[list[Outcome]
         for rows in (evidence.steady, evidence.at_rest)
     ]
     if evidence.facts.known:
-        calm.append(np.abs(forward) > BEYOND * float(np.quantile(np.abs(evidence.rim), 0.99)))
+        fastest = max(speed, float(np.quantile(np.abs(evidence.rim), 0.99)))
+        calm.append(np.abs(forward) > BEYOND * fastest)
     wild &= np.any(calm, axis=0)[2:-2]
     share = float(np.mean(wild))
     forward[2:-2] = np.where(wild, beside, forward[2:-2])

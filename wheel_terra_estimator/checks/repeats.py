@@ -47,18 +47,15 @@ def check_repeats(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     deep = [] if sinkage is None else _sinkage(evidence, sinkage)
     outcomes, evidence = _reference(evidence)
     imu = evidence.recording.imu
-    if imu is not None and evidence.force is not None:
-        dead = stays(evidence, evidence.seconds(imu), imu.force)
+    for name, field in (('force', 'linear_acceleration'), ('gyro', 'angular_velocity')):
+        if imu is None or getattr(evidence, name) is None:
+            continue
+        dead = stays(evidence, evidence.seconds(imu), imu.force if name == 'force' else imu.rate)
         if dead is not None:
-            how = f'linear_acceleration {dead.how}'
-            outcomes.append(evidence.found('sensor_frozen', 0.97, how=how))
-            evidence = replace(evidence, force=None)
-    if imu is not None and evidence.gyro is not None:
-        dead = stays(evidence, evidence.seconds(imu), imu.rate)
-        if dead is not None:
-            how = f'angular_velocity {dead.how}'
-            outcomes.append(evidence.found('sensor_frozen', 0.97, how=how))
-            evidence = replace(evidence, gyro=None)
+            outcomes.append(evidence.found('sensor_frozen', 0.97, how=f'{field} {dead.how}'))
+            evidence = (
+                replace(evidence, force=None) if name == 'force' else replace(evidence, gyro=None)
+            )
     torques, evidence = _torques(evidence)
     return [*outcomes, *torques, *deep], evidence
 

@@ -14,7 +14,7 @@ from wheel_terra_estimator.checks.evidence import Evidence
 from wheel_terra_estimator.checks.faults import listed
 from wheel_terra_estimator.checks.finding import Finding, NotChecked, Outcome
 from wheel_terra_estimator.checks.series import SinkageSeries
-from wheel_terra_estimator.checks.statistics import bend_noise
+from wheel_terra_estimator.checks.statistics import bend_noise, correlation
 from wheel_terra_estimator.checks.trial import halves
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.sensor_errors import LinearErrors, SensorErrors
@@ -29,6 +29,8 @@ BELOW_ZERO = 0.006
 """A median sinkage further above the ground than this [m] is no sinkage (lugs carry less)."""
 BURIED = 0.5
 """Depth over radius that no drive has all the time [-]."""
+LIKE_OTHERS = 0.2
+"""Correlation with the other wheels of one that counts downwards as they do [-]."""
 ALIKE_SHARE = 0.4
 """Share by which the offset of a wheel may change over a drive to count as its zero [-]."""
 DEEP_STD = 0.02
@@ -158,7 +160,10 @@ def _sign_and_zero(
         spread = max(float(np.nanmax(others) - np.nanmin(others)), 0.1 * abs(far))
         how = f'reads {1000 * far:+.0f} mm off the other wheels all the time'
         if own < -limit < float(np.nanmin(others)):
-            if abs(-own - typical) < 0.6 * typical and _skew(table[:, index]) <= 0.0:
+            beside_it = np.nanmedian(np.delete(table, index, axis=1), axis=1)
+            alike = correlation(table[:, index] - own, beside_it - typical) > LIKE_OTHERS
+            like_sign = not alike and abs(-own - typical) < 0.6 * typical
+            if like_sign and _skew(table[:, index]) <= 0.0:
                 beside = f', the others {1000 * typical:.0f} mm'
                 told = {'reading': 1000 * own, 'others': beside, 'of': f' of {name}'}
                 outcomes.append(evidence.found('sinkage_sign', 0.9, wheel=name, value=-1.0, **told))

@@ -21,6 +21,7 @@ from wheel_terra_estimator.checks.faults import listed
 from wheel_terra_estimator.checks.finding import Finding, NotChecked, Outcome
 from wheel_terra_estimator.checks.statistics import (
     Estimate,
+    bend_noise,
     block_fit,
     confidence,
     correlation,
@@ -323,17 +324,27 @@ def slope_on_the_level(evidence: Evidence) -> Estimate | None:
 
     The zero of a torque is that of its wheel alone. None without drives both ways.
     """
-    fits = both_ways(evidence) if evidence.force is not None else None
-    if fits is None or _unsigned(evidence):
+    force, facts = evidence.force, evidence.facts
+    fits = both_ways(evidence) if force is not None else None
+    if force is None or fits is None or _unsigned(evidence):
         return None
-    facts = evidence.facts
     share = facts.mass * facts.gravity / len(fits) * facts.radius
     seen = -np.array([zero.value for zero, _ in fits]) / share
     resistance = float(np.mean([back.value for _, back in fits] / share))
     alike = float(np.ptp(seen)) < ALIKE * abs(float(np.mean(seen)))
+    rows, calm = evidence.straight, _calm_force(evidence)
+    left = bend_noise(force[rows, :1]) / math.sqrt(evidence.rows_in(SLOPE_TIME))
+    alike &= left < 0.2 * float(np.std(calm[rows, 0]))  # noise makes slopes look flat
     if not alike or resistance <= 0.0:
         return None
     return Estimate(float(np.mean(seen)), RUTS * resistance)
+
+
+def _calm_force(evidence: Evidence) -> FloatArray:
+    """Return horizontal specific forces (k, 2) without vibration [m/s^2]."""
+    assert evidence.force is not None
+    width = evidence.rows_in(SLOPE_TIME)
+    return np.column_stack([moving_mean(column, width) for column in evidence.force[:, :2].T])
 
 
 def both_ways(evidence: Evidence) -> list[tuple[Estimate, Estimate]] | None:
@@ -344,8 +355,8 @@ def both_ways(evidence: Evidence) -> list[tuple[Estimate, Estimate]] | None:
     sense = np.sign(smooth[rows])
     if min((sense > 0).sum(), (sense < 0).sum()) < 2 * LEAST_MOVING_ROWS:
         return None
-    slopes = evidence.force[rows, :2]  # along both axes: the IMU may be turned about z
-    slopes = slopes[:, np.std(_smooth(slopes), axis=0) >= LEAST_SLOPE_STD]
+    slopes = _calm_force(evidence)[rows]  # along both axes: the IMU may be turned about z
+    slopes = slopes[:, np.std(slopes, axis=0) >= LEAST_SLOPE_STD]
     design = np.column_stack([np.ones(sense.size), sense, slopes])
     fits = [block_fit(design, np.nan_to_num(column)) for column in evidence.torque[rows].T]
     return [(fit[0], fit[1]) for fit in fits]

@@ -41,12 +41,14 @@ TRIAL_ROWS = 1000
 """Rows, spread over the drive, that hypotheses are compared on."""
 MOST_STEERING = 3.3
 """Steering angle that no wheel has [rad]."""
+MOST_UNLIKE = 0.1
+"""Residual in turns of wheels that roll where they are steered, at most [-]."""
 MOST_WHEELS = 10
 """Wheels for which all combinations of signs are tried."""
 LEAST_TURNING_ROWS = 40
 """Rows with a turn by the gyro that the wheels must account for."""
-MOST_LEFT = 0.4
-"""Residual that a cure may leave [-]."""
+MOST_LEFT, MOST_LEFT_STEERED = 0.4, 0.2
+"""Residual that a cure may leave [-]; of wheels that roll where they are steered."""
 UNTURNED = 0.5
 """What the residual of turns without an answer of the wheels weighs beside wheels unlike [-]."""
 CLEAR_DIRECTION = 0.8
@@ -76,10 +78,12 @@ class Turning:
     yaw: FloatArray
     lateral: FloatArray
     unbiased: bool = True  # else a constant yaw rate may be the gyro's
+    along: FloatArray | None = None  # (k, m) cosine of the steering angles; None: not steered
 
     def rows(self, part: slice | Mask) -> Turning:
         """Return a part of the stretch."""
-        return replace(self, speed=self.speed[part], yaw=self.yaw[part])
+        along = None if self.along is None else self.along[part]
+        return replace(self, speed=self.speed[part], yaw=self.yaw[part], along=along)
 
     @cached_property
     def turns(self) -> Mask:
@@ -139,6 +143,7 @@ class Comparison(NamedTuple):
 def fit_of(fix: Fix, stretch: Turning) -> Fit:
     """Return how well a hypothesis accounts for wheels and gyro."""
     speed, yaw, lateral = fix.applied(stretch.speed), stretch.yaw, stretch.lateral
+    speed = speed if stretch.along is None else speed * stretch.along
     track, alike, cost, rolling = 0.0, 0.0, 0.0, speed
     if stretch.turns.sum() >= LEAST_TURNING_ROWS:
         left, right = lateral > 0.0, lateral < 0.0
@@ -217,8 +222,9 @@ def stretch_of(evidence: Evidence, there: NDArray[np.intp], rows: Mask) -> Turni
     sides = (lateral > 0.0).any() and (lateral < 0.0).any() and np.isfinite(lateral).all()
     if evidence.gyro is None or not sides:
         lateral = np.zeros(there.size)
-    speed = evidence.speed[keep][:, there]
-    return Turning(speed, evidence.yaw[keep], lateral, evidence.rested)
+    speed = (evidence.rate * evidence.radius)[keep][:, there]
+    along = np.cos(np.nan_to_num(evidence.steering[keep][:, there]))
+    return Turning(speed, evidence.yaw[keep], lateral, evidence.rested, along)
 
 
 def _known(evidence: Evidence) -> tuple[NDArray[np.intp], Mask]:
@@ -241,29 +247,31 @@ class _Chosen(NamedTuple):
     unlike: bool = False
 
 
-def check_steering(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
-    """Return steering angles of another unit or sign, and the evidence with these mended."""
-    steering, outcomes, joints = evidence.steering, list[Outcome](), evidence.facts
-    if not np.isfinite(steering).any():
+def check_steering_unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
+    """Return steering angles in degrees, and the evidence with these in radians."""
+    most = float(np.nanmax(np.abs(evidence.steering), initial=0.0))
+    if most <= MOST_STEERING:
         return [], evidence
-    assert joints.configuration is not None
-    if float(np.nanmax(np.abs(steering))) > MOST_STEERING:
-        told = {'value': math.radians(1.0), 'most': float(np.nanmax(np.abs(steering)))}
-        outcomes.append(evidence.found('steering_degrees', 0.97, **told))
-        evidence = replace(evidence, steering=np.radians(steering))
-    along = evidence.speed * np.tan(np.nan_to_num(evidence.steering))  # w_z x
-    turn, rows = evidence.yaw[:, None] * joints.configuration.wheels.x, evidence.turning
-    track = track_ratio(evidence)
-    if track is None or track < 0.0 or rows.sum() < LEAST_TURNING_ROWS:
-        return outcomes, evidence
-    fits = [correlation(a, b) for a, b in zip(along[rows].T, turn[rows].T, strict=True)]
+    told = evidence.found('steering_degrees', 0.97, value=math.radians(1.0), most=most)
+    return [told], replace(evidence, steering=np.radians(evidence.steering))
+
+
+def check_steering_sign(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
+    """Return wheels that are steered against the turn of gyro and rims, and these mended."""
+    facts, rows, track = evidence.facts, evidence.turning, track_ratio(evidence)
+    there = np.isfinite(evidence.steering).any() and facts.configuration is not None
+    if not there or track is None or track < 0.0 or rows.sum() < LEAST_TURNING_ROWS:
+        return [], evidence
+    assert facts.configuration is not None
+    aside = evidence.speed * np.tan(np.nan_to_num(evidence.steering))  # w_z x
+    turn = evidence.yaw[:, None] * facts.configuration.wheels.x
+    fits = [correlation(a, b) for a, b in zip(aside[rows].T, turn[rows].T, strict=True)]
     wrong = np.array(fits) < -LEAST_CORRELATION
-    if wrong.any():
-        wheel = ', '.join(name for name, w in zip(joints.names, wrong, strict=True) if w)
-        outcomes.append(evidence.found('steering_sign', 0.95, wheel=wheel, value=-1.0))
-        mended = np.where(wrong, -evidence.steering, evidence.steering)
-        evidence = replace(evidence, steering=mended)
-    return outcomes, evidence
+    if not wrong.any():
+        return [], evidence
+    wheel = ', '.join(name for name, w in zip(facts.names, wrong, strict=True) if w)
+    told = evidence.found('steering_sign', 0.95, wheel=wheel, value=-1.0)
+    return [told], replace(evidence, steering=evidence.steering * np.where(wrong, -1.0, 1.0))
 
 
 def check_signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
@@ -327,7 +335,8 @@ def _chosen(evidence: Evidence, there: NDArray[np.intp], rows: Mask) -> _Chosen:
         again = compare_exchanges(stretch)
         best = again if again is not None and again.trial.falls else best
     # Nothing is clearly better than what the rover file says, or good enough.
-    if not best.trial.falls or best.trial.after > MOST_LEFT:
+    steered = np.isfinite(evidence.steering).any()
+    if not best.trial.falls or best.trial.after > (MOST_LEFT_STEERED if steered else MOST_LEFT):
         track = fit_of(Fix((1,) * count), stretch).clear_track
         return _Chosen(signs, track, unlike=best.trial.falls)
     turn = best.fit.clear_track
@@ -536,6 +545,13 @@ def track_ratio(evidence: Evidence) -> float | None:
     if evidence.gyro is None or not evidence.facts.has_sides() or rows.sum() < LEAST_TURNING_ROWS:
         return None
     return fit_of(Fix((1,) * there.size), stretch_of(evidence, there, rows)).clear_track or None
+
+
+def unlike_in_turns(evidence: Evidence) -> bool:
+    """Return whether no track makes the wheels roll alike in turns."""
+    there, rows = _known(evidence)
+    stretch = stretch_of(evidence, there, rows & evidence.turning)
+    return fit_of(Fix((1,) * there.size), stretch).cost > MOST_UNLIKE
 
 
 def ordinary_track(ratio: float) -> bool:

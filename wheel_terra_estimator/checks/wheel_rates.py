@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,7 @@ from wheel_terra_estimator.checks.reference import (
     ahead,
     either_unit,
 )
+from wheel_terra_estimator.checks.repeats import stays
 from wheel_terra_estimator.checks.statistics import (
     bend_noise,
     correlation,
@@ -61,15 +63,6 @@ FASTEST_RIM = 15.0
 """Rim speed that no rover of this kind drives [m/s]."""
 FROZEN_TIME = 5.0
 """A rate that does not change in the last digit for this long [s] while the others do."""
-STEPS = 5.0
-"""Change of the other rates at a steady speed over the least change of a wheel's own [-]."""
-COARSE = 0.1
-"""Step of the rates over the working rate, above which a rate that stays tells nothing [-]."""
-SETTLING = 1.0
-"""Time after which wheels of one command have reached their speeds, some before others [s]."""
-FROZEN_CHANGE = 0.3
-"""Change of the other rates meanwhile, as a share of the working rate; steps of coarse encoders are
-none."""
 LIVELY = 0.3
 """Rate of the other wheels beside which a wheel does not stand, over the working rate [-]."""
 SAME_SPEED = 0.05
@@ -77,7 +70,7 @@ SAME_SPEED = 0.05
 LEAST_ODD, MOST_ODD, ODD = 0.08, 0.35, 3.0
 """Speed of an odd wheel over that of the others [ln]: least, most of a radius; over scatter [-]."""
 LONG_FROZEN_TIME = 10.0
-"""The same at a steady speed, where a coarse encoder may repeat itself [s]."""
+"""Time of driving in which an encoder that repeats itself is told from a coarse one [s]."""
 HELD_TORQUE = 1.5
 """Torque of a standing wheel over that of the others meanwhile, above which it is held [-]."""
 CLEAR_SPEED = 5.0
@@ -109,14 +102,11 @@ def check_dead_wheels(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     moving = evidence.moving
     if moving.sum() < LEAST_MOVING_ROWS or evidence.rate.shape[1] < 2:
         return [], evidence
-    step = common_step(evidence.rate[moving], evidence.time[moving])
-    change = max(FROZEN_CHANGE * evidence.working_rate, 1.5 * step)
     outcomes: list[Outcome] = []
-    rounded = step > COARSE * evidence.working_rate  # a steady rate then repeats itself
-    for at_zero in (True,) if rounded else (True, False):  # beside a dead one none is frozen
+    for look in (_stands, _stays):  # beside a dead one none is frozen
         mended = evidence.rate.copy()
         for index, name in enumerate(evidence.facts.names):
-            how = _frozen(evidence, index, change, at_zero)
+            how = look(evidence, index)
             if how:
                 outcomes.append(evidence.found('rate_frozen', 0.97, wheel=name, how=how))
                 mended[:, index] = np.nan
@@ -124,37 +114,29 @@ def check_dead_wheels(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     return outcomes, evidence
 
 
-def _frozen(evidence: Evidence, index: int, change: float, at_zero: bool) -> str:
-    """Return how a rate is frozen, at zero or elsewhere; '' if it is not."""
+def _stands(evidence: Evidence, index: int) -> str:
+    """Return how long a rate is 0 while the others turn and no torque holds the wheel."""
+    own, others = evidence.rate[:, index], np.delete(evidence.rate, index, axis=1)
+    busy = row_medians(np.abs(others)) > LIVELY * evidence.working_rate
+    longest = 0.0
+    for start, end in runs(own == 0.0):
+        rows = np.flatnonzero(busy[start:end]) + start
+        if rows.size * evidence.period > FROZEN_TIME and not _held(evidence, index, rows):
+            longest = max(longest, rows.size * evidence.period)
+    return f'does not change for up to {longest:.1f} s' if longest else ''
+
+
+def _stays(evidence: Evidence, index: int) -> str:
+    """Return how a rate is the same for longer than it ever is, or repeats itself, elsewhere."""
     rate, moving = evidence.rate, evidence.moving
-    own, others = rate[:, index], np.delete(rate, index, axis=1)
-    steps, longest = np.abs(np.diff(own)), 0.0
-    settling = evidence.rows_in(SETTLING)
-    least = np.min(steps[steps > SAME_VALUE * evidence.working_rate], initial=np.inf)
-    for start, end in runs(np.diff(own) == 0.0):
-        lasts = (end - start) * evidence.period  # a gap is none
-        if lasts < FROZEN_TIME or (own[start] == 0.0) != at_zero:
-            continue
-        stretch = slice(start, end + 1)
-        inside = others[start + settling : max(end + 1 - settling, start + settling + 1)]
-        if at_zero:
-            busy = row_medians(np.abs(others[stretch])) > LIVELY * evidence.working_rate
-            lasts *= float(busy.mean())
-            lively = lasts > FROZEN_TIME and not _held(evidence, index, np.r_[stretch][busy])
-        else:
-            beside = np.nanmax(inside, axis=0) - np.nanmin(inside, axis=0)
-            steady = lasts > LONG_FROZEN_TIME and _repeats(others[stretch]) < 0.5
-            steady &= bool(np.nanmedian(beside) > STEPS * least)
-            lively = steady or float(np.mean(beside > change)) > 0.5
-        if lively:
-            longest = max(longest, lasts)
-    if longest > 0.0:
-        return f'does not change for up to {longest:.1f} s'
-    repeats, beside = _repeats(own[moving]), _repeats(others[moving])
+    dead = stays(evidence, evidence.time, rate[:, index : index + 1])
+    if dead is not None and dead.value != 0.0:
+        return f'does not change for up to {dead.longest:.1f} s'
+    own, others = _repeats(rate[moving, index]), _repeats(np.delete(rate, index, axis=1)[moving])
     lasts = moving.sum() * evidence.period > LONG_FROZEN_TIME
-    if at_zero or not lasts or repeats < 0.6 or beside > 0.2 or _held(evidence, index, moving):
+    if not lasts or own < 0.6 or others > 0.2 or _held(evidence, index, moving):
         return ''
-    return f'repeats its last value in {100 * repeats:.0f} % of the messages'
+    return f'repeats its last value in {100 * own:.0f} % of the messages'
 
 
 def _repeats(rate: FloatArray) -> float:
@@ -185,23 +167,25 @@ def check_scales(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     ratio = speed[rows] / middle[rows, None]
     ratios = [np.nanmedian(part, axis=0) for part in (ratio, *np.array_split(ratio, 2))]
     whole, first, second = (np.log(np.maximum(part, 1e-3)) for part in ratios)
-    outcomes, rate = list[Outcome](), evidence.rate.copy()
+    outcomes, rate, rolling = list[Outcome](), evidence.rate.copy(), facts.radius.copy()
     for i, name in enumerate(facts.names):
         beside = max(float(np.nanmax(np.abs(np.delete(whole, i)))), abs(first[i] - second[i]))
         if not abs(whole[i]) > max(LEAST_ODD, ODD * beside) or whole[i] < math.log(LIVELY):
             continue
         times = math.exp(whole[i])
-        rate[:, i] /= times
         told = {'times': times, 'by': 1.0 / times}
         if abs(whole[i]) > MOST_ODD:  # no wheel is so much larger
             outcomes.append(evidence.found('wheel_counts', 0.95, wheel=name, **told))
+            rate[:, i] /= times
             continue
-        radii = facts.configuration.wheels.radius.copy()
-        radii[i] -= facts.radius[i] * (1.0 - told['by'])  # lugs stay
+        rolling[i] /= times
+        radii = facts.configuration.wheels.radius + rolling - facts.radius  # lugs stay
         told['value'] = round(float(radii[i]), 5)
         finding = evidence.found('wheel_scale', 0.9, wheel=name, radii=listed(radii), **told)
         outcomes.append(finding)
-    return outcomes, evidence.with_rate(rate) if outcomes else evidence
+    if not outcomes:
+        return [], evidence
+    return outcomes, replace(evidence.with_rate(rate), facts=replace(facts, radius=rolling))
 
 
 # Units -------------------------------------------------------------------------------------------
