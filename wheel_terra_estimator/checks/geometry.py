@@ -427,9 +427,11 @@ def check_track(evidence: Evidence) -> list[Outcome]:
         ratio = Estimate(ratio.value, math.hypot(ratio.std, 0.03))
     rolling = figures.get('rover.speed_over_rim_speed', 1.0)
     unlike = turning.unlike_in_turns(evidence)
-    if not skids(evidence) and (unlike or abs(ratio.value * rolling - 1.0) < LEAST_TRACK_ERROR):
-        reason = 'wheels do not roll alike in turns, whatever the track'
-        if not unlike:
+    soft = figures.get('torque.level_traction', 0.0) > SOFT_TRACTION
+    both = abs(ratio.value * rolling - 1.0) < LEAST_TRACK_ERROR
+    if not skids(evidence) and (unlike or soft or both):
+        reason = 'wheels slip in turns, whatever the track; drive circles on firm ground'
+        if both:
             reason = f'turns and straights both need {rolling:.2f} of the radius'
         return [NotChecked(kind, reason) for kind in ('track', 'radius')]
     if skids(evidence):

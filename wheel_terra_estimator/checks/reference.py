@@ -14,7 +14,12 @@ from wheel_terra_estimator.checks import turning
 from wheel_terra_estimator.checks.evidence import Evidence, Mask
 from wheel_terra_estimator.checks.finding import NotChecked, Outcome
 from wheel_terra_estimator.checks.series import VelocitySeries
-from wheel_terra_estimator.checks.statistics import bend_noise, correlation, robust_std
+from wheel_terra_estimator.checks.statistics import (
+    bend_noise,
+    correlation,
+    moving_mean,
+    robust_std,
+)
 
 FloatArray = NDArray[np.float64]
 
@@ -77,7 +82,8 @@ def check_sense(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     ]
     told = len(ways) == 2 and not _sideways(reference) and _without_sign(rim, forward)
     if told and min(followed) > 0.5 and max(followed) < 2.0:
-        sense = np.sign(np.interp(evidence.time, evidence.seconds(reference), forward))
+        calm = moving_mean(forward, LEAST_ROWS)
+        sense = np.sign(np.interp(evidence.time, evidence.seconds(reference), calm))
         mended = evidence.with_rate(evidence.rate * sense[:, None])
         return [evidence.found('rates_unsigned', 0.95)], mended
     return [], evidence

@@ -129,9 +129,10 @@ def stays(evidence: Evidence, time: FloatArray, values: FloatArray) -> Stays | N
     speed = np.interp(at, evidence.time, np.abs(evidence.common_rate))
     same = (np.diff(readings, axis=0) == 0.0).all(axis=1)
     rows, longest, value = np.zeros(time.size, dtype=bool), 0.0, 0.0
+    period = float(np.median(np.abs(np.diff(at))))
     for first, last in runs(same):
         share = float(driving[first:last].mean())
-        lasts = share * float(at[last] - at[first])
+        lasts = share * (last - first) * period  # a gap is none
         live = not readings[first].any() and readings.any()
         if live or lasts < LEAST_TIME:
             continue

@@ -92,7 +92,11 @@ def _one_cause(findings: list[Finding]) -> list[Finding]:
     """Name the orientation alone where gyro and wheels agree with each other, not with it."""
     reversed_ = [f for f in findings if f.fault == 'gyro_reversed' and ORIENTATION in f.words]
     swapped = [f for f in findings if f.fault == 'swapped_sides']
-    if not swapped or not any('.z' in f.words for f in reversed_):
+    if reversed_ and not any('.z' in f.words for f in reversed_):  # no turn tells which
+        doubtful = [replace(f, confidence=0.45) for f in reversed_]
+        rest = [f for f in findings if f not in reversed_]
+        return [*rest, *doubtful, found('orientation_frame', reversed_[0].topic, 0.45)]
+    if not swapped or not reversed_:
         return findings
     told = found('orientation_frame', reversed_[0].topic, swapped[0].confidence)
     return [*(f for f in findings if f not in reversed_ and f not in swapped), told]

@@ -72,6 +72,8 @@ GAIN_SIGMAS = 4.0
 ZERO_FACTOR = 6.0
 ZERO_SIGMAS = 5.0
 MEAN_SIGMAS = 2.0
+LEAST_ROLLING = 0.3
+"""Resistance over the slope that all torques deny: without, they have no sign [-]."""
 UNSIGNED = 0.9
 """Residual of torques without a sign over that of torques with one, at most, on slopes [-]."""
 
@@ -331,11 +333,11 @@ def slope_on_the_level(evidence: Evidence) -> Estimate | None:
     share = facts.mass * facts.gravity / len(fits) * facts.radius
     seen = -np.array([zero.value for zero, _ in fits]) / share
     resistance = float(np.mean([back.value for _, back in fits] / share))
-    alike = float(np.ptp(seen)) < ALIKE * abs(float(np.mean(seen)))
+    alike = float(np.ptp(seen)) < 0.5 * ALIKE * abs(float(np.mean(seen)))
     rows, calm = evidence.straight, _calm_force(evidence)
     left = bend_noise(force[rows, :1]) / math.sqrt(evidence.rows_in(SLOPE_TIME))
     alike &= left < 0.2 * float(np.std(calm[rows, 0]))  # noise makes slopes look flat
-    if not alike or resistance <= 0.0:
+    if not alike or resistance < LEAST_ROLLING * abs(float(np.mean(seen))):
         return None
     return Estimate(float(np.mean(seen)), RUTS * resistance)
 
@@ -365,7 +367,10 @@ def both_ways(evidence: Evidence) -> list[tuple[Estimate, Estimate]] | None:
 def _unsigned(evidence: Evidence) -> list[Outcome]:
     """Return torques whose mean both ways exceeds what the sense of motion changes, all wheels."""
     fits = both_ways(evidence)
-    if fits is not None and _follows_slopes(evidence):
+    rolls = fits is not None and all(
+        abs(back.value) > LEAST_ROLLING * abs(zero.value) for zero, back in fits
+    )
+    if rolls and _follows_slopes(evidence):
         return []
     if fits is None or not all(
         zero.value > max(MEAN_SIGMAS * zero.std, abs(resistance.value)) for zero, resistance in fits

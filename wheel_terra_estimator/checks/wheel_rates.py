@@ -130,7 +130,7 @@ def _stays(evidence: Evidence, index: int) -> str:
     """Return how a rate is the same for longer than it ever is, or repeats itself, elsewhere."""
     rate, moving = evidence.rate, evidence.moving
     dead = stays(evidence, evidence.time, rate[:, index : index + 1])
-    if dead is not None and dead.value != 0.0:
+    if dead is not None and dead.value != 0.0 and dead.longest > LONG_FROZEN_TIME:
         return f'does not change for up to {dead.longest:.1f} s'
     own, others = _repeats(rate[moving, index]), _repeats(np.delete(rate, index, axis=1)[moving])
     lasts = moving.sum() * evidence.period > LONG_FROZEN_TIME
@@ -180,7 +180,7 @@ def check_scales(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
             continue
         rolling[i] /= times
         radii = facts.configuration.wheels.radius + rolling - facts.radius  # lugs stay
-        told['value'] = round(float(radii[i]), 5)
+        told |= {'value': round(float(radii[i]), 5), 'std': round(float(radii[i]) * beside, 5)}
         finding = evidence.found('wheel_scale', 0.9, wheel=name, radii=listed(radii), **told)
         outcomes.append(finding)
     if not outcomes:
