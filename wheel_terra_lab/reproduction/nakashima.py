@@ -136,8 +136,8 @@ def _table7(rows: Sequence[Row]) -> list[Statement]:
                     f'; {off:.2f} N, which H lacks as well, as H - R_r = W sin 25 deg; '
                     f'they are {force:.0f} % of H'
                 )
-            place, what = 'table 7', f'wheel {wheel}, 25 degrees: {name}'
-            found.append(Statement(place, what, f'{said:.3g}', f'{have:.3g}', good, why))
+            paper_s, ours_s, what = f'{said:.3g}', f'{have:.3g}', f'{name}, 25 degrees'
+            found.append(Statement('table 7', what, paper_s, ours_s, good, why, wheel))
     if len(ours) == len(paper) == len(before):
         for key, (name, _) in named.items():
             pairs = [(values[key][0], paper[wheel][key]) for wheel, values in ours.items()]
@@ -217,8 +217,8 @@ def _table6(rows: Sequence[Row]) -> list[Statement]:
                 else f'{100 * off / said:.0f} % apart, {100 * POWER_SHARE:.0f} % allowed'
             )
             why += '' if good else _why_table6(rows, wheel, key, said)
-            what = f'wheel {wheel}: {name}'
-            found.append(Statement('table 6', what, f'{said:.3g}', f'{have:.3g}', good, why))
+            paper_s, ours_s = f'{said:.3g}', f'{have:.3g}'
+            found.append(Statement('table 6', name, paper_s, ours_s, good, why, wheel))
         pairs = [
             (values[key], paper[wheel][key])
             for wheel, values in ours.items()

@@ -30,6 +30,8 @@ class Statement:
         None: not computed, or an input that cannot fail.
     why : str
         Within what it is reproduced, or why it is not.
+    wheel : int
+        Of several wheels with the same quantity; 0: no such.
     """
 
     place: str
@@ -38,6 +40,7 @@ class Statement:
     ours: str
     holds: bool | None
     why: str = ''
+    wheel: int = 0
 
     @property
     def verdict(self) -> str:
@@ -67,5 +70,21 @@ def page(title: str, statements: Sequence[Statement]) -> list[str]:
     judged = sum(row.holds is not None for row in statements)
     lines = [f'## {title}', '', f'{held} of {judged} statements that can fail are reproduced.', '']
     lines += ['| where | what | paper | ours | verdict |', '|---|---|---|---|---|']
-    lines += [f'| {s.place} | {s.what} | {s.paper} | {s.ours} | {s.verdict} |' for s in statements]
-    return [*lines, '']
+    groups: dict[tuple[str, ...], list[Statement]] = {}
+    for s in statements:
+        alone = '' if s.holds and s.wheel else f'{s.wheel} {s.holds}'
+        groups.setdefault((s.place, s.what, alone), []).append(s)
+    return [*lines, *map(_row, groups.values()), '']
+
+
+def _row(group: Sequence[Statement]) -> str:
+    """Return one row: a statement, or those of several wheels that are all reproduced."""
+    first, several = group[0], len(group) > 1
+    wheels = ', '.join(str(s.wheel) for s in group if s.wheel)
+    what = f'wheel{"s" * several} {wheels}: {first.what}' if wheels else first.what
+    verdict = first.verdict
+    if several:
+        worst = max((s.why for s in group), key=lambda why: float(why.partition(' ')[0]))
+        verdict = f'reproduced: at worst {worst}'
+    paper, ours = ', '.join(s.paper for s in group), ', '.join(s.ours for s in group)
+    return f'| {first.place} | {what} | {paper} | {ours} | {verdict} |'
