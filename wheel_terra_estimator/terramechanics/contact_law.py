@@ -22,7 +22,8 @@ BEKKER_WONG_JANOSI, WONG_REECE, RESISTIVE_FORCE = (
     'resistive_force',
 )
 LAWS = (BEKKER_WONG_JANOSI, WONG_REECE, RESISTIVE_FORCE)
-# Shift of the peak stress with slip where none is configured; loose sand (Wong and Reece 1967).
+# Shift of the peak stress with slip where none is configured; loose sand: Wong and Reece 1967,
+# J. Terramechanics 4(1), 81-98 (doi 10.1016/0022-4898(67)90105-X).
 PEAK_SHIFT = 0.32
 PLATE_DEPTH = 0.02  # at which the resistive stress is that of the soil's plate test [m]
 

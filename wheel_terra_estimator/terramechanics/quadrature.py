@@ -76,7 +76,8 @@ def _stressed(
     entry_side = t1 - front * x
     angle = np.concatenate([entry_side, np.broadcast_to(t2 + rear * x, entry_side.shape)])
     cosine, sine = np.cos(angle), np.sin(angle)
-    # The rear branch mirrors the front one (Wong and Reece), so both share the same stress.
+    # The rear branch mirrors the front one, so both share the same stress: Wong and Reece 1967,
+    # J. Terramechanics 4(1), 81-98 (doi 10.1016/0022-4898(67)90105-X).
     stress = stresses.front_stress(contact, entry_side, cosine=cosine[:nodes])
     contact.angle = angle
     contact.normal_stress = np.concatenate([stress, stress])
