@@ -399,6 +399,23 @@ def track_ratio(evidence: Evidence) -> Told | NotChecked:
     return Told(ratio, trial)
 
 
+def rolling_track(evidence: Evidence) -> Told | NotChecked:
+    """Return the track ratio of a rover that does not skid, unless slip or a radius may be it."""
+    told, figures = track_ratio(evidence), evidence.figures
+    if isinstance(told, NotChecked) or abs(told.ratio.value - 1.0) < LEAST_TRACK_ERROR:
+        return told
+    ratio, rolling = told.ratio, figures.get('rover.speed_over_rim_speed')
+    if rolling is not None and abs(ratio.value * rolling - 1.0) < LEAST_TRACK_ERROR:
+        return NotChecked('track', f'turns and straights both need {rolling:.2f} of the radius')
+    soft = figures.get('torque.level_traction', 0.0) > SOFT_TRACTION
+    if soft or turning.unlike_in_turns(evidence):
+        reason = 'wheels slip in turns, whatever the track; drive circles on firm ground'
+        return NotChecked('track', reason)
+    if rolling is None:
+        return told._replace(ratio=Estimate(ratio.value, math.hypot(ratio.std, 0.03)))
+    return told
+
+
 def check_track(evidence: Evidence) -> list[Outcome]:
     """Return a track that the turns contradict."""
     figures = evidence.figures
@@ -421,19 +438,13 @@ def check_track(evidence: Evidence) -> list[Outcome]:
                 'that is skid no recording tells: measure it with a tape',
             )
         ]
+    if not skids(evidence):
+        rolling = rolling_track(evidence)
+        if isinstance(rolling, NotChecked):
+            return [NotChecked(kind, rolling.reason) for kind in ('track', 'radius')]
+        ratio = rolling.ratio
     if ratio.sigmas_from(1.0) < 4.0 or abs(ratio.value - 1.0) < LEAST_TRACK_ERROR:
         return []
-    if not skids(evidence) and 'rover.speed_over_rim_speed' not in figures:
-        ratio = Estimate(ratio.value, math.hypot(ratio.std, 0.03))
-    rolling = figures.get('rover.speed_over_rim_speed', 1.0)
-    unlike = turning.unlike_in_turns(evidence)
-    soft = figures.get('torque.level_traction', 0.0) > SOFT_TRACTION
-    both = abs(ratio.value * rolling - 1.0) < LEAST_TRACK_ERROR
-    if not skids(evidence) and (unlike or soft or both):
-        reason = 'wheels slip in turns, whatever the track; drive circles on firm ground'
-        if both:
-            reason = f'turns and straights both need {rolling:.2f} of the radius'
-        return [NotChecked(kind, reason) for kind in ('track', 'radius')]
     if skids(evidence):
         return [
             evidence.found(
