@@ -247,19 +247,19 @@ def stuck_reason(reasons: Sequence[str]) -> str:
     return '; '.join(dict.fromkeys(part for part in parts if part))
 
 
-def read_estimates(bag: Bag, namespace: str = f'/{NODE}') -> EstimateHistory:
-    """Read the estimates out of a bag of the node's outputs below a namespace.
+def read_estimates(bag: Bag) -> EstimateHistory:
+    """Read the estimates out of a bag of the node's outputs.
 
     Raises
     ------
     UserError
         The bag holds no estimates.
     """
-    types = {f'{namespace}/{topic}': kind for topic, kind in OUTPUT_TYPES.items()}
+    types = {f'/{NODE}/{topic}': kind for topic, kind in OUTPUT_TYPES.items()}
     types[DIAGNOSTICS] = 'diagnostic_msgs/msg/DiagnosticArray'
-    if f'{namespace}/slip' not in bag.topics:
+    if f'/{NODE}/slip' not in bag.topics:
         raise UserError(
-            f'{bag.path}: no {namespace}/slip in it, so no estimates; there are: '
+            f'{bag.path}: no /{NODE}/slip in it, so no estimates; there are: '
             + ', '.join(bag.topics)
         )
     found = _EstimateMessages()
@@ -269,7 +269,7 @@ def read_estimates(bag: Bag, namespace: str = f'/{NODE}') -> EstimateHistory:
             message = unpack[topic](data)
         except DamagedMessageError:
             continue
-        found.add(topic.removeprefix(f'{namespace}/'), message, log_time)
+        found.add(topic.removeprefix(f'/{NODE}/'), message, log_time)
     return found.history()
 
 

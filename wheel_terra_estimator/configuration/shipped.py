@@ -123,10 +123,10 @@ def find(name: str | Path, kind: str = '', folder: Path | None = None) -> Path:
     )
 
 
-def nearest_names(wanted: str, shipped: Iterable[str], count: int = 3) -> list[str]:
-    """Return the shipped names that are most like a word, the likest first."""
+def nearest_names(wanted: str, shipped: Iterable[str]) -> list[str]:
+    """Return the three shipped names that are most like a word, the likest first."""
     bare = wanted.rsplit('/', 1)[-1]
     return sorted(
         shipped,
         key=lambda key: -difflib.SequenceMatcher(None, bare, key.rsplit('/', 1)[-1]).ratio(),
-    )[:count]
+    )[:3]

@@ -23,7 +23,7 @@ from wheel_terra_estimator.terramechanics import effects as effect_catalogue
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.kinematics import shear_displacement, speed_ratio
 from wheel_terra_estimator.terramechanics.soil import Soil
-from wheel_terra_estimator.terramechanics.stresses import bearing_law, front_stress
+from wheel_terra_estimator.terramechanics.stresses import front_stress
 from wheel_terra_estimator.terramechanics.terms import Terms, set_angles
 from wheel_terra_estimator.terramechanics.wheel import Wheel
 
@@ -101,14 +101,7 @@ class ContactModel:
         self._wheel = wheel
         self._soil = soil
         self._tan_friction = float(np.tan(soil.friction_angle))
-        self._modulus, self._reference_depth = bearing_law(
-            soil.pressure_law,
-            soil.cohesive_modulus,
-            soil.frictional_modulus,
-            wheel.width,
-            soil.cohesion,
-            soil.density * gravity,
-        )
+        self._modulus, self._reference_depth = soil.bearing(wheel.width, gravity)
         self._slip_radius = slip_radius
         self._gravity = gravity
         self._terms = Terms(effect_catalogue.check_settings(effects))

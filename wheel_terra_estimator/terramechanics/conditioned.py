@@ -25,7 +25,6 @@ from wheel_terra_estimator.terramechanics.kinematics import slip_of_speed_ratio
 from wheel_terra_estimator.terramechanics.maths import ScalarMaths
 from wheel_terra_estimator.terramechanics.operating_points import STANDARD_GRAVITY
 from wheel_terra_estimator.terramechanics.soil import Soil
-from wheel_terra_estimator.terramechanics.stresses import bearing_law
 from wheel_terra_estimator.terramechanics.terms import (
     PEAK_MARGIN,
     SOIL_NUMBERS,
@@ -466,14 +465,7 @@ def _contacts(
         contact.width = width
         contact.lug_height, contact.lug_count, contact.lug_thickness = height, count, thickness
         contact.gravity, contact.density = gravity, float(soil.density)
-        contact.bearing_modulus, contact.reference_depth = bearing_law(
-            soil.pressure_law,
-            soil.cohesive_modulus,
-            soil.frictional_modulus,
-            width,
-            soil.cohesion,
-            soil.density * gravity,
-        )
+        contact.bearing_modulus, contact.reference_depth = soil.bearing(width, gravity)
         contacts.append((contact, radius + height if slip_radius == 'lug_tip' else radius))
     return contacts
 

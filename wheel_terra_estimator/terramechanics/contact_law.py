@@ -93,14 +93,7 @@ def reece_soil(soil: Soil, width: float, gravity: float = STANDARD_GRAVITY) -> S
 
 def plate_scale(soil: Soil, width: float, gravity: float = STANDARD_GRAVITY) -> float:
     """Scale of the resistive stress with which a flat plate meets the soil's pressure [-]."""
-    modulus, depth = bearing_law(
-        soil.pressure_law,
-        soil.cohesive_modulus,
-        soil.frictional_modulus,
-        width,
-        soil.cohesion,
-        soil.density * gravity,
-    )
+    modulus, depth = soil.bearing(width, gravity)
     pressure = modulus * (PLATE_DEPTH / depth) ** soil.sinkage_exponent
     generic = 1e6 * float(stress_maps(0.0, 0.5 * np.pi)[0]) * PLATE_DEPTH
     return float(pressure) / generic

@@ -23,6 +23,7 @@ FloatArray = NDArray[np.float64]
 LARGEST_ANGLE = np.pi / 2
 SMALLEST_ANGLE = 1e-5
 _STEP = 1e-6
+_TOLERANCE = 1e-10  # of the load
 # Of the load; what interpolation leaves.
 _REST = 1e-10
 
@@ -102,7 +103,6 @@ def solve_entrance_angle(
     carried: Callable[[FloatArray], FloatArray],
     load: FloatArray,
     start: FloatArray,
-    tolerance: float = 1e-10,
 ) -> tuple[FloatArray, NDArray[np.bool_]]:
     """Solve carried(t1) = load for each point.
 
@@ -115,8 +115,6 @@ def solve_entrance_angle(
         (2, N) angles -> (2, N) vertical force [N].
     load, start : numpy.ndarray
         (N,) load [N] and first guess [rad].
-    tolerance : float
-        Relative to the load.
 
     Returns
     -------
@@ -134,7 +132,7 @@ def solve_entrance_angle(
         pair[0], pair[1] = angle, angle * (1.0 + _STEP)
         force, next_force = carried(pair)
         error = np.abs(force - load)
-        done = error <= tolerance * load
+        done = error <= _TOLERANCE * load
         if done.all():
             return angle, done
         low = np.where(force < load, angle, low)

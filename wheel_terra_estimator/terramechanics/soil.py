@@ -5,11 +5,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from wheel_terra_estimator.terramechanics.checks import check_range
 from wheel_terra_estimator.terramechanics.maths import Quantity
+from wheel_terra_estimator.terramechanics.stresses import bearing_law
 
 PRESSURE_LAWS = ('bekker', 'reece')
 
@@ -71,3 +73,14 @@ class Soil:
         check_range('peak stress ratio', self.peak_stress_ratio, 0.0, 1.0)
         check_range('leaving angle ratio', self.leaving_angle_ratio, -1.5, 0.0)
         check_range('density', self.density, 0.0, unit='kg/m^3')
+
+    def bearing(self, width: Quantity, gravity: float) -> tuple[Any, Any]:
+        """Pressure at the reference depth [Pa], and that depth [m], of a wheel of a width [m]."""
+        return bearing_law(
+            self.pressure_law,
+            self.cohesive_modulus,
+            self.frictional_modulus,
+            width,
+            self.cohesion,
+            self.density * gravity,
+        )

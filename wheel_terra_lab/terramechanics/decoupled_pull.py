@@ -6,8 +6,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
 from wheel_terra_estimator.terramechanics.closed_form import coefficients
 
 
@@ -18,11 +16,10 @@ def decoupled_pull(
     peak_angle: Any,
     leaving_angle: Any,
     shear_radius: Any,
-    maths: Any = np,
 ) -> Any:
     """Drawbar pull from torque, load and contact angles: no soil parameter, no width [N].
 
     F = (A^2 + B^2)/(A C) T/R - (B/A) W: both peak stresses eliminated from the three balances.
     """
-    a, b, c = coefficients(entrance_angle, peak_angle, leaving_angle, maths)
+    a, b, c = coefficients(entrance_angle, peak_angle, leaving_angle)
     return (a * a + b * b) / (a * c) * torque / shear_radius - b / a * normal_load
