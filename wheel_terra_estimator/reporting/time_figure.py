@@ -255,11 +255,11 @@ def _pieces(x: FloatArray, y: FloatArray) -> str:
     return ''.join(parts)
 
 
-def nice(low: float, high: float) -> list[tuple[float, str]]:
-    """Return about `TICKS` round numbers within limits, each with its text."""
+def nice(low: float, high: float, count: int = TICKS) -> list[tuple[float, str]]:
+    """Return about ``count`` round numbers within limits, each with its text."""
     if not high > low:
         return []
-    raw = (high - low) / TICKS
+    raw = (high - low) / count
     unit = 10.0 ** math.floor(math.log10(raw))
     step = unit * next(factor for factor in (1.0, 2.0, 5.0, 10.0) if factor * unit >= raw)
     first, last = math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9)
