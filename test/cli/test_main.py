@@ -239,7 +239,7 @@ EFFECTS = """
 import sys
 from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter
 
-def term(contact, p, maths):
+def term(contact, p):
     {body}
 
 {top}

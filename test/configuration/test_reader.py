@@ -428,7 +428,7 @@ def test_an_effect_of_ones_own(tmp_path):
     """Named by a path relative to the file that names it; its keys are then known."""
     (tmp_path / 'mine.py').write_text(
         'from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter\n'
-        'def term(contact, p, maths):\n'
+        'def term(contact, p):\n'
         '    contact.drawbar_pull = contact.drawbar_pull + p.extra\n'
         "MINE = Effect(name='my_effect', claim='mine', symbol='F += x',\n"
         "    touches=frozenset({'drawbar_pull'}),\n"

@@ -16,7 +16,7 @@ from wheel_terra_estimator.discrepancy.proposal import find, words
 from wheel_terra_estimator.discrepancy.report.model_file import write_proposal
 from wheel_terra_estimator.discrepancy.result import LeftOut, as_json
 from wheel_terra_estimator.errors import UserError
-from wheel_terra_estimator.terramechanics.conditioned import ConditionedForces
+from wheel_terra_estimator.terramechanics.conditioned import ConditionedForces, ConditionedInputs
 from wheel_terra_estimator.terramechanics.effects.learned_closure import (
     EFFECT,
     REFERENCE_SPEED,
@@ -202,12 +202,11 @@ def test_quadrature_closed_form_and_filter_honour_the_law():
         changed = np.abs(getattr(exact, key) - getattr(plain, key)).max()
         assert np.abs(getattr(closed, key) - getattr(exact, key)).max() < 0.25 * changed
     forces = ConditionedForces(points.wheel, SOIL, {'learned_closure': LAW}, 'lug_tip', 9.81)
-    for k in range(3):
-        ratio = 1.0 - points.slip[k]
-        found = forces.forces(
-            0, ratio, float(exact.sinkage[k]), 80.0, 300.0, np.tan(0.56), 0.012, rim_speed=0.15
-        )
-        assert found.torque == pytest.approx(exact.torque[k], rel=0.03)
+    soil = 300.0, np.tan(0.56), 0.012
+    torque, _ = forces.forces(
+        ConditionedInputs(1.0 - points.slip, exact.sinkage, 80.0, *soil, rim_speed=0.15)
+    )
+    assert torque == pytest.approx(exact.torque, rel=0.03)
 
 
 def test_a_factor_is_bounded_and_no_law_is_the_plain_model():

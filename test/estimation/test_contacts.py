@@ -289,7 +289,9 @@ def standing_pull(parts, torque, speed, lateral_motion=0.0):
     wheels = StationaryWheels(parts.rover, parts.sensors, parts.layout, parts.models)
     headings = straight_headings(parts.rover)
     given = {'yaw_rate': 0.0, 'headings': headings, 'lateral_motion': lateral_motion}
-    return wheels.pull(0, x, torque, 60.0, **given)
+    n = parts.rover.wheel_count
+    pulls = wheels.pulls(x, np.full(n, torque), np.full(n, 60.0), **given)
+    return float(pulls[0])
 
 
 @pytest.mark.parametrize('torque', [-8.0, 20.0])

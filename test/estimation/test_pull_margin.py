@@ -9,7 +9,7 @@ import pytest
 from parts import SAND, Parts
 
 from wheel_terra_estimator.configuration import reader
-from wheel_terra_estimator.estimation.contacts.wheel_models import WheelState
+from wheel_terra_estimator.estimation.contacts.wheel_models import WheelStates
 from wheel_terra_estimator.estimation.judgement.pull_margin import PullMargin
 
 LOADS = (250.0,) * 5 + (0.0,)
@@ -23,25 +23,17 @@ def parts():
 def margin(parts, slope, direction=1.0):
     found = PullMargin(len(LOADS), parts.models)
     sinkages = parts.filter().mean[parts.layout.sinkage]
-    wheels = [
-        WheelState(1.0, z, load, 0.0, 0.0, mound=0.05)
-        for z, load in zip(sinkages.tolist(), LOADS, strict=True)
-    ]
+    wheels = WheelStates(1.0, sinkages, np.array(LOADS), mound=0.05)
     found.update(0.0, wheels, direction * math.tan(slope))
     return found.state.margin
 
 
 def test_the_margin_is_the_greatest_pull_less_what_the_slope_asks(parts):
-    x = parts.filter().mean
-    pulls = [
-        parts.models.forces(
-            0,
-            WheelState(1.0 - s, float(x[parts.layout.sinkage.start]), 250.0, 0.0, 0.0, mound=0.05),
-        ).pull
-        for s in np.linspace(0.2, 0.95, 40)
-    ]
+    sinkage = parts.filter().mean[parts.layout.sinkage]
+    ratio = 1.0 - np.linspace(0.2, 0.95, 40)[:, None]
+    _, pulls = parts.models.torque_and_pull(WheelStates(ratio, sinkage, 250.0, mound=0.05))
     level = margin(parts, 0.0)
-    assert level[0] == pytest.approx(max(pulls), abs=0.02 * 250.0)
+    assert level[0] == pytest.approx(pulls[:, 0].max(), abs=0.02 * 250.0)
     assert level[5] == 0.0  # in the air
     uphill = margin(parts, 0.2)
     assert level[0] - uphill[0] == pytest.approx(250.0 * math.tan(0.2))

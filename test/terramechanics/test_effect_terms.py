@@ -14,7 +14,7 @@ import pytest
 from terra_tools import SAND, WHEEL, points, state
 
 from wheel_terra_estimator.terramechanics import effects as catalogue_module
-from wheel_terra_estimator.terramechanics.conditioned import ConditionedForces
+from wheel_terra_estimator.terramechanics.conditioned import ConditionedForces, ConditionedInputs
 from wheel_terra_estimator.terramechanics.effects import (
     OUTPUTS,
     Effect,
@@ -146,12 +146,14 @@ def test_settings_that_are_refused(settings: dict, words: str) -> None:
 
 
 OWN = """
+import numpy as np
+
 from wheel_terra_estimator.terramechanics.effects import Effect, EffectParameter
 
-def term(contact, p, maths):
-    contact.normal_stress = contact.normal_stress * (1.0 + p.gain * maths.cos(contact.angle))
+def term(contact, p):
+    contact.normal_stress = contact.normal_stress * (1.0 + p.gain * np.cos(contact.angle))
 
-def drag(contact, p, maths):
+def drag(contact, p):
     contact.drawbar_pull = contact.drawbar_pull - 10.0 * p.gain
 
 SPRING = Effect(
@@ -176,11 +178,10 @@ def test_a_user_s_effect_takes_part_everywhere(tmp_path: Path) -> None:
     step = [WheelSoilModel(SAND, {'spring': {'gain': g}}).steady_state(points(0.3)).outputs()
             for g in (0.301, 0.299)]  # fmt: skip
     assert jacobian[..., 0] == pytest.approx((step[0] - step[1]) / 0.002, rel=1e-4)
-    with_effect = ConditionedForces(WHEEL, SAND, settings).forces(
-        0, 0.7, 0.01, 80.0, 250.0, 0.6, 0.01
-    )
-    without = ConditionedForces(WHEEL, SAND).forces(0, 0.7, 0.01, 80.0, 250.0, 0.6, 0.01)
-    assert with_effect.drawbar_pull == pytest.approx(without.drawbar_pull - 3.0)
+    inputs = ConditionedInputs(0.7, 0.01, 80.0, 250.0, 0.6, 0.01)
+    _, with_effect = ConditionedForces(WHEEL, SAND, settings).forces(inputs)
+    _, without = ConditionedForces(WHEEL, SAND).forces(inputs)
+    assert with_effect == pytest.approx(without - 3.0)
 
 
 def test_registering_refuses_taken_names_and_empty_effects(tmp_path: Path) -> None:
@@ -195,6 +196,9 @@ def test_registering_refuses_taken_names_and_empty_effects(tmp_path: Path) -> No
     broken = tmp_path / 'broken.py'
     broken.write_text('1/0\n')
     with pytest.raises(ValueError, match='ZeroDivisionError'):
+        load_file(broken)
+    broken.write_text(OWN.replace('(contact, p)', '(contact, p, maths)'))
+    with pytest.raises(ValueError, match=r'takes \(contact, parameters\), not 3 arguments'):
         load_file(broken)
     broken.write_text('x = 1\n')
     with pytest.raises(ValueError, match='defines no Effect'):

@@ -40,7 +40,6 @@ def test_what_three_angles_do_not_settle_goes_to_the_bracketed_solver() -> None:
             exponent=np.full(count, 1.0),
             small_angle=lambda load: np.full(len(load), 0.02),
             forces=forces,
-            load=lambda t: forces(t)[0],
             take=lambda rest: form(int(rest.sum())),
         )
 

@@ -12,7 +12,7 @@ from terra_tools import SAND, WHEEL, points, state
 
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.errors import UserError
-from wheel_terra_estimator.terramechanics.conditioned import ConditionedForces
+from wheel_terra_estimator.terramechanics.conditioned import ConditionedForces, ConditionedInputs
 from wheel_terra_estimator.terramechanics.effects import (
     Effect,
     EffectParameter,
@@ -143,7 +143,7 @@ def test_the_order_of_settings_does_not_matter() -> None:
 
 
 def test_a_shared_parameter_means_the_same_in_every_form() -> None:
-    def term(contact, p, maths):
+    def term(contact, p):
         contact.torque = contact.torque + p.a
 
     one = EffectParameter('a', '-', 0.0, 0.0, 1.0, 1.0, 'normal', 'm')
@@ -156,13 +156,13 @@ def test_a_shared_parameter_means_the_same_in_every_form() -> None:
 
 
 def test_the_filter_s_forces_know_the_forms() -> None:
-    inputs = (0, 0.7, 0.01, 80.0, 250.0, 0.6, 0.01)
-    plain = ConditionedForces(WHEEL, SAND).forces(*inputs)
+    inputs = ConditionedInputs(0.7, 0.01, 80.0, 250.0, 0.6, 0.01)
+    _, plain = ConditionedForces(WHEEL, SAND).forces(inputs)
     # With the sinkage given, the bearing law sets no force: the exponent does, a factor on it not.
-    steeper = ConditionedForces(WHEEL, SAND, {SKID: {'n1': 0.5}}).forces(*inputs)
-    weaker = ConditionedForces(WHEEL, SAND, {SKID: {'form': 'lyasko'}}).forces(*inputs)
-    assert steeper.drawbar_pull != pytest.approx(plain.drawbar_pull, rel=1e-4)
-    assert weaker.drawbar_pull == pytest.approx(plain.drawbar_pull, rel=1e-12)
+    _, steeper = ConditionedForces(WHEEL, SAND, {SKID: {'n1': 0.5}}).forces(inputs)
+    _, weaker = ConditionedForces(WHEEL, SAND, {SKID: {'form': 'lyasko'}}).forces(inputs)
+    assert steeper[0] != pytest.approx(plain[0], rel=1e-4)
+    assert weaker[0] == pytest.approx(plain[0], rel=1e-12)
 
 
 # Configuration ---------------------------------------------------------------------------------

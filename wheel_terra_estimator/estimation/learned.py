@@ -128,12 +128,12 @@ class Learned:
             pull = steady_pull(
                 models,
                 rover,
-                min(climbed.slip, 1.0),
+                np.array([min(climbed.slip, 1.0)]),
                 strength=strength,
                 shear_modulus=float(mean[SHEAR_MODULUS]),
                 stiffness=float(mean[self._layout.stiffness].mean()),
             )
-            return pull < climbed.demand
+            return float(pull[0]) < climbed.demand
 
         if not lacks(learned):
             return learned

@@ -17,7 +17,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cache
 from math import isnan
 from typing import NamedTuple
 
@@ -31,6 +30,9 @@ FloatArray = NDArray[np.float64]
 Floats = tuple[float, ...]
 
 _NO_LOAD = 1e-3  # of all wheels [N]
+_PLACES = np.array([0.1 * u + 0.9 * u**3 for u in np.linspace(-1.0, 1.0, 49)])
+"""Lateral speeds that are looked at, over the greatest: close together where forces change most.
+Between them the force is a straight line: 0.003 of the speed."""
 UNKNOWN_ANGLE_STD = math.pi / math.sqrt(3.0)
 """Deviation of a slip angle of which nothing is known: even over the whole turn [rad]."""
 
@@ -159,8 +161,9 @@ class SidewaysMotion(Component[SidewaysState]):
             told = self._at_rest(given)
             self.state = SidewaysState(time, error, doubt, pace, felt, 0.0, told)
             return told
-        model, model_variance = model_speed(self._rover, given, tuning)
-        told = self._told(given, model + error * pace, doubt * model_variance)
+        contacts = _contacts(self._rover, given, tuning)
+        model, model_variance = model_speed(self._rover, given, contacts, tuning)
+        told = self._told(given, contacts, model + error * pace, doubt * model_variance)
         self.state = SidewaysState(time, error, doubt, pace, felt, model_variance, told)
         return told
 
@@ -190,23 +193,23 @@ class SidewaysMotion(Component[SidewaysState]):
             (0.5 * self._rover.rest_speed) ** 2,
         )
 
-    def _told(self, given: SidewaysInputs, velocity: float, variance: float) -> Sideways:
+    def _told(
+        self, given: SidewaysInputs, contacts: _Contacts, velocity: float, variance: float
+    ) -> Sideways:
         tuning, rover = self._tuning, self._rover
         x, y = np.array(rover.longitudinal), np.array(rover.lateral)
-        sine, cosine = np.sin(given.steering), np.cos(given.steering)
-        forward = given.speed - given.yaw_rate * y
-        aside = velocity + given.yaw_rate * x
+        sine, cosine, forward, turning = contacts[:4]
+        aside = velocity + turning
         along, across = forward * cosine + aside * sine, aside * cosine - forward * sine
         # How far speed, turning and lateral speed are known, turned into the wheel.
-        turning = given.yaw_rate_std**2
-        var_forward = given.speed_std**2 + turning * y * y
-        var_aside = variance + turning * x * x
+        var_yaw_rate = given.yaw_rate_std**2
+        var_forward = given.speed_std**2 + var_yaw_rate * y * y
+        var_aside = variance + var_yaw_rate * x * x
         var_along = var_forward * cosine**2 + var_aside * sine**2
         var_across = var_forward * sine**2 + var_aside * cosine**2
         angle = np.arctan2(across, along)
         angle_std = _angle_std(along, across, np.sqrt(var_along), np.sqrt(var_across))
-        contacts = _contacts(rover, given, tuning)
-        forces = np.array(_wheel_forces(contacts, velocity, rover.rest_speed, given.shear_modulus))
+        forces = _wheel_forces(contacts, velocity, rover.rest_speed, given.shear_modulus)
         _, std = _felt_force(rover, given, tuning)
         loads = np.array(given.loads)
         shared = std * loads / max(float(loads.sum()), 1e-9)
@@ -243,86 +246,76 @@ def _floats(values: FloatArray) -> Floats:
     return tuple(values.tolist())
 
 
-class _Contact(NamedTuple):
-    """A wheel, its motion but for the lateral speed of the body, and its soil."""
+class _Contacts(NamedTuple):
+    """The wheels, their motion but for the lateral speed of the body, and their soil, (n,) each."""
 
-    sine: float  # of the steering angle
-    cosine: float
-    forward: float  # speed of the hub along x of the body [m/s]
-    turning: float  # its speed along y by the yaw rate [m/s]
-    rim: float  # [m/s], nan = unknown
-    radius: float  # [m]
-    swept: float  # by the rim since the soil met it [rad]
-    covered: float  # by the hub, over the radius
-    strength: float  # greatest force [N]
+    sine: FloatArray  # of the steering angle
+    cosine: FloatArray
+    forward: FloatArray  # speed of the hub along x of the body [m/s]
+    turning: FloatArray  # its speed along y by the yaw rate [m/s]
+    rim: FloatArray  # [m/s], nan = unknown
+    radius: FloatArray  # [m]
+    swept: FloatArray  # by the rim since the soil met it [rad]
+    covered: FloatArray  # by the hub, over the radius
+    strength: FloatArray  # greatest force [N]
 
 
-def _contacts(
-    rover: SidewaysRover, given: SidewaysInputs, tuning: SidewaysTuning
-) -> list[_Contact]:
-    found = []
-    for i, (rim, angle, load) in enumerate(
-        zip(given.rims, given.steering, given.loads, strict=True)
-    ):
-        radius = rover.radius[i]
-        depth = min(max(given.sinkage[i], 1e-4) / radius, 1.0)
-        entry = math.acos(1.0 - depth)
-        swept = tuning.contact_share * entry
-        covered = math.sin(entry) - math.sin(entry - swept)
-        strength = given.tan_friction * load
-        strength += given.cohesion * rover.width[i] * radius * entry
-        forward = given.speed - given.yaw_rate * rover.lateral[i]
-        turning = given.yaw_rate * rover.longitudinal[i]
-        sine, cosine = math.sin(angle), math.cos(angle)
-        found.append(
-            _Contact(sine, cosine, forward, turning, rim, radius, swept, covered, strength)
-        )
-    return found
+def _contacts(rover: SidewaysRover, given: SidewaysInputs, tuning: SidewaysTuning) -> _Contacts:
+    radius = np.array(rover.radius)
+    entry = np.arccos(1.0 - np.minimum(np.maximum(given.sinkage, 1e-4) / radius, 1.0))
+    swept = tuning.contact_share * entry
+    strength = given.tan_friction * np.array(given.loads)
+    return _Contacts(
+        np.sin(given.steering),
+        np.cos(given.steering),
+        given.speed - given.yaw_rate * np.array(rover.lateral),
+        given.yaw_rate * np.array(rover.longitudinal),
+        np.array(given.rims),
+        radius,
+        swept,
+        np.sin(entry) - np.sin(entry - swept),
+        strength + given.cohesion * np.array(rover.width) * radius * entry,
+    )
 
 
 def _wheel_forces(
-    contacts: Sequence[_Contact], lateral: float, rest_speed: float, shear_modulus: float
-) -> list[float]:
-    """Return the lateral force of each wheel, positive left [N], at a lateral speed [m/s]."""
-    found = []
-    for sine, cosine, forward, turning, rim, radius, swept, covered, strength in contacts:
-        aside = lateral + turning
-        along, across = forward * cosine + aside * sine, aside * cosine - forward * sine
-        turned = along if isnan(rim) else rim
-        scale = radius / max(abs(turned), math.hypot(along, across), rest_speed)
-        back, aside = scale * (turned * swept - along * covered), scale * across * swept
-        displacement = max(math.hypot(back, aside), 1e-12)
-        share = -math.expm1(-displacement / shear_modulus)
-        found.append(-strength * share * aside / displacement)
-    return found
+    contacts: _Contacts, lateral: FloatArray | float, rest_speed: float, shear_modulus: float
+) -> FloatArray:
+    """Return the lateral force of each wheel, positive left [N], at lateral speeds [m/s].
+
+    `lateral` broadcasts against (n,).
+    """
+    sine, cosine, forward, turning, rim, radius, swept, covered, strength = contacts
+    aside = lateral + turning
+    along, across = forward * cosine + aside * sine, aside * cosine - forward * sine
+    turned = np.where(np.isnan(rim), along, rim)
+    fastest = np.maximum(np.maximum(np.abs(turned), np.hypot(along, across)), rest_speed)
+    scale = radius / fastest
+    back, aside = scale * (turned * swept - along * covered), scale * across * swept
+    displacement = np.maximum(np.hypot(back, aside), 1e-12)
+    share = -np.expm1(-displacement / shear_modulus)
+    return np.asarray(-strength * share * aside / displacement)
 
 
 def model_speed(
-    rover: SidewaysRover, given: SidewaysInputs, tuning: SidewaysTuning
+    rover: SidewaysRover, given: SidewaysInputs, contacts: _Contacts, tuning: SidewaysTuning
 ) -> tuple[float, float]:
     """Return the lateral speed of the body by forces alone [m/s], and its variance."""
-    from scipy.optimize import brentq  # late: messages and help ask only for the types above
-
-    contacts = _contacts(rover, given, tuning)
-
-    @cache  # each bracket is asked for four times
-    def total(lateral: float) -> float:
-        forces = _wheel_forces(contacts, lateral, rover.rest_speed, given.shear_modulus)
-        return sum(f * contact.cosine for f, contact in zip(forces, contacts, strict=True))
-
     pace = _pace(rover, given)
     felt, felt_std = _felt_force(rover, given, tuning)
     reach = 2.0 * pace + abs(given.yaw_rate) * max(abs(x) for x in rover.longitudinal)
-    tolerance = 1e-4 * pace
-    free = float(brentq(total, -reach, reach, xtol=tolerance))
-    ends = total(reach), total(-reach)  # the greatest forces to the right and to the left
-    if not ends[0] < felt < ends[1]:
+    speeds = reach * _PLACES
+    forces = _wheel_forces(contacts, speeds[:, None], rover.rest_speed, given.shear_modulus)
+    against = -(forces @ contacts.cosine)  # grows with the speed
+    free = float(np.interp(0.0, against, speeds))
+    if not against[0] < -felt < against[-1]:
         # More than this soil gives: sliding, anywhere up to the bound.
         lateral = 0.5 * math.copysign(reach, -felt)
         return lateral, lateral**2
-    lateral = float(brentq(lambda v: total(v) - felt, -reach, reach, xtol=tolerance))
+    lateral = float(np.interp(-felt, against, speeds))
     step = 0.02 * pace
-    stiffness = (total(lateral - step) - total(lateral + step)) / (2.0 * step)
+    ends = np.interp((lateral - step, lateral + step), speeds, against)
+    stiffness = float(ends[1] - ends[0]) / (2.0 * step)
     # Softer towards the limit of the strength: there little is known of a speed.
     doubt = math.hypot(felt_std, tuning.strength_share * felt)
     std = min(doubt / max(stiffness, 1e-9), reach)

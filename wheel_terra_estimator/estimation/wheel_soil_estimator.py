@@ -34,7 +34,7 @@ from wheel_terra_estimator.estimation.contacts.steepest_climb import SteepestCli
 from wheel_terra_estimator.estimation.contacts.steering import Steering
 from wheel_terra_estimator.estimation.contacts.turning import Turning, sides_oppose
 from wheel_terra_estimator.estimation.contacts.unloaded_wheels import UnloadedWheels
-from wheel_terra_estimator.estimation.contacts.wheel_models import WheelState
+from wheel_terra_estimator.estimation.contacts.wheel_models import WheelStates
 from wheel_terra_estimator.estimation.estimates import EstimateSet
 from wheel_terra_estimator.estimation.filter.ekf import FilterMemory, FloatArray, Row
 from wheel_terra_estimator.estimation.filter.force_balance import (
@@ -650,26 +650,30 @@ class WheelSoilEstimator:
     def _stationary_pulls(self, cycle: _Cycle) -> list[StationaryPull | None]:
         """Return what to expect of the wheels that do not turn under a load; None = it turns."""
         motion, share = self._turning.state, cycle.loads.slope_share
-        found: list[StationaryPull | None] = []
-        for i, (rim, load) in enumerate(zip(cycle.rims, cycle.loads.load, strict=True)):
-            if cycle.turns[i]:
-                found.append(None)
-                continue
-            pull = NAN
-            if not isnan(rim) and load >= self._linearisation.least_load:
-                pull = self._stationary.pull(
-                    i,
-                    self._ekf.mean,
-                    cycle.torque[i],
-                    load,
-                    yaw_rate=motion.yaw_rate,
-                    headings=self._steering.state.headings,
-                    lateral_motion=motion.lateral_motion,
-                )
-            expectation = self._stationary.expectation(pull, load, share, motion.lateral_motion)
-            found.append(expectation)
-        self._pulls.note_stationary(tuple([p.pull if p else NAN for p in found]))
-        return found
+        told = [
+            not (turns or isnan(rim) or isnan(torque)) and load >= self._linearisation.least_load
+            for turns, rim, torque, load in zip(
+                cycle.turns, cycle.rims, cycle.torque, cycle.loads.load, strict=True
+            )
+        ]
+        pulls = [NAN] * len(told)
+        if any(told):
+            found = self._stationary.pulls(
+                self._ekf.mean,
+                np.array(cycle.torque),
+                np.array(cycle.loads.load),
+                yaw_rate=motion.yaw_rate,
+                headings=self._steering.state.headings,
+                lateral_motion=motion.lateral_motion,
+            )
+            pulls = np.where(told, found, NAN).tolist()
+        self._pulls.note_stationary(tuple(pulls))
+        return [
+            None
+            if turns
+            else self._stationary.expectation(pull, load, share, motion.lateral_motion)
+            for turns, pull, load in zip(cycle.turns, pulls, cycle.loads.load, strict=True)
+        ]
 
     # -- What it means ---------------------------------------------------------------------------
 
@@ -726,18 +730,21 @@ class WheelSoilEstimator:
         if self._tape is not None:
             self._tape.mark(self._instant(time, body), Gaussian(ekf.mean, ekf.covariance))
 
-    def _wheel_states(self, loads: LoadState) -> list[WheelState]:
-        """Return the state of each wheel as the models take it, at no slip."""
+    def _wheel_states(self, loads: LoadState) -> WheelStates:
+        """Return the state of the wheels as the models take it, at no slip."""
         x, layout = self._ekf.mean, self._layout
-        common = float(x[SHEAR_MODULUS]), float(x[CENTROID]), float(x[MOUND])
-        strengths = (x[SHEAR_STRENGTH] + x[layout.shear_error]).tolist()
         sinkages = contact_depths(
             x[layout.sinkage].tolist(), self._ruts.state.depth, float(x[RUT_SHARE])
         )
-        return [
-            WheelState(1.0, sinkage, load, strength, *common)
-            for sinkage, load, strength in zip(sinkages, loads.load, strengths, strict=True)
-        ]
+        return WheelStates(
+            1.0,
+            np.array(sinkages),
+            np.array(loads.load),
+            x[SHEAR_STRENGTH] + x[layout.shear_error],
+            float(x[SHEAR_MODULUS]),
+            float(x[CENTROID]),
+            float(x[MOUND]),
+        )
 
     def _learn_slopes(
         self, time: float, slips: tuple[WheelSlip, ...], rims: Floats, lateral_motion: float

@@ -7,7 +7,7 @@
   ``terms`` (one contact with its effects).
 - Forces at given angles: ``quadrature``, ``branch_moments`` (closed form),
   ``closed_form`` (its use with effects, the triangles A, B, C).
-- Load to sinkage, pull, torque: ``model`` (arrays, by ``load_balance``); sinkage to torque and
-  pull: ``conditioned`` by ``balanced_branches`` (floats, for the filter).
+- Load to sinkage, pull, torque: ``model`` (by ``load_balance``); sinkage to torque and pull:
+  ``conditioned`` (for the filter).
 - Questions: ``slope_locomotion``, ``entrapment``.
 """

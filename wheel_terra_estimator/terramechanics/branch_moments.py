@@ -13,13 +13,14 @@ sideways, where the displacement turns its direction.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wheel_terra_estimator.terramechanics.contact import Contact
-from wheel_terra_estimator.terramechanics.maths import Maths, Quantity
+from wheel_terra_estimator.terramechanics.quantity import Quantity
 
 # Skid beyond pure rolling, v/(w R) - 1, from which and over which the nodes take over from the
 # centroid; below the first, one place per side is within 1.3 % of the load.
@@ -75,32 +76,23 @@ class BranchForces:
     Parameters
     ----------
     contact : Contact
-        Floats, or arrays of one shape (or shapes that broadcast); its angles are not read.
+        Arrays of one shape, or shapes that broadcast; its angles are not read.
     peak_share, leaving_share : float or numpy.ndarray
         tm/t1 and t2/t1 [-].
-    maths : module or class
-        numpy, or ``ScalarMaths`` for floats.
     """
 
     __slots__ = (
-        '_abs', '_arc_front', '_arc_rear', '_cohesion_front', '_cohesion_rear', '_copysign',
+        '_arc_front', '_arc_rear', '_bearing_modulus', '_cohesion_front', '_cohesion_rear',
         '_drift', '_edge_front', '_edge_rear', '_exponent', '_friction_front', '_friction_rear',
-        '_further', '_half', '_maths', '_middle_front', '_middle_rear', '_minimum', '_modulus',
-        '_nearer', '_normal_front', '_normal_rear', '_peak', '_place_front', '_place_rear',
-        '_rim_front', '_rim_rear', '_roll', '_shear_radius', '_sin', '_skid', '_skidding', '_sqrt',
-        '_stress', '_turn', '_turns_back', '_width',
+        '_further', '_half', '_middle_front', '_middle_rear', '_modulus', '_nearer',
+        '_normal_front', '_normal_rear', '_place_front', '_place_rear', '_rim_front', '_rim_rear',
+        '_roll', '_shape', '_share', '_shear_radius', '_sideways', '_skid', '_skidding', '_turn',
+        '_turns_back', '_width',
     )  # fmt: skip
 
     def __init__(
-        self,
-        contact: Contact[Quantity],
-        peak_share: Quantity,
-        leaving_share: Quantity,
-        maths: Maths = np,
+        self, contact: Contact[Quantity], peak_share: Quantity, leaving_share: Quantity
     ) -> None:
-        self._maths = maths
-        self._sin, self._sqrt = maths.sin, maths.sqrt
-        self._abs, self._copysign, self._minimum = maths.abs, maths.copysign, maths.minimum
         self._exponent = n = contact.sinkage_exponent
         front, rear = 1.0 - peak_share, peak_share - leaving_share
         area, centroid = branch_moments(n, front / (1.0 + peak_share))
@@ -113,45 +105,37 @@ class BranchForces:
         r, R = contact.radius, contact.shear_radius
         self._modulus = contact.shear_modulus
         self._shear_radius, self._width = R, contact.width
-        self._drift = 0.0 if contact.straight else contact.lateral_ratio / self._modulus
-        self.set_speed(contact.velocity_ratio)
+        self._sideways = not contact.straight
+        self._drift = contact.lateral_ratio / self._modulus
+        self._roll = contact.velocity_ratio / self._modulus
         self._turn = turn = R / self._modulus
+        self._set_skid(contact.velocity_ratio / R - 1.0, contact.lateral_ratio / R)
         self._rim_front, self._rim_rear = turn * (1.0 - place_front), turn * (1.0 - place_rear)
         square_front, square_rear = front * front, rear * rear
         # A branch is an arc: its resultant is a little smaller than the sum of its stresses.
         self._arc_front, self._arc_rear = spread * square_front, spread * square_rear
         self._edge_front, self._edge_rear = square_front / 24.0, square_rear / 24.0
-        # Cohesion is spread evenly: a quarter of its mean displacement in front, and by how much it
+        # Shear is spread evenly where cohesion gives it: nearer to the edge in front, where it
         # is larger behind, both per displacement at the stress's centroid.
         self._nearer = 0.125 / centroid
         self._further = (place_rear - self._middle_rear) / (1.0 - place_rear)
-        self._stress = contact.bearing_modulus * (2.0 * r / contact.reference_depth) ** n
-        self._peak = area * self._stress
+        self._bearing_modulus = contact.bearing_modulus
+        self._shape = (2.0 * r / contact.reference_depth) ** n  # of the stress, per bearing modulus
+        self._share = area * self._shape
         self._normal_front, self._normal_rear = r * front, r * rear
         grip, cling = R * contact.tan_friction, R * contact.cohesion
         self._friction_front, self._friction_rear = grip * front, grip * rear
         self._cohesion_front, self._cohesion_rear = cling * front, cling * rear
 
-    def set_speed(self, velocity_ratio: Any) -> None:
-        """Change v/w [m]; all else stays as it is."""
-        self._roll = velocity_ratio / self._modulus
-        skid = velocity_ratio / self._shear_radius - 1.0
-        self._turns_back = bool(np.any(skid > 0.0)) if self._maths is np else skid > 0.0
-        share = (skid - _TAKE_OVER_AT) / _TAKE_OVER
+    def _set_skid(self, skid: Any, side: Any) -> None:
+        """Note where nodes take over from the centroids: skid [-], lateral speed over w R [-]."""
+        self._turns_back = bool(np.any(skid > 0.0))
+        share = np.maximum((skid - _TAKE_OVER_AT) / _TAKE_OVER, 0.0)
         if self._sideways:
-            side = self._abs(self._drift) * self._modulus / self._shear_radius
-            share = self._maths.maximum(share, 0.0) + side / _SIDEWAYS_TAKE_OVER
-        if self._maths is np:
-            share = np.minimum(np.maximum(share, 0.0), 1.0)
-            self._skidding = bool(np.any(share > 0.0))
-        else:
-            share = 0.0 if share <= 0.0 else min(share, 1.0)
-            self._skidding = share > 0.0
+            share = share + np.abs(side) / _SIDEWAYS_TAKE_OVER
+        share = np.minimum(share, 1.0)
+        self._skidding = bool(np.any(share > 0.0))
         self._skid = share * share * (3.0 - 2.0 * share)
-
-    @property
-    def _sideways(self) -> bool:
-        return not (isinstance(self._drift, float) and self._drift == 0.0)
 
     @property
     def exponent(self) -> Any:
@@ -159,15 +143,81 @@ class BranchForces:
         return self._exponent
 
     def take(self, rows: NDArray[np.bool_]) -> BranchForces:
-        """Return the form of some of the points (arrays only)."""
+        """Return the form of some of the points."""
 
         def chosen(value: Any) -> Any:
-            return value[rows] if isinstance(value, np.ndarray) and value.size > 1 else value
+            if isinstance(value, np.ndarray) and value.size > 1:
+                return np.broadcast_to(value, rows.shape)[rows]
+            return value
 
         part = object.__new__(BranchForces)
         for name in self.__slots__:
             setattr(part, name, chosen(getattr(self, name)))
         return part
+
+    def forces(self, angle: Quantity) -> tuple[Any, Any, Any]:
+        """Load [N], pull [N] and torque [N m] at an entrance angle."""
+        stressed, sticking = self._parts(angle)
+        modulus = self._bearing_modulus
+        load, pull, torque = (modulus * s + c for s, c in zip(stressed, sticking, strict=True))
+        return load, pull, torque
+
+    def balanced(self, angle: Quantity, load: Quantity, shift: Quantity = 0.0) -> tuple[Any, Any]:
+        """Pull [N] and torque [N m] at an entrance angle under a normal load [N].
+
+        The bearing modulus is the one that carries the load: that of the contact is not read.
+        `shift` turns all stresses about the hub, towards the front [rad].
+        """
+        (lift, push, turn), (lift_c, push_c, turn_c) = self._parts(angle)
+        cosine, sine = np.cos(shift), np.sin(shift)
+        modulus = (load - lift_c * cosine - push_c * sine) / (lift * cosine + push * sine)
+        pull = modulus * (push * cosine - lift * sine) + push_c * cosine - lift_c * sine
+        return pull, modulus * turn + turn_c
+
+    def lateral_force(self, angle: Quantity) -> Any:
+        """Force of the soil under the rim at an entrance angle, positive left [N]."""
+        stressed, sticking = self._node_parts(angle)
+        return self._bearing_modulus * stressed[3] + sticking[3]
+
+    def _parts(self, angle: Quantity) -> tuple[Sequence[Any], Sequence[Any]]:
+        """Load, pull, torque per bearing modulus of stress and friction; those of cohesion."""
+        sin, sqrt, square = np.sin, np.sqrt, angle * angle
+        top, front, rear = sin(angle), sin(self._place_front * angle), sin(self._place_rear * angle)
+        cos_front, cos_rear = sqrt(1.0 - front * front), sqrt(1.0 - rear * rear)
+        share_front, share_rear, even_front, even_rear = self._mobilised(
+            angle, top, front, rear, cos_rear
+        )
+        middle, mean = sin(self._middle_front * angle), sin(self._middle_rear * angle)
+        size = self._width * angle
+        peak = size * self._share * (middle * sin(self._half * angle)) ** self._exponent
+        arc_front = peak * (1.0 - self._arc_front * square)
+        arc_rear = peak * (1.0 - self._arc_rear * square)
+        rub_front, rub_rear = self._friction_front * share_front, self._friction_rear * share_rear
+        normal_front, normal_rear = self._normal_front * arc_front, self._normal_rear * arc_rear
+        friction_front, friction_rear = rub_front * arc_front, rub_rear * arc_rear
+        stressed = (
+            normal_front * cos_front
+            + normal_rear * cos_rear
+            + friction_front * front
+            + friction_rear * rear,
+            friction_front * cos_front
+            + friction_rear * cos_rear
+            - normal_front * front
+            - normal_rear * rear,
+            self._shear_radius * peak * (rub_front + rub_rear),
+        )
+        stick_front = size * self._cohesion_front * even_front
+        stick_rear = size * self._cohesion_rear * even_rear
+        edge_front = stick_front * (1.0 - self._edge_front * square)
+        edge_rear = stick_rear * (1.0 - self._edge_rear * square)
+        sticking = (
+            edge_front * middle + edge_rear * mean,
+            edge_front * sqrt(1.0 - middle * middle) + edge_rear * sqrt(1.0 - mean * mean),
+            self._shear_radius * (stick_front + stick_rear),
+        )
+        if self._skidding:
+            return self._with_skid(angle, stressed, sticking)
+        return stressed, sticking
 
     def _mobilised(
         self, angle: Quantity, top: Quantity, front: Quantity, rear: Quantity, cos_rear: Quantity
@@ -188,9 +238,9 @@ class BranchForces:
         pace = self._turn - roll * cos_rear
         wide = self._arc_rear * square * pace * pace
         if self._turns_back:
-            sign_front, sign_rear = self._copysign(1.0, x), self._copysign(1.0, y)
+            sign_front, sign_rear = np.copysign(1.0, x), np.copysign(1.0, y)
             x, y = x * sign_front, y * sign_rear
-            wide = self._minimum(wide, 0.25 * y * y)
+            wide = np.minimum(wide, 0.25 * y * y)
         base = 1.0 / (1.0 + 0.125 * x)
         base *= base
         base *= base
@@ -211,104 +261,37 @@ class BranchForces:
             share_rear, even_rear = share_rear * sign_rear, even_rear * sign_rear
         return share_front, share_rear, even_front, even_rear
 
-    def load(self, angle: Quantity) -> Any:
-        """Vertical force at an entrance angle [N]: as ``forces``, half as long."""
-        if self._skidding:
-            return self.forces(angle)[0]
-        sin, sqrt, square = self._sin, self._sqrt, angle * angle
-        top, front, rear = sin(angle), sin(self._place_front * angle), sin(self._place_rear * angle)
-        cos_rear = sqrt(1.0 - rear * rear)
-        share_front, share_rear, even_front, even_rear = self._mobilised(
-            angle, top, front, rear, cos_rear
-        )
-        middle = sin(self._middle_front * angle)
-        peak = self._peak * (middle * sin(self._half * angle)) ** self._exponent
-        stressed = (1.0 - self._arc_front * square) * (
-            self._normal_front * sqrt(1.0 - front * front)
-            + self._friction_front * share_front * front
-        ) + (1.0 - self._arc_rear * square) * (
-            self._normal_rear * cos_rear + self._friction_rear * share_rear * rear
-        )
-        sticking = self._cohesion_front * even_front * (1.0 - self._edge_front * square) * middle
-        sticking = sticking + self._cohesion_rear * even_rear * (
-            1.0 - self._edge_rear * square
-        ) * sin(self._middle_rear * angle)
-        return self._width * angle * (peak * stressed + sticking)
-
-    def forces(self, angle: Quantity) -> tuple[Any, Any, Any]:
-        """Load [N], pull [N] and torque [N m] at an entrance angle."""
-        sin, sqrt, square = self._sin, self._sqrt, angle * angle
-        top, front, rear = sin(angle), sin(self._place_front * angle), sin(self._place_rear * angle)
-        cos_rear = sqrt(1.0 - rear * rear)
-        share_front, share_rear, even_front, even_rear = self._mobilised(
-            angle, top, front, rear, cos_rear
-        )
-        middle, mean = sin(self._middle_front * angle), sin(self._middle_rear * angle)
-        peak = self._peak * (middle * sin(self._half * angle)) ** self._exponent
-        arc_front, arc_rear = 1.0 - self._arc_front * square, 1.0 - self._arc_rear * square
-        normal_front = self._normal_front * peak * arc_front
-        normal_rear = self._normal_rear * peak * arc_rear
-        rub_front = self._friction_front * peak * share_front
-        rub_rear = self._friction_rear * peak * share_rear
-        friction_front, friction_rear = rub_front * arc_front, rub_rear * arc_rear
-        stick_front = self._cohesion_front * even_front
-        stick_rear = self._cohesion_rear * even_rear
-        cohesion_front = stick_front * (1.0 - self._edge_front * square)
-        cohesion_rear = stick_rear * (1.0 - self._edge_rear * square)
-        size = self._width * angle
-        load = size * (
-            normal_front * (cos_front := sqrt(1.0 - front * front))
-            + normal_rear * cos_rear
-            + friction_front * front
-            + friction_rear * rear
-            + cohesion_front * middle
-            + cohesion_rear * mean
-        )
-        pull = size * (
-            friction_front * cos_front
-            + friction_rear * cos_rear
-            - normal_front * front
-            - normal_rear * rear
-            + cohesion_front * sqrt(1.0 - middle * middle)
-            + cohesion_rear * sqrt(1.0 - mean * mean)
-        )
-        torque = size * self._shear_radius * (rub_front + rub_rear + stick_front + stick_rear)
-        if self._skidding:
-            return self._with_skid(angle, (load, pull, torque))
-        return load, pull, torque
-
-    def _with_skid(self, angle: Any, rolling: tuple[Any, Any, Any]) -> tuple[Any, Any, Any]:
-        """Load, pull and torque with the nodes' share where the rim skids."""
+    def _with_skid(
+        self, angle: Any, *rolling: Sequence[Any]
+    ) -> tuple[Sequence[Any], Sequence[Any]]:
+        """`_parts` with the nodes' share where the rim skids."""
         skid = self._skid
         if np.ndim(skid) == 0 or np.shape(skid) != np.shape(angle):
-            skidding = self._node_forces(angle)
-            load, pull, torque = (
-                r + skid * (s - r) for r, s in zip(rolling, skidding[:3], strict=True)
+            nodes = self._node_parts(angle)
+            stressed, sticking = (
+                [part + skid * (there - part) for part, there in zip(parts, found, strict=False)]
+                for parts, found in zip(rolling, nodes, strict=True)
             )
-            return load, pull, torque
+            return stressed, sticking
         rows = skid > 0.0
-        skidding = self.take(rows)._node_forces(angle[rows])
-        for r, s in zip(rolling, skidding[:3], strict=True):
-            r[rows] += skid[rows] * (s - r[rows])
-        return rolling
+        skid, nodes = skid[rows], self.take(rows)._node_parts(angle[rows])
+        for parts, found in zip(rolling, nodes, strict=True):
+            for part, there in zip(parts, found, strict=False):  # without the lateral force
+                part[rows] += skid * (there - part[rows])
+        return rolling[0], rolling[1]
 
-    def lateral_force(self, angle: Quantity) -> Any:
-        """Force of the soil under the rim at an entrance angle, positive left [N]."""
-        return self._node_forces(angle)[3]
-
-    def _node_forces(self, angle: Quantity) -> tuple[Any, Any, Any, Any]:
-        """Load, pull, torque and lateral force from nodes on either side of the peak."""
-        maths, sin, sqrt = self._maths, self._sin, self._sqrt
+    def _node_parts(self, angle: Quantity) -> tuple[Sequence[Any], Sequence[Any]]:
+        """`_parts`, and the lateral force [N], from nodes on either side of the peak."""
+        sin = np.sin
         R, roll = self._shear_radius, self._roll
         front, top = 2.0 * self._half, sin(angle)
         leaving = 2.0 * self._middle_rear - (1.0 - front)
         rear = 1.0 - front - leaving
-        load = pull = torque = lateral = 0.0
-        sideways = self._sideways
+        stressed, sticking = [0.0] * 4, [0.0] * 4
         for place, weight in _NODES:
             ahead = 1.0 - front * place
             depth = sin(0.5 * (1.0 + ahead) * angle) * sin(0.5 * front * place * angle)
-            stress = self._stress * depth**self._exponent
+            stress = self._shape * depth**self._exponent
             for at, normal, friction, cohesion in (
                 (ahead, self._normal_front, self._friction_front, self._cohesion_front),
                 (
@@ -319,23 +302,35 @@ class BranchForces:
                 ),
             ):
                 sine = sin(at * angle)
-                cosine = sqrt(1.0 - sine * sine)
+                cosine = np.sqrt(1.0 - sine * sine)
                 x = R / self._modulus * (1.0 - at) * angle - roll * (top - sine)
+                along, across = self._node_shares(x, self._drift * (1.0 - at) * angle)
                 pressed = weight * normal * stress
-                strength = weight * (friction * stress + cohesion)
-                if sideways:
-                    y = self._drift * (1.0 - at) * angle
-                    length = maths.maximum(sqrt(x * x + y * y), _NO_DISPLACEMENT)
-                    share = -maths.expm1(-length) / length
-                    lateral = lateral - strength * share * y
-                    sheared = strength * share * x
-                else:
-                    sheared = strength * self._copysign(-maths.expm1(-self._abs(x)), x)
-                load = load + pressed * cosine + sheared * sine
-                pull = pull + sheared * cosine - pressed * sine
-                torque = torque + sheared
+                for sums, strength in (
+                    (stressed, weight * friction * stress),
+                    (sticking, weight * cohesion),
+                ):
+                    sheared = strength * along
+                    sums[0] = sums[0] + sheared * sine
+                    sums[1] = sums[1] + sheared * cosine
+                    sums[2] = sums[2] + sheared
+                    sums[3] = sums[3] - strength * across
+                stressed[0] = stressed[0] + pressed * cosine
+                stressed[1] = stressed[1] - pressed * sine
         size = self._width * angle
-        return size * load, size * pull, size * R * torque, size * lateral
+        factors = size, size, size * R, size
+        return (
+            [factor * part for factor, part in zip(factors, stressed, strict=True)],
+            [factor * part for factor, part in zip(factors, sticking, strict=True)],
+        )
+
+    def _node_shares(self, x: Any, y: Any) -> tuple[Any, Any]:
+        """Mobilised shares along and across the rim [-], for displacements over K."""
+        if not self._sideways:
+            return np.copysign(-np.expm1(-np.abs(x)), x), 0.0
+        length = np.maximum(np.sqrt(x * x + y * y), _NO_DISPLACEMENT)
+        share = -np.expm1(-length) / length
+        return share * x, share * y
 
     def small_angle(self, load: Quantity) -> Any:
         """Entrance angle at which the normal stress alone carries a load, for small angles.
@@ -343,5 +338,6 @@ class BranchForces:
         1 to 5 % from the balance: a start, not an answer.
         """
         n, span = self._exponent, self._normal_front + self._normal_rear
-        unit = self._width * span * self._peak * (self._middle_front * self._half) ** n
+        stress = self._bearing_modulus * self._share
+        unit = self._width * span * stress * (self._middle_front * self._half) ** n
         return (load / unit) ** (1.0 / (2.0 * n + 1.0))

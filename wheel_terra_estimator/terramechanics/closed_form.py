@@ -10,8 +10,6 @@ Two of them:
   moments of the pressure-sinkage curve, so that the shape of the normal stress (its exponent)
   and the growth of shear along the contact are kept. Nothing in it is fitted; over the
   validation family its error is some ten times smaller than that of the triangles.
-
-With ``maths = ScalarMaths`` everything runs on floats.
 """
 
 from __future__ import annotations
@@ -23,7 +21,7 @@ import numpy as np
 from wheel_terra_estimator.terramechanics import stresses
 from wheel_terra_estimator.terramechanics.branch_moments import BranchForces
 from wheel_terra_estimator.terramechanics.contact import Contact
-from wheel_terra_estimator.terramechanics.maths import Maths, Quantity
+from wheel_terra_estimator.terramechanics.quantity import Quantity
 from wheel_terra_estimator.terramechanics.terms import PEAK_MARGIN, Terms
 
 # Stress that effects add (a hard layer) is integrated with Gauss's four points per side.
@@ -34,7 +32,7 @@ _POINTS, _WEIGHTS = (
 
 
 def coefficients(
-    entrance_angle: Quantity, peak_angle: Quantity, leaving_angle: Quantity, maths: Maths = np
+    entrance_angle: Quantity, peak_angle: Quantity, leaving_angle: Quantity
 ) -> tuple[Any, Any, Any]:
     """Integrals A, B, C of a unit triangle times cos t, sin t and 1 over the contact.
 
@@ -42,69 +40,67 @@ def coefficients(
     C = (t1 - t2)/2; by parts, exact.
     """
     front, rear = entrance_angle - peak_angle, peak_angle - leaving_angle
-    cos_m, sin_m = maths.cos(peak_angle), maths.sin(peak_angle)
-    a = (cos_m - maths.cos(leaving_angle)) / rear + (cos_m - maths.cos(entrance_angle)) / front
-    b = (sin_m - maths.sin(leaving_angle)) / rear + (sin_m - maths.sin(entrance_angle)) / front
+    cos_m, sin_m = np.cos(peak_angle), np.sin(peak_angle)
+    a = (cos_m - np.cos(leaving_angle)) / rear + (cos_m - np.cos(entrance_angle)) / front
+    b = (sin_m - np.sin(leaving_angle)) / rear + (sin_m - np.sin(entrance_angle)) / front
     return a, b, 0.5 * (entrance_angle - leaving_angle)
 
 
-def peak_stresses(contact: Contact[Any], terms: Terms, maths: Maths = np) -> tuple[Any, Any]:
+def peak_stresses(contact: Contact[Any], terms: Terms) -> tuple[Any, Any]:
     """Normal and shear stress at the peak angle, effects included [Pa]."""
     peak = contact.peak_angle
     contact.angle = peak
-    contact.normal_stress = stresses.front_stress(contact, peak, maths)
-    terms.apply('on_normal_stress', contact, maths)
+    contact.normal_stress = stresses.front_stress(contact, peak)
+    terms.apply('on_normal_stress', contact)
     sigma = contact.normal_stress
-    return sigma, stresses.shear_stress(contact, peak, sigma, maths)
+    return sigma, stresses.shear_stress(contact, peak, sigma)
 
 
 def triangle_forces(
-    contact: Contact[Quantity], terms: Terms, maths: Maths = np
+    contact: Contact[Quantity], terms: Terms
 ) -> tuple[Quantity, Quantity, Quantity]:
     """Load [N], pull [N] and torque [N m] of triangular stresses, angles given.
 
     W = b (r A sigma_m + R B tau_m), F = b (R A tau_m - r B sigma_m), T = b R^2 C tau_m.
     """
-    a, b, c = coefficients(contact.entrance_angle, contact.peak_angle, contact.leaving_angle, maths)
-    sigma, tau = peak_stresses(contact, terms, maths)
+    a, b, c = coefficients(contact.entrance_angle, contact.peak_angle, contact.leaving_angle)
+    sigma, tau = peak_stresses(contact, terms)
     r, R, width = contact.radius, contact.shear_radius, contact.width
     load = width * (r * a * sigma + R * b * tau)
     pull = width * (R * a * tau - r * b * sigma)
     return load, pull, width * R * R * c * tau
 
 
-def forces(
-    contact: Contact[Quantity], terms: Terms, maths: Maths = np
-) -> tuple[Quantity, Quantity, Quantity]:
+def forces(contact: Contact[Quantity], terms: Terms) -> tuple[Quantity, Quantity, Quantity]:
     """Load [N], pull [N] and torque [N m] from branch moments, angles given."""
     t1 = contact.entrance_angle
-    form = BranchForces(contact, contact.peak_angle / t1, contact.leaving_angle / t1, maths)
+    form = BranchForces(contact, contact.peak_angle / t1, contact.leaving_angle / t1)
     result = form.forces(t1)
     if terms.stages['on_normal_stress']:
-        added = _added_stress_forces(contact, terms, maths)[:3]
+        added = _added_stress_forces(contact, terms)[:3]
         result = tuple(a + b for a, b in zip(result, added, strict=True))
     return result
 
 
-def lateral_force(contact: Contact[Quantity], terms: Terms, maths: Maths = np) -> Quantity:
+def lateral_force(contact: Contact[Quantity], terms: Terms) -> Quantity:
     """Force of the soil under the rim on the wheel, positive left [N], angles given."""
     t1 = contact.entrance_angle
     if contact.straight:
         return 0.0 * t1
-    form = BranchForces(contact, contact.peak_angle / t1, contact.leaving_angle / t1, maths)
+    form = BranchForces(contact, contact.peak_angle / t1, contact.leaving_angle / t1)
     force = form.lateral_force(t1)
     if terms.stages['on_normal_stress']:
-        force = force + _added_stress_forces(contact, terms, maths)[3]
+        force = force + _added_stress_forces(contact, terms)[3]
     return force
 
 
-def triangle_lateral_force(contact: Contact[Quantity], terms: Terms, maths: Maths = np) -> Quantity:
+def triangle_lateral_force(contact: Contact[Quantity], terms: Terms) -> Quantity:
     """Return the same from triangular stresses: b R C tau_y of the peak angle [N]."""
     if contact.straight:
         return 0.0 * contact.entrance_angle
-    sigma, _ = peak_stresses(contact, terms, maths)
+    sigma, _ = peak_stresses(contact, terms)
     strength = contact.cohesion + sigma * contact.tan_friction
-    across = strength * stresses.mobilised_shares(contact, contact.peak_angle, maths)[1]
+    across = strength * stresses.mobilised_shares(contact, contact.peak_angle)[1]
     span = 0.5 * (contact.entrance_angle - contact.leaving_angle)
     return contact.width * contact.shear_radius * span * across
 
@@ -114,15 +110,15 @@ def angles_in_proportion(terms: Terms) -> bool:
     return not (terms.stages['on_contact'] or terms.stages['on_normal_stress'])
 
 
-def proportional_forces(contact: Contact[Quantity], maths: Maths = np) -> BranchForces:
+def proportional_forces(contact: Contact[Quantity]) -> BranchForces:
     """Forces for all entrance angles at once, peak and leaving angle in proportion to them."""
     leaving = contact.leaving_ratio
     margin = PEAK_MARGIN * (1.0 - leaving)
-    peak = maths.minimum(maths.maximum(contact.peak_ratio, leaving + margin), 1.0 - margin)
-    return BranchForces(contact, peak, leaving, maths)
+    peak = np.minimum(np.maximum(contact.peak_ratio, leaving + margin), 1.0 - margin)
+    return BranchForces(contact, peak, leaving)
 
 
-def _added_stress_forces(contact: Contact[Quantity], terms: Terms, maths: Maths) -> tuple[Any, ...]:
+def _added_stress_forces(contact: Contact[Quantity], terms: Terms) -> tuple[Any, ...]:
     """Load, pull, torque, lateral force of what effects add to the normal stress, friction too."""
     t1, tm, t2 = contact.entrance_angle, contact.peak_angle, contact.leaving_angle
     R = contact.shear_radius
@@ -131,15 +127,15 @@ def _added_stress_forces(contact: Contact[Quantity], terms: Terms, maths: Maths)
         for point, weight in zip(_POINTS, _WEIGHTS, strict=True):
             angle = low + (high - low) * point
             mirror = t1 - (t1 - tm) * (point if behind else 1.0 - point)
-            stress = stresses.front_stress(contact, mirror, maths)
+            stress = stresses.front_stress(contact, mirror)
             contact.angle, contact.normal_stress = angle, stress
-            terms.apply('on_normal_stress', contact, maths)
+            terms.apply('on_normal_stress', contact)
             normal = (contact.normal_stress - stress) * weight * (high - low)
-            along, across = stresses.mobilised_shares(contact, angle, maths)
+            along, across = stresses.mobilised_shares(contact, angle)
             friction = normal * contact.tan_friction * R
             shear = friction * along
             normal = normal * contact.radius
-            cosine, sine = maths.cos(angle), maths.sin(angle)
+            cosine, sine = np.cos(angle), np.sin(angle)
             load = load + normal * cosine + shear * sine
             pull = pull + shear * cosine - normal * sine
             torque = torque + shear

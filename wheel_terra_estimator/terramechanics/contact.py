@@ -7,7 +7,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
-from wheel_terra_estimator.terramechanics.maths import Maths, Quantity
+import numpy as np
+
+from wheel_terra_estimator.terramechanics.quantity import Quantity
 
 Q = TypeVar('Q')
 
@@ -67,16 +69,20 @@ class Contact(Generic[Q]):
     # Sideways motion; the float 0.0 where no wheel slides sideways.
     lateral_ratio: Q | float = 0.0  # v_y/w [m], positive left
 
+    def __copy__(self) -> Contact[Q]:
+        """Return a contact with the same quantities: terms change the copy alone."""
+        return Contact(*map(self.__getattribute__, Contact.__slots__))
+
     @property
     def straight(self) -> bool:
         """Whether no wheel slides sideways: lateral force is zero and need not be worked out."""
         return isinstance(self.lateral_ratio, float) and self.lateral_ratio == 0.0
 
-    def heading(self, maths: Maths) -> tuple[Quantity, Quantity]:
+    def heading(self) -> tuple[Quantity, Quantity]:
         """Cosine and sine (positive left) of the slip angle, from the two speeds of the hub [-]."""
         if self.straight:
             return 1.0, 0.0
         forward: Any = self.velocity_ratio
         aside: Any = self.lateral_ratio
-        speed = maths.maximum(maths.sqrt(forward * forward + aside * aside), 1e-300)
+        speed = np.maximum(np.sqrt(forward * forward + aside * aside), 1e-300)
         return forward / speed, aside / speed

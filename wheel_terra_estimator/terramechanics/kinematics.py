@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wheel_terra_estimator.terramechanics.maths import Maths, Quantity, ScalarMaths
+from wheel_terra_estimator.terramechanics.quantity import Quantity
 
 # A locked wheel (s = -1) has v/w without bound; this floor on 1 + s keeps it finite, with a shear
 # that is saturated long before.
@@ -48,22 +48,18 @@ def slip_ratio(
     return np.clip(np.where(turning | moving, slip, np.nan), -1.0, 1.0)
 
 
-def speed_ratio(slip: Quantity, maths: Maths = np) -> Any:
-    """Return v/(r w) for a slip ratio (scalars with `maths=ScalarMaths`) [-]."""
+def speed_ratio(slip: Quantity) -> Any:
+    """Return v/(r w) for a slip ratio [-]."""
     driving = 1.0 - slip
-    braking = 1.0 / maths.maximum(1.0 + slip, _LOCKED)
-    return maths.where(slip >= 0.0, driving, braking)
+    braking = 1.0 / np.maximum(1.0 + slip, _LOCKED)
+    return np.where(slip >= 0.0, driving, braking)
 
 
-def slip_of_speed_ratio(ratio: Quantity, maths: Maths = np) -> Any:
+def slip_of_speed_ratio(ratio: Quantity) -> Any:
     """Return the slip ratio for u = v/(r w); the inverse of `speed_ratio` for u >= 0 [-]."""
-    if maths is ScalarMaths:  # what the filter asks for most often, and nothing is worked out twice
-        if ratio <= 1.0:
-            return 1.0 - ratio if ratio >= 0.0 else 1.0
-        return 1.0 / ratio - 1.0 if ratio >= 1.0 else 0.0
-    driving = 1.0 - maths.maximum(ratio, 0.0)
-    braking = 1.0 / maths.maximum(ratio, 1.0) - 1.0
-    return maths.where(ratio <= 1.0, driving, braking)
+    driving = 1.0 - np.maximum(ratio, 0.0)
+    braking = 1.0 / np.maximum(ratio, 1.0) - 1.0
+    return np.where(ratio <= 1.0, driving, braking)
 
 
 def shear_displacement(
@@ -71,7 +67,6 @@ def shear_displacement(
     entrance_angle: Quantity,
     shear_radius: Quantity,
     velocity_ratio: Quantity,
-    maths: Maths = np,
     sine: Quantity | None = None,
 ) -> Quantity:
     """Shear displacement j = R (t1 - t) - (v/w)(sin t1 - sin t) [m].
@@ -88,7 +83,7 @@ def shear_displacement(
     sine : float or array_like, optional
         Of the hub angle, where it is known already.
     """
-    sine = maths.sin(angle) if sine is None else sine
+    sine = np.sin(angle) if sine is None else sine
     return shear_radius * (entrance_angle - angle) - velocity_ratio * (
-        maths.sin(entrance_angle) - sine
+        np.sin(entrance_angle) - sine
     )

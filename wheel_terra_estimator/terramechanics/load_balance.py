@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from wheel_terra_estimator.terramechanics.branch_moments import BranchForces
 from wheel_terra_estimator.terramechanics.contact import Contact
-from wheel_terra_estimator.terramechanics.maths import Quantity
+from wheel_terra_estimator.terramechanics.quantity import Quantity
 
 FloatArray = NDArray[np.float64]
 
@@ -88,7 +88,7 @@ def balance(
     part = form.take(rest)
     start = np.where(np.isfinite(angle), angle, 0.3)[rest]
     angle[rest], settled[rest] = solve_entrance_angle(
-        part.load, load[rest], np.clip(start, 1e-3, 1.4)
+        lambda angles: part.forces(angles)[0], load[rest], np.clip(start, 1e-3, 1.4)
     )
     _, pull[rest], torque[rest] = part.forces(angle[rest])
     return angle, pull, torque, settled

@@ -21,8 +21,8 @@ from wheel_terra_estimator.terramechanics.load_balance import (
     explicit_entrance_angle,
     solve_entrance_angle,
 )
-from wheel_terra_estimator.terramechanics.maths import Quantity
 from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
+from wheel_terra_estimator.terramechanics.quantity import Quantity
 from wheel_terra_estimator.terramechanics.soil import Soil
 from wheel_terra_estimator.terramechanics.terms import (
     SOIL_NUMBERS,

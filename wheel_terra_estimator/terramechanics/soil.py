@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from wheel_terra_estimator.terramechanics.checks import check_range
-from wheel_terra_estimator.terramechanics.maths import Quantity
+from wheel_terra_estimator.terramechanics.quantity import Quantity
 from wheel_terra_estimator.terramechanics.stresses import bearing_law
 
 PRESSURE_LAWS = ('bekker', 'reece')

@@ -13,7 +13,7 @@ import numpy as np
 
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.kinematics import shear_displacement
-from wheel_terra_estimator.terramechanics.maths import Maths, Quantity
+from wheel_terra_estimator.terramechanics.quantity import Quantity
 
 _NO_DISPLACEMENT = 1e-300  # [m]; keeps the direction of none finite
 
@@ -54,39 +54,38 @@ def rolling_sinkage(
     width: Quantity,
     modulus: Quantity,
     exponent: Quantity,
-    maths: Maths = np,
 ) -> Quantity:
     """Sinkage of a towed rigid wheel without slip [m] (Bekker 1969).
 
     z = [3 W / ((3 - n) b k sqrt(D))]^(2/(2n+1)); small sinkage, n below 1.3, stress in front only.
     The series that it comes from ends before n = 3: beyond 2.8 it goes on with 3 - n = 0.2.
     """
-    force = maths.maximum(3.0 - exponent, 0.2) * width * modulus * (2.0 * radius) ** 0.5
+    force = np.maximum(3.0 - exponent, 0.2) * width * modulus * (2.0 * radius) ** 0.5
     return (3.0 * load / force) ** (2.0 / (2.0 * exponent + 1.0))
 
 
 def front_stress(
-    contact: Contact[Quantity], angle: Quantity, maths: Maths = np, cosine: Quantity | None = None
+    contact: Contact[Quantity], angle: Quantity, cosine: Quantity | None = None
 ) -> Quantity:
     """Normal stress ahead of its peak, k [(r/z0)(cos t - cos t1)]^N [Pa].
 
     Wong and Reece 1967 (doi 10.1016/0022-4898(67)90105-X); Ding et al. 2010 eq. 17
     (doi 10.1007/s11771-010-0021-7). ``cosine`` of the angle, where it is known already.
     """
-    cosine = maths.cos(angle) if cosine is None else cosine
-    depth = contact.radius * (cosine - maths.cos(contact.entrance_angle))
-    relative = maths.maximum(depth, 0.0) / contact.reference_depth
+    cosine = np.cos(angle) if cosine is None else cosine
+    depth = contact.radius * (cosine - np.cos(contact.entrance_angle))
+    relative = np.maximum(depth, 0.0) / contact.reference_depth
     return contact.bearing_modulus * relative**contact.sinkage_exponent
 
 
-def mobilised_share(displacement: Quantity, shear_modulus: Quantity, maths: Maths = np) -> Quantity:
+def mobilised_share(displacement: Quantity, shear_modulus: Quantity) -> Quantity:
     """Signed share of the shear strength, sgn(j) (1 - exp(-|j|/K)) (Janosi and Hanamoto) [-]."""
-    share = -maths.expm1(-maths.abs(displacement) / shear_modulus)
-    return maths.where(displacement >= 0.0, share, -share)
+    share = -np.expm1(-np.abs(displacement) / shear_modulus)
+    return np.where(displacement >= 0.0, share, -share)
 
 
 def mobilised_shares(
-    contact: Contact[Quantity], angle: Quantity, maths: Maths = np, sine: Quantity | None = None
+    contact: Contact[Quantity], angle: Quantity, sine: Quantity | None = None
 ) -> tuple[Quantity, Quantity]:
     """Signed shares of the shear strength along the wheel (forward) and across it (left) [-].
 
@@ -98,13 +97,13 @@ def mobilised_shares(
     is known already.
     """
     along = shear_displacement(
-        angle, contact.entrance_angle, contact.shear_radius, contact.velocity_ratio, maths, sine
+        angle, contact.entrance_angle, contact.shear_radius, contact.velocity_ratio, sine
     )
     if contact.straight:
-        return mobilised_share(along, contact.shear_modulus, maths), 0.0
+        return mobilised_share(along, contact.shear_modulus), 0.0
     across = contact.lateral_ratio * (contact.entrance_angle - angle)
-    length = maths.maximum(maths.sqrt(along * along + across * across), _NO_DISPLACEMENT)
-    share = -maths.expm1(-length / contact.shear_modulus) / length
+    length = np.maximum(np.sqrt(along * along + across * across), _NO_DISPLACEMENT)
+    share = -np.expm1(-length / contact.shear_modulus) / length
     return share * along, -share * across
 
 
@@ -112,7 +111,6 @@ def shear_stress(
     contact: Contact[Quantity],
     angle: Quantity,
     normal_stress: Quantity,
-    maths: Maths = np,
     sine: Quantity | None = None,
 ) -> Quantity:
     """Shear stress along the wheel (c + sigma tan phi) sgn(j) (1 - exp(-|j|/K)) [Pa].
@@ -122,4 +120,4 @@ def shear_stress(
     already.
     """
     strength = contact.cohesion + normal_stress * contact.tan_friction
-    return strength * mobilised_shares(contact, angle, maths, sine)[0]
+    return strength * mobilised_shares(contact, angle, sine)[0]

@@ -21,8 +21,8 @@ from wheel_terra_estimator.terramechanics.effects.base import (
     Term,
 )
 from wheel_terra_estimator.terramechanics.kinematics import speed_ratio
-from wheel_terra_estimator.terramechanics.maths import Maths, Quantity
 from wheel_terra_estimator.terramechanics.operating_points import OperatingPoints
+from wheel_terra_estimator.terramechanics.quantity import Quantity
 from wheel_terra_estimator.terramechanics.soil import Soil
 
 SOIL_NUMBERS = tuple(f.name for f in fields(Soil) if f.name != 'pressure_law')
@@ -55,10 +55,10 @@ class Terms:
                 if (term := getattr(effect, stage)) is not None
             ]
 
-    def apply(self, stage: str, contact: Contact[Any], maths: Maths = np) -> None:
+    def apply(self, stage: str, contact: Contact[Any]) -> None:
         """Run all terms of a stage on the contact."""
         for term, parameters in self.stages[stage]:
-            term(contact, parameters, maths)
+            term(contact, parameters)
 
 
 def build_contact(
@@ -136,19 +136,16 @@ def set_angles(
     entrance_angle: Quantity,
     measured_leaving: Quantity | None,
     terms: Terms,
-    maths: Maths = np,
 ) -> None:
     """Set entrance, leaving and peak angle; a measured leaving angle overrides the law."""
     contact.entrance_angle = entrance_angle
     contact.leaving_angle = contact.leaving_ratio * entrance_angle
     contact.peak_angle = contact.peak_ratio * entrance_angle
-    terms.apply('on_contact', contact, maths)
+    terms.apply('on_contact', contact)
     if measured_leaving is not None:
-        given = maths.minimum(measured_leaving, 0.9 * entrance_angle)
-        contact.leaving_angle = maths.where(
-            maths.isnan(measured_leaving), contact.leaving_angle, given
-        )
+        given = np.minimum(measured_leaving, 0.9 * entrance_angle)
+        contact.leaving_angle = np.where(np.isnan(measured_leaving), contact.leaving_angle, given)
     margin = PEAK_MARGIN * (entrance_angle - contact.leaving_angle)
-    contact.peak_angle = maths.minimum(
-        maths.maximum(contact.peak_angle, contact.leaving_angle + margin), entrance_angle - margin
+    contact.peak_angle = np.minimum(
+        np.maximum(contact.peak_angle, contact.leaving_angle + margin), entrance_angle - margin
     )

@@ -9,7 +9,7 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 from wheel_terra_estimator.terramechanics.checks import check_range
-from wheel_terra_estimator.terramechanics.maths import Quantity
+from wheel_terra_estimator.terramechanics.quantity import Quantity
 
 
 @dataclass(frozen=True)

@@ -6,13 +6,15 @@ Used with ``wheel-terra diagnose DATA.csv --effects side_drag.py -o DIR``, or, s
 ``predict`` and the node know it as well, with ``effect_file: side_drag.py`` in a parameter file.
 """
 
+import numpy as np
+
 from wheel_terra_estimator.terramechanics.effects import Effect, EffectParameter
 
 
-def rub(contact, p, maths):
+def rub(contact, p):
     """Friction of both sides under the weight of the soil beside them, over the sunken segment."""
-    depth = contact.radius * (1.0 - maths.cos(contact.entrance_angle))
-    area = depth * maths.sqrt(2.0 * contact.radius * depth)
+    depth = contact.radius * (1.0 - np.cos(contact.entrance_angle))
+    area = depth * np.sqrt(2.0 * contact.radius * depth)
     force = p.gain * contact.density * contact.gravity * contact.tan_friction * depth * area
     contact.torque = contact.torque + contact.direction * contact.radius * force
     contact.drawbar_pull = contact.drawbar_pull - contact.direction * force

@@ -4,17 +4,18 @@
 
 from __future__ import annotations
 
-import math
+import numpy as np
 
 from wheel_terra_estimator.configuration.configuration import Configuration
+from wheel_terra_estimator.estimation.contacts.resistive_table import RimForces, rim_forces
 from wheel_terra_estimator.estimation.contacts.wheel_models import (
+    LEAST_SINKAGE,
     MOST_RATIO,
     Bearing,
-    WheelForces,
+    FloatArray,
     WheelModels,
-    WheelState,
+    WheelStates,
 )
-from wheel_terra_estimator.estimation.scalars import clipped
 from wheel_terra_estimator.terramechanics.conditioned import SMALLEST_ANGLE
 from wheel_terra_estimator.terramechanics.contact_law import (
     RESISTIVE_FORCE,
@@ -24,9 +25,7 @@ from wheel_terra_estimator.terramechanics.contact_law import (
     reece_soil,
 )
 from wheel_terra_estimator.terramechanics.kinematics import slip_of_speed_ratio
-from wheel_terra_estimator.terramechanics.maths import ScalarMaths
 from wheel_terra_estimator.terramechanics.resistive_force import PER_CUBIC_METRE
-from wheel_terra_estimator.terramechanics.resistive_table import RimForces, rim_forces
 
 
 def contact_models(configuration: Configuration) -> WheelModels:
@@ -56,60 +55,27 @@ class ResistiveForceModels(WheelModels):
     def __init__(self, configuration: Configuration) -> None:
         super().__init__(configuration, configuration.soil, {})
         gravity = float(configuration.rover.gravity)
-        self._unit = [
-            plate_scale(configuration.soil, width, gravity) * PER_CUBIC_METRE * width * radius**2
-            for width, radius in zip(configuration.wheels.width, self._radius, strict=True)
-        ]
+        width = np.array(configuration.wheels.width, float)
+        scale = np.array([plate_scale(configuration.soil, w, gravity) for w in width.tolist()])
+        self._unit = scale * PER_CUBIC_METRE * width * self._radius**2
 
-    def forces(self, wheel: int, state: WheelState) -> WheelForces:  # noqa: D102
-        rim, radius, load = self._rim_forces(wheel, state), self._radius[wheel], state.load
-        high, depth, angle = self._contact(
-            wheel, clipped(state.speed_ratio, 0.0, MOST_RATIO), state.sinkage
-        )
-        within = 0.0 <= state.speed_ratio <= MOST_RATIO
-        # The shift of the stresses is (centroid - mound high^2) times the entrance angle.
-        shift = state.centroid - state.mound * high * high
-        by_ratio = 2.0 * state.mound * high / self._mound_span * angle if within else 0.0
-        by_depth = 0.0
-        if depth == state.sinkage and angle > SMALLEST_ANGLE:
-            by_depth = 1.0 / (radius * math.sin(angle))
-        scale = self._slip_radius[wheel] / radius if within else 0.0
-        t, f = (
-            (
-                unit * (d[0] * scale + d[3] * by_ratio),
-                unit * (d[1] + d[3] * shift) * by_depth,
-                unit * d[2],
-                0.0,
-                unit * d[3] * angle,
-                -unit * d[3] * angle * high * high,
-            )
-            for d, unit in ((rim.d_torque, load * radius), (rim.d_pull, load))
-        )
-        return WheelForces(rim.torque * load * radius, rim.pull * load, t, f)
+    def torque_and_pull(self, states: WheelStates) -> tuple[FloatArray, FloatArray]:  # noqa: D102
+        rim = self._rim_forces(states)
+        return rim.torque * states.load * self._radius, rim.pull * states.load
 
-    def pull(self, wheel: int, state: WheelState) -> float:  # noqa: D102
-        return self._rim_forces(wheel, state).pull * state.load
-
-    def bearing(self, wheel: int, state: WheelState) -> Bearing:  # noqa: D102
-        rim = self._rim_forces(wheel, state._replace(centroid=0.0, mound=0.0))
-        _, depth, _ = self._contact(wheel, 1.0, state.sinkage)
-        softer = state.slip_sinkage * abs(slip_of_speed_ratio(state.speed_ratio, ScalarMaths))
+    def bearing(self, states: WheelStates) -> Bearing:  # noqa: D102
+        rim = self._rim_forces(states._replace(centroid=0.0, mound=0.0))
+        depth = np.minimum(np.maximum(states.sinkage, LEAST_SINKAGE), self._radius)
+        softer = states.slip_sinkage * np.abs(slip_of_speed_ratio(states.speed_ratio))
         # As in a law with the exponent 1, to which slip adds.
-        factor = self._unit[wheel] * math.exp(state.stiffness) * depth**softer
-        return Bearing(factor * rim.lift, 1.0 + softer, math.log(depth))
+        factor = self._unit * np.exp(states.stiffness) * depth**softer
+        return Bearing(factor * rim.lift, *np.broadcast_arrays(1.0 + softer, np.log(depth)))
 
-    def bearing_and_slower(  # noqa: D102
-        self, wheel: int, state: WheelState, step: float
-    ) -> tuple[Bearing, Bearing]:
-        slower = state._replace(speed_ratio=state.speed_ratio - step)
-        return self.bearing(wheel, state), self.bearing(wheel, slower)
-
-    def _rim_forces(self, wheel: int, state: WheelState) -> RimForces:
-        within = clipped(state.speed_ratio, 0.0, MOST_RATIO)
-        high, _, angle = self._contact(wheel, within, state.sinkage)
+    def _rim_forces(self, states: WheelStates) -> RimForces:
+        within = np.minimum(np.maximum(states.speed_ratio, 0.0), MOST_RATIO)
         return rim_forces(
-            within * self._slip_radius[wheel] / self._radius[wheel],
-            max(angle, SMALLEST_ANGLE),
-            math.exp(state.strength),
-            (state.centroid - state.mound * high * high) * angle,
+            within * self._slip_radius / self._radius,
+            np.maximum(self._entrance_angle(states.sinkage), SMALLEST_ANGLE),
+            np.exp(states.strength),
+            self._shift(states, within),
         )

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import isnan
 from typing import NamedTuple
 
 import numpy as np
@@ -14,9 +13,11 @@ from numpy.typing import NDArray
 from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.contacts.steering import Headings
 from wheel_terra_estimator.estimation.contacts.wheel_models import (
+    STEPPED,
+    STRENGTH,
     WheelForces,
     WheelModels,
-    WheelState,
+    WheelStates,
 )
 from wheel_terra_estimator.estimation.filter.state import (
     CENTROID,
@@ -32,7 +33,6 @@ from wheel_terra_estimator.estimation.rover import Rover
 
 FloatArray = NDArray[np.float64]
 Floats = tuple[float, ...]
-_STRENGTH = 2  # column of the strength in the derivatives of `WheelForces`
 
 
 @dataclass(frozen=True)
@@ -46,24 +46,6 @@ class LinearisationTuning:
     least_load: float = 1e-3  # [N]: a wheel with less is in the air
     least_rim_over_rest: float = 2.0
     """Rim speed over ``rest_speed`` above which a wheel turns."""
-
-
-class SlopeState(NamedTuple):
-    """Smoothed derivatives of torque and pull of each wheel as in `WheelForces`; None = none."""
-
-    torque: tuple[Floats | None, ...]
-    pull: tuple[Floats | None, ...]
-
-
-class _Contact(NamedTuple):
-    """How the state enters the contact of a wheel."""
-
-    wheel: int
-    direction: float
-    by_speed: float  # v / rim speed by the body's speed [s/m]
-    by_shear_radius: float  # v / rim speed by it [-]
-    by_sinkage: float  # depth of the contact by the sinkage [-]
-    by_rut_share: float  # the same by the share of the rut that stays [m]
 
 
 class ContactForces(NamedTuple):
@@ -83,8 +65,10 @@ class ContactForces(NamedTuple):
         return self.pull + self.pull_rows @ moved, self.torque + self.torque_rows @ moved
 
 
-class Linearisation(Component[SlopeState]):
+class Linearisation(Component[FloatArray]):
     """Evaluates the wheel models once per cycle, with smoothed derivatives.
+
+    Its memory: smoothed derivatives of torque and pull as in `WheelForces`, (2, 6, n); nan = none.
 
     Parameters
     ----------
@@ -108,8 +92,7 @@ class Linearisation(Component[SlopeState]):
         leaving_angle_std: float,
         tuning: LinearisationTuning = LinearisationTuning(),
     ) -> None:
-        none = (None,) * rover.wheel_count
-        super().__init__(SlopeState(none, none))
+        super().__init__(np.full((2, len(STEPPED), rover.wheel_count), np.nan))
         self._rover, self._layout, self._models, self._tuning = rover, layout, models, tuning
         self._leaving_angle_std = leaving_angle_std
         self.least_load = tuning.least_load
@@ -152,95 +135,82 @@ class Linearisation(Component[SlopeState]):
         ruts : tuple of float
             That each wheel meets [m].
         """
-        rover, layout = self._rover, self._layout
-        pull, torque, pull_noise, torque_noise = np.zeros((4, rover.wheel_count))
-        rows = np.zeros((2, rover.wheel_count, layout.size))
-        torque_slopes, pull_slopes = list(self.state.torque), list(self.state.pull)
-        entries = x.tolist()
-        speed, strength, modulus = entries[SPEED], entries[SHEAR_STRENGTH], entries[SHEAR_MODULUS]
-        centroid, mound, rut_share = entries[CENTROID], entries[MOUND], entries[RUT_SHARE]
-        sheared = 1.0 - entries[SHEAR_RADIUS]
-        sinkage, error = entries[layout.sinkage], entries[layout.shear_error]
-        for i in range(rover.wheel_count):
-            if not turns[i]:
-                continue
-            rim = abs(rims[i])
-            direction = 1.0 if rims[i] > 0.0 else -1.0
-            # No wheel stands higher than the rut that it meets.
-            rut = min(ruts[i], max(sinkage[i], 0.0))
-            wheel = WheelState(
-                speed_ratio=sheared * direction * headings.speed(i, speed, yaw_rate) / rim,
-                sinkage=sinkage[i] - rut_share * rut,
-                load=loads[i],
-                strength=strength + error[i],
-                shear_modulus=modulus,
-                centroid=centroid,
-                mound=mound,
-                rim_speed=rim,
-                leaving_angle=leaving_angles[i],
-            )
-            forces = self._models.forces(i, wheel)
-            if not isnan(wheel.leaving_angle):
-                torque_noise[i], pull_noise[i] = self._noise_of_angle(i, wheel, forces)
-            pull[i], torque[i] = direction * forces.pull, direction * forces.torque
-            moment = loads[i] * rover.shear_radius[i]
-            torque_slopes[i], pull_slopes[i] = by_torque, by_pull = self.smoothed(
-                torque_slopes[i], pull_slopes[i], forces, moment
-            )
-            by_speed = sheared * headings.by_speed[i] / rim
-            by_radius = -wheel.speed_ratio / sheared
-            by_sinkage = 1.0 - rut_share if rut < ruts[i] else 1.0
-            contact = _Contact(i, direction, by_speed, by_radius, by_sinkage, -rut)
-            self._fill(rows[0, i], contact, by_pull)
-            self._fill(rows[1, i], contact, by_torque)
-        self.state = SlopeState(tuple(torque_slopes), tuple(pull_slopes))
+        layout, n = self._layout, self._rover.wheel_count
+        rows = np.zeros((2, n, layout.size))
+        if not any(turns):
+            nothing = np.zeros(n)
+            return ContactForces(x.copy(), nothing, nothing, rows[0], rows[1], nothing, nothing)
+        turning = np.array(turns)
+        rim, load, rut = np.where(turning, rims, 1.0), np.array(loads), np.array(ruts)
+        direction, rim = np.where(rim > 0.0, 1.0, -1.0), np.abs(rim)
+        rut_share, sheared = float(x[RUT_SHARE]), 1.0 - float(x[SHEAR_RADIUS])
+        # No wheel stands higher than the rut that it meets.
+        sinkage = x[layout.sinkage]
+        met = np.minimum(rut, np.maximum(sinkage, 0.0))
+        measured = np.array(leaving_angles)
+        states = WheelStates(
+            speed_ratio=sheared * direction * headings.speeds(float(x[SPEED]), yaw_rate) / rim,
+            sinkage=sinkage - rut_share * met,
+            load=load,
+            strength=x[SHEAR_STRENGTH] + x[layout.shear_error],
+            shear_modulus=float(x[SHEAR_MODULUS]),
+            centroid=float(x[CENTROID]),
+            mound=float(x[MOUND]),
+            rim_speed=rim,
+            leaving_angle=None if np.isnan(measured).all() else measured,
+        )
+        forces = self._models.forces(states)
+        torque_noise, pull_noise = self._noise_of_angle(states, forces, turning)
+        self.state = self.smoothed(forces, load * np.array(self._rover.shear_radius), turning)
+        by_ratio, by_depth, by_strength, by_modulus, by_centroid, by_mound = np.moveaxis(
+            self.state[::-1], 1, 0
+        )
+        wheels = np.arange(n)
+        # The ratio is that of the direction of rolling: the two signs cancel.
+        rows[:, :, SPEED] = by_ratio * (sheared * np.array(headings.by_speed) / rim)
+        rows[:, :, SHEAR_RADIUS] = by_ratio * (direction * -states.speed_ratio / sheared)
+        by_sinkage = np.where(met < rut, 1.0 - rut_share, 1.0)
+        rows[:, wheels, layout.sinkage.start + wheels] = by_depth * (direction * by_sinkage)
+        rows[:, :, RUT_SHARE] = by_depth * (direction * -met)
+        rows[:, :, SHEAR_STRENGTH] = by_strength * direction
+        rows[:, wheels, layout.shear_error.start + wheels] = by_strength * direction
+        rows[:, :, SHEAR_MODULUS] = by_modulus * direction
+        rows[:, :, CENTROID] = by_centroid * direction
+        rows[:, :, MOUND] = by_mound * direction
+        rows[:, ~turning] = 0.0
+        pull, torque = (
+            np.where(turning, direction * force, 0.0) for force in (forces.pull, forces.torque)
+        )
         return ContactForces(x.copy(), pull, torque, rows[0], rows[1], pull_noise, torque_noise)
 
     def _noise_of_angle(
-        self, wheel: int, state: WheelState, forces: WheelForces
-    ) -> tuple[float, float]:
-        """Return what one deviation of the leaving angle makes of torque and pull."""
-        angle = state.leaving_angle - self._leaving_angle_std
-        there = self._models.forces(wheel, state._replace(leaving_angle=angle))
-        return abs(there.torque - forces.torque), abs(there.pull - forces.pull)
+        self, states: WheelStates, forces: WheelForces, turning: NDArray[np.bool_]
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return what one deviation of the leaving angles makes of torques and pulls, (n,) each."""
+        nothing = np.zeros(len(turning))
+        if states.leaving_angle is None:
+            return nothing, nothing
+        told = turning & ~np.isnan(states.leaving_angle)
+        angle = states.leaving_angle - self._leaving_angle_std
+        torque, pull = self._models.torque_and_pull(states._replace(leaving_angle=angle))
+        return (
+            np.where(told, np.abs(torque - forces.torque), 0.0),
+            np.where(told, np.abs(pull - forces.pull), 0.0),
+        )
 
     def smoothed(
-        self,
-        old_torque: Floats | None,
-        old_pull: Floats | None,
-        forces: WheelForces,
-        moment: float,
-    ) -> tuple[Floats, Floats]:
-        """Return the smoothed derivatives of torque and pull; `moment`: load times radius [N m]."""
-        tuning = self._tuning
-        if old_torque is None or old_pull is None:
-            return forces.d_torque, forces.d_pull
-        torque = smoothed_slopes(old_torque, forces.d_torque, tuning.slope_keep)
-        pull = smoothed_slopes(old_pull, forces.d_pull, tuning.slope_keep)
-        change = abs(forces.d_torque[_STRENGTH] - old_torque[_STRENGTH])
-        if change > tuning.new_contact * moment:
-            # A wheel that comes free or locks is another contact at once.
-            return (torque[0], *forces.d_torque[1:]), (pull[0], *forces.d_pull[1:])
-        return torque, pull
-
-    def _fill(self, row: FloatArray, contact: _Contact, slopes: Floats) -> None:
-        """Write the derivatives of a wheel's force into its row of the Jacobian."""
-        layout, (wheel, direction) = self._layout, contact[:2]
-        by_ratio, by_depth, by_strength, by_modulus, by_centroid, by_mound = slopes
-        # The ratio is that of the direction of rolling: the two signs cancel.
-        row[SPEED] = by_ratio * contact.by_speed
-        row[layout.sinkage.start + wheel] = direction * by_depth * contact.by_sinkage
-        row[SHEAR_STRENGTH] = row[layout.shear_error.start + wheel] = direction * by_strength
-        row[SHEAR_MODULUS] = direction * by_modulus
-        row[CENTROID] = direction * by_centroid
-        row[MOUND] = direction * by_mound
-        row[RUT_SHARE] = direction * by_depth * contact.by_rut_share
-        row[SHEAR_RADIUS] = direction * by_ratio * contact.by_shear_radius
+        self, forces: WheelForces, moment: FloatArray, turning: NDArray[np.bool_]
+    ) -> FloatArray:
+        """Return the smoothed derivatives; `moment`: load times radius of each wheel [N m]."""
+        old, new = self.state, np.stack([forces.d_torque, forces.d_pull])
+        slopes = smoothed_slopes(old, new, self._tuning.slope_keep)
+        # A wheel that comes free or locks is another contact at once.
+        change = np.abs(new[0, STRENGTH] - old[0, STRENGTH])
+        other = change > self._tuning.new_contact * moment
+        slopes[:, 1:] = np.where(other, new[:, 1:], slopes[:, 1:])
+        return np.where(turning, slopes, old)
 
 
-def smoothed_slopes(old: Floats | None, new: Floats, keep: float) -> Floats:
-    """Return derivatives of which the share `keep` is that of the cycle before."""
-    if old is None:
-        return new
-    gain = 1.0 - keep
-    return tuple([keep * a + gain * b for a, b in zip(old, new, strict=True)])
+def smoothed_slopes(old: FloatArray, new: FloatArray, keep: float) -> FloatArray:
+    """Return derivatives of which the share `keep` is that of the cycle before; nan = none."""
+    return np.where(np.isnan(old), new, keep * old + (1.0 - keep) * new)

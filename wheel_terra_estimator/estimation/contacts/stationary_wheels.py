@@ -12,7 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wheel_terra_estimator.estimation.contacts.steering import Headings
-from wheel_terra_estimator.estimation.contacts.wheel_models import WheelModels, WheelState
+from wheel_terra_estimator.estimation.contacts.wheel_models import (
+    STRENGTH,
+    WheelModels,
+    WheelStates,
+)
 from wheel_terra_estimator.estimation.filter.state import (
     CENTROID,
     SHEAR_MODULUS,
@@ -21,10 +25,8 @@ from wheel_terra_estimator.estimation.filter.state import (
     StateLayout,
 )
 from wheel_terra_estimator.estimation.rover import Rover, SensorFigures
-from wheel_terra_estimator.estimation.scalars import NAN, clipped
 
 FloatArray = NDArray[np.float64]
-_STRENGTH = 2  # column of the strength in the derivatives of `WheelForces`
 
 
 @dataclass(frozen=True)
@@ -65,18 +67,17 @@ class StationaryWheels:
         self._rover, self._layout, self._models, self._tuning = rover, layout, models, tuning
         self._gain_std = sensors.torque_gain_std
 
-    def pull(
+    def pulls(
         self,
-        wheel: int,
         x: FloatArray,
-        torque: float,
-        load: float,
+        torques: FloatArray,
+        loads: FloatArray,
         *,
         yaw_rate: float,
         headings: Headings,
         lateral_motion: float,
-    ) -> float:
-        """Return the pull of a wheel that stands, from its torque [N]; nan without a torque.
+    ) -> FloatArray:
+        """Return the pulls of wheels that stand, from their torques, (n,) [N]; nan without one.
 
         A locked wheel slides: its shear is saturated, and torque gives the pull whatever the
         strength of the soil. Where its hub stands too, torque and pull balance about the hub. A
@@ -84,41 +85,38 @@ class StationaryWheels:
 
         Parameters
         ----------
-        wheel : int
-            Index.
         x : numpy.ndarray
             (size,) state.
-        torque, load : float
-            [N m], [N].
+        torques, loads : numpy.ndarray
+            (n,) [N m], [N].
         yaw_rate, lateral_motion : float
             Turning of the rover [rad/s], [-].
         headings : Headings
             Of the wheels.
         """
-        if isnan(torque):
-            return NAN
         rover, tuning = self._rover, self._tuning
-        speed = headings.speed(wheel, float(x[SPEED]), yaw_rate)
-        if abs(speed) < rover.rest_speed:
-            return clipped(torque / rover.shear_radius[wheel], -load, load)
-        direction = 1.0 if speed > 0.0 else -1.0
+        speed = headings.speeds(float(x[SPEED]), yaw_rate)
+        held = np.clip(torques / np.array(rover.shear_radius), -loads, loads)
+        direction = np.where(speed > 0.0, 1.0, -1.0)
         forces = self._models.forces(
-            wheel,
-            WheelState(
+            WheelStates(
                 tuning.sliding_ratio,
-                float(x[self._layout.sinkage.start + wheel]),
-                load,
+                x[self._layout.sinkage],
+                loads,
                 float(x[SHEAR_STRENGTH]),
                 float(x[SHEAR_MODULUS]),
                 float(x[CENTROID]),
-            ),
+            )
         )
-        pull = forces.pull
-        jammed = direction * torque > 0.0 and lateral_motion < tuning.straight
-        if forces.d_torque[_STRENGTH] and not jammed:
-            gain = forces.d_pull[_STRENGTH] / forces.d_torque[_STRENGTH]
-            pull += gain * (direction * torque - forces.torque)
-        return direction * clipped(pull, -tuning.most_drag * load, load)
+        by_torque, by_pull = forces.d_torque[STRENGTH], forces.d_pull[STRENGTH]
+        jammed = (direction * torques > 0.0) & (lateral_motion < tuning.straight)
+        tells = (by_torque != 0.0) & ~jammed
+        gain = np.where(tells, by_pull / np.where(tells, by_torque, 1.0), 0.0)
+        pull = forces.pull + gain * (direction * torques - forces.torque)
+        most = tuning.most_drag * loads
+        return np.where(
+            np.abs(speed) < rover.rest_speed, held, direction * np.clip(pull, -most, most)
+        )
 
     def expectation(
         self, pull: float, load: float, slope_share: float, lateral_motion: float

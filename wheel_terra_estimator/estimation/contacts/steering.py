@@ -24,6 +24,8 @@ from collections.abc import Sequence
 from math import isnan
 from typing import NamedTuple
 
+import numpy as np
+
 from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.measurements import FloatArray
 from wheel_terra_estimator.estimation.rover import Rover
@@ -47,6 +49,10 @@ class Headings(NamedTuple):
     def speed(self, wheel: int, speed: float, yaw_rate: float) -> float:
         """Return the ground speed of a wheel along its heading [m/s]."""
         return self.by_speed[wheel] * speed + self.by_yaw_rate[wheel] * yaw_rate
+
+    def speeds(self, speed: float, yaw_rate: float) -> FloatArray:
+        """Return the ground speed of each wheel along its heading, (n,) [m/s]."""
+        return np.array(self.by_speed) * speed + np.array(self.by_yaw_rate) * yaw_rate
 
     def body_speed(self, wheel: int, rim: float, yaw_rate: float) -> float:
         """Return the body speed that comes nearest to a wheel's rolling [m/s]; nan as its rim.

@@ -4,14 +4,19 @@
 
 from __future__ import annotations
 
-import math
 from bisect import bisect_left
 from functools import cached_property
 
+import numpy as np
+from numpy.typing import NDArray
+
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.contacts.contact_models import contact_models
-from wheel_terra_estimator.estimation.contacts.wheel_models import WheelModels, WheelState
+from wheel_terra_estimator.estimation.contacts.wheel_models import WheelModels, WheelStates
 from wheel_terra_estimator.estimation.rover import Rover
+from wheel_terra_estimator.terramechanics.kinematics import speed_ratio
+
+FloatArray = NDArray[np.float64]
 
 _SLIPS = (-0.5, -0.3, -0.2, -0.1, -0.05, 0.0, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6, 0.75, 0.9)
 """Slips of the curve, close together where it is steep."""
@@ -57,10 +62,10 @@ class UsualSlip:
     def curve(self) -> tuple[list[float], list[float]]:
         """Pull over load and slip, both increasing, up to the greatest pull."""
         models, rover = contact_models(self._configuration), self._rover
+        shares = steady_pull(models, rover, np.array(_SLIPS))
         pulls: list[float] = []
         slips: list[float] = []
-        for slip in _SLIPS:
-            share = steady_pull(models, rover, slip)
+        for slip, share in zip(_SLIPS, shares.tolist(), strict=True):
             if pulls and share <= pulls[-1]:
                 continue
             pulls.append(share)
@@ -71,33 +76,31 @@ class UsualSlip:
 def steady_pull(
     models: WheelModels,
     rover: Rover,
-    slip: float,
+    slip: FloatArray,
     *,
     strength: float = 0.0,
     shear_modulus: float = 0.0,
     stiffness: float = 0.0,
-) -> float:
-    """Return the pull of the whole rover over its load on level ground [-].
+) -> FloatArray:
+    """Return the pull of the whole rover over its load on level ground, at slips (m,) [-].
 
     The three factors are those of the filter's state: logarithms, 0 for the configured soil.
     """
-    loads = rover.load.loads((0.0, 0.0, rover.gravity)).tolist()
-    ratio = 1.0 - slip if slip >= 0.0 else 1.0 / (1.0 + slip)
-    pull = 0.0
-    for i, load in enumerate(loads):
-        wheel = WheelState(ratio, 0.0, load, strength, shear_modulus, stiffness=stiffness)
-        sinkage = steady_sinkage(models, i, wheel, rover.rim_radius[i])
-        pull += models.forces(i, wheel._replace(sinkage=sinkage)).pull
-    return pull / sum(loads)
+    load = rover.load.loads((0.0, 0.0, rover.gravity))
+    wheels = WheelStates(
+        speed_ratio(slip)[:, None], 0.0, load, strength, shear_modulus, stiffness=stiffness
+    )
+    sinkage = steady_sinkage(models, wheels, np.array(rover.rim_radius))
+    _, pull = models.torque_and_pull(wheels._replace(sinkage=sinkage))
+    return np.asarray(pull.sum(-1) / load.sum())
 
 
-def steady_sinkage(models: WheelModels, index: int, wheel: WheelState, radius: float) -> float:
-    """Return the sinkage at which the bearing law carries the load of a wheel [m]."""
-    low, high = _SHALLOWEST, _DEEPEST * radius
+def steady_sinkage(models: WheelModels, wheels: WheelStates, radius: FloatArray) -> FloatArray:
+    """Return the sinkages at which the bearing law carries the loads of n wheels, (..., n) [m]."""
+    shape = np.broadcast_shapes(np.shape(wheels.speed_ratio), radius.shape)
+    low, high = np.full(shape, _SHALLOWEST), np.broadcast_to(_DEEPEST * radius, shape)
     for _ in range(_BISECTIONS):
-        z = math.sqrt(low * high)
-        if models.bearing(index, wheel._replace(sinkage=z)).load < wheel.load:
-            low = z
-        else:
-            high = z
+        z = np.sqrt(low * high)
+        sinks = models.bearing(wheels._replace(sinkage=z)).load < wheels.load
+        low, high = np.where(sinks, z, low), np.where(sinks, high, z)
     return high

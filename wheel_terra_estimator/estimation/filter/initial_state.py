@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.contacts.usual_slip import steady_sinkage
-from wheel_terra_estimator.estimation.contacts.wheel_models import WheelModels, WheelState
+from wheel_terra_estimator.estimation.contacts.wheel_models import WheelModels, WheelStates
 from wheel_terra_estimator.estimation.filter.ekf import FilterMemory, GatedFilter
 from wheel_terra_estimator.estimation.filter.state import (
     CENTROID,
@@ -198,12 +198,10 @@ def initial_filter(
     mean[MOUND] = 0.0 if 'soil_mound' in configuration.effects else tuning.mound_mean
     mean[RUT_SHARE] = tuning.rut_share_mean
     mean[SLIP_PER_DEMAND] = tuning.slip_per_demand_mean
-    z = [
-        steady_sinkage(models, i, WheelState(1.0, 0.0, loads[i], 0.0, 0.0), rover.rim_radius[i])
-        for i in range(n)
-    ]
+    level = WheelStates(1.0, 0.0, np.array(loads))
+    z = steady_sinkage(models, level, np.array(rover.rim_radius))
     mean[layout.sinkage] = z
-    spread = tuning.sinkage_share * np.array(z) + tuning.sinkage_floor
+    spread = tuning.sinkage_share * z + tuning.sinkage_floor
     P[layout.sinkage, layout.sinkage] = np.diag(spread**2)
     own = tuning.own_stiffness_share * priors.stiffness_std
     P[layout.stiffness, layout.stiffness] = priors.stiffness_std**2 + np.eye(n) * own**2

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from math import isnan
 from typing import NamedTuple
 
 import numpy as np
@@ -15,7 +14,7 @@ from numpy.typing import NDArray
 from wheel_terra_estimator.estimation.component import Component
 from wheel_terra_estimator.estimation.contacts.linearisation import smoothed_slopes
 from wheel_terra_estimator.estimation.contacts.steering import Headings
-from wheel_terra_estimator.estimation.contacts.wheel_models import WheelModels, WheelState
+from wheel_terra_estimator.estimation.contacts.wheel_models import WheelModels, WheelStates
 from wheel_terra_estimator.estimation.filter.ekf import GatedFilter
 from wheel_terra_estimator.estimation.filter.prediction import Prediction
 from wheel_terra_estimator.estimation.filter.state import (
@@ -26,9 +25,7 @@ from wheel_terra_estimator.estimation.filter.state import (
     StateLayout,
 )
 from wheel_terra_estimator.estimation.rover import Rover
-from wheel_terra_estimator.estimation.scalars import clipped, gain_of
 from wheel_terra_estimator.terramechanics.kinematics import slip_of_speed_ratio
-from wheel_terra_estimator.terramechanics.maths import ScalarMaths
 
 FloatArray = NDArray[np.float64]
 Floats = tuple[float, ...]
@@ -64,23 +61,22 @@ class SinkageTuning:
 
 
 class SinkageState(NamedTuple):
-    """One entry per wheel."""
+    """What the prediction of the sinkages remembers."""
 
-    slopes: tuple[tuple[float, ...] | None, ...]
-    """Smoothed derivatives of ln(load carried) by v / rim speed and by n1; None = none."""
-    rate: Floats  # [m/s]
+    slopes: FloatArray
+    """(2, n) smoothed derivatives of ln(load carried) by v / rim speed and by n1; nan = none."""
+    rate: Floats  # of each wheel [m/s]
     rate_std: Floats
 
 
-class _Step(NamedTuple):
-    """One wheel's relaxation in a cycle."""
+class _Motion(NamedTuple):
+    """Of turning wheels, in their direction of rolling, (n,) each."""
 
-    mean: float
-    noise: float
-    memory: float = 1.0
-    by_stiffness: float = 0.0
-    by_slip_sinkage: float = 0.0
-    by_speed: float = 0.0
+    speed: FloatArray  # [m/s]
+    rim: FloatArray  # [m/s]
+    by_speed: FloatArray
+    """Speed of each wheel by that of the body, as far as it counts as a sensor of slip [-]."""
+    dt: float  # [s]
 
 
 class SinkageProcess(Component[SinkageState]):
@@ -103,13 +99,14 @@ class SinkageProcess(Component[SinkageState]):
         tuning: SinkageTuning = SinkageTuning(),
     ) -> None:
         n = rover.wheel_count
-        super().__init__(SinkageState((None,) * n, (0.0,) * n, (tuning.first_rate_std,) * n))
+        none = np.full((2, n), np.nan)
+        super().__init__(SinkageState(none, (0.0,) * n, (tuning.first_rate_std,) * n))
         self._rover, self._layout, self._models, self._tuning = rover, layout, models, tuning
         self._leaving_angle_std = leaving_angle_std
 
     def forget_slopes(self) -> None:
         """Take the derivatives anew: the wheels stand."""
-        self.state = self.state._replace(slopes=(None,) * self._rover.wheel_count)
+        self.state = self.state._replace(slopes=self._start.slopes)
 
     def predict(
         self,
@@ -144,44 +141,88 @@ class SinkageProcess(Component[SinkageState]):
             Whether a reference velocity tells the slip.
         """
         tuning, layout = self._tuning, self._layout
-        share = 1.0 if reference_known else tuning.law_share
-        travels = []
-        slopes = list(self.state.slopes)
-        entries = x.tolist()
-        body, strength, modulus = entries[SPEED], entries[SHEAR_STRENGTH], entries[SHEAR_MODULUS]
-        slip_sinkage, stiffness = entries[SLIP_SINKAGE], entries[layout.stiffness]
-        for i, rim in enumerate(rims):
-            zi = layout.sinkage.start + i
-            if isnan(rim) or abs(rim) < self._rover.rest_speed:
-                prediction.Q[zi, zi] = tuning.resting_walk * dt
-                continue
-            direction = 1.0 if rim > 0.0 else -1.0
-            speed = direction * headings.speed(i, body, yaw_rate)
-            rim = abs(rim)
-            travels.append(abs(speed) + tuning.spin_travel * abs(rim - speed))
-            if loads[i] <= tuning.least_load:
-                prediction.Q[zi, zi] = tuning.lifted_walk * dt
-                continue
-            wheel = WheelState(
+        entries = range(layout.size)[layout.sinkage]
+        turning = np.array([abs(rim) >= self._rover.rest_speed for rim in rims])  # known ones
+        loaded = np.array(loads) > tuning.least_load
+        prediction.Q[entries, entries] = (
+            np.where(turning, tuning.lifted_walk, tuning.resting_walk) * dt
+        )
+        if not turning.any():
+            return 0.0
+        rim = np.where(turning, rims, 1.0)
+        direction, rim = np.where(rim > 0.0, 1.0, -1.0), np.abs(rim)
+        speed = direction * headings.speeds(float(x[SPEED]), yaw_rate)
+        travel = np.abs(speed) + tuning.spin_travel * np.abs(rim - speed)
+        relaxes = turning & loaded
+        if relaxes.any():
+            measured = np.array(leaving_angles)
+            states = WheelStates(
                 speed / rim,
-                entries[zi],
-                loads[i],
-                strength,
-                modulus,
-                leaving_angle=leaving_angles[i],
-                stiffness=stiffness[i],
-                slip_sinkage=slip_sinkage,
+                x[layout.sinkage],
+                np.maximum(loads, tuning.least_load),
+                float(x[SHEAR_STRENGTH]),
+                float(x[SHEAR_MODULUS]),
+                leaving_angle=None if np.isnan(measured).all() else measured,
+                stiffness=x[layout.stiffness],
+                slip_sinkage=float(x[SLIP_SINKAGE]),
             )
-            step, slopes[i] = self._relaxed(i, wheel, speed, rim, dt)
-            prediction.mean[zi] = step.mean
-            prediction.F[zi, zi] = step.memory
-            prediction.F[zi, layout.stiffness.start + i] = step.by_stiffness
-            prediction.F[zi, SLIP_SINKAGE] = step.by_slip_sinkage
-            by_speed = step.by_speed * direction * headings.by_speed[i]
-            prediction.F[zi, SPEED] = share * by_speed
-            prediction.Q[zi, zi] = step.noise
-        self.state = self.state._replace(slopes=tuple(slopes))
-        return dt * math.fsum(travels) / len(rims) if travels else 0.0
+            share = 1.0 if reference_known else tuning.law_share
+            by_speed = share * direction * np.array(headings.by_speed)
+            self._relax(prediction, states, _Motion(speed, rim, by_speed, dt), relaxes)
+        return dt * float(travel[turning].sum()) / len(rims)
+
+    def _relax(
+        self,
+        prediction: Prediction,
+        states: WheelStates,
+        motion: _Motion,
+        relaxes: NDArray[np.bool_],
+    ) -> None:
+        """Relax the sinkages of turning wheels under a load."""
+        tuning, layout, z = self._tuning, self._layout, np.asarray(states.sinkage)
+        speed, rim, by_speed, dt = motion
+        slip = slip_of_speed_ratio(states.speed_ratio)
+        radius = np.array(self._rover.rim_radius)
+        shortest = tuning.least_contact_sinkage
+        length = np.maximum(np.sqrt(2.0 * radius * np.maximum(z, shortest)), tuning.least_contact)
+        travel = (np.abs(speed) + tuning.spin_relaxation * np.abs(rim - speed)) * dt
+        alpha = -np.expm1(-travel / length)
+        slower = np.array([0.0, tuning.ratio_step])[:, None]
+        carried, exponents, log_depths = self._models.bearing(
+            states._replace(speed_ratio=states.speed_ratio - slower)
+        )
+        # One Newton step on log load over log sinkage, bounded: relaxation does the rest.
+        power = exponents[0] + tuning.pressure_power
+        most = tuning.longest_step
+        growth = np.clip(np.log(states.load / carried[0]) / power, -most, most)
+        floored = np.maximum(z, tuning.least_sinkage)
+        target = floored * np.exp(growth)
+        sensitivity = alpha * target / power
+        raw = np.stack(
+            [
+                np.log(carried[0] / carried[1]) / tuning.ratio_step,
+                np.abs(slip) * log_depths[0],
+            ]
+        )
+        slopes = smoothed_slopes(self.state.slopes, raw, tuning.slope_keep)
+        self.state = self.state._replace(slopes=np.where(relaxes, slopes, self.state.slopes))
+        # What the law does not know: a share of the sinkage per contact length, and digging.
+        digging = tuning.digging * np.maximum(slip, 0.0) ** 2 * rim * dt
+        noise = (tuning.law_error * floored) ** 2 * 2.0 * alpha + digging**2 + tuning.walk * dt
+        if states.leaving_angle is not None:
+            angle = states.leaving_angle - self._leaving_angle_std
+            there = self._models.bearing(states._replace(leaving_angle=angle)).load
+            error = (sensitivity * np.log(carried[0] / there)) ** 2
+            noise += np.where(np.isnan(angle), 0.0, error)
+        wheels = np.flatnonzero(relaxes)
+        zi = layout.sinkage.start + wheels
+        memory = np.maximum(1.0 - alpha * tuning.relaxation_slope, tuning.least_memory)
+        prediction.mean[zi] = (z + alpha * (target - z))[wheels]
+        prediction.F[zi, zi] = memory[wheels]
+        prediction.F[zi, layout.stiffness.start + wheels] = -sensitivity[wheels]
+        prediction.F[zi, SLIP_SINKAGE] = (-sensitivity * slopes[1])[wheels]
+        prediction.F[zi, SPEED] = (-sensitivity * slopes[0] / rim * by_speed)[wheels]
+        prediction.Q[zi, zi] = noise[wheels]
 
     def end_cycle(self, ekf: GatedFilter, before: FloatArray, dt: float) -> None:
         """Keep the rate of change since `before`, the (n,) sinkages at the start of the cycle."""
@@ -195,48 +236,3 @@ class SinkageProcess(Component[SinkageState]):
             rate=tuple([r + gain * (c - r) for r, c in zip(self.state.rate, change, strict=True)]),
             rate_std=tuple([math.sqrt(2.0 * v) for v in variance]),
         )
-
-    def _relaxed(
-        self, i: int, wheel: WheelState, speed: float, rim: float, dt: float
-    ) -> tuple[_Step, tuple[float, ...]]:
-        """Return the relaxation of a turning wheel and its smoothed derivatives."""
-        tuning = self._tuning
-        ratio, z, load = wheel.speed_ratio, wheel.sinkage, wheel.load
-        slip = slip_of_speed_ratio(ratio, ScalarMaths)
-        radius = self._rover.rim_radius[i]
-        length = max(
-            math.sqrt(2.0 * radius * max(z, tuning.least_contact_sinkage)), tuning.least_contact
-        )
-        travel = (abs(speed) + tuning.spin_relaxation * abs(rim - speed)) * dt
-        alpha = gain_of(travel, length)
-        bearing, slower = self._models.bearing_and_slower(i, wheel, tuning.ratio_step)
-        # One Newton step on log load over log sinkage, bounded: relaxation does the rest.
-        power = bearing.exponent + tuning.pressure_power
-        growth = clipped(
-            math.log(load / bearing.load) / power, -tuning.longest_step, tuning.longest_step
-        )
-        z_floor = max(z, tuning.least_sinkage)
-        target = z_floor * math.exp(growth)
-        sensitivity = alpha * target / power
-        raw = (
-            math.log(bearing.load / slower.load) / tuning.ratio_step,
-            abs(slip) * bearing.log_depth,
-        )
-        slopes = smoothed_slopes(self.state.slopes[i], raw, tuning.slope_keep)
-        by_ratio, by_slip_sinkage = slopes
-        # What the law does not know: a share of the sinkage per contact length, and digging.
-        digging = tuning.digging * max(slip, 0.0) ** 2 * rim * dt
-        noise = (tuning.law_error * z_floor) ** 2 * 2.0 * alpha + digging**2 + tuning.walk * dt
-        if not isnan(wheel.leaving_angle):
-            angle = wheel.leaving_angle - self._leaving_angle_std
-            there = self._models.bearing(i, wheel._replace(leaving_angle=angle))
-            noise += (sensitivity * math.log(bearing.load / there.load)) ** 2
-        step = _Step(
-            z + alpha * (target - z),
-            noise,
-            memory=max(1.0 - alpha * tuning.relaxation_slope, tuning.least_memory),
-            by_stiffness=-sensitivity,
-            by_slip_sinkage=-sensitivity * by_slip_sinkage,
-            by_speed=-sensitivity * by_ratio / rim,
-        )
-        return step, slopes

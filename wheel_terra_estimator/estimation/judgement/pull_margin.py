@@ -4,12 +4,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
+import numpy as np
+
 from wheel_terra_estimator.estimation.component import Component
-from wheel_terra_estimator.estimation.contacts.wheel_models import WheelModels, WheelState
+from wheel_terra_estimator.estimation.contacts.wheel_models import WheelModels, WheelStates
 
 Floats = tuple[float, ...]
 
@@ -44,28 +45,20 @@ class PullMargin(Component[MarginState]):
         """Return whether margins are to be worked out anew at a time [s]."""
         return time - self.state.time >= self._tuning.period
 
-    def update(self, time: float, wheels: Sequence[WheelState], demand: float) -> None:
+    def update(self, time: float, wheels: WheelStates, demand: float) -> None:
         """Work out the margins.
 
         Parameters
         ----------
         time : float
             [s].
-        wheels : sequence of WheelState
+        wheels : WheelStates
             Of all wheels; their speed ratios do not matter.
         demand : float
             Pull that the ground asks in the direction of driving, over the load [-].
         """
-        margin = [
-            self._greatest_pull(i, wheel) - demand * wheel.load
-            if wheel.load >= self._tuning.least_load
-            else 0.0
-            for i, wheel in enumerate(wheels)
-        ]
-        self.state = MarginState(tuple(margin), time)
-
-    def _greatest_pull(self, i: int, wheel: WheelState) -> float:
-        return max(
-            self._models.pull(i, wheel._replace(speed_ratio=1.0 - slip))
-            for slip in self._tuning.slips
-        )
+        ratios = 1.0 - np.array(self._tuning.slips)
+        _, pull = self._models.torque_and_pull(wheels._replace(speed_ratio=ratios[:, None]))
+        margin = pull.max(axis=0) - demand * wheels.load
+        margin = np.where(wheels.load >= self._tuning.least_load, margin, 0.0)
+        self.state = MarginState(tuple(margin.tolist()), time)

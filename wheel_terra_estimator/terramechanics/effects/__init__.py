@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
+import inspect
 import pkgutil
 from collections.abc import Iterator, Mapping
 from functools import lru_cache
@@ -22,6 +23,7 @@ from wheel_terra_estimator.errors import EFFECT_FILE_MODULE
 from wheel_terra_estimator.terramechanics.effects.base import (
     FORM_MARK,
     OUTPUTS,
+    STAGES,
     Effect,
     EffectParameter,
     EffectSettings,
@@ -133,12 +135,23 @@ def load_file(path: str | Path) -> list[Effect]:
     if not effects:
         raise ValueError(f'{path}: defines no Effect')
     for effect in effects:
+        _check_terms(path, effect)
         known = _registered.get(effect.name)
         # A file loaded twice makes equal effects with other function objects: the newer one stands.
         if known is not None and known.claim == effect.claim:
             del _registered[effect.name]
         register(effect)
     return effects
+
+
+def _check_terms(path: Path, effect: Effect) -> None:
+    for term in filter(None, (getattr(form, stage) for form in effect.forms for stage in STAGES)):
+        taken = len(inspect.signature(term).parameters)
+        if taken != 2:
+            raise ValueError(
+                f'{path}: a term of {effect.name} takes (contact, parameters), '
+                f'not {taken} arguments'
+            )
 
 
 def check_settings(settings: EffectSettings) -> dict[str, dict[str, float]]:

@@ -11,7 +11,7 @@ from types import SimpleNamespace
 from typing import Any, TypeAlias
 
 from wheel_terra_estimator.terramechanics.contact import Contact
-from wheel_terra_estimator.terramechanics.maths import Maths, Quantity
+from wheel_terra_estimator.terramechanics.quantity import Quantity
 
 OUTPUTS = ('sinkage', 'drawbar_pull', 'torque')
 TOUCHABLE = (*OUTPUTS, 'lateral_force')
@@ -19,8 +19,8 @@ PRIORS = ('half_normal', 'normal')
 STAGES = ('on_inputs', 'on_contact', 'on_normal_stress', 'on_outputs')
 
 # A term changes the contact in place; `parameters.kd` is the value of the parameter ``kd``;
-# `maths` is numpy or ScalarMaths.
-Term: TypeAlias = Callable[[Contact[Any], SimpleNamespace, Maths], None]
+# its quantities are numbers or arrays.
+Term: TypeAlias = Callable[[Contact[Any], SimpleNamespace], None]
 REFERENCE_PRESSURE = 3000.0  # [Pa]; 80 N on 165 mm x 157 mm, the wheel of Ding et al. 2010
 # Effect name -> parameter -> value; ``form`` names the form where it is not the first one.
 EffectSettings: TypeAlias = Mapping[str, Mapping[str, Any]]
@@ -151,7 +151,7 @@ class Effect:
     other_forms : tuple of Form
         Further forms; a parameter that several forms share is the same object in each.
     on_inputs, on_contact, on_normal_stress, on_outputs : callable or None
-        The terms, ``term(contact, parameters, maths)``: see ``Contact`` for what each may change.
+        The terms, ``term(contact, parameters)``: see ``Contact`` for what each may change.
     """
 
     name: str

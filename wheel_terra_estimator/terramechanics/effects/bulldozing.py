@@ -6,59 +6,61 @@ from __future__ import annotations
 
 from types import SimpleNamespace
 
+import numpy as np
+
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter, Form
-from wheel_terra_estimator.terramechanics.maths import Maths, Quantity
+from wheel_terra_estimator.terramechanics.quantity import Quantity
 
 _LEAST_FRICTION = 0.02  # tan(phi); Terzaghi's factors divide by it
 
 
-def wedge_resistance(contact: Contact[Quantity], depth: Quantity, maths: Maths) -> Quantity:
+def wedge_resistance(contact: Contact[Quantity], depth: Quantity) -> Quantity:
     """Passive resistance of soil to an upright wall, per width [N/m] (Hegedus 1960, no DOI).
 
     D1 (c h + D2 rho g h^2/2) at the depth h [m] of its foot.
     """
-    friction = maths.arctan(contact.tan_friction)
-    wedge = 0.25 * maths.pi - 0.5 * friction  # angle of the failure plane, Xc
-    cot = 1.0 / maths.tan(wedge)
-    d1 = cot + maths.tan(wedge + friction)
+    friction = np.arctan(contact.tan_friction)
+    wedge = 0.25 * np.pi - 0.5 * friction  # angle of the failure plane, Xc
+    cot = 1.0 / np.tan(wedge)
+    d1 = cot + np.tan(wedge + friction)
     d2 = cot + cot * cot * contact.tan_friction
     weight = contact.density * contact.gravity
     return d1 * (contact.cohesion * depth + 0.5 * d2 * weight * depth**2)
 
 
-def _blade(contact: Contact[Quantity], maths: Maths) -> Quantity:
+def _blade(contact: Contact[Quantity]) -> Quantity:
     """Width of the wheel as a plate across its motion, its share along the wheel [m].
 
     b without sideways motion, none at a slip angle of 90 degrees.
     """
-    cosine, sine = contact.heading(maths)
-    return (contact.width * cosine + 2.0 * contact.rim_radius * maths.abs(sine)) * cosine
+    cosine, sine = contact.heading()
+    return (contact.width * cosine + 2.0 * contact.rim_radius * np.abs(sine)) * cosine
 
 
-def _push(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
-    depth = contact.radius * (1.0 - maths.cos(contact.entrance_angle))
-    resistance = _blade(contact, maths) * wedge_resistance(contact, depth, maths)
+def _push(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+    depth = contact.radius * (1.0 - np.cos(contact.entrance_angle))
+    resistance = _blade(contact) * wedge_resistance(contact, depth)
     contact.drawbar_pull = contact.drawbar_pull - contact.direction * p.kb * resistance
 
 
-def _earth_pressure(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
-    friction = maths.arctan(maths.maximum(contact.tan_friction, _LEAST_FRICTION))
-    tan, cos = maths.tan(friction), maths.cos(friction)
-    half = 0.25 * maths.pi + 0.5 * friction
-    turn = maths.exp(2.0 * (0.75 * maths.pi - 0.5 * friction) * tan)
-    n_q = 0.5 * turn / maths.cos(half) ** 2
+def _earth_pressure(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+    friction = np.arctan(np.maximum(contact.tan_friction, _LEAST_FRICTION))
+    tan, cos = np.tan(friction), np.cos(friction)
+    half = 0.25 * np.pi + 0.5 * friction
+    turn = np.exp(2.0 * (0.75 * np.pi - 0.5 * friction) * tan)
+    n_q = 0.5 * turn / np.cos(half) ** 2
     n_c = (n_q - 1.0) / tan
-    n_gamma = 2.0 * (n_q + 1.0) * tan / (1.0 + 0.4 * maths.sin(4.0 * friction))
+    n_gamma = 2.0 * (n_q + 1.0) * tan / (1.0 + 0.4 * np.sin(4.0 * friction))
     k_c = (n_c - tan) * cos * cos
     k_gamma = (2.0 * n_gamma / tan + 1.0) * cos * cos
-    depth = contact.radius * (1.0 - maths.cos(contact.entrance_angle))
+    depth = contact.radius * (1.0 - np.cos(contact.entrance_angle))
     weight = contact.density * contact.gravity
     # Front of the wheel as a blade that leans by half the entrance angle from the horizontal.
-    rake = 0.5 * maths.pi - 0.5 * contact.entrance_angle
-    front = maths.sin(rake + friction) / (2.0 * maths.sin(rake) * cos)
+    rake = 0.5 * np.pi - 0.5 * contact.entrance_angle
+    front = np.sin(rake + friction) / (2.0 * np.sin(rake) * cos)
     pressure = 2.0 * contact.cohesion * k_c + weight * depth * k_gamma
-    resistance = _blade(contact, maths) * front * depth * pressure
+    resistance = _blade(contact) * front * depth * pressure
     contact.drawbar_pull = contact.drawbar_pull - contact.direction * p.kb * resistance
 
 

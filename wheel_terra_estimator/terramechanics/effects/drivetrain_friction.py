@@ -6,23 +6,25 @@ from __future__ import annotations
 
 from types import SimpleNamespace
 
+import numpy as np
+
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter, Form
-from wheel_terra_estimator.terramechanics.maths import Maths, Quantity
+from wheel_terra_estimator.terramechanics.quantity import Quantity
 
 
-def _friction(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
+def _friction(contact: Contact[Quantity], p: SimpleNamespace) -> None:
     contact.torque = contact.torque + contact.direction * p.torque
 
 
-def _in_proportion(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
-    lost = p.share * maths.abs(contact.torque)
+def _in_proportion(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+    lost = p.share * np.abs(contact.torque)
     contact.torque = contact.torque + contact.direction * lost
 
 
-def _viscous(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
+def _viscous(contact: Contact[Quantity], p: SimpleNamespace) -> None:
     known = contact.rim_speed > 0.0  # not where it is nan
-    rate = maths.where(known, contact.rim_speed, 0.0) / contact.rim_radius
+    rate = np.where(known, contact.rim_speed, 0.0) / contact.rim_radius
     contact.torque = contact.torque + contact.direction * p.damping * rate
 
 

@@ -6,43 +6,43 @@ from __future__ import annotations
 
 from types import SimpleNamespace
 
+import numpy as np
+
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter, Form
-from wheel_terra_estimator.terramechanics.maths import Maths, Quantity
+from wheel_terra_estimator.terramechanics.quantity import Quantity
 
 
-def _thrust(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
-    slip = maths.maximum(contact.slip, 0.0)
-    passive = _passive_coefficient(contact, maths)
-    _push(contact, p.share, (passive - 1.0) * slip, slip, maths)
+def _thrust(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+    slip = np.maximum(contact.slip, 0.0)
+    passive = _passive_coefficient(contact)
+    _push(contact, p.share, (passive - 1.0) * slip, slip)
 
 
-def _textbook(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
-    slip = maths.maximum(contact.slip, 0.0)
-    _push(contact, p.share, _passive_coefficient(contact, maths), slip, maths)
+def _textbook(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+    slip = np.maximum(contact.slip, 0.0)
+    _push(contact, p.share, _passive_coefficient(contact), slip)
 
 
-def _passive_coefficient(contact: Contact[Quantity], maths: Maths) -> Quantity:
+def _passive_coefficient(contact: Contact[Quantity]) -> Quantity:
     """Rankine's Np = tan^2(pi/4 + phi/2) [-]."""
-    friction = maths.arctan(contact.tan_friction)
-    return maths.tan(0.25 * maths.pi + 0.5 * friction) ** 2
+    friction = np.arctan(contact.tan_friction)
+    return np.tan(0.25 * np.pi + 0.5 * friction) ** 2
 
 
-def _push(
-    contact: Contact[Quantity], share: float, of_surcharge: Quantity, slip: Quantity, maths: Maths
-) -> None:
+def _push(contact: Contact[Quantity], share: float, of_surcharge: Quantity, slip: Quantity) -> None:
     """Add the thrust of the lugs in the contact, with the given factor on the surcharge q h."""
     span = contact.entrance_angle - contact.leaving_angle
-    engaged = contact.lug_count * span / (2.0 * maths.pi)
-    passive = _passive_coefficient(contact, maths)
+    engaged = contact.lug_count * span / (2.0 * np.pi)
+    passive = _passive_coefficient(contact)
     height = contact.lug_height
     surcharge = contact.normal_load / (contact.width * contact.radius * span)
     blade = (
         0.5 * contact.density * contact.gravity * height * height * passive
         + surcharge * height * of_surcharge
-        + 2.0 * contact.cohesion * height * maths.sqrt(passive)
+        + 2.0 * contact.cohesion * height * np.sqrt(passive)
     )
-    mobilised = -maths.expm1(-slip * contact.radius * span / contact.shear_modulus)
+    mobilised = -np.expm1(-slip * contact.radius * span / contact.shear_modulus)
     thrust = contact.direction * share * contact.width * engaged * blade * mobilised
     contact.drawbar_pull = contact.drawbar_pull + thrust
     contact.torque = contact.torque + thrust * (contact.radius + 0.5 * height)

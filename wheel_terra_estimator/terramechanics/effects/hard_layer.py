@@ -6,31 +6,31 @@ from __future__ import annotations
 
 from types import SimpleNamespace
 
+import numpy as np
+
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter, Form
-from wheel_terra_estimator.terramechanics.maths import Maths, Quantity
+from wheel_terra_estimator.terramechanics.quantity import Quantity
 
 _BLEND = 0.001  # [m]; the layer comes in over a millimetre, so that derivatives exist
 
 
-def _layer(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
-    contact.normal_stress = contact.normal_stress + _support(contact, contact.angle, p, maths)
+def _layer(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+    contact.normal_stress = contact.normal_stress + _support(contact, contact.angle, p)
 
 
-def _bearing(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
+def _bearing(contact: Contact[Quantity], p: SimpleNamespace) -> None:
     t1, tm, t2 = contact.entrance_angle, contact.peak_angle, contact.leaving_angle
     mirrored = t1 - (contact.angle - t2) * (t1 - tm) / (tm - t2)
-    angle = maths.where(contact.angle >= tm, contact.angle, mirrored)
-    contact.normal_stress = contact.normal_stress + _support(contact, angle, p, maths)
+    angle = np.where(contact.angle >= tm, contact.angle, mirrored)
+    contact.normal_stress = contact.normal_stress + _support(contact, angle, p)
 
 
-def _support(
-    contact: Contact[Quantity], angle: Quantity, p: SimpleNamespace, maths: Maths
-) -> Quantity:
+def _support(contact: Contact[Quantity], angle: Quantity, p: SimpleNamespace) -> Quantity:
     """Stress that the layer adds where the rim is as deep as at an angle [Pa]."""
-    depth = contact.radius * (maths.cos(angle) - maths.cos(contact.entrance_angle))
-    inside = maths.maximum(depth - p.depth, 0.0)
-    blended = maths.where(inside < _BLEND, 0.5 * inside * inside / _BLEND, inside - 0.5 * _BLEND)
+    depth = contact.radius * (np.cos(angle) - np.cos(contact.entrance_angle))
+    inside = np.maximum(depth - p.depth, 0.0)
+    blended = np.where(inside < _BLEND, 0.5 * inside * inside / _BLEND, inside - 0.5 * _BLEND)
     return p.stiffness * blended
 
 

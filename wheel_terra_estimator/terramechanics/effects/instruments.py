@@ -7,21 +7,23 @@ from __future__ import annotations
 from functools import partial
 from types import SimpleNamespace
 
+import numpy as np
+
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter
-from wheel_terra_estimator.terramechanics.maths import Maths, Quantity
+from wheel_terra_estimator.terramechanics.quantity import Quantity
 
 
-def _gain(quantity: str, contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
+def _gain(quantity: str, contact: Contact[Quantity], p: SimpleNamespace) -> None:
     setattr(contact, quantity, getattr(contact, quantity) * (1.0 + p.gain))
 
 
-def _offset(quantity: str, contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
+def _offset(quantity: str, contact: Contact[Quantity], p: SimpleNamespace) -> None:
     setattr(contact, quantity, getattr(contact, quantity) + p.offset)
 
 
-def _tilt(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
-    contact.drawbar_pull = contact.drawbar_pull + contact.stated_load * maths.sin(p.bias)
+def _tilt(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+    contact.drawbar_pull = contact.drawbar_pull + contact.stated_load * np.sin(p.bias)
 
 
 def _gain_of(

@@ -18,9 +18,11 @@ from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
+
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects.base import OUTPUTS, Effect, EffectParameter
-from wheel_terra_estimator.terramechanics.maths import Maths, Quantity
+from wheel_terra_estimator.terramechanics.quantity import Quantity
 
 NAME = 'learned_closure'
 REFERENCE_SPEED = 0.05  # rim speed at which the feature rim_speed is 0 [m/s]
@@ -64,7 +66,7 @@ class Feature:
     Attributes
     ----------
     value : callable
-        (contact, maths) -> feature.
+        (contact) -> feature.
     spread : float
         Range over which it usually varies; the prior of a coefficient is in proportion to 1/spread.
     columns : tuple of str
@@ -77,7 +79,7 @@ class Feature:
         Names of the two features that a product multiplies.
     """
 
-    value: Callable[[Contact[Quantity], Maths], Quantity]
+    value: Callable[[Contact[Quantity]], Quantity]
     spread: float
     columns: tuple[str, ...]
     meaning: str
@@ -100,17 +102,17 @@ TARGETS: Mapping[str, Target] = {
 }
 
 
-def _over(onset: float) -> Callable[[Contact[Quantity], Maths], Quantity]:
-    def excess(contact: Contact[Quantity], maths: Maths) -> Quantity:
-        return maths.maximum(maths.abs(contact.slip) - onset, 0.0)
+def _over(onset: float) -> Callable[[Contact[Quantity]], Quantity]:
+    def excess(contact: Contact[Quantity]) -> Quantity:
+        return np.maximum(np.abs(contact.slip) - onset, 0.0)
 
     return excess
 
 
-def _near(middle: float) -> Callable[[Contact[Quantity], Maths], Quantity]:
-    def band(contact: Contact[Quantity], maths: Maths) -> Quantity:
-        away = (maths.abs(contact.slip) - middle) / _BAND
-        inside = maths.maximum(1.0 - away * away, 0.0)
+def _near(middle: float) -> Callable[[Contact[Quantity]], Quantity]:
+    def band(contact: Contact[Quantity]) -> Quantity:
+        away = (np.abs(contact.slip) - middle) / _BAND
+        inside = np.maximum(1.0 - away * away, 0.0)
         return inside * inside
 
     return band
@@ -121,20 +123,20 @@ def _weight(contact: Contact[Quantity]) -> Quantity:
     return contact.density * contact.gravity * contact.width * contact.radius * contact.radius
 
 
-def _load(contact: Contact[Quantity], maths: Maths) -> Quantity:
+def _load(contact: Contact[Quantity]) -> Quantity:
     share = contact.stated_load / _weight(contact)
-    return maths.log(maths.maximum(share, _LEAST)) / maths.log(10.0)
+    return np.log(np.maximum(share, _LEAST)) / np.log(10.0)
 
 
-def _rim_speed(contact: Contact[Quantity], maths: Maths) -> Quantity:
-    speed = maths.maximum(contact.rim_speed / REFERENCE_SPEED, 1e-3)
-    decades = maths.log(speed) / maths.log(10.0)
-    return maths.where(maths.isnan(contact.rim_speed), 0.0, decades)
+def _rim_speed(contact: Contact[Quantity]) -> Quantity:
+    speed = np.maximum(contact.rim_speed / REFERENCE_SPEED, 1e-3)
+    decades = np.log(speed) / np.log(10.0)
+    return np.where(np.isnan(contact.rim_speed), 0.0, decades)
 
 
-def _torque_squared(contact: Contact[Quantity], maths: Maths) -> Quantity:
-    lever = maths.maximum(contact.stated_load * contact.radius, _LEAST)
-    square = contact.torque * maths.abs(contact.torque) * contact.direction
+def _torque_squared(contact: Contact[Quantity]) -> Quantity:
+    lever = np.maximum(contact.stated_load * contact.radius, _LEAST)
+    square = contact.torque * np.abs(contact.torque) * contact.direction
     return square / (lever * _weight(contact) * contact.radius)
 
 
@@ -153,23 +155,23 @@ BENT_READING: Mapping[str, Feature] = {
 }
 
 _SINGLE: Mapping[str, Feature] = {
-    'one': Feature(lambda c, m: 1.0 + 0.0 * c.slip, 1.0, (), 'everywhere alike'),
-    'slip': Feature(lambda c, m: m.abs(c.slip), 0.5, ('slip',), '|s|'),
-    'slip_squared': Feature(lambda c, m: c.slip * c.slip, 0.4, ('slip',), 's^2'),
+    'one': Feature(lambda c: 1.0 + 0.0 * c.slip, 1.0, (), 'everywhere alike'),
+    'slip': Feature(lambda c: np.abs(c.slip), 0.5, ('slip',), '|s|'),
+    'slip_squared': Feature(lambda c: c.slip * c.slip, 0.4, ('slip',), 's^2'),
     'slip_over_02': Feature(_over(0.2), 0.35, ('slip',), '|s| beyond 0.2'),
     'slip_over_04': Feature(_over(0.4), 0.25, ('slip',), '|s| beyond 0.4'),
     'slip_over_06': Feature(_over(0.6), 0.15, ('slip',), '|s| beyond 0.6'),
     **BANDS,
     'load': Feature(_load, 0.3, ('normal_load',), 'log10 of W/(rho g b r^2)'),
-    'lug': Feature(lambda c, m: c.lug_height / c.radius, 0.06, ('lug_height',), 'h/r'),
-    'width': Feature(lambda c, m: c.width / c.radius, 0.3, ('wheel_width', 'wheel_radius'), 'b/r'),
+    'lug': Feature(lambda c: c.lug_height / c.radius, 0.06, ('lug_height',), 'h/r'),
+    'width': Feature(lambda c: c.width / c.radius, 0.3, ('wheel_width', 'wheel_radius'), 'b/r'),
     'rim_speed': Feature(
         _rim_speed, 0.5, ('angular_velocity',), 'decades of rim speed over 0.05 m/s'
     ),
-    'pass': Feature(lambda c, m: c.pass_number - 1.0, 1.0, ('pass_number',), 'earlier passes'),
-    'slope': Feature(lambda c, m: c.slope + 0.0 * c.slip, 0.2, ('slope',), 'slope [rad]'),
+    'pass': Feature(lambda c: c.pass_number - 1.0, 1.0, ('pass_number',), 'earlier passes'),
+    'slope': Feature(lambda c: c.slope + 0.0 * c.slip, 0.2, ('slope',), 'slope [rad]'),
     'depth': Feature(
-        lambda c, m: 1.0 - m.cos(c.entrance_angle),
+        lambda c: 1.0 - np.cos(c.entrance_angle),
         0.08,
         ('slip', 'normal_load'),
         'z/r',
@@ -183,7 +185,7 @@ def _product(first: str, second: str) -> Feature:
     """Return a feature for what acts only where two others do."""
     one, other = _SINGLE[first], _SINGLE[second]
     return Feature(
-        lambda c, m: one.value(c, m) * other.value(c, m),
+        lambda c: one.value(c) * other.value(c),
         one.spread * other.spread,
         (*one.columns, *other.columns),
         f'{one.meaning} times {other.meaning}',
@@ -253,17 +255,17 @@ def coefficients_of(
 
 
 def changes(
-    contact: Contact[Quantity], p: SimpleNamespace, maths: Maths, targets: Iterable[str]
+    contact: Contact[Quantity], p: SimpleNamespace, targets: Iterable[str]
 ) -> dict[str, Any]:
     """Return target -> bounded change x' for those targets that the law has."""
     total: dict[str, Any] = {}
     for name, coefficient in vars(p).items():
         target, feature = pair_of(name)
         if target in targets:
-            part = coefficient * FEATURES[feature].value(contact, maths)
+            part = coefficient * FEATURES[feature].value(contact)
             total[target] = total[target] + part if target in total else part
     return {
-        target: TARGETS[target].bound * x / (TARGETS[target].bound + maths.abs(x))
+        target: TARGETS[target].bound * x / (TARGETS[target].bound + np.abs(x))
         for target, x in total.items()
     }
 
@@ -271,28 +273,28 @@ def changes(
 _BEFORE = tuple(name for name in TARGETS if name not in OUTPUTS)
 
 
-def _change_closures(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
-    for target, x in changes(contact, p, maths, _BEFORE).items():
+def _change_closures(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+    for target, x in changes(contact, p, _BEFORE).items():
         if target == 'bearing_pressure':
-            contact.bearing_modulus = contact.bearing_modulus * maths.exp(x)
+            contact.bearing_modulus = contact.bearing_modulus * np.exp(x)
         elif target == 'exponent':
-            contact.sinkage_exponent = maths.maximum(contact.sinkage_exponent + x, 0.1)
+            contact.sinkage_exponent = np.maximum(contact.sinkage_exponent + x, 0.1)
         elif target == 'peak_angle':
             contact.peak_ratio = contact.peak_ratio + x
         elif target == 'leaving_angle':
-            contact.leaving_ratio = maths.minimum(contact.leaving_ratio + x, 0.0)
+            contact.leaving_ratio = np.minimum(contact.leaving_ratio + x, 0.0)
         elif target == 'friction':
-            contact.tan_friction = contact.tan_friction * maths.exp(x)
+            contact.tan_friction = contact.tan_friction * np.exp(x)
         elif target == 'cohesion':
-            contact.cohesion = contact.cohesion * maths.exp(x)
+            contact.cohesion = contact.cohesion * np.exp(x)
         elif target == 'shear_modulus':
-            contact.shear_modulus = contact.shear_modulus * maths.exp(x)
+            contact.shear_modulus = contact.shear_modulus * np.exp(x)
         elif target == 'shear_radius':
-            contact.shear_radius = contact.shear_radius * maths.exp(x)
+            contact.shear_radius = contact.shear_radius * np.exp(x)
 
 
-def _change_outputs(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
-    for target, x in changes(contact, p, maths, OUTPUTS).items():
+def _change_outputs(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+    for target, x in changes(contact, p, OUTPUTS).items():
         if target == 'sinkage':
             contact.sinkage = contact.sinkage + x * contact.radius
         elif target == 'drawbar_pull':

@@ -6,22 +6,24 @@ from __future__ import annotations
 
 from types import SimpleNamespace
 
+import numpy as np
+
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter, Form
-from wheel_terra_estimator.terramechanics.maths import Maths, Quantity
+from wheel_terra_estimator.terramechanics.quantity import Quantity
 
 _STEADY = 0.95  # slip above which a steady state is not known; the term grows no further there
 
 
-def _dig(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
-    slip = maths.maximum(contact.slip, 0.0)
-    again = slip / (1.0 - maths.minimum(slip, _STEADY))  # lugs per advance, less the first
+def _dig(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+    slip = np.maximum(contact.slip, 0.0)
+    again = slip / (1.0 - np.minimum(slip, _STEADY))  # lugs per advance, less the first
     contact.sinkage = contact.sinkage + p.kd * contact.lug_height * slip * (1.0 + p.rework * again)
 
 
-def _saturating(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
-    slip = maths.maximum(contact.slip, 0.0)
-    dug = -maths.expm1(-slip / p.range)
+def _saturating(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+    slip = np.maximum(contact.slip, 0.0)
+    dug = -np.expm1(-slip / p.range)
     contact.sinkage = contact.sinkage + p.kd * contact.lug_height * dug
 
 

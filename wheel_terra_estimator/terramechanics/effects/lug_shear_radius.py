@@ -8,10 +8,10 @@ from types import SimpleNamespace
 
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter
-from wheel_terra_estimator.terramechanics.maths import Maths, Quantity
+from wheel_terra_estimator.terramechanics.quantity import Quantity
 
 
-def _radius(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
+def _radius(contact: Contact[Quantity], p: SimpleNamespace) -> None:
     contact.shear_radius = contact.shear_radius + p.lam * contact.lug_height
 
 

@@ -6,18 +6,20 @@ from __future__ import annotations
 
 from types import SimpleNamespace
 
+import numpy as np
+
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter, Form
-from wheel_terra_estimator.terramechanics.maths import Maths, Quantity
+from wheel_terra_estimator.terramechanics.quantity import Quantity
 
 
-def _support(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
-    lifted = maths.where(contact.lug_height > 0.0, p.dz4, 0.0)
+def _support(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+    lifted = np.where(contact.lug_height > 0.0, p.dz4, 0.0)
     contact.sinkage = contact.sinkage - lifted
 
 
-def _by_height(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
-    high = maths.maximum(contact.lug_height - p.free_height, 0.0)
+def _by_height(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+    high = np.maximum(contact.lug_height - p.free_height, 0.0)
     contact.sinkage = contact.sinkage - p.share * high
 
 

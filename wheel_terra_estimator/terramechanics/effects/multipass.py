@@ -6,32 +6,34 @@ from __future__ import annotations
 
 from types import SimpleNamespace
 
+import numpy as np
+
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter, Form
-from wheel_terra_estimator.terramechanics.maths import Maths, Quantity
+from wheel_terra_estimator.terramechanics.quantity import Quantity
 
 
-def _compacted(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
-    gain = p.stiffening * _earlier_passes(contact, maths)
+def _compacted(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+    gain = p.stiffening * _earlier_passes(contact)
     contact.bearing_modulus = contact.bearing_modulus * (1.0 + gain)
 
 
-def _rut_stress(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
-    rut = p.rut * _earlier_passes(contact, maths) / contact.reference_depth
-    share = maths.maximum(contact.normal_stress / contact.bearing_modulus, 0.0)
+def _rut_stress(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+    rut = p.rut * _earlier_passes(contact) / contact.reference_depth
+    share = np.maximum(contact.normal_stress / contact.bearing_modulus, 0.0)
     depth = share ** (1.0 / contact.sinkage_exponent)  # below the bottom of the rut, over z0
     stress = contact.bearing_modulus * (depth + rut) ** contact.sinkage_exponent
-    contact.normal_stress = maths.where(rut > 0.0, stress, contact.normal_stress)
+    contact.normal_stress = np.where(rut > 0.0, stress, contact.normal_stress)
 
 
-def _rut_depth(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
-    contact.sinkage = contact.sinkage + p.rut * _earlier_passes(contact, maths)
+def _rut_depth(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+    contact.sinkage = contact.sinkage + p.rut * _earlier_passes(contact)
 
 
-def _earlier_passes(contact: Contact[Quantity], maths: Maths) -> Quantity:
+def _earlier_passes(contact: Contact[Quantity]) -> Quantity:
     """Weight of the earlier passes, 0, 1, 3/2, 7/4, ...: each does half as much as the last."""
-    earlier = maths.maximum(contact.pass_number - 1.0, 0.0)
-    return 2.0 * (1.0 - maths.exp(-0.6931471805599453 * earlier))
+    earlier = np.maximum(contact.pass_number - 1.0, 0.0)
+    return 2.0 * (1.0 - np.exp(-0.6931471805599453 * earlier))
 
 
 EFFECT = Effect(

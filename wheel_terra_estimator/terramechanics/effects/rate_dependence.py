@@ -6,19 +6,21 @@ from __future__ import annotations
 
 from types import SimpleNamespace
 
+import numpy as np
+
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter
-from wheel_terra_estimator.terramechanics.maths import Maths, Quantity
+from wheel_terra_estimator.terramechanics.quantity import Quantity
 
 REFERENCE_SPEED = 0.05  # [m/s]; rover speed, below which Ding et al. 2010 saw no influence
 
 
-def _rate(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
+def _rate(contact: Contact[Quantity], p: SimpleNamespace) -> None:
     known = contact.rim_speed > 1e-4
-    speed = maths.where(known, contact.rim_speed, REFERENCE_SPEED)
-    decades = maths.log(speed / REFERENCE_SPEED)
-    contact.bearing_modulus = contact.bearing_modulus * maths.exp(p.bearing * decades)
-    shear = maths.exp(p.shear * decades)
+    speed = np.where(known, contact.rim_speed, REFERENCE_SPEED)
+    decades = np.log(speed / REFERENCE_SPEED)
+    contact.bearing_modulus = contact.bearing_modulus * np.exp(p.bearing * decades)
+    shear = np.exp(p.shear * decades)
     contact.cohesion = contact.cohesion * shear
     contact.tan_friction = contact.tan_friction * shear
 

@@ -6,13 +6,15 @@ from __future__ import annotations
 
 from types import SimpleNamespace
 
+import numpy as np
+
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter
-from wheel_terra_estimator.terramechanics.maths import Maths, Quantity
+from wheel_terra_estimator.terramechanics.quantity import Quantity
 
 
-def _slide(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
-    bare = maths.exp(-contact.lug_height / p.ring_height)
+def _slide(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+    bare = np.exp(-contact.lug_height / p.ring_height)
     contact.tan_friction = contact.tan_friction * (1.0 - p.loss * bare)
 
 

@@ -6,6 +6,8 @@ from __future__ import annotations
 
 from types import SimpleNamespace
 
+import numpy as np
+
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects.base import (
     Effect,
@@ -13,15 +15,15 @@ from wheel_terra_estimator.terramechanics.effects.base import (
     Form,
     relative_pressure,
 )
-from wheel_terra_estimator.terramechanics.maths import Maths, Quantity
+from wheel_terra_estimator.terramechanics.quantity import Quantity
 
 
-def _factor(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
-    contact.shear_modulus = contact.shear_modulus * maths.exp(p.log_factor)
+def _factor(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+    contact.shear_modulus = contact.shear_modulus * np.exp(p.log_factor)
 
 
-def _with_pressure(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
-    growth = maths.exp(p.growth * maths.log(relative_pressure(contact)))
+def _with_pressure(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+    growth = np.exp(p.growth * np.log(relative_pressure(contact)))
     contact.shear_modulus = contact.shear_modulus * growth
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter, Form
 from wheel_terra_estimator.terramechanics.effects.bulldozing import wedge_resistance
-from wheel_terra_estimator.terramechanics.maths import Maths, Quantity
+from wheel_terra_estimator.terramechanics.quantity import Quantity
 from wheel_terra_estimator.terramechanics.stresses import mobilised_share
 
 # Gauss's nodes and weights on (0, 1), over the flank in the soil.
@@ -22,48 +22,46 @@ _NODES = tuple(
 _CENTRE = 2.0 / 3.0  # distance from the hub at which soil rubs on the flank, share of the radius
 
 
-def _push_aside(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
+def _push_aside(contact: Contact[Quantity], p: SimpleNamespace) -> None:
     if contact.straight:
         return
     t1, r = contact.entrance_angle, contact.radius
-    span, edge = t1 - contact.leaving_angle, maths.cos(t1)
+    span, edge = t1 - contact.leaving_angle, np.cos(t1)
     force = 0.0
     for place, weight in _NODES:
         behind_entry = place * span
-        cosine = maths.cos(t1 - behind_entry)
-        depth = maths.maximum(r * (cosine - edge), 0.0)
-        moved = mobilised_share(contact.lateral_ratio * behind_entry, contact.shear_modulus, maths)
-        force = force + weight * moved * wedge_resistance(contact, depth, maths) * (
-            r - depth * cosine
-        )
+        cosine = np.cos(t1 - behind_entry)
+        depth = np.maximum(r * (cosine - edge), 0.0)
+        moved = mobilised_share(contact.lateral_ratio * behind_entry, contact.shear_modulus)
+        force = force + weight * moved * wedge_resistance(contact, depth) * (r - depth * cosine)
     contact.lateral_force = contact.lateral_force - p.ks * span * force
 
 
-def _plate(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
+def _plate(contact: Contact[Quantity], p: SimpleNamespace) -> None:
     if contact.straight:
         return
     t1, t2, r = contact.entrance_angle, contact.leaving_angle, contact.radius
-    cosine, sine = contact.heading(maths)
-    along = maths.maximum(cosine, 1e-9)
+    cosine, sine = contact.heading()
+    along = np.maximum(cosine, 1e-9)
     span = t1 - t2
     # Soil surface along the flank: straight from where the rim goes in to where it leaves.
-    fall = (maths.cos(t2) - maths.cos(t1)) / (maths.sin(t1) - maths.sin(t2))
+    fall = (np.cos(t2) - np.cos(t1)) / (np.sin(t1) - np.sin(t2))
     force = 0.0
     for place, weight in _NODES:
         angle = t1 - place * span
-        behind = r * (maths.sin(t1) - maths.sin(angle))
-        depth = maths.maximum(r * (maths.cos(angle) - maths.cos(t1)) - fall * behind, 0.0)
-        moved = mobilised_share(behind * sine, contact.shear_modulus * along, maths)
-        width = r * maths.cos(angle)
-        force = force + weight * width * moved * wedge_resistance(contact, depth, maths)
+        behind = r * (np.sin(t1) - np.sin(angle))
+        depth = np.maximum(r * (np.cos(angle) - np.cos(t1)) - fall * behind, 0.0)
+        moved = mobilised_share(behind * sine, contact.shear_modulus * along)
+        width = r * np.cos(angle)
+        force = force + weight * width * moved * wedge_resistance(contact, depth)
     push = p.ks * span * force
     contact.lateral_force = contact.lateral_force - push
     # The flank slides past the wedge: backwards as the wheel turns, down as the wedge rises.
     back = _CENTRE * r - contact.velocity_ratio
-    wedge = 0.25 * maths.pi - 0.5 * maths.arctan(contact.tan_friction)
-    rise = maths.tan(wedge) * contact.lateral_ratio
-    slide = maths.maximum(maths.sqrt(back * back + rise * rise), 1e-12)
-    rub = contact.tan_friction * maths.abs(push) * back / slide
+    wedge = 0.25 * np.pi - 0.5 * np.arctan(contact.tan_friction)
+    rise = np.tan(wedge) * contact.lateral_ratio
+    slide = np.maximum(np.sqrt(back * back + rise * rise), 1e-12)
+    rub = contact.tan_friction * np.abs(push) * back / slide
     contact.drawbar_pull = contact.drawbar_pull + contact.direction * rub
     contact.torque = contact.torque + contact.direction * _CENTRE * r * rub
 

@@ -6,6 +6,8 @@ from __future__ import annotations
 
 from types import SimpleNamespace
 
+import numpy as np
+
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects.base import (
     Effect,
@@ -14,41 +16,41 @@ from wheel_terra_estimator.terramechanics.effects.base import (
     relative_pressure,
 )
 from wheel_terra_estimator.terramechanics.kinematics import speed_ratio
-from wheel_terra_estimator.terramechanics.maths import Maths, Quantity
+from wheel_terra_estimator.terramechanics.quantity import Quantity
 
 
-def _sliding(contact: Contact[Quantity], maths: Maths) -> Quantity:
+def _sliding(contact: Contact[Quantity]) -> Quantity:
     """Speed of the rim through the soil over the faster of rim and hub; |s| without side slip."""
     if contact.straight:
-        return maths.abs(contact.slip)
-    forward = speed_ratio(contact.slip, maths)
+        return np.abs(contact.slip)
+    forward = speed_ratio(contact.slip)
     back, aside = 1.0 - forward, contact.lateral_ratio / contact.rim_radius
-    fastest = maths.maximum(maths.sqrt(forward * forward + aside * aside), 1.0)
-    return maths.sqrt(back * back + aside * aside) / fastest
+    fastest = np.maximum(np.sqrt(forward * forward + aside * aside), 1.0)
+    return np.sqrt(back * back + aside * aside) / fastest
 
 
-def _exponent(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
-    skid = maths.maximum(-contact.slip, 0.0)
-    growth = p.n1 * _sliding(contact, maths) + p.n2 * skid
+def _exponent(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+    skid = np.maximum(-contact.slip, 0.0)
+    growth = p.n1 * _sliding(contact) + p.n2 * skid
     contact.sinkage_exponent = contact.sinkage_exponent + growth
     if not contact.straight:
         # Soil that comes in past the flank was never rolled over: it bears less.
-        cosine, sine = contact.heading(maths)
-        aside = contact.rim_radius * maths.abs(sine)
+        cosine, sine = contact.heading()
+        aside = contact.rim_radius * np.abs(sine)
         share = aside / (aside + contact.width * cosine)
         contact.bearing_modulus = contact.bearing_modulus * (1.0 - p.side * share * share)
 
 
-def _lyasko(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
-    slip = _sliding(contact, maths)
+def _lyasko(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+    slip = _sliding(contact)
     gain = 1.0 + p.gain * ((1.0 + slip) / (1.0 - 0.5 * slip) - 1.0)
     # The load grows with k z^(N + 1/2): this modulus gives the sinkage `gain` times as much.
     weaker = gain ** -(contact.sinkage_exponent + 0.5)
     contact.bearing_modulus = contact.bearing_modulus * weaker
 
 
-def _with_load(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
-    growth = p.nw * maths.log(relative_pressure(contact)) + p.n1 * _sliding(contact, maths)
+def _with_load(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+    growth = p.nw * np.log(relative_pressure(contact)) + p.n1 * _sliding(contact)
     contact.sinkage_exponent = contact.sinkage_exponent + growth
 
 

@@ -6,18 +6,20 @@ from __future__ import annotations
 
 from types import SimpleNamespace
 
+import numpy as np
+
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter
-from wheel_terra_estimator.terramechanics.maths import Maths, Quantity
+from wheel_terra_estimator.terramechanics.quantity import Quantity
 
 
-def _load(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
-    lost = contact.stated_load * (1.0 - maths.cos(contact.slope))
+def _load(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+    lost = contact.stated_load * (1.0 - np.cos(contact.slope))
     contact.normal_load = contact.normal_load - p.share * lost
 
 
-def _pull(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
-    down_hill = contact.stated_load * maths.sin(contact.slope)
+def _pull(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+    down_hill = contact.stated_load * np.sin(contact.slope)
     contact.drawbar_pull = contact.drawbar_pull - p.share * down_hill
 
 

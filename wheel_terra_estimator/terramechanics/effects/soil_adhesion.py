@@ -6,23 +6,25 @@ from __future__ import annotations
 
 from types import SimpleNamespace
 
+import numpy as np
+
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter, Form
-from wheel_terra_estimator.terramechanics.maths import Maths, Quantity
+from wheel_terra_estimator.terramechanics.quantity import Quantity
 
 
-def _layer(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
+def _layer(contact: Contact[Quantity], p: SimpleNamespace) -> None:
     contact.radius = contact.radius + p.thickness
     contact.shear_radius = contact.shear_radius + p.thickness
 
 
-def _below_the_rim(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
+def _below_the_rim(contact: Contact[Quantity], p: SimpleNamespace) -> None:
     contact.sinkage = contact.sinkage - p.thickness
 
 
-def _tension(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
-    rear = maths.minimum(contact.leaving_angle, -_LEAST_ANGLE)
-    share = maths.maximum(contact.angle / rear, 0.0)
+def _tension(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+    rear = np.minimum(contact.leaving_angle, -_LEAST_ANGLE)
+    share = np.maximum(contact.angle / rear, 0.0)
     contact.normal_stress = contact.normal_stress - p.tension * share
 
 

@@ -6,39 +6,41 @@ from __future__ import annotations
 
 from types import SimpleNamespace
 
+import numpy as np
+
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter, Form
-from wheel_terra_estimator.terramechanics.maths import Maths, Quantity
+from wheel_terra_estimator.terramechanics.quantity import Quantity
 
 SMALLEST_ROOM = 1e-12
 """Height left below the hub over r [-]; contact that leaves above the hub has none."""
 
 
-def _mound(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
+def _mound(contact: Contact[Quantity], p: SimpleNamespace) -> None:
     """Raise the rear contact height by kappa z ((s - onset)+/(1 - onset))^2."""
-    excess = maths.maximum(contact.slip - p.onset, 0.0) / (1.0 - p.onset)
-    _raise(contact, p.kappa * excess * excess * (1.0 - maths.cos(contact.entrance_angle)), maths)
+    excess = np.maximum(contact.slip - p.onset, 0.0) / (1.0 - p.onset)
+    _raise(contact, p.kappa * excess * excess * (1.0 - np.cos(contact.entrance_angle)))
 
 
-def _conveyed(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
+def _conveyed(contact: Contact[Quantity], p: SimpleNamespace) -> None:
     """Raise the rear contact height by kappa z (q/(q + z))^2, q conveyed per unit of advance."""
-    depth = 1.0 - maths.cos(contact.entrance_angle)  # over r
-    slip = maths.maximum(contact.slip, 0.0)
+    depth = 1.0 - np.cos(contact.entrance_angle)  # over r
+    slip = np.maximum(contact.slip, 0.0)
     carried = (contact.lug_height + p.band) / contact.rim_radius * slip
-    room = maths.maximum(carried + depth * (1.0 - slip), SMALLEST_ROOM)
+    room = np.maximum(carried + depth * (1.0 - slip), SMALLEST_ROOM)
     share = carried / room
-    _raise(contact, p.kappa * share * share * depth, maths)
+    _raise(contact, p.kappa * share * share * depth)
 
 
-def _raise(contact: Contact[Quantity], rise: Quantity, maths: Maths) -> None:
+def _raise(contact: Contact[Quantity], rise: Quantity) -> None:
     """Raise the rear contact by a height over r, below the hub."""
     # 1 - cos is the contact height over r. The slope of a circle is steeper the higher one gets, so
     # the height saturates below the hub (1 - exp keeps it smooth).
-    base = 1.0 - maths.cos(contact.leaving_angle)
-    room = maths.maximum(1.0 - base, SMALLEST_ROOM)
-    height = base + room * (1.0 - maths.exp(-rise / room))
-    raised = -maths.arccos(maths.maximum(1.0 - height, 0.0))
-    contact.leaving_angle = maths.where(rise > 0.0, raised, contact.leaving_angle)
+    base = 1.0 - np.cos(contact.leaving_angle)
+    room = np.maximum(1.0 - base, SMALLEST_ROOM)
+    height = base + room * (1.0 - np.exp(-rise / room))
+    raised = -np.arccos(np.maximum(1.0 - height, 0.0))
+    contact.leaving_angle = np.where(rise > 0.0, raised, contact.leaving_angle)
 
 
 _KAPPA = EffectParameter(

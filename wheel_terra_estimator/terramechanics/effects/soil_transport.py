@@ -6,13 +6,15 @@ from __future__ import annotations
 
 from types import SimpleNamespace
 
+import numpy as np
+
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter
-from wheel_terra_estimator.terramechanics.maths import Maths, Quantity
+from wheel_terra_estimator.terramechanics.quantity import Quantity
 
 
-def _carry(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
-    slip = maths.maximum(contact.slip, 0.0)
+def _carry(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+    slip = np.maximum(contact.slip, 0.0)
     layer = p.fill * contact.lug_height * slip
     weight = contact.density * contact.gravity * contact.width * layer  # per rim travel
     contact.sinkage = contact.sinkage + layer

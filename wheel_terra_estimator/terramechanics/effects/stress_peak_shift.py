@@ -6,17 +6,19 @@ from __future__ import annotations
 
 from types import SimpleNamespace
 
+import numpy as np
+
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter, Form
-from wheel_terra_estimator.terramechanics.maths import Maths, Quantity
+from wheel_terra_estimator.terramechanics.quantity import Quantity
 
 
-def _shift(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
-    skid = maths.maximum(-contact.slip, 0.0)
+def _shift(contact: Contact[Quantity], p: SimpleNamespace) -> None:
+    skid = np.maximum(-contact.slip, 0.0)
     contact.peak_ratio = contact.peak_ratio + p.c2 * contact.slip + p.skid * skid
 
 
-def _retreat(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
+def _retreat(contact: Contact[Quantity], p: SimpleNamespace) -> None:
     contact.peak_ratio = contact.peak_ratio - p.retreat * contact.slip
 
 

@@ -6,17 +6,19 @@ from __future__ import annotations
 
 from types import SimpleNamespace
 
+import numpy as np
+
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter
-from wheel_terra_estimator.terramechanics.maths import Maths, Quantity
+from wheel_terra_estimator.terramechanics.quantity import Quantity
 from wheel_terra_estimator.terramechanics.stresses import rolling_sinkage
 
 _LEAST = 1e-9  # keeps a wheel without load free of divisions by zero [m]
 
 
-def _widening(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> Quantity:
+def _widening(contact: Contact[Quantity], p: SimpleNamespace) -> Quantity:
     """Circle of the same chord over the rim, r*/r = 1 + f/z0; nothing of the contact's shape."""
-    modulus = maths.maximum(contact.bearing_modulus, 1.0) / (
+    modulus = np.maximum(contact.bearing_modulus, 1.0) / (
         contact.reference_depth**contact.sinkage_exponent
     )
     sinkage = rolling_sinkage(
@@ -25,23 +27,22 @@ def _widening(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> Q
         contact.width,
         modulus,
         contact.sinkage_exponent,
-        maths,
     )
-    return 1.0 + p.compliance * contact.normal_load / maths.maximum(sinkage, _LEAST)
+    return 1.0 + p.compliance * contact.normal_load / np.maximum(sinkage, _LEAST)
 
 
-def _flatten(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
+def _flatten(contact: Contact[Quantity], p: SimpleNamespace) -> None:
     """Widen the contact."""
-    flatter = _widening(contact, p, maths)
+    flatter = _widening(contact, p)
     contact.radius = contact.radius * flatter
     # The belt runs at the rim's speed along a longer contact: j and its force grow alike.
     contact.shear_radius = contact.shear_radius * flatter
     contact.velocity_ratio = contact.velocity_ratio * flatter
 
 
-def _arm(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
+def _arm(contact: Contact[Quantity], p: SimpleNamespace) -> None:
     """Keep the arm of the shear at the height of the hub."""
-    contact.torque = contact.torque / _widening(contact, p, maths)
+    contact.torque = contact.torque / _widening(contact, p)
 
 
 EFFECT = Effect(

@@ -9,14 +9,14 @@ from types import SimpleNamespace
 from wheel_terra_estimator.terramechanics.contact import Contact
 from wheel_terra_estimator.terramechanics.effects.base import Effect, EffectParameter
 from wheel_terra_estimator.terramechanics.kinematics import slip_of_speed_ratio, speed_ratio
-from wheel_terra_estimator.terramechanics.maths import Maths, Quantity
+from wheel_terra_estimator.terramechanics.quantity import Quantity
 
 
-def _bias(contact: Contact[Quantity], p: SimpleNamespace, maths: Maths) -> None:
+def _bias(contact: Contact[Quantity], p: SimpleNamespace) -> None:
     scale = 1.0 + p.bias
     contact.velocity_ratio = contact.velocity_ratio / scale
-    ratio = speed_ratio(contact.slip, maths) / scale
-    contact.slip = slip_of_speed_ratio(ratio, maths)
+    ratio = speed_ratio(contact.slip) / scale
+    contact.slip = slip_of_speed_ratio(ratio)
 
 
 EFFECT = Effect(

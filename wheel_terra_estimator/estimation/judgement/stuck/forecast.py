@@ -42,15 +42,17 @@ def outlook(s: Situation, passage: FirstPassage, settings: StuckSettings) -> Out
     wheels = s.motion.wheels
     within = passage.probability([w.slip for w in wheels], [w.slip_std for w in wheels], s.digging)
     travel = max(settings.horizon * s.fastest, settings.travel) if s.settled else 0.0
+    place = min(travel / TRAVELS[1], len(TRAVELS) - 1.0)
+    before = min(int(place), len(TRAVELS) - 2)
+    chances = within[:, before] + (place - before) * (within[:, before + 1] - within[:, before])
     found = []
-    by_wheel = zip(wheels, s.stalled, within, s.climbing_room, strict=True)
-    for wheel, stands, course, room in by_wheel:
+    by_wheel = zip(wheels, s.stalled, chances.tolist(), within, s.climbing_room, strict=True)
+    for wheel, stands, likely, course, room in by_wheel:
         if stands:
             found.append(WheelForecast(1.0, 0.0, 0.0))
         elif not wheel.known:
             found.append(WheelForecast(0.0, LONGEST_TIME, NO_ENTRAPMENT_IN_SIGHT))
         else:
-            likely = float(np.interp(travel, TRAVELS, course))
             left, time = min(room, NO_ENTRAPMENT_IN_SIGHT), LONGEST_TIME
             if course[-1] > 0.5:
                 left = min(left, float(np.interp(0.5, course, TRAVELS)))
